@@ -1,0 +1,71 @@
+# One module = one library target, made the same way: warnings, determinism flags, header set, install and export.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+find_program(SUPPLE_CCACHE ccache)
+if(SUPPLE_CCACHE AND PROJECT_IS_TOP_LEVEL)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${SUPPLE_CCACHE})
+endif()
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_RUNTIME_OUTPUT_DIRECTORY)
+  set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+endif()
+
+add_library(supple_flags INTERFACE)
+target_compile_features(supple_flags INTERFACE cxx_std_20)
+# AVX2 and FMA are the documented minimum; contraction off, because fma is written where it is wanted.
+target_compile_options(supple_flags INTERFACE
+  -march=x86-64-v3 -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  # GCC bug 105651: false -Wrestrict on std::string concatenation.
+  target_compile_options(supple_flags INTERFACE -Wno-restrict)
+endif()
+if(SUPPLE_WARNINGS_AS_ERRORS)
+  target_compile_options(supple_flags INTERFACE -Werror)
+endif()
+if(SUPPLE_SANITIZE)
+  list(JOIN SUPPLE_SANITIZE "," supple_sanitizers)
+  target_compile_options(supple_flags INTERFACE -fsanitize=${supple_sanitizers} -fno-omit-frame-pointer -O1)
+  target_link_options(supple_flags INTERFACE -fsanitize=${supple_sanitizers})
+  if(supple_sanitizers MATCHES "undefined")
+    target_compile_options(supple_flags INTERFACE -fno-sanitize-recover=undefined)
+  endif()
+endif()
+
+# supple_module(NAME HEADERS h... SOURCES s... [PUBLIC targets] [PRIVATE targets])
+# HEADERS are relative to include/supple/NAME.
+function(supple_module name)
+  cmake_parse_arguments(arg "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  set(target supple_${name})
+  add_library(${target} ${arg_SOURCES})
+  add_library(supple::${name} ALIAS ${target})
+  list(TRANSFORM arg_HEADERS PREPEND "include/supple/${name}/")
+  target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${arg_HEADERS})
+  target_include_directories(${target} PRIVATE src)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:supple_flags>)
+  set_target_properties(${target} PROPERTIES
+    EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON INSTALL_RPATH "$ORIGIN"
+    VERIFY_INTERFACE_HEADER_SETS ON)
+  install(TARGETS ${target} EXPORT suppleTargets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+endfunction()
+
+# supple_test(MODULE SOURCES s... [LIBRARIES targets]): one test program per module, <module>_tests.
+function(supple_test module)
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_executable(${module}_tests ${arg_SOURCES})
+  target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
+  target_compile_definitions(${module}_tests PRIVATE SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${module}_tests PROPERTIES LABELS ${module} DISCOVERY_TIMEOUT 60 TIMEOUT 600)
+endfunction()
+
+function(supple_install_package)
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/suppleConfig.cmake.in
+    ${PROJECT_BINARY_DIR}/suppleConfig.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/suppleConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+  install(EXPORT suppleTargets NAMESPACE supple:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
+  install(FILES ${PROJECT_BINARY_DIR}/suppleConfig.cmake ${PROJECT_BINARY_DIR}/suppleConfigVersion.cmake
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
+endfunction()

@@ -1,0 +1,70 @@
+/// @file supple/collision/contact_surface.h
+/// Stage 6: where bodies A and B overlap, the contact surface is Sigma = {p_A = p_B > 0} (Gascuel 1993, with pressures in
+/// place of potentials so that stiffnesses may differ); with three or more bodies only where no other pressure is
+/// larger. It is sampled by quadrature points: sums over them are integrals over Sigma.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "supple/collision/bodies.h"
+#include "supple/collision/find_contacts.h"
+#include "supple/core/executor.h"
+
+namespace supple::collision {
+
+enum class ContactRule : std::uint8_t {
+  None,   ///< no overlap was found
+  Polar,  ///< Gauss-Legendre in radius times trapezoid in angle about the point of largest pressure
+  March,  ///< tetrahedra over the overlap box, points projected onto Sigma
+};
+
+struct ContactSettings {
+  double error = 1e-4;   ///< relative error of force, area and centre of pressure asked for, in [1e-10, 0.1]
+  int max_refinement = 6;  ///< refinements before the estimate is accepted as it is
+  ContactRule only = ContactRule::None;  ///< None: the cheapest rule that fits; otherwise this rule alone
+};
+
+/// Quadrature points of all pairs, sorted by (pair, order of the rule); one array per attribute.
+struct ContactSurface {
+  // On Sigma.
+  std::vector<std::uint32_t> pair;   ///< index into `summary`
+  std::vector<Vec3> point;           ///< world [m]
+  std::vector<Vec3> normal;          ///< unit, out of A and into B: -grad(p_A - p_B) / |.|
+  std::vector<double> area;          ///< quadrature weight [m^2]
+  std::vector<double> pressure;      ///< p_A = p_B [Pa], >= 0
+
+  // In the two squeezed regions V_A = {0 < p_A < p_B} and V_B, for the energy rule.
+  std::vector<std::uint32_t> volume_pair;
+  std::vector<std::uint8_t> volume_side;  ///< 0: in V_A, 1: in V_B
+  std::vector<Vec3> volume_point;         ///< world [m]
+  std::vector<double> volume_weight;      ///< quadrature weight [m^3]
+
+  struct Summary {
+    BodyPair bodies;
+    ContactRule rule = ContactRule::None;
+    Vec3 force = Vec3::Zero();             ///< elastic force on A, -integral p N dA [N]; B gets the opposite
+    Vec3 moment = Vec3::Zero();            ///< of the force on A about the world origin [N m]
+    double area = 0.0;                     ///< [m^2]
+    Vec3 centre_of_pressure = Vec3::Zero();  ///< integral x p dA / integral p dA [m]
+    double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]
+    double largest_pressure = 0.0;         ///< [Pa]
+    double largest_overlap = 0.0;          ///< thickness of {p_A > 0, p_B > 0} through the point of largest pressure [m]
+    double displaced_a = 0.0;              ///< volume of V_A [m^3]: what A loses to B
+    double displaced_b = 0.0;              ///< volume of V_B [m^3]
+    double residual = 0.0;                 ///< largest |p_A - p_B| / max(P_A, P_B) at the points [1]
+    double error_estimate = 0.0;           ///< relative, of force, area and centre of pressure (the largest)
+    std::uint32_t patches = 0;             ///< connected components found
+    std::uint64_t points = 0;              ///< quadrature points on Sigma
+    std::uint64_t evaluations = 0;         ///< field evaluations spent
+  };
+  std::vector<Summary> summary;            ///< one per candidate pair that touches, sorted by bodies
+
+  void clear();
+};
+
+/// Stage 6. @param bodies  all bodies (third ones bound Sigma too)
+void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
+                           const ContactSettings& settings, const Executor& executor, ContactSurface& out);
+
+}  // namespace supple::collision

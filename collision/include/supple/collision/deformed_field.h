@@ -1,0 +1,82 @@
+/// @file supple/collision/deformed_field.h
+/// The field of a body with its contacts (Gascuel 1993): compressed inside the others, bulging around them. What is
+/// meshed and drawn.
+#pragma once
+
+#include "supple/collision/bodies.h"
+#include "supple/collision/contact_surface.h"
+
+namespace supple::collision {
+
+/// Bulge of the propagation zone, h(x) for x in [0, w]: h(0) = 0, h'(0) = k, h(w/2) = a0, h'(w/2) = 0, h(w) = h'(w) = 0;
+/// C^1. Its maximum is a0 iff w k <= 6 a0. (Gascuel 1993; Wyvill, FCG 22.7, with two misprints corrected.)
+struct BulgeProfile {
+  double stiffness = 0.0;  ///< k
+  double height = 0.0;     ///< a0
+  double width = 0.0;      ///< w
+  [[nodiscard]] double value(double x) const noexcept;
+  [[nodiscard]] double slope(double x) const noexcept;
+};
+/// w_eff = min(w, lambda a0 / k), lambda = 6: the bulge vanishes with a0, so nothing pops at first touch.
+[[nodiscard]] double effective_width(double width, double height, double stiffness) noexcept;
+
+struct BulgeSettings {
+  double attenuation = 0.4;  ///< alpha: a0 = alpha times the largest contact pressure; 0 switches bulges off
+  double width = 0.15;       ///< w: zone width as a share of the other body's feature size [1], > 0
+};
+
+/// The claim of body i on space: p^_i = p_i inside every other body, p_i + h(...) outside (the bulge around each body
+/// that it touches), in Pa. Space goes to the largest positive claim, so body i with its contacts is
+/// {p^_i > 0, p^_i >= p^_j}: claims are what polygonise_partition takes. The bulge uses -p_j as its coordinate (k = 1):
+/// h <= -p_j there, so two bulges can never claim the same point, and the C^1 join with the compression is exact. Where
+/// several bodies are near, the sum of the bulges is limited to the smallest -p_m of all of them: claims stay continuous
+/// across every surface and no bulge enters a third body.
+class ClaimField {
+ public:
+  /// @param body  index of the claimant in `bodies`; views are kept, so everything must outlive this
+  ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
+             const BulgeSettings& settings);
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const;  ///< of the undeformed field, in Pa
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& box) const;
+  [[nodiscard]] Box surface_box() const;
+  [[nodiscard]] double feature_size() const;
+
+ private:
+  struct Neighbour {
+    std::uint32_t body;
+    BulgeProfile profile;  ///< in pressure units, k = 1
+  };
+  /// Values, and gradients where `gradients` is not empty.
+  void evaluate_claims(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+
+  std::span<const ContactBody> bodies_;
+  std::uint32_t body_;
+  std::vector<Neighbour> neighbours_;
+  std::vector<std::uint32_t> limiting_;  ///< other bodies that a bulge could reach
+  double rise_ = 0.0;                    ///< largest possible sum of the bulges [Pa]
+  Box box_;                              ///< of {claim >= 0}
+};
+
+/// The deformed field itself: F~_i = (p^_i - max over j of max(p^_j, 0)) / P_i: iso surfaces of touching bodies coincide.
+class DeformedField {
+ public:
+  DeformedField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
+                const BulgeSettings& settings);
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const;  ///< of the undeformed field
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& box) const;
+  [[nodiscard]] Box surface_box() const;
+  [[nodiscard]] double feature_size() const;
+
+ private:
+  ClaimField own_;
+  std::vector<ClaimField> others_;
+  double modulus_;
+};
+
+}  // namespace supple::collision

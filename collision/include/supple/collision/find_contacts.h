@@ -1,0 +1,30 @@
+/// @file supple/collision/find_contacts.h
+/// Stage 5: which bodies may touch, and where to look. First the boxes of {F >= 0}, then the surface samples: a sample of
+/// A with p_B near or above 0 is a candidate. The candidates are only starting points; their number changes no force.
+#pragma once
+
+#include "supple/collision/bodies.h"
+#include "supple/core/executor.h"
+
+namespace supple::collision {
+
+struct ContactCandidates {
+  std::vector<BodyPair> pair;          ///< sorted, shape [pairs]
+  std::vector<Box> overlap;            ///< intersection of the two surface boxes [m], shape [pairs]
+  std::vector<std::uint32_t> offset;   ///< seeds of pair k are [offset[k], offset[k+1]), shape [pairs + 1]
+  std::vector<Vec3> seed;              ///< world points [m]
+  std::vector<double> spacing;         ///< of the coarser samples of the two bodies [m], 0: none; shape [pairs]
+  std::uint64_t pairs_present = 0;     ///< pairs that the rules allow, as `broad_phase` counts them
+};
+
+/// Pairs whose surface boxes overlap, by sweep and prune along the longest axis; sorted.
+[[nodiscard]] std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
+                                                std::uint64_t* present = nullptr);
+
+/// Stage 5. Needs the samples of stage 4 for the bodies of the broad phase. A sample is a seed when the other surface is,
+/// to first order, at most one sample spacing away. Pairs that have samples but no seed are left out; pairs without any
+/// samples are kept and searched by stage 6. `pairs_present` is left as it is.
+void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair> pairs, const Executor& executor,
+                   ContactCandidates& out);
+
+}  // namespace supple::collision

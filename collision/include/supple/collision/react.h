@@ -1,0 +1,40 @@
+/// @file supple/collision/react.h
+/// Stage 7: tractions on the contact surface and their split to the parts of each body. Elastic part: the gradient of
+/// U = integral of [min(p_A, p_B)]+ dV, so part k of A gets F_k = integral over V_A of grad p_Ak dV and the torque
+/// integral of (x - x_k) x grad p_Ak; the difference to the force and moment on Sigma (quadrature error) is spread over
+/// the parts as a rigid-consistent load by their mean contribution, weighted with p dA, so that momentum is exact.
+/// Dissipative part: t = -p [(1 + d v_n)_+ - 1] N - mu p_d f1(|v_t|) v_t/|v_t| on A, distributed by the contributions
+/// lambda_k = f_k / f that also interpolate the velocity, so that its power is never positive.
+#pragma once
+
+#include "supple/collision/bodies.h"
+#include "supple/collision/contact_surface.h"
+
+namespace supple::collision {
+
+enum class SplitRule : std::uint8_t {
+  Energy,        ///< gradient of the contact energy (the default)
+  Contribution,  ///< elastic part by lambda_k too (Desbrun & Gascuel 1995); not a gradient
+};
+
+struct ReactionSettings {
+  SplitRule split = SplitRule::Energy;
+  double friction_speed = 1e-3;  ///< regularisation speed of Coulomb friction [m/s], > 0
+};
+
+/// f1(y) = 2 y/e - y^2/e^2 for y < e, 1 beyond.
+[[nodiscard]] double friction_mollifier(double speed, double regularisation) noexcept;
+
+struct ReactionReport {
+  double energy = 0.0;              ///< contact energy [J]
+  double dissipated_power = 0.0;    ///< of damping and friction [W], >= 0
+};
+
+/// Adds to loads[i] (sized to the parts of body i) what contact does to body i. Forces and moments of a pair sum to zero.
+/// @param dissipative  if not empty: receives the dissipative part of the same loads, by body, sized like `loads`
+/// @param traction_force  if not null: total force on A of each pair, dissipative part included, shape [pairs]
+ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
+                     const ReactionSettings& settings, std::span<PartLoads> loads,
+                     std::vector<Vec3>* traction_force = nullptr, std::span<PartLoads> dissipative = {});
+
+}  // namespace supple::collision

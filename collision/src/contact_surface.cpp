@@ -1,0 +1,333 @@
+#include "supple/collision/contact_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "find_peak.h"
+#include "march_rule.h"
+#include "polar_rule.h"
+#include "supple/core/error.h"
+
+namespace supple::collision {
+namespace {
+
+/// What one pair gives; each has a slot of its own and is joined in pair order.
+struct PairResult {
+  ContactSurface::Summary summary;
+  PatchPoints points;
+};
+
+/// Bodies by pair, to find third ones: the partners of body i are partner[offset[i] .. offset[i + 1]), rising.
+struct Partners {
+  std::vector<std::uint32_t> offset, partner;
+
+  void build(std::size_t bodies, std::span<const BodyPair> pairs) {
+    offset.assign(bodies + 1, 0);
+    for (const BodyPair& p : pairs) {
+      ++offset[p.a + 1];
+      ++offset[p.b + 1];
+    }
+    for (std::size_t i = 0; i < bodies; ++i) offset[i + 1] += offset[i];
+    partner.resize(2 * pairs.size());
+    // Filled from the back, so that offset[i] ends as the begin of i.
+    for (std::size_t k = pairs.size(); k-- > 0;) {
+      partner[--offset[pairs[k].a + 1]] = pairs[k].b;
+      partner[--offset[pairs[k].b + 1]] = pairs[k].a;
+    }
+    for (std::size_t i = 0; i < bodies; ++i) offset[i] = offset[i + 1];
+    offset[bodies] = static_cast<std::uint32_t>(partner.size());
+  }
+  [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t i) const {
+    return std::span(partner).subspan(offset[i], offset[i + 1] - offset[i]);
+  }
+};
+
+/// The solver of one thread; its buffers are reused.
+class PairSolver {
+ public:
+  void solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
+             std::size_t k, const ContactSettings& settings, PairResult& out);
+
+ private:
+  bool polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
+  bool parts_are_sound(PairPressure& pressure, double extent);
+  bool thirds_press(std::span<const ContactBody> bodies, const PairResult& out);
+  void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
+             const ContactSettings& settings, PairResult& out);
+  void add_sums(const PatchSums& sums, const Vec3& reference, ContactSurface::Summary& summary);
+
+  PeakFinder finder_;
+  PolarRuleSolver polar_;
+  MarchRuleSolver march_;
+  StartPoints starts_;
+  std::vector<PolarCover> covers_;
+  std::size_t cover_count_ = 0;
+  std::vector<std::uint32_t> third_;
+  std::vector<const ContactBody*> third_bodies_;
+  std::vector<double> value_;
+  PressureBatch batch_;
+  Vec3 first_ = Vec3::Zero();  // integral of x p dA
+  double load_ = 0.0;
+};
+
+void PairSolver::add_sums(const PatchSums& sums, const Vec3& reference, ContactSurface::Summary& summary) {
+  summary.force -= sums.force;
+  summary.moment -= sums.moment + reference.cross(sums.force);
+  summary.area += sums.area;
+  first_ += sums.first + sums.load * reference;
+  load_ += sums.load;
+}
+
+/// One polar patch for each hill. @return false where the rule does not fit
+bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out) {
+  cover_count_ = 0;
+  const auto covered = [this](const Vec3& x, double slack) {
+    return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
+                       [&](const PolarCover& cover) { return cover.contains(x, slack); });
+  };
+  for (const Vec3& hill : starts_.hill) {
+    const std::optional<PeakFrame> frame = finder_.climb(pressure, hill, extent);
+    if (!frame || covered(frame->origin, 0.0)) continue;
+    const double largest_before = out.summary.largest_pressure;
+    if (!polar_.solve(pressure, *frame, settings.error, settings.max_refinement, 2.0 * extent, out.points)) {
+      return false;
+    }
+    add_sums(polar_.sums(), frame->origin, out.summary);
+    out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
+    if (frame->peak > largest_before) {
+      out.summary.largest_pressure = frame->peak;
+      out.summary.largest_overlap = polar_.thickness();
+    }
+    if (covers_.size() == cover_count_) covers_.emplace_back();
+    PolarCover& cover = covers_[cover_count_++];
+    cover.frame = *frame;
+    cover.radius = polar_.rim_radius();
+    cover.height = polar_.rim_height();
+    cover.thickness = polar_.thickness();
+  }
+  out.summary.patches = static_cast<std::uint32_t>(cover_count_);
+  return parts_are_sound(pressure, extent);
+}
+
+/// Patches must not overlap, and every point inside both bodies must belong to one.
+bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
+  for (std::size_t i = 0; i < cover_count_; ++i) {
+    for (std::size_t j = 0; j < cover_count_; ++j) {
+      if (i == j) continue;
+      for (std::size_t k = 0; k < covers_[i].radius.size(); ++k) {
+        if (covers_[j].contains(covers_[i].rim_point(k), 0.0)) return false;
+      }
+    }
+  }
+  constexpr double kSlack = 0.05;
+  batch_.point.clear();
+  for (const Vec3& x : starts_.inside) {
+    bool inside = false;
+    for (std::size_t i = 0; i < cover_count_ && !inside; ++i) inside = covers_[i].contains(x, kSlack);
+    if (!inside) batch_.point.push_back(x);
+  }
+  if (batch_.point.empty()) return true;
+  // The rest may only seem to lie outside, by a slanted axis: what counts is their foot on Sigma.
+  batch_.resize(batch_.point.size());
+  double peak = 0.0;
+  for (std::size_t i = 0; i < cover_count_; ++i) peak = std::max(peak, covers_[i].frame.peak);
+  constexpr int kSteps = 6;
+  for (int step = 0; step < kSteps; ++step) {
+    pressure.evaluate(batch_);
+    if (step + 1 == kSteps) break;
+    for (std::size_t i = 0; i < batch_.size(); ++i) {
+      const Vec3 slope = batch_.slope_a[i] - batch_.slope_b[i];
+      const double square = slope.squaredNorm();
+      if (!(square > 0.0)) continue;
+      Vec3 move = ((batch_.b[i] - batch_.a[i]) / square) * slope;
+      const double length = move.norm();
+      if (length > extent) move *= extent / length;
+      batch_.point[i] += move;
+    }
+  }
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) continue;
+    if (batch_.a[i] <= 1e-3 * peak) continue;
+    bool inside = false;
+    for (std::size_t c = 0; c < cover_count_ && !inside; ++c) inside = covers_[c].contains(batch_.point[i], kSlack);
+    if (!inside) return false;
+  }
+  return true;
+}
+
+/// Whether a third body presses on the patches nearly as much as the pair does.
+bool PairSolver::thirds_press(std::span<const ContactBody> bodies, const PairResult& out) {
+  Box patch;
+  for (std::size_t i = 0; i < cover_count_; ++i) {
+    for (std::size_t k = 0; k < covers_[i].radius.size(); ++k) patch.include(covers_[i].rim_point(k));
+    patch.include(covers_[i].frame.origin);
+  }
+  for (const Vec3& x : out.points.point) patch.include(x);
+  constexpr double kMargin = 0.05;
+  value_.resize(out.points.point.size());
+  bool press = false;
+  for (const std::uint32_t c : third_) {
+    if (bodies[c].field.bound(patch).upper <= 0.0) continue;
+    third_bodies_.push_back(&bodies[c]);
+    bodies[c].field.evaluate(out.points.point, value_);
+    for (std::size_t i = 0; i < value_.size(); ++i) {
+      const double p = bodies[c].material.modulus * value_[i];
+      press = press || p > out.points.pressure[i] - kMargin * out.summary.largest_pressure;
+    }
+    // Beyond the outermost nodes the pressure of the pair falls to zero.
+    for (std::size_t i = 0; i < cover_count_ && !press; ++i) {
+      for (std::size_t k = 0; k < covers_[i].radius.size() && !press; ++k) {
+        press = bodies[c].field.value(covers_[i].rim_point(k)) > 0.0;
+      }
+    }
+  }
+  return press;
+}
+
+void PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
+                       const ContactSettings& settings, PairResult& out) {
+  const BodyPair pair = out.summary.bodies;
+  out.summary = {};
+  out.summary.bodies = pair;
+  third_bodies_.clear();
+  for (const std::uint32_t c : third_) {
+    if (bodies[c].field.bound(overlap).upper > 0.0) third_bodies_.push_back(&bodies[c]);
+  }
+  first_ = Vec3::Zero();
+  load_ = 0.0;
+  const Vec3 reference = overlap.centre();
+  if (!march_.solve(pressure, third_bodies_, overlap, settings.error, settings.max_refinement, reference,
+                    out.points)) {
+    return;
+  }
+  add_sums(march_.sums(), reference, out.summary);
+  out.summary.rule = ContactRule::March;
+  out.summary.error_estimate = march_.estimate();
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  out.summary.largest_overlap = march_.thickness();
+  out.summary.patches = std::max(1u, static_cast<std::uint32_t>(cover_count_));
+}
+
+void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
+                       const Partners& partners, std::size_t k, const ContactSettings& settings, PairResult& out) {
+  const BodyPair pair = candidates.pair[k];
+  const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
+  PairPressure pressure(a, b);
+  out.summary = {};
+  out.summary.bodies = pair;
+  out.points.clear();
+  first_ = Vec3::Zero();
+  load_ = 0.0;
+  cover_count_ = 0;
+
+  const Box& overlap = candidates.overlap[k];
+  const std::span<const Vec3> seeds =
+      std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
+  const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
+  const double diagonal = overlap.extent().norm();
+  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
+  // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
+  extent = std::max(extent, 2.0 * spacing);
+  if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
+  if (!std::isfinite(extent)) return;  // two half-spaces
+
+  third_.clear();
+  third_bodies_.clear();
+  const auto first = partners.of(pair.a), second = partners.of(pair.b);
+  std::set_union(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(third_));
+  std::erase_if(third_, [&](std::uint32_t c) { return c == pair.a || c == pair.b; });
+
+  if (seeds.empty()) {
+    finder_.start_from_scan(pressure, overlap, starts_);
+  } else {
+    finder_.start_from_seeds(pressure, seeds, spacing, starts_);
+  }
+  bool fits = settings.only != ContactRule::March && polar(pressure, settings, extent, out);
+  if (fits && cover_count_ > 0) {
+    out.summary.rule = ContactRule::Polar;
+    if (!third_.empty() && settings.only != ContactRule::Polar) fits = !thirds_press(bodies, out);
+  }
+  if (!fits) {
+    out.points.clear();
+    if (settings.only == ContactRule::Polar) {
+      out.summary = {};
+      out.summary.bodies = pair;
+      out.summary.error_estimate = 1.0;
+    } else {
+      march(pressure, bodies, overlap, settings, out);
+    }
+  }
+  ContactSurface::Summary& summary = out.summary;
+  if (load_ > 0.0) summary.centre_of_pressure = first_ / load_;
+  summary.energy = out.points.energy;
+  summary.displaced_a = out.points.displaced[0];
+  summary.displaced_b = out.points.displaced[1];
+  summary.residual = out.points.residual / pressure.largest_modulus();
+  summary.points = out.points.point.size();
+  summary.evaluations = pressure.evaluations();
+}
+
+template <class T>
+void append(std::vector<T>& to, const std::vector<T>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+}  // namespace
+
+void ContactSurface::clear() {
+  pair.clear();
+  point.clear();
+  normal.clear();
+  area.clear();
+  pressure.clear();
+  volume_pair.clear();
+  volume_side.clear();
+  volume_point.clear();
+  volume_weight.clear();
+  summary.clear();
+}
+
+void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
+                           const ContactSettings& settings, const Executor& executor, ContactSurface& out) {
+  SUPPLE_EXPECTS(settings.error >= 1e-10 && settings.error <= 0.1);
+  SUPPLE_EXPECTS(candidates.offset.size() == candidates.pair.size() + 1);
+  out.clear();
+  if (candidates.pair.empty()) return;
+  thread_local std::vector<PairResult> results;
+  thread_local Partners partners;
+  if (results.size() < candidates.pair.size()) results.resize(candidates.pair.size());
+  partners.build(bodies.size(), candidates.pair);
+  struct Job {
+    std::span<const ContactBody> bodies;
+    const ContactCandidates& candidates;
+    const ContactSettings& settings;
+    const Partners& partners;
+    std::vector<PairResult>& results;
+  } job{bodies, candidates, settings, partners, results};
+  constexpr std::size_t kBlock = 2;
+  executor.for_blocks(candidates.pair.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
+    thread_local PairSolver solver;
+    for (std::size_t k = begin; k < end; ++k) {
+      solver.solve(job.bodies, job.candidates, job.partners, k, job.settings, job.results[k]);
+    }
+  });
+  for (std::size_t k = 0; k < candidates.pair.size(); ++k) {
+    const PairResult& result = results[k];
+    if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0) continue;
+    const auto index = static_cast<std::uint32_t>(out.summary.size());
+    out.summary.push_back(result.summary);
+    out.pair.insert(out.pair.end(), result.points.point.size(), index);
+    append(out.point, result.points.point);
+    append(out.normal, result.points.normal);
+    append(out.area, result.points.area);
+    append(out.pressure, result.points.pressure);
+    out.volume_pair.insert(out.volume_pair.end(), result.points.volume_point.size(), index);
+    append(out.volume_side, result.points.volume_side);
+    append(out.volume_point, result.points.volume_point);
+    append(out.volume_weight, result.points.volume_weight);
+  }
+}
+
+}  // namespace supple::collision

@@ -1,0 +1,285 @@
+#include "supple/collision/deformed_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "supple/core/error.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// How far the pressure of a body falls below zero [Pa]: P c where the kernels are compact, infinite else.
+double depth_outside(const ContactBody& body) {
+  const Box box = body.field.surface_box();
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return kInfinity;
+  const Vec3 far = box.centre() + Vec3::Constant(100.0 * box.extent().maxCoeff());
+  Vec3 slope;
+  const double value = body.field.value(far, slope);
+  return slope.isZero(0.0) ? -body.material.modulus * value : kInfinity;
+}
+
+Box bounding_box(const ContactBody& body, double below) {
+  // Slabs are put on each side of the surface's box until one lies where p < -below everywhere.
+  Box box = body.field.surface_box();
+  const double step = 0.25 * body.field.feature_size();
+  if (!(below > 0.0) || !std::isfinite(step) || box.empty()) return box;
+  constexpr int kMostSteps = 32;
+  const Box wide = box.inflated(kMostSteps * step);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool upper : {false, true}) {
+      double& side = upper ? box.upper[axis] : box.lower[axis];
+      for (int i = 0; i < kMostSteps && std::isfinite(side); ++i) {
+        Box slab = wide;
+        slab.lower[axis] = upper ? side : side - step;
+        slab.upper[axis] = upper ? side + step : side;
+        const bool outside = body.material.modulus * body.field.bound(slab).upper < -below;
+        if (outside) break;
+        side += upper ? step : -step;
+      }
+    }
+  }
+  return box;
+}
+
+/// Buffers of one call; taken from the thread while in use, because fields call each other.
+struct Buffers {
+  std::vector<double> value, bulge, limit;
+  std::vector<Vec3> slope, bulge_slope, limit_slope;
+};
+
+class Borrowed {
+ public:
+  Borrowed() : buffers_(std::move(kept())) {}
+  ~Borrowed() { kept() = std::move(buffers_); }
+  Borrowed(const Borrowed&) = delete;
+  Borrowed& operator=(const Borrowed&) = delete;
+  Buffers* operator->() { return &buffers_; }
+
+ private:
+  static Buffers& kept() {
+    thread_local Buffers buffers;
+    return buffers;
+  }
+  Buffers buffers_;
+};
+
+}  // namespace
+
+ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
+                       const BulgeSettings& settings)
+    : bodies_(bodies), body_(body) {
+  SUPPLE_EXPECTS(body < bodies.size());
+  SUPPLE_EXPECTS(settings.attenuation >= 0.0 && settings.width > 0.0);
+  const auto is_own = [&](const ContactSurface::Summary& s) {
+    return (s.bodies.a == body || s.bodies.b == body) && s.largest_pressure > 0.0;
+  };
+  if (settings.attenuation > 0.0) {
+    // All bulges together stay below half of what would lift the empty space around the body onto its surface.
+    const auto touching = static_cast<double>(std::count_if(surface.summary.begin(), surface.summary.end(), is_own));
+    const double highest = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
+    for (const ContactSurface::Summary& s : surface.summary) {
+      if (!is_own(s)) continue;
+      const std::uint32_t other = s.bodies.a == body ? s.bodies.b : s.bodies.a;
+      const ContactBody& b = bodies[other];
+      Vec3 slope;
+      static_cast<void>(b.field.value(s.centre_of_pressure, slope));
+      const double steepness = b.material.modulus * slope.norm();
+      double height = std::min(settings.attenuation * s.largest_pressure, highest);
+      double width = settings.width * b.field.feature_size() * steepness;
+      if (std::isnan(width)) width = kInfinity;
+      // Where the kernels of the other body end, the bulge must have ended too.
+      width = effective_width(std::min(width, 0.9 * depth_outside(b)), height, 1.0);
+      // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
+      height = std::min(height, width / 3.0);
+      if (!(height > 0.0)) continue;
+      neighbours_.push_back({other, {.stiffness = 1.0, .height = height, .width = width}});
+      rise_ += height;
+    }
+  }
+  box_ = bounding_box(bodies[body], rise_);
+  if (neighbours_.empty()) return;
+  for (std::uint32_t j = 0; j < bodies.size(); ++j) {
+    if (j == body || bodies[j].material.modulus * bodies[j].field.bound(box_).upper < -rise_) continue;
+    limiting_.push_back(j);
+  }
+}
+
+void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double> values,
+                                 std::span<Vec3> gradients) const {
+  const bool with_gradients = !gradients.empty();
+  const std::size_t n = points.size();
+  const auto pressures = [&](const ContactBody& body, std::span<double> p, std::span<Vec3> g) {
+    if (with_gradients) {
+      body.field.evaluate(points, p, g);
+      for (Vec3& v : g) v *= body.material.modulus;
+    } else {
+      body.field.evaluate(points, p);
+    }
+    for (double& v : p) v *= body.material.modulus;
+  };
+  pressures(bodies_[body_], values, gradients);
+  if (neighbours_.empty() || n == 0) return;
+
+  Box box;
+  for (const Vec3& x : points) box.include(x);
+  Borrowed scratch;
+  scratch->value.resize(n);
+  scratch->bulge.assign(n, 0.0);
+  scratch->limit.assign(n, kInfinity);
+  scratch->slope.resize(n);
+  if (with_gradients) {
+    scratch->bulge_slope.assign(n, Vec3::Zero());
+    scratch->limit_slope.assign(n, Vec3::Zero());
+  }
+  bool any = false;
+  for (const Neighbour& neighbour : neighbours_) {
+    const ContactBody& other = bodies_[neighbour.body];
+    const Interval p = other.field.bound(box);
+    if (other.material.modulus * p.upper <= -neighbour.profile.width || p.lower >= 0.0) continue;  // no bulge here
+    any = true;
+    pressures(other, scratch->value, scratch->slope);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double x = -scratch->value[i];
+      scratch->bulge[i] += neighbour.profile.value(x);
+      if (with_gradients && x > 0.0) scratch->bulge_slope[i] -= neighbour.profile.slope(x) * scratch->slope[i];
+    }
+  }
+  if (!any) return;
+  for (const std::uint32_t j : limiting_) {
+    const ContactBody& other = bodies_[j];
+    if (other.material.modulus * other.field.bound(box).upper < -rise_) continue;  // limits nothing
+    pressures(other, scratch->value, scratch->slope);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (-scratch->value[i] >= scratch->limit[i]) continue;
+      scratch->limit[i] = -scratch->value[i];
+      if (with_gradients) scratch->limit_slope[i] = -scratch->slope[i];
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool limited = scratch->limit[i] < scratch->bulge[i];
+    const double lift = limited ? std::max(scratch->limit[i], 0.0) : scratch->bulge[i];
+    values[i] += lift;
+    if (with_gradients && lift > 0.0) gradients[i] += limited ? scratch->limit_slope[i] : scratch->bulge_slope[i];
+  }
+}
+
+void ClaimField::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+  SUPPLE_EXPECTS(points.size() == values.size());
+  evaluate_claims(points, values, {});
+}
+
+void ClaimField::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+  SUPPLE_EXPECTS(points.size() == values.size() && points.size() == gradients.size());
+  evaluate_claims(points, values, gradients);
+}
+
+void ClaimField::evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const {
+  const ContactBody& own = bodies_[body_];
+  own.field.evaluate_parts(points, parts);
+  for (double& v : parts.value) v *= own.material.modulus;
+  for (Vec3& g : parts.gradient) g *= own.material.modulus;
+}
+
+Interval ClaimField::bound(const Box& box) const {
+  const ContactBody& own = bodies_[body_];
+  Interval claim = own.field.bound(box);
+  claim.lower *= own.material.modulus;
+  claim.upper *= own.material.modulus;
+  for (const Neighbour& neighbour : neighbours_) {
+    const ContactBody& other = bodies_[neighbour.body];
+    const Interval p = other.field.bound(box);
+    if (p.lower >= 0.0 || other.material.modulus * p.upper <= -neighbour.profile.width) continue;
+    // h <= min(a0, x)
+    claim.upper += std::min(neighbour.profile.height, -other.material.modulus * p.lower);
+  }
+  return claim;
+}
+
+double ClaimField::gradient_bound(const Box& box) const {
+  const auto steepness = [&](const ContactBody& body) { return body.material.modulus * body.field.gradient_bound(box); };
+  double bulge = 0.0;  // |h'| <= 1
+  for (const Neighbour& neighbour : neighbours_) bulge += steepness(bodies_[neighbour.body]);
+  for (const std::uint32_t j : limiting_) bulge = std::max(bulge, steepness(bodies_[j]));
+  return steepness(bodies_[body_]) + bulge;
+}
+
+Box ClaimField::surface_box() const { return box_; }
+double ClaimField::feature_size() const { return bodies_[body_].field.feature_size(); }
+
+DeformedField::DeformedField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
+                             const BulgeSettings& settings)
+    : own_(bodies, body, surface, settings), modulus_(bodies[body].material.modulus) {
+  for (std::uint32_t j = 0; j < bodies.size(); ++j) {
+    if (j == body) continue;
+    ClaimField other(bodies, j, surface, settings);
+    if (other.surface_box().overlaps(own_.surface_box())) others_.push_back(std::move(other));
+  }
+}
+
+void DeformedField::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+  SUPPLE_EXPECTS(points.size() == values.size());
+  thread_local std::vector<double> largest, other;
+  own_.evaluate(points, values);
+  largest.assign(points.size(), 0.0);
+  other.resize(points.size());
+  for (const ClaimField& claim : others_) {
+    claim.evaluate(points, other);
+    for (std::size_t i = 0; i < points.size(); ++i) largest[i] = std::max(largest[i], other[i]);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) values[i] = (values[i] - largest[i]) / modulus_;
+}
+
+void DeformedField::evaluate(std::span<const Vec3> points, std::span<double> values,
+                             std::span<Vec3> gradients) const {
+  SUPPLE_EXPECTS(points.size() == values.size() && points.size() == gradients.size());
+  thread_local std::vector<double> largest, other;
+  thread_local std::vector<Vec3> largest_slope, slope;
+  own_.evaluate(points, values, gradients);
+  largest.assign(points.size(), 0.0);
+  largest_slope.assign(points.size(), Vec3::Zero());
+  other.resize(points.size());
+  slope.resize(points.size());
+  for (const ClaimField& claim : others_) {
+    claim.evaluate(points, other, slope);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (other[i] <= largest[i]) continue;
+      largest[i] = other[i];
+      largest_slope[i] = slope[i];
+    }
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    values[i] = (values[i] - largest[i]) / modulus_;
+    gradients[i] = (gradients[i] - largest_slope[i]) / modulus_;
+  }
+}
+
+void DeformedField::evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const {
+  own_.evaluate_parts(points, parts);
+  for (double& v : parts.value) v /= modulus_;
+  for (Vec3& g : parts.gradient) g /= modulus_;
+}
+
+Interval DeformedField::bound(const Box& box) const {
+  Interval sum = own_.bound(box);
+  Interval taken{0.0, 0.0};
+  for (const ClaimField& claim : others_) {
+    const Interval other = claim.bound(box);
+    taken.lower = std::max(taken.lower, other.lower);
+    taken.upper = std::max(taken.upper, other.upper);
+  }
+  return {(sum.lower - taken.upper) / modulus_, (sum.upper - taken.lower) / modulus_};
+}
+
+double DeformedField::gradient_bound(const Box& box) const {
+  double other = 0.0;
+  for (const ClaimField& claim : others_) other = std::max(other, claim.gradient_bound(box));
+  return (own_.gradient_bound(box) + other) / modulus_;
+}
+
+Box DeformedField::surface_box() const { return own_.surface_box(); }
+double DeformedField::feature_size() const { return own_.feature_size(); }
+
+}  // namespace supple::collision

@@ -1,0 +1,169 @@
+#include "supple/collision/find_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace supple::collision {
+namespace {
+
+/// The axis along which the finite box centres spread most.
+int longest_axis(std::span<const Box> boxes) {
+  Box spread;
+  for (const Box& box : boxes) {
+    if (!box.empty() && box.lower.allFinite() && box.upper.allFinite()) spread.include(box.centre());
+  }
+  if (spread.empty()) return 0;
+  Eigen::Index axis = 0;
+  spread.extent().maxCoeff(&axis);
+  return static_cast<int>(axis);
+}
+
+bool allowed(std::span<const ContactBody> bodies, const ContactRules& rules, std::uint32_t a, std::uint32_t b) {
+  return !(bodies[a].fixed && bodies[b].fixed) && (!rules.allowed || rules.allowed(a, b));
+}
+
+std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules) {
+  const auto pairs_of = [](std::uint64_t n) { return n == 0 ? 0 : n * (n - 1) / 2; };
+  if (!rules.allowed) {
+    const auto fixed = std::count_if(bodies.begin(), bodies.end(), [](const ContactBody& b) { return b.fixed; });
+    return pairs_of(bodies.size()) - pairs_of(static_cast<std::uint64_t>(fixed));
+  }
+  std::uint64_t count = 0;
+  for (std::uint32_t a = 0; a < bodies.size(); ++a) {
+    for (std::uint32_t b = a + 1; b < bodies.size(); ++b) count += allowed(bodies, rules, a, b) ? 1 : 0;
+  }
+  return count;
+}
+
+/// Mean distance of the samples of a body [m]; 0 without samples.
+double sample_spacing(const ContactBody& body) {
+  if (body.samples == nullptr) return 0.0;
+  double area = 0.0;
+  std::size_t count = 0;
+  for (std::size_t s = 0; s < body.samples->point.size(); ++s) {
+    if (body.samples->valid[s] == 0) continue;
+    area += body.samples->area[s];
+    ++count;
+  }
+  return count == 0 ? 0.0 : std::sqrt(area / static_cast<double>(count));
+}
+
+/// Buffers of one thread.
+struct Scratch {
+  std::vector<Vec3> point;
+  std::vector<double> reach;  // how far this sample looks [m]
+  std::vector<double> value;
+  std::vector<Vec3> slope;
+};
+
+/// Appends the samples of `from` in `box` from which the surface of `to` is at most one spacing away.
+void collect(const ContactBody& from, const ContactBody& to, const Box& box, double spacing, Scratch& scratch,
+             std::vector<Vec3>& seeds) {
+  if (from.samples == nullptr) return;
+  const implicit::SurfaceSamples& samples = *from.samples;
+  scratch.point.clear();
+  scratch.reach.clear();
+  for (std::size_t s = 0; s < samples.point.size(); ++s) {
+    if (samples.valid[s] == 0 || !box.contains(samples.point[s])) continue;
+    scratch.point.push_back(samples.point[s]);
+    scratch.reach.push_back(std::max(spacing, std::sqrt(samples.area[s])));
+  }
+  scratch.value.resize(scratch.point.size());
+  scratch.slope.resize(scratch.point.size());
+  to.field.evaluate(scratch.point, scratch.value, scratch.slope);
+  for (std::size_t s = 0; s < scratch.point.size(); ++s) {
+    const double slope = scratch.slope[s].norm();
+    if (scratch.value[s] > 0.0 || (slope > 0.0 && scratch.value[s] > -scratch.reach[s] * slope)) {
+      seeds.push_back(scratch.point[s]);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
+                                  std::uint64_t* present) {
+  const auto count = static_cast<std::uint32_t>(bodies.size());
+  std::vector<Box> box(count);
+  for (std::uint32_t i = 0; i < count; ++i) box[i] = bodies[i].field.surface_box();
+  const int axis = longest_axis(box);
+
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (!box[i].empty()) order.push_back(i);
+  }
+  std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
+    return box[i].lower[axis] != box[j].lower[axis] ? box[i].lower[axis] < box[j].lower[axis] : i < j;
+  });
+
+  std::vector<BodyPair> pairs;
+  std::vector<std::uint32_t> open;  // boxes that reach the sweep position
+  for (const std::uint32_t i : order) {
+    std::erase_if(open, [&](std::uint32_t j) { return box[j].upper[axis] < box[i].lower[axis]; });
+    for (const std::uint32_t j : open) {
+      if (!box[i].overlaps(box[j])) continue;
+      const BodyPair pair{std::min(i, j), std::max(i, j)};
+      if (allowed(bodies, rules, pair.a, pair.b)) pairs.push_back(pair);
+    }
+    open.push_back(i);
+  }
+  std::sort(pairs.begin(), pairs.end());
+  if (present != nullptr) *present = count_allowed(bodies, rules);
+  return pairs;
+}
+
+void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair> pairs, const Executor& executor,
+                   ContactCandidates& out) {
+  // Seeds of one pair lie in a slot of its own, so that blocks may run in any order.
+  struct Slot {
+    Box overlap;
+    double spacing = 0.0;
+    std::vector<Vec3> seed;
+  };
+  thread_local std::vector<Slot> slots;
+  thread_local std::vector<double> spacing;
+  struct Job {
+    std::span<const ContactBody> bodies;
+    std::span<const BodyPair> pairs;
+    std::vector<Slot>& slots;
+    std::vector<double>& spacing;
+  } job{bodies, pairs, slots, spacing};
+
+  if (slots.size() < pairs.size()) slots.resize(pairs.size());
+  spacing.resize(bodies.size());
+  constexpr std::size_t kBlock = 4;
+  executor.for_blocks(bodies.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) job.spacing[i] = sample_spacing(job.bodies[i]);
+  });
+  executor.for_blocks(pairs.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
+    thread_local Scratch scratch;
+    for (std::size_t k = begin; k < end; ++k) {
+      const ContactBody& a = job.bodies[job.pairs[k].a];
+      const ContactBody& b = job.bodies[job.pairs[k].b];
+      Slot& slot = job.slots[k];
+      slot.overlap = a.field.surface_box().intersection(b.field.surface_box());
+      slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
+      slot.seed.clear();
+      const Box near = slot.overlap.inflated(slot.spacing);
+      collect(a, b, near, job.spacing[job.pairs[k].a], scratch, slot.seed);
+      collect(b, a, near, job.spacing[job.pairs[k].b], scratch, slot.seed);
+    }
+  });
+
+  out.pair.clear();
+  out.overlap.clear();
+  out.spacing.clear();
+  out.seed.clear();
+  out.offset.assign(1, 0);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const Slot& slot = slots[k];
+    if (slot.seed.empty() && slot.spacing > 0.0) continue;
+    out.pair.push_back(pairs[k]);
+    out.overlap.push_back(slot.overlap);
+    out.spacing.push_back(slot.spacing);
+    out.seed.insert(out.seed.end(), slot.seed.begin(), slot.seed.end());
+    out.offset.push_back(static_cast<std::uint32_t>(out.seed.size()));
+  }
+}
+
+}  // namespace supple::collision

@@ -1,0 +1,207 @@
+#include "find_peak.h"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace supple::collision {
+namespace {
+
+constexpr std::size_t kMostHills = 16;
+constexpr int kMostSteps = 40;
+
+/// Principal directions of a symmetric 2 x 2 matrix: angle of the first, and both eigenvalues.
+struct Principal {
+  double cosine, sine;
+  double first, second;
+};
+Principal principal(double xx, double xy, double yy) {
+  const double mean = 0.5 * (xx + yy), half = 0.5 * (xx - yy);
+  const double radius = std::sqrt(half * half + xy * xy);
+  // Half-angle of (half, xy), without a trigonometric function.
+  double c = 1.0, s = 0.0;
+  if (radius > 1e-14 * (std::abs(xx) + std::abs(yy))) {
+    if (half >= 0.0) {
+      c = std::sqrt(0.5 * (1.0 + half / radius));
+      s = 0.5 * xy / (radius * c);
+    } else {
+      s = std::copysign(std::sqrt(0.5 * (1.0 - half / radius)), xy);
+      c = 0.5 * xy / (radius * s);
+      if (xy == 0.0) c = 0.0;
+    }
+  }
+  return {c, s, mean + radius, mean - radius};
+}
+
+}  // namespace
+
+void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> seeds, double spacing,
+                                  StartPoints& out) {
+  out.hill.clear();
+  out.inside.clear();
+  batch_.resize(seeds.size());
+  std::copy(seeds.begin(), seeds.end(), batch_.point.begin());
+  pressure.evaluate_values(batch_);
+  score_.resize(seeds.size());
+  // A sample has zero pressure in its own body, so that the sum is what the other body says of it. The round-off of
+  // that zero must not turn a sample on both surfaces into an outside one.
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
+    score_[i] = a + b;
+    if (std::min(a, b) > -1e-9 && score_[i] > 0.0) out.inside.push_back(seeds[i]);
+  }
+  order_.resize(seeds.size());
+  std::iota(order_.begin(), order_.end(), 0u);
+  std::sort(order_.begin(), order_.end(), [this](std::uint32_t i, std::uint32_t j) {
+    return score_[i] != score_[j] ? score_[i] > score_[j] : i < j;
+  });
+  const double near = 4.0 * spacing * spacing;
+  for (std::size_t k = 0; k < order_.size() && out.hill.size() < kMostHills; ++k) {
+    const Vec3& x = seeds[order_[k]];
+    bool top = true;
+    for (std::size_t j = 0; j < k && top; ++j) top = (seeds[order_[j]] - x).squaredNorm() > near;
+    if (top) out.hill.push_back(x);
+  }
+}
+
+void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, StartPoints& out) {
+  out.hill.clear();
+  out.inside.clear();
+  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return;
+  constexpr int kNodes = 11;
+  constexpr double kStep = 1.0 / (kNodes - 1);
+  batch_.resize(kNodes * kNodes * kNodes);
+  const Vec3 extent = overlap.extent();
+  const auto index = [](int i, int j, int k) { return static_cast<std::size_t>((k * kNodes + j) * kNodes + i); };
+  for (int k = 0; k < kNodes; ++k) {
+    for (int j = 0; j < kNodes; ++j) {
+      for (int i = 0; i < kNodes; ++i) {
+        batch_.point[index(i, j, k)] = overlap.lower + extent.cwiseProduct(Vec3(i, j, k) * kStep);
+      }
+    }
+  }
+  pressure.evaluate_values(batch_);
+  score_.resize(batch_.size());
+  for (std::size_t n = 0; n < batch_.size(); ++n) {
+    score_[n] = std::min(batch_.a[n], batch_.b[n]);
+    if (score_[n] >= 0.0) out.inside.push_back(batch_.point[n]);
+  }
+  order_.clear();
+  for (int k = 0; k < kNodes; ++k) {
+    for (int j = 0; j < kNodes; ++j) {
+      for (int i = 0; i < kNodes; ++i) {
+        const std::size_t here = index(i, j, k);
+        bool top = true;
+        for (int n = 0; n < 27 && top; ++n) {
+          const int x = i + n % 3 - 1, y = j + n / 3 % 3 - 1, z = k + n / 9 - 1;
+          if (std::min({x, y, z}) < 0 || std::max({x, y, z}) >= kNodes) continue;
+          const std::size_t there = index(x, y, z);
+          top = score_[there] < score_[here] || (score_[there] == score_[here] && there >= here);
+        }
+        if (top) order_.push_back(static_cast<std::uint32_t>(here));
+      }
+    }
+  }
+  std::sort(order_.begin(), order_.end(), [this](std::uint32_t i, std::uint32_t j) {
+    return score_[i] != score_[j] ? score_[i] > score_[j] : i < j;
+  });
+  for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(batch_.point[order_[n]]);
+}
+
+std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& start, double extent) {
+  const double reach = std::min(0.5 * pressure.feature_size(), extent);  // longest step
+  const double h = 1e-4 * reach;
+  PeakFrame frame;
+  Vec3 x = start;
+  double before = -std::numeric_limits<double>::infinity();  // min(p_A, p_B) and |p_A - p_B| at the last point kept
+  double gap_before = 0.0;
+  Vec3 kept = start, step = Vec3::Zero();
+  batch_.resize(5);
+  for (int iteration = 0; iteration < kMostSteps; ++iteration) {
+    // The tangents come from the normal at the last point; they need not be exact.
+    if (iteration == 0) {
+      batch_.resize(1);
+      batch_.point[0] = x;
+      pressure.evaluate(batch_);
+      frame.axis = batch_.slope_b[0] - batch_.slope_a[0];
+      const double norm = frame.axis.norm();
+      if (!(norm > 0.0)) return std::nullopt;
+      frame.axis /= norm;
+      batch_.resize(5);
+    }
+    Vec3 u = frame.axis.unitOrthogonal();
+    Vec3 v = frame.axis.cross(u);
+    batch_.point[0] = x;
+    batch_.point[1] = x + h * u;
+    batch_.point[2] = x - h * u;
+    batch_.point[3] = x + h * v;
+    batch_.point[4] = x - h * v;
+    pressure.evaluate(batch_);
+    const double a = batch_.a[0], b = batch_.b[0];
+    const double lower = std::min(a, b), gap = std::abs(a - b);
+    if (lower < before && gap > 0.5 * gap_before && step.norm() > 1e-12 * reach) {  // neither up nor nearer to Sigma
+      step *= 0.5;
+      x = kept + step;
+      continue;
+    }
+    kept = x;
+    before = lower;
+    gap_before = gap;
+
+    const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
+    const double steepness = slope.norm();
+    if (!(steepness > 0.0)) return std::nullopt;
+    // Round-off of the pressures, which that of the coordinates adds to.
+    const double noise = 16.0 * std::numeric_limits<double>::epsilon() *
+                         std::max(pressure.largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
+    const Vec3 axis = -slope / steepness;
+    u = (u - u.dot(axis) * axis).normalized();
+    v = axis.cross(u);
+    // Weights of the Lagrange function q = (1 - w) p_A + w p_B, whose gradient is tangential to Sigma.
+    const double fall = -batch_.slope_a[0].dot(axis), rise = batch_.slope_b[0].dot(axis);
+    const double w = std::clamp(fall / (fall + rise), 0.0, 1.0);
+    const Vec3 tangential = (1.0 - w) * batch_.slope_a[0] + w * batch_.slope_b[0];
+    const auto second = [&](int side, int i, const Vec3& direction) {
+      const std::vector<Vec3>& g = side == 0 ? batch_.slope_a : batch_.slope_b;
+      const auto k = static_cast<std::size_t>(2 * i);
+      return (g[k + 1] - g[k + 2]).dot(direction) / (2.0 * h);
+    };
+    const double a_uu = second(0, 0, u), a_uv = 0.5 * (second(0, 0, v) + second(0, 1, u)), a_vv = second(0, 1, v);
+    const double b_uu = second(1, 0, u), b_uv = 0.5 * (second(1, 0, v) + second(1, 1, u)), b_vv = second(1, 1, v);
+    const Principal p = principal(-((1.0 - w) * a_uu + w * b_uu), -((1.0 - w) * a_uv + w * b_uv),
+                                  -((1.0 - w) * a_vv + w * b_vv));
+    const Vec3 first = p.cosine * u + p.sine * v, other = axis.cross(first);
+    const double level = (1.0 - w) * a + w * b;  // p at the foot on Sigma, to first order
+    // A patch longer than `extent` along a direction of no curvature is not believed.
+    const double flattest = 2.0 * std::max(std::abs(level), noise) / (extent * extent);
+    const double c1 = std::max(std::abs(p.first), flattest), c2 = std::max(std::abs(p.second), flattest);
+    const double g1 = tangential.dot(first), g2 = tangential.dot(other);
+    const double gain = 0.5 * (g1 * g1 / c1 + g2 * g2 / c2);
+
+    step = (g1 / c1) * first + (g2 / c2) * other + ((a - b) / steepness) * axis;
+    const bool on_sigma = gap <= 1e-6 * std::abs(level) + noise;
+    const bool at_top = gain <= 1e-12 * std::abs(level) + 1e-3 * noise;
+    frame.axis = axis;
+    if ((on_sigma && at_top) || iteration + 1 == kMostSteps) {
+      if (level <= noise || !on_sigma || !(fall > 0.0) || !(rise > 0.0)) return std::nullopt;
+      frame.origin = x;
+      frame.peak = level;
+      frame.u = first / std::sqrt(c1);
+      frame.v = other / std::sqrt(c2);
+      frame.thickness = level / fall + level / rise;
+      // Sigma: (p_A - p_B)(x) = 0 with slope -steepness along the axis.
+      const double cs = p.cosine, sn = p.sine;
+      const double d_uu = (a_uu - b_uu) / steepness, d_uv = (a_uv - b_uv) / steepness, d_vv = (a_vv - b_vv) / steepness;
+      frame.height_uu = (cs * cs * d_uu + 2.0 * cs * sn * d_uv + sn * sn * d_vv) / c1;
+      frame.height_uv = (-cs * sn * d_uu + (cs * cs - sn * sn) * d_uv + cs * sn * d_vv) / std::sqrt(c1 * c2);
+      frame.height_vv = (sn * sn * d_uu - 2.0 * cs * sn * d_uv + cs * cs * d_vv) / c2;
+      return frame;
+    }
+    const double length = step.norm();
+    if (length > reach) step *= reach / length;
+    x += step;
+  }
+  return std::nullopt;
+}
+
+}  // namespace supple::collision

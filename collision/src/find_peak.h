@@ -1,0 +1,50 @@
+/// @file find_peak.h
+/// Where on Sigma = {p_A = p_B} the pressure is largest: starting points from seeds, and the ascent from one of them.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pair_pressure.h"
+
+namespace supple::collision {
+
+/// A local frame of Sigma at its point of largest pressure: x = origin + rho (cos u + sin v) + t axis.
+/// u and v are orthogonal tangents along the principal directions of the pressure on Sigma, scaled such that
+/// p = peak - rho^2 / 2 to second order: an elongated patch becomes a circle.
+struct PeakFrame {
+  Vec3 origin = Vec3::Zero();
+  Vec3 axis = Vec3::Zero();  ///< unit, out of A and into B
+  Vec3 u = Vec3::Zero();     ///< [m / sqrt(Pa)]
+  Vec3 v = Vec3::Zero();
+  double peak = 0.0;         ///< p at the origin [Pa]
+  /// Height of Sigma to second order: t = rho^2 / 2 (uu cos^2 + 2 uv cos sin + vv sin^2).
+  double height_uu = 0.0, height_uv = 0.0, height_vv = 0.0;
+  double thickness = 0.0;    ///< of the overlap along the axis, to first order [m]
+};
+
+/// Starting points of one pair, and points that lie inside both bodies.
+struct StartPoints {
+  std::vector<Vec3> hill;    ///< one for each hill of the seeds, most promising first
+  std::vector<Vec3> inside;  ///< points of {p_A >= 0, p_B >= 0}: every component should hold one
+};
+
+class PeakFinder {
+ public:
+  /// From surface samples: a hill is a seed without a higher one within twice the spacing.
+  void start_from_seeds(PairPressure& pressure, std::span<const Vec3> seeds, double spacing, StartPoints& out);
+  /// Without samples: local maxima of min(p_A, p_B) on a coarse grid.
+  void start_from_scan(PairPressure& pressure, const Box& overlap, StartPoints& out);
+  /// Newton's method for the largest p on Sigma (Lagrange function with Hessian by differences of gradients).
+  /// @param extent  longest half axis of a patch that is believed [m]
+  /// @return nothing where no point with p > 0 was found
+  [[nodiscard]] std::optional<PeakFrame> climb(PairPressure& pressure, const Vec3& start, double extent);
+
+ private:
+  PressureBatch batch_;
+  std::vector<std::uint32_t> order_;
+  std::vector<double> score_;
+};
+
+}  // namespace supple::collision

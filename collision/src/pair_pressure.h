@@ -1,0 +1,72 @@
+/// @file pair_pressure.h
+/// The pressures p = P F of two bodies at batches of points, and what they cost.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "supple/collision/bodies.h"
+
+namespace supple::collision {
+
+/// Pressures [Pa] and their gradients [Pa/m] at `point`; index i is the same point in every array.
+struct PressureBatch {
+  std::vector<Vec3> point;
+  std::vector<double> a, b;
+  std::vector<Vec3> slope_a, slope_b;
+
+  [[nodiscard]] std::size_t size() const noexcept { return point.size(); }
+  void resize(std::size_t n) {
+    point.resize(n);
+    a.resize(n);
+    b.resize(n);
+    slope_a.resize(n);
+    slope_b.resize(n);
+  }
+};
+
+class PairPressure {
+ public:
+  PairPressure(const ContactBody& a, const ContactBody& b)
+      : field_{a.field, b.field}, modulus_{a.material.modulus, b.material.modulus} {}
+
+  /// Values and gradients of both bodies at batch.point.
+  void evaluate(PressureBatch& batch) {
+    evaluate(0, batch.point, batch.a, batch.slope_a);
+    evaluate(1, batch.point, batch.b, batch.slope_b);
+  }
+  /// Values of both bodies.
+  void evaluate_values(PressureBatch& batch) {
+    evaluate(0, batch.point, batch.a);
+    evaluate(1, batch.point, batch.b);
+  }
+  /// One body (side 0: A, 1: B).
+  void evaluate(int side, std::span<const Vec3> points, std::span<double> values, std::span<Vec3> slopes) {
+    field_[side].evaluate(points, values, slopes);
+    for (double& v : values) v *= modulus_[side];
+    for (Vec3& g : slopes) g *= modulus_[side];
+    evaluations_ += points.size();
+  }
+  void evaluate(int side, std::span<const Vec3> points, std::span<double> values) {
+    field_[side].evaluate(points, values);
+    for (double& v : values) v *= modulus_[side];
+    evaluations_ += points.size();
+  }
+
+  [[nodiscard]] double modulus(int side) const noexcept { return modulus_[side]; }
+  [[nodiscard]] double largest_modulus() const noexcept { return std::max(modulus_[0], modulus_[1]); }
+  /// Length [m] that steps are limited by: the smaller feature size of the two bodies.
+  [[nodiscard]] double feature_size() const {
+    return std::min(field_[0].feature_size(), field_[1].feature_size());
+  }
+  [[nodiscard]] std::uint64_t evaluations() const noexcept { return evaluations_; }
+
+ private:
+  implicit::FieldView field_[2];
+  double modulus_[2];
+  std::uint64_t evaluations_ = 0;  // of one body at one point
+};
+
+}  // namespace supple::collision

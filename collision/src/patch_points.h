@@ -1,0 +1,67 @@
+/// @file patch_points.h
+/// What a quadrature rule hands over: weighted points on Sigma and in the squeezed regions, and their sums.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "supple/core/types.h"
+
+namespace supple::collision {
+
+/// Sums over quadrature points of Sigma; moments are about `reference`.
+struct PatchSums {
+  Vec3 force = Vec3::Zero();    ///< integral of p N dA [N]
+  Vec3 moment = Vec3::Zero();   ///< integral of (x - reference) x p N dA [N m]
+  Vec3 first = Vec3::Zero();    ///< integral of (x - reference) p dA [N m]
+  double load = 0.0;            ///< integral of p dA [N]
+  double area = 0.0;            ///< [m^2]
+
+  void add(const Vec3& from_reference, const Vec3& normal, double weight, double pressure) {
+    const Vec3 f = (weight * pressure) * normal;
+    force += f;
+    moment += from_reference.cross(f);
+    first += (weight * pressure) * from_reference;
+    load += weight * pressure;
+    area += weight;
+  }
+  [[nodiscard]] Vec3 centre() const { return load > 0.0 ? Vec3(first / load) : Vec3::Zero().eval(); }
+};
+
+/// Largest relative difference of force, area and centre of pressure (over the root of the area). A force that nearly
+/// cancels over the patch is measured against a thousandth of the load at least.
+inline double relative_difference(const PatchSums& fine, const PatchSums& coarse) {
+  if (!(fine.load > 0.0) || !(fine.area > 0.0)) return 1.0;
+  const double force = (fine.force - coarse.force).norm() / std::max(fine.force.norm(), 1e-3 * fine.load);
+  const double area = std::abs(fine.area - coarse.area) / fine.area;
+  const double centre = (fine.centre() - coarse.centre()).norm() / std::sqrt(fine.area);
+  return std::max({force, area, centre});
+}
+
+struct PatchPoints {
+  std::vector<Vec3> point, normal;
+  std::vector<double> area, pressure;
+  double residual = 0.0;  ///< largest |p_A - p_B| [Pa]
+
+  std::vector<Vec3> volume_point;
+  std::vector<double> volume_weight;
+  std::vector<std::uint8_t> volume_side;
+  double energy = 0.0;
+  double displaced[2] = {0.0, 0.0};  ///< volumes of V_A and V_B
+
+  void clear() {
+    point.clear();
+    normal.clear();
+    area.clear();
+    pressure.clear();
+    residual = 0.0;
+    volume_point.clear();
+    volume_weight.clear();
+    volume_side.clear();
+    energy = displaced[0] = displaced[1] = 0.0;
+  }
+};
+
+}  // namespace supple::collision

@@ -1,0 +1,288 @@
+#include "polar_rule.h"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "supple/core/math.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
+constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so that columns stay inside the rim
+constexpr int kRimSteps = 30;
+constexpr int kFreeRimSteps = 10;
+constexpr int kHeightSteps = 14;
+constexpr int kEndSteps = 14;
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+void PolarRuleSolver::start_rim(const PolarRule& rule, bool first) {
+  const auto n = static_cast<std::size_t>(rule.angular);
+  if (!first) {
+    coarse_radius_.swap(rim_radius_);
+    coarse_height_.swap(rim_height_);
+  }
+  rim_radius_.resize(n);
+  rim_height_.resize(n);
+  const std::size_t coarse = coarse_radius_.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    if (first) {
+      const double c = rule.cosine[k], s = rule.sine[k];
+      rim_radius_[k] = std::sqrt(2.0 * frame_.peak);
+      rim_height_[k] = frame_.peak * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+      continue;
+    }
+    double radius = 0.0, height = 0.0;
+    const double* row = rule.from_coarser.data() + k * coarse;
+    for (std::size_t j = 0; j < coarse; ++j) {
+      radius += row[j] * coarse_radius_[j];
+      height += row[j] * coarse_height_[j];
+    }
+    rim_radius_[k] = radius;
+    rim_height_[k] = height;
+  }
+}
+
+bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, double error) {
+  const auto n = static_cast<std::size_t>(rule.angular);
+  rim_.resize(n);
+  low_.assign(n, 0.0);
+  high_.assign(n, std::numeric_limits<double>::infinity());
+  done_.assign(n, 0);
+  // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
+  const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
+  std::size_t open = n;
+  for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
+    for (std::size_t k = 0; k < n; ++k) {
+      const Vec3 e = rule.cosine[k] * frame_.u + rule.sine[k] * frame_.v;
+      rim_.point[k] = frame_.origin + rim_radius_[k] * e + rim_height_[k] * frame_.axis;
+    }
+    pressure.evaluate(rim_);
+    for (std::size_t k = 0; k < n; ++k) {
+      if (done_[k] != 0) continue;
+      const Vec3 e = rule.cosine[k] * frame_.u + rule.sine[k] * frame_.v;
+      const Vec3 &ga = rim_.slope_a[k], &gb = rim_.slope_b[k];
+      const double a = rim_.a[k], b = rim_.b[k];
+      const double ar = ga.dot(e), at = ga.dot(frame_.axis), br = gb.dot(e), bt = gb.dot(frame_.axis);
+      // p where the line along the axis meets Sigma, and its slope along rho on Sigma, to first order.
+      const double rate = bt - at;
+      if (!(rate > kLeastCosine * (gb - ga).norm())) return false;
+      const double on_sigma = (a * bt - b * at) / rate;
+      const double along = (ar * bt - br * at) / rate;
+      double& radius = rim_radius_[k];
+      // Newton's first steps may stray from Sigma, where the sign of on_sigma says little: they set no bracket.
+      if (iteration >= kFreeRimSteps) (on_sigma > 0.0 ? low_[k] : high_[k]) = radius;
+      double next = along < 0.0 ? radius - on_sigma / along : 2.0 * radius;
+      next = std::clamp(next, 0.4 * radius, 2.0 * radius);
+      const bool near = std::abs(next - radius) <= enough * radius;
+      if (!near && (!(next > low_[k]) || !(next < high_[k]))) {
+        next = std::isfinite(high_[k]) ? 0.5 * (low_[k] + high_[k]) : 1.5 * radius;
+      }
+      const double step = next - radius;
+      const double lift = ((a - b) + (ar - br) * step) / rate;
+      const bool settled = std::abs(lift) <= enough * std::max(frame_.thickness, std::abs(rim_height_[k]));
+      if (near && settled) {
+        // Both bodies must fall away from the axis beyond the rim, or their squeezed regions reach over it.
+        if (!(-at > kLeastOverhang * ga.norm()) || !(bt > kLeastOverhang * gb.norm())) return false;
+        done_[k] = 1;
+        --open;
+      }
+      radius = next;
+      rim_height_[k] += lift;
+      if (radius * e.norm() > extent_ || !std::isfinite(radius + rim_height_[k])) return false;
+    }
+  }
+  return open == 0;
+}
+
+bool PolarRuleSolver::solve_heights(PairPressure& pressure, const PolarRule& rule, double error) {
+  const auto angles = static_cast<std::size_t>(rule.angular), radii = static_cast<std::size_t>(rule.radial);
+  const GaussRule& gauss = gauss_rule(rule.radial);
+  const std::size_t n = angles * radii;
+  node_.resize(n);
+  foot_.resize(n);
+  height_.resize(n);
+  weight_.resize(n);
+  const double sector = 2.0 * std::numbers::pi / rule.angular;
+  for (std::size_t k = 0; k < angles; ++k) {
+    const double c = rule.cosine[k], s = rule.sine[k], rim = rim_radius_[k];
+    const Vec3 e = c * frame_.u + s * frame_.v;
+    // Through the curvature at the origin and the rim.
+    const double square =
+        0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+    const double fourth = rim_height_[k] - square;
+    for (std::size_t j = 0; j < radii; ++j) {
+      const std::size_t i = k * radii + j;
+      const double r = gauss.node[j], r2 = r * r;
+      foot_[i] = frame_.origin + (r * rim) * e;
+      height_[i] = r2 * (square + r2 * fourth);
+      weight_[i] = sector * gauss.weight[j] * rim * rim * r * jacobian_;
+    }
+  }
+  const double round_off = 4.0 * kEpsilon * pressure.largest_modulus();
+  const double enough = std::max(round_off, std::min(1e-11 * pressure.largest_modulus(), 1e-3 * error * frame_.peak));
+  for (int iteration = 0; iteration < kHeightSteps; ++iteration) {
+    for (std::size_t i = 0; i < n; ++i) node_.point[i] = foot_[i] + height_[i] * frame_.axis;
+    pressure.evaluate(node_);
+    residual_ = 0.0;
+    bool moved = false;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double gap = node_.a[i] - node_.b[i];
+      residual_ = std::max(residual_, std::abs(gap));
+      if (std::abs(gap) <= enough) continue;
+      const double rate = (node_.slope_b[i] - node_.slope_a[i]).dot(frame_.axis);
+      if (!(rate > 0.0)) return false;
+      const double step = gap / rate;
+      // A step below the round-off of the coordinates cannot help.
+      if (std::abs(step) <= 2.0 * kEpsilon * node_.point[i].lpNorm<Eigen::Infinity>()) continue;
+      height_[i] += step;
+      moved = true;
+      if (!(std::abs(height_[i]) <= extent_)) return false;
+    }
+    if (!moved) return true;
+  }
+  return residual_ <= 1e-6 * frame_.peak;
+}
+
+bool PolarRuleSolver::integrate(const PolarRule& rule) {
+  const std::size_t n = static_cast<std::size_t>(rule.angular) * static_cast<std::size_t>(rule.radial);
+  area_.resize(n);
+  normal_.resize(n);
+  pressure_.resize(n);
+  fine_ = {};
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3 across = node_.slope_b[i] - node_.slope_a[i];
+    normal_[i] = across / across.norm();
+    const double cosine = normal_[i].dot(frame_.axis);
+    // On Sigma to first order: the round-off of a steep body counts little.
+    const double fall = -node_.slope_a[i].dot(frame_.axis), rise = node_.slope_b[i].dot(frame_.axis);
+    const double p = (node_.a[i] * rise + node_.b[i] * fall) / (rise + fall);
+    if (!(cosine > kLeastCosine) || !(p > -residual_)) return false;
+    area_[i] = weight_[i] / cosine;
+    pressure_[i] = std::max(p, 0.0);
+    fine_.add(node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
+  }
+  return fine_.load > 0.0;
+}
+
+/// Distance from Sigma, along +axis for A and -axis for B, to where the body's pressure vanishes; the last entry is the
+/// column through the peak.
+bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double tolerance) {
+  const std::size_t n = node_.size() + 1;
+  const double sign = side == 0 ? 1.0 : -1.0;
+  std::vector<double>& end = end_[side];
+  end.resize(n);
+  line_point_.resize(n);
+  line_value_.resize(n);
+  line_slope_.resize(n);
+  const double floor = 16.0 * kEpsilon * pressure.modulus(side);
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    const Vec3& g = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
+    const double fall = -sign * g.dot(frame_.axis);
+    if (!(fall > 0.0)) return false;
+    end[i] = pressure_[i] / fall;
+  }
+  end[n - 1] = 0.5 * frame_.thickness;
+  for (int iteration = 0; iteration < kEndSteps; ++iteration) {
+    for (std::size_t i = 0; i + 1 < n; ++i) line_point_[i] = node_.point[i] + (sign * end[i]) * frame_.axis;
+    line_point_[n - 1] = frame_.origin + (sign * end[n - 1]) * frame_.axis;
+    pressure.evaluate(side, line_point_, line_value_, line_slope_);
+    bool moved = false;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double fall = -sign * line_slope_[i].dot(frame_.axis);
+      if (!(fall > kLeastOverhang * line_slope_[i].norm())) return false;
+      const double step = line_value_[i] / fall;
+      if (std::abs(step) > tolerance * frame_.thickness && std::abs(line_value_[i]) > floor) moved = true;
+      end[i] = std::max(end[i] + step, 0.0);
+      if (!(end[i] <= extent_)) return false;
+    }
+    if (!moved) return true;
+  }
+  return false;
+}
+
+bool PolarRuleSolver::add_columns(PairPressure& pressure, const PolarRule& rule, double error, PatchPoints& points) {
+  const double tolerance = std::min(1e-3, 0.1 * std::sqrt(error));
+  const GaussRule& gauss = gauss_rule(rule.column);
+  const std::size_t n = node_.size();
+  thickness_ = 0.0;
+  for (const int side : {0, 1}) {
+    if (!column_ends(pressure, side, tolerance)) return false;
+    thickness_ += end_[side][n];
+    const double sign = side == 0 ? 1.0 : -1.0;
+    const std::size_t begin = points.volume_point.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      const double length = end_[side][i];
+      points.displaced[side] += weight_[i] * length;
+      for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+        points.volume_point.push_back(node_.point[i] + (sign * length * gauss.node[j]) * frame_.axis);
+        points.volume_weight.push_back(weight_[i] * length * gauss.weight[j]);
+        points.volume_side.push_back(static_cast<std::uint8_t>(side));
+      }
+    }
+    const std::size_t count = points.volume_point.size() - begin;
+    line_value_.resize(count);
+    pressure.evaluate(side, std::span(points.volume_point).subspan(begin), line_value_);
+    for (std::size_t i = 0; i < count; ++i) {
+      points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
+    }
+  }
+  return true;
+}
+
+bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, double error, int refinements,
+                            double extent, PatchPoints& points) {
+  frame_ = frame;
+  jacobian_ = frame.u.norm() * frame.v.norm();
+  extent_ = extent;
+  estimate_ = 1.0;
+  const std::span<const PolarRule> rules = polar_rules();
+  const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(refinements, 1)));
+  // Fine accuracies do not ask the coarsest rules.
+  const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 2 : error < 1e-5 ? 1 : 0, last - 1);
+  for (std::size_t r = first; r <= last; ++r) {
+    start_rim(rules[r], r == first);
+    if (!solve_rim(pressure, rules[r], error) || !solve_heights(pressure, rules[r], error)) return false;
+    coarse_ = fine_;
+    if (!integrate(rules[r])) return false;
+    if (r == first) continue;
+    estimate_ = std::max(relative_difference(fine_, coarse_), 16.0 * kEpsilon);
+    if (estimate_ > error && r < last) continue;
+    if (!add_columns(pressure, rules[r], error, points)) return false;
+    for (std::size_t i = 0; i < node_.size(); ++i) {
+      points.point.push_back(node_.point[i]);
+      points.normal.push_back(normal_[i]);
+      points.area.push_back(area_[i]);
+      points.pressure.push_back(pressure_[i]);
+    }
+    points.residual = std::max(points.residual, residual_);
+    return true;
+  }
+  return false;
+}
+
+bool PolarCover::contains(const Vec3& x, double slack) const {
+  const Vec3 d = x - frame.origin;
+  const double c = d.dot(frame.u) / frame.u.squaredNorm(), s = d.dot(frame.v) / frame.v.squaredNorm();
+  const double rho = std::sqrt(c * c + s * s);
+  const auto n = static_cast<double>(radius.size());
+  double turn = math::atan2(s, c) / (2.0 * std::numbers::pi);
+  if (turn < 0.0) turn += 1.0;
+  const double at = turn * n;
+  const double below = std::floor(at), share = at - below;
+  const std::size_t k = static_cast<std::size_t>(below) % radius.size(), next = (k + 1) % radius.size();
+  const double rim = (1.0 - share) * radius[k] + share * radius[next];
+  if (rho > (1.0 + slack) * rim) return false;
+  const double rise = (1.0 - share) * height[k] + share * height[next];
+  return std::abs(d.dot(frame.axis) - rise * (rho / rim) * (rho / rim)) <= 2.0 * thickness + 0.5 * std::abs(rise);
+}
+
+Vec3 PolarCover::rim_point(std::size_t k) const {
+  const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(radius.size()));
+  return frame.origin + radius[k] * (c * frame.u + s * frame.v) + height[k] * frame.axis;
+}
+
+}  // namespace supple::collision

@@ -1,0 +1,87 @@
+#include "quadrature.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "supple/core/error.h"
+#include "supple/core/math.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr int kLargestGauss = 16;
+
+/// Newton on the Legendre polynomial P_n, from the asymptotic roots.
+GaussRule make_gauss(int n) {
+  GaussRule rule;
+  for (int i = 0; i < n; ++i) {
+    double x = -math::sin_cos(std::numbers::pi * (i + 0.75) / (n + 0.5)).cos;
+    double slope = 1.0;
+    for (int iteration = 0; iteration < 20; ++iteration) {
+      double p = 1.0, before = 0.0;
+      for (int k = 1; k <= n; ++k) {
+        const double next = ((2.0 * k - 1.0) * x * p - (k - 1.0) * before) / k;
+        before = p;
+        p = next;
+      }
+      slope = n * (x * p - before) / (x * x - 1.0);
+      const double step = p / slope;
+      x -= step;
+      if (std::abs(step) < 1e-16) break;
+    }
+    rule.node.push_back(0.5 * (1.0 + x));
+    rule.weight.push_back(1.0 / ((1.0 - x * x) * slope * slope));
+  }
+  return rule;
+}
+
+/// Weight of an even number n of equally spaced angles in the trigonometric interpolant, at distance x from an angle:
+/// sin(n x / 2) cot(x / 2) / n.
+double cardinal(int n, double x) {
+  const auto [s, c] = math::sin_cos(0.5 * x);
+  if (std::abs(s) < 1e-14) return 1.0;
+  return math::sin_cos(0.5 * n * x).sin * c / (s * n);
+}
+
+std::vector<PolarRule> make_polar() {
+  std::vector<PolarRule> rules;
+  constexpr std::array<std::array<int, 3>, 6> kSizes{
+      {{3, 8, 2}, {4, 12, 3}, {6, 20, 3}, {8, 28, 4}, {12, 44, 5}, {16, 64, 6}}};
+  for (const auto& size : kSizes) {
+    PolarRule rule{.radial = size[0], .angular = size[1], .column = size[2], .cosine = {}, .sine = {},
+                   .from_coarser = {}};
+    for (int k = 0; k < rule.angular; ++k) {
+      const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * k / rule.angular);
+      rule.cosine.push_back(c);
+      rule.sine.push_back(s);
+      if (rules.empty()) continue;
+      const int coarse = rules.back().angular;
+      for (int j = 0; j < coarse; ++j) {
+        const double x = 2.0 * std::numbers::pi * (static_cast<double>(k) / rule.angular - static_cast<double>(j) / coarse);
+        rule.from_coarser.push_back(cardinal(coarse, x));
+      }
+    }
+    rules.push_back(std::move(rule));
+  }
+  return rules;
+}
+
+}  // namespace
+
+const GaussRule& gauss_rule(int n) {
+  static const std::vector<GaussRule> rules = [] {
+    std::vector<GaussRule> all(1);
+    for (int k = 1; k <= kLargestGauss; ++k) all.push_back(make_gauss(k));
+    return all;
+  }();
+  SUPPLE_EXPECTS(n >= 1 && n <= kLargestGauss);
+  return rules[static_cast<std::size_t>(n)];
+}
+
+std::span<const PolarRule> polar_rules() {
+  static const std::vector<PolarRule> rules = make_polar();
+  return rules;
+}
+
+}  // namespace supple::collision

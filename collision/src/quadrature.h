@@ -1,0 +1,28 @@
+/// @file quadrature.h
+/// Tables of the quadrature rules: Gauss-Legendre on (0, 1), equally spaced angles, trigonometric interpolation.
+#pragma once
+
+#include <span>
+#include <vector>
+
+namespace supple::collision {
+
+struct GaussRule {
+  std::vector<double> node;    ///< in (0, 1), rising
+  std::vector<double> weight;  ///< sum to 1
+};
+/// @pre 1 <= n <= 16
+[[nodiscard]] const GaussRule& gauss_rule(int n);
+
+/// The rules of the polar quadrature from coarse to fine (theory of spectral quadrature on a smooth patch).
+struct PolarRule {
+  int radial;
+  int angular;
+  int column;  ///< Gauss points through each squeezed region
+  std::vector<double> cosine, sine;  ///< of the angles 2 pi k / angular
+  /// Row k: trigonometric interpolation from the angles of the rule before to angle k; empty for the first.
+  std::vector<double> from_coarser;
+};
+[[nodiscard]] std::span<const PolarRule> polar_rules();
+
+}  // namespace supple::collision

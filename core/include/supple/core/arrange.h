@@ -1,0 +1,51 @@
+/// @file supple/core/arrange.h
+/// Generators of particle arrangements. They lie in the x-y plane with z as axis; `place` turns them elsewhere.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "supple/core/types.h"
+
+namespace supple::core {
+
+/// Poses of particles and the body vector that is each particle's normal.
+struct Arrangement {
+  std::vector<Vec3> position;      ///< [m]
+  std::vector<Quat> orientation;   ///< body to world
+  [[nodiscard]] std::size_t size() const noexcept { return position.size(); }
+};
+
+/// Which way the normals point at rest; the normal is always the body's z axis.
+enum class NormalDirection : std::uint8_t {
+  Radial,  ///< along the principal normal of the curve, away from its centre (spiral, ring), in the plane
+  Axis,    ///< along the axis of the arrangement (+z)
+};
+
+/// Archimedean spiral of `count` particles from `inner_radius` to `outer_radius` over `turns` turns, at equal arc length;
+/// body x points along the curve. @pre count >= 2, 0 <= inner < outer
+[[nodiscard]] Arrangement arrange_spiral(int count, double inner_radius, double outer_radius, double turns,
+                                         NormalDirection normal);
+/// `count` particles on a circle, at equal angles.
+[[nodiscard]] Arrangement arrange_ring(int count, double radius, NormalDirection normal);
+/// `count` particles `spacing` apart along x, centred; normals +z.
+[[nodiscard]] Arrangement arrange_line(int count, double spacing);
+/// Rectangular grid, `columns` along x and `rows` along y, centred; normals +z.
+[[nodiscard]] Arrangement arrange_grid(int columns, int rows, double spacing);
+/// One particle at the origin, normal +z.
+[[nodiscard]] Arrangement arrange_single();
+
+/// Moves an arrangement: x -> pose x.
+void place(Arrangement& arrangement, const Pose& pose);
+
+/// Bonds between particles that are at most `steps` apart in their order (chains), A < B, sorted.
+struct Bonds {
+  std::vector<std::uint32_t> first;
+  std::vector<std::uint32_t> second;
+};
+[[nodiscard]] Bonds bonds_along(std::uint32_t begin, std::uint32_t end, int steps);
+/// Bonds between particles of [begin, end) nearer than `distance` [m], sorted.
+[[nodiscard]] Bonds bonds_within(std::span<const Vec3> position, std::uint32_t begin, std::uint32_t end, double distance);
+
+}  // namespace supple::core

@@ -1,0 +1,65 @@
+/// @file supple/core/error.h
+/// The three lanes of failure. What a user can mend throws `Error`; what a caller broke is SUPPLE_EXPECTS, which
+/// throws `ContractViolation`; what the numbers did is returned in a report and is no exception.
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace supple {
+
+/// Why a run stopped; the value is the exit code of the command line.
+enum class ErrorKind : std::uint8_t {
+  Internal = 1,  ///< a fault of ours
+  Usage = 2,     ///< a wrong argument
+  Scene = 3,     ///< the scene file asks for something that cannot be
+  Io = 4,        ///< a file cannot be read or written
+  Diverged = 5,  ///< the numbers left their bounds
+  Limit = 6,     ///< memory, size or step limits
+  Corrupt = 7,   ///< a checkpoint or cache is not what was written
+};
+
+/// One thing a user can mend: where, what was expected, what was found, and a hint.
+struct Fault {
+  std::string place{};     ///< "file:line:column", a path, or an argument; may be empty
+  std::string key{};       ///< dotted key path, e.g. objects[0].skeleton[0].radius; may be empty
+  std::string expected{};  ///< e.g. "expected a length > 0 [m]"; or the whole statement
+  std::string found{};     ///< e.g. "-0.2"; may be empty
+  std::string hint{};      ///< e.g. "did you mean 'radius'?"; may be empty
+
+  /// place: key: expected, found FOUND; HINT   (empty parts left out)
+  [[nodiscard]] std::string message() const;
+};
+
+/// Thrown for everything a user can mend. Holds one fault or several of the same kind.
+class Error : public std::runtime_error {
+ public:
+  Error(ErrorKind kind, Fault fault);
+  /// @pre !faults.empty()
+  Error(ErrorKind kind, std::vector<Fault> faults);
+
+  [[nodiscard]] ErrorKind kind() const noexcept { return kind_; }
+  [[nodiscard]] const std::vector<Fault>& faults() const noexcept { return faults_; }
+
+ private:
+  ErrorKind kind_;
+  std::vector<Fault> faults_;
+};
+
+/// A precondition was broken by the calling code.
+class ContractViolation : public std::logic_error {
+ public:
+  using std::logic_error::logic_error;
+};
+
+namespace detail {
+[[noreturn]] void contract_failed(const char* condition, const char* file, int line);
+}
+
+}  // namespace supple
+
+#define SUPPLE_EXPECTS(condition) \
+  ((condition) ? static_cast<void>(0) : ::supple::detail::contract_failed(#condition, __FILE__, __LINE__))

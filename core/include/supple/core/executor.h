@@ -1,0 +1,40 @@
+/// @file supple/core/executor.h
+/// Threads, passed in and never global. Work is cut into blocks whose size is a constant of the algorithm, so a result
+/// cannot depend on the number of threads (docs/determinism.md).
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+namespace supple {
+
+class Executor {
+ public:
+  /// @param threads  number of threads, >= 1; 0 means all the machine has
+  explicit Executor(int threads = 1);
+  ~Executor();
+  Executor(const Executor&) = delete;
+  Executor& operator=(const Executor&) = delete;
+
+  [[nodiscard]] int threads() const noexcept;
+
+  /// Calls body(begin, end) for the consecutive blocks [0, block), [block, 2 block) ... of [0, n), in any order and
+  /// possibly at the same time. The first exception in block order is rethrown after all blocks ended.
+  /// @pre block > 0
+  void for_blocks(std::size_t n, std::size_t block, const std::function<void(std::size_t, std::size_t)>& body) const;
+
+  /// Runs `body` inside the executor's arena, so that library code that uses TBB stays within its threads.
+  void run(const std::function<void()>& body) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+inline constexpr std::size_t kReduceBlock = 256;
+
+/// Sum of map(i) for i in [0, n), grouped by kReduceBlock alone: the same bits for every thread count.
+[[nodiscard]] double ordered_sum(const Executor& executor, std::size_t n, const std::function<double(std::size_t)>& map);
+
+}  // namespace supple

@@ -1,0 +1,128 @@
+/// @file supple/core/interactions.h
+/// Everything that acts on the particles of a scene apart from contact: bonded and geometric pair laws, friction
+/// between particles, medium damping, external loads, gravity. Built once from a scene, then const.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "supple/core/executor.h"
+#include "supple/core/neighbours.h"
+#include "supple/core/pair_laws.h"
+#include "supple/core/particles.h"
+
+namespace supple::core {
+
+/// A law on a fixed list of pairs; index k is the same bond in `first`, `second` and `law`.
+template <class Law>
+struct BondedLaw {
+  std::string name;                    ///< as users read it: "spiral/bond_frame"
+  std::vector<std::uint32_t> first;    ///< particle A, shape [bonds]
+  std::vector<std::uint32_t> second;   ///< particle B, A < B, shape [bonds]
+  std::vector<Law> law;                ///< shape [bonds]
+};
+
+/// A law between every two particles of two objects (or of one) that are nearer than its range.
+template <class Law>
+struct GeometricLaw {
+  std::string name;
+  std::uint32_t object_a = 0;
+  std::uint32_t object_b = 0;  ///< may equal object_a
+  double range = 0.0;          ///< [m]; the law must vanish there
+  Law law;
+};
+
+/// Friction between particles, momentum-conserving: a force -c v_rel at the mid point of the pair, v_rel being the
+/// relative velocity there, and a couple c_r times the relative spin. Zero for rigid motion, power never positive.
+struct Friction {
+  std::string name;
+  std::vector<std::uint32_t> first, second;  ///< A < B, shape [bonds]
+  double linear = 0.0;    ///< c [N s/m]
+  double angular = 0.0;   ///< c_r [N m s]
+};
+
+/// Drag of a surrounding medium on one object: F = -gamma m v, tau = -gamma_r I omega.
+struct MediumDamping {
+  std::uint32_t object = 0;
+  double linear = 0.0;   ///< gamma [1/s]
+  double angular = 0.0;  ///< gamma_r [1/s]
+};
+
+/// A force and a torque on one particle during a time window, ramped linearly at both ends.
+struct ExternalLoad {
+  std::uint32_t particle = 0;
+  Vec3 force = Vec3::Zero();    ///< [N], world axes
+  Vec3 torque = Vec3::Zero();   ///< [N m], world axes
+  double begin = 0.0;           ///< [s]
+  double end = 0.0;             ///< [s], the first time without load; may be infinite
+  double ramp = 0.0;            ///< rise and fall time inside the window [s]
+  [[nodiscard]] double factor(double time) const;  ///< in [0, 1]
+};
+
+struct Interactions {
+  std::vector<BondedLaw<Cohesion>> cohesion;
+  std::vector<BondedLaw<Form>> form;
+  std::vector<BondedLaw<FormRadius>> form_radius;
+  std::vector<BondedLaw<BondFrame>> bond_frame;
+  std::vector<BondedLaw<Coplanarity>> coplanarity;
+  std::vector<GeometricLaw<Cohesion>> geometric_cohesion;
+  std::vector<GeometricLaw<Repulsion>> repulsion;
+  std::vector<Friction> friction;
+  std::vector<MediumDamping> medium;
+  std::vector<ExternalLoad> external;
+  Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
+
+  /// True when no law needs the neighbour search.
+  [[nodiscard]] bool bonded_only() const { return geometric_cohesion.empty() && repulsion.empty(); }
+};
+
+/// Energy [J], forces and torques of one law, for `query forces` and for audits.
+struct LawReport {
+  std::string name;
+  double energy = 0.0;
+  Loads loads;
+};
+
+/// Counts of one evaluation, for `--profile`.
+struct InteractionCounts {
+  std::uint64_t pairs_visited = 0;
+  std::uint64_t pairs_present = 0;
+};
+
+/// Per-particle gather lists and buffers, made once; capacity is kept between steps. Frame data.
+class InteractionWorkspace {
+ public:
+  InteractionWorkspace(const ParticleSet& set, const Interactions& interactions);
+  ~InteractionWorkspace();
+  InteractionWorkspace(InteractionWorkspace&&) noexcept;
+  InteractionWorkspace& operator=(InteractionWorkspace&&) noexcept;
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Stage 1. Adds the conservative pair loads to `internal` and gravity and the external loads at `time` to `external`
+/// (not friction and not medium damping: those are part of `advance`). Deterministic: each particle gathers its pairs in
+/// a fixed order. @pre both are sized to the particles
+InteractionCounts accumulate_interactions(const ParticleSet& set, const ParticleState& state,
+                                          const Interactions& interactions, double time, const Executor& executor,
+                                          InteractionWorkspace& workspace, Loads& internal, Loads& external);
+
+/// Potential energy of all pair laws [J] (gravity and external loads are counted as external work). A geometric law is
+/// counted from the end of its range, so that a pair that comes or goes there changes nothing.
+[[nodiscard]] double potential_energy(const ParticleSet& set, const ParticleState& state,
+                                      const Interactions& interactions);
+
+/// The same, law by law, with loads; also one report each for "gravity" and "external" (energy 0).
+[[nodiscard]] std::vector<LawReport> report_laws(const ParticleSet& set, const ParticleState& state,
+                                                 const Interactions& interactions, double time);
+
+/// Upper bound of the largest angular frequency of the pair laws about rest [rad/s]: omega^2 <= max_i (2/m_i) sum_j k_ij
+/// for translation plus the same with inertia and torsional stiffness for rotation.
+[[nodiscard]] double largest_frequency(const ParticleSet& set, const ParticleState& rest,
+                                       const Interactions& interactions);
+
+}  // namespace supple::core

@@ -1,0 +1,31 @@
+/// @file supple/core/io/mesh_files.h
+/// Surface meshes and tables as files other tools open.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "supple/core/mesh.h"
+
+namespace supple::io {
+
+/// Binary little-endian PLY with normals and every column as a float property. @throws Error{Io}
+void write_ply(const std::filesystem::path& path, const Mesh& mesh);
+
+/// One named column of a table; all columns of a table have the same length.
+struct TableColumn {
+  std::string name;               ///< with its unit, e.g. "pressure_pa"
+  std::span<const double> values;
+};
+
+/// CSV with a header line; numbers print with 17 significant digits, so reading them back gives the same bits.
+/// @throws Error{Io}
+void write_csv(const std::filesystem::path& path, std::span<const TableColumn> columns);
+
+/// Points from a CSV file: three numbers a line, an optional header line, '#' comments.
+/// @throws Error{Io} when absent, Error{Scene} with file:line for a line that is not three finite numbers.
+[[nodiscard]] std::vector<Vec3> read_points_csv(const std::filesystem::path& path);
+
+}  // namespace supple::io

@@ -1,0 +1,20 @@
+// Velocity-dependent loads of one half step: friction between particles and the drag of a medium.
+#pragma once
+
+#include "supple/core/integrate.h"
+
+namespace supple::core {
+
+/// The order in which the pairs are visited: the second half step mirrors the first.
+enum class PairOrder { Forward, Backward };
+
+/// Friction of all pairs over dt, each pair implicitly: J = -(1 + dt c K)^-1 dt c u at its mid point, u the relative
+/// velocity and K the inverse effective mass there. Momentum is exact, the energy lost is booked exactly.
+void apply_friction(const ParticleSet& set, const std::vector<Friction>& friction, double dt, PairOrder order,
+                    ParticleState& state, Ledger& ledger);
+
+/// v' = -gamma v and L' = -gamma_r L over dt, exactly.
+void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medium, double dt, ParticleState& state,
+                  Ledger& ledger);
+
+}  // namespace supple::core

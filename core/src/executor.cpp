@@ -1,0 +1,120 @@
+#include "supple/core/executor.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "supple/core/error.h"
+
+namespace supple {
+namespace {
+
+int machine_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
+
+/// Keeps the exception of the lowest block.
+class FirstFailure {
+ public:
+  void keep(std::size_t block, std::exception_ptr exception) {
+    const std::lock_guard lock(mutex_);
+    if (block < block_) {
+      block_ = block;
+      exception_ = std::move(exception);
+    }
+  }
+  void rethrow() const {
+    if (exception_) std::rethrow_exception(exception_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::size_t block_ = std::numeric_limits<std::size_t>::max();
+  std::exception_ptr exception_;
+};
+
+}  // namespace
+
+struct Executor::Impl {
+  explicit Impl(int count) : threads(count), arena(count) {
+    // TBB never runs more threads than the machine has unless it is allowed to.
+    if (count > machine_threads()) {
+      allowance.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count));
+    }
+  }
+  int threads;
+  std::optional<tbb::global_control> allowance;
+  mutable tbb::task_arena arena;
+};
+
+Executor::Executor(int threads) {
+  SUPPLE_EXPECTS(threads >= 0);
+  impl_ = std::make_unique<Impl>(threads == 0 ? machine_threads() : threads);
+}
+
+Executor::~Executor() = default;
+
+int Executor::threads() const noexcept { return impl_->threads; }
+
+void Executor::for_blocks(std::size_t n, std::size_t block,
+                          const std::function<void(std::size_t, std::size_t)>& body) const {
+  SUPPLE_EXPECTS(block > 0);
+  if (n == 0) return;
+  const std::size_t blocks = (n - 1) / block + 1;
+  FirstFailure failure;
+  const auto run_block = [&](std::size_t index) {
+    try {
+      const std::size_t begin = index * block;
+      body(begin, n - begin < block ? n : begin + block);
+    } catch (...) {
+      failure.keep(index, std::current_exception());
+    }
+  };
+  if (impl_->threads == 1 || blocks == 1) {
+    for (std::size_t index = 0; index < blocks; ++index) run_block(index);
+  } else {
+    impl_->arena.execute([&] {
+      tbb::parallel_for(
+          tbb::blocked_range<std::size_t>(0, blocks, 1),
+          [&](const tbb::blocked_range<std::size_t>& range) {
+            for (std::size_t index = range.begin(); index != range.end(); ++index) run_block(index);
+          },
+          tbb::auto_partitioner());
+    });
+  }
+  failure.rethrow();
+}
+
+void Executor::run(const std::function<void()>& body) const { impl_->arena.execute([&] { body(); }); }
+
+double ordered_sum(const Executor& executor, std::size_t n, const std::function<double(std::size_t)>& map) {
+  const auto block_sum = [&map](std::size_t begin, std::size_t end) {
+    double sum = 0.0;
+    for (std::size_t i = begin; i < end; ++i) sum += map(i);
+    return sum;
+  };
+  if (n <= kReduceBlock) return block_sum(0, n);
+
+  // The buffer is taken out of its slot while in use, so that a nested call finds the slot empty, not our sums.
+  thread_local std::vector<double> kept;
+  std::vector<double> partial = std::move(kept);
+  partial.assign((n - 1) / kReduceBlock + 1, 0.0);
+  executor.for_blocks(n, kReduceBlock, [&](std::size_t begin, std::size_t end) {
+    partial[begin / kReduceBlock] = block_sum(begin, end);
+  });
+  double sum = 0.0;
+  for (const double value : partial) sum += value;
+  kept = std::move(partial);
+  return sum;
+}
+
+}  // namespace supple

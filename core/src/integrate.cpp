@@ -1,0 +1,225 @@
+#include "supple/core/integrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "damping.h"
+#include "supple/core/error.h"
+
+namespace supple::core {
+namespace {
+
+bool holds_position(const ParticleSet& set, std::size_t i) { return (set.pinned[i] & kPinPosition) != 0; }
+bool holds_orientation(const ParticleSet& set, std::size_t i) { return (set.pinned[i] & kPinOrientation) != 0; }
+
+void stop_pinned(const ParticleSet& set, ParticleState& state) {
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (holds_position(set, i)) state.velocity[i].setZero();
+    if (holds_orientation(set, i)) state.angular_momentum[i].setZero();
+  }
+}
+
+void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample) {
+  sample.internal.reset(state.size());
+  sample.external.reset(state.size());
+  sample.force_on_fixed.setZero();
+  sample.moment_on_fixed.setZero();
+  sample.dissipative.reset(0);
+  forces(state, time, sample);
+}
+
+/// Work of the dissipative loads in a kick, exact: each acts along the mean of the velocities before and after.
+double dissipated_by(const ParticleSet& set, const ForceSample& sample, double dt, const ParticleState& before_kick) {
+  double work = 0.0;
+  for (std::size_t i = 0; i < sample.dissipative.force.size(); ++i) {
+    const Vec3& f = sample.dissipative.force[i];
+    const Vec3& t = sample.dissipative.torque[i];
+    if (f == Vec3::Zero() && t == Vec3::Zero()) continue;
+    if (!holds_position(set, i)) {
+      const Vec3 gain = 0.5 * dt / set.mass[i] * (sample.internal.force[i] + sample.external.force[i]);
+      work += dt * f.dot(before_kick.velocity[i] + gain);
+    }
+    if (!holds_orientation(set, i)) {
+      const Vec3 mean = before_kick.angular_momentum[i] +
+                        0.5 * dt * (sample.internal.torque[i] + sample.external.torque[i]);
+      const Quat& q = before_kick.orientation[i];
+      work += dt * t.dot(q * (q.conjugate() * mean).cwiseQuotient(set.inertia[i]));
+    }
+  }
+  return -work;
+}
+
+void kick(const ParticleSet& set, const ForceSample& sample, double dt, ParticleState& state, Ledger& ledger) {
+  ledger.dissipated += dissipated_by(set, sample, dt, state);
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    const Vec3& x = state.position[i];
+    const Vec3& external_force = sample.external.force[i];
+    const Vec3& external_torque = sample.external.torque[i];
+    const Vec3 impulse = dt * (sample.internal.force[i] + external_force);
+    const Vec3 angular = dt * (sample.internal.torque[i] + external_torque);
+    ledger.external_impulse += dt * external_force;
+    ledger.external_angular_impulse += dt * (x.cross(external_force) + external_torque);
+    if (holds_position(set, i)) {
+      ledger.pin_impulse -= impulse;
+      ledger.pin_angular_impulse -= x.cross(impulse);
+    } else {
+      state.velocity[i] += 1.0 / set.mass[i] * impulse;
+    }
+    if (holds_orientation(set, i)) {
+      ledger.pin_angular_impulse -= angular;
+    } else {
+      state.angular_momentum[i] += angular;
+    }
+  }
+  ledger.external_impulse -= dt * sample.force_on_fixed;
+  ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
+}
+
+void drift(const ParticleSet& set, double dt, ParticleState& state) {
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (!holds_position(set, i)) state.position[i] += dt * state.velocity[i];
+    if (!holds_orientation(set, i) && state.angular_momentum[i] != Vec3::Zero()) {
+      rotate_free(state.orientation[i], state.angular_momentum[i], set.inertia[i], dt);
+    }
+  }
+}
+
+/// The rotation vector of the drift that led to `state`; the drift is undone, because it is reversible.
+Vec3 drifted_rotation(const ParticleSet& set, const ParticleState& state, std::size_t i, double dt) {
+  Quat before = state.orientation[i];
+  rotate_free(before, state.angular_momentum[i], set.inertia[i], -dt);
+  return rotation_log(state.orientation[i] * before.conjugate());
+}
+
+/// Half the work of the external loads over the drift that led to `state`, velocities and momenta still being its own.
+double half_work(const ParticleSet& set, const Loads& external, const ParticleState& state, double dt) {
+  double work = 0.0;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (!holds_position(set, i)) work += 0.5 * dt * external.force[i].dot(state.velocity[i]);
+    if (!holds_orientation(set, i) && external.torque[i] != Vec3::Zero()) {
+      work += 0.5 * external.torque[i].dot(drifted_rotation(set, state, i, dt));
+    }
+  }
+  return work;
+}
+
+void save_loads(const Loads& loads, StateWriter& out) {
+  out.write(loads.force);
+  out.write(loads.torque);
+}
+
+void load_loads(Loads& loads, StateReader& in) {
+  in.read(loads.force);
+  in.read(loads.torque);
+}
+
+void save_vector(const Vec3& v, StateWriter& out) {
+  for (int k = 0; k < 3; ++k) out.write(v[k]);
+}
+
+void load_vector(Vec3& v, StateReader& in) {
+  for (int k = 0; k < 3; ++k) in.read(v[k]);
+}
+
+void hash_vector(const Vec3& v, Hasher& hasher) {
+  for (int k = 0; k < 3; ++k) hasher.add(v[k]);
+}
+
+}  // namespace
+
+void Ledger::save(StateWriter& out) const {
+  out.write(external_work);
+  out.write(dissipated);
+  for (const Vec3* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
+    save_vector(*v, out);
+  }
+}
+
+void Ledger::load(StateReader& in) {
+  in.read(external_work);
+  in.read(dissipated);
+  for (Vec3* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
+    load_vector(*v, in);
+  }
+}
+
+void Ledger::hash(Hasher& hasher) const {
+  hasher.add(external_work);
+  hasher.add(dissipated);
+  for (const Vec3* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
+    hash_vector(*v, hasher);
+  }
+}
+
+void KickState::save(StateWriter& out) const {
+  out.write(std::uint64_t{valid ? 1U : 0U});
+  save_loads(sample.internal, out);
+  save_loads(sample.external, out);
+  save_vector(sample.force_on_fixed, out);
+  save_vector(sample.moment_on_fixed, out);
+  save_loads(sample.dissipative, out);
+}
+
+void KickState::load(StateReader& in) {
+  std::uint64_t flag = 0;
+  in.read(flag);
+  valid = flag != 0;
+  load_loads(sample.internal, in);
+  load_loads(sample.external, in);
+  load_vector(sample.force_on_fixed, in);
+  load_vector(sample.moment_on_fixed, in);
+  load_loads(sample.dissipative, in);
+}
+
+void KickState::hash(Hasher& hasher) const {
+  hasher.add(std::uint64_t{valid ? 1U : 0U});
+  if (!valid) return;
+  for (const Loads* loads : {&sample.internal, &sample.external, &sample.dissipative}) {
+    hasher.add(loads->force);
+    hasher.add(loads->torque);
+  }
+  hash_vector(sample.force_on_fixed, hasher);
+  hash_vector(sample.moment_on_fixed, hasher);
+}
+
+void advance(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time, double dt,
+             ParticleState& state, KickState& kick_state, Ledger& ledger) {
+  SUPPLE_EXPECTS(dt > 0.0 && state.size() == set.size());
+  ForceSample& sample = kick_state.sample;
+  stop_pinned(set, state);
+  if (!kick_state.valid) evaluate(forces, state, time, sample);
+  SUPPLE_EXPECTS(sample.internal.force.size() == set.size() && sample.external.force.size() == set.size());
+
+  apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+  apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
+  kick(set, sample, 0.5 * dt, state, ledger);
+  drift(set, dt, state);
+  ledger.external_work += half_work(set, sample.external, state, dt);
+  evaluate(forces, state, time + dt, sample);
+  kick_state.valid = true;
+  ledger.external_work += half_work(set, sample.external, state, dt);
+  kick(set, sample, 0.5 * dt, state, ledger);
+  apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
+  apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+}
+
+double stable_step(const StepLimits& limits) {
+  double step = std::numeric_limits<double>::infinity();
+  const auto limit = [&step](double scale, double rate) {
+    if (rate > 0.0) step = std::min(step, scale / rate);
+  };
+  limit(0.3, limits.frequency);
+  if (limits.length > 0.0) limit(0.1 * limits.length, limits.speed);
+  limit(0.3, limits.angular_speed);
+  return step;
+}
+
+int halvings(double frame, double step) {
+  SUPPLE_EXPECTS(frame > 0.0 && step > 0.0);
+  int k = 0;
+  while (std::ldexp(frame, -k) > step) ++k;
+  return k;
+}
+
+}  // namespace supple::core

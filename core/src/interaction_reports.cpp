@@ -1,0 +1,148 @@
+// Energies, loads by law and the frequency bound, from the reference laws of pair_laws.cpp.
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include "supple/core/error.h"
+#include "supple/core/interactions.h"
+
+namespace supple::core {
+namespace {
+
+PairPose pair_pose(const ParticleSet& set, const ParticleState& state, std::uint32_t a, std::uint32_t b) {
+  return {.r = state.position[b] - state.position[a],
+          .orientation_a = state.orientation[a],
+          .orientation_b = state.orientation[b],
+          .normal_a = state.orientation[a] * set.normal[a],
+          .normal_b = state.orientation[b] * set.normal[b]};
+}
+
+/// Calls visit(law, a, b) for every pair on which a list acts, in order.
+template <class Law, class Visit>
+void for_each_pair(const BondedLaw<Law>& list, const ParticleSet&, const ParticleState&, const Visit& visit) {
+  for (std::size_t k = 0; k < list.law.size(); ++k) visit(list.law[k], list.first[k], list.second[k]);
+}
+
+template <class Law, class Visit>
+void for_each_pair(const GeometricLaw<Law>& list, const ParticleSet& set, const ParticleState& state,
+                   const Visit& visit) {
+  for (const IndexPair& pair : find_neighbours(state.position, list.range)) {
+    const auto lower = std::min(set.object[pair.first], set.object[pair.second]);
+    const auto upper = std::max(set.object[pair.first], set.object[pair.second]);
+    if (lower != std::min(list.object_a, list.object_b) || upper != std::max(list.object_a, list.object_b)) continue;
+    visit(list.law, pair.first, pair.second);
+  }
+}
+
+/// Energy that a list counts as zero: that of a pair at the end of its range, so that pairs may come and go.
+template <class Law>
+double zero_energy(const BondedLaw<Law>&) {
+  return 0.0;
+}
+double zero_energy(const GeometricLaw<Cohesion>& list) { return list.law.energy(list.range); }
+double zero_energy(const GeometricLaw<Repulsion>&) { return 0.0; }
+
+/// Calls visit(list) for every list of pairs of a scene, in one order.
+template <class Visit>
+void for_each_list(const Interactions& interactions, const Visit& visit) {
+  for (const auto& list : interactions.cohesion) visit(list);
+  for (const auto& list : interactions.form) visit(list);
+  for (const auto& list : interactions.form_radius) visit(list);
+  for (const auto& list : interactions.bond_frame) visit(list);
+  for (const auto& list : interactions.coplanarity) visit(list);
+  for (const auto& list : interactions.geometric_cohesion) visit(list);
+  for (const auto& list : interactions.repulsion) visit(list);
+}
+
+template <class Law>
+Stiffness pair_stiffness(const Law& law, double rest_distance) {
+  if constexpr (std::is_same_v<Law, Form> || std::is_same_v<Law, Coplanarity>) {
+    return stiffness(law, rest_distance);
+  } else {
+    return stiffness(law);
+  }
+}
+
+}  // namespace
+
+double potential_energy(const ParticleSet& set, const ParticleState& state, const Interactions& interactions) {
+  double energy = 0.0;
+  for_each_list(interactions, [&](const auto& list) {
+    const double zero = zero_energy(list);
+    for_each_pair(list, set, state, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
+      energy += evaluate(law, pair_pose(set, state, a, b)).energy - zero;
+    });
+  });
+  return energy;
+}
+
+std::vector<LawReport> report_laws(const ParticleSet& set, const ParticleState& state,
+                                   const Interactions& interactions, double time) {
+  std::vector<LawReport> reports;
+  const auto add_report = [&](std::string name) -> LawReport& {
+    LawReport& report = reports.emplace_back();
+    report.name = std::move(name);
+    report.loads.reset(set.size());
+    return report;
+  };
+  for_each_list(interactions, [&](const auto& list) {
+    LawReport& report = add_report(list.name);
+    const double zero = zero_energy(list);
+    for_each_pair(list, set, state, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
+      const PairLoad load = evaluate(law, pair_pose(set, state, a, b));
+      report.energy += load.energy - zero;
+      report.loads.force[a] -= load.force_b;
+      report.loads.force[b] += load.force_b;
+      report.loads.torque[a] += load.torque_a;
+      report.loads.torque[b] += load.torque_b;
+    });
+  });
+  LawReport& gravity = add_report("gravity");
+  for (std::size_t i = 0; i < set.size(); ++i) gravity.loads.force[i] = set.mass[i] * interactions.gravity;
+  LawReport& external = add_report("external");
+  for (const ExternalLoad& load : interactions.external) {
+    const double factor = load.factor(time);
+    external.loads.force[load.particle] += factor * load.force;
+    external.loads.torque[load.particle] += factor * load.torque;
+  }
+  return reports;
+}
+
+double largest_frequency(const ParticleSet& set, const ParticleState& rest, const Interactions& interactions) {
+  std::vector<Stiffness> total(set.size());
+  const auto add = [&total](const Stiffness& k, std::uint32_t i) {
+    total[i].translation += k.translation;
+    total[i].rotation += k.rotation;
+  };
+  for_each_list(interactions, [&](const auto& list) {
+    for_each_pair(list, set, rest, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
+      const Stiffness k = pair_stiffness(law, (rest.position[b] - rest.position[a]).norm());
+      add(k, a);
+      add(k, b);
+    });
+  });
+  // Objects that only meet later have no pair at rest: one pair each is counted.
+  const auto add_meeting = [&](const auto& list) {
+    const Stiffness k = stiffness(list.law);
+    for (std::uint32_t i = 0; i < set.size(); ++i) {
+      if (set.object[i] == list.object_a || set.object[i] == list.object_b) add(k, i);
+    }
+  };
+  for (const auto& list : interactions.geometric_cohesion) add_meeting(list);
+  for (const auto& list : interactions.repulsion) add_meeting(list);
+
+  // The Hessian is positive semi-definite up to residual stress, so its largest eigenvalue is at most the sum of those
+  // of its translational and its rotational block; a pinned degree of freedom has none.
+  double translation = 0.0;
+  double rotation = 0.0;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if ((set.pinned[i] & kPinPosition) == 0) translation = std::max(translation, total[i].translation / set.mass[i]);
+    if ((set.pinned[i] & kPinOrientation) == 0) {
+      rotation = std::max(rotation, total[i].rotation / set.inertia[i].minCoeff());
+    }
+  }
+  return std::sqrt(2.0 * (translation + rotation));
+}
+
+}  // namespace supple::core

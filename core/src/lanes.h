@@ -1,0 +1,113 @@
+// Four doubles that are worked on at once. Lanes never exchange values, so a result does not depend on its neighbours;
+// every operation is the IEEE one of a double, so a kernel written for both types gives the same bits.
+#pragma once
+
+#include <immintrin.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "supple/core/math.h"
+
+namespace supple::core {
+
+inline constexpr std::size_t kLanes = 4;
+
+struct Lanes {
+  __m256d v;
+
+  Lanes() = default;
+  Lanes(__m256d value) : v(value) {}
+  Lanes(double value) : v(_mm256_set1_pd(value)) {}
+  static Lanes load(const double* aligned) { return _mm256_load_pd(aligned); }
+  void store(double* aligned) const { _mm256_store_pd(aligned, v); }
+
+  friend Lanes operator+(Lanes a, Lanes b) { return _mm256_add_pd(a.v, b.v); }
+  friend Lanes operator-(Lanes a, Lanes b) { return _mm256_sub_pd(a.v, b.v); }
+  friend Lanes operator*(Lanes a, Lanes b) { return _mm256_mul_pd(a.v, b.v); }
+  friend Lanes operator/(Lanes a, Lanes b) { return _mm256_div_pd(a.v, b.v); }
+  friend Lanes operator-(Lanes a) { return _mm256_xor_pd(a.v, _mm256_set1_pd(-0.0)); }
+};
+
+inline Lanes fma(Lanes a, Lanes b, Lanes c) { return _mm256_fmadd_pd(a.v, b.v, c.v); }
+inline Lanes fms(Lanes a, Lanes b, Lanes c) { return _mm256_fmsub_pd(a.v, b.v, c.v); }
+inline Lanes sqrt(Lanes a) { return _mm256_sqrt_pd(a.v); }
+/// The positive part; 0 where a is NaN or negative.
+inline Lanes positive(Lanes a) { return _mm256_max_pd(a.v, _mm256_setzero_pd()); }
+inline Lanes exp(Lanes a) {
+  alignas(32) std::array<double, kLanes> x;
+  a.store(x.data());
+  for (double& value : x) value = math::exp(value);
+  return Lanes::load(x.data());
+}
+
+inline double fma(double a, double b, double c) { return std::fma(a, b, c); }
+inline double fms(double a, double b, double c) { return std::fma(a, b, -c); }
+inline double positive(double a) { return a > 0.0 ? a : 0.0; }
+inline double exp(double a) { return math::exp(a); }
+using std::sqrt;
+
+template <class T>
+struct Vector {
+  T x, y, z;
+
+  friend Vector operator+(const Vector& a, const Vector& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend Vector operator*(const T& s, const Vector& a) { return {s * a.x, s * a.y, s * a.z}; }
+};
+
+template <class T>
+T dot(const Vector<T>& a, const Vector<T>& b) {
+  return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
+}
+
+template <class T>
+Vector<T> cross(const Vector<T>& a, const Vector<T>& b) {
+  return {fms(a.y, b.z, a.z * b.y), fms(a.z, b.x, a.x * b.z), fms(a.x, b.y, a.y * b.x)};
+}
+
+/// s a + b.
+template <class T>
+Vector<T> scaled_sum(const T& s, const Vector<T>& a, const Vector<T>& b) {
+  return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)};
+}
+
+/// A rotation: vector part u and scalar part w.
+template <class T>
+struct Rotation {
+  Vector<T> u;
+  T w;
+};
+
+template <class T>
+Vector<T> rotate(const Rotation<T>& q, const Vector<T>& v) {
+  const Vector<T> half = cross(q.u, v);
+  const Vector<T> t = half + half;
+  return scaled_sum(q.w, t, v + cross(q.u, t));
+}
+
+template <class T>
+Rotation<T> product(const Rotation<T>& a, const Rotation<T>& b) {
+  return {scaled_sum(a.w, b.u, scaled_sum(b.w, a.u, cross(a.u, b.u))), fms(a.w, b.w, dot(a.u, b.u))};
+}
+
+/// a times the conjugate of b.
+template <class T>
+Rotation<T> product_conjugate(const Rotation<T>& a, const Rotation<T>& b) {
+  return {scaled_sum(b.w, a.u, cross(b.u, a.u)) - a.w * b.u, fma(a.w, b.w, dot(a.u, b.u))};
+}
+
+/// Rows and columns of a 4 x 4 block exchanged.
+inline void transpose(Lanes& a, Lanes& b, Lanes& c, Lanes& d) {
+  const __m256d ab_low = _mm256_unpacklo_pd(a.v, b.v);
+  const __m256d ab_high = _mm256_unpackhi_pd(a.v, b.v);
+  const __m256d cd_low = _mm256_unpacklo_pd(c.v, d.v);
+  const __m256d cd_high = _mm256_unpackhi_pd(c.v, d.v);
+  a = _mm256_permute2f128_pd(ab_low, cd_low, 0x20);
+  b = _mm256_permute2f128_pd(ab_high, cd_high, 0x20);
+  c = _mm256_permute2f128_pd(ab_low, cd_low, 0x31);
+  d = _mm256_permute2f128_pd(ab_high, cd_high, 0x31);
+}
+
+}  // namespace supple::core

@@ -1,0 +1,88 @@
+// Rotations of rigid bodies (docs/notation.md): exponential, logarithm, free motion.
+#include <array>
+#include <cmath>
+
+#include "supple/core/integrate.h"
+#include "supple/core/math.h"
+
+namespace supple::core {
+namespace {
+
+struct HalfAngle {
+  double sinc;  ///< sin(x) / x
+  double cos;
+};
+
+/// sin(x)/x and cos(x) from x^2: by series below 1/16, where eight terms are exact to the last place.
+HalfAngle half_angle(double x2) {
+  if (x2 < 0.0625) {
+    constexpr std::array<double, 7> kSinc{1.0,        -1.0 / 6.0,          1.0 / 120.0,         -1.0 / 5040.0,
+                                          1.0 / 362880.0, -1.0 / 39916800.0, 1.0 / 6227020800.0};
+    constexpr std::array<double, 8> kCos{1.0,           -1.0 / 2.0,         1.0 / 24.0,          -1.0 / 720.0,
+                                         1.0 / 40320.0, -1.0 / 3628800.0, 1.0 / 479001600.0, -1.0 / 87178291200.0};
+    double sinc = kSinc.back();
+    for (std::size_t k = kSinc.size() - 1; k-- > 0;) sinc = std::fma(sinc, x2, kSinc[k]);
+    double cos = kCos.back();
+    for (std::size_t k = kCos.size() - 1; k-- > 0;) cos = std::fma(cos, x2, kCos[k]);
+    return {sinc, cos};
+  }
+  const double x = std::sqrt(x2);
+  const math::SinCos value = math::sin_cos(x);
+  return {value.sin / x, value.cos};
+}
+
+/// One Newton step to unit length; a product of unit quaternions is a rounding error away from it.
+void renormalise(Quat& q) { q.coeffs() *= 1.5 - 0.5 * q.squaredNorm(); }
+
+/// R_k(h): the exact flow of L_k^2 / (2 I_k) over h on the orientation and the body angular momentum.
+void rotate_about_axis(int k, double h, const Vec3& inertia, Quat& q, Vec3& body_momentum) {
+  const double half = 0.5 * h * body_momentum[k] / inertia[k];
+  const HalfAngle value = half_angle(half * half);
+  const double s = value.sinc * half;
+  const double c = value.cos;
+  const int i = (k + 1) % 3;
+  const int j = (k + 2) % 3;
+  const double sin_full = 2.0 * s * c;
+  const double cos_full = 1.0 - 2.0 * s * s;
+  const double l_i = body_momentum[i];
+  const double l_j = body_momentum[j];
+  body_momentum[i] = cos_full * l_i + sin_full * l_j;
+  body_momentum[j] = -sin_full * l_i + cos_full * l_j;
+  Vec3 axis = Vec3::Zero();
+  axis[k] = s;
+  q = q * Quat(c, axis.x(), axis.y(), axis.z());
+}
+
+}  // namespace
+
+Quat rotation_exp(const Vec3& rotation) {
+  const HalfAngle value = half_angle(0.25 * rotation.squaredNorm());
+  const Vec3 u = 0.5 * value.sinc * rotation;
+  return Quat(value.cos, u.x(), u.y(), u.z());
+}
+
+Vec3 rotation_log(const Quat& q) {
+  const double sign = q.w() < 0.0 ? -1.0 : 1.0;
+  const Vec3 u = sign * q.vec();
+  const double w = sign * q.w();
+  const double length = u.norm();
+  // Below 1e-8 the arc tangent equals its argument to the last place.
+  if (length < 1e-8) return 2.0 / w * u;
+  return 2.0 * math::atan2(length, w) / length * u;
+}
+
+void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt) {
+  if (inertia.x() == inertia.y() && inertia.y() == inertia.z()) {
+    orientation = rotation_exp(dt / inertia.x() * angular_momentum) * orientation;
+  } else {
+    Vec3 body = orientation.conjugate() * angular_momentum;
+    rotate_about_axis(2, 0.5 * dt, inertia, orientation, body);
+    rotate_about_axis(1, 0.5 * dt, inertia, orientation, body);
+    rotate_about_axis(0, dt, inertia, orientation, body);
+    rotate_about_axis(1, 0.5 * dt, inertia, orientation, body);
+    rotate_about_axis(2, 0.5 * dt, inertia, orientation, body);
+  }
+  renormalise(orientation);
+}
+
+}  // namespace supple::core

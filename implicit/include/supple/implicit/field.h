@@ -1,0 +1,76 @@
+/// @file supple/implicit/field.h
+/// The field of one body: F(p) = sum_k f_k(p) - c over its primitives, with a bounding volume hierarchy over their
+/// supports and packed, batched evaluation. Sums run in primitive order, so culling cannot change a bit.
+#pragma once
+
+#include <memory>
+
+#include "supple/core/executor.h"
+#include "supple/implicit/field_view.h"
+#include "supple/implicit/skeleton.h"
+
+namespace supple::implicit {
+
+/// Work of the evaluations since the last reset, for `--profile`; approximate under threads is not allowed: counted per
+/// call and summed by the caller.
+struct FieldCounts {
+  std::uint64_t points = 0;
+  std::uint64_t primitives_visited = 0;  ///< kernel evaluations made
+  std::uint64_t primitives_present = 0;  ///< points x primitives
+};
+
+class Field {
+ public:
+  Field();
+  ~Field();
+  Field(Field&&) noexcept;
+  Field& operator=(Field&&) noexcept;
+
+  // The ScalarField operations (see field_view.h).
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const;
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& box) const;
+  [[nodiscard]] Box surface_box() const;
+  [[nodiscard]] double feature_size() const;
+
+  /// Hessian of F [1/m^2] at one point (mean curvature, tests); the mean curvature is > 0 for a sphere:
+  /// kappa = (g^T H g - |g|^2 tr H) / (2 |g|^3).
+  [[nodiscard]] Mat3 hessian(const Vec3& point) const;
+
+  [[nodiscard]] std::size_t primitive_count() const;
+  /// What evaluating these points as one batch visits against what is present.
+  [[nodiscard]] FieldCounts count(std::span<const Vec3> points) const;
+  /// Off: every primitive is evaluated at every point. Changes no bit of any value; on by default.
+  void set_culling(bool on);
+
+  struct Index;
+
+ private:
+  friend void index_field(const Skeleton&, const PlacedSkeleton&, Field&);
+  std::unique_ptr<Index> index_;
+};
+
+/// Stage 3. Rebuilds `field` for the placed primitives; capacity is reused.
+void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& field);
+
+/// The clear reference: sums every primitive through `evaluate(Kernel)` and `evaluate(ShapeKind)`, no index, no batch.
+[[nodiscard]] double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed, const Vec3& point,
+                                        Vec3* gradient = nullptr);
+
+/// Half-space {(x - point) . normal <= 0}: F = slope ((point - x) . normal), one part. Grounds and walls.
+struct HalfSpace {
+  Vec3 point = Vec3::Zero();     ///< [m]
+  Vec3 normal = Vec3::UnitZ();   ///< unit, outward
+  double slope = 1.0;            ///< |grad F| [1/m], > 0
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const;
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& box) const;
+  [[nodiscard]] Box surface_box() const;
+  [[nodiscard]] double feature_size() const;
+};
+
+}  // namespace supple::implicit

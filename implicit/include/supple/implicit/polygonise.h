@@ -1,0 +1,59 @@
+/// @file supple/implicit/polygonise.h
+/// Surface meshes on a world lattice: node (i, j, k) lies at origin + cell (i, j, k), whatever the object, so that
+/// objects that touch share their nodes. Each cube is cut into six tetrahedra around its main diagonal; vertices lie on
+/// the tetrahedra's edges at the exact root of the field, so the mesh is closed and free of self-intersection by its
+/// case table. Blocks of 8^3 cells that cannot hold surface are skipped by bounds.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "supple/core/executor.h"
+#include "supple/core/mesh.h"
+#include "supple/implicit/field_view.h"
+
+namespace supple::implicit {
+
+struct Lattice {
+  Vec3 origin = Vec3::Zero();  ///< [m]
+  double cell = 0.0;           ///< edge of a cell [m], > 0
+};
+
+struct PolygoniseCounts {
+  std::uint64_t blocks_visited = 0;   ///< blocks evaluated
+  std::uint64_t blocks_present = 0;   ///< blocks of the lattice inside the surface boxes
+  std::uint64_t nodes = 0;            ///< field values taken
+  double residual = 0.0;              ///< largest |F| at a vertex, |F_a - F_b| where two bodies touch
+  std::uint64_t junctions = 0;        ///< points where three or more of bodies and outside meet
+  std::uint64_t junctions_moved = 0;  ///< of these, not exact: the exact point lies beyond its simplex of the lattice
+  std::uint64_t gaps = 0;             ///< edges across a gap between two bodies that is thinner than a cell
+};
+
+/// Coordinates (lowest node / 8) of the 8^3-cell blocks whose bounds admit a sign change of F, in z, y, x order.
+/// @throws Error{Limit} when more than `limit` blocks would have to be looked at.
+[[nodiscard]] std::vector<std::array<std::int32_t, 3>> find_surface_blocks(const FieldView& field,
+                                                                           const Lattice& lattice,
+                                                                           const Executor& executor,
+                                                                           std::uint64_t limit = 4'000'000,
+                                                                           PolygoniseCounts* counts = nullptr);
+
+/// Stage 9 for one body: the closed surface F = 0, outward oriented, with analytic normals.
+[[nodiscard]] Mesh polygonise(const FieldView& field, const Lattice& lattice, const Executor& executor,
+                              PolygoniseCounts* counts = nullptr);
+
+/// Stage 9 for bodies that touch: space is divided by the largest positive field. Mesh m bounds
+/// {F_m > 0, F_m >= F_j for all j}; where two bodies meet, both meshes have bit-equal vertices (on F_a = F_b) and the
+/// same triangles reversed, joined along the rim (F_a = F_b = 0). Where a gap between two bodies is thinner than a cell
+/// (F_a = F_b < 0 on an edge) each body keeps its own vertex, on its own F = 0. Ties go to the lower index.
+/// A vertex on the outer surface has the normal of its own field; inside the contact -+ grad(F_a - F_b).
+/// Every mesh gets a column "contact": index of the other body + 1 on the contact surface and its rim, 0 elsewhere
+/// (where several others meet, the lowest).
+/// Across a gap thinner than a cell each body keeps its own surface (counted). Where a rim leaves the simplex of the
+/// lattice that it belongs to, its vertex stays inside, on F_a = F_b and less than a cell from the rim (counted).
+/// An unbounded body (a ground) shapes the others and gets an empty mesh. @throws Error{Usage} when all are unbounded.
+[[nodiscard]] std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice,
+                                                     const Executor& executor, PolygoniseCounts* counts = nullptr);
+
+}  // namespace supple::implicit

@@ -1,0 +1,219 @@
+#include "field_index.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "supple/core/error.h"
+
+namespace supple::implicit {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Relative widening of reaches: far above the round-off of q, far below anything that costs time.
+constexpr double kSlack = 1e-12;
+
+PackedKind kind_of(const Primitive& p) noexcept {
+  const bool wyvill = p.kernel.kind == KernelKind::Wyvill;
+  switch (p.shape) {
+    case ShapeKind::Point: return wyvill ? PackedKind::PointWyvill : PackedKind::PointGascuel;
+    case ShapeKind::Disc: return wyvill ? PackedKind::DiscWyvill : PackedKind::DiscGascuel;
+    default: return wyvill ? PackedKind::SlabWyvill : PackedKind::SlabGascuel;
+  }
+}
+
+void pack(const Primitive& p, const Vec3& position, const Mat3& rotation, PackedPrimitive& packed, PackedShape& shape,
+          RoundedBox& rounded) noexcept {
+  const double R = p.kernel.radius;
+  packed.position = {position.x(), position.y(), position.z()};
+  packed.inverse_r2 = 1.0 / (R * R);
+  packed.gradient_factor = -6.0 / (R * R);
+  packed.kind = kind_of(p);
+  packed.part = p.part;
+
+  Mat3 A = rotation.transpose();
+  Vec3 half = Vec3::Zero();       // of the flat part, primitive frame
+  Vec3 core_half = Vec3::Zero();  // world half extents of what the support is a rounding of
+  double reach = R;
+  shape.distance_scale = 1.0;
+  shape.scales = p.shape == ShapeKind::Ellipsoid;
+  switch (p.shape) {
+    case ShapeKind::Point: break;
+    case ShapeKind::Segment: half = {p.size.x(), 0.0, 0.0}; break;
+    case ShapeKind::Rectangle: half = {p.size.x(), p.size.y(), 0.0}; break;
+    case ShapeKind::Box: half = p.size; break;
+    case ShapeKind::Disc:
+      half = {p.size.x(), 0.0, 0.0};
+      core_half = rotation.leftCols<2>().rowwise().norm() * p.size.x();
+      break;
+    case ShapeKind::Ellipsoid: {
+      // By Minkowski's inequality the ellipsoid lies within its least semi-axis b of the one with semi-axes size - b.
+      reach = p.size.minCoeff();
+      shape.distance_scale = R / reach;
+      core_half = (rotation * (p.size - Vec3::Constant(reach)).asDiagonal()).rowwise().norm();
+      A = (R * p.size.cwiseInverse()).asDiagonal() * rotation.transpose();
+      break;
+    }
+  }
+  if (p.shape != ShapeKind::Disc && p.shape != ShapeKind::Ellipsoid) core_half = rotation.cwiseAbs() * half;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) shape.to_local[static_cast<std::size_t>(3 * i + j)] = A(i, j);
+    const double slack = kSlack * (core_half.maxCoeff() + R) + 1e-15 * std::abs(position[i]);
+    rounded.lower[static_cast<std::size_t>(i)] = position[i] - core_half[i] - slack * (core_half[i] > 0.0);
+    rounded.upper[static_cast<std::size_t>(i)] = position[i] + core_half[i] + slack * (core_half[i] > 0.0);
+    shape.half[static_cast<std::size_t>(i)] = half[i];
+  }
+  rounded.reach2 = reach * reach * (1.0 + 4.0 * kSlack);
+  shape.kernel = p.kernel;
+  shape.peak = 1.0;
+  if (p.kernel.kind == KernelKind::Gascuel) {
+    const double w = R - p.kernel.thickness;
+    shape.outer_square = p.kernel.iso / (w * w);
+    shape.outer_cubic = (2.0 * p.kernel.iso / w - p.kernel.slope) / (w * w);
+    shape.peak = p.kernel.iso + p.kernel.slope * p.kernel.thickness;
+  }
+  shape.lipschitz = shape.distance_scale * lipschitz(p.kernel);
+}
+
+double feature_of(const Primitive& p) noexcept {
+  const Kernel& k = p.kernel;
+  const double kernel = k.kind == KernelKind::Wyvill ? k.radius : std::min(k.thickness, k.radius - k.thickness);
+  return p.shape == ShapeKind::Ellipsoid ? kernel * (p.size.minCoeff() / k.radius) : kernel;
+}
+
+/// The ten bits of x, two zeros between each and the next.
+std::uint32_t spread_bits(std::uint32_t x) noexcept {
+  x = (x | (x << 16)) & 0x030000ffu;
+  x = (x | (x << 8)) & 0x0300f00fu;
+  x = (x | (x << 4)) & 0x030c30c3u;
+  return (x | (x << 2)) & 0x09249249u;
+}
+
+void set_box(NodePack& pack, std::size_t slot, const Box& box) noexcept {
+  for (int k = 0; k < 3; ++k) {
+    pack.lower[k][slot] = box.lower[k];
+    pack.upper[k][slot] = box.upper[k];
+  }
+}
+
+}  // namespace
+
+void Field::Index::build_leaves() {
+  const std::size_t n = size();
+  order.resize(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = static_cast<std::uint32_t>(i);
+  if (n > kScanLimit) {
+    Box all;
+    for (const Box& box : support) all.include(box.centre());
+    const Vec3 scale = all.extent().unaryExpr([](double e) { return e > 0.0 ? 1023.0 / e : 0.0; });
+    code.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3 cell = (support[i].centre() - all.lower).cwiseProduct(scale);
+      code[i] = spread_bits(static_cast<std::uint32_t>(cell.x())) |
+                (spread_bits(static_cast<std::uint32_t>(cell.y())) << 1) |
+                (spread_bits(static_cast<std::uint32_t>(cell.z())) << 2);
+    }
+    // Stable radix sort, so that equal codes stay in id order.
+    order_swap.resize(n);
+    for (std::uint32_t shift = 0; shift < 30; shift += 10) {
+      std::array<std::uint32_t, 1025> start{};
+      for (std::size_t i = 0; i < n; ++i) ++start[((code[i] >> shift) & 1023u) + 1];
+      for (std::size_t b = 0; b < 1024; ++b) start[b + 1] += start[b];
+      for (std::size_t i = 0; i < n; ++i) order_swap[start[(code[order[i]] >> shift) & 1023u]++] = order[i];
+      order.swap(order_swap);
+    }
+  }
+  leaf.resize((n + kPack - 1) / kPack);
+  for (std::size_t i = 0; i < leaf.size() * kPack; ++i) {
+    LeafPack& pack = leaf[i / kPack];
+    if (i < n) {
+      set_slot(pack, i % kPack, rounded[order[i]], order[i]);
+      pack.inverse_r2[i % kPack] = primitive[order[i]].inverse_r2;
+    } else {
+      clear_slot(pack, i % kPack);
+    }
+  }
+}
+
+void Field::Index::build_levels() {
+  level_count = 0;
+  const std::size_t n = size();
+  if (n <= kScanLimit) return;
+  struct Sums {
+    double peak, lipschitz;
+  };
+  const auto leaf_sums = [&](std::size_t l) {
+    Sums sums{0.0, 0.0};
+    for (std::size_t i = l * kPack; i < std::min(n, (l + 1) * kPack); ++i) {
+      const PackedShape& s = shape[order[i]];
+      sums.peak += s.peak;
+      sums.lipschitz += s.lipschitz;
+    }
+    return sums;
+  };
+  leaf_box.assign(leaf.size(), Box{});
+  for (std::size_t i = 0; i < n; ++i) leaf_box[i / kPack] = leaf_box[i / kPack].united(support[order[i]]);
+  std::vector<Box>* below = &leaf_box;
+  std::vector<Box>* above = &box_swap;
+  while (below->size() > 1 || level_count == 0) {
+    if (level.size() == level_count) level.emplace_back();
+    std::vector<NodePack>& nodes = level[level_count];
+    const std::size_t count = below->size();
+    nodes.resize((count + kPack - 1) / kPack);
+    above->assign(nodes.size(), Box{});
+    for (std::size_t i = 0; i < nodes.size() * kPack; ++i) {
+      NodePack& node = nodes[i / kPack];
+      const std::size_t slot = i % kPack;
+      if (i >= count) {
+        set_box(node, slot, Box{});
+        node.peak[slot] = 0.0;
+        node.lipschitz[slot] = 0.0;
+        continue;
+      }
+      set_box(node, slot, (*below)[i]);
+      (*above)[i / kPack] = (*above)[i / kPack].united((*below)[i]);
+      Sums sums{0.0, 0.0};
+      if (level_count == 0) {
+        sums = leaf_sums(i);
+      } else {
+        const NodePack& child = level[level_count - 1][i];
+        for (std::size_t s = 0; s < kPack; ++s) {
+          sums.peak += child.peak[s];
+          sums.lipschitz += child.lipschitz[s];
+        }
+      }
+      node.peak[slot] = sums.peak;
+      node.lipschitz[slot] = sums.lipschitz;
+    }
+    std::swap(below, above);
+    ++level_count;
+  }
+}
+
+void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& field) {
+  const std::size_t n = skeleton.primitive.size();
+  SUPPLE_EXPECTS(placed.position.size() == n && placed.rotation.size() == n && placed.support.size() == n);
+  if (!field.index_) field.index_ = std::make_unique<Field::Index>();
+  Field::Index& index = *field.index_;
+  index.iso = skeleton.iso;
+  index.primitive.resize(n);
+  index.shape.resize(n);
+  index.rounded.resize(n);
+  index.support.assign(placed.support.begin(), placed.support.end());
+  index.feature_size = kInfinity;
+  index.uniform = true;
+  index.surface_box.reset();
+  double extent = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    pack(skeleton.primitive[i], placed.position[i], placed.rotation[i], index.primitive[i], index.shape[i],
+         index.rounded[i]);
+    index.feature_size = std::min(index.feature_size, feature_of(skeleton.primitive[i]));
+    index.uniform = index.uniform && index.primitive[i].kind == index.primitive[0].kind;
+    extent += placed.support[i].extent().sum();
+  }
+  index.typical_extent = n > 0 ? extent / (3.0 * static_cast<double>(n)) : 0.0;
+  index.build_leaves();
+  index.build_levels();
+}
+
+}  // namespace supple::implicit

@@ -1,0 +1,113 @@
+/// @file field_index.h
+/// What a Field holds: the primitives packed for evaluation, and a packed 8-ary hierarchy of bounding boxes over them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "supple/implicit/field.h"
+
+namespace supple::implicit {
+
+/// Shapes as the evaluation tells them apart. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
+/// the vector from the foot point is v = y - clamp(y, -half, half) and q = |v|^2. For an ellipsoid half = 0 and
+/// A = R D^-1 Q^T, otherwise A = Q^T.
+enum class PackedKind : std::uint32_t { PointWyvill, PointGascuel, SlabWyvill, SlabGascuel, DiscWyvill, DiscGascuel };
+
+/// What the hot loop reads of a primitive; one cache line.
+struct alignas(64) PackedPrimitive {
+  std::array<double, 3> position{};  ///< p [m]
+  double inverse_r2 = 0.0;           ///< 1 / R^2 [1/m^2]
+  double gradient_factor = 0.0;      ///< Wyvill: -6 / R^2, so that grad f = factor t^2 A^T v
+  PackedKind kind = PackedKind::PointWyvill;
+  std::uint32_t part = 0;
+};
+
+/// What all but Wyvill points need besides.
+struct PackedShape {
+  std::array<double, 9> to_local{};  ///< A, row by row
+  std::array<double, 3> half{};      ///< [m]; a disc keeps its radius in half[0]
+  Kernel kernel;
+  double outer_cubic = 0.0;     ///< Gascuel: iso D
+  double outer_square = 0.0;    ///< Gascuel: iso / (R - e)^2
+  double distance_scale = 1.0;  ///< largest |grad d|: 1, or R / smallest semi-axis of an ellipsoid
+  double peak = 0.0;            ///< f(0)
+  double lipschitz = 0.0;       ///< largest |grad f| [1/m]
+  bool scales = false;          ///< level sets are scaled copies of each other (ellipsoid), not offsets
+};
+
+/// The support of a primitive, {f > 0}, lies within `reach` of the box [lower, upper]; a point's box is the point.
+struct alignas(64) RoundedBox {
+  std::array<double, 3> lower{};
+  std::array<double, 3> upper{};
+  double reach2 = 0.0;  ///< reach^2, a little more than exact [m^2]
+};
+
+inline constexpr std::size_t kPack = 8;
+
+/// Eight rounded boxes side by side; unused slots have reach2 < 0 and never match.
+struct alignas(64) LeafPack {
+  double lower[3][kPack];
+  double upper[3][kPack];
+  double reach2[kPack];
+  double inverse_r2[kPack];  ///< of the kernel; only where the hierarchy's own leaves are read for bounds
+  std::uint32_t id[kPack];
+};
+
+/// Boxes of eight packs of the level below; unused slots are empty.
+struct alignas(64) NodePack {
+  double lower[3][kPack];
+  double upper[3][kPack];
+  double peak[kPack];       ///< sum of f(0) below
+  double lipschitz[kPack];  ///< sum of the largest |grad f| below
+};
+
+struct Field::Index {
+  /// Up to this many primitives, all leaves are scanned in id order and there are no nodes.
+  static constexpr std::size_t kScanLimit = 64;
+
+  double iso = 0.5;
+  double feature_size = 0.0;
+  double typical_extent = 0.0;  ///< mean edge of the supports' boxes [m]
+  bool cull = true;
+  bool uniform = true;          ///< all primitives are of one kind
+  std::vector<PackedPrimitive> primitive;  ///< by id
+  std::vector<PackedShape> shape;          ///< by id
+  std::vector<RoundedBox> rounded;         ///< by id
+  std::vector<Box> support;                ///< by id
+  std::vector<LeafPack> leaf;              ///< by id up to kScanLimit primitives, else along a Morton curve
+  std::vector<std::vector<NodePack>> level;  ///< level[0] bounds the leaves, level[l + 1] bounds level[l]
+  std::size_t level_count = 0;
+
+  // The surface box, sought when it is first asked for; contact asks every step, other uses never.
+  mutable std::mutex surface_box_mutex;
+  mutable std::optional<Box> surface_box;
+
+  // Scratch of the build, kept for its capacity.
+  std::vector<std::uint32_t> order, order_swap;
+  std::vector<std::uint32_t> code;
+  std::vector<Box> leaf_box, box_swap;
+
+  [[nodiscard]] std::size_t size() const noexcept { return primitive.size(); }
+  void build_leaves();
+  void build_levels();
+};
+
+/// One rounded box as slot of a pack.
+inline void set_slot(LeafPack& pack, std::size_t slot, const RoundedBox& box, std::uint32_t id) noexcept {
+  for (std::size_t k = 0; k < 3; ++k) {
+    pack.lower[k][slot] = box.lower[k];
+    pack.upper[k][slot] = box.upper[k];
+  }
+  pack.reach2[slot] = box.reach2;
+  pack.inverse_r2[slot] = 0.0;
+  pack.id[slot] = id;
+}
+inline void clear_slot(LeafPack& pack, std::size_t slot) noexcept {
+  set_slot(pack, slot, RoundedBox{.lower = {}, .upper = {}, .reach2 = -1.0}, 0);
+}
+
+}  // namespace supple::implicit

@@ -1,0 +1,313 @@
+// Interfaces between labels are made once, as triangles between two labels, and given to both bodies. A tetrahedron with
+// two labels is cut as for one body. With three or four labels, its faces are divided around their face points and the
+// interfaces are the cones over those segments from an interior point: faces of a subdivision of the tetrahedron, so
+// they cannot intersect.
+
+#include "polygonise_partition.h"
+
+#include <algorithm>
+
+#include "polygonise_block_edges.h"
+#include "polygonise_blocks.h"
+#include "supple/core/error.h"
+#include "supple/implicit/polygonise.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace lattice;
+
+constexpr std::size_t kBlocksPerTask = 16;
+
+/// A triangle facing from body `inner` into label `outer`; vertices are numbered over all blocks.
+struct Facet {
+  Label inner = 0, outer = 0;
+  std::array<std::uint32_t, 3> vertex{};
+};
+
+struct BodyCount {
+  std::uint32_t body = 0;
+  std::uint64_t count = 0;
+  std::uint64_t first = 0;  ///< index of the first one in the body's mesh
+};
+
+struct FacetPart {
+  std::vector<Facet> facet;
+  std::vector<BodyCount> body;
+};
+
+BodyCount& count_of(std::vector<BodyCount>& counts, std::uint32_t body) {
+  for (BodyCount& c : counts) {
+    if (c.body == body) return c;
+  }
+  return counts.emplace_back(BodyCount{.body = body});
+}
+
+const BlockCoord& coord_of(const LabelledBlock& block) { return block.coord; }
+
+/// Writes the facets of one block.
+class FacetMaker {
+ public:
+  FacetMaker(std::span<const LabelledBlock> blocks, std::size_t self, std::span<const std::uint8_t> has_mesh,
+             std::vector<Facet>& out)
+      : blocks_(blocks), block_(blocks[self]), has_mesh_(has_mesh),
+        neighbour_(upper_neighbours(blocks, self, coord_of)), out_(out),
+        next_interior_(block_.first_vertex + block_.edge_count + static_cast<std::uint32_t>(block_.face_key.size())) {}
+
+  void run() {
+    for_all_cells([&](const Cell& cell) {
+      const Label first = block_.label[cell.node(0)];
+      bool uniform = true;
+      for (unsigned corner = 1; corner < 8 && uniform; ++corner) uniform = block_.label[cell.node(corner)] == first;
+      if (uniform) return;
+      for (std::size_t t = 0; t < kTetrahedra.size(); ++t) cut(cell, t);
+    });
+  }
+
+ private:
+  void cut(const Cell& cell, std::size_t t) {
+    std::array<Label, 4> label{};
+    LabelSet labels;
+    for (std::size_t v = 0; v < 4; ++v) {
+      label[v] = block_.label[cell.node(kTetrahedra[t][v])];
+      labels.insert(label[v]);
+    }
+    if (labels.count == 1) return;
+    if (labels.count > 2) {
+      cone(cell, t, label);
+      return;
+    }
+    const auto [low, high] = std::pair(labels.label[0], labels.label[1]);
+    if (!wanted(low, high)) return;
+    unsigned inside = 0;
+    for (unsigned v = 0; v < 4; ++v) inside |= (label[v] == high ? 1u : 0u) << v;
+    const TetCase& tet = kTetCases[t][inside];
+    for (std::size_t k = 0; k < tet.count; ++k) {
+      std::array<std::uint32_t, 3> vertex{};
+      for (std::size_t v = 0; v < 3; ++v) vertex[v] = edge_vertex(cell, t, tet.triangle[k][v]);
+      add(high, low, vertex);
+    }
+  }
+
+  /// Facets of a tetrahedron with three or four labels.
+  void cone(const Cell& cell, std::size_t t, const std::array<Label, 4>& label) {
+    const auto& chain = kTetrahedra[t];
+    const std::uint32_t apex = next_interior_++;
+    const auto corner = [&](std::size_t v) { return detail::corner_point(chain[v]); };
+    // Reference positions, times twelve: centroids of the tetrahedron, of a face, of an edge.
+    const auto centroid = [&](std::initializer_list<std::size_t> vertices) {
+      detail::Point p{};
+      for (const std::size_t v : vertices) p = detail::sum(p, corner(v));
+      return detail::scaled(12 / static_cast<int>(vertices.size()), p);
+    };
+    const detail::Point top = centroid({0, 1, 2, 3});
+    // The segment from point p to the vertex of edge (from, to), as facet that faces from `from` to `to`.
+    const auto facet = [&](std::uint32_t p, const detail::Point& p_at, std::size_t from, std::size_t to) {
+      if (!wanted(label[from], label[to])) return;
+      const std::uint32_t e = edge_vertex(cell, t, tet_edge(from, to));
+      const detail::Point to_p = detail::difference(p_at, top);
+      const detail::Point to_e = detail::difference(centroid({from, to}), top);
+      const bool faces_to = detail::triple(detail::difference(detail::scaled(12, corner(to)), top), to_p, to_e) > 0;
+      add(label[from], label[to], faces_to ? std::array{apex, p, e} : std::array{apex, e, p});
+    };
+    for (std::size_t opposite = 0; opposite < 4; ++opposite) {
+      std::array<std::size_t, 3> v{};
+      for (std::size_t k = 0, n = 0; k < 4; ++k) {
+        if (k != opposite) v[n++] = k;
+      }
+      const bool same01 = label[v[0]] == label[v[1]], same02 = label[v[0]] == label[v[2]],
+                 same12 = label[v[1]] == label[v[2]];
+      if (same01 && same02) continue;
+      if (!same01 && !same02 && !same12) {
+        const std::uint32_t p = face_vertex(cell, chain[v[0]], chain[v[1]], chain[v[2]]);
+        const detail::Point at = centroid({v[0], v[1], v[2]});
+        facet(p, at, v[0], v[1]);
+        facet(p, at, v[0], v[2]);
+        facet(p, at, v[1], v[2]);
+        continue;
+      }
+      const std::size_t alone = same01 ? v[2] : same02 ? v[1] : v[0];
+      const std::size_t a = alone == v[0] ? v[1] : v[0], b = alone == v[2] ? v[1] : v[2];
+      if (!wanted(label[a], label[alone])) continue;
+      facet(edge_vertex(cell, t, tet_edge(a, alone)), centroid({a, alone}), b, alone);
+    }
+  }
+
+  static std::size_t tet_edge(std::size_t a, std::size_t b) { return static_cast<std::size_t>(kTetEdgeOf[a][b]); }
+
+  [[nodiscard]] const LabelledBlock& owner(const OwnedNode& node) const {
+    const std::int64_t at = neighbour_[node.neighbour];
+    if (at < 0) missing(node);
+    return blocks_[static_cast<std::size_t>(at)];
+  }
+  [[noreturn]] void missing(const OwnedNode& node) const {
+    BlockCoord coord = block_.coord;
+    for (std::size_t k = 0; k < 3; ++k) coord[k] += static_cast<std::int32_t>(node.neighbour >> k & 1u);
+    throw_missing_block(coord);
+  }
+  static OwnedNode owned(const Cell& cell, unsigned corner) {
+    return {cell.x + static_cast<int>(corner & 1u), cell.y + static_cast<int>(corner >> 1 & 1u),
+            cell.z + static_cast<int>(corner >> 2 & 1u)};
+  }
+
+  [[nodiscard]] std::uint32_t edge_vertex(const Cell& cell, std::size_t t, std::size_t edge) const {
+    const auto [corner, mask] = kCellEdge[cell_edge(t, edge)];
+    const OwnedNode node = owned(cell, corner);
+    const LabelledBlock& block = owner(node);
+    const std::size_t row = EdgeSet::row_of(node.y, node.z, mask);
+    if (!block.edges.contains(row, node.x)) missing(node);
+    return block.first_vertex + block.edges.rank(row, node.x);
+  }
+  [[nodiscard]] std::uint32_t face_vertex(const Cell& cell, unsigned a, unsigned b, unsigned c) const {
+    const OwnedNode node = owned(cell, a);
+    const LabelledBlock& block = owner(node);
+    const std::uint16_t key = face_key({node.x, node.y, node.z}, kFaceOf[a ^ b][b ^ c]);
+    const auto at = std::lower_bound(block.face_key.begin(), block.face_key.end(), key);
+    if (at == block.face_key.end() || *at != key) missing(node);
+    return block.first_vertex + block.edge_count + static_cast<std::uint32_t>(at - block.face_key.begin());
+  }
+
+  /// Does a body with a mesh lie on one side? Blocks beside other interfaces need not exist.
+  [[nodiscard]] bool wanted(Label a, Label b) const {
+    return (a != 0 && has_mesh_[a - 1] != 0) || (b != 0 && has_mesh_[b - 1] != 0);
+  }
+
+  void add(Label from, Label to, std::array<std::uint32_t, 3> vertex) {
+    if (from == 0) {
+      std::swap(from, to);
+      std::swap(vertex[1], vertex[2]);
+    }
+    out_.push_back({.inner = from, .outer = to, .vertex = vertex});
+  }
+
+  std::span<const LabelledBlock> blocks_;
+  const LabelledBlock& block_;
+  std::span<const std::uint8_t> has_mesh_;
+  std::array<std::int64_t, 8> neighbour_;
+  std::vector<Facet>& out_;
+  std::uint32_t next_interior_;  ///< interior points are numbered in the order in which tetrahedra are cut
+};
+
+/// All vertices, in block order, and how bodies number those they use.
+struct AllVertices {
+  std::vector<LabelledBlock> block;
+  std::vector<std::uint32_t> use_end;
+  std::vector<VertexUse> use;
+
+  [[nodiscard]] const VertexUse& use_of(std::uint32_t vertex, std::uint32_t body) const {
+    std::uint32_t u = vertex == 0 ? 0 : use_end[vertex - 1];
+    while (use[u].body != body) ++u;
+    return use[u];
+  }
+};
+
+/// Calls use(body, vertex) for both sides of a facet that get a mesh.
+template <class Use>
+void for_sides(const Facet& facet, std::span<const std::uint8_t> has_mesh, const Use& use) {
+  const auto& v = facet.vertex;
+  if (has_mesh[facet.inner - 1] != 0) use(facet.inner - 1, std::array{v[0], v[1], v[2]});
+  if (facet.outer != 0 && has_mesh[facet.outer - 1] != 0) use(facet.outer - 1, std::array{v[0], v[2], v[1]});
+}
+
+AllVertices join(std::vector<PartitionVertices>& parts, std::vector<std::uint32_t>& vertex_count,
+                 const Lattice& lattice, PolygoniseCounts& counts) {
+  AllVertices all;
+  std::uint64_t vertices = 0, uses = 0;
+  for (PartitionVertices& part : parts) {
+    for (LabelledBlock& block : part.block) {
+      block.first_vertex += static_cast<std::uint32_t>(vertices);
+      all.block.push_back(std::move(block));
+    }
+    vertices += part.use_end.size();
+    expect_indexable(vertices + uses + part.use.size(), lattice);
+    for (const std::uint32_t end : part.use_end) all.use_end.push_back(end + static_cast<std::uint32_t>(uses));
+    uses += part.use.size();
+    for (VertexUse& use : part.use) use.local = vertex_count[use.body]++;
+    all.use.insert(all.use.end(), part.use.begin(), part.use.end());
+    counts.nodes += part.counts.nodes;
+    counts.residual = std::max(counts.residual, part.counts.residual);
+    counts.junctions += part.counts.junctions;
+    counts.junctions_moved += part.counts.junctions_moved;
+    counts.gaps += part.counts.gaps;
+    part = {};
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice,
+                                       const Executor& executor, PolygoniseCounts* counts) {
+  PolygoniseCounts local;
+  PolygoniseCounts& count = counts != nullptr ? *counts : local;
+  count = {};
+  std::vector<Box> surface;
+  std::vector<std::uint8_t> has_mesh;
+  for (const FieldView& field : fields) {
+    surface.push_back(field.surface_box());
+    has_mesh.push_back(surface.back().empty() || is_bounded(surface.back()) ? 1 : 0);
+  }
+  if (!fields.empty() && std::count(has_mesh.begin(), has_mesh.end(), 1) == 0) {
+    (void)block_range(surface.front(), lattice, 1);  // refuses it
+  }
+  const BlockList list = find_label_blocks(fields, surface, lattice, executor, kBlockLimit, count);
+  count.blocks_visited = list.block.size();
+
+  std::vector<PartitionVertices> parts((list.block.size() + kBlocksPerTask - 1) / kBlocksPerTask);
+  executor.for_blocks(list.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    Labeller labeller(fields, has_mesh, lattice);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::span candidates(list.candidate.data() + list.offset[i], list.offset[i + 1] - list.offset[i]);
+      labeller.take_block(list.block[i], candidates, parts[begin / kBlocksPerTask]);
+    }
+  });
+  std::vector<std::uint32_t> vertex_count(fields.size());
+  const AllVertices all = join(parts, vertex_count, lattice, count);
+
+  std::vector<FacetPart> facets((all.block.size() + kBlocksPerTask - 1) / kBlocksPerTask);
+  executor.for_blocks(all.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    FacetPart& part = facets[begin / kBlocksPerTask];
+    for (std::size_t i = begin; i < end; ++i) FacetMaker(all.block, i, has_mesh, part.facet).run();
+    for (const Facet& facet : part.facet) {
+      for_sides(facet, has_mesh, [&](std::uint32_t body, const auto&) { ++count_of(part.body, body).count; });
+    }
+  });
+
+  std::vector<Mesh> meshes(fields.size());
+  std::vector<std::uint64_t> triangle_count(fields.size());
+  for (FacetPart& part : facets) {
+    for (BodyCount& body : part.body) {
+      body.first = triangle_count[body.body];
+      triangle_count[body.body] += body.count;
+    }
+  }
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    meshes[m].position.resize(vertex_count[m]);
+    meshes[m].normal.resize(vertex_count[m]);
+    meshes[m].columns.push_back({.name = "contact", .values = std::vector<double>(vertex_count[m])});
+    meshes[m].triangle.resize(triangle_count[m]);
+  }
+  constexpr std::size_t kVerticesPerTask = 4096;
+  executor.for_blocks(all.use_end.size(), kVerticesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin, u = begin == 0 ? 0 : all.use_end[begin - 1]; i < end; ++i) {
+      for (; u < all.use_end[i]; ++u) {
+        const VertexUse& use = all.use[u];
+        meshes[use.body].position[use.local] = use.position;
+        meshes[use.body].normal[use.local] = use.normal;
+        meshes[use.body].columns[0].values[use.local] = use.contact;
+      }
+    }
+  });
+  executor.for_blocks(facets.size(), 1, [&](std::size_t p, std::size_t) {
+    FacetPart& part = facets[p];
+    for (const Facet& facet : part.facet) {
+      for_sides(facet, has_mesh, [&](std::uint32_t body, const std::array<std::uint32_t, 3>& v) {
+        std::uint64_t& next = count_of(part.body, body).first;
+        meshes[body].triangle[next++] = {all.use_of(v[0], body).local, all.use_of(v[1], body).local, all.use_of(v[2], body).local};
+      });
+    }
+  });
+  return meshes;
+}
+
+}  // namespace supple::implicit

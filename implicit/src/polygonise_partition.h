@@ -1,0 +1,118 @@
+/// @file polygonise_partition.h
+/// Space divided by the largest positive field, block by block: labels of the nodes and the vertices that follow from
+/// them. Label 0 is outside, label m + 1 is body m.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "polygonise_junctions.h"
+#include "polygonise_lattice.h"
+#include "polygonise_roots.h"
+
+namespace supple::implicit::lattice {
+
+/// A cell of a block by its lowest node.
+struct Cell {
+  int x = 0, y = 0, z = 0;
+  [[nodiscard]] std::size_t node(unsigned corner) const {
+    return static_cast<std::size_t>(node_index(x, y, z) + node_stride(corner));
+  }
+};
+
+template <class Use>
+void for_all_cells(const Use& use) {
+  for (int z = 0; z < kCells; ++z) {
+    for (int y = 0; y < kCells; ++y) {
+      for (int x = 0; x < kCells; ++x) use(Cell{x, y, z});
+    }
+  }
+}
+
+/// Number of a face point among those that a block can own: in the order of cells, then faces.
+[[nodiscard]] inline std::uint16_t face_key(const Cell& base, std::size_t face) {
+  return static_cast<std::uint16_t>(static_cast<std::size_t>((base.z * kCells + base.y) * kCells + base.x) * kFaces +
+                                    face);
+}
+
+[[nodiscard]] inline LabelSet labels_of(std::span<const Label> labels) {
+  LabelSet set;
+  for (const Label l : labels) set.insert(l);
+  return set;
+}
+
+/// A vertex as one body sees it.
+struct VertexUse {
+  std::uint32_t body = 0;
+  std::uint32_t contact = 0;  ///< other body + 1, or 0
+  std::uint32_t local = 0;    ///< index in the body's mesh
+  Vec3 normal = Vec3::Zero();
+  Vec3 position = Vec3::Zero();  ///< bit-equal for all bodies of a contact; each body's own across a gap
+};
+
+/// A block where labels meet. It owns the vertices of its edges, then its face points, then its interior points.
+struct LabelledBlock {
+  BlockCoord coord{};
+  EdgeSet edges;
+  std::uint32_t edge_count = 0;
+  std::vector<std::uint16_t> face_key;   ///< of its face points, ascending
+  std::vector<Label> label;              ///< of its nodes, shape [kBlockNodes]
+  bool has_junctions = false;            ///< three or more labels in the block
+  std::uint32_t first_vertex = 0;        ///< within its task, then over all blocks
+};
+
+/// Vertices of the blocks of one task; those of a block follow each other.
+struct PartitionVertices {
+  std::vector<LabelledBlock> block;
+  std::vector<std::uint32_t> use_end;  ///< uses of vertex i end here and begin where those of i - 1 end
+  std::vector<VertexUse> use;
+  PolygoniseCounts counts;
+};
+
+/// Finds labels and vertices of blocks; one a task.
+class Labeller {
+ public:
+  /// @param has_mesh  by body: 0 when only the others' meshes are wanted
+  Labeller(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, const Lattice& lattice)
+      : fields_(fields), has_mesh_(has_mesh), lattice_(lattice) {}
+
+  /// @param candidates  bodies that can be the label of a node here, ascending
+  void take_block(const BlockCoord& coord, std::span<const std::uint32_t> candidates, PartitionVertices& out);
+
+ private:
+  struct EdgeVertex {
+    Label low, high;  ///< its labels, ascending
+    Vec3 point, gradient;
+    bool gap = false;  ///< two bodies, and F_low = F_high < 0: a gap thinner than a cell lies between them
+  };
+
+  void label_nodes();
+  void mark_edges(LabelledBlock& block);
+  void solve_edges(const LabelledBlock& block, Label low, Label high, PartitionVertices& out);
+  void add_edge_vertices(const LabelledBlock& block, PartitionVertices& out);
+  void add_junctions(LabelledBlock& block, PartitionVertices& out);
+  void add_junction(const Cell& cell, const std::array<std::uint8_t, 4>& chain, std::uint8_t size,
+                    const LabelSet& labels, PartitionVertices& out);
+  [[nodiscard]] Vec3 crossing(std::size_t node_a, std::size_t node_b) const;
+  [[nodiscard]] Vec3 own_root(Label label, const Vec3& inside, const Vec3& outside) const;
+  [[nodiscard]] Vec3 own_junction(Label label, const Cell& cell, std::span<const std::uint8_t> chain,
+                                  const Vec3& shared) const;
+  [[nodiscard]] Vec3 own_normal(Label label, const Vec3& point, const Vec3& fallback) const;
+  [[nodiscard]] std::size_t slot_of(Label label) const;
+  [[nodiscard]] double value(std::size_t slot, std::size_t node) const { return values_[slot * kBlockNodes + node]; }
+
+  std::span<const FieldView> fields_;
+  std::span<const std::uint8_t> has_mesh_;
+  Lattice lattice_;
+  // Of the current block.
+  std::span<const std::uint32_t> candidates_;
+  std::array<Vec3, kBlockNodes> nodes_;
+  std::array<Label, kBlockNodes> label_{};
+  std::vector<double> values_, scale_;  ///< by candidate
+  std::vector<EdgeVertex> edge_vertex_;
+  EdgeRoots roots_;
+};
+
+}  // namespace supple::implicit::lattice

@@ -1,0 +1,39 @@
+/// @file supple/render/image.h
+/// 8-bit sRGB images and what is made of them: PNG files, contact sheets, films.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace supple::render {
+
+/// RGB, 3 bytes a pixel, rows from top to bottom.
+struct Image {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> pixels;  ///< shape [height][width][3]
+};
+
+/// Writes a PNG (sRGB chunk, text chunks for `software`) by temporary file and rename. @throws Error{Io}
+void write_png(const std::filesystem::path& path, const Image& image);
+/// Reads an 8-bit RGB or RGBA PNG (alpha dropped). @throws Error{Io}, Error{Corrupt}
+[[nodiscard]] Image read_png(const std::filesystem::path& path);
+
+/// Averages boxes of pixels down to `width` (height in proportion), in linear light. @pre 1 <= width <= image.width
+[[nodiscard]] Image downscale(const Image& image, int width);
+/// A grid of equally sized images, `columns` a row, with `gap` pixels of white between and around.
+/// @pre !images.empty(), columns >= 1, gap >= 0
+[[nodiscard]] Image contact_sheet(std::span<const Image> images, int columns, int gap);
+
+/// Encodes frames folder/stem.0001.png ... (first .. last) to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg
+/// program, into a temporary file that is renamed when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names
+/// another program or its path. Odd sizes are stretched to even ones.
+/// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line).
+void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
+                 const std::filesystem::path& film);
+
+}  // namespace supple::render

@@ -1,0 +1,59 @@
+/// @file draw_list.h
+/// What a picture is made of, in the numbers the graphics driver takes: packed vertices, matrices, fitted maps.
+/// Lengths are relative to the point the camera looks at, so that single precision is spent on what is seen.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "supple/render/renderer.h"
+
+namespace supple::render {
+
+/// The triangles of one item: a range of DrawList::indices.
+struct DrawRange {
+  std::size_t first = 0;
+  std::size_t count = 0;
+  std::size_t item = 0;  ///< index of the item it came from
+};
+
+/// All items in one vertex and one index array.
+struct DrawList {
+  std::vector<float> vertices;         ///< position and normal, shape [vertices][6]
+  std::vector<std::uint32_t> indices;  ///< shape [triangles][3]
+  std::vector<DrawRange> ranges;       ///< items that have triangles, in their order
+  Box bounds;                          ///< of all vertices, relative to the origin [m]
+};
+
+/// Fills `list`, reusing its capacity.
+/// @pre every mesh has one normal a vertex, finite positions and valid indices; fewer than 2^32 vertices in all
+void pack(std::span<const Item> items, const Vec3& origin, DrawList& list);
+
+struct CameraMatrices {
+  Eigen::Matrix4f view;             ///< world (relative to the origin) to eye; the eye looks along -z
+  Eigen::Matrix4f view_projection;  ///< world to clip
+  Eigen::Vector3f eye;              ///< relative to the origin [m]
+  Eigen::Vector2f half_extent;      ///< tangents of half the horizontal and half the vertical field of view
+  Eigen::Vector2f depth_range;      ///< near and far plane [m]
+  double distance = 0.0;            ///< from the eye to the point looked at [m]
+};
+
+/// @throws Error{Usage} when the eye is at the point looked at or the field of view is not in (0, pi).
+[[nodiscard]] CameraMatrices camera_matrices(const Camera& camera, double aspect, const Box& bounds);
+
+/// An orthographic map of a box: u, v in [0, 1] across it and w in [0, 1] along the direction of view.
+struct MapFit {
+  Eigen::Matrix4f to_unit;  ///< world (relative to the origin) to (u, v, w)
+  Eigen::Matrix4f to_clip;  ///< the same in clip coordinates
+  Eigen::Matrix4f axes;     ///< rows: the directions of u, v, w
+  Eigen::Vector3f extent;   ///< of the box along u, v, w [m]
+};
+
+/// The map of `bounds` seen along `direction`, `size` texels an edge. Its edges grow in steps and its corner lies on
+/// whole texels, so that the map of a slowly changing box stands still and shadows do not swim from frame to frame.
+[[nodiscard]] MapFit fit_map(const Box& bounds, const Vec3& direction, int size);
+
+/// Linear light of an sRGB colour in [0, 1] (IEC 61966-2-1).
+[[nodiscard]] Eigen::Vector3f linear_colour(const Vec3& srgb);
+
+}  // namespace supple::render

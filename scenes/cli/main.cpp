@@ -1,0 +1,265 @@
+/// The command line tool: parses, calls the library, prints. Nothing lives here that a library user lacks.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "progress_bar.h"
+#include "supple/core/error.h"
+#include "supple/core/hash.h"
+#include "supple/scenes/query.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/run.h"
+
+namespace {
+
+using namespace supple;
+namespace fs = std::filesystem;
+
+constexpr int kUsage = 2;
+constexpr int kInternal = 1;
+
+std::atomic<int> interrupted{0};
+
+void on_signal(int number) { interrupted = number; }
+
+struct Arguments {
+  std::string scene;
+  std::vector<std::string> set;
+  std::string out;
+  std::string frames;
+  std::string progress = "auto";
+  std::string context = "auto";
+  std::string points;
+  std::string state;
+  std::string query;
+  int threads = 0;
+  int cells = 0;
+  double error = 0.0;
+  bool overwrite = false;
+  bool resume = false;
+  bool simulate_only = false;
+  bool profile = false;
+  bool quiet = false;
+  bool samples = false;
+  bool json = false;
+};
+
+void print_profile(const fs::path& folder) {
+  std::printf("stages: see \"stages\" in %s\n", (folder / "result.json").c_str());
+}
+
+int report(const scenes::RunResult& result, const Arguments& arguments) {
+  if (result.outcome != "done") {
+    std::fprintf(stderr, "%s\n", result.reason.c_str());
+    std::fprintf(stderr, "stopped: %s, last good frame %d, %s\n", result.outcome.c_str(), result.frames,
+                 (result.folder / "result.json").c_str());
+    return result.exit_code;
+  }
+  if (!arguments.quiet) {
+    std::printf("frames: %s\n", (result.folder / "frames").c_str());
+    if (!result.film.empty()) std::printf("film:   %s\n", result.film.c_str());
+    std::printf("result: %s (state %s)\n", (result.folder / "result.json").c_str(), to_hex(result.state_hash).c_str());
+    if (arguments.profile) print_profile(result.folder);
+  }
+  return 0;
+}
+
+scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folder, tool::ProgressBar& bar) {
+  scenes::RunOptions options;
+  options.folder = folder;
+  if (!arguments.frames.empty()) options.frames = scenes::parse_frames(arguments.frames);
+  options.threads = arguments.threads;
+  options.overwrite = arguments.overwrite;
+  options.resume = arguments.resume;
+  options.simulate_only = arguments.simulate_only;
+  options.profile = arguments.profile;
+  options.context = arguments.context;
+  options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
+  options.interrupt = &interrupted;
+  return options;
+}
+
+tool::ProgressBar make_bar(const Arguments& arguments) {
+  return tool::ProgressBar(arguments.quiet ? tool::ProgressStyle::None : tool::progress_style(arguments.progress));
+}
+
+scenes::Scene read_for_run(const Arguments& arguments) {
+  try {
+    return scenes::read_scene(arguments.scene, arguments.set);
+  } catch (const Error& error) {
+    const std::string name = fs::path(arguments.scene).stem().string();
+    scenes::leave_failure(arguments.out.empty() ? fs::path("out") / name : fs::path(arguments.out), name, error);
+    throw;
+  }
+}
+
+int run(const Arguments& arguments) {
+  const scenes::Scene scene = read_for_run(arguments);
+  tool::ProgressBar bar = make_bar(arguments);
+  const fs::path folder = arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
+  const scenes::RunResult result = scenes::run_scene(scene, run_options(arguments, folder, bar));
+  bar.finish();
+  return report(result, arguments);
+}
+
+int render(const Arguments& arguments) {
+  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  tool::ProgressBar bar = make_bar(arguments);
+  const fs::path folder = arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
+  const scenes::RunResult result = scenes::render_run(scene, run_options(arguments, folder, bar));
+  bar.finish();
+  return report(result, arguments);
+}
+
+int check(const Arguments& arguments) {
+  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  const scenes::Simulation simulation(scene);
+  if (!arguments.quiet) {
+    std::printf("%s: no fault found (%zu objects, %zu particles, %d frames)\n", arguments.scene.c_str(),
+                scene.objects.size(), simulation.model().particles.size(), scene.frame_count());
+  }
+  return 0;
+}
+
+int explain(const Arguments& arguments) {
+  scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  if (arguments.simulate_only) scene.output = {};
+  std::fputs(scenes::explain(scenes::Simulation(std::move(scene))).c_str(), stdout);
+  return 0;
+}
+
+int query(const Arguments& arguments) {
+  scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  if (arguments.error > 0.0) scene.contact.error = arguments.error;
+  const std::uint64_t fingerprint = scene.content_hash;
+  scenes::Simulation simulation(std::move(scene), {.threads = arguments.threads});
+  if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, fingerprint));
+  std::string answer;
+  if (arguments.query == "forces") {
+    answer = scenes::query_forces(simulation);
+  } else if (arguments.query == "contact") {
+    answer = scenes::query_contact(simulation, arguments.samples);
+  } else if (arguments.query == "field") {
+    if (arguments.points.empty()) {
+      throw Error(ErrorKind::Usage, Fault{.place = "--points",
+                                          .key = {},
+                                          .expected = "expected a CSV file of points for `query field`",
+                                          .found = "none",
+                                          .hint = "supple query field SCENE --points points.csv"});
+    }
+    answer = scenes::query_field(simulation, arguments.points);
+  } else {
+    answer = scenes::query_mesh(simulation, {.cells = arguments.cells, .out = arguments.out});
+  }
+  std::fputs(answer.c_str(), stdout);
+  return 0;
+}
+
+void scene_option(CLI::App* verb, Arguments& a) {
+  verb->add_option("scene", a.scene, "scene file (YAML)")->required();
+  verb->add_option("--set", a.set, "override a key, e.g. --set objects.ball.particles.mass=2")->take_all();
+}
+
+void run_flags(CLI::App* verb, Arguments& a) {
+  scene_option(verb, a);
+  verb->add_option("--out", a.out, "output folder (default: out/NAME)");
+  verb->add_option("--frames", a.frames, "frames to output, e.g. 1-50,60,70-90:2 (default: all)");
+  verb->add_option("--threads", a.threads, "threads (default: all; changes no bit)")->check(CLI::Range(0, 1024));
+  verb->add_option("--progress", a.progress, "auto, bar, plain or none")
+      ->check(CLI::IsMember({"auto", "bar", "plain", "none"}));
+  verb->add_option("--context", a.context, "OpenGL context: auto, osmesa or egl")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}));
+  verb->add_flag("--profile", a.profile, "time every call of every stage");
+  verb->add_flag("--quiet", a.quiet, "print faults only");
+}
+
+int parse_and_call(int argc, char** argv) {
+  Arguments a;
+  CLI::App app("supple: oriented particles, implicit surfaces, exact contact");
+  app.require_subcommand(1);
+  app.footer("Exit codes: 0 done, 1 internal fault, 2 usage, 3 scene invalid, 4 input/output, 5 diverged, 6 limit,\n"
+             "7 corrupt checkpoint, 130/143 interrupted.");
+
+  CLI::App* run_verb = app.add_subcommand("run", "simulate, surface, render and film a scene");
+  run_flags(run_verb, a);
+  run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder");
+  run_verb->add_flag("--resume", a.resume, "continue from the last saved state in the folder");
+  run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
+  run_verb->footer("Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
+
+  CLI::App* render_verb = app.add_subcommand("render", "draw the frames of a run again from its saved states");
+  run_flags(render_verb, a);
+  render_verb->footer("Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
+
+  CLI::App* check_verb = app.add_subcommand("check", "read a scene and report every fault in it");
+  scene_option(check_verb, a);
+  check_verb->add_flag("--quiet", a.quiet, "print faults only");
+  check_verb->footer("Example: supple check my_scene.yaml");
+
+  CLI::App* explain_verb = app.add_subcommand("explain", "print the stages a scene runs, each with the reason");
+  scene_option(explain_verb, a);
+  explain_verb->add_flag("--simulate-only", a.simulate_only, "as if no output were requested");
+  explain_verb->footer("Example: supple explain scenes/library/contacts/two_balls.yaml");
+
+  CLI::App* query_verb = app.add_subcommand("query", "forces, contact, field or mesh of a state, as JSON");
+  query_verb->add_option("what", a.query, "forces, contact, field or mesh")
+      ->required()
+      ->check(CLI::IsMember({"forces", "contact", "field", "mesh"}));
+  scene_option(query_verb, a);
+  query_verb->add_option("--state", a.state, "a saved state instead of the initial one");
+  query_verb->add_option("--points", a.points, "field: CSV of points");
+  query_verb->add_option("--cells", a.cells, "mesh: cells along the longest side")->check(CLI::Range(4, 4096));
+  query_verb->add_option("--out", a.out, "mesh: .ply file or folder to write");
+  query_verb->add_option("--error", a.error, "contact: relative error asked for")->check(CLI::Range(1e-10, 0.1));
+  query_verb->add_option("--threads", a.threads, "threads")->check(CLI::Range(0, 1024));
+  query_verb->add_flag("--samples", a.samples, "contact: every point of the contact surface too");
+  query_verb->add_flag("--json", a.json, "JSON (always; accepted for scripts)");
+  query_verb->footer("Example: supple query contact scenes/library/contacts/two_balls.yaml --error 1e-6");
+
+  CLI::App* reference_verb = app.add_subcommand("reference", "print every key of scene files, with defaults and units");
+  reference_verb->add_flag("--schema", a.json, "as a JSON Schema, for editors");
+  reference_verb->footer("Example: supple reference --schema > supple.schema.json");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error);
+    return kUsage;
+  }
+  if (run_verb->parsed()) return run(a);
+  if (render_verb->parsed()) return render(a);
+  if (check_verb->parsed()) return check(a);
+  if (explain_verb->parsed()) return explain(a);
+  if (reference_verb->parsed()) {
+    std::fputs((a.json ? scenes::scene_json_schema() : scenes::scene_reference()).c_str(), stdout);
+    return 0;
+  }
+  return query(a);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    return parse_and_call(argc, argv);
+  } catch (const supple::Error& error) {
+    std::cout.flush();
+    std::fprintf(stderr, "%s\n", error.what());
+    return static_cast<int>(error.kind());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "internal fault: %s\n", error.what());
+    return kInternal;
+  }
+}

@@ -1,0 +1,54 @@
+/// @file supple/scenes/model.h
+/// A scene turned into what the modules work on: particles, laws, skeletons, contact bodies. Const during a run.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "supple/collision/deformed_field.h"
+#include "supple/collision/react.h"
+#include "supple/core/integrate.h"
+#include "supple/core/interactions.h"
+#include "supple/implicit/field.h"
+#include "supple/implicit/surface_samples.h"
+#include "supple/scenes/scene.h"
+
+namespace supple::scenes {
+
+/// One object: a range of particles and the surface they carry.
+struct ObjectModel {
+  std::string name;
+  std::uint32_t first = 0;                ///< its particles are [first, last)
+  std::uint32_t last = 0;
+  implicit::Skeleton skeleton;            ///< empty: the object has no surface
+  implicit::SampleLayout samples;         ///< empty unless it can touch something
+  collision::ContactMaterial material;
+  bool collides = false;                  ///< has `contact` and a surface
+  double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
+  double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
+};
+
+struct Model {
+  core::ParticleSet particles;
+  core::ParticleState initial;
+  core::ParticleState rest;               ///< rest poses (the initial arrangement)
+  core::Interactions interactions;
+  std::vector<ObjectModel> objects;       ///< in the order of the scene (by name)
+  bool has_ground = false;                ///< the ground collides: it is the last contact body
+  implicit::HalfSpace ground;
+  collision::ContactMaterial ground_material;
+  collision::ContactRules rules;          ///< body index = object index; the ground is objects.size()
+  collision::ContactSettings contact;
+  collision::ReactionSettings reaction;
+  collision::BulgeSettings bulge;
+  double cell = 0.0;                      ///< lattice cell for meshes and grids [m]; 0 when nothing has a surface
+  double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
+  double smallest_length = 0.0;           ///< what a step must resolve: nearest rest distance or iso radius [m]
+  double scene_length = 0.0;              ///< diagonal of everything, for the divergence limits [m]
+};
+
+/// @throws Error{Scene} for what only the whole scene shows (a pair naming an absent object, an iso value that no kernel
+/// reaches, two particles at one place with a bond between them ...), with the key concerned.
+[[nodiscard]] Model build_model(const Scene& scene);
+
+}  // namespace supple::scenes

@@ -1,0 +1,85 @@
+/// @file supple/scenes/plan.h
+/// Which stages a scene runs, decided once, in a table that can be printed (`supple explain`).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "supple/scenes/model.h"
+
+namespace supple::scenes {
+
+/// In the order of one frame. Interact to Integrate run once a step, Polygonise to Export once an output frame.
+enum class Stage : std::uint8_t {
+  Interact,
+  PlaceSkeleton,
+  IndexField,
+  SampleSurface,
+  FindContacts,
+  SolveContactSurface,
+  React,
+  Integrate,
+  Polygonise,
+  Render,
+  Export,
+};
+inline constexpr int kStageCount = 11;
+
+/// What stages read and write, as a bit mask.
+using DataMask = std::uint32_t;
+namespace data {
+inline constexpr DataMask kState = 1u << 0;      ///< particles, kept samples, the ledger
+inline constexpr DataMask kForces = 1u << 1;
+inline constexpr DataMask kSkeleton = 1u << 2;
+inline constexpr DataMask kField = 1u << 3;
+inline constexpr DataMask kSamples = 1u << 4;
+inline constexpr DataMask kPairs = 1u << 5;
+inline constexpr DataMask kContacts = 1u << 6;
+inline constexpr DataMask kMesh = 1u << 7;
+inline constexpr DataMask kImage = 1u << 8;
+}  // namespace data
+
+struct StageInfo {
+  Stage stage;
+  std::string_view name;    ///< of the function, e.g. "find_contacts"
+  std::string_view module;
+  DataMask reads;
+  DataMask writes;
+};
+[[nodiscard]] std::span<const StageInfo> stage_table();
+[[nodiscard]] const StageInfo& info(Stage stage);
+
+/// What a run is asked to leave behind.
+struct OutputRequest {
+  bool images = false;
+  bool film = false;
+  bool meshes = false;
+  bool grids = false;
+  bool contacts = false;
+  bool particles = false;
+};
+/// What the scene's `output` asks for.
+[[nodiscard]] OutputRequest requested_outputs(const Scene& scene);
+
+struct PlannedStage {
+  Stage stage;
+  bool on = false;
+  std::string reason;
+};
+
+struct StepPlan {
+  std::vector<PlannedStage> stages;  ///< all of them, in order
+  [[nodiscard]] bool on(Stage stage) const;
+};
+
+/// Every stage with the reason it is on or off.
+/// @post well_formed(plan)
+[[nodiscard]] StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& outputs);
+
+/// Every stage that is on reads only what State holds or an earlier stage wrote.
+[[nodiscard]] bool well_formed(const StepPlan& plan);
+
+}  // namespace supple::scenes

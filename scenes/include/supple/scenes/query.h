@@ -1,0 +1,31 @@
+/// @file supple/scenes/query.h
+/// Questions about a scene's initial (or a saved) state, answered as JSON text: `supple query WHAT SCENE`.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+/// Force, torque and energy by law, particle by particle; contact included as law "contact".
+[[nodiscard]] std::string query_forces(Simulation& simulation);
+
+/// For each pair: force, moment about the origin, area, centre of pressure, energy, error bound, points, cpu_us.
+[[nodiscard]] std::string query_contact(Simulation& simulation, bool samples);
+
+/// Value, gradient and owner at each point of a CSV file, of each object. @throws Error{Io}, Error{Scene}
+[[nodiscard]] std::string query_field(Simulation& simulation, const std::filesystem::path& points);
+
+struct MeshQuery {
+  int cells = 0;                   ///< cells along the longest side of all surfaces; 0: the scene's cell
+  std::filesystem::path out;       ///< folder or .ply file for the meshes; empty: none
+};
+/// Counts, closed or not, area, volume, cpu_ms, by object. @throws Error{Io}
+[[nodiscard]] std::string query_mesh(Simulation& simulation, const MeshQuery& query);
+
+/// The plan as text (`supple explain`): stages with reasons, time step, sizes.
+[[nodiscard]] std::string explain(const Simulation& simulation);
+
+}  // namespace supple::scenes

@@ -1,0 +1,28 @@
+/// @file supple/scenes/read_scene.h
+/// Scene files: YAML in, a checked Scene out, or every fault at once with file, line, column, key and hint.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "supple/scenes/scene.h"
+
+namespace supple::scenes {
+
+/// Reads and checks a scene. @param overrides  "objects.ball.particles.mass=2" (objects by name), applied before checks.
+/// @throws Error{Io} when the file cannot be read; Error{Scene} with up to 20 faults, each
+/// "file:line:column: path.to.key: expected ..., found ...; hint". Files over 8 MiB or 200,000 nodes (each alias counted
+/// at each use), aliases to ancestors, duplicate or unknown keys, several documents, merge keys, NaN, infinities, bad
+/// UTF-8 and octal-looking integers are faults.
+[[nodiscard]] Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides = {});
+
+/// The same from text; `name` stands for the file in messages, `folder` is where sidecar files are looked for.
+[[nodiscard]] Scene parse_scene(const std::string& text, const std::string& name,
+                                const std::filesystem::path& folder, std::span<const std::string> overrides = {});
+
+/// The reference page of all keys (Markdown), and a JSON Schema, from the field lists that read scenes.
+[[nodiscard]] std::string scene_reference();
+[[nodiscard]] std::string scene_json_schema();
+
+}  // namespace supple::scenes

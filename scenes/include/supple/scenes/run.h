@@ -1,0 +1,70 @@
+/// @file supple/scenes/run.h
+/// A whole run, from scene to files: what `supple run` and `supple render` do.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "supple/core/error.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+/// Frames asked for: "1-50,60,70-90:2". @throws Error{Usage}
+[[nodiscard]] std::set<int> parse_frames(const std::string& text);
+
+struct Progress {
+  std::string stage;       ///< "simulate", "surface", "render", "film"
+  int frame = 0;           ///< the frame at work
+  int frame_count = 0;
+  double elapsed_s = 0.0;
+  double left_s = -1.0;    ///< estimate; negative while unknown
+};
+
+struct RunOptions {
+  std::filesystem::path folder;                 ///< where everything goes
+  std::set<int> frames{};                        ///< frames to output; empty: all
+  int threads = 0;                              ///< 0: all the machine has
+  bool overwrite = false;                       ///< a folder with a result may be replaced
+  bool resume = false;                          ///< continue from the last state in the folder
+  bool simulate_only = false;                   ///< no images, meshes, grids or film
+  bool skip = true;                             ///< see SimulationOptions::skip
+  bool profile = false;
+  std::string context = "auto";                 ///< auto, osmesa or egl
+  std::function<void(const Progress&)> progress{}; ///< called from the running thread; may be empty
+  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current frame (the signal's number)
+};
+
+struct RunResult {
+  std::string outcome;      ///< done, diverged, interrupted, limit, io, invalid
+  std::string reason;       ///< empty when done
+  int exit_code = 0;
+  int frames = 0;           ///< the last frame reached
+  std::uint64_t state_hash = 0;
+  std::filesystem::path folder;
+  std::filesystem::path film;   ///< empty: none
+  std::vector<std::string> warnings;
+};
+
+/// Simulates, surfaces, renders and films a scene into options.folder:
+/// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, grids/, contacts/, particles/ as
+/// asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
+/// @throws Error{Io} when not even the folder can be made or is in use, Error{Usage}
+[[nodiscard]] RunResult run_scene(const Scene& scene, const RunOptions& options);
+
+/// Draws the frames of a finished or interrupted run again from its saved states, with the scene's camera and looks.
+[[nodiscard]] RunResult render_run(const Scene& scene, const RunOptions& options);
+
+/// Leaves a result.json that says why a run could not begin (a faulty scene, say). Does nothing where the folder cannot
+/// be made or holds an earlier result.
+void leave_failure(const std::filesystem::path& folder, const std::string& name, const Error& error);
+
+/// File stem of a scene: its file name without extension.
+[[nodiscard]] std::string scene_name(const Scene& scene);
+
+}  // namespace supple::scenes

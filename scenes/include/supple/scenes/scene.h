@@ -1,0 +1,235 @@
+/// @file supple/scenes/scene.h
+/// A scene as its file describes it: one struct per YAML mapping, one member per key, in the same order, with its
+/// default. Const after reading. docs/scene_reference.md is generated from the same field lists that read it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "supple/core/types.h"
+
+namespace supple::scenes {
+
+/// Time that the frame grid decides (`auto`) or that the scene fixes.
+struct TimeStepDesc {
+  std::optional<double> size;        ///< [s]; absent: auto
+  std::optional<int> substeps;       ///< steps a frame, a power of two; absent: auto
+  int max_substeps = 4096;           ///< refuse to go finer than this
+};
+
+enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File };
+enum class NormalKind : std::uint8_t { Axis, Radial };
+
+/// objects[].particles
+struct ParticlesDesc {
+  ArrangeKind arrange = ArrangeKind::Single;
+  int count = 1;                      ///< line, ring, spiral
+  double radius = 0.0;                ///< ring [m]
+  double inner_radius = 0.0;          ///< spiral [m]
+  double outer_radius = 0.0;          ///< spiral [m]
+  double turns = 1.0;                 ///< spiral
+  double spacing = 0.0;               ///< line, grid [m]
+  int columns = 1;                    ///< grid
+  int rows = 1;                       ///< grid
+  std::string file;                   ///< CSV of x, y, z beside the scene
+  NormalKind normal = NormalKind::Axis;
+  Vec3 at = Vec3::Zero();             ///< where the arrangement's origin goes [m]
+  Vec3 axis = Vec3::UnitZ();          ///< where its z axis goes
+  double angle = 0.0;                 ///< turn about its own axis, first [rad] (key angle_deg)
+  Vec3 velocity = Vec3::Zero();       ///< initial [m/s]
+  Vec3 spin = Vec3::Zero();           ///< initial, rigid, about the centre of mass [rad/s]
+  double mass = 1.0;                  ///< of one particle [kg]
+  std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance, or the iso radius
+};
+
+enum class LawKind : std::uint8_t { Cohesion, Form, FormRadius, BondFrame, Coplanarity, Friction };
+
+/// objects[].interactions[]
+struct InteractionDesc {
+  LawKind law = LawKind::BondFrame;
+  int neighbours = 1;                 ///< bonds between particles up to this many apart in their order
+  std::optional<double> within;       ///< instead: bonds between particles nearer than this at rest [m]
+  double stretch = 0.0;               ///< bond_frame k_s [N/m]
+  double rotation = 0.0;              ///< bond_frame k_theta [N m]
+  double strength = 0.0;              ///< form [J m^2], form_radius [N/m], coplanarity [N/m]
+  double linear = 0.0;                ///< friction c [N s/m]
+  double angular = 0.0;               ///< friction c_r [N m s]
+  std::optional<double> rest_distance;     ///< cohesion r0 [m]; absent: the rest distance of each bond
+  std::optional<double> maximum_distance;  ///< cohesion r_m [m]
+  std::optional<double> maximum_force;     ///< cohesion F_max [N]
+  std::optional<double> gain;              ///< cohesion E [N/m^2]
+  std::optional<double> alpha;             ///< cohesion alpha [1/m^2]
+  std::optional<double> range;             ///< weight range h [m]; absent: psi = 1 (bonded)
+};
+
+enum class ShapeName : std::uint8_t { Point, Segment, Square, Rectangle, Disc, Box, Ellipsoid };
+enum class KernelName : std::uint8_t { Wyvill, Gascuel };
+
+/// objects[].skeleton[].kernel
+struct KernelDesc {
+  KernelName type = KernelName::Wyvill;
+  double radius = 0.0;                ///< support R [m]
+  std::optional<double> thickness;    ///< gascuel: e [m]
+  std::optional<double> slope;        ///< gascuel: -f' at the surface [1/m]
+};
+
+/// objects[].skeleton[]
+struct SkeletonDesc {
+  ShapeName shape = ShapeName::Point;
+  double half_size = 0.0;             ///< square [m]
+  double half_length = 0.0;           ///< segment, along the primitive's x [m]
+  Vec3 half_sizes = Vec3::Zero();     ///< box; rectangle uses x and y [m]
+  double radius = 0.0;                ///< disc [m]
+  Vec3 semi_axes = Vec3::Zero();      ///< ellipsoid: of the support [m]
+  Vec3 at = Vec3::Zero();             ///< offset in the particle's frame [m]
+  Vec3 turn_axis = Vec3::UnitZ();     ///< with turn: rotation in the particle's frame
+  double turn = 0.0;                  ///< [rad] (key turn_deg)
+  std::vector<int> particles;         ///< which particles carry it; empty: all
+  KernelDesc kernel;
+};
+
+/// objects[].contact
+struct MaterialDesc {
+  double modulus = 1e4;               ///< P0 [Pa]
+  double friction = 0.0;
+  double dissipation = 0.0;           ///< d [s/m]
+};
+
+/// objects[].repulsion: exponential repulsion against other objects that have it, where contact is off
+struct RepulsionDesc {
+  double force = 0.0;                 ///< [N]
+  double distance = 0.0;              ///< d0 [m]
+  double length = 0.0;                ///< lambda [m]
+};
+
+/// objects[].medium
+struct MediumDesc {
+  double linear = 0.0;                ///< gamma [1/s]
+  double angular = 0.0;               ///< gamma_r [1/s]
+};
+
+/// objects[].pins[]
+struct PinDesc {
+  int particle = 0;                   ///< negative counts from the end: -1 is the last
+  bool position = true;
+  bool orientation = true;
+};
+
+/// objects[].loads[]
+struct LoadDesc {
+  int particle = 0;                   ///< negative counts from the end
+  Vec3 force = Vec3::Zero();          ///< [N]
+  Vec3 torque = Vec3::Zero();         ///< [N m]
+  double from = 0.0;                  ///< [s]
+  double until = std::numeric_limits<double>::infinity();  ///< [s]
+  double ramp = 0.0;                  ///< [s]
+};
+
+struct ObjectDesc {
+  std::string name;
+  ParticlesDesc particles;
+  std::vector<InteractionDesc> interactions;
+  std::vector<SkeletonDesc> skeleton;
+  double iso = 0.5;
+  std::optional<MaterialDesc> contact;      ///< absent: the object touches nothing
+  std::optional<RepulsionDesc> repulsion;
+  std::optional<MediumDesc> medium;
+  std::vector<PinDesc> pins;
+  std::vector<LoadDesc> loads;
+  Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
+  double roughness = 0.45;
+};
+
+struct RestitutionDesc {
+  double value = 1.0;                 ///< e in (0, 1]
+  double at_speed = 0.0;              ///< [m/s]
+};
+
+/// pairs[]: what two objects do that differs from their materials
+struct PairDesc {
+  std::vector<std::string> objects;   ///< two names; "ground" is the ground
+  std::optional<bool> collide;
+  std::optional<double> friction;
+  std::optional<double> dissipation;
+  std::optional<RestitutionDesc> restitution;
+};
+
+enum class SplitName : std::uint8_t { Energy, Contribution };
+
+/// contact: of the scene
+struct ContactDesc {
+  double error = 1e-4;
+  SplitName split = SplitName::Energy;
+  double friction_speed = 1e-3;       ///< [m/s]
+  double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
+  double bulge_width = 0.15;          ///< share of the other body's feature size
+  std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
+};
+
+struct CameraDesc {
+  Vec3 from = Vec3(0.4, -2.6, 1.4);
+  Vec3 look_at = Vec3::Zero();
+  Vec3 up = Vec3::UnitZ();
+  double field_of_view = 0.61;        ///< vertical [rad] (key field_of_view_deg)
+};
+
+struct LightDesc {
+  Vec3 direction = Vec3(-0.45, 0.35, -1.0);
+  double softness = 0.03;             ///< angular radius [rad] (key softness_deg)
+};
+
+struct GroundDesc {
+  double height = 0.0;                ///< [m]
+  Vec3 colour = Vec3(0.80, 0.80, 0.78);
+  bool visible = true;
+  bool collides = true;
+  double modulus = 1e6;               ///< P of the half-space [Pa]
+  double slope = 1.0;                 ///< |grad F| [1/m]
+  double friction = 0.5;
+};
+
+struct ImagesDesc {
+  std::vector<int> size = {1280, 720};
+  int samples = 4;
+};
+
+enum class TableName : std::uint8_t { None, Csv };
+enum class MeshName : std::uint8_t { None, Ply };
+enum class GridName : std::uint8_t { None, Vdb };
+
+struct OutputDesc {
+  std::optional<ImagesDesc> images;
+  bool film = false;                  ///< needs images
+  TableName contacts = TableName::None;
+  TableName particles = TableName::None;
+  MeshName mesh = MeshName::None;
+  GridName grid = GridName::None;
+  std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
+};
+
+struct Scene {
+  int schema = 1;
+  std::string title;
+  double duration = 0.0;              ///< [s]
+  double frame_rate = 24.0;           ///< [1/s]
+  Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
+  TimeStepDesc time_step;
+  std::vector<ObjectDesc> objects;    ///< sorted by name
+  std::vector<PairDesc> pairs;
+  ContactDesc contact;
+  CameraDesc camera;
+  LightDesc light;
+  std::optional<GroundDesc> ground;
+  OutputDesc output;
+  std::filesystem::path source;       ///< the file it was read from; not a key
+  std::uint64_t content_hash = 0;     ///< of all keys but those of looks, output and duration; not a key
+
+  /// Frame n shows t = (n - 1) / frame_rate; frame 1 is the initial state.
+  [[nodiscard]] int frame_count() const;
+};
+
+}  // namespace supple::scenes

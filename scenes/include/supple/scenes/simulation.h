@@ -1,0 +1,110 @@
+/// @file supple/scenes/simulation.h
+/// A scene in motion. Results are pulled: asking for meshes, contacts or audits never changes a later state.
+///
+///     #include <supple/scenes/read_scene.h>
+///     #include <supple/scenes/simulation.h>
+///
+///     supple::scenes::Simulation simulation(supple::scenes::read_scene("ball_hits_spiral.yaml"));
+///     while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "supple/core/mesh.h"
+#include "supple/scenes/model.h"
+#include "supple/scenes/plan.h"
+#include "supple/scenes/state.h"
+
+namespace supple::scenes {
+
+struct SimulationOptions {
+  int threads = 1;             ///< 0: all the machine has; the result does not depend on it
+  bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
+  bool profile = false;        ///< time every step, not every 64th
+};
+
+/// Work of one stage so far.
+struct StageProfile {
+  std::uint64_t calls = 0;
+  double cpu_s = 0.0;          ///< measured on every 64th call and scaled, unless profiling
+  std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... looked at
+  std::uint64_t present = 0;   ///< of so many
+};
+using Profile = std::array<StageProfile, kStageCount>;
+
+/// Energies of the current state [J].
+struct Energies {
+  double kinetic = 0.0;
+  double interaction = 0.0;    ///< of the pair laws
+  double contact = 0.0;
+  [[nodiscard]] double total() const { return kinetic + interaction + contact; }
+};
+
+/// Relative errors since frame 1, the largest seen; what result.json calls `audits`.
+struct Audits {
+  double momentum_error = 0.0;          ///< over the largest sum of m |v| [1]
+  double angular_momentum_error = 0.0;  ///< over the largest sum of |x - c| m |v| + |L| [1]
+  double energy_error = 0.0;            ///< over the largest kinetic + interaction + contact energy [1]
+  double contact_residual = 0.0;        ///< |p_A - p_B| / max(P_A, P_B) on contact samples, the largest [1]
+  double largest_overlap = 0.0;         ///< of the undeformed fields [m]
+  double largest_overlap_share = 0.0;   ///< over the thickness of the thinner body [1]
+};
+
+class Simulation {
+ public:
+  /// @throws Error{Scene} when the model cannot be built, Error{Limit} when the time step would need more than
+  /// max_substeps.
+  explicit Simulation(Scene scene, SimulationOptions options = {});
+  ~Simulation();
+  Simulation(Simulation&&) noexcept;
+  Simulation& operator=(Simulation&&) noexcept;
+
+  [[nodiscard]] const Scene& scene() const;
+  [[nodiscard]] const Model& model() const;
+  [[nodiscard]] const State& state() const;
+  [[nodiscard]] int frame() const;              ///< the last frame reached; 1 at the start
+  [[nodiscard]] double time() const;            ///< [s]
+  [[nodiscard]] double time_step() const;       ///< of the current frame interval [s]
+  [[nodiscard]] std::uint64_t state_hash() const;
+
+  /// One time step, frame time / 2^halvings. @throws Error{Diverged} naming particle, cause and value; the state is then
+  /// that of the last frame.
+  void step();
+  /// Steps to the next frame and books its audits.
+  void step_frame();
+  /// Continues from a saved state. @pre it belongs to this scene
+  void restore(State state);
+
+  /// Surfaces of the current state, one a object in the order of the scene (empty without skeleton); deformed by
+  /// contact, with columns "contact" and "pressure" [Pa]. Kept until the next step.
+  [[nodiscard]] const std::vector<Mesh>& meshes();
+  /// Contacts of the current state; body indices as in Model::rules. Kept until the next step.
+  [[nodiscard]] const collision::ContactSurface& contacts();
+  /// Total force on body A of each contact, damping and friction included [N], shape [contacts().summary].
+  [[nodiscard]] const std::vector<Vec3>& contact_forces();
+  /// Loads of contact on all particles at the current state.
+  [[nodiscard]] const core::Loads& contact_loads();
+  /// Fields of the objects at the current state, by object; valid until the next step.
+  [[nodiscard]] const std::vector<implicit::Field>& fields();
+
+  /// Edge of a lattice cell of `meshes` [m], and its choice by a number of cells along the longest side of all surfaces.
+  [[nodiscard]] double cell() const;
+  void set_cells(int cells);
+
+  [[nodiscard]] Energies energies();
+  [[nodiscard]] Audits audits() const;
+  /// Work by stage; the time of `advance` is without the force evaluations inside it.
+  [[nodiscard]] Profile profile() const;
+  /// Where a stage outside the simulation (render, export) books its work.
+  [[nodiscard]] StageProfile& profile(Stage stage);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace supple::scenes

@@ -1,0 +1,56 @@
+/// @file supple/scenes/state.h
+/// Exactly what must be kept to continue a run with the same bits; a checkpoint is this struct in a file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "supple/core/integrate.h"
+#include "supple/core/particles.h"
+#include "supple/implicit/surface_samples.h"
+
+namespace supple::scenes {
+
+/// What result.json reports about a run so far; kept over restarts, not part of the hash.
+struct RunRecord {
+  struct ObjectRecord {
+    double largest_deformation = 0.0;  ///< RMS after the best rigid fit over the rest diameter [1]
+    double final_shape_error = 0.0;    ///< the same, now
+  };
+  core::Motion initial;                ///< at frame 1
+  double initial_energy = 0.0;         ///< kinetic + pair + contact at frame 1 [J]
+  double largest_energy = 0.0;         ///< of the same [J]
+  double momentum_scale = 0.0;         ///< largest so far [N s]
+  double angular_momentum_scale = 0.0; ///< largest so far [N m s]
+  double momentum_error = 0.0;         ///< largest |P - P0 - impulses| [N s]
+  double angular_momentum_error = 0.0; ///< [N m s]
+  double energy_error = 0.0;           ///< largest |E - E0 - W + D| [J]
+  double contact_residual = 0.0;       ///< largest |p_A - p_B| / max(P_A, P_B) on a contact sample [1]
+  double largest_overlap = 0.0;        ///< thickness of the overlap of undeformed fields [m]
+  double largest_overlap_share = 0.0;  ///< the same over twice the smaller iso radius [1]
+  std::vector<ObjectRecord> objects;
+  bool valid = false;
+};
+
+struct State {
+  std::int32_t frame = 1;              ///< the frame this state shows when substep is 0
+  std::int32_t substep = 0;            ///< steps done towards the next frame, < 2^halvings
+  std::int32_t halvings = 0;           ///< the current step is frame time / 2^halvings
+  std::uint64_t steps = 0;             ///< steps since the start
+  core::ParticleState particles;
+  core::KickState kick;
+  core::Ledger ledger;
+  std::vector<implicit::SampleState> samples;  ///< by object
+  RunRecord record;
+
+  [[nodiscard]] std::uint64_t hash() const;    ///< of everything but the record
+};
+
+/// Checkpoints: versioned, little-endian, with a hash over the content and the fingerprint of the scene.
+void save_state(const std::filesystem::path& path, const State& state, std::uint64_t fingerprint);
+/// @throws Error{Corrupt} when the file is not exactly what was written, or belongs to another scene; Error{Io}
+[[nodiscard]] State load_state(const std::filesystem::path& path, std::uint64_t fingerprint);
+
+}  // namespace supple::scenes

@@ -1,0 +1,384 @@
+/// @file fields.h
+/// The keys of a scene, once: `fields` lists the members of each struct with rule and meaning, in the order of the
+/// struct. The reader, the reference page and the JSON schema are archives over these lists.
+///
+/// An archive offers
+///   archive(key, member, rule, meaning), archive.required(key, member, rule, meaning)
+///   archive.given(key)                              whether the file names the key
+///   archive.check(holds, key, expected, found, hint)  a relation between keys; `key` may be a path below this mapping
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "fields_rules.h"
+#include "read_scene_faults.h"
+
+namespace supple::scenes {
+
+inline constexpr double kMostCount = 1e6;
+
+template <class Archive>
+void fields(Archive& archive, TimeStepDesc& d) {
+  archive("size", d.size, above(0.0, kTime).or_auto(), "largest step; a step is always frame / 2^k");
+  archive("substeps", d.substeps, between(1.0, 1048576.0, kNumber).or_auto(), "steps a frame, a power of two");
+  archive("max_substeps", d.max_substeps, between(1.0, 1048576.0, kNumber), "finer than this is refused");
+  if (d.substeps) {
+    const int n = *d.substeps;
+    archive.check((n & (n - 1)) == 0, "substeps", "expected a power of two", std::to_string(n), "");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, ParticlesDesc& d) {
+  using enum ArrangeKind;
+  const auto only = [&d](const Rule& rule, std::initializer_list<ArrangeKind> kinds) {
+    return rule.only("arrange", d.arrange, kinds);
+  };
+  archive("arrange", d.arrange, {}, "how the particles lie; generators lie in the x-y plane");
+  archive.required("count", d.count, only(between(1.0, kMostCount, kNumber), {Line, Ring, Spiral}), "how many");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Ring}), "of the circle");
+  archive.required("inner_radius", d.inner_radius, only(at_least(0.0, kLength), {Spiral}), "where the spiral begins");
+  archive.required("outer_radius", d.outer_radius, only(above(0.0, kLength), {Spiral}), "where the spiral ends");
+  archive("turns", d.turns, only(up_to(1000.0, kNumber), {Spiral}), "of the spiral");
+  archive.required("spacing", d.spacing, only(above(0.0, kLength), {Line, Grid}), "between neighbours");
+  archive.required("columns", d.columns, only(between(1.0, 1e4, kNumber), {Grid}), "along x");
+  archive.required("rows", d.rows, only(between(1.0, 1e4, kNumber), {Grid}), "along y");
+  archive.required("file", d.file, only({}, {File}), "CSV of x, y, z [m], relative to the scene's folder");
+  archive("normal", d.normal, only({}, {Ring, Spiral}), "where particle normals point: along the axis, or out of the curve");
+  archive("at", d.at, any(kLength), "where the origin of the arrangement goes");
+  archive("axis", d.axis, direction(), "where its z axis goes");
+  archive("angle_deg", d.angle, degrees(-360.0, 360.0), "turn about its own axis, made first");
+  archive("velocity", d.velocity, any(kSpeed), "at the start");
+  archive("spin", d.spin, any(kSpin), "at the start, of the whole about its centre of mass");
+  archive("mass", d.mass, above(0.0, kMass), "of one particle");
+  archive("inertia_radius", d.inertia_radius, above(0.0, kLength).or_auto(),
+          "a in the inertia 2/5 m a^2; auto: half the distance of the nearest neighbour, or the iso radius when alone");
+  if (d.arrange == Spiral) {
+    archive.check(d.count >= 2, "count", "expected a whole number >= 2 for a spiral", std::to_string(d.count), "");
+    archive.check(d.inner_radius < d.outer_radius, "outer_radius",
+                  "expected more than inner_radius = " + number_text(d.inner_radius) + " [m]", number_text(d.outer_radius),
+                  "");
+  }
+  if (d.arrange == File) {
+    const std::filesystem::path file = d.file;
+    const bool climbs = std::find(file.begin(), file.end(), "..") != file.end();
+    archive.check(!d.file.empty() && file.is_relative() && !climbs, "file", "expected a file inside the scene's folder",
+                  '\'' + shown(d.file) + '\'', "");
+  }
+  if (d.arrange == Grid) {
+    archive.check(double(d.columns) * d.rows <= kMostCount, "rows", "expected at most 1000000 particles",
+                  number_text(double(d.columns) * d.rows), "");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, InteractionDesc& d) {
+  using enum LawKind;
+  const auto only = [&d](const Rule& rule, std::initializer_list<LawKind> laws) { return rule.only("law", d.law, laws); };
+  archive.required("law", d.law, {}, "what acts between bonded particles");
+  archive("neighbours", d.neighbours, between(1.0, 1000.0, kNumber), "bonds join particles up to this many apart in their order");
+  archive("within", d.within, above(0.0, kLength), "instead: bonds join particles nearer than this at rest");
+  archive.required("stretch", d.stretch, only(at_least(0.0, kStiffness), {BondFrame}), "k_s");
+  archive.required("rotation", d.rotation, only(at_least(0.0, kTorque), {BondFrame}), "k_theta");
+  archive.required("strength", d.strength, only(at_least(0.0, kBending), {Form}), "k; a chain bends like a beam of EI = 2 k / spacing");
+  archive.required("strength", d.strength, only(at_least(0.0, kStiffness), {FormRadius, Coplanarity}), "k");
+  archive("linear", d.linear, only(at_least(0.0, kDamping), {Friction}), "c, against relative velocity");
+  archive("angular", d.angular, only(at_least(0.0, kAngularDamping), {Friction}), "c_r, against relative spin");
+  archive("rest_distance", d.rest_distance, only(above(0.0, kLength).or_auto(), {Cohesion}), "r0; auto: of each bond at rest");
+  archive("maximum_distance", d.maximum_distance, only(above(0.0, kLength), {Cohesion}), "r_m, of the largest attraction");
+  archive("maximum_force", d.maximum_force, only(above(0.0, kForce), {Cohesion}), "F_max, the largest attraction");
+  archive("gain", d.gain, only(above(0.0, kPressure), {Cohesion}), "E, instead of maximum_distance and maximum_force");
+  archive("alpha", d.alpha, only(above(0.0, kInverseArea), {Cohesion}), "alpha, with gain");
+  archive("range", d.range, only(above(0.0, kLength), {Form, FormRadius, Coplanarity}),
+          "h of the weight (1 - d^2/h^2)^3; absent: weight 1");
+  archive.check(!(archive.given("neighbours") && d.within), "within", "expected either neighbours or within", "both", "");
+  if (d.law == Cohesion) {
+    const bool by_maximum = d.maximum_distance || d.maximum_force;
+    const bool by_gain = d.gain || d.alpha;
+    archive.check(by_maximum || by_gain, "", "expected maximum_distance and maximum_force, or gain and alpha", "none of them", "");
+    archive.check(!(by_maximum && by_gain), d.gain ? "gain" : "alpha",
+                  "expected either maximum_distance and maximum_force, or gain and alpha", "keys of both", "");
+    archive.check(by_gain || !by_maximum || (d.maximum_distance && d.maximum_force),
+                  d.maximum_force ? "maximum_force" : "maximum_distance", "expected maximum_distance and maximum_force together",
+                  "one of them", "");
+    archive.check(by_maximum || !by_gain || (d.gain && d.alpha), d.gain ? "gain" : "alpha", "expected gain and alpha together",
+                  "one of them", "");
+    if (d.rest_distance && d.maximum_distance) {
+      archive.check(*d.maximum_distance > *d.rest_distance, "maximum_distance",
+                    "expected more than rest_distance = " + number_text(*d.rest_distance) + " [m]",
+                    number_text(*d.maximum_distance), "");
+    }
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, KernelDesc& d) {
+  using enum KernelName;
+  archive("type", d.type, {}, "wyvill: (1 - d^2/R^2)^3; gascuel: linear down to the thickness, then cubic");
+  archive("radius", d.radius, above(0.0, kLength), "support R; required, except for an ellipsoid (its smallest semi-axis)");
+  archive.required("thickness", d.thickness, above(0.0, kLength).only("type", d.type, {Gascuel}), "e: distance of the surface");
+  archive.required("slope", d.slope, above(0.0, kSlope).only("type", d.type, {Gascuel}),
+                   "steepness at the surface; slope (radius - thickness) <= 3 iso");
+  if (d.thickness && d.radius > 0.0) {
+    archive.check(*d.thickness < d.radius, "thickness", "expected less than radius = " + number_text(d.radius) + " [m]",
+                  number_text(*d.thickness), "");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, SkeletonDesc& d) {
+  using enum ShapeName;
+  const auto only = [&d](const Rule& rule, std::initializer_list<ShapeName> shapes) {
+    return rule.only("shape", d.shape, shapes);
+  };
+  archive.required("shape", d.shape, {}, "what is thickened by the kernel; flat shapes lie in their x-y plane");
+  archive.required("half_size", d.half_size, only(above(0.0, kLength), {Square}), "half an edge");
+  archive.required("half_length", d.half_length, only(above(0.0, kLength), {Segment}), "along x");
+  archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength).items(d.shape == Rectangle ? 2 : 3, 3), {Rectangle, Box}),
+                   "along x, y (and z for a box)");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Disc}), "of the disc");
+  archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {Ellipsoid}), "of the support, along x, y, z");
+  archive("at", d.at, any(kLength), "offset in the particle's frame");
+  archive("turn_axis", d.turn_axis, direction(), "in the particle's frame, with turn_deg");
+  archive("turn_deg", d.turn, degrees(-360.0, 360.0), "rotation in the particle's frame");
+  archive("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
+          "which particles carry it, from 0, negative from the end; absent: all");
+  archive.required("kernel", d.kernel, {}, "how the field falls off");
+  archive.check(d.kernel.radius > 0.0 || d.shape == Ellipsoid, "kernel.radius", "expected a length > 0 [m]", "nothing",
+                "this key is required");
+}
+
+template <class Archive>
+void fields(Archive& archive, MaterialDesc& d) {
+  archive("modulus", d.modulus, above(0.0, kPressure), "P0: pressure is P0 (f - iso)");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient; a pair has sqrt(mu_A mu_B)");
+  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "Hunt & Crossley d; 1/d is the largest speed of a bounce");
+}
+
+template <class Archive>
+void fields(Archive& archive, RepulsionDesc& d) {
+  archive.required("force", d.force, above(0.0, kForce), "at the distance d0");
+  archive.required("distance", d.distance, above(0.0, kLength), "d0");
+  archive.required("length", d.length, above(0.0, kLength), "over which the force falls by e");
+}
+
+template <class Archive>
+void fields(Archive& archive, MediumDesc& d) {
+  archive("linear", d.linear, at_least(0.0, kRate), "gamma: force -gamma m v");
+  archive("angular", d.angular, at_least(0.0, kRate), "gamma_r: torque -gamma_r I omega");
+}
+
+template <class Archive>
+void fields(Archive& archive, PinDesc& d) {
+  archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "from 0; negative counts from the end");
+  archive("position", d.position, {}, "held");
+  archive("orientation", d.orientation, {}, "held");
+}
+
+template <class Archive>
+void fields(Archive& archive, LoadDesc& d) {
+  archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "from 0; negative counts from the end");
+  archive("force", d.force, any(kForce), "world axes");
+  archive("torque", d.torque, any(kTorque), "world axes");
+  archive("from", d.from, at_least(0.0, kTime), "begin");
+  archive("until", d.until, above(0.0, kTime), "end; absent: never");
+  archive("ramp", d.ramp, at_least(0.0, kTime), "linear rise and fall inside the window");
+  archive.check(d.until > d.from, "until", "expected more than from = " + number_text(d.from) + " [s]", number_text(d.until), "");
+}
+
+/// How many particles there are; none when a file decides.
+[[nodiscard]] inline std::optional<int> particle_count(const ParticlesDesc& d) {
+  switch (d.arrange) {
+    case ArrangeKind::Single: return 1;
+    case ArrangeKind::Line:
+    case ArrangeKind::Ring:
+    case ArrangeKind::Spiral: return d.count;
+    case ArrangeKind::Grid: return d.columns * d.rows;
+    case ArrangeKind::File: break;
+  }
+  return std::nullopt;
+}
+
+/// Particles that pins, loads and primitives name are there.
+template <class Archive>
+void check_particles(Archive& archive, const ObjectDesc& d) {
+  const std::optional<int> count = particle_count(d.particles);
+  if (!count) return;
+  const auto check = [&](const std::string& key, int particle) {
+    archive.check(particle >= -*count && particle < *count, key, particle_range(static_cast<std::uint32_t>(*count)),
+                  std::to_string(particle), "");
+  };
+  for (std::size_t k = 0; k < d.pins.size(); ++k) check("pins[" + std::to_string(k) + "].particle", d.pins[k].particle);
+  for (std::size_t k = 0; k < d.loads.size(); ++k) check("loads[" + std::to_string(k) + "].particle", d.loads[k].particle);
+  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
+    for (std::size_t j = 0; j < d.skeleton[k].particles.size(); ++j) {
+      check("skeleton[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.skeleton[k].particles[j]);
+    }
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, ObjectDesc& d) {
+  archive.required("name", d.name, identifier(), "unique; objects are numbered in the order of their names");
+  archive.required("particles", d.particles, {}, "who is there");
+  archive("interactions", d.interactions, {}, "what holds them together");
+  archive("skeleton", d.skeleton, {}, "what they look like; without it the object has no surface");
+  archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");
+  archive("contact", d.contact, {}, "what the surface does on contact; absent or false: it touches nothing");
+  archive("repulsion", d.repulsion, {}, "exponential repulsion from other objects that have it, where contact is off");
+  archive("medium", d.medium, {}, "drag of a surrounding medium; absent: none");
+  archive("pins", d.pins, {}, "particles that do not move");
+  archive("loads", d.loads, {}, "external forces and torques");
+  archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
+  archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
+  archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",
+                "add 'skeleton' or remove 'contact'");
+  check_particles(archive, d);
+  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
+    const KernelDesc& kernel = d.skeleton[k].kernel;
+    if (kernel.type != KernelName::Gascuel || !kernel.slope || !kernel.thickness || kernel.radius <= 0.0) continue;
+    const double width = kernel.radius - *kernel.thickness;
+    archive.check(*kernel.slope * width <= 3.0 * d.iso, "skeleton[" + std::to_string(k) + "].kernel.slope",
+                  "expected slope (radius - thickness) <= 3 iso = " + number_text(3.0 * d.iso),
+                  short_text(*kernel.slope * width), "use a slope of at most " + short_text(3.0 * d.iso / width) + " [1/m]");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, RestitutionDesc& d) {
+  archive.required("value", d.value, up_to(1.0, kNumber), "rebound speed over approach speed");
+  archive.required("at_speed", d.at_speed, above(0.0, kSpeed), "approach speed at which it holds");
+}
+
+template <class Archive>
+void fields(Archive& archive, PairDesc& d) {
+  archive.required("objects", d.objects, identifier().items(2, 2), "two names; 'ground' is the ground");
+  archive("collide", d.collide, {}, "whether they can touch");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "instead of sqrt(mu_A mu_B)");
+  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "instead of the materials'");
+  archive("restitution", d.restitution, {}, "instead of dissipation");
+  archive.check(!(d.dissipation && d.restitution), "restitution", "expected either dissipation or restitution", "both", "");
+  if (d.objects.size() == 2) {
+    archive.check(d.objects[0] != d.objects[1], "objects", "expected two different objects", '\'' + shown(d.objects[0]) + "' twice", "");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, ContactDesc& d) {
+  archive("error", d.error, between(1e-10, 0.1, kNumber), "relative error of force, area and centre of pressure");
+  archive("split", d.split, {}, "how forces reach the particles: gradient of the contact energy, or by contribution");
+  archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out");
+  archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
+  archive("bulge_width", d.bulge_width, up_to(1.0, kNumber), "share of the other body's feature size");
+  archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "of the surface samples; auto: a sixth of the smallest feature");
+}
+
+template <class Archive>
+void fields(Archive& archive, CameraDesc& d) {
+  archive("from", d.from, any(kLength), "where it stands");
+  archive("look_at", d.look_at, any(kLength), "what is in the middle");
+  archive("up", d.up, direction(), "what is up in the picture");
+  archive("field_of_view_deg", d.field_of_view, degrees(1.0, 150.0), "vertical");
+  const Vec3 sight = d.look_at - d.from;
+  archive.check(sight.norm() > 0.0, "look_at", "expected a point apart from 'from'", "the same point", "");
+  archive.check(sight.norm() == 0.0 || sight.cross(d.up).norm() > 1e-6 * sight.norm() * d.up.norm(), "up", "expected a direction across the line of sight",
+                "one along it", "");
+}
+
+template <class Archive>
+void fields(Archive& archive, LightDesc& d) {
+  archive("direction", d.direction, direction(), "the way the light travels");
+  archive("softness_deg", d.softness, degrees(0.0, 20.0), "angular radius; 0: sharp shadows");
+}
+
+template <class Archive>
+void fields(Archive& archive, GroundDesc& d) {
+  archive("height", d.height, any(kLength), "z of the plane");
+  archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
+  archive("visible", d.visible, {}, "drawn");
+  archive("collides", d.collides, {}, "with every object that has contact");
+  archive("modulus", d.modulus, above(0.0, kPressure), "P of the half-space");
+  archive("slope", d.slope, above(0.0, kSlope), "of its field: pressure is modulus times slope times depth");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
+}
+
+template <class Archive>
+void fields(Archive& archive, ImagesDesc& d) {
+  archive("size", d.size, between(16.0, 16384.0, kNumber).items(2, 2), "width, height [pixel]");
+  archive("samples", d.samples, between(1.0, 8.0, kNumber), "a pixel: 1, 2, 4 or 8");
+  archive.check((d.samples & (d.samples - 1)) == 0, "samples", "expected 1, 2, 4 or 8", std::to_string(d.samples), "");
+}
+
+template <class Archive>
+void fields(Archive& archive, OutputDesc& d) {
+  archive("images", d.images, {}, "a PNG a frame");
+  archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
+  archive("contacts", d.contacts, {}, "table of contacts");
+  archive("particles", d.particles, {}, "table of particles a frame");
+  archive("mesh", d.mesh, {}, "surfaces a frame");
+  archive("grid", d.grid, {}, "fields a frame");
+  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids; auto: 8 cells across the smallest thickness, 64 along each object");
+  archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");
+}
+
+/// Object names are unique, none is "ground", and pairs name what is there.
+template <class Archive>
+void check_names(Archive& archive, const Scene& d) {
+  std::map<std::string_view, std::size_t> index;
+  for (std::size_t i = 0; i < d.objects.size(); ++i) {
+    const std::string& name = d.objects[i].name;
+    const std::string key = "objects[" + std::to_string(i) + "].name";
+    archive.check(name != "ground", key, "expected a name other than 'ground'", "", "'ground' stands for the ground in pairs");
+    const auto [first, fresh] = index.try_emplace(name, i);
+    archive.check(fresh || name.empty(), key, "expected a unique name", '\'' + shown(name) + '\'',
+                  "objects[" + std::to_string(first->second) + "] has it already");
+  }
+  if (index.contains("")) return;  // a name is missing, so nothing can be said about pairs
+  std::vector<std::string_view> names;
+  for (const auto& [name, i] : index) names.push_back(name);
+  if (d.ground) names.emplace_back("ground");
+  std::map<std::pair<std::string, std::string>, std::size_t> pairs;
+  for (std::size_t k = 0; k < d.pairs.size(); ++k) {
+    std::vector<std::string> two = d.pairs[k].objects;
+    const std::string key = "pairs[" + std::to_string(k) + "].objects";
+    for (std::size_t side = 0; side < two.size(); ++side) {
+      const bool known = index.contains(two[side]) || (two[side] == "ground" && d.ground);
+      const std::string near = known ? "" : nearest_word(two[side], names);
+      archive.check(known, key + '[' + std::to_string(side) + ']', "expected the name of an object", '\'' + shown(two[side]) + '\'',
+                    (near.empty() ? "" : "did you mean '" + near + "'? ") + "(known: " + shown(joined(names)) + ")");
+    }
+    if (two.size() != 2) continue;
+    std::sort(two.begin(), two.end());
+    const auto [first, fresh] = pairs.try_emplace({two[0], two[1]}, k);
+    archive.check(fresh, key, "expected a pair that is not listed yet", two[0] + " and " + two[1],
+                  "pairs[" + std::to_string(first->second) + "] has it already");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, Scene& d) {
+  archive.required("schema", d.schema, between(1.0, 1.0, kNumber), "version of this format");
+  archive("title", d.title, {}, "for people");
+  archive.required("duration", d.duration, above(0.0, kTime), "of the animation; frame n shows t = (n - 1) / frame_rate");
+  archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames a second");
+  archive("gravity", d.gravity, any(kAcceleration), "z is up");
+  archive("time_step", d.time_step, {}, "how finely time is cut");
+  archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
+  archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
+  archive("contact", d.contact, {}, "how contact is computed");
+  archive("camera", d.camera, {}, "who looks on");
+  archive("light", d.light, {}, "the sun");
+  archive("ground", d.ground, {}, "a horizontal plane; absent: none");
+  archive("output", d.output, {}, "what is written");
+  archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",
+                number_text(std::floor(d.duration * d.frame_rate)), "");
+  check_names(archive, d);
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,135 @@
+/// @file fields_rules.h
+/// What a key of a scene may hold: quantity, range, and for which kinds it has a meaning. The reader checks by these
+/// rules; the reference page and the JSON schema print them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "supple/scenes/scene.h"
+#include "yaml_quantity.h"
+
+namespace supple::scenes {
+
+/// Names of an enum's values in files, in the order of the enumerators (which count from 0).
+template <class E>
+struct EnumNames;
+template <> struct EnumNames<ArrangeKind> {
+  static constexpr std::array<std::string_view, 6> names{"single", "line", "ring", "grid", "spiral", "file"};
+};
+template <> struct EnumNames<NormalKind> {
+  static constexpr std::array<std::string_view, 2> names{"axis", "radial"};
+};
+template <> struct EnumNames<LawKind> {
+  static constexpr std::array<std::string_view, 6> names{"cohesion",   "form",        "form_radius",
+                                                         "bond_frame", "coplanarity", "friction"};
+};
+template <> struct EnumNames<ShapeName> {
+  static constexpr std::array<std::string_view, 7> names{"point", "segment", "square",   "rectangle",
+                                                         "disc",  "box",     "ellipsoid"};
+};
+template <> struct EnumNames<KernelName> {
+  static constexpr std::array<std::string_view, 2> names{"wyvill", "gascuel"};
+};
+template <> struct EnumNames<SplitName> {
+  static constexpr std::array<std::string_view, 2> names{"energy", "contribution"};
+};
+template <> struct EnumNames<TableName> {
+  static constexpr std::array<std::string_view, 2> names{"none", "csv"};
+};
+template <> struct EnumNames<MeshName> {
+  static constexpr std::array<std::string_view, 2> names{"none", "ply"};
+};
+template <> struct EnumNames<GridName> {
+  static constexpr std::array<std::string_view, 2> names{"none", "vdb"};
+};
+
+template <class E>
+[[nodiscard]] constexpr std::string_view name_of(E value) {
+  return EnumNames<E>::names[static_cast<std::size_t>(value)];
+}
+
+/// The choices of another key for which a key has a meaning; empty: always.
+struct When {
+  std::string_view selector;
+  std::string_view current;
+  std::vector<std::string_view> choices;
+  [[nodiscard]] bool applies() const {
+    if (choices.empty()) return true;
+    for (const std::string_view choice : choices) {
+      if (choice == current) return true;
+    }
+    return false;
+  }
+};
+
+struct Rule {
+  Quantity quantity = kNumber;
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_open = false;
+  bool high_open = false;
+  bool degrees = false;    ///< written in degrees, kept in radians
+  bool automatic = false;  ///< `auto` is the same as leaving the key out
+  bool direction = false;  ///< a vector that must not vanish
+  bool name = false;       ///< text that must be an identifier
+  std::size_t least_items = 0;
+  std::size_t most_items = std::numeric_limits<std::size_t>::max();
+  When when = {};
+
+  [[nodiscard]] Rule or_auto() const {
+    Rule rule = *this;
+    rule.automatic = true;
+    return rule;
+  }
+  [[nodiscard]] Rule items(std::size_t least, std::size_t most) const {
+    Rule rule = *this;
+    rule.least_items = least;
+    rule.most_items = most;
+    return rule;
+  }
+  /// Only with these values of the key `selector`, which is read before this one.
+  template <class E>
+  [[nodiscard]] Rule only(std::string_view selector, E current, std::initializer_list<E> choices) const {
+    Rule rule = *this;
+    rule.when = {selector, name_of(current), {}};
+    for (const E choice : choices) rule.when.choices.push_back(name_of(choice));
+    return rule;
+  }
+  [[nodiscard]] bool holds(double value) const {
+    return (low_open ? value > low : value >= low) && (high_open ? value < high : value <= high);
+  }
+};
+
+[[nodiscard]] inline Rule any(const Quantity& quantity) { return {.quantity = quantity}; }
+[[nodiscard]] inline Rule above(double low, const Quantity& quantity) {
+  return {.quantity = quantity, .low = low, .low_open = true};
+}
+[[nodiscard]] inline Rule at_least(double low, const Quantity& quantity) { return {.quantity = quantity, .low = low}; }
+[[nodiscard]] inline Rule between(double low, double high, const Quantity& quantity) {
+  return {.quantity = quantity, .low = low, .high = high};
+}
+[[nodiscard]] inline Rule inside(double low, double high, const Quantity& quantity) {
+  return {.quantity = quantity, .low = low, .high = high, .low_open = true, .high_open = true};
+}
+/// In (0, high].
+[[nodiscard]] inline Rule up_to(double high, const Quantity& quantity) {
+  return {.quantity = quantity, .low = 0.0, .high = high, .low_open = true};
+}
+[[nodiscard]] inline Rule degrees(double low, double high) {
+  return {.quantity = kAngle, .low = low, .high = high, .degrees = true};
+}
+[[nodiscard]] inline Rule direction() { return {.direction = true}; }
+[[nodiscard]] inline Rule identifier() { return {.name = true}; }
+
+/// "a length > 0 [m]", "a number in [0, 1]", "a whole number >= 1"
+[[nodiscard]] std::string rule_text(const Rule& rule, bool whole);
+
+}  // namespace supple::scenes

@@ -1,0 +1,290 @@
+#include "frame.h"
+
+#include <time.h>
+
+#include <algorithm>
+
+#include "supple/collision/deformed_field.h"
+#include "supple/core/parts.h"
+#include "supple/implicit/polygonise.h"
+
+namespace supple::scenes {
+namespace {
+
+constexpr std::uint64_t kTimedEvery = 64;
+
+double process_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+Box box_of(const implicit::PlacedSkeleton& placed) {
+  Box box;
+  for (const Box& support : placed.support) box = box.united(support);
+  return box;
+}
+
+bool has_surface(const ObjectModel& object) { return !object.skeleton.primitive.empty(); }
+
+void place(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
+  const ObjectModel& object = context.model.objects[i];
+  core::gather_poses(particles, object.first, object.last, frame.pose[i]);
+  implicit::place_skeleton(object.skeleton, frame.pose[i], frame.placed[i]);
+  frame.reach[i] = box_of(frame.placed[i]);
+  frame.indexed[i] = 0;
+}
+
+void index(const StageContext& context, std::size_t i, Frame& frame) {
+  if (frame.indexed[i]) return;
+  implicit::index_field(context.model.objects[i].skeleton, frame.placed[i], frame.field[i]);
+  frame.indexed[i] = 1;
+}
+
+/// The bodies of contact: objects by index, then the ground. Objects without contact keep an empty view.
+void view_bodies(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+  const Model& model = context.model;
+  static const Pose kStill{};
+  static const Vec3 kZero = Vec3::Zero();
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    const ObjectModel& object = model.objects[i];
+    collision::ContactBody& body = frame.bodies[i];
+    if (!object.collides) continue;
+    core::gather_spins(model.particles, particles, object.first, object.last, frame.spin[i]);
+    body.field = frame.field[i];
+    body.material = object.material;
+    body.pose = frame.pose[i];
+    body.velocity = std::span(particles.velocity).subspan(object.first, object.last - object.first);
+    body.angular_velocity = frame.spin[i];
+    body.samples = &frame.samples[i];
+  }
+  if (model.has_ground) {
+    collision::ContactBody& body = frame.bodies.back();
+    body.field = model.ground;
+    body.material = model.ground_material;
+    body.pose = {&kStill, 1};
+    body.velocity = {&kZero, 1};
+    body.angular_velocity = {&kZero, 1};
+    body.fixed = true;
+  }
+}
+
+Box body_reach(const StageContext& context, const Frame& frame, std::size_t body) {
+  return body < context.model.objects.size() ? frame.reach[body] : context.model.ground.surface_box();
+}
+
+bool may_touch(const StageContext& context, std::size_t body) {
+  return body < context.model.objects.size() ? context.model.objects[body].collides : context.model.has_ground;
+}
+
+/// Flags the parts of each object whose supports reach another body: the only ones that are sampled. A rule on State
+/// alone, so it decides which kept distances move on.
+void flag_active_parts(const StageContext& context, Frame& frame) {
+  const Model& model = context.model;
+  const std::size_t bodies = model.objects.size() + (model.has_ground ? 1 : 0);
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    const ObjectModel& object = model.objects[i];
+    frame.active[i].assign(object.last - object.first, 0);
+    if (!object.collides) continue;
+    for (std::size_t j = 0; j < bodies; ++j) {
+      if (j == i || !may_touch(context, j)) continue;
+      const auto low = static_cast<std::uint32_t>(std::min(i, j));
+      const auto high = static_cast<std::uint32_t>(std::max(i, j));
+      if (model.rules.allowed && !model.rules.allowed(low, high)) continue;
+      const Box other = body_reach(context, frame, j);
+      if (!frame.reach[i].overlaps(other)) continue;
+      for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
+        if (frame.placed[i].support[k].overlaps(other)) frame.active[i][object.skeleton.primitive[k].part] = 1;
+      }
+    }
+  }
+}
+
+bool any_active(const std::vector<std::uint8_t>& flags) {
+  return std::find(flags.begin(), flags.end(), 1) != flags.end();
+}
+
+}  // namespace
+
+Frame::Frame(const Model& model)
+    : pose(model.objects.size()),
+      velocity(model.objects.size()),
+      spin(model.objects.size()),
+      placed(model.objects.size()),
+      reach(model.objects.size()),
+      field(model.objects.size()),
+      indexed(model.objects.size(), 0),
+      active(model.objects.size()),
+      samples(model.objects.size()),
+      bodies(model.objects.size() + (model.has_ground ? 1 : 0)),
+      loads(bodies.size()),
+      dissipative(bodies.size()) {}
+
+StageTimer::StageTimer(StageProfile& profile, bool every_call) : profile_(profile) {
+  if (every_call) {
+    weight_ = 1.0;
+  } else if (profile.calls % kTimedEvery == 0) {
+    weight_ = static_cast<double>(kTimedEvery);
+  }
+  ++profile.calls;
+  if (weight_ > 0.0) begin_ = process_cpu_seconds();
+}
+
+StageTimer::~StageTimer() {
+  if (weight_ > 0.0) profile_.cpu_s += weight_ * (process_cpu_seconds() - begin_);
+}
+
+void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+  for (std::size_t i = 0; i < context.model.objects.size(); ++i) {
+    if (!has_surface(context.model.objects[i])) continue;
+    place(context, particles, i, frame);
+    index(context, i, frame);
+  }
+}
+
+void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
+                          std::vector<implicit::SampleState>& samples, Frame& frame) {
+  const Model& model = context.model;
+  const std::size_t objects = model.objects.size();
+  const auto profile = [&](Stage stage) -> StageProfile& {
+    return context.profile[static_cast<std::size_t>(stage)];
+  };
+  frame.surface.clear();
+  {
+    StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
+    for (std::size_t i = 0; i < objects; ++i) {
+      profile(Stage::PlaceSkeleton).present += model.objects[i].skeleton.primitive.size();
+      if (!model.objects[i].collides) continue;
+      place(context, particles, i, frame);
+      profile(Stage::PlaceSkeleton).visited += model.objects[i].skeleton.primitive.size();
+    }
+    flag_active_parts(context, frame);
+  }
+  // Bodies whose supports reach no other body cannot touch: their fields are not even indexed.
+  bool near = false;
+  {
+    StageTimer timer(profile(Stage::IndexField), context.every_call);
+    for (std::size_t i = 0; i < objects; ++i) {
+      if (!model.objects[i].collides) continue;
+      ++profile(Stage::IndexField).present;
+      if (context.skip && !any_active(frame.active[i])) continue;
+      index(context, i, frame);
+      ++profile(Stage::IndexField).visited;
+    }
+    for (std::size_t i = 0; i < objects; ++i) near |= any_active(frame.active[i]);
+  }
+  view_bodies(context, particles, frame);
+  if (context.skip && !near) return;
+  {
+    StageTimer timer(profile(Stage::SampleSurface), context.every_call);
+    for (std::size_t i = 0; i < objects; ++i) {
+      const ObjectModel& object = model.objects[i];
+      if (!object.collides) continue;
+      profile(Stage::SampleSurface).present += object.samples.size();
+      if (!any_active(frame.active[i])) {
+        frame.samples[i] = {};
+        continue;
+      }
+      implicit::sample_surface(object.skeleton, object.samples, frame.pose[i], frame.field[i], frame.active[i],
+                               context.executor, samples[i], frame.samples[i]);
+      profile(Stage::SampleSurface).visited += frame.samples[i].visited;
+    }
+  }
+  {
+    StageTimer timer(profile(Stage::FindContacts), context.every_call);
+    collision::ContactRules rules = model.rules;
+    const auto allowed = [&](std::uint32_t a, std::uint32_t b) {
+      const auto usable = [&](std::uint32_t i) {
+        return i == objects || (model.objects[i].collides && frame.indexed[i] != 0);
+      };
+      return usable(a) && usable(b) && (!model.rules.allowed || model.rules.allowed(a, b));
+    };
+    rules.allowed = allowed;
+    std::uint64_t present = 0;
+    frame.pairs = collision::broad_phase(frame.bodies, rules, &present);
+    profile(Stage::FindContacts).present += present;
+    profile(Stage::FindContacts).visited += frame.pairs.size();
+    if (context.skip && frame.pairs.empty()) return;
+    collision::find_contacts(frame.bodies, frame.pairs, context.executor, frame.candidates);
+  }
+  if (context.skip && frame.candidates.pair.empty()) return;
+  {
+    StageTimer timer(profile(Stage::SolveContactSurface), context.every_call);
+    collision::solve_contact_surface(frame.bodies, frame.candidates, model.contact, context.executor, frame.surface);
+    profile(Stage::SolveContactSurface).present += frame.candidates.pair.size();
+    profile(Stage::SolveContactSurface).visited += frame.surface.summary.size();
+  }
+}
+
+void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out) {
+  const Model& model = context.model;
+  frame.reaction = {};
+  frame.traction_force.clear();
+  if (context.skip && frame.surface.summary.empty()) return;
+  StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
+  StageTimer timer(profile, context.every_call);
+  for (std::size_t i = 0; i < frame.bodies.size(); ++i) {
+    for (collision::PartLoads* loads : {&frame.loads[i], &frame.dissipative[i]}) {
+      loads->force.assign(frame.bodies[i].pose.size(), Vec3::Zero());
+      loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
+    }
+  }
+  frame.reaction = collision::react(frame.bodies, model.rules, frame.surface, model.reaction, frame.loads,
+                                    &frame.traction_force, frame.dissipative);
+  if (frame.reaction.dissipated_power != 0.0) out.dissipative.reset(model.particles.size());
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    if (frame.reaction.dissipated_power != 0.0) {
+      core::add_part_loads(frame.dissipative[i].force, frame.dissipative[i].torque, model.objects[i].first,
+                           out.dissipative);
+    }
+    core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, model.objects[i].first, out.internal);
+  }
+  if (model.has_ground) {
+    out.force_on_fixed += frame.loads.back().force[0];
+    out.moment_on_fixed += frame.loads.back().torque[0];
+  }
+  profile.visited += frame.surface.point.size();
+  profile.present += frame.surface.point.size();
+}
+
+std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) {
+  const Model& model = context.model;
+  StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
+  StageTimer timer(profile, true);
+  const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = model.cell};
+  std::vector<Mesh> meshes(model.objects.size());
+  implicit::PolygoniseCounts counts;
+
+  // Objects that touch are divided together on one lattice; the ground divides nothing, it is flat and opaque.
+  std::vector<std::uint32_t> touching;
+  for (const auto& s : frame.surface.summary) {
+    for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
+      if (body < model.objects.size()) touching.push_back(body);
+    }
+  }
+  std::sort(touching.begin(), touching.end());
+  touching.erase(std::unique(touching.begin(), touching.end()), touching.end());
+
+  const auto add_counts = [&] {
+    profile.visited += counts.blocks_visited;
+    profile.present += counts.blocks_present;
+    counts = {};
+  };
+  if (!touching.empty()) {
+    std::vector<collision::ClaimField> claims;
+    claims.reserve(touching.size());
+    for (const std::uint32_t i : touching) claims.emplace_back(frame.bodies, i, frame.surface, model.bulge);
+    const std::vector<implicit::FieldView> views(claims.begin(), claims.end());
+    std::vector<Mesh> parts = implicit::polygonise_partition(views, lattice, context.executor, &counts);
+    add_counts();
+    for (std::size_t k = 0; k < touching.size(); ++k) meshes[touching[k]] = std::move(parts[k]);
+  }
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    if (!has_surface(model.objects[i]) || std::binary_search(touching.begin(), touching.end(), i)) continue;
+    meshes[i] = implicit::polygonise(frame.field[i], lattice, context.executor, &counts);
+    add_counts();
+  }
+  return meshes;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,76 @@
+/// Everything that one force evaluation or one picture computes and may throw away. Each block is written by one stage;
+/// capacity is reused from step to step.
+#pragma once
+
+#include <vector>
+
+#include "supple/collision/find_contacts.h"
+#include "supple/collision/react.h"
+#include "supple/core/executor.h"
+#include "supple/implicit/field.h"
+#include "supple/scenes/model.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+struct Frame {
+  // place_skeleton and index_field, by object
+  std::vector<std::vector<Pose>> pose;
+  std::vector<std::vector<Vec3>> velocity;
+  std::vector<std::vector<Vec3>> spin;
+  std::vector<implicit::PlacedSkeleton> placed;
+  std::vector<Box> reach;                     ///< box of all supports; holds the surface box
+  std::vector<implicit::Field> field;
+  std::vector<std::uint8_t> indexed;          ///< 1: `field` belongs to this frame
+  // sample_surface, by object
+  std::vector<std::vector<std::uint8_t>> active;
+  std::vector<implicit::SurfaceSamples> samples;
+  // find_contacts, solve_contact_surface, react
+  std::vector<collision::ContactBody> bodies;
+  std::vector<collision::BodyPair> pairs;
+  collision::ContactCandidates candidates;
+  collision::ContactSurface surface;
+  std::vector<collision::PartLoads> loads;    ///< by body
+  std::vector<collision::PartLoads> dissipative;  ///< the part of them that takes energy, by body
+  collision::ReactionReport reaction;
+  std::vector<Vec3> traction_force;           ///< by pair of `surface`
+
+  explicit Frame(const Model& model);
+};
+
+/// Measures one call of a stage; every 64th call is timed and counted 64-fold, or every call when profiling.
+class StageTimer {
+ public:
+  StageTimer(StageProfile& profile, bool every_call);
+  ~StageTimer();
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  StageProfile& profile_;
+  double weight_ = 0.0;
+  double begin_ = 0.0;
+};
+
+struct StageContext {
+  const Model& model;
+  const Executor& executor;
+  Profile& profile;
+  bool skip = true;
+  bool every_call = false;
+};
+
+/// Stages 2 and 3 for every object with a surface.
+void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
+
+/// Stages 2 to 6: from particles to the contact surface. Warm starts are read from and written to `samples`.
+void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
+                          std::vector<implicit::SampleState>& samples, Frame& frame);
+
+/// Stage 7: loads of the contact surface on particles; the loads on the ground are added to the sample apart.
+void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
+
+/// Stage 9 on the deformed fields, one mesh an object.
+[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame);
+
+}  // namespace supple::scenes

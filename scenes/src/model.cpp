@@ -1,0 +1,439 @@
+#include "supple/scenes/model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "fields_rules.h"
+#include "model_contact.h"
+#include "model_faults.h"
+#include "supple/core/arrange.h"
+#include "supple/core/error.h"
+#include "supple/core/io/mesh_files.h"
+#include "supple/core/math.h"
+
+namespace supple::scenes {
+namespace {
+
+/// Cells across the thinnest surface: a plate then has about a hundred triangles across its rounded rim.
+constexpr double kCellsAcross = 8.0;   // lattice cells across the smallest surface thickness
+constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
+
+core::NormalDirection direction_of(NormalKind normal) {
+  return normal == NormalKind::Radial ? core::NormalDirection::Radial : core::NormalDirection::Axis;
+}
+
+/// Rotation about a unit axis, from exact parts: a zero angle is the identity to the bit.
+Quat turned(const Vec3& axis, double angle) {
+  const auto [sin, cos] = math::sin_cos(0.5 * angle);
+  return Quat(cos, sin * axis.x(), sin * axis.y(), sin * axis.z());
+}
+
+/// The shortest rotation from z to a direction.
+Quat from_z_to(const Vec3& direction) {
+  const Vec3 a = direction.normalized();
+  if (a.z() < -1.0 + 1e-12) return Quat(0.0, 1.0, 0.0, 0.0);
+  return Quat(1.0 + a.z(), -a.y(), a.x(), 0.0).normalized();
+}
+
+core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
+  core::Arrangement out;
+  switch (d.arrange) {
+    case ArrangeKind::Single: out = core::arrange_single(); break;
+    case ArrangeKind::Line: out = core::arrange_line(d.count, d.spacing); break;
+    case ArrangeKind::Ring: out = core::arrange_ring(d.count, d.radius, direction_of(d.normal)); break;
+    case ArrangeKind::Grid: out = core::arrange_grid(d.columns, d.rows, d.spacing); break;
+    case ArrangeKind::Spiral:
+      out = core::arrange_spiral(d.count, d.inner_radius, d.outer_radius, d.turns, direction_of(d.normal));
+      break;
+    case ArrangeKind::File:
+      out.position = io::read_points_csv(scene.source.parent_path() / d.file);
+      out.orientation.assign(out.position.size(), Quat::Identity());
+      break;
+  }
+  core::place(out, Pose{d.at, from_z_to(d.axis) * turned(Vec3::UnitZ(), d.angle)});
+  return out;
+}
+
+/// Distance of each point to its nearest neighbour; infinite for a single one. Sweeps along the longest extent.
+std::vector<double> nearest_distances(std::span<const Vec3> points) {
+  Box box;
+  for (const Vec3& p : points) box.include(p);
+  Eigen::Index axis = 0;
+  if (!points.empty()) box.extent().maxCoeff(&axis);
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return points[a][axis] != points[b][axis] ? points[a][axis] < points[b][axis] : a < b;
+  });
+  std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Vec3& here = points[order[i]];
+    double& least = nearest[order[i]];
+    for (std::size_t j = i + 1; j < order.size() && points[order[j]][axis] - here[axis] < least; ++j) {
+      least = std::min(least, (points[order[j]] - here).norm());
+    }
+    for (std::size_t j = i; j > 0 && here[axis] - points[order[j - 1]][axis] < least; --j) {
+      least = std::min(least, (points[order[j - 1]] - here).norm());
+    }
+  }
+  return nearest;
+}
+
+/// Largest distance of two points: pairs in falling order of their distances from the centre, cut when none can win.
+double largest_distance(std::span<const Vec3> points) {
+  if (points.empty()) return 0.0;
+  Vec3 centre = Vec3::Zero();
+  for (const Vec3& p : points) centre += p;
+  centre /= static_cast<double>(points.size());
+  std::vector<Vec3> sorted(points.begin(), points.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](const Vec3& a, const Vec3& b) { return (a - centre).squaredNorm() > (b - centre).squaredNorm(); });
+  double largest = 0.0;
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    const double reach = (sorted[i] - centre).norm();
+    if (2.0 * reach <= largest) break;
+    for (std::size_t j = i + 1; j < sorted.size() && reach + (sorted[j] - centre).norm() > largest; ++j) {
+      largest = std::max(largest, (sorted[i] - sorted[j]).norm());
+    }
+  }
+  return largest;
+}
+
+/// Index of a particle of an object of n, negative from the end.
+std::optional<std::uint32_t> particle_index(int given, std::uint32_t n) {
+  const std::int64_t index = given < 0 ? std::int64_t{given} + n : given;
+  if (index < 0 || index >= n) return std::nullopt;
+  return static_cast<std::uint32_t>(index);
+}
+
+void fail_index(ModelFaults& faults, const std::string& key, int given, std::uint32_t n) {
+  faults.add(key, particle_range(n), std::to_string(given), "");
+}
+
+implicit::ShapeKind shape_of(ShapeName name) {
+  switch (name) {
+    case ShapeName::Point: return implicit::ShapeKind::Point;
+    case ShapeName::Segment: return implicit::ShapeKind::Segment;
+    case ShapeName::Square:
+    case ShapeName::Rectangle: return implicit::ShapeKind::Rectangle;
+    case ShapeName::Disc: return implicit::ShapeKind::Disc;
+    case ShapeName::Box: return implicit::ShapeKind::Box;
+    case ShapeName::Ellipsoid: break;
+  }
+  return implicit::ShapeKind::Ellipsoid;
+}
+
+Vec3 size_of(const SkeletonDesc& d) {
+  switch (d.shape) {
+    case ShapeName::Point: return Vec3::Zero();
+    case ShapeName::Segment: return {d.half_length, 0.0, 0.0};
+    case ShapeName::Square: return {d.half_size, d.half_size, 0.0};
+    case ShapeName::Rectangle: return {d.half_sizes.x(), d.half_sizes.y(), 0.0};
+    case ShapeName::Disc: return {d.radius, 0.0, 0.0};
+    case ShapeName::Box: return d.half_sizes;
+    case ShapeName::Ellipsoid: break;
+  }
+  return d.semi_axes;
+}
+
+implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object, std::uint32_t n, ModelFaults& faults) {
+  implicit::Skeleton skeleton;
+  skeleton.part_count = n;
+  skeleton.iso = d.iso;
+  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
+    const SkeletonDesc& s = d.skeleton[k];
+    const std::string key = object + ".skeleton[" + std::to_string(k) + ']';
+    // For an ellipsoid the radius is but the scale of its kernel.
+    const bool own_scale = s.kernel.radius == 0.0 && s.shape == ShapeName::Ellipsoid;
+    const double radius = own_scale ? s.semi_axes.minCoeff() : s.kernel.radius;
+    implicit::Primitive primitive;
+    primitive.shape = shape_of(s.shape);
+    primitive.size = size_of(s);
+    primitive.offset = {s.at, turned(s.turn_axis.normalized(), s.turn)};
+    try {
+      primitive.kernel = s.kernel.type == KernelName::Wyvill
+                             ? implicit::Kernel::wyvill(radius)
+                             : implicit::Kernel::gascuel(s.kernel.thickness.value_or(0.0), radius,
+                                                         s.kernel.slope.value_or(0.0), d.iso);
+    } catch (const Error& error) {
+      const Fault& fault = error.faults().front();
+      faults.add(key + '.' + fault.key, fault.expected, fault.found, fault.hint);
+      continue;
+    }
+    if (s.kernel.type == KernelName::Wyvill && !(d.iso > 0.0 && d.iso < 1.0)) {
+      faults.add(object + ".iso", "expected an iso value in (0, 1), which a kernel reaches", number_text(d.iso), "");
+      continue;
+    }
+    std::vector<std::uint32_t> carriers;
+    for (std::size_t j = 0; j < s.particles.size(); ++j) {
+      if (const auto index = particle_index(s.particles[j], n)) {
+        carriers.push_back(*index);
+      } else {
+        fail_index(faults, key + ".particles[" + std::to_string(j) + ']', s.particles[j], n);
+      }
+    }
+    if (s.particles.empty()) {
+      carriers.resize(n);
+      std::iota(carriers.begin(), carriers.end(), 0U);
+    }
+    for (const std::uint32_t part : carriers) {
+      primitive.part = part;
+      skeleton.primitive.push_back(primitive);
+    }
+  }
+  std::stable_sort(skeleton.primitive.begin(), skeleton.primitive.end(),
+                   [](const implicit::Primitive& a, const implicit::Primitive& b) { return a.part < b.part; });
+  return skeleton;
+}
+
+/// Adds the laws of one object.
+class LawBuilder {
+ public:
+  LawBuilder(Model& model, ModelFaults& faults, const ObjectModel& object, std::string key)
+      : model_(model), faults_(faults), object_(object), key_(std::move(key)) {}
+
+  void add(const InteractionDesc& d, std::size_t index) {
+    const std::string key = key_ + ".interactions[" + std::to_string(index) + ']';
+    const core::Bonds bonds = d.within ? core::bonds_within(model_.rest.position, object_.first, object_.last, *d.within)
+                                       : core::bonds_along(object_.first, object_.last, d.neighbours);
+    if (bonds.first.empty()) {
+      faults_.add(key, "expected a bond", "none",
+                  d.within ? "no two particles are nearer than " + number_text(*d.within) + " m"
+                           : "the object has a single particle");
+      return;
+    }
+    if (d.law == LawKind::Friction) {
+      model_.interactions.friction.push_back({name(d), bonds.first, bonds.second, d.linear, d.angular});
+      return;
+    }
+    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
+      if (model_.rest.position[bonds.first[b]] == model_.rest.position[bonds.second[b]]) {
+        faults_.add(key, "expected bonded particles at different places",
+                    "particles " + std::to_string(bonds.first[b] - object_.first) + " and " +
+                        std::to_string(bonds.second[b] - object_.first) + " at one place",
+                    "");
+        return;
+      }
+    }
+    const core::Weight weight{.range = d.range.value_or(0.0)};
+    core::Interactions& laws = model_.interactions;
+    switch (d.law) {
+      case LawKind::Cohesion:
+        fill(laws.cohesion, d, bonds, [&](const core::PairPose& rest) { return cohesion(d, rest.r.norm(), key); });
+        break;
+      case LawKind::Form:
+        fill(laws.form, d, bonds, [&](const core::PairPose& rest) {
+          return core::Form{d.strength, core::Form::fit_curvature(rest.r, rest.normal_a, rest.normal_b), weight};
+        });
+        break;
+      case LawKind::FormRadius:
+        fill(laws.form_radius, d, bonds,
+             [&](const core::PairPose& rest) { return core::FormRadius{d.strength, radius(rest, key), weight}; });
+        break;
+      case LawKind::BondFrame:
+        fill(laws.bond_frame, d, bonds,
+             [&](const core::PairPose& rest) { return core::BondFrame::from_rest(d.stretch, d.rotation, rest); });
+        break;
+      case LawKind::Coplanarity:
+        fill(laws.coplanarity, d, bonds, [&](const core::PairPose&) { return core::Coplanarity{d.strength, weight}; });
+        break;
+      case LawKind::Friction: break;
+    }
+  }
+
+ private:
+  /// "spiral/bond_frame"; a second law of the same kind is "spiral/bond_frame.2".
+  std::string name(const InteractionDesc& d) {
+    const int count = ++counts_[static_cast<std::size_t>(d.law)];
+    return object_.name + '/' + std::string(name_of(d.law)) + (count > 1 ? '.' + std::to_string(count) : "");
+  }
+
+  [[nodiscard]] core::PairPose rest_pose(std::uint32_t a, std::uint32_t b) const {
+    const core::ParticleState& rest = model_.rest;
+    return {.r = rest.position[b] - rest.position[a],
+            .orientation_a = rest.orientation[a],
+            .orientation_b = rest.orientation[b],
+            .normal_a = rest.orientation[a] * model_.particles.normal[a],
+            .normal_b = rest.orientation[b] * model_.particles.normal[b]};
+  }
+
+  template <class Law, class Make>
+  void fill(std::vector<core::BondedLaw<Law>>& list, const InteractionDesc& d, const core::Bonds& bonds, const Make& make) {
+    core::BondedLaw<Law> law{name(d), bonds.first, bonds.second, {}};
+    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
+      law.law.push_back(make(rest_pose(bonds.first[b], bonds.second[b])));
+    }
+    list.push_back(std::move(law));
+  }
+
+  core::Cohesion cohesion(const InteractionDesc& d, double rest_distance, const std::string& key) {
+    const double r0 = d.rest_distance.value_or(rest_distance);
+    if (d.gain && d.alpha) return core::Cohesion::from_gain(r0, *d.gain, *d.alpha);
+    const double r_m = d.maximum_distance.value_or(0.0);
+    if (!(r_m > r0) || !d.maximum_force) {
+      faults_.add_once(key + ".maximum_distance",
+                       "expected more than the rest distance of every bond, " + number_text(r0) + " m here",
+                       number_text(r_m), "");
+      return {.r0 = r0, .f0 = 1.0};
+    }
+    return core::Cohesion::from_maximum(r0, r_m, *d.maximum_force);
+  }
+
+  /// Least squares over the pair: R = r . (n_B - n_A) / |n_B - n_A|^2 (the inverse problem of Form::fit_curvature).
+  double radius(const core::PairPose& rest, const std::string& key) {
+    const Vec3 change = rest.normal_b - rest.normal_a;
+    if (change.norm() < 1e-9) {
+      faults_.add_once(key, "expected normals that differ along every bond for form_radius", "parallel ones",
+                       "use 'law: form', which knows flat shapes");
+      return 0.0;
+    }
+    return rest.r.dot(change) / change.squaredNorm();
+  }
+
+  Model& model_;
+  ModelFaults& faults_;
+  const ObjectModel& object_;
+  std::string key_;
+  std::array<int, EnumNames<LawKind>::names.size()> counts_{};
+};
+
+/// Particles of one object, with the inertia of a ball, 2/5 m a^2.
+void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
+                   ModelFaults& faults) {
+  const core::Arrangement arrangement = arrange(scene, d.particles);
+  const auto n = static_cast<std::uint32_t>(arrangement.size());
+  object.first = static_cast<std::uint32_t>(model.particles.size());
+  object.last = object.first + n;
+  if (n == 0) {
+    faults.add(key + ".particles.file", "expected at least one particle", "none", "");
+    return;
+  }
+  object.skeleton = build_skeleton(d, key, n, faults);
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    const double iso = iso_radius(primitive, d.iso);
+    object.iso_radius = object.iso_radius == 0.0 ? iso : std::min(object.iso_radius, iso);
+  }
+
+  const std::vector<double> nearest = nearest_distances(arrangement.position);
+  Vec3 centre = Vec3::Zero();
+  for (const Vec3& p : arrangement.position) centre += p;
+  centre /= n;  // all masses of an object are equal
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const double a = d.particles.inertia_radius.value_or(n > 1 ? 0.5 * nearest[i] : object.iso_radius);
+    if (!(a > 0.0)) {
+      faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
+                      n > 1 ? "two particles lie at one place, so give it" : "a single particle without a surface needs it");
+    }
+    const double inertia = 0.4 * d.particles.mass * a * a;
+    model.particles.mass.push_back(d.particles.mass);
+    model.particles.inertia.emplace_back(inertia, inertia, inertia);
+    model.particles.normal.push_back(Vec3::UnitZ());
+    model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
+    model.particles.pinned.push_back(0);
+    model.initial.position.push_back(arrangement.position[i]);
+    model.initial.orientation.push_back(arrangement.orientation[i]);
+    model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
+    model.initial.angular_momentum.push_back(inertia * d.particles.spin);
+    if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : a);
+    model.smallest_length = std::min({model.smallest_length, nearest[i], n == 1 ? 0.5 * object.rest_diameter : nearest[i]});
+  }
+  if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);
+  if (n > 1) object.rest_diameter = largest_distance(arrangement.position);
+}
+
+void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model,
+                        ModelFaults& faults) {
+  const std::uint32_t n = object.last - object.first;
+  for (std::size_t k = 0; k < d.pins.size(); ++k) {
+    const auto index = particle_index(d.pins[k].particle, n);
+    if (!index) {
+      fail_index(faults, key + ".pins[" + std::to_string(k) + "].particle", d.pins[k].particle, n);
+      continue;
+    }
+    std::uint8_t& pinned = model.particles.pinned[object.first + *index];
+    if (d.pins[k].position) pinned |= core::kPinPosition;
+    if (d.pins[k].orientation) pinned |= core::kPinOrientation;
+  }
+  for (std::size_t k = 0; k < d.loads.size(); ++k) {
+    const LoadDesc& load = d.loads[k];
+    const auto index = particle_index(load.particle, n);
+    if (!index) {
+      fail_index(faults, key + ".loads[" + std::to_string(k) + "].particle", load.particle, n);
+      continue;
+    }
+    model.interactions.external.push_back(
+        {object.first + *index, load.force, load.torque, load.from, load.until, load.ramp});
+  }
+}
+
+/// Pinned particles begin at rest, or the pin would take their momentum in the first step.
+void stop_pinned(Model& model) {
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    if ((model.particles.pinned[i] & core::kPinPosition) != 0) model.initial.velocity[i].setZero();
+    if ((model.particles.pinned[i] & core::kPinOrientation) != 0) model.initial.angular_momentum[i].setZero();
+  }
+}
+
+}  // namespace
+
+Model build_model(const Scene& scene) {
+  Model model;
+  ModelFaults faults(scene);
+  model.smallest_length = std::numeric_limits<double>::infinity();
+  for (const ObjectDesc& d : scene.objects) {
+    const std::string key = "objects." + d.name;
+    ObjectModel object;
+    object.name = d.name;
+    add_particles(scene, d, key, object, model, faults);
+    if (d.contact) {
+      object.material = {d.contact->modulus, d.contact->friction, d.contact->dissipation};
+      object.collides = !object.skeleton.primitive.empty();
+    }
+    add_pins_and_loads(d, key, object, model, faults);
+    model.objects.push_back(std::move(object));
+  }
+  if (model.particles.size() == 0) faults.add("objects", "expected at least one object with particles", "none", "");
+  faults.raise();  // what follows relies on particles
+
+  model.rest = model.initial;
+  for (Vec3& velocity : model.rest.velocity) velocity.setZero();
+  for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
+  stop_pinned(model);
+
+  model.interactions.gravity = scene.gravity;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const ObjectDesc& d = scene.objects[i];
+    LawBuilder laws(model, faults, model.objects[i], "objects." + d.name);
+    for (std::size_t k = 0; k < d.interactions.size(); ++k) laws.add(d.interactions[k], k);
+    if (d.medium) {
+      model.interactions.medium.push_back({static_cast<std::uint32_t>(i), d.medium->linear, d.medium->angular});
+    }
+  }
+  build_contact(scene, model, faults);
+  faults.raise();
+
+  double cell = std::numeric_limits<double>::infinity();
+  Box everything;
+  for (const ObjectModel& object : model.objects) {
+    double reach = object.iso_radius;
+    for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+      const double thickness = 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive));
+      cell = std::min(cell, thickness / kCellsAcross);
+      reach = std::max(reach, primitive.offset.position.norm() + primitive.size.norm() + primitive.kernel.radius);
+    }
+    Box own;
+    for (std::uint32_t p = object.first; p < object.last; ++p) {
+      own = own.united(Box{model.rest.position[p], model.rest.position[p]}.inflated(reach));
+    }
+    if (!object.skeleton.primitive.empty()) cell = std::min(cell, own.extent().maxCoeff() / kCellsAlong);
+    everything = everything.united(own);
+  }
+  if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
+  model.scene_length = everything.extent().norm();
+  if (!(model.scene_length > 0.0)) model.scene_length = model.smallest_length;
+  return model;
+}
+
+}  // namespace supple::scenes

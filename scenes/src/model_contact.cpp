@@ -1,0 +1,195 @@
+#include "model_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "supple/core/error.h"
+#include "supple/core/math.h"
+
+namespace supple::scenes {
+namespace {
+
+using collision::BodyPair;
+
+constexpr double kSamplesAcross = 6.0;  // of the smallest thickness
+
+/// x - ln(1 + x) for x > -1, without cancellation near 0.
+double lag(double x) {
+  if (std::abs(x) > 0.2) return x - math::log(1.0 + x);
+  double sum = 0.0;
+  double power = x;
+  for (int k = 2; k < 26; ++k) {  // 0.2^26 is below the last bit
+    power *= -x;
+    sum -= power / k;
+  }
+  return sum;
+}
+
+std::uint32_t body_of(const Scene& scene, const std::string& name) {
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    if (scene.objects[i].name == name) return static_cast<std::uint32_t>(i);
+  }
+  return static_cast<std::uint32_t>(scene.objects.size()) + (name == "ground" ? 0 : 1);
+}
+
+/// Upper estimate of the angular frequency of one object's contact, sqrt(P k A / m): its pressure rises by P k a metre
+/// of depth (k = |grad f| on the surface), over the patch of a primitive at moderate overlap, A = pi a (a + h) with a the
+/// iso distance and h the largest half size (a linear ball is at most half as stiff: F' <= pi K a^2 / 2), on the
+/// lightest particle that carries such a primitive. Against another body both compliances are in series, so a pair is
+/// never faster than the faster of its two bodies against a rigid one.
+double contact_frequency(const ObjectModel& object, const core::ParticleSet& particles) {
+  double largest = 0.0;
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    const double a = iso_radius(primitive, object.skeleton.iso);
+    const double half = primitive.shape == implicit::ShapeKind::Ellipsoid
+                            ? primitive.size.maxCoeff() / primitive.size.minCoeff() * a - a
+                            : primitive.size.maxCoeff();
+    const double scale = primitive.shape == implicit::ShapeKind::Ellipsoid
+                             ? primitive.kernel.radius / primitive.size.minCoeff()
+                             : 1.0;
+    const double slope = implicit::iso_slope(primitive.kernel, object.skeleton.iso) * scale;
+    const double stiffness = object.material.modulus * slope * std::numbers::pi * a * (a + half);
+    largest = std::max(largest, stiffness / particles.mass[object.first + primitive.part]);
+  }
+  return std::sqrt(largest);
+}
+
+void add_pairs(const Scene& scene, Model& model, ModelFaults& faults, std::vector<BodyPair>& forbidden) {
+  const auto ground = static_cast<std::uint32_t>(model.objects.size());
+  const auto collides = [&](std::uint32_t body) { return body == ground ? model.has_ground : model.objects[body].collides; };
+  const auto material = [&](std::uint32_t body) -> const collision::ContactMaterial& {
+    return body == ground ? model.ground_material : model.objects[body].material;
+  };
+  for (std::size_t k = 0; k < scene.pairs.size(); ++k) {
+    const PairDesc& d = scene.pairs[k];
+    const std::string key = "pairs[" + std::to_string(k) + ']';
+    if (d.objects.size() != 2) {
+      faults.add(key + ".objects", "expected 2 names", std::to_string(d.objects.size()), "");
+      continue;
+    }
+    std::array<std::uint32_t, 2> body{};
+    bool known = true;
+    for (std::size_t side = 0; side < 2; ++side) {
+      body[side] = body_of(scene, d.objects[side]);
+      if (body[side] > ground || (body[side] == ground && !scene.ground)) {
+        faults.add(key + ".objects[" + std::to_string(side) + ']', "expected the name of an object",
+                   '\'' + shown(d.objects[side]) + '\'', "");
+        known = false;
+      }
+    }
+    if (!known) continue;
+    const BodyPair pair{std::min(body[0], body[1]), std::max(body[0], body[1])};
+    if (pair.a == pair.b) {
+      faults.add(key + ".objects", "expected two different objects", '\'' + shown(d.objects[0]) + "' twice", "");
+      continue;
+    }
+    if (d.collide && !*d.collide) {
+      forbidden.push_back(pair);
+      continue;
+    }
+    if (!collides(pair.a) || !collides(pair.b)) {
+      const std::string& name = d.objects[collides(body[0]) ? 1 : 0];
+      faults.add(key, "expected two objects with contact", '\'' + shown(name) + "' without",
+                 name == "ground" ? "set ground.collides: true" : "add 'contact: {}' to it, or set 'collide: false' here");
+      continue;
+    }
+    collision::PairMaterial combined = collision::combine(material(pair.a), material(pair.b));
+    if (d.friction) combined.friction = *d.friction;
+    if (d.dissipation) combined.dissipation = *d.dissipation;
+    if (d.restitution) combined.dissipation = dissipation_for(d.restitution->value, d.restitution->at_speed);
+    model.rules.overrides.push_back({pair, combined});
+  }
+  std::sort(forbidden.begin(), forbidden.end());
+  std::sort(model.rules.overrides.begin(), model.rules.overrides.end(),
+            [](const auto& a, const auto& b) { return a.pair < b.pair; });
+}
+
+/// Between every two objects that have it and that do not touch: forces by geometric mean, lengths by mean.
+void add_repulsion(const Scene& scene, Model& model, const std::vector<BodyPair>& forbidden) {
+  for (std::uint32_t a = 0; a < scene.objects.size(); ++a) {
+    for (std::uint32_t b = a + 1; b < scene.objects.size(); ++b) {
+      if (!scene.objects[a].repulsion || !scene.objects[b].repulsion) continue;
+      const bool touch = model.objects[a].collides && model.objects[b].collides &&
+                         !std::binary_search(forbidden.begin(), forbidden.end(), BodyPair{a, b});
+      if (touch) continue;
+      const RepulsionDesc& x = *scene.objects[a].repulsion;
+      const RepulsionDesc& y = *scene.objects[b].repulsion;
+      core::GeometricLaw<core::Repulsion> law;
+      law.name = model.objects[a].name + '-' + model.objects[b].name + "/repulsion";
+      law.object_a = a;
+      law.object_b = b;
+      law.law.force = std::sqrt(x.force * y.force);
+      law.law.distance = 0.5 * (x.distance + y.distance);
+      law.law.length = 0.5 * (x.length + y.length);
+      law.range = law.law.cut_off();
+      model.interactions.repulsion.push_back(law);
+    }
+  }
+}
+
+}  // namespace
+
+double iso_radius(const implicit::Primitive& primitive, double iso) {
+  const double distance = implicit::iso_distance(primitive.kernel, iso);
+  if (primitive.shape != implicit::ShapeKind::Ellipsoid) return distance;
+  return distance * primitive.size.minCoeff() / primitive.kernel.radius;  // there q = R^2 |D^-1 y|^2
+}
+
+double solid_half_size(const implicit::Primitive& primitive) {
+  return primitive.shape == implicit::ShapeKind::Box ? primitive.size.minCoeff() : 0.0;
+}
+
+double dissipation_for(double restitution, double speed) {
+  const double e = restitution;
+  SUPPLE_EXPECTS(e > 0.0 && e <= 1.0 && speed > 0.0);
+  if (e == 1.0) return 0.0;
+  // g(y) = (y - ln(1 + y)) + (e y + ln(1 - e y)) rises from 0 and falls to -inf at y = 1 / e: one root, bracketed.
+  double low = 0.5 * (1.0 - e);  // the root is near 1.5 (1 - e) for e near 1 and near 1 / e for e near 0
+  double high = 1.0 / e;
+  for (int i = 0; i < 200; ++i) {
+    const double y = 0.5 * (low + high);
+    if (y <= low || y >= high) break;
+    (e * y < 1.0 && lag(y) - lag(-e * y) > 0.0 ? low : high) = y;
+  }
+  return 0.5 * (low + high) / speed;
+}
+
+void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
+  if (scene.ground) {
+    model.has_ground = scene.ground->collides;
+    model.ground = {.point = Vec3(0.0, 0.0, scene.ground->height), .normal = Vec3::UnitZ(), .slope = scene.ground->slope};
+    model.ground_material = {scene.ground->modulus, scene.ground->friction, 0.0};
+  }
+  model.contact.error = scene.contact.error;
+  model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy
+                                                                  : collision::SplitRule::Contribution;
+  model.reaction.friction_speed = scene.contact.friction_speed;
+  model.bulge = {scene.contact.bulge, scene.contact.bulge_width};
+
+  std::vector<BodyPair> forbidden;
+  add_pairs(scene, model, faults, forbidden);
+  add_repulsion(scene, model, forbidden);
+  if (!forbidden.empty()) {
+    model.rules.allowed = [forbidden](std::uint32_t a, std::uint32_t b) {
+      return !std::binary_search(forbidden.begin(), forbidden.end(), BodyPair{std::min(a, b), std::max(a, b)});
+    };
+  }
+
+  const auto count = static_cast<std::uint32_t>(model.objects.size());
+  for (std::uint32_t i = 0; i < count; ++i) {
+    ObjectModel& object = model.objects[i];
+    if (!object.collides) continue;
+    bool touches = false;
+    for (std::uint32_t j = 0; j <= count && !touches; ++j) {
+      const bool other = j == count ? model.has_ground : j != i && model.objects[j].collides;
+      touches = other && (!model.rules.allowed || model.rules.allowed(i, j));
+    }
+    if (!touches) continue;
+    const double spacing = scene.contact.sample_spacing.value_or(2.0 * object.iso_radius / kSamplesAcross);
+    object.samples = implicit::make_sample_layout(object.skeleton, spacing);
+    model.contact_frequency = std::max(model.contact_frequency, contact_frequency(object, model.particles));
+  }
+}
+
+}  // namespace supple::scenes

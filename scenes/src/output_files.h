@@ -1,0 +1,46 @@
+/// Stages 10 and 11: pictures and files of one frame, each complete when it has its name.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "supple/render/renderer.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+[[nodiscard]] std::filesystem::path state_path(const std::filesystem::path& folder, const std::string& name, int frame);
+[[nodiscard]] std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame);
+
+/// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result).
+void remove_outputs(const std::filesystem::path& folder, const std::string& name);
+
+[[nodiscard]] std::unique_ptr<render::Renderer> make_scene_renderer(const Scene& scene, render::ContextKind context);
+[[nodiscard]] render::Image render_scene(render::Renderer& renderer, const Scene& scene, const std::vector<Mesh>& meshes);
+
+void write_mesh_files(const std::filesystem::path& folder, const std::string& name, int frame,
+                      const Simulation& simulation, const std::vector<Mesh>& meshes);
+void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation);
+void write_contact_table(const std::filesystem::path& folder, const std::string& name, int frame,
+                         Simulation& simulation);
+void write_particle_table(const std::filesystem::path& folder, const std::string& name, int frame,
+                          const Simulation& simulation);
+/// NAME_sheet.png: twelve frames spread over 1 .. last that exist, 3 rows of 4.
+void write_contact_sheet(const std::filesystem::path& folder, const std::string& name, int last);
+
+/// Books process CPU time of a scope on a stage.
+class StageClock {
+ public:
+  explicit StageClock(StageProfile& profile);
+  ~StageClock();
+  StageClock(const StageClock&) = delete;
+  StageClock& operator=(const StageClock&) = delete;
+
+ private:
+  StageProfile& profile_;
+  double begin_;
+};
+
+}  // namespace supple::scenes

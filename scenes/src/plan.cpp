@@ -1,0 +1,149 @@
+#include "supple/scenes/plan.h"
+
+#include <algorithm>
+#include <array>
+
+namespace supple::scenes {
+namespace {
+
+using namespace data;
+
+constexpr std::array<StageInfo, kStageCount> kTable{{
+    {Stage::Interact, "accumulate_interactions", "core", kState, kForces},
+    {Stage::PlaceSkeleton, "place_skeleton", "implicit", kState, kSkeleton},
+    {Stage::IndexField, "index_field", "implicit", kSkeleton, kField},
+    {Stage::SampleSurface, "sample_surface", "implicit", kState | kField, kSamples | kState},
+    {Stage::FindContacts, "find_contacts", "collision", kSamples | kField, kPairs},
+    {Stage::SolveContactSurface, "solve_contact_surface", "collision", kPairs | kField, kContacts},
+    {Stage::React, "react", "collision", kContacts | kField | kState, kForces},
+    {Stage::Integrate, "advance", "core", kState | kForces, kState},
+    {Stage::Polygonise, "polygonise", "implicit", kField, kMesh},
+    {Stage::Render, "render", "render", kMesh, kImage},
+    {Stage::Export, "export", "core", kState, 0},
+}};
+
+std::string count(std::size_t n, const char* one, const char* many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+std::size_t law_count(const core::Interactions& i) {
+  return i.cohesion.size() + i.form.size() + i.form_radius.size() + i.bond_frame.size() + i.coplanarity.size() +
+         i.geometric_cohesion.size() + i.repulsion.size();
+}
+
+std::string list(std::initializer_list<std::pair<bool, const char*>> items) {
+  std::string text;
+  for (const auto& [on, name] : items) {
+    if (!on) continue;
+    if (!text.empty()) text += ", ";
+    text += name;
+  }
+  return text;
+}
+
+/// Bodies that may touch another one, the ground included.
+std::size_t contact_body_count(const Model& model) {
+  const auto n = static_cast<std::uint32_t>(model.objects.size());
+  const auto collides = [&](std::uint32_t i) { return i == n ? model.has_ground : model.objects[i].collides; };
+  std::size_t bodies = 0;
+  for (std::uint32_t a = 0; a <= n; ++a) {
+    if (!collides(a)) continue;
+    bool partner = false;
+    for (std::uint32_t b = 0; b <= n && !partner; ++b) {
+      partner = b != a && collides(b) &&
+                (!model.rules.allowed || model.rules.allowed(std::min(a, b), std::max(a, b)));
+    }
+    bodies += partner;
+  }
+  return bodies;
+}
+
+}  // namespace
+
+std::span<const StageInfo> stage_table() { return kTable; }
+
+const StageInfo& info(Stage stage) { return kTable[static_cast<std::size_t>(stage)]; }
+
+OutputRequest requested_outputs(const Scene& scene) {
+  const OutputDesc& o = scene.output;
+  return {.images = o.images.has_value(),
+          .film = o.film,
+          .meshes = o.mesh != MeshName::None,
+          .grids = o.grid != GridName::None,
+          .contacts = o.contacts != TableName::None,
+          .particles = o.particles != TableName::None};
+}
+
+bool StepPlan::on(Stage stage) const { return stages[static_cast<std::size_t>(stage)].on; }
+
+StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& outputs) {
+  StepPlan plan;
+  const auto add = [&](Stage stage, bool on, std::string reason) {
+    plan.stages.push_back({stage, on, std::move(reason)});
+  };
+
+  const std::size_t laws = law_count(model.interactions);
+  const std::size_t loads = model.interactions.external.size();
+  const bool gravity = !scene.gravity.isZero();
+  const bool driven = laws > 0 || loads > 0 || gravity;
+  add(Stage::Interact, driven,
+      driven ? count(laws, "interaction law", "interaction laws") + ", " + count(loads, "external load", "external loads") +
+                   (gravity ? ", gravity" : "")
+             : "no interaction, load or gravity acts on a particle");
+
+  const std::size_t bodies = contact_body_count(model);
+  const bool contact = bodies >= 2;
+  const bool surfaces = std::any_of(model.objects.begin(), model.objects.end(),
+                                    [](const ObjectModel& o) { return !o.skeleton.primitive.empty(); });
+  const bool mesh_wanted = outputs.images || outputs.meshes;
+  const bool field = surfaces && (contact || mesh_wanted || outputs.grids);
+  std::string field_reason;
+  if (!surfaces) {
+    field_reason = "no object has a skeleton";
+  } else if (field) {
+    field_reason = "needed by " + list({{contact, "contact"}, {outputs.images, "images"}, {outputs.meshes, "mesh files"},
+                                        {outputs.grids, "grid files"}}) +
+                   (contact ? "" : " (at output frames only)");
+  } else {
+    field_reason = "no contact is possible and no image, mesh or grid is requested";
+  }
+  add(Stage::PlaceSkeleton, field, field_reason);
+  add(Stage::IndexField, field, field_reason);
+
+  const std::string contact_reason =
+      contact ? count(bodies, "body", "bodies") + " may touch"
+              : (bodies == 0 && model.objects.size() < 2 ? "a single object has nothing to touch"
+                                                         : "fewer than two bodies may touch");
+  add(Stage::SampleSurface, contact, contact ? contact_reason + "; only parts near another body are sampled" : contact_reason);
+  add(Stage::FindContacts, contact, contact_reason);
+  add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair" : contact_reason);
+  add(Stage::React, contact, contact ? "runs when a contact surface was found" : contact_reason);
+  add(Stage::Integrate, true, "always");
+
+  const bool mesh = mesh_wanted && surfaces;
+  add(Stage::Polygonise, mesh,
+      mesh ? "needed by " + list({{outputs.images, "images"}, {outputs.meshes, "mesh files"}})
+           : (surfaces ? "no image or mesh file is requested" : "no object has a skeleton"));
+  add(Stage::Render, outputs.images, outputs.images ? "images are requested" : "no image is requested");
+  const bool files = outputs.images || outputs.film || outputs.meshes || outputs.grids || outputs.contacts || outputs.particles;
+  add(Stage::Export, files,
+      files ? list({{outputs.images, "images"}, {outputs.film, "film"}, {outputs.meshes, "mesh files"},
+                    {outputs.grids, "grid files"}, {outputs.contacts, "contact tables"},
+                    {outputs.particles, "particle tables"}})
+            : "no output file is requested");
+  return plan;
+}
+
+bool well_formed(const StepPlan& plan) {
+  if (plan.stages.size() != static_cast<std::size_t>(kStageCount)) return false;
+  // Empty meshes and zero forces exist before any stage runs; everything else must have been written.
+  DataMask available = kState | kForces | kMesh;
+  for (const PlannedStage& planned : plan.stages) {
+    if (!planned.on) continue;
+    if ((info(planned.stage).reads & ~available) != 0) return false;
+    available |= info(planned.stage).writes;
+  }
+  return true;
+}
+
+}  // namespace supple::scenes

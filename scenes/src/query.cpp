@@ -1,0 +1,207 @@
+#include "supple/scenes/query.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "supple/core/error.h"
+#include "supple/core/hash.h"
+#include "supple/core/io/atomic_file.h"
+#include "supple/core/io/mesh_files.h"
+#include "supple/implicit/polygonise.h"
+
+namespace supple::scenes {
+namespace {
+
+using nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+double thread_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+std::string body_name(const Model& model, std::uint32_t body) {
+  return body < model.objects.size() ? model.objects[body].name : "ground";
+}
+
+std::string rule_name(collision::ContactRule rule) {
+  switch (rule) {
+    case collision::ContactRule::Polar: return "polar";
+    case collision::ContactRule::March: return "march";
+    case collision::ContactRule::None: break;
+  }
+  return "none";
+}
+
+ordered_json loads_json(const core::Loads& loads) {
+  ordered_json particles = ordered_json::array();
+  for (std::size_t i = 0; i < loads.force.size(); ++i) {
+    particles.push_back({{"force", vector(loads.force[i])}, {"torque", vector(loads.torque[i])}});
+  }
+  return particles;
+}
+
+std::string text(const ordered_json& json) { return json.dump(2) + "\n"; }
+
+}  // namespace
+
+std::string query_forces(Simulation& simulation) {
+  const Model& model = simulation.model();
+  ordered_json json;
+  json["time_s"] = simulation.time();
+  ordered_json objects = ordered_json::array();
+  for (const ObjectModel& o : model.objects) objects.push_back({{"name", o.name}, {"first", o.first}, {"last", o.last}});
+  json["objects"] = objects;
+  ordered_json laws = ordered_json::array();
+  for (const core::LawReport& law :
+       core::report_laws(model.particles, simulation.state().particles, model.interactions, simulation.time())) {
+    laws.push_back({{"name", law.name}, {"energy_j", law.energy}, {"particles", loads_json(law.loads)}});
+  }
+  const collision::ContactSurface& surface = simulation.contacts();
+  double energy = 0.0;
+  for (const auto& s : surface.summary) energy += s.energy;
+  laws.push_back({{"name", "contact"}, {"energy_j", energy}, {"particles", loads_json(simulation.contact_loads())}});
+  json["laws"] = laws;
+  return text(json);
+}
+
+std::string query_contact(Simulation& simulation, bool samples) {
+  const Model& model = simulation.model();
+  const double begin = thread_cpu_seconds();
+  const collision::ContactSurface& surface = simulation.contacts();
+  const double cpu_us = 1e6 * (thread_cpu_seconds() - begin);
+  ordered_json json;
+  json["time_s"] = simulation.time();
+  json["cpu_us"] = cpu_us;
+  ordered_json pairs = ordered_json::array();
+  for (std::size_t k = 0; k < surface.summary.size(); ++k) {
+    const auto& s = surface.summary[k];
+    ordered_json pair = {{"a", body_name(model, s.bodies.a)},
+                         {"b", body_name(model, s.bodies.b)},
+                         {"rule", rule_name(s.rule)},
+                         {"force_n", vector(s.force)},
+                         {"moment_nm", vector(s.moment)},
+                         {"area_m2", s.area},
+                         {"centre_of_pressure_m", vector(s.centre_of_pressure)},
+                         {"energy_j", s.energy},
+                         {"largest_pressure_pa", s.largest_pressure},
+                         {"largest_overlap_m", s.largest_overlap},
+                         {"residual", s.residual},
+                         {"error_bound", s.error_estimate},
+                         {"patches", s.patches},
+                         {"points", s.points},
+                         {"evaluations", s.evaluations}};
+    if (samples) {
+      ordered_json rows = ordered_json::array();
+      for (std::size_t i = 0; i < surface.point.size(); ++i) {
+        if (surface.pair[i] != k) continue;
+        rows.push_back({{"point", vector(surface.point[i])},
+                        {"normal", vector(surface.normal[i])},
+                        {"area_m2", surface.area[i]},
+                        {"pressure_pa", surface.pressure[i]}});
+      }
+      pair["samples"] = rows;
+    }
+    pairs.push_back(pair);
+  }
+  json["pairs"] = pairs;
+  return text(json);
+}
+
+std::string query_field(Simulation& simulation, const fs::path& points) {
+  const std::vector<Vec3> at = io::read_points_csv(points);
+  const Model& model = simulation.model();
+  const std::vector<implicit::Field>& fields = simulation.fields();
+  ordered_json json;
+  json["time_s"] = simulation.time();
+  json["convention"] = "value > 0 inside; the outward normal is -gradient / |gradient|";
+  ordered_json objects = ordered_json::array();
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    if (model.objects[i].skeleton.primitive.empty()) continue;
+    std::vector<double> values(at.size());
+    std::vector<Vec3> gradients(at.size());
+    fields[i].evaluate(at, values, gradients);
+    ordered_json rows = ordered_json::array();
+    for (std::size_t p = 0; p < at.size(); ++p) {
+      rows.push_back({{"point", vector(at[p])}, {"value", values[p]}, {"gradient_1_m", vector(gradients[p])}});
+    }
+    objects.push_back({{"name", model.objects[i].name}, {"points", rows}});
+  }
+  json["objects"] = objects;
+  return text(json);
+}
+
+std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
+  if (query.cells > 0) simulation.set_cells(query.cells);
+  const Model& model = simulation.model();
+  const double begin = thread_cpu_seconds();
+  const std::vector<Mesh>& meshes = simulation.meshes();
+  const double cpu_ms = 1e3 * (thread_cpu_seconds() - begin);
+  ordered_json json;
+  json["cell_m"] = simulation.cell();
+  json["cpu_ms"] = cpu_ms;
+  ordered_json objects = ordered_json::array();
+  const std::size_t surfaces = static_cast<std::size_t>(std::count_if(
+      meshes.begin(), meshes.end(), [](const Mesh& m) { return !m.position.empty(); }));
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    if (meshes[i].position.empty()) continue;
+    const MeshReport report = inspect(meshes[i]);
+    objects.push_back({{"name", model.objects[i].name},
+                       {"vertices", meshes[i].vertex_count()},
+                       {"triangles", meshes[i].triangle_count()},
+                       {"closed", report.closed},
+                       {"oriented", report.oriented},
+                       {"euler_characteristic", report.euler_characteristic},
+                       {"components", report.components},
+                       {"area_m2", report.area},
+                       {"volume_m3", report.volume}});
+    if (query.out.empty()) continue;
+    if (query.out.extension() == ".ply" && surfaces == 1) {
+      io::write_ply(query.out, meshes[i]);
+    } else {
+      const fs::path folder = query.out.extension() == ".ply" ? query.out.parent_path() : query.out;
+      const std::string stem = query.out.extension() == ".ply" ? query.out.stem().string() + "." : std::string();
+      if (!folder.empty()) io::make_writable_folder(folder);
+      io::write_ply(folder / (stem + model.objects[i].name + ".ply"), meshes[i]);
+    }
+  }
+  json["objects"] = objects;
+  return text(json);
+}
+
+std::string explain(const Simulation& simulation) {
+  const Scene& scene = simulation.scene();
+  const Model& model = simulation.model();
+  std::string out = scene.title.empty() ? std::string() : scene.title + "\n";
+  const auto line = [&](const char* format, auto... values) {
+    const int n = std::snprintf(nullptr, 0, format, values...);
+    std::string row(static_cast<std::size_t>(n) + 1, '\0');
+    std::snprintf(row.data(), row.size(), format, values...);
+    row.pop_back();
+    out += row + "\n";
+  };
+  line("%zu objects, %zu particles, %d frames at %g a second", model.objects.size(), model.particles.size(),
+       scene.frame_count(), scene.frame_rate);
+  for (const ObjectModel& o : model.objects) {
+    line("  %-16s %u particles, %zu primitives, %zu surface samples%s", o.name.c_str(), o.last - o.first,
+         o.skeleton.primitive.size(), o.samples.size(), o.collides ? "" : ", no contact");
+  }
+  line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
+       scene.time_step.size || scene.time_step.substeps ? ", fixed by the scene" : ", by the stability limits at frame 1");
+  if (model.cell > 0.0) line("surface lattice cell %g m", model.cell);
+  out += "\n";
+  const StepPlan plan = plan_step(scene, model, requested_outputs(scene));
+  for (const PlannedStage& planned : plan.stages) {
+    line("%-4s %-24s %-10s %s", planned.on ? "on" : "off", std::string(info(planned.stage).name).c_str(),
+         std::string(info(planned.stage).module).c_str(), planned.reason.c_str());
+  }
+  return out;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,200 @@
+#include "supple/scenes/read_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <optional>
+
+#include "read_scene_archive.h"
+#include "supple/core/hash.h"
+
+namespace supple::scenes {
+namespace {
+
+/// One "path=value", followed down the tree; what lies on the way is copied, because aliases may share it.
+class Override {
+ public:
+  Override(Tree& tree, FaultList& faults, std::uint32_t source, std::string_view path)
+      : tree_(tree), faults_(faults), mark_{source, 1, 1}, path_(path), rest_(path) {}
+
+  void apply(Node*& root, Node* value) {
+    Node** slot = &root;
+    while (!rest_.empty()) {
+      if (rest_[0] == '.' && rest_.size() < path_.size()) rest_.remove_prefix(1);
+      const std::string done(path_.substr(0, path_.size() - rest_.size()));
+      Node* node = *slot;
+      if (node->kind == Node::Kind::Scalar && !node->quoted && node->text == "true") {
+        node = tree_.make(Node::Kind::Mapping, mark_);  // `images: true` is `images: {}`
+      } else {
+        node = tree_.copy(*node);
+      }
+      *slot = node;
+      slot = node->kind == Node::Kind::List ? item(*node, done) : node->kind == Node::Kind::Mapping ? key(*node) : nullptr;
+      if (slot == nullptr) {
+        if (node->kind != Node::Kind::List) fail(done, "expected a mapping or a list", node->described());
+        return;
+      }
+    }
+    *slot = value;
+  }
+
+ private:
+  void fail(std::string key, std::string expected, std::string found) {
+    if (!key.empty() && key.back() == '.') key.pop_back();
+    faults_.add(mark_, shown(key), std::move(expected), std::move(found), "");
+  }
+
+  Node** key(Node& mapping) {
+    const std::size_t length = std::min(rest_.find_first_of(".["), rest_.size());
+    const std::string_view word = rest_.substr(0, length);
+    rest_.remove_prefix(length);
+    for (Node::Entry& entry : mapping.entries) {
+      if (entry.key == word) return &entry.value;
+    }
+    mapping.entries.push_back({std::string(word), mark_, tree_.make(Node::Kind::Mapping, mark_)});
+    return &mapping.entries.back().value;
+  }
+
+  Node** item(Node& list, const std::string& done) {
+    std::string_view word = rest_;
+    if (word[0] == '[') word.remove_prefix(1);
+    std::size_t index = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), index);
+    if (error == std::errc()) {
+      std::string_view after = word.substr(static_cast<std::size_t>(end - word.data()));
+      if (after.starts_with(']')) after.remove_prefix(1);
+      if (index < list.items.size() && (after.empty() || after[0] == '.' || after[0] == '[')) {
+        rest_ = after;
+        return &list.items[index];
+      }
+    }
+    // Names may hold dots, so the longest one that fits is meant.
+    Node** best = nullptr;
+    std::string_view name;
+    std::string known;
+    for (Node*& node : list.items) {
+      const Node::Entry* entry = node->kind == Node::Kind::Mapping ? node->find("name") : nullptr;
+      if (entry == nullptr) continue;
+      const std::string_view text = entry->value->text;
+      known += (known.empty() ? "" : ", ") + shown(text);
+      const bool fits = rest_.starts_with(text) && (rest_.size() == text.size() || rest_[text.size()] == '.');
+      if (fits && text.size() > name.size()) {
+        best = &node;
+        name = text;
+      }
+    }
+    if (best == nullptr) {
+      const std::string range = list.items.empty() ? "none: the list is empty"
+                                                   : "an index from 0 to " + std::to_string(list.items.size() - 1);
+      fail(done, known.empty() ? "expected " + range : "expected " + range + " or one of the names " + known,
+           '\'' + shown(rest_.substr(0, rest_.find('.'))) + '\'');
+      return nullptr;
+    }
+    rest_.remove_prefix(name.size());
+    return best;
+  }
+
+  Tree& tree_;
+  FaultList& faults_;
+  Mark mark_;
+  std::string_view path_;
+  std::string_view rest_;
+};
+
+/// Keys that change a picture but not the motion: a run with other values continues, or is drawn again.
+constexpr std::array<std::string_view, 8> kLooks = {"title", "camera",    "light",  "output",
+                                                    "colour", "roughness", "visible", "duration"};
+
+void add_content(const Node& node, Hasher& hasher) {
+  hasher.add(static_cast<std::uint64_t>(node.kind));
+  hasher.add(node.text);
+  for (const Node* item : node.items) add_content(*item, hasher);
+  std::vector<const Node::Entry*> entries;
+  for (const Node::Entry& entry : node.entries) {
+    if (std::find(kLooks.begin(), kLooks.end(), entry.key) == kLooks.end()) entries.push_back(&entry);
+  }
+  std::sort(entries.begin(), entries.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
+  for (const Node::Entry* entry : entries) {
+    hasher.add(entry->key);
+    add_content(*entry->value, hasher);
+  }
+}
+
+/// Of everything that decides the motion, whatever the order of the keys.
+std::uint64_t content_hash(const Node& root) {
+  Hasher hasher;
+  add_content(root, hasher);
+  return hasher.value();
+}
+
+}  // namespace
+
+int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
+
+Scene parse_scene(const std::string& text, const std::string& name, const std::filesystem::path& folder,
+                  std::span<const std::string> overrides) {
+  FaultList faults;
+  Tree tree;
+  const std::uint32_t source = faults.add_source(name, text, false);
+  Node* root = parse_yaml(text, source, tree, faults);
+  if (root == nullptr) {
+    if (faults.count() == 0) faults.add({source, 1, 1}, "", "expected a scene", "an empty file", "begin with 'schema: 1'");
+    faults.raise();
+  }
+  std::vector<std::string> values;  // faults view them
+  values.reserve(overrides.size());
+  for (const std::string& text_set : overrides) {
+    const std::size_t equals = std::min(text_set.find('='), text_set.size());
+    values.push_back(equals < text_set.size() ? text_set.substr(equals + 1) : "");
+    const std::uint32_t set = faults.add_source("--set " + shown(text_set), values.back(), true);
+    const std::string_view path = std::string_view(text_set).substr(0, equals);
+    if (equals == text_set.size() || path.empty() || path.front() == '.' || path.back() == '.' ||
+        path.find("..") != std::string_view::npos) {
+      faults.add({set, 1, 1}, "", "expected path.to.key=value", '\'' + shown(text_set) + '\'', "");
+      continue;
+    }
+    Node* value = parse_yaml(values.back(), set, tree, faults);
+    if (value == nullptr) value = tree.make(Node::Kind::Null, {set, 1, 1});
+    Override(tree, faults, set, path).apply(root, value);
+  }
+  Scene scene;
+  if (root->kind != Node::Kind::Mapping) {
+    faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");
+  } else {
+    ReadArchive archive(faults, *root, "");
+    fields(archive, scene);
+    archive.finish();
+  }
+  faults.raise();
+  // Ids follow names, so the order of the file changes no bit.
+  std::sort(scene.objects.begin(), scene.objects.end(), [](const ObjectDesc& a, const ObjectDesc& b) { return a.name < b.name; });
+  scene.source = folder / name;
+  scene.content_hash = content_hash(*root);
+  return scene;
+}
+
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides) {
+  std::error_code status;
+  const auto fail = [&](std::string found) {
+    throw Error(ErrorKind::Io, Fault{.place = path.string(),
+                                     .key = "",
+                                     .expected = "expected a readable scene file",
+                                     .found = std::move(found),
+                                     .hint = ""});
+  };
+  if (std::filesystem::is_directory(path, status)) fail("a folder");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail(std::filesystem::exists(path, status) ? "a file that cannot be opened" : "nothing");
+  std::string text(kLargestText + 1, '\0');  // one more than allowed, so that a larger file is seen as such
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (file.bad()) fail("a file that cannot be read");
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  Scene scene = parse_scene(text, path.string(), path.parent_path(), overrides);
+  scene.source = path;
+  return scene;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,221 @@
+#include "read_scene_archive.h"
+
+#include <algorithm>
+#include <charconv>
+#include <numbers>
+
+namespace supple::scenes {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+
+bool is_identifier(std::string_view text) {
+  return !text.empty() && letter(text[0]) && text.size() <= 100 && std::all_of(text.begin(), text.end(), [](char c) {
+    return letter(c) || (c >= '0' && c <= '9') || c == '.' || c == '-';
+  });
+}
+
+/// Words of other tools and of the physics for keys that we name differently.
+std::string_view our_word(std::string_view key) {
+  constexpr std::array<std::array<std::string_view, 2>, 10> kWords{{{"stiffness", "modulus"},
+                                                                    {"fov", "field_of_view_deg"},
+                                                                    {"field_of_view", "field_of_view_deg"},
+                                                                    {"position", "at"},
+                                                                    {"offset", "at"},
+                                                                    {"fps", "frame_rate"},
+                                                                    {"damping", "medium"},
+                                                                    {"forces", "loads"},
+                                                                    {"restitution", "dissipation"},
+                                                                    {"k", "strength"}}};
+  for (const auto& [theirs, ours] : kWords) {
+    if (theirs == key) return ours;
+  }
+  return "";
+}
+
+/// Where else a key of this name exists: "objects.particles", or "" when nowhere or at the top.
+std::string home_of(std::string_view key, const std::vector<FieldInfo>& list, const std::string& path) {
+  for (const FieldInfo& info : list) {
+    if (info.key == key && !path.empty()) return path;
+    const std::string below = home_of(key, info.children, path.empty() ? std::string(info.key) : path + '.' + std::string(info.key));
+    if (!below.empty()) return below;
+  }
+  return "";
+}
+
+}  // namespace
+
+void ReadArchive::check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) {
+  if (holds) return;
+  const std::string path = path_.empty() ? key : key.empty() ? path_ : path_ + '.' + key;
+  if (!key.empty() && faults_.has(path)) return;
+  const Node* node = &mapping_;
+  Mark mark = mapping_.mark;
+  for (std::string_view rest = key; !rest.empty();) {
+    if (rest[0] == '.') rest.remove_prefix(1);
+    if (rest[0] == '[') {
+      std::size_t index = 0;
+      const auto [end, error] = std::from_chars(rest.data() + 1, rest.data() + rest.size(), index);
+      if (error != std::errc() || node->kind != Node::Kind::List || index >= node->items.size()) break;
+      node = node->items[index];
+      rest.remove_prefix(static_cast<std::size_t>(end - rest.data()) + 1);
+    } else {
+      const std::size_t length = std::min(rest.find_first_of(".["), rest.size());
+      const Node::Entry* entry = node->find(rest.substr(0, length));
+      if (entry == nullptr) {
+        mark = node->mark;
+        break;
+      }
+      node = entry->value;
+      rest.remove_prefix(length);
+    }
+    mark = node->mark;
+  }
+  faults_.add(mark, path, std::move(expected), std::move(found), std::move(hint));
+}
+
+void ReadArchive::finish() {
+  for (const Node::Entry& entry : mapping_.entries) {
+    const std::string_view key = entry.key;
+    if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+    const std::string path = (path_.empty() ? "" : path_ + '.') + shown(key);
+    std::vector<std::string_view> users;
+    const When* when = nullptr;
+    for (const Idle& idle : idle_) {
+      if (idle.key != key) continue;
+      users.insert(users.end(), idle.when.choices.begin(), idle.when.choices.end());
+      when = &idle.when;
+    }
+    if (when != nullptr) {
+      const std::string selector(when->selector);
+      faults_.add(entry.mark, path, "has no meaning with " + selector + ": " + std::string(when->current), "",
+                  "it belongs to " + selector + ": " + joined(users));
+      continue;
+    }
+    std::string hint = "known: " + joined(known_);
+    const std::string_view ours = our_word(key);
+    std::string near = std::find(known_.begin(), known_.end(), ours) != known_.end() ? std::string(ours) : "";
+    if (near.empty()) near = nearest_word(key, known_);
+    if (!near.empty()) {
+      hint = "did you mean '" + near + "'? (" + hint + ')';
+    } else if (const std::string home = home_of(key, scene_fields(), ""); !home.empty() && home != path_) {
+      hint = "a key of this name belongs to " + home + " (" + hint + ')';
+    }
+    faults_.add(entry.mark, path, "unknown key", "", hint);
+  }
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, double& value, const Rule& rule) {
+  const std::string expected = "expected " + rule_text(rule, false);
+  if (node.kind != Node::Kind::Scalar) {
+    fault(node, path, expected, "");
+    return;
+  }
+  const QuantityText text = read_quantity(node.text, rule.quantity);
+  if (!text.ok || !rule.holds(text.value)) {
+    fault(node, path, expected, text.hint);
+    return;
+  }
+  value = rule.degrees ? text.value * kDegree : text.value;
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, int& value, const Rule& rule) {
+  const std::string expected = "expected " + rule_text(rule, true);
+  if (node.kind != Node::Kind::Scalar) {
+    fault(node, path, expected, "");
+    return;
+  }
+  const WholeText text = read_whole(node.text);
+  if (!text.ok || !rule.holds(static_cast<double>(text.value)) || std::abs(text.value) > 2'000'000'000) {
+    fault(node, path, expected, text.hint);
+    return;
+  }
+  value = static_cast<int>(text.value);
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, bool& value, const Rule& /*rule*/) {
+  if (node.kind == Node::Kind::Scalar && !node.quoted && (node.text == "true" || node.text == "false")) {
+    value = node.text == "true";
+  } else {
+    fault(node, path, "expected true or false", "");
+  }
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, std::string& value, const Rule& rule) {
+  if (node.kind != Node::Kind::Scalar) {
+    fault(node, path, rule.name ? "expected a name" : "expected text", "");
+  } else if (rule.name && !is_identifier(node.text)) {
+    fault(node, path, "expected a name", "names are letters, digits, '_', '.', '-', and begin with a letter or '_'");
+  } else {
+    value = node.text;
+  }
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, Vec3& value, const Rule& rule) {
+  const std::size_t least = rule.least_items == 0 ? 3 : rule.least_items;
+  if (node.kind != Node::Kind::List || node.items.size() < least || node.items.size() > 3) {
+    fault(node, path, "expected " + expectation(FieldType::Vector, {}, rule), "");
+    return;
+  }
+  const std::size_t before = faults_.count();
+  Vec3 read_value = Vec3::Zero();
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    read(*node.items[i], path + '[' + std::to_string(i) + ']', read_value[static_cast<Eigen::Index>(i)], rule);
+  }
+  if (faults_.count() != before) return;
+  if (rule.direction && !(read_value.norm() > 1e-150 && read_value.norm() < 1e150)) {
+    faults_.add(node.mark, path, "expected a direction", "a vector without one", "");
+    return;
+  }
+  value = read_value;
+}
+
+bool ReadArchive::read_items(const Node& node, const std::string& path, const Rule& rule, std::string_view noun) {
+  if (node.kind != Node::Kind::List) {
+    fault(node, path, "expected a list of " + std::string(noun),
+          node.kind == Node::Kind::Mapping ? "begin each item with '- '" : node.kind == Node::Kind::Null ? "write [] for none" : "");
+    return false;
+  }
+  if (node.items.size() < rule.least_items || node.items.size() > rule.most_items) {
+    fault(node, path,
+          rule.least_items == rule.most_items ? "expected " + std::to_string(rule.least_items) + ' ' + std::string(noun)
+                                              : "expected a list of at least " + std::to_string(rule.least_items),
+          "");
+    return false;
+  }
+  return true;
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, std::vector<int>& value, const Rule& rule) {
+  if (!read_items(node, path, rule, "whole numbers")) return;
+  value.assign(node.items.size(), 0);
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    read(*node.items[i], path + '[' + std::to_string(i) + ']', value[i], rule);
+  }
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, std::vector<std::string>& value, const Rule& rule) {
+  if (!read_items(node, path, rule, "names")) return;
+  value.assign(node.items.size(), "");
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    read(*node.items[i], path + '[' + std::to_string(i) + ']', value[i], rule);
+  }
+}
+
+std::optional<std::size_t> ReadArchive::read_choice(const Node& node, const std::string& path,
+                                                    std::span<const std::string_view> names) {
+  std::string hint;
+  if (node.kind == Node::Kind::Scalar) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names[i] == node.text) return i;
+    }
+    const std::string near = nearest_word(node.text, names);
+    if (!near.empty()) hint = "did you mean '" + near + "'?";
+  }
+  fault(node, path, "expected one of " + joined(names), hint);
+  return std::nullopt;
+}
+
+}  // namespace supple::scenes

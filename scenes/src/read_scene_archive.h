@@ -1,0 +1,139 @@
+/// @file read_scene_archive.h
+/// The archive that reads: one per mapping of the file.
+#pragma once
+
+#include <concepts>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fields.h"
+#include "fields_info.h"
+#include "read_scene_faults.h"
+#include "yaml_tree.h"
+
+namespace supple::scenes {
+
+class ReadArchive {
+ public:
+  /// @param mapping  a Mapping node   @param path  its key path, "" for the whole scene
+  ReadArchive(FaultList& faults, const Node& mapping, std::string path)
+      : faults_(faults), mapping_(mapping), path_(std::move(path)) {}
+
+  template <class T>
+  void operator()(std::string_view key, T& value, const Rule& rule, std::string_view /*meaning*/) {
+    field(key, value, rule, false);
+  }
+  template <class T>
+  void required(std::string_view key, T& value, const Rule& rule, std::string_view /*meaning*/) {
+    field(key, value, rule, true);
+  }
+  [[nodiscard]] bool given(std::string_view key) const { return mapping_.find(key) != nullptr; }
+  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds or that key is faulty already.
+  void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint);
+  /// Reports keys that no field took. Call after `fields`.
+  void finish();
+
+ private:
+  template <class T>
+  void field(std::string_view key, T& value, const Rule& rule, bool required) {
+    if (!rule.when.choices.empty() && faults_.has(path_of(rule.when.selector))) {
+      known_.push_back(key);  // the kind is not known, so nothing can be said about its keys
+      return;
+    }
+    if (!rule.when.applies()) {
+      idle_.push_back({key, rule.when});
+      return;
+    }
+    known_.push_back(key);
+    const std::string path = path_of(key);
+    if (const Node::Entry* entry = mapping_.find(key)) {
+      read(*entry->value, path, value, rule);
+    } else if (required) {
+      faults_.add(mapping_.mark, path, "expected " + expectation(value, rule), "nothing", "this key is required");
+    }
+  }
+
+  [[nodiscard]] std::string path_of(std::string_view key) const {
+    return path_.empty() ? std::string(key) : path_ + '.' + std::string(key);
+  }
+  void fault(const Node& node, const std::string& path, std::string expected, std::string hint) {
+    faults_.add(node.mark, path, std::move(expected), node.described(), std::move(hint));
+  }
+
+  void read(const Node& node, const std::string& path, double& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, int& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, bool& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, std::string& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, Vec3& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, std::vector<int>& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, std::vector<std::string>& value, const Rule& rule);
+  [[nodiscard]] bool read_items(const Node& node, const std::string& path, const Rule& rule, std::string_view noun);
+  /// Index of the word in names, or none with a fault.
+  std::optional<std::size_t> read_choice(const Node& node, const std::string& path, std::span<const std::string_view> names);
+
+  template <class E>
+    requires std::is_enum_v<E>
+  void read(const Node& node, const std::string& path, E& value, const Rule& /*rule*/) {
+    if (const auto index = read_choice(node, path, EnumNames<E>::names)) value = static_cast<E>(*index);
+  }
+
+  template <class T>
+    requires std::same_as<T, double> || std::same_as<T, int> || std::same_as<T, bool>
+  void read(const Node& node, const std::string& path, std::optional<T>& value, const Rule& rule) {
+    if (rule.automatic && node.kind == Node::Kind::Scalar && node.text == "auto") return;
+    const std::size_t before = faults_.count();
+    T read_value{};
+    read(node, path, read_value, rule);
+    if (faults_.count() == before) value = read_value;
+  }
+
+  template <Described D>
+  void read(const Node& node, const std::string& path, D& value, const Rule& /*rule*/) {
+    if (node.kind != Node::Kind::Mapping) {
+      fault(node, path, "expected a mapping", node.kind == Node::Kind::Null ? "write {} for the defaults" : "");
+      return;
+    }
+    ReadArchive inner(faults_, node, path);
+    fields(inner, value);
+    inner.finish();
+  }
+
+  template <Described D>
+  void read(const Node& node, const std::string& path, std::optional<D>& value, const Rule& rule) {
+    if (node.kind == Node::Kind::Scalar && !node.quoted && node.text == "false") return;
+    value.emplace();
+    if (node.kind == Node::Kind::Scalar && !node.quoted && node.text == "true") {
+      Node empty;
+      empty.kind = Node::Kind::Mapping;
+      empty.mark = node.mark;
+      read(empty, path, *value, rule);
+    } else if (node.kind != Node::Kind::Mapping) {
+      fault(node, path, "expected a mapping", "write {} for the defaults or false for none");
+    } else {
+      read(node, path, *value, rule);
+    }
+  }
+
+  template <Described D>
+  void read(const Node& node, const std::string& path, std::vector<D>& value, const Rule& rule) {
+    if (!read_items(node, path, rule, "mappings")) return;
+    for (std::size_t i = 0; i < node.items.size(); ++i) {
+      read(*node.items[i], path + '[' + std::to_string(i) + ']', value.emplace_back(), rule);
+    }
+  }
+
+  struct Idle {
+    std::string_view key;
+    When when;
+  };
+
+  FaultList& faults_;
+  const Node& mapping_;
+  std::string path_;
+  std::vector<std::string_view> known_;
+  std::vector<Idle> idle_;
+};
+
+}  // namespace supple::scenes

@@ -1,0 +1,147 @@
+#include "read_scene_faults.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace supple::scenes {
+namespace {
+
+constexpr std::size_t kMostShown = 20;
+constexpr std::size_t kMostKept = 1000;  // a hostile file may hold a fault per node
+
+bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
+
+/// Damerau-Levenshtein distance (optimal string alignment).
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0U : 1U)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    std::swap(before, last);
+    std::swap(last, row);
+  }
+  return last[b.size()];
+}
+
+}  // namespace
+
+std::uint32_t FaultList::add_source(std::string name, std::string_view text, bool whole) {
+  sources_.push_back({std::move(name), text, whole});
+  return static_cast<std::uint32_t>(sources_.size() - 1);
+}
+
+void FaultList::add(Mark mark, std::string key, std::string expected, std::string found, std::string hint) {
+  ++count_;
+  if (faults_.size() >= kMostKept) return;
+  faults_.push_back({mark, Fault{"", std::move(key), std::move(expected), std::move(found), std::move(hint)}});
+}
+
+bool FaultList::has(std::string_view key) const {
+  return std::any_of(faults_.begin(), faults_.end(), [&](const Placed& placed) {
+    const std::string_view other = placed.fault.key;
+    if (other.empty()) return false;
+    const std::string_view above = other.size() < key.size() ? other : key;
+    const std::string_view below = other.size() < key.size() ? key : other;
+    return below.starts_with(above) && (below.size() == above.size() || below[above.size()] == '.' || below[above.size()] == '[');
+  });
+}
+
+std::string FaultList::place(Mark mark) const {
+  const Source& source = sources_[mark.source];
+  if (source.whole) return source.name;
+  std::size_t start = 0;
+  for (int line = 1; line < mark.line && start < source.text.size(); ++line) {
+    const std::size_t end = source.text.find('\n', start);
+    if (end == std::string_view::npos) break;
+    start = end + 1;
+  }
+  int column = 1;
+  const std::string_view before = source.text.substr(start, static_cast<std::size_t>(mark.column - 1));
+  for (const char c : before) column += continues_character(c) ? 0 : 1;
+  return source.name + ':' + std::to_string(mark.line) + ':' + std::to_string(column);
+}
+
+void FaultList::raise() const {
+  if (faults_.empty()) return;
+  std::vector<Placed> sorted = faults_;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const Placed& a, const Placed& b) { return a.mark < b.mark; });
+  std::vector<Fault> out;
+  for (Placed& placed : sorted) {
+    if (out.size() == kMostShown) break;
+    placed.fault.place = place(placed.mark);
+    out.push_back(std::move(placed.fault));
+  }
+  if (count_ > kMostShown) {
+    std::string& hint = out.back().hint;
+    hint += (hint.empty() ? "(" : " (") + std::to_string(count_ - kMostShown) + " more faults are not shown)";
+  }
+  throw Error(ErrorKind::Scene, std::move(out));
+}
+
+std::string shown(std::string_view text) {
+  std::string out;
+  std::size_t characters = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (!continues_character(c) && ++characters > 60) return out + "...";
+    if (byte < 0x20 || byte == 0x7F) {
+      std::array<char, 8> escaped{};
+      std::snprintf(escaped.data(), escaped.size(), "\\x%02x", byte);
+      out += escaped.data();
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  const bool whole = std::abs(value) < 1e9 && value == std::floor(value);
+  const auto [end, error] = whole ? std::to_chars(text.data(), text.data() + text.size(), static_cast<long long>(value))
+                                  : std::to_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() ? std::string(text.data(), end) : "?";
+}
+
+std::string short_text(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
+std::string particle_range(std::uint32_t n) {
+  return "expected a particle from 0 to " + std::to_string(n - 1) + ", or from -" + std::to_string(n) + " to -1";
+}
+
+std::string joined(std::span<const std::string_view> words) {
+  std::string text;
+  for (const std::string_view word : words) {
+    if (!text.empty()) text += ", ";
+    text += word;
+  }
+  return text;
+}
+
+std::string nearest_word(std::string_view word, std::span<const std::string_view> words) {
+  if (word.size() > 40) return "";
+  std::string_view best;
+  std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
+  for (const std::string_view candidate : words) {
+    const std::size_t distance = edit_distance(word, candidate);
+    if (distance < least && distance < candidate.size()) {
+      least = distance;
+      best = candidate;
+    }
+  }
+  return std::string(best);
+}
+
+}  // namespace supple::scenes

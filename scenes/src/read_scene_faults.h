@@ -1,0 +1,66 @@
+/// @file read_scene_faults.h
+/// Faults of a scene, collected with their places so that a user sees them all at once, in the order of the file.
+#pragma once
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "supple/core/error.h"
+
+namespace supple::scenes {
+
+/// A position in a text; lines and columns count from 1, columns in bytes (places are given in characters).
+struct Mark {
+  std::uint32_t source = 0;
+  int line = 1;
+  int column = 1;
+  friend auto operator<=>(const Mark&, const Mark&) = default;
+};
+
+class FaultList {
+ public:
+  /// A text that faults may point into; its views must outlive the list. @param whole  shown without line and column
+  std::uint32_t add_source(std::string name, std::string_view text, bool whole);
+  void add(Mark mark, std::string key, std::string expected, std::string found, std::string hint);
+  [[nodiscard]] std::size_t count() const { return count_; }
+  /// A fault at this key, above it or below it is listed.
+  [[nodiscard]] bool has(std::string_view key) const;
+  /// @throws Error{Scene} with the first 20 by place, when there is any.
+  void raise() const;
+
+ private:
+  struct Source {
+    std::string name;
+    std::string_view text;
+    bool whole = false;
+  };
+  struct Placed {
+    Mark mark;
+    Fault fault;
+  };
+  [[nodiscard]] std::string place(Mark mark) const;
+
+  std::vector<Source> sources_;
+  std::vector<Placed> faults_;
+  std::size_t count_ = 0;
+};
+
+/// Text safe to show: control characters escaped, at most 60 characters.
+[[nodiscard]] std::string shown(std::string_view text);
+/// Shortest text that reads back as the same number.
+[[nodiscard]] std::string number_text(double value);
+/// Six significant digits, for computed values.
+[[nodiscard]] std::string short_text(double value);
+/// "expected a particle from 0 to n - 1, or from -n to -1"
+[[nodiscard]] std::string particle_range(std::uint32_t n);
+/// "a, b, c"
+[[nodiscard]] std::string joined(std::span<const std::string_view> words);
+/// The word nearest to `word` by edit distance (with transpositions), or "" when none is near.
+[[nodiscard]] std::string nearest_word(std::string_view word, std::span<const std::string_view> words);
+
+}  // namespace supple::scenes

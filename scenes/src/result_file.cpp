@@ -1,0 +1,81 @@
+#include "result_file.h"
+
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+
+#include "supple/core/hash.h"
+#include "supple/core/io/atomic_file.h"
+
+namespace supple::scenes {
+namespace {
+
+using nlohmann::ordered_json;
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+}  // namespace
+
+void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, double wall_s) {
+  ordered_json json;
+  json["scene"] = scene_name(scene);
+  json["title"] = scene.title;
+  json["outcome"] = result.outcome;
+  json["reason"] = result.reason;
+  json["exit_code"] = result.exit_code;
+  json["frames"] = result.frames;
+  json["last_good_frame"] = result.frames;
+  json["frame_count"] = scene.frame_count();
+  json["state_hash"] = to_hex(result.state_hash);
+  json["warnings"] = result.warnings;
+  json["units"] = {{"length", "m"}, {"up_axis", "z"}};
+  if (simulation != nullptr) {
+    const State& state = simulation->state();
+    json["steps"] = state.steps;
+    json["time_step_s"] = simulation->time_step();
+    json["simulated_s"] = simulation->time();
+    const Audits audits = simulation->audits();
+    json["audits"] = {{"momentum_error", audits.momentum_error},
+                      {"angular_momentum_error", audits.angular_momentum_error},
+                      {"energy_error", audits.energy_error},
+                      {"contact_residual", audits.contact_residual},
+                      {"largest_overlap", audits.largest_overlap},
+                      {"largest_overlap_share", audits.largest_overlap_share},
+                      {"dissipated_j", state.ledger.dissipated},
+                      {"external_work_j", state.ledger.external_work},
+                      {"external_impulse_ns", vector(state.ledger.external_impulse)},
+                      {"pin_impulse_ns", vector(state.ledger.pin_impulse)},
+                      {"pin_angular_impulse_nms", vector(state.ledger.pin_angular_impulse)}};
+    const Model& model = simulation->model();
+    ordered_json objects = ordered_json::object();
+    for (std::size_t i = 0; i < model.objects.size(); ++i) {
+      const ObjectModel& o = model.objects[i];
+      const auto& record = state.record.objects[i];
+      objects[o.name] = {{"particles", o.last - o.first},
+                         {"diameter", o.rest_diameter},
+                         {"largest_deformation", record.largest_deformation},
+                         {"final_shape_error", record.final_shape_error}};
+    }
+    json["objects"] = objects;
+    const Profile profile = simulation->profile();
+    ordered_json stages = ordered_json::object();
+    for (const StageInfo& stage : stage_table()) {
+      const StageProfile& p = profile[static_cast<std::size_t>(stage.stage)];
+      stages[std::string(stage.name)] = {
+          {"calls", p.calls}, {"cpu_s", p.cpu_s}, {"visited", p.visited}, {"present", p.present}};
+    }
+    json["stages"] = stages;
+  }
+  json["film"] = result.film.empty() ? ordered_json(nullptr) : ordered_json(result.film.filename().string());
+  json["peak_memory_mb"] = peak_memory_mb();
+  json["wall_s"] = wall_s;
+  io::write_atomically(result.folder / "result.json", std::string_view(json.dump(2) + "\n"));
+}
+
+}  // namespace supple::scenes

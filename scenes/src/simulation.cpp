@@ -1,0 +1,354 @@
+#include "supple/scenes/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frame.h"
+#include "supple/core/error.h"
+#include "supple/core/parts.h"
+
+namespace supple::scenes {
+namespace {
+
+/// Beyond this many scene lengths from the start, or this many scene lengths in a frame, numbers have left the scene.
+constexpr double kBelievable = 1e4;
+
+int log2_of(int n) {
+  int k = 0;
+  while ((1 << k) < n) ++k;
+  return k;
+}
+
+double share(double value, double scale) { return scale > 0.0 ? value / scale : value; }
+
+}  // namespace
+
+struct Simulation::Impl {
+  Scene scene;
+  Model model;
+  SimulationOptions options;
+  Executor executor;
+  StepPlan plan;
+  Profile profile{};
+  State state;
+  State last_frame;
+  Frame frame;
+  core::InteractionWorkspace workspace;
+  double pair_frequency = 0.0;
+
+  // Results pulled at the current state; their own frame, so that pulling cannot disturb stepping.
+  Frame pulled;
+  core::ForceSample pulled_sample;
+  bool pulled_contacts = false;
+  bool pulled_fields = false;
+  std::vector<Mesh> meshes;
+  bool pulled_meshes = false;
+
+  Impl(Scene s, SimulationOptions o)
+      : scene(std::move(s)),
+        model(build_model(scene)),
+        options(o),
+        executor(o.threads),
+        plan(plan_step(scene, model, requested_outputs(scene))),
+        frame(model),
+        workspace(model.particles, model.interactions),
+        pair_frequency(core::largest_frequency(model.particles, model.rest, model.interactions)),
+        pulled(model) {
+    state.particles = model.initial;
+    state.samples.resize(model.objects.size());
+    for (std::size_t i = 0; i < model.objects.size(); ++i) {
+      state.samples[i].distance.assign(model.objects[i].samples.size(), -1.0);
+    }
+    choose_step();
+    book_audits();
+  }
+
+  StageContext context() { return {model, executor, profile, options.skip, options.profile}; }
+
+  [[nodiscard]] double frame_time() const { return 1.0 / scene.frame_rate; }
+  [[nodiscard]] double dt() const { return std::ldexp(frame_time(), -state.halvings); }
+  [[nodiscard]] double time() const { return (state.frame - 1) * frame_time() + state.substep * dt(); }
+  [[nodiscard]] bool contact_on() const { return !options.skip || plan.on(Stage::FindContacts); }
+
+  /// The step of the next frame interval: frame time / 2^k by the stability limits (or as the scene fixes it).
+  void choose_step() {
+    const TimeStepDesc& desc = scene.time_step;
+    if (desc.substeps) {
+      state.halvings = log2_of(*desc.substeps);
+      return;
+    }
+    if (desc.size) {
+      state.halvings = core::halvings(frame_time(), *desc.size);
+      return;
+    }
+    const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
+    const core::StepLimits limits{.frequency = std::hypot(pair_frequency, model.contact_frequency),
+                                  .length = model.smallest_length,
+                                  .speed = speeds.linear + scene.gravity.norm() * frame_time(),
+                                  .angular_speed = speeds.angular};
+    const double step = core::stable_step(limits);
+    const int k = step < frame_time() ? core::halvings(frame_time(), step) : 0;
+    if (k > log2_of(desc.max_substeps)) {
+      throw Error(ErrorKind::Limit,
+                  Fault{.place = scene.source.string(),
+                        .key = "time_step.max_substeps",
+                        .expected = "expected a stable step with at most " + std::to_string(desc.max_substeps) +
+                                    " substeps a frame",
+                        .found = "one of " + std::to_string(step) + " s (" + std::to_string(1LL << k) + " substeps) at frame " +
+                                 std::to_string(state.frame),
+                        .hint = "soften the stiffest interaction or contact, make the lightest particle heavier, or "
+                                "raise time_step.max_substeps"});
+    }
+    state.halvings = k;
+  }
+
+  void evaluate_forces(const core::ParticleState& particles, double at, core::ForceSample& out) {
+    const std::size_t n = model.particles.size();
+    out.internal.reset(n);
+    out.external.reset(n);
+    out.force_on_fixed.setZero();
+    out.moment_on_fixed.setZero();
+    out.dissipative.reset(0);
+    if (!options.skip || plan.on(Stage::Interact)) {
+      StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
+      StageTimer timer(p, options.profile);
+      const core::InteractionCounts counts = core::accumulate_interactions(
+          model.particles, particles, model.interactions, at, executor, workspace, out.internal, out.external);
+      p.visited += counts.pairs_visited;
+      p.present += counts.pairs_present;
+    }
+    if (contact_on()) {
+      find_contact_surface(context(), particles, state.samples, frame);
+      apply_reactions(context(), frame, out);
+    }
+  }
+
+  void step() {
+    drop_results();
+    if (state.substep == 0) {
+      last_frame = state;
+      choose_step();
+    }
+    const core::ForceModel forces = [this](const core::ParticleState& particles, double at, core::ForceSample& out) {
+      evaluate_forces(particles, at, out);
+    };
+    {
+      StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
+      // Timed with the force evaluation inside, whose share `Simulation::profile` takes off again.
+      StageTimer timer(p, options.profile);
+      core::advance(model.particles, model.interactions, forces, time(), dt(), state.particles, state.kick,
+                    state.ledger);
+      p.visited += model.particles.size();
+      p.present += model.particles.size();
+    }
+    ++state.steps;
+    ++state.substep;
+    const core::Divergence divergence =
+        core::find_divergence(model.particles, state.particles, kBelievable * model.scene_length,
+                              kBelievable * model.scene_length * scene.frame_rate);
+    if (divergence.found) {
+      const std::uint64_t step = state.steps;
+      const double at = time();
+      if (last_frame.record.valid) state = last_frame;
+      throw_diverged(divergence, step, at);
+    }
+    if (state.substep == (1 << state.halvings)) {
+      state.substep = 0;
+      ++state.frame;
+    }
+  }
+
+  [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const {
+    const auto object = std::find_if(model.objects.begin(), model.objects.end(), [&](const ObjectModel& o) {
+      return o.first <= divergence.particle && divergence.particle < o.last;
+    });
+    const std::string particle =
+        object == model.objects.end()
+            ? "particle " + std::to_string(divergence.particle)
+            : object->name + ", particle " + std::to_string(divergence.particle - object->first);
+    throw Error(ErrorKind::Diverged,
+                Fault{.place = scene.source.string(),
+                      .key = {},
+                      .expected = "diverged at step " + std::to_string(step_number) + " (t = " + std::to_string(at) +
+                                  " s): " + divergence.cause + " of " + particle,
+                      .found = std::to_string(divergence.value) + ", believable up to " + std::to_string(divergence.limit),
+                      .hint = scene.time_step.size || scene.time_step.substeps
+                                  ? "the scene fixes its own time step; let it be auto"
+                                  : "check stiffness, mass and strength of the objects concerned"});
+  }
+
+  void drop_results() {
+    pulled_contacts = pulled_fields = pulled_meshes = false;
+    meshes.clear();
+  }
+
+  void pull_contacts() {
+    if (pulled_contacts) return;
+    if (contact_on()) {
+      std::vector<implicit::SampleState> trial = state.samples;
+      Profile unused{};
+      const StageContext quiet{model, executor, unused, options.skip, false};
+      find_contact_surface(quiet, state.particles, trial, pulled);
+      pulled_sample.internal.reset(model.particles.size());
+      apply_reactions(quiet, pulled, pulled_sample);
+    }
+    pulled_contacts = true;
+    pulled_fields = false;
+  }
+
+  void pull_fields() {
+    pull_contacts();
+    if (pulled_fields) return;
+    Profile unused{};
+    place_and_index_all({model, executor, unused, options.skip, false}, state.particles, pulled);
+    pulled_fields = true;
+  }
+
+  const std::vector<Mesh>& pull_meshes() {
+    if (pulled_meshes) return meshes;
+    pull_fields();
+    meshes = polygonise_objects(context(), pulled);
+    pulled_meshes = true;
+    return meshes;
+  }
+
+  Energies energies() {
+    pull_contacts();
+    Energies e;
+    e.kinetic = core::measure_motion(model.particles, state.particles).kinetic_energy;
+    e.interaction = core::potential_energy(model.particles, state.particles, model.interactions);
+    for (const auto& s : pulled.surface.summary) e.contact += s.energy;
+    return e;
+  }
+
+  /// Compares motion and energy with frame 1 and with what the ledger booked; keeps the largest deviations.
+  void book_audits() {
+    RunRecord& r = state.record;
+    const core::Motion motion = core::measure_motion(model.particles, state.particles);
+    const double energy = energies().total();
+    if (!r.valid) {
+      r = {};
+      r.valid = true;
+      r.initial = motion;
+      r.initial_energy = energy;
+      r.objects.resize(model.objects.size());
+    }
+    const core::Ledger& ledger = state.ledger;
+    const Vec3 momentum = motion.momentum - r.initial.momentum - ledger.external_impulse - ledger.pin_impulse;
+    const Vec3 angular = motion.angular_momentum - r.initial.angular_momentum - ledger.external_angular_impulse -
+                         ledger.pin_angular_impulse;
+    r.momentum_error = std::max(r.momentum_error, momentum.norm());
+    r.angular_momentum_error = std::max(r.angular_momentum_error, angular.norm());
+    r.momentum_scale = std::max(r.momentum_scale, motion.momentum_scale);
+    r.angular_momentum_scale = std::max(r.angular_momentum_scale, motion.angular_momentum_scale);
+    r.largest_energy = std::max(r.largest_energy, energy);
+    r.energy_error =
+        std::max(r.energy_error, std::abs(energy - r.initial_energy - ledger.external_work + ledger.dissipated));
+    for (const auto& s : pulled.surface.summary) {
+      r.contact_residual = std::max(r.contact_residual, s.residual);
+      r.largest_overlap = std::max(r.largest_overlap, s.largest_overlap);
+      double thickness = std::numeric_limits<double>::infinity();
+      for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
+        if (body < model.objects.size()) thickness = std::min(thickness, 2.0 * model.objects[body].iso_radius);
+      }
+      r.largest_overlap_share = std::max(r.largest_overlap_share, s.largest_overlap / thickness);
+    }
+    for (std::size_t i = 0; i < model.objects.size(); ++i) {
+      const ObjectModel& o = model.objects[i];
+      const std::size_t n = o.last - o.first;
+      const core::ShapeError error = core::shape_error(std::span(model.rest.position).subspan(o.first, n),
+                                                       std::span(state.particles.position).subspan(o.first, n));
+      r.objects[i].final_shape_error = share(error.rms, o.rest_diameter);
+      r.objects[i].largest_deformation = std::max(r.objects[i].largest_deformation, r.objects[i].final_shape_error);
+    }
+  }
+};
+
+Simulation::Simulation(Scene scene, SimulationOptions options)
+    : impl_(std::make_unique<Impl>(std::move(scene), options)) {}
+Simulation::~Simulation() = default;
+Simulation::Simulation(Simulation&&) noexcept = default;
+Simulation& Simulation::operator=(Simulation&&) noexcept = default;
+
+const Scene& Simulation::scene() const { return impl_->scene; }
+const Model& Simulation::model() const { return impl_->model; }
+const State& Simulation::state() const { return impl_->state; }
+int Simulation::frame() const { return impl_->state.frame; }
+double Simulation::time() const { return impl_->time(); }
+double Simulation::time_step() const { return impl_->dt(); }
+std::uint64_t Simulation::state_hash() const { return impl_->state.hash(); }
+void Simulation::step() { impl_->step(); }
+
+void Simulation::step_frame() {
+  const int target = impl_->state.frame + 1;
+  while (impl_->state.frame < target) impl_->step();
+  impl_->book_audits();
+}
+
+void Simulation::restore(State state) {
+  SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());
+  SUPPLE_EXPECTS(state.samples.size() == impl_->model.objects.size());
+  impl_->drop_results();
+  impl_->state = std::move(state);
+}
+
+const std::vector<Mesh>& Simulation::meshes() { return impl_->pull_meshes(); }
+
+const collision::ContactSurface& Simulation::contacts() {
+  impl_->pull_contacts();
+  return impl_->pulled.surface;
+}
+
+const std::vector<Vec3>& Simulation::contact_forces() {
+  impl_->pull_contacts();
+  return impl_->pulled.traction_force;
+}
+
+const std::vector<implicit::Field>& Simulation::fields() {
+  impl_->pull_fields();
+  return impl_->pulled.field;
+}
+
+const core::Loads& Simulation::contact_loads() {
+  impl_->pull_contacts();
+  impl_->pulled_sample.internal.force.resize(impl_->model.particles.size(), Vec3::Zero());
+  impl_->pulled_sample.internal.torque.resize(impl_->model.particles.size(), Vec3::Zero());
+  return impl_->pulled_sample.internal;
+}
+
+double Simulation::cell() const { return impl_->model.cell; }
+
+void Simulation::set_cells(int cells) {
+  SUPPLE_EXPECTS(cells > 0);
+  impl_->pull_fields();
+  Box all;
+  for (std::size_t i = 0; i < impl_->model.objects.size(); ++i) {
+    if (!impl_->model.objects[i].skeleton.primitive.empty()) all = all.united(impl_->pulled.field[i].surface_box());
+  }
+  if (!all.empty()) impl_->model.cell = all.extent().maxCoeff() / cells;
+  impl_->pulled_meshes = false;
+}
+
+Energies Simulation::energies() { return impl_->energies(); }
+
+Audits Simulation::audits() const {
+  const RunRecord& r = impl_->state.record;
+  return {.momentum_error = share(r.momentum_error, r.momentum_scale),
+          .angular_momentum_error = share(r.angular_momentum_error, r.angular_momentum_scale),
+          .energy_error = share(r.energy_error, r.largest_energy),
+          .contact_residual = r.contact_residual,
+          .largest_overlap = r.largest_overlap,
+          .largest_overlap_share = r.largest_overlap_share};
+}
+
+Profile Simulation::profile() const {
+  Profile profile = impl_->profile;
+  double& integrate = profile[static_cast<std::size_t>(Stage::Integrate)].cpu_s;
+  for (std::size_t s = 0; s < static_cast<std::size_t>(Stage::Integrate); ++s) integrate -= profile[s].cpu_s;
+  integrate = std::max(integrate, 0.0);
+  return profile;
+}
+
+StageProfile& Simulation::profile(Stage stage) { return impl_->profile[static_cast<std::size_t>(stage)]; }
+
+}  // namespace supple::scenes

@@ -1,0 +1,151 @@
+#include "supple/scenes/state.h"
+
+#include <cstring>
+
+#include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
+
+namespace supple::scenes {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
+constexpr std::uint64_t kVersion = 1;
+constexpr std::size_t kLargestFile = std::size_t{8} << 30;
+
+void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
+
+void read(StateReader& in, Vec3& v) {
+  std::vector<Vec3> one;
+  in.read(one);
+  if (one.size() != 1) throw Error(ErrorKind::Corrupt, Fault{.expected = "expected one vector in the saved state"});
+  v = one[0];
+}
+
+void save_record(StateWriter& out, const RunRecord& r) {
+  out.write(std::uint64_t{r.valid});
+  write(out, r.initial.momentum);
+  write(out, r.initial.angular_momentum);
+  out.write(r.initial.kinetic_energy);
+  for (const double value : {r.initial_energy, r.largest_energy, r.momentum_scale, r.angular_momentum_scale,
+                             r.momentum_error, r.angular_momentum_error, r.energy_error, r.contact_residual,
+                             r.largest_overlap, r.largest_overlap_share}) {
+    out.write(value);
+  }
+  out.write(std::uint64_t{r.objects.size()});
+  for (const auto& o : r.objects) {
+    out.write(o.largest_deformation);
+    out.write(o.final_shape_error);
+  }
+}
+
+void load_record(StateReader& in, RunRecord& r) {
+  std::uint64_t flag = 0;
+  in.read(flag);
+  r.valid = flag != 0;
+  read(in, r.initial.momentum);
+  read(in, r.initial.angular_momentum);
+  in.read(r.initial.kinetic_energy);
+  for (double* value : {&r.initial_energy, &r.largest_energy, &r.momentum_scale, &r.angular_momentum_scale,
+                        &r.momentum_error, &r.angular_momentum_error, &r.energy_error, &r.contact_residual,
+                        &r.largest_overlap, &r.largest_overlap_share}) {
+    in.read(*value);
+  }
+  std::uint64_t n = 0;
+  in.read(n);
+  r.objects.clear();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    RunRecord::ObjectRecord o;
+    in.read(o.largest_deformation);
+    in.read(o.final_shape_error);
+    r.objects.push_back(o);
+  }
+}
+
+[[noreturn]] void corrupt(const std::filesystem::path& path, const std::string& what) {
+  throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
+                                        .key = {},
+                                        .expected = "expected a complete saved state",
+                                        .found = what,
+                                        .hint = "remove the file and run the scene again"});
+}
+
+}  // namespace
+
+std::uint64_t State::hash() const {
+  Hasher hasher;
+  hasher.add(static_cast<std::uint64_t>(frame));
+  hasher.add(static_cast<std::uint64_t>(substep));
+  hasher.add(static_cast<std::uint64_t>(halvings));
+  hasher.add(steps);
+  particles.hash(hasher);
+  kick.hash(hasher);
+  ledger.hash(hasher);
+  for (const auto& s : samples) s.hash(hasher);
+  return hasher.value();
+}
+
+void save_state(const std::filesystem::path& path, const State& state, std::uint64_t fingerprint) {
+  StateWriter out;
+  out.write(kMagic);
+  out.write(kVersion);
+  out.write(fingerprint);
+  for (const std::int32_t value : {state.frame, state.substep, state.halvings}) {
+    out.write(static_cast<std::uint64_t>(static_cast<std::uint32_t>(value)));
+  }
+  out.write(state.steps);
+  state.particles.save(out);
+  state.kick.save(out);
+  state.ledger.save(out);
+  out.write(std::uint64_t{state.samples.size()});
+  for (const auto& s : state.samples) s.save(out);
+  save_record(out, state.record);
+  const std::uint64_t check = hash_bytes(out.bytes());
+  out.write(check);
+  io::write_atomically(path, std::span<const std::byte>(out.bytes()));
+}
+
+State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
+  const std::vector<std::byte> bytes = io::read_file(path, kLargestFile);
+  if (bytes.size() < 4 * sizeof(std::uint64_t)) corrupt(path, "a file of " + std::to_string(bytes.size()) + " bytes");
+  const std::span<const std::byte> content(bytes.data(), bytes.size() - sizeof(std::uint64_t));
+  std::uint64_t check = 0;
+  std::memcpy(&check, bytes.data() + content.size(), sizeof check);
+  if (check != hash_bytes(content)) corrupt(path, "content that does not match its checksum");
+
+  StateReader in(content);
+  std::uint64_t magic = 0, version = 0, scene = 0;
+  in.read(magic);
+  in.read(version);
+  in.read(scene);
+  if (magic != kMagic) corrupt(path, "another kind of file");
+  if (version != kVersion) corrupt(path, "version " + std::to_string(version));
+  if (scene != fingerprint) {
+    throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
+                                          .key = {},
+                                          .expected = "expected a state of this scene",
+                                          .found = "one of another scene, or of other parameters",
+                                          .hint = "use --overwrite to start again, or another --out folder"});
+  }
+  State state;
+  for (std::int32_t* value : {&state.frame, &state.substep, &state.halvings}) {
+    std::uint64_t raw = 0;
+    in.read(raw);
+    *value = static_cast<std::int32_t>(static_cast<std::uint32_t>(raw));
+  }
+  in.read(state.steps);
+  state.particles.load(in);
+  state.kick.load(in);
+  state.ledger.load(in);
+  std::uint64_t n = 0;
+  in.read(n);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    implicit::SampleState samples;
+    samples.load(in);
+    state.samples.push_back(std::move(samples));
+  }
+  load_record(in, state.record);
+  if (!in.at_end()) corrupt(path, "bytes after the end");
+  return state;
+}
+
+}  // namespace supple::scenes

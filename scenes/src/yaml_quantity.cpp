@@ -1,0 +1,239 @@
+#include "yaml_quantity.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "read_scene_faults.h"
+
+namespace supple::scenes {
+namespace {
+
+struct Unit {
+  std::string_view name;
+  double factor;
+  Dimension dimension;
+};
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr Dimension kNoDimension{};
+
+constexpr std::array kUnits{
+    Unit{"m", 1.0, kLength.dimension},       Unit{"km", 1e3, kLength.dimension},     Unit{"dm", 1e-1, kLength.dimension},
+    Unit{"cm", 1e-2, kLength.dimension},     Unit{"mm", 1e-3, kLength.dimension},    Unit{"um", 1e-6, kLength.dimension},
+    Unit{"kg", 1.0, kMass.dimension},        Unit{"g", 1e-3, kMass.dimension},       Unit{"mg", 1e-6, kMass.dimension},
+    Unit{"t", 1e3, kMass.dimension},         Unit{"s", 1.0, kTime.dimension},        Unit{"ms", 1e-3, kTime.dimension},
+    Unit{"us", 1e-6, kTime.dimension},       Unit{"min", 60.0, kTime.dimension},     Unit{"Hz", 1.0, kRate.dimension},
+    Unit{"kHz", 1e3, kRate.dimension},       Unit{"rad", 1.0, kAngle.dimension},     Unit{"deg", kDegree, kAngle.dimension},
+    Unit{"N", 1.0, kForce.dimension},        Unit{"mN", 1e-3, kForce.dimension},     Unit{"kN", 1e3, kForce.dimension},
+    Unit{"MN", 1e6, kForce.dimension},       Unit{"Pa", 1.0, kPressure.dimension},   Unit{"kPa", 1e3, kPressure.dimension},
+    Unit{"MPa", 1e6, kPressure.dimension},   Unit{"GPa", 1e9, kPressure.dimension},  Unit{"J", 1.0, kTorque.dimension},
+    Unit{"mJ", 1e-3, kTorque.dimension},     Unit{"kJ", 1e3, kTorque.dimension},     Unit{"%", 1e-2, kNoDimension},
+};
+
+bool digit(char c) { return c >= '0' && c <= '9'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+  return text;
+}
+
+/// A decimal number at the start of `text`: [+-] digits [. digits] [e digits].
+struct Leading {
+  std::size_t length = 0;  // 0: none
+  double value = 0.0;
+  bool in_range = true;
+  bool octal_looking = false;
+};
+Leading leading_number(std::string_view text) {
+  std::size_t i = !text.empty() && (text[0] == '+' || text[0] == '-') ? 1 : 0;
+  const std::size_t start = i;
+  while (i < text.size() && digit(text[i])) ++i;
+  const std::size_t whole = i - start;
+  std::size_t fraction = 0;
+  if (i < text.size() && text[i] == '.') {
+    ++i;
+    while (i < text.size() && digit(text[i])) ++i, ++fraction;
+  }
+  Leading out;
+  if (whole + fraction == 0) return out;
+  if (i < text.size() && (text[i] == 'e' || text[i] == 'E')) {
+    std::size_t j = i + 1;
+    if (j < text.size() && (text[j] == '+' || text[j] == '-')) ++j;
+    if (j < text.size() && digit(text[j])) {
+      while (j < text.size() && digit(text[j])) ++j;
+      i = j;
+    }
+  }
+  out.length = i;
+  out.octal_looking = whole > 1 && text[start] == '0' && i == start + whole;
+  const std::size_t sign = text[0] == '+' ? 1 : 0;
+  const auto [end, error] = std::from_chars(text.data() + sign, text.data() + i, out.value);
+  out.in_range = error == std::errc() && end == text.data() + i && std::isfinite(out.value);
+  return out;
+}
+
+std::string plain_decimal(std::string_view text) {
+  std::string out(text.substr(0, text[0] == '-' ? 1 : 0));
+  text.remove_prefix(text[0] == '-' || text[0] == '+' ? 1 : 0);
+  while (text.size() > 1 && text[0] == '0') text.remove_prefix(1);
+  return out += text;
+}
+
+/// "m/s^2", "N s/m", "1/m^2": factors joined by blanks, '*' or '/', the latter for the next factor alone.
+struct UnitText {
+  bool ok = false;
+  double factor = 1.0;
+  Dimension dimension;
+  std::string hint;
+};
+UnitText read_unit(std::string_view text) {
+  UnitText out;
+  int sign = 1;
+  for (std::size_t i = 0; i < text.size();) {
+    if (text[i] == ' ' || text[i] == '*') {
+      ++i;
+      continue;
+    }
+    if (text[i] == '/') {
+      sign = -1;
+      ++i;
+      continue;
+    }
+    std::size_t j = i;
+    while (j < text.size() && text[j] != ' ' && text[j] != '*' && text[j] != '/' && text[j] != '^') ++j;
+    const std::string_view name = text.substr(i, j - i);
+    int power = 1;
+    if (j < text.size() && text[j] == '^') {
+      const auto [end, error] = std::from_chars(text.data() + j + 1, text.data() + text.size(), power);
+      if (error != std::errc() || power < 1 || power > 4) {
+        out.hint = "exponents of units are written m^2";
+        return out;
+      }
+      j = static_cast<std::size_t>(end - text.data());
+    }
+    i = j;
+    if (name == "1" && sign == 1) continue;
+    const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.name == name; });
+    if (unit == kUnits.end()) {
+      std::vector<std::string_view> names;
+      for (const Unit& u : kUnits) names.push_back(u.name);
+      const std::string near = nearest_word(name, names);
+      out.hint = "unknown unit '" + shown(name) + '\'' +
+                 (near.empty() ? "; known: " + joined(names) : "; did you mean '" + near + "'?");
+      return out;
+    }
+    for (int k = 0; k < power; ++k) {
+      out.factor = sign > 0 ? out.factor * unit->factor : out.factor / unit->factor;
+      out.dimension.m = static_cast<std::int8_t>(out.dimension.m + sign * unit->dimension.m);
+      out.dimension.kg = static_cast<std::int8_t>(out.dimension.kg + sign * unit->dimension.kg);
+      out.dimension.s = static_cast<std::int8_t>(out.dimension.s + sign * unit->dimension.s);
+      out.dimension.rad = static_cast<std::int8_t>(out.dimension.rad + sign * unit->dimension.rad);
+    }
+    sign = 1;
+  }
+  out.ok = true;
+  return out;
+}
+
+std::string_view noun_of(const Dimension& dimension) {
+  for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce, kTorque,
+                            kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed}) {
+    if (q.dimension == dimension) return q.noun;
+  }
+  return "";
+}
+
+/// The same exponents; an angle may also be left out ("1/s" for rad/s).
+bool matches(Dimension found, Dimension wanted) {
+  if (found == wanted) return true;
+  found.rad = wanted.rad = 0;
+  return found == wanted && wanted != Dimension{};
+}
+
+std::string not_a_number_hint(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
+  std::string_view bare = lower;
+  if (!bare.empty() && (bare[0] == '+' || bare[0] == '-')) bare.remove_prefix(1);
+  if (bare == ".nan" || bare == ".inf" || bare == "nan" || bare == "inf" || bare == "infinity") return "numbers must be finite";
+  return "";
+}
+
+}  // namespace
+
+bool looks_like_number(std::string_view text) {
+  return !text.empty() && leading_number(text).length == text.size();
+}
+
+QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
+  QuantityText out;
+  text = trimmed(text);
+  const Leading number = leading_number(text);
+  if (number.length == 0) {
+    out.hint = not_a_number_hint(text);
+    return out;
+  }
+  if (number.octal_looking) {
+    out.hint = "a leading zero looks octal; write " + plain_decimal(text.substr(0, number.length));
+    return out;
+  }
+  const std::string_view rest = trimmed(text.substr(number.length));
+  if (!number.in_range) {
+    out.hint = "the number is out of range";
+    return out;
+  }
+  out.value = number.value;
+  if (rest.empty()) {
+    out.ok = true;
+    return out;
+  }
+  if (rest[0] == ',' && rest.size() > 1 && digit(rest[1])) {
+    out.hint = "the decimal sign is a point";
+    return out;
+  }
+  if ((rest[0] == 'x' || rest[0] == 'o' || rest[0] == '_') && rest.size() == text.size() - number.length) {
+    out.hint = "write a plain decimal number";
+    return out;
+  }
+  const UnitText unit = read_unit(rest);
+  if (!unit.ok) {
+    out.hint = unit.hint;
+    return out;
+  }
+  if (!matches(unit.dimension, quantity.dimension)) {
+    const std::string_view noun = noun_of(unit.dimension);
+    out.hint = '\'' + shown(rest) + "' is " + (noun.empty() ? "something else" : "a unit of " + std::string(noun));
+    return out;
+  }
+  const bool degrees = quantity.unit == kAngle.unit;
+  if (!(degrees && rest == "deg")) out.value *= degrees ? unit.factor / kDegree : unit.factor;
+  out.ok = std::isfinite(out.value);
+  if (!out.ok) out.hint = "the number is out of range";
+  return out;
+}
+
+WholeText read_whole(std::string_view text) {
+  WholeText out;
+  text = trimmed(text);
+  const Leading number = leading_number(text);
+  if (number.length == 0 || number.length != text.size()) {
+    out.hint = not_a_number_hint(text);
+    return out;
+  }
+  if (number.octal_looking) {
+    out.hint = "a leading zero looks octal; write " + plain_decimal(text);
+    return out;
+  }
+  const std::size_t sign = text[0] == '+' ? 1 : 0;
+  const auto [end, error] = std::from_chars(text.data() + sign, text.data() + text.size(), out.value);
+  if (error == std::errc::result_out_of_range) out.hint = "the number is out of range";
+  out.ok = error == std::errc() && end == text.data() + text.size();
+  return out;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,63 @@
+/// @file yaml_quantity.h
+/// Numbers with units: a bare number is SI, "5 cm" is converted after its dimension has been checked.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace supple::scenes {
+
+/// Exponents of metre, kilogram, second and radian.
+struct Dimension {
+  std::int8_t m = 0, kg = 0, s = 0, rad = 0;
+  friend bool operator==(const Dimension&, const Dimension&) = default;
+};
+
+/// What a key measures: a noun and the SI unit for messages, and the dimension.
+struct Quantity {
+  std::string_view noun;
+  std::string_view unit;  ///< "" for pure numbers
+  Dimension dimension;
+};
+
+inline constexpr Quantity kNumber{"number", "", {}};
+inline constexpr Quantity kLength{"length", "m", {1, 0, 0, 0}};
+inline constexpr Quantity kMass{"mass", "kg", {0, 1, 0, 0}};
+inline constexpr Quantity kTime{"time", "s", {0, 0, 1, 0}};
+inline constexpr Quantity kRate{"rate", "1/s", {0, 0, -1, 0}};
+inline constexpr Quantity kAngle{"angle", "deg", {0, 0, 0, 1}};
+inline constexpr Quantity kSpeed{"speed", "m/s", {1, 0, -1, 0}};
+inline constexpr Quantity kSpin{"angular speed", "rad/s", {0, 0, -1, 1}};
+inline constexpr Quantity kAcceleration{"acceleration", "m/s^2", {1, 0, -2, 0}};
+inline constexpr Quantity kForce{"force", "N", {1, 1, -2, 0}};
+inline constexpr Quantity kTorque{"torque", "N m", {2, 1, -2, 0}};
+inline constexpr Quantity kPressure{"pressure", "Pa", {-1, 1, -2, 0}};
+inline constexpr Quantity kStiffness{"stiffness", "N/m", {0, 1, -2, 0}};
+inline constexpr Quantity kBending{"bending strength", "J m^2", {4, 1, -2, 0}};
+inline constexpr Quantity kDamping{"damping", "N s/m", {0, 1, -1, 0}};
+inline constexpr Quantity kAngularDamping{"angular damping", "N m s", {2, 1, -1, 0}};
+inline constexpr Quantity kSlope{"slope", "1/m", {-1, 0, 0, 0}};
+inline constexpr Quantity kInverseArea{"inverse area", "1/m^2", {-2, 0, 0, 0}};
+inline constexpr Quantity kInverseSpeed{"inverse speed", "s/m", {-1, 0, 1, 0}};
+
+/// A scalar read as a quantity. Without `ok`, `hint` says what to do (may be empty).
+struct QuantityText {
+  bool ok = false;
+  double value = 0.0;  ///< SI; of kAngle: degrees
+  std::string hint;
+};
+[[nodiscard]] QuantityText read_quantity(std::string_view text, const Quantity& quantity);
+
+/// A scalar read as a whole number.
+struct WholeText {
+  bool ok = false;
+  long long value = 0;
+  std::string hint;
+};
+[[nodiscard]] WholeText read_whole(std::string_view text);
+
+/// True when the whole text is a plain decimal number.
+[[nodiscard]] bool looks_like_number(std::string_view text);
+
+}  // namespace supple::scenes

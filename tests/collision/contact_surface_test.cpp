@@ -1,0 +1,274 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "bodies.h"
+#include "supple/core/hash.h"
+
+namespace supple::collision {
+namespace {
+
+using testing::Blobs;
+using testing::Ellipsoid;
+using testing::Linear;
+using testing::LinearSphere;
+using testing::sphere_samples;
+using testing::Stage;
+
+std::vector<Vec3> moved(std::vector<Vec3> points, const Quat& q, const Vec3& shift, double scale) {
+  for (Vec3& x : points) x = scale * (q * x) + shift;
+  return points;
+}
+
+/// Two bodies of blobs that overlap obliquely, the second twice as stiff.
+const std::vector<Vec3> kLeft{Vec3(-0.4, 0, 0), Vec3(0, 0.1, 0), Vec3(-0.2, 0.3, 0.1)};
+const std::vector<Vec3> kRight{Vec3(0.62, 0.15, 0.1), Vec3(0.85, -0.1, 0.3)};
+
+struct TwoBlobs {
+  Blobs left, right;
+  Stage stage;
+  TwoBlobs(const Quat& q, const Vec3& shift, double scale, bool swap = false)
+      : left(moved(kLeft, q, shift, scale), scale), right(moved(kRight, q, shift, scale), scale) {
+    if (swap) {
+      stage.add(right.field, right.centre, 2.0);
+      stage.add(left.field, left.centre, 1.0);
+    } else {
+      stage.add(left.field, left.centre, 1.0);
+      stage.add(right.field, right.centre, 2.0);
+    }
+  }
+};
+
+ContactSurface::Summary two_blobs(const Quat& q, const Vec3& shift, double scale, bool swap = false,
+                                  double error = 1e-6) {
+  TwoBlobs bodies(q, shift, scale, swap);
+  const ContactSurface& s = bodies.stage.solve({.error = error});
+  return s.summary.empty() ? ContactSurface::Summary{} : s.summary.front();
+}
+
+TEST(ContactSurface, HasBothPressuresEqualAtEveryPoint) {
+  for (const ContactRule rule : {ContactRule::Polar, ContactRule::March}) {
+    TwoBlobs bodies(Quat::Identity(), Vec3::Zero(), 1.0);
+    const ContactSurface& s = bodies.stage.solve({.error = 1e-3, .only = rule});
+    ASSERT_EQ(s.summary.size(), 1u);
+    ASSERT_EQ(s.summary[0].rule, rule);
+    for (std::size_t i = 0; i < s.point.size(); ++i) {
+      Vec3 ga, gb;
+      const double a = bodies.stage.bodies()[0].field.value(s.point[i], ga);
+      const double b = 2.0 * bodies.stage.bodies()[1].field.value(s.point[i], gb);
+      EXPECT_LE(std::abs(a - b), 1e-10);
+      EXPECT_NEAR(s.pressure[i], a, 1e-10);
+      EXPECT_LT((s.normal[i] - (2.0 * gb - ga).normalized()).norm(), 1e-9);
+      EXPECT_GT(s.area[i], 0.0);
+    }
+    EXPECT_LE(s.summary[0].residual, 1e-10);
+    EXPECT_EQ(s.summary[0].points, s.point.size());
+  }
+}
+
+TEST(ContactSurface, IsEmptyWhenBodiesDoNotTouch) {
+  const LinearSphere left{Vec3::Zero(), Linear{1.0, 1.0}}, right{Vec3(2.0 + 1e-9, 0, 0), Linear{1.0, 1.0}};
+  const auto left_samples = sphere_samples(left.centre, 1.0, 300), right_samples = sphere_samples(right.centre, 1.0, 300);
+  Stage stage;
+  stage.add(left).samples = &left_samples;
+  stage.add(right).samples = &right_samples;
+  EXPECT_TRUE(stage.solve().summary.empty());
+  EXPECT_TRUE(stage.surface.point.empty());
+  for (const PartLoads& load : stage.react()) {
+    EXPECT_EQ(load.force[0], Vec3::Zero());
+    EXPECT_EQ(load.torque[0], Vec3::Zero());
+  }
+}
+
+TEST(ContactSurface, TurnsMovesAndScalesWithTheBodies) {
+  // F scales with P L^2, moments with P L^3, energy with P L^3; P is the same. 1e-9: round-off of the peak's frame.
+  const ContactSurface::Summary rest = two_blobs(Quat::Identity(), Vec3::Zero(), 1.0);
+  ASSERT_EQ(rest.rule, ContactRule::Polar);
+  const Quat q = Quat(0.3, -0.5, 0.7, 0.2).normalized();
+  const Vec3 shift(3, -2, 5);
+  for (const double scale : {1.0, 1e-3, 1e3}) {
+    const ContactSurface::Summary s = two_blobs(q, scale * shift, scale);
+    const double size = rest.force.norm();
+    EXPECT_LT((s.force / (scale * scale) - q * rest.force).norm(), 1e-9 * size) << scale;
+    EXPECT_NEAR(s.energy / (scale * scale * scale), rest.energy, 1e-8 * rest.energy);
+    EXPECT_NEAR(s.area / (scale * scale), rest.area, 1e-9 * rest.area);
+    EXPECT_LT((s.centre_of_pressure - scale * (q * rest.centre_of_pressure + shift)).norm(), 1e-9 * scale);
+  }
+}
+
+TEST(ContactSurface, GivesTheOppositeWhenBodiesChangePlaces) {
+  const ContactSurface::Summary one = two_blobs(Quat::Identity(), Vec3::Zero(), 1.0);
+  const ContactSurface::Summary other = two_blobs(Quat::Identity(), Vec3::Zero(), 1.0, true);
+  EXPECT_LT((one.force + other.force).norm(), 1e-12 * one.force.norm());
+  EXPECT_LT((one.moment + other.moment).norm(), 1e-12 * one.force.norm());
+  EXPECT_NEAR(one.area, other.area, 1e-12);
+  EXPECT_NEAR(one.displaced_a, other.displaced_b, 1e-10 * one.displaced_a);
+}
+
+TEST(ContactSurface, AgreesBetweenItsTwoRules) {
+  const ContactSurface::Summary polar = two_blobs(Quat::Identity(), Vec3::Zero(), 1.0, false, 1e-8);
+  TwoBlobs bodies(Quat::Identity(), Vec3::Zero(), 1.0);
+  const ContactSurface::Summary march =
+      bodies.stage.solve({.error = 1e-6, .only = ContactRule::March}).summary.front();
+  const double bound = march.error_estimate;
+  EXPECT_LT(bound, 5e-3);
+  EXPECT_LT((polar.force - march.force).norm(), bound * polar.force.norm());
+  EXPECT_NEAR(polar.area, march.area, bound * polar.area);
+  // The volumes are of order 2 in the same cells.
+  EXPECT_NEAR(polar.energy, march.energy, 4.0 * bound * polar.energy);
+  EXPECT_NEAR(polar.displaced_a, march.displaced_a, 4.0 * bound * polar.displaced_a);
+  EXPECT_NEAR(polar.displaced_b, march.displaced_b, 4.0 * bound * polar.displaced_b);
+  EXPECT_NEAR(polar.largest_overlap, march.largest_overlap, 0.05 * polar.largest_overlap);
+}
+
+TEST(ContactEnergy, HasForceAndTorqueAsItsGradient) {
+  // Two oblique ellipsoids: F = -dU/dx and T = -dU/dtheta (Elandt; gradient of the integral of min(p_A, p_B)).
+  // Central differences with h = 1e-3 leave h^2/6 U'''/U' ~ 1e-6 / delta^2 with delta ~ .2 the overlap: 1e-5 relative.
+  Ellipsoid left{Vec3::Zero(), Quat(0.9, 0.2, -0.3, 0.1).normalized(), Vec3(1.0, 0.7, 0.8), 0.5};
+  Ellipsoid right{Vec3(0.95, 0.25, 0.1), Quat(0.8, -0.3, 0.2, 0.4).normalized(), Vec3(0.7, 0.9, 0.6), 0.5};
+  const auto solve = [&] {
+    Stage stage;
+    stage.add(left, {left.centre}, 1.5);
+    stage.add(right, {right.centre}, 1.0);
+    return stage.solve({.error = 1e-10}).summary.at(0);
+  };
+  const ContactSurface::Summary s = solve();
+  ASSERT_EQ(s.rule, ContactRule::Polar);
+  const double h = 1e-3;
+  const Vec3 torque = s.moment - left.centre.cross(s.force);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 e = Vec3::Unit(axis);
+    const Ellipsoid rest = left;
+    double energy[2], turned[2];
+    for (const int i : {0, 1}) {
+      const double step = i == 0 ? -h : h;
+      left = rest;
+      left.centre += step * e;
+      energy[i] = solve().energy;
+      left = rest;
+      left.orientation = Quat(Eigen::AngleAxisd(step, e)) * rest.orientation;
+      turned[i] = solve().energy;
+    }
+    left = rest;
+    EXPECT_NEAR(s.force[axis], -(energy[1] - energy[0]) / (2.0 * h), 3e-5 * s.force.norm());
+    EXPECT_NEAR(torque[axis], -(turned[1] - turned[0]) / (2.0 * h), 3e-5 * s.force.norm());
+  }
+}
+
+TEST(ContactSurface, FindsBothPatchesOfAPlateWithTwoBumps) {
+  // Each bump is a Wyvill sphere of its own on a rigid plane, h = .40 and .35: closed forms of the two add up.
+  const Blobs bumps({Vec3(-1.5, 0, 0.40), Vec3(1.5, 0.2, 0.35)}, 1.0);
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1e9};
+  for (const bool sampled : {false, true}) {
+    auto samples = sphere_samples(bumps.centre[0], 0.454202019, 150);
+    const auto more = sphere_samples(bumps.centre[1], 0.454202019, 150);
+    samples.point.insert(samples.point.end(), more.point.begin(), more.point.end());
+    samples.area.insert(samples.area.end(), more.area.begin(), more.area.end());
+    samples.valid.insert(samples.valid.end(), more.valid.begin(), more.valid.end());
+    Stage stage;
+    ContactBody& body = stage.add(bumps.field, bumps.centre);
+    if (sampled) body.samples = &samples;
+    stage.add(plane).fixed = true;
+    const ContactSurface& s = stage.solve({.error = 1e-8});
+    ASSERT_EQ(s.summary.size(), 1u);
+    EXPECT_EQ(s.summary[0].rule, ContactRule::Polar);
+    EXPECT_EQ(s.summary[0].patches, 2u);
+    EXPECT_NEAR(s.summary[0].force.z(), 0.0066147403 + 0.0223527569, 1e-8);
+  }
+}
+
+/// Integral of [p]+ over the plane z = 0 by the midpoint rule, where p exceeds `third`.
+double plane_integral(const implicit::FieldView& field, double half, const implicit::FieldView* third = nullptr) {
+  const int n = 800;
+  std::vector<Vec3> row(n);
+  std::vector<double> p(n), q(n, -1e300);
+  double sum = 0.0;
+  const double h = 2.0 * half / n;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) row[static_cast<std::size_t>(i)] = Vec3(-half + (i + 0.5) * h, -half + (j + 0.5) * h, 0);
+    field.evaluate(row, p);
+    if (third != nullptr) third->evaluate(row, q);
+    for (std::size_t i = 0; i < p.size(); ++i) sum += p[i] > 0.0 && p[i] >= q[i] ? p[i] * h * h : 0.0;
+  }
+  return sum;
+}
+
+TEST(ContactSurface, IntegratesARingShapedPatch) {
+  std::vector<Vec3> ring;
+  for (int k = 0; k < 16; ++k) {
+    const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * k / 16);
+    ring.push_back(Vec3(c, s, 0.3));
+  }
+  const Blobs torus(ring, 0.7);
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1e9};
+  Stage stage;
+  stage.add(torus.field, torus.centre);
+  stage.add(plane).fixed = true;
+  const ContactSurface& s = stage.solve({.error = 1e-3});
+  ASSERT_EQ(s.summary.size(), 1u);
+  EXPECT_EQ(s.summary[0].rule, ContactRule::March);
+  const double force = plane_integral(torus.field, 2.0);
+  EXPECT_NEAR(s.summary[0].force.z(), force, std::max(1e-3, s.summary[0].error_estimate) * force);
+  EXPECT_LT(s.summary[0].centre_of_pressure.norm(), 1e-3);
+}
+
+TEST(ContactSurface, OfThreeBodiesStopsWhereTheThirdPressesHarder) {
+  // Equal linear spheres on a triangle: the interface of the two lower ones ends at the third one's.
+  const LinearSphere a{Vec3(0, 0, 0.8), Linear{1.0, 1.0}}, b{Vec3(0, 0, -0.8), Linear{1.0, 1.0}};
+  const LinearSphere c{Vec3(1.0, 0, 0), Linear{1.0, 1.0}};
+  Stage stage;
+  stage.add(a);
+  stage.add(b);
+  stage.add(c);
+  const ContactSurface& s = stage.solve({.error = 1e-3});
+  ASSERT_EQ(s.summary.size(), 3u);
+  for (std::size_t i = 0; i < s.point.size(); ++i) {
+    const BodyPair pair = s.summary[s.pair[i]].bodies;
+    const std::uint32_t third = 3 - pair.a - pair.b;
+    // A facet's centroid may lie a fraction of a cell beyond the line where three pressures meet.
+    EXPECT_LE(stage.bodies()[third].field.value(s.point[i]), s.pressure[i] + 0.01);
+  }
+  const implicit::FieldView third(c);
+  const double force = plane_integral(a, 1.0, &third);
+  EXPECT_LT(force, 0.9 * plane_integral(a, 1.0));
+  EXPECT_NEAR(s.summary[0].force.norm(), force, 3e-3 * force);
+  EXPECT_EQ(s.summary[0].rule, ContactRule::March);
+}
+
+std::uint64_t hash_of(const ContactSurface& s) {
+  Hasher hasher;
+  hasher.add(std::span<const Vec3>(s.point));
+  hasher.add(std::span<const Vec3>(s.normal));
+  hasher.add(std::span<const double>(s.area));
+  hasher.add(std::span<const double>(s.pressure));
+  hasher.add(std::span<const Vec3>(s.volume_point));
+  hasher.add(std::span<const double>(s.volume_weight));
+  for (const auto& summary : s.summary) {
+    hasher.add(std::uint64_t{summary.bodies.a});
+    hasher.add(std::uint64_t{summary.bodies.b});
+    hasher.add(summary.energy);
+  }
+  return hasher.value();
+}
+
+TEST(ContactSurface, HasTheSameBitsForAnyNumberOfThreads) {
+  std::vector<LinearSphere> spheres;
+  std::vector<implicit::SurfaceSamples> samples;
+  for (int i = 0; i < 27; ++i) {
+    spheres.push_back({Vec3(i % 3, i / 3 % 3, i / 9) * 0.95 + Vec3(0.01 * i, 0, 0), Linear{0.5, 1.0}});
+    samples.push_back(sphere_samples(spheres.back().centre, 0.5, 200));
+  }
+  std::uint64_t expected = 0;
+  for (const int threads : {1, 2, 3, 8}) {
+    Stage stage;
+    for (std::size_t i = 0; i < spheres.size(); ++i) stage.add(spheres[i]).samples = &samples[i];
+    const ContactSurface& s = stage.solve({}, threads);
+    EXPECT_GT(s.summary.size(), 20u);
+    const std::uint64_t hash = hash_of(s);
+    if (threads == 1) expected = hash;
+    EXPECT_EQ(hash, expected) << threads;
+  }
+}
+
+}  // namespace
+}  // namespace supple::collision

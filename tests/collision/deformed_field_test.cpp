@@ -1,0 +1,206 @@
+#include "supple/collision/deformed_field.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "bodies.h"
+
+namespace supple::collision {
+namespace {
+
+using testing::Blobs;
+using testing::Stage;
+
+TEST(BulgeProfile, TakesTheValuesOfTheTheoryAndIsSmooth) {
+  // Gascuel 1993; k = 2, a0 = .5, w = 1.
+  const BulgeProfile h{2.0, 0.5, 1.0};
+  EXPECT_DOUBLE_EQ(h.value(0.1), 0.18);
+  EXPECT_DOUBLE_EQ(h.value(0.25), 0.375);
+  EXPECT_DOUBLE_EQ(h.value(0.5), 0.5);
+  EXPECT_DOUBLE_EQ(h.value(0.75), 0.25);
+  EXPECT_NEAR(h.value(0.9), 0.052, 1e-15);
+  EXPECT_EQ(h.value(0.0), 0.0);
+  EXPECT_EQ(h.value(1.0), 0.0);
+  EXPECT_DOUBLE_EQ(h.slope(0.0), 2.0);
+  EXPECT_EQ(h.slope(1.0), 0.0);
+  const double d = 1e-9;
+  for (const double x : {0.5, 1.0}) {  // C^1 where the pieces meet: |h''| <= 40 on both sides
+    EXPECT_NEAR(h.value(x + d), h.value(x - d), 1e-12);
+    EXPECT_NEAR(h.slope(x + d), h.slope(x - d), 1e-7);
+  }
+  for (double x = 0.05; x < 1.0; x += 0.1) {  // h^2/6 h''' of a central difference
+    EXPECT_NEAR(h.slope(x), (h.value(x + 1e-5) - h.value(x - 1e-5)) / 2e-5, 1e-8);
+  }
+}
+
+TEST(BulgeProfile, DoesNotPopAtFirstTouch) {
+  const double k = 1.0, width = 0.3;
+  const auto peak = [](const BulgeProfile& h) {
+    double largest = 0.0;
+    for (int i = 0; i <= 1000; ++i) largest = std::max(largest, h.value(h.width * i / 1000.0));
+    return largest;
+  };
+  for (const double height : {1e-2, 1e-4, 1e-8}) {
+    const double w = effective_width(width, height, k);
+    EXPECT_LE(w, width);
+    EXPECT_NEAR(peak({k, height, w}), height, 1e-12 * height);  // the profile vanishes with its height
+  }
+  EXPECT_NEAR(peak({k, 0.0, width}), 2.0 * width * k / 27.0, 1e-6);  // the plain width leaves 2 w k / 27
+}
+
+/// Two touching bodies of blobs of different stiffness, and points around them.
+struct Touching {
+  Blobs left{{Vec3(-0.4, 0, 0), Vec3(0, 0.1, 0), Vec3(-0.2, 0.3, 0.1)}, 1.0};
+  Blobs right{{Vec3(0.62, 0.15, 0.1), Vec3(0.85, -0.1, 0.3)}, 1.0};
+  Stage stage;
+  Touching() {
+    stage.add(left.field, left.centre, 1e4);
+    stage.add(right.field, right.centre, 3e4);
+    stage.solve({.error = 1e-4});
+  }
+};
+
+std::vector<Vec3> random_points(std::uint64_t seed, int count) {
+  std::mt19937_64 engine(seed);
+  const auto uniform = [&] { return 2.0 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1.0; };
+  std::vector<Vec3> points;
+  for (int i = 0; i < count; ++i) points.push_back(Vec3(0.2, 0.1, 0.1) + 1.1 * Vec3(uniform(), uniform(), uniform()));
+  return points;
+}
+
+TEST(DeformedField, IsZeroOnTheContactSurfaceForBothBodies) {
+  Touching scene;
+  ASSERT_FALSE(scene.stage.surface.point.empty());
+  for (const std::uint32_t i : {0u, 1u}) {
+    const DeformedField field(scene.stage.bodies(), i, scene.stage.surface, {});
+    std::vector<double> values(scene.stage.surface.point.size());
+    field.evaluate(scene.stage.surface.point, values);
+    for (const double v : values) EXPECT_LE(std::abs(v), 1e-10);
+  }
+}
+
+TEST(DeformedField, NeverGivesOnePointToTwoBodies) {
+  // Positive in both would be an overlap; inside the overlap of the bodies one must be positive or both zero.
+  Touching scene;
+  const DeformedField a(scene.stage.bodies(), 0, scene.stage.surface, {});
+  const DeformedField b(scene.stage.bodies(), 1, scene.stage.surface, {});
+  const std::vector<Vec3> points = random_points(5, 4000);
+  std::vector<double> va(points.size()), vb(points.size());
+  a.evaluate(points, va);
+  b.evaluate(points, vb);
+  int in_both = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_FALSE(va[i] > 1e-12 && vb[i] > 1e-12);
+    const double pa = scene.stage.bodies()[0].field.value(points[i]), pb = scene.stage.bodies()[1].field.value(points[i]);
+    if (pa <= 0.0 || pb <= 0.0) continue;
+    ++in_both;
+    EXPECT_NEAR(va[i] * 1e4, -vb[i] * 3e4, 1e-8);
+  }
+  EXPECT_GT(in_both, 20);
+}
+
+TEST(DeformedField, JoinsCompressionAndBulgeWithOneSlope) {
+  // At p_j = 0 inside body i, both sides have the gradient grad(p_i - p_j) / P_i.
+  Touching scene;
+  const DeformedField field(scene.stage.bodies(), 0, scene.stage.surface, {});
+  int tried = 0;
+  for (const Vec3& start : random_points(6, 3000)) {
+    Vec3 x = start, gb;
+    for (int k = 0; k < 20; ++k) {
+      const double f = scene.stage.bodies()[1].field.value(x, gb);
+      if (gb.squaredNorm() < 1e-6) break;
+      x -= f / gb.squaredNorm() * gb;
+    }
+    Vec3 ga;
+    if (gb.squaredNorm() < 1e-6 || scene.stage.bodies()[0].field.value(x, ga) < 1e-3) continue;
+    ++tried;
+    const Vec3 expected = ga - 3.0 * gb;
+    for (const double side : {-1e-7, 1e-7}) {
+      const Vec3 y = x + side * gb.normalized();
+      double value;
+      Vec3 gradient;
+      field.evaluate({&y, 1}, {&value, 1}, {&gradient, 1});
+      EXPECT_LT((gradient - expected).norm(), 1e-4 * expected.norm());
+    }
+  }
+  EXPECT_GT(tried, 10);
+}
+
+TEST(DeformedField, HasTheGradientOfItsValues) {
+  Touching scene;
+  const DeformedField field(scene.stage.bodies(), 0, scene.stage.surface, {});
+  const double h = 1e-6;
+  int rough = 0;
+  const std::vector<Vec3> points = random_points(7, 400);
+  for (const Vec3& x : points) {
+    double value;
+    Vec3 gradient, difference;
+    field.evaluate({&x, 1}, {&value, 1}, {&gradient, 1});
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3 up = x + h * Vec3::Unit(axis), down = x - h * Vec3::Unit(axis);
+      difference[axis] = (implicit::FieldView(field).value(up) - implicit::FieldView(field).value(down)) / (2.0 * h);
+    }
+    rough += (difference - gradient).norm() > 1e-4 ? 1 : 0;
+  }
+  EXPECT_LE(rough, 2);  // a point may lie on a crease
+}
+
+TEST(DeformedField, LiesWithinItsBounds) {
+  Touching scene;
+  for (const std::uint32_t body : {0u, 1u}) {
+    const DeformedField field(scene.stage.bodies(), body, scene.stage.surface, {});
+    const ClaimField claim(scene.stage.bodies(), body, scene.stage.surface, {});
+    std::mt19937_64 engine(9);
+    for (const Vec3& corner : random_points(10 + body, 300)) {
+      const double size = 0.3 * static_cast<double>(engine() >> 11) * 0x1p-53;
+      const Box box{corner, corner + Vec3::Constant(size)};
+      std::vector<Vec3> inside;
+      for (int k = 0; k < 27; ++k) inside.push_back(corner + 0.5 * size * Vec3(k % 3, k / 3 % 3, k / 9));
+      std::vector<double> v(inside.size()), c(inside.size());
+      std::vector<Vec3> g(inside.size());
+      field.evaluate(inside, v, g);
+      claim.evaluate(inside, c);
+      const Interval bound = field.bound(box), claim_bound = claim.bound(box);
+      const double slope = field.gradient_bound(box);
+      for (std::size_t k = 0; k < inside.size(); ++k) {
+        EXPECT_GE(v[k], bound.lower - 1e-12);
+        EXPECT_LE(v[k], bound.upper + 1e-12);
+        EXPECT_GE(c[k], claim_bound.lower - 1e-8);
+        EXPECT_LE(c[k], claim_bound.upper + 1e-8);
+        EXPECT_LE(g[k].norm(), slope * (1.0 + 1e-12));
+        if (v[k] > 0.0) {
+          EXPECT_TRUE(field.surface_box().contains(inside[k]));
+        }
+      }
+    }
+  }
+}
+
+TEST(ClaimField, IsContinuousWhereBulgesOfSeveralBodiesMeet) {
+  // Steps of 1e-5 change a claim by at most its slope times the step: no jump at any surface.
+  const Blobs centre({Vec3::Zero()}, 1.0), right({Vec3(0.8, 0, 0)}, 1.0), top({Vec3(0.35, 0.78, 0)}, 1.0);
+  Stage stage;
+  stage.add(centre.field, centre.centre, 1e4);
+  stage.add(right.field, right.centre, 1e4);
+  stage.add(top.field, top.centre, 2e4);
+  stage.solve({.error = 1e-3});
+  ASSERT_EQ(stage.surface.summary.size(), 3u);
+  const ClaimField claim(stage.bodies(), 0, stage.surface, {.attenuation = 0.8, .width = 0.5});
+  const double limit = claim.gradient_bound(Box{Vec3::Constant(-2), Vec3::Constant(2)});
+  std::mt19937_64 engine(11);
+  const auto uniform = [&] { return 2.0 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1.0; };
+  for (int line = 0; line < 20; ++line) {
+    const Vec3 from(0.4 + 0.5 * uniform(), 0.3 + 0.5 * uniform(), 0.3 * uniform());
+    const Vec3 to(0.4 + 0.5 * uniform(), 0.3 + 0.5 * uniform(), 0.3 * uniform());
+    std::vector<Vec3> points;
+    for (int i = 0; i <= 2000; ++i) points.push_back(from + i / 2000.0 * (to - from));
+    std::vector<double> values(points.size());
+    claim.evaluate(points, values);
+    const double step = (to - from).norm() / 2000.0;
+    for (std::size_t i = 1; i < values.size(); ++i) EXPECT_LE(std::abs(values[i] - values[i - 1]), limit * step * 1.0001);
+  }
+}
+
+}  // namespace
+}  // namespace supple::collision

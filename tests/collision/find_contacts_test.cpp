@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "bodies.h"
+
+namespace supple::collision {
+namespace {
+
+using testing::Linear;
+using testing::LinearSphere;
+using testing::sphere_samples;
+using testing::Stage;
+
+double uniform(std::mt19937_64& engine, double low, double high) {
+  return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53;
+}
+
+TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
+  std::mt19937_64 engine(3);
+  std::vector<LinearSphere> spheres;
+  for (int i = 0; i < 80; ++i) {
+    const Vec3 x(uniform(engine, -3, 3), uniform(engine, -1, 1), uniform(engine, -1, 1));
+    spheres.push_back({x, Linear{uniform(engine, 0.05, 0.6), 1.0}});
+  }
+  const implicit::HalfSpace ground{Vec3(0, 0, -0.8), Vec3::UnitZ(), 1.0}, wall{Vec3(-3, 0, 0), Vec3::UnitX(), 1.0};
+  Stage stage;
+  for (const LinearSphere& s : spheres) stage.add(s);
+  stage.add(ground).fixed = true;
+  stage.add(wall).fixed = true;
+  stage.rules.allowed = [](std::uint32_t a, std::uint32_t b) { return (a + b) % 5 != 0; };
+  std::vector<BodyPair> expected;
+  std::uint64_t expected_present = 0;
+  for (std::uint32_t a = 0; a < stage.bodies().size(); ++a) {
+    for (std::uint32_t b = a + 1; b < stage.bodies().size(); ++b) {
+      const bool both_fixed = stage.bodies()[a].fixed && stage.bodies()[b].fixed;
+      if (both_fixed || (a + b) % 5 == 0) continue;
+      ++expected_present;
+      if (stage.bodies()[a].field.surface_box().overlaps(stage.bodies()[b].field.surface_box())) {
+        expected.push_back({a, b});
+      }
+    }
+  }
+  std::uint64_t present = 0;
+  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules, &present), expected);
+  EXPECT_EQ(present, expected_present);
+  EXPECT_GT(expected.size(), 50u);
+}
+
+TEST(FindContacts, SeedsAnOverlapMuchSmallerThanTheSampleSpacing) {
+  std::mt19937_64 engine(4);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Vec3 direction = Vec3(uniform(engine, -1, 1), uniform(engine, -1, 1), uniform(engine, -1, 1)).normalized();
+    const double delta = 1e-7;
+    const LinearSphere left{Vec3::Zero(), Linear{1.0, 1.0}}, right{(1.7 - delta) * direction, Linear{0.7, 1.0}};
+    const auto left_samples = sphere_samples(left.centre, 1.0, 200), right_samples = sphere_samples(right.centre, 0.7, 100);
+    Stage stage;
+    stage.add(left).samples = &left_samples;
+    stage.add(right).samples = &right_samples;
+    const ContactSurface& s = stage.solve();
+    ASSERT_EQ(s.summary.size(), 1u) << trial;
+    EXPECT_EQ(s.summary[0].rule, ContactRule::Polar);
+    EXPECT_NEAR(s.summary[0].largest_overlap, delta, 1e-3 * delta);
+  }
+}
+
+TEST(FindContacts, LeavesOutPairsWhoseSamplesAreFarFromTheOtherSurface) {
+  // The boxes overlap, the spheres do not.
+  const LinearSphere left{Vec3::Zero(), Linear{1.0, 1.0}}, right{Vec3(1.3, 1.3, 1.3), Linear{1.0, 1.0}};
+  const auto left_samples = sphere_samples(left.centre, 1.0, 400), right_samples = sphere_samples(right.centre, 1.0, 400);
+  Stage stage;
+  stage.add(left).samples = &left_samples;
+  stage.add(right).samples = &right_samples;
+  stage.solve();
+  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules).size(), 1u);
+  EXPECT_TRUE(stage.candidates.pair.empty());
+}
+
+TEST(FindContacts, GivesTheSameForceForAnyNumberOfSamples) {
+  // The ascent ends within 1e-6 of the patch of its peak, and the quadrature does not feel its pole's place.
+  const LinearSphere left{Vec3::Zero(), Linear{1.0, 1.0}}, right{Vec3(1.0, 0.9, 0.8), Linear{0.7, 3.0}};
+  double force = 0.0;
+  for (const int count : {60, 200, 1000}) {
+    const auto left_samples = sphere_samples(left.centre, 1.0, count), right_samples = sphere_samples(right.centre, 0.7, count);
+    Stage stage;
+    stage.add(left).samples = &left_samples;
+    stage.add(right).samples = &right_samples;
+    const ContactSurface& s = stage.solve({.error = 1e-4});
+    ASSERT_EQ(s.summary.size(), 1u);
+    if (force > 0.0) {
+      EXPECT_NEAR(s.summary[0].force.norm(), force, 1e-9 * force);
+    }
+    force = s.summary[0].force.norm();
+  }
+}
+
+TEST(ContactMaterial, CombinesByGeometricMeanAndByCompliance) {
+  const PairMaterial m = combine({.modulus = 1e4, .friction = 0.4, .dissipation = 0.5},
+                                 {.modulus = 3e4, .friction = 0.1, .dissipation = 0.1});
+  EXPECT_DOUBLE_EQ(m.friction, 0.2);
+  EXPECT_DOUBLE_EQ(m.dissipation, (0.5 * 3e4 + 0.1 * 1e4) / 4e4);
+}
+
+}  // namespace
+}  // namespace supple::collision

@@ -1,0 +1,166 @@
+// Friction between particles and the drag of a medium.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/support.h"
+#include "supple/core/integrate.h"
+
+namespace supple::core {
+namespace {
+
+using test::Draw;
+using test::Particles;
+
+const ForceModel kNoForces = [](const ParticleState&, double, ForceSample&) {};
+
+struct Damped {
+  Particles p;
+  Interactions interactions;
+  KickState kick;
+  Ledger ledger;
+  void step(double dt) { advance(p.set, interactions, kNoForces, 0.0, dt, p.state, kick, ledger); }
+  [[nodiscard]] Motion motion() const { return measure_motion(p.set, p.state); }
+};
+
+/// Six particles with every pair rubbing; `anisotropic` bodies take the general path.
+Damped make_rubbing(bool anisotropic, double linear, double angular, std::uint64_t seed) {
+  Draw draw(seed);
+  Damped d;
+  for (int i = 0; i < 6; ++i) {
+    d.p.add(draw.vector(1.0), draw.uniform(0.5, 2.0), draw.uniform(0.2, 0.6));
+    if (anisotropic) d.p.set.inertia.back() = Vec3::Constant(0.4) + draw.vector(0.2);
+    d.p.state.orientation.back() = draw.rotation();
+    d.p.state.velocity.back() = draw.vector(1.0);
+    d.p.state.angular_momentum.back() = draw.vector(0.5);
+  }
+  Friction law{.name = "friction", .first = {}, .second = {}, .linear = linear, .angular = angular};
+  test::along_chain(6, 5, [&](std::uint32_t a, std::uint32_t b) {
+    law.first.push_back(a);
+    law.second.push_back(b);
+  });
+  d.interactions.friction.push_back(law);
+  return d;
+}
+
+/// Velocities of a rigid motion of all particles.
+void move_rigidly(Particles& p, const Vec3& velocity, const Vec3& spin) {
+  for (std::size_t i = 0; i < p.set.size(); ++i) {
+    p.state.velocity[i] = velocity + spin.cross(p.state.position[i]);
+    const Quat& q = p.state.orientation[i];
+    p.state.angular_momentum[i] = q * p.set.inertia[i].cwiseProduct(q.conjugate() * spin);
+  }
+}
+
+class FrictionBetweenParticles : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Bodies, FrictionBetweenParticles, testing::Values(false, true),
+                         [](const auto& bodies) { return bodies.param ? "Anisotropic" : "Isotropic"; });
+
+TEST_P(FrictionBetweenParticles, KeepsMomentumAndBooksExactlyTheEnergyItTakes) {
+  for (const double c : {0.1, 10.0, 1e8}) {
+    Damped d = make_rubbing(GetParam(), c, 0.2 * c, 61);
+    for (int k = 0; k < 20; ++k) {
+      // Without motion in between: the drift turns anisotropic bodies, and that conserves energy to O(dt^2) only.
+      const double dt = 1e-9;
+      const Motion before = d.motion();
+      const double taken = d.ledger.dissipated;
+      d.step(dt);
+      const Motion after = d.motion();
+      ASSERT_LE((after.momentum - before.momentum).norm(), 1e-14 * before.momentum_scale);
+      ASSERT_LE((after.angular_momentum - before.angular_momentum).norm(), 1e-13 * before.angular_momentum_scale);
+      ASSERT_GE(d.ledger.dissipated, taken);
+      ASSERT_NEAR(before.kinetic_energy - after.kinetic_energy, d.ledger.dissipated - taken,
+                  1e-13 * before.kinetic_energy + 1e-9 * (d.ledger.dissipated - taken));
+    }
+  }
+}
+
+TEST_P(FrictionBetweenParticles, DoesNothingToARigidMotion) {
+  Damped d = make_rubbing(GetParam(), 1e3, 1e3, 62);
+  move_rigidly(d.p, Vec3(1, -2, 0.5), Vec3(0.3, 0.7, -0.4));
+  const ParticleState before = d.p.state;
+  d.step(1e-12);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_LE((d.p.state.velocity[i] - before.velocity[i]).norm(), 1e-13);
+    EXPECT_LE((d.p.state.angular_momentum[i] - before.angular_momentum[i]).norm(), 1e-13);
+  }
+  EXPECT_LE(d.ledger.dissipated, 1e-24);
+}
+
+TEST_P(FrictionBetweenParticles, TendsToARigidMotionForAnyStep) {
+  // Unconditionally stable: the largest coefficient leaves the rigid motion of the same momenta.
+  Damped d = make_rubbing(GetParam(), 1e9, 1e9, 63);
+  const Motion before = d.motion();
+  for (int k = 0; k < 3000; ++k) d.step(1e-7);
+  double largest = 0.0;
+  for (std::size_t i = 1; i < 6; ++i) {
+    const Vec3 relative = angular_velocity(d.p.set, d.p.state, i) - angular_velocity(d.p.set, d.p.state, 0);
+    largest = std::max(largest, relative.norm());
+  }
+  EXPECT_LE(largest, 1e-6);
+  EXPECT_LE((d.motion().angular_momentum - before.angular_momentum).norm(), 1e-12 * before.angular_momentum_scale);
+  EXPECT_LT(d.motion().kinetic_energy, before.kinetic_energy);
+}
+
+TEST_P(FrictionBetweenParticles, HasThePowerOfItsLaw) {
+  // -dE/dt = sum c |v_rel|^2 + c_r |omega_rel|^2 as dt -> 0.
+  const double c = 0.3, c_r = 0.05;
+  Damped d = make_rubbing(GetParam(), c, c_r, 64);
+  double power = 0.0;
+  const ParticleState& s = d.p.state;
+  test::along_chain(6, 5, [&](std::uint32_t a, std::uint32_t b) {
+    const Vec3 w_a = angular_velocity(d.p.set, s, a), w_b = angular_velocity(d.p.set, s, b);
+    const Vec3 middle = 0.5 * (s.position[a] + s.position[b]);
+    const Vec3 u_a = s.velocity[a] + w_a.cross(middle - s.position[a]);
+    const Vec3 u = s.velocity[b] + w_b.cross(middle - s.position[b]) - u_a;
+    power += c * u.squaredNorm() + c_r * (w_b - w_a).squaredNorm();
+  });
+  const double dt = 1e-6;
+  d.step(dt);
+  EXPECT_NEAR(d.ledger.dissipated / dt, power, 1e-4 * power);
+}
+
+TEST(Friction, GivesTheSameOnTheIsotropicAndTheGeneralPath) {
+  Damped isotropic = make_rubbing(false, 5.0, 1.0, 65);
+  Damped general = isotropic;
+  for (Vec3& inertia : general.p.set.inertia) inertia.x() *= 1.0 + 1e-15;
+  isotropic.step(1e-3);
+  general.step(1e-3);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_LE((isotropic.p.state.velocity[i] - general.p.state.velocity[i]).norm(), 1e-13);
+    EXPECT_LE((isotropic.p.state.angular_momentum[i] - general.p.state.angular_momentum[i]).norm(), 1e-13);
+  }
+  EXPECT_NEAR(isotropic.ledger.dissipated, general.ledger.dissipated, 1e-13);
+}
+
+TEST(MediumDamping, IsTheExactExponentialForAnyStep) {
+  for (const double dt : {0.01, 1.0, 10.0}) {
+    Damped d;
+    d.p.add(Vec3(1, 2, 3), 2.0);
+    d.p.set.inertia[0] = Vec3(1, 2, 3);
+    d.p.state.velocity[0] = Vec3(1, -1, 2);
+    d.p.state.angular_momentum[0] = Vec3(0, 0, 0.3);
+    d.interactions.medium.push_back({.object = 0, .linear = 0.7, .angular = 0.4});
+    d.step(dt);
+    EXPECT_LE((d.p.state.velocity[0] - std::exp(-0.7 * dt) * Vec3(1, -1, 2)).norm(), 1e-15);
+    EXPECT_LE((d.p.state.angular_momentum[0] - std::exp(-0.4 * dt) * Vec3(0, 0, 0.3)).norm(), 1e-15);
+  }
+}
+
+TEST(MediumDamping, BooksItsImpulseAndEnergyAndSparesOtherObjects) {
+  Damped d = make_rubbing(false, 0.0, 0.0, 66);
+  d.p.set.object[2] = 1;
+  d.interactions.medium.push_back({.object = 0, .linear = 3.0, .angular = 2.0});
+  const Vec3 untouched = d.p.state.velocity[2];
+  const Motion before = d.motion();
+  for (int k = 0; k < 100; ++k) d.step(0.01);
+  const Motion after = d.motion();
+  EXPECT_EQ(d.p.state.velocity[2], untouched);
+  EXPECT_LE((after.momentum - before.momentum - d.ledger.external_impulse).norm(), 1e-14 * before.momentum_scale);
+  EXPECT_LE((after.angular_momentum - before.angular_momentum - d.ledger.external_angular_impulse).norm(),
+            1e-13 * before.angular_momentum_scale);
+  EXPECT_NEAR(before.kinetic_energy - after.kinetic_energy, d.ledger.dissipated, 1e-13 * before.kinetic_energy);
+}
+
+}  // namespace
+}  // namespace supple::core

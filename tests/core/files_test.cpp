@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <string>
+
+#include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
+#include "supple/core/io/mesh_files.h"
+
+namespace {
+
+using namespace supple;
+namespace fs = std::filesystem;
+
+/// An empty folder that goes with the test.
+class Files : public testing::Test {
+ protected:
+  Files()
+      : folder_(fs::temp_directory_path() / ("supple_core_files_" + std::to_string(::getpid()) + '_' +
+                                             testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::create_directories(folder_);
+  }
+  ~Files() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] fs::path path(const char* name) const { return folder_ / name; }
+  [[nodiscard]] std::size_t file_count() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}));
+  }
+  [[nodiscard]] static std::string text_of(const fs::path& path) {
+    const auto bytes = io::read_file(path, 1 << 20);
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  }
+  template <class Call>
+  static void expect_error(ErrorKind kind, const std::string& part, const Call& call) {
+    try {
+      call();
+      FAIL() << part;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), kind);
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  }
+
+ private:
+  fs::path folder_;
+};
+
+TEST_F(Files, AreWrittenWholeAndReplaced) {
+  io::write_atomically(path("a.txt"), std::string_view("first"));
+  io::write_atomically(path("a.txt"), std::string_view("second"));
+  EXPECT_EQ(text_of(path("a.txt")), "second");
+  EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Files, ThatCannotBeWrittenLeaveNothing) {
+  io::write_atomically(path("file"), std::string_view("x"));
+  const fs::path below = path("file") / "child.txt";
+  expect_error(ErrorKind::Io, below.string() + ": cannot be written: Not a directory",
+               [&] { io::write_atomically(below, std::string_view("y")); });
+  // A folder of the target's name: the temporary file is complete, the rename fails, and nothing is left.
+  fs::create_directories(path("folder") / "inside");
+  expect_error(ErrorKind::Io, "folder: cannot be written",
+               [&] { io::write_atomically(path("folder"), std::string_view("y")); });
+  EXPECT_EQ(file_count(), 2U);
+  EXPECT_EQ(text_of(path("file")), "x");
+}
+
+TEST_F(Files, ThatAreAbsentOrTooLargeAreNamed) {
+  expect_error(ErrorKind::Io, "absent: cannot be read: No such file",
+               [&] { static_cast<void>(io::read_file(path("absent"), 10)); });
+  expect_error(ErrorKind::Io, "cannot be read: Is a directory",
+               [&] { static_cast<void>(io::read_file(path("."), 10)); });
+  io::write_atomically(path("large"), std::string_view("12345678901"));
+  expect_error(ErrorKind::Limit, "expected at most 10 bytes, found 11",
+               [&] { static_cast<void>(io::read_file(path("large"), 10)); });
+  EXPECT_EQ(io::read_file(path("large"), 11).size(), 11U);
+}
+
+TEST_F(Files, FoldersAreMadeOrRefused) {
+  io::make_writable_folder(path("a") / "b");
+  EXPECT_TRUE(fs::is_directory(path("a") / "b"));
+  io::make_writable_folder(path("a") / "b");
+  EXPECT_TRUE(fs::is_empty(path("a") / "b"));
+  io::write_atomically(path("file"), std::string_view("x"));
+  expect_error(ErrorKind::Io, "Not a directory", [&] { io::make_writable_folder(path("file") / "b"); });
+  expect_error(ErrorKind::Io, "file", [&] { io::make_writable_folder(path("file")); });
+}
+
+TEST_F(Files, OfMeshesAreBinaryPly) {
+  Mesh mesh;
+  mesh.position = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0.5)};
+  mesh.normal.assign(3, Vec3::UnitZ());
+  mesh.triangle = {{0, 1, 2}};
+  mesh.columns = {{"contact pressure", {1.5, 2.5, 3.5}}};
+  io::write_ply(path("m.ply"), mesh);
+  const std::string text = text_of(path("m.ply"));
+  const std::string header =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property float nx\nproperty float ny\nproperty float nz\nproperty float contact_pressure\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  ASSERT_EQ(text.substr(0, header.size()), header);
+  ASSERT_EQ(text.size(), header.size() + 3 * 7 * 4 + 13);
+  const auto number = [&](std::size_t index) {
+    float value = 0.0F;
+    std::memcpy(&value, text.data() + header.size() + 4 * index, 4);
+    return value;
+  };
+  EXPECT_EQ(number(2 * 7 + 2), 0.5F);
+  EXPECT_EQ(number(1 * 7 + 5), 1.0F);
+  EXPECT_EQ(number(2 * 7 + 6), 3.5F);
+  EXPECT_EQ(text[header.size() + 84], 3);
+  std::int32_t last = 0;
+  std::memcpy(&last, text.data() + text.size() - 4, 4);
+  EXPECT_EQ(last, 2);
+}
+
+TEST_F(Files, OfTablesReadBackWithTheSameBits) {
+  const std::vector<double> x{0.1, -1.0 / 3.0, 6.02214076e23, 5e-324};
+  const std::vector<double> y{1.0, 2.0, 3.0, 4.0};
+  const std::vector<io::TableColumn> columns{{"x_m", x}, {"y_m", y}, {"z_m", x}};
+  io::write_csv(path("t.csv"), columns);
+  EXPECT_EQ(text_of(path("t.csv")).substr(0, 12), "x_m,y_m,z_m\n");
+  const std::vector<Vec3> points = io::read_points_csv(path("t.csv"));
+  ASSERT_EQ(points.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(points[i], Vec3(x[i], y[i], x[i]));
+}
+
+TEST_F(Files, OfPointsMayHaveHeadersCommentsAndAnySeparator) {
+  io::write_atomically(path("p.csv"), std::string_view("\xEF\xBB\xBF# made by hand\r\nx, y, z\r\n1, 2,3\r\n\n"
+                                                       "  4 5\t6 # the second\n+7;8;9e0"));
+  const std::vector<Vec3> points = io::read_points_csv(path("p.csv"));
+  EXPECT_EQ(points, (std::vector<Vec3>{Vec3(1, 2, 3), Vec3(4, 5, 6), Vec3(7, 8, 9)}));
+}
+
+TEST_F(Files, OfPointsNameEveryLineThatIsNotThreeNumbers) {
+  io::write_atomically(path("p.csv"), std::string_view("1,2,3\n1,2\n1,2,3,4\n1,,3\nx,y,z\n1,nan,3\n1,2,inf\n4,5,6\n"));
+  try {
+    static_cast<void>(io::read_points_csv(path("p.csv")));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Scene);
+    ASSERT_EQ(error.faults().size(), 6U);
+    EXPECT_EQ(error.faults()[0].message(), path("p.csv").string() + ":2: expected three finite numbers, found '1,2'");
+    EXPECT_EQ(error.faults()[5].place, path("p.csv").string() + ":7");
+  }
+  expect_error(ErrorKind::Io, "none.csv", [&] { static_cast<void>(io::read_points_csv(path("none.csv"))); });
+}
+
+}  // namespace

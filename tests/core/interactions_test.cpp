@@ -1,0 +1,338 @@
+#include "supple/core/interactions.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "core/allocations.h"
+#include "core/support.h"
+#include "supple/core/error.h"
+#include "supple/core/integrate.h"
+
+namespace supple::core {
+namespace {
+
+using test::Draw;
+using test::Particles;
+
+/// A crowd with every law at work: bonds of all kinds on a chain, geometric laws within and between two objects.
+struct Crowd {
+  Particles p;
+  Interactions interactions;
+};
+
+Crowd make_crowd(std::size_t count, std::uint64_t seed) {
+  Draw draw(seed);
+  Crowd crowd;
+  Particles& p = crowd.p;
+  const double size = 0.25 * std::cbrt(static_cast<double>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    p.add(draw.vector(size), draw.uniform(0.5, 2.0), draw.uniform(0.01, 0.1));
+    p.set.object.back() = i < count / 2 ? 0 : 1;
+    p.set.normal.back() = draw.direction();
+    p.state.orientation.back() = draw.rotation();
+    p.state.velocity.back() = draw.vector(1.0);
+    p.state.angular_momentum.back() = draw.vector(0.05);
+  }
+  Interactions& all = crowd.interactions;
+  all.cohesion.resize(1);
+  all.form.resize(1);
+  all.form_radius.resize(1);
+  all.coplanarity.resize(2);
+  all.bond_frame.push_back(test::bond_frames(p, 30.0, 0.5));
+  const auto add = [](auto& list, std::uint32_t a, std::uint32_t b, const auto& law) {
+    list.first.push_back(a);
+    list.second.push_back(b);
+    list.law.push_back(law);
+  };
+  test::along_chain(count, 3, [&](std::uint32_t a, std::uint32_t b) {
+    const Weight weight{.range = draw.uniform(0.5, 3.0)};
+    add(all.cohesion[0], a, b, Cohesion{.r0 = draw.uniform(0.3, 0.8), .f0 = 2.0, .a = 4.0});
+    add(all.form[0], a, b, Form{.strength = 0.2, .curvature = draw.uniform(-2, 2), .weight = weight});
+    add(all.form_radius[0], a, b, FormRadius{.strength = 0.3, .radius = draw.uniform(0.2, 2), .weight = {}});
+    add(all.coplanarity[b % 2], a, b, Coplanarity{.strength = 0.4, .weight = weight});
+  });
+  const Cohesion cohesion{.r0 = 0.3, .f0 = 1.0, .a = 8.0};
+  all.geometric_cohesion.push_back(
+      {.name = "own", .object_a = 0, .object_b = 0, .range = cohesion.influence_radius(1e-3), .law = cohesion});
+  const Repulsion repulsion{.force = 1.0, .distance = 0.3, .length = 0.05, .tolerance = 1e-3};
+  all.repulsion.push_back(
+      {.name = "other", .object_a = 1, .object_b = 0, .range = repulsion.cut_off(), .law = repulsion});
+  all.gravity = Vec3(0.1, 0.0, -9.81);
+  all.external.push_back({.particle = 3, .force = Vec3(1, 2, 3), .torque = Vec3(0, 0, 4), .begin = 0, .end = 1});
+  return crowd;
+}
+
+struct Evaluated {
+  Loads internal, external;
+  InteractionCounts counts;
+};
+
+Evaluated evaluate_loads(const Particles& p, const Interactions& interactions, const Executor& executor,
+                         double time = 0.5) {
+  Evaluated result;
+  result.internal.reset(p.set.size());
+  result.external.reset(p.set.size());
+  InteractionWorkspace workspace(p.set, interactions);
+  result.counts = accumulate_interactions(p.set, p.state, interactions, time, executor, workspace, result.internal,
+                                          result.external);
+  return result;
+}
+
+std::uint64_t hash_of(const Evaluated& loads) {
+  Hasher hasher;
+  for (const Loads* part : {&loads.internal, &loads.external}) {
+    hasher.add(part->force);
+    hasher.add(part->torque);
+  }
+  return hasher.value();
+}
+
+TEST(Interactions, AddUpToTheReferenceLaws) {
+  for (const std::size_t count : {2U, 3U, 7U, 61U}) {
+    const Crowd crowd = make_crowd(std::max<std::size_t>(count, 4), 31 + count);
+    const Evaluated fast = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
+    Loads reference;
+    reference.reset(crowd.p.set.size());
+    double scale = 0.0;
+    for (const LawReport& report : report_laws(crowd.p.set, crowd.p.state, crowd.interactions, 0.5)) {
+      for (std::size_t i = 0; i < crowd.p.set.size(); ++i) {
+        reference.force[i] += report.loads.force[i];
+        reference.torque[i] += report.loads.torque[i];
+        scale = std::max({scale, report.loads.force[i].norm(), report.loads.torque[i].norm()});
+      }
+    }
+    // A few hundred roundings of terms up to the scale.
+    for (std::size_t i = 0; i < crowd.p.set.size(); ++i) {
+      EXPECT_LE((fast.internal.force[i] + fast.external.force[i] - reference.force[i]).norm(), 1e-12 * scale) << i;
+      EXPECT_LE((fast.internal.torque[i] + fast.external.torque[i] - reference.torque[i]).norm(), 1e-12 * scale) << i;
+    }
+  }
+}
+
+TEST(Interactions, GiveNoForceAndNoMomentToTheWhole) {
+  const Crowd crowd = make_crowd(200, 32);
+  const Evaluated loads = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
+  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+  double scale = 0.0;
+  for (std::size_t i = 0; i < crowd.p.set.size(); ++i) {
+    force += loads.internal.force[i];
+    moment += crowd.p.state.position[i].cross(loads.internal.force[i]) + loads.internal.torque[i];
+    scale += loads.internal.force[i].norm();
+  }
+  EXPECT_LE(force.norm(), 1e-13 * scale);
+  EXPECT_LE(moment.norm(), 1e-13 * scale);
+}
+
+TEST(Interactions, AreTheGradientOfThePotentialEnergy) {
+  Crowd crowd = make_crowd(40, 33);
+  const Evaluated loads = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
+  Draw draw(34);
+  const double h = 1e-5;
+  for (int k = 0; k < 5; ++k) {
+    const std::size_t i = static_cast<std::size_t>(8 * k);
+    const Vec3 dx = draw.direction(), turn = draw.direction();
+    const auto at = [&](double step) {
+      Particles moved = crowd.p;
+      moved.state.position[i] += step * dx;
+      moved.state.orientation[i] = rotation_exp(step * turn) * moved.state.orientation[i];
+      return potential_energy(moved.set, moved.state, crowd.interactions);
+    };
+    const double expected = loads.internal.force[i].dot(dx) + loads.internal.torque[i].dot(turn);
+    // Truncation h^2 U'''/6 with U''' up to 1e4 where close pairs repel; a pair crossing its range adds less.
+    EXPECT_NEAR(-(at(h) - at(-h)) / (2.0 * h), expected, 1e-6 * (1.0 + std::abs(expected))) << i;
+  }
+}
+
+TEST(Interactions, HaveTheSameBitsForEveryNumberOfThreads) {
+  const Crowd crowd = make_crowd(3000, 35);
+  const std::uint64_t one = hash_of(evaluate_loads(crowd.p, crowd.interactions, Executor(1)));
+  for (const int threads : {2, 3, 8}) {
+    EXPECT_EQ(hash_of(evaluate_loads(crowd.p, crowd.interactions, Executor(threads))), one) << threads;
+  }
+}
+
+TEST(Interactions, CountWhatTheyVisit) {
+  const Crowd crowd = make_crowd(60, 36);
+  const Evaluated loads = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
+  const std::size_t chain = 59 + 58 + 57;
+  EXPECT_GE(loads.counts.pairs_present, 4 * chain + 59 + 58);
+  EXPECT_GE(loads.counts.pairs_visited, loads.counts.pairs_present);
+  Interactions bonded = crowd.interactions;
+  bonded.geometric_cohesion.clear();
+  bonded.repulsion.clear();
+  EXPECT_TRUE(bonded.bonded_only());
+  EXPECT_EQ(evaluate_loads(crowd.p, bonded, Executor(1)).counts.pairs_visited, 4 * chain + 59 + 58);
+}
+
+TEST(Interactions, AllocateNothingAfterTheFirstCall) {
+  const Crowd crowd = make_crowd(2000, 37);
+  for (const int threads : {1, 2}) {
+    const Executor executor(threads);
+    InteractionWorkspace workspace(crowd.p.set, crowd.interactions);
+    Loads internal, external;
+    const auto call = [&] {
+      internal.reset(crowd.p.set.size());
+      external.reset(crowd.p.set.size());
+      accumulate_interactions(crowd.p.set, crowd.p.state, crowd.interactions, 0.0, executor, workspace, internal,
+                              external);
+    };
+    call();
+    const std::uint64_t before = test::allocation_count();
+    call();
+    EXPECT_EQ(test::allocation_count(), before) << threads;
+  }
+}
+
+TEST(GeometricLaws, ActOnlyBetweenTheirObjects) {
+  Particles p;
+  p.add(Vec3(0, 0, 0));
+  p.add(Vec3(0.2, 0, 0));
+  p.add(Vec3(0.4, 0, 0));
+  p.set.object = {0, 0, 2};
+  Interactions all;
+  all.repulsion.push_back({.name = "r", .object_a = 0, .object_b = 2, .range = 0.3,
+                           .law = {.force = 1.0, .distance = 0.2, .length = 0.05, .tolerance = 0.13}});
+  const Evaluated loads = evaluate_loads(p, all, Executor(1));
+  EXPECT_EQ(loads.counts.pairs_present, 1U);
+  EXPECT_EQ(loads.internal.force[0], Vec3::Zero());
+  EXPECT_GT(loads.internal.force[2].x(), 0.0);
+  EXPECT_LT(loads.internal.force[1].x(), 0.0);
+}
+
+TEST(GeometricCohesion, HasAnEnergyThatVanishesAtItsRange) {
+  Particles p;
+  p.add(Vec3::Zero());
+  p.add(Vec3::UnitX());
+  const Cohesion law{.r0 = 1.0, .f0 = 1.0, .a = 4.0};
+  Interactions all;
+  all.geometric_cohesion.push_back({.name = "c", .object_a = 0, .object_b = 0, .range = 3.0, .law = law});
+  EXPECT_NEAR(potential_energy(p.set, p.state, all), -law.energy(3.0), 1e-15);
+  p.state.position[1].x() = 3.0 - 1e-9;
+  EXPECT_NEAR(potential_energy(p.set, p.state, all), 0.0, 1e-12);
+  p.state.position[1].x() = 3.0 + 1e-9;
+  EXPECT_EQ(potential_energy(p.set, p.state, all), 0.0);
+}
+
+TEST(ExternalLoads, ActInTheirWindowAndRampAtBothEnds) {
+  const ExternalLoad load{.begin = 1.0, .end = 3.0, .ramp = 0.5};
+  EXPECT_EQ(load.factor(0.99), 0.0);
+  EXPECT_DOUBLE_EQ(load.factor(1.25), 0.5);
+  EXPECT_EQ(load.factor(2.0), 1.0);
+  EXPECT_DOUBLE_EQ(load.factor(2.75), 0.5);
+  EXPECT_EQ(load.factor(3.0), 0.0);
+  const ExternalLoad step{.begin = 1.0, .end = 3.0};
+  EXPECT_EQ(step.factor(1.0), 1.0);
+  EXPECT_EQ(step.factor(2.999), 1.0);
+  EXPECT_EQ(step.factor(3.0), 0.0);
+  const ExternalLoad lasting{.begin = 0.0, .end = std::numeric_limits<double>::infinity(), .ramp = 2.0};
+  EXPECT_EQ(lasting.factor(1e12), 1.0);
+}
+
+TEST(ExternalLoads, AndGravityAreKeptApartFromInternalLoads) {
+  Crowd crowd = make_crowd(10, 38);
+  const Evaluated inside = evaluate_loads(crowd.p, crowd.interactions, Executor(1), 0.5);
+  EXPECT_EQ(inside.external.force[3], Vec3(crowd.p.set.mass[3] * crowd.interactions.gravity + Vec3(1, 2, 3)));
+  EXPECT_EQ(inside.external.torque[3], Vec3(0, 0, 4));
+  const Evaluated outside = evaluate_loads(crowd.p, crowd.interactions, Executor(1), 1.5);
+  EXPECT_EQ(outside.external.force[3], Vec3(crowd.p.set.mass[3] * crowd.interactions.gravity));
+  EXPECT_EQ(outside.internal.force[3], inside.internal.force[3]);
+}
+
+TEST(LawReports, NameEveryLawAndAddUpToThePotentialEnergy) {
+  const Crowd crowd = make_crowd(30, 39);
+  const std::vector<LawReport> reports = report_laws(crowd.p.set, crowd.p.state, crowd.interactions, 0.5);
+  ASSERT_EQ(reports.size(), 10U);
+  EXPECT_EQ(reports[3].name, "bond_frame");
+  EXPECT_EQ(reports[6].name, "own");
+  EXPECT_EQ(reports[8].name, "gravity");
+  EXPECT_EQ(reports[9].name, "external");
+  double energy = 0.0, size = 0.0;
+  for (const LawReport& report : reports) {
+    energy += report.energy;
+    size += std::abs(report.energy);
+  }
+  EXPECT_NEAR(energy, potential_energy(crowd.p.set, crowd.p.state, crowd.interactions), 1e-13 * size);
+}
+
+/// The largest eigenfrequency about a pose, from differences of the loads: sqrt of the largest eigenvalue of M^-1 H.
+double true_frequency(const Particles& p, const Interactions& interactions) {
+  const auto n = static_cast<Eigen::Index>(6 * p.set.size());
+  Eigen::MatrixXd h(n, n);
+  const double step = 1e-5;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto loads_at = [&](double by) {
+      Particles moved = p;
+      const auto i = static_cast<std::size_t>(k / 6);
+      if (k % 6 < 3) {
+        moved.state.position[i] += by * Vec3::Unit(k % 3);
+      } else {
+        moved.state.orientation[i] = rotation_exp(by * Vec3::Unit(k % 3)) * moved.state.orientation[i];
+      }
+      return evaluate_loads(moved, interactions, Executor(1)).internal;
+    };
+    const Loads plus = loads_at(step), minus = loads_at(-step);
+    const auto inertia_of = [&](Eigen::Index row) {
+      const auto i = static_cast<std::size_t>(row / 6);
+      return row % 6 < 3 ? p.set.mass[i] : p.set.inertia[i].x();
+    };
+    for (Eigen::Index row = 0; row < n; ++row) {
+      const auto i = static_cast<std::size_t>(row / 6);
+      const auto& a = row % 6 < 3 ? plus.force[i] : plus.torque[i];
+      const auto& b = row % 6 < 3 ? minus.force[i] : minus.torque[i];
+      h(row, k) = -(a[row % 3] - b[row % 3]) / (2.0 * step) / std::sqrt(inertia_of(row) * inertia_of(k));
+    }
+  }
+  const Eigen::MatrixXd symmetric = 0.5 * (h + h.transpose());
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(symmetric).eigenvalues().maxCoeff());
+}
+
+TEST(LargestFrequency, BoundsTheEigenfrequenciesAndIsNotFarAbove) {
+  Particles spiral = test::make_spiral();
+  spiral.set.mass[4] *= 3.0;
+  Interactions frames;
+  frames.bond_frame.push_back(test::bond_frames(spiral, 400.0, 1.5));
+  Interactions both = frames;
+  both.coplanarity.push_back(test::coplanarities(spiral, 2.0));
+  for (const Interactions& interactions : {frames, both}) {
+    const double exact = true_frequency(spiral, interactions);
+    const double bound = largest_frequency(spiral.set, spiral.state, interactions);
+    EXPECT_GE(bound, exact);
+    EXPECT_LE(bound, 2.0 * exact);
+  }
+}
+
+TEST(LargestFrequency, BoundsATriangleOfSprings) {
+  // Three springs of zero length, U = k |r|^2 each (stiffness 2 k): the eigenvalues m omega^2 are 0 and 6 k.
+  Particles p;
+  p.add(Vec3(0, 0, 0), 2.0);
+  p.add(Vec3(1, 0, 0), 2.0);
+  p.add(Vec3(0.5, 0.8, 0), 2.0);
+  Interactions all;
+  BondedLaw<FormRadius> springs{.name = "springs", .first = {0, 0, 1}, .second = {1, 2, 2}, .law = {}};
+  springs.law.assign(3, {.strength = 5.0, .radius = 0.0, .weight = {}});
+  all.form_radius.push_back(springs);
+  EXPECT_NEAR(true_frequency(p, all), std::sqrt(6.0 * 5.0 / 2.0), 1e-6);
+  EXPECT_DOUBLE_EQ(largest_frequency(p.set, p.state, all), std::sqrt(2.0 / 2.0 * 2 * 10.0));
+}
+
+TEST(LargestFrequency, IsZeroForWhatCannotMove) {
+  Particles spiral = test::make_spiral();
+  Interactions all;
+  all.bond_frame.push_back(test::bond_frames(spiral, 400.0, 1.5));
+  spiral.set.pinned.assign(spiral.set.size(), kPinPosition | kPinOrientation);
+  EXPECT_EQ(largest_frequency(spiral.set, spiral.state, all), 0.0);
+}
+
+TEST(InteractionWorkspaces, RefuseBondsOfParticlesThatDoNotExist) {
+  Particles p;
+  p.add(Vec3::Zero());
+  Interactions all;
+  all.coplanarity.push_back({.name = "c", .first = {0}, .second = {1}, .law = {Coplanarity{}}});
+  EXPECT_THROW(InteractionWorkspace(p.set, all), ContractViolation);
+}
+
+}  // namespace
+}  // namespace supple::core

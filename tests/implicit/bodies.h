@@ -1,0 +1,122 @@
+/// @file tests/implicit/bodies.h
+/// Bodies and points for tests, the same on every run.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "supple/implicit/field.h"
+#include "supple/implicit/skeleton.h"
+
+namespace supple::implicit::testing {
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
+  }
+  std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(engine_() % n); }
+  Vec3 in_box(double half) { return {uniform(-half, half), uniform(-half, half), uniform(-half, half)}; }
+  Vec3 direction() {
+    for (;;) {
+      const Vec3 v = in_box(1.0);
+      const double n = v.norm();
+      if (n > 0.1 && n < 1.0) return v / n;
+    }
+  }
+  Quat rotation() {
+    for (;;) {
+      const Quat q(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+      if (q.norm() > 0.1 && q.norm() < 1.0) return q.normalized();
+    }
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// A skeleton, the poses of its parts and the field they make.
+struct Body {
+  Skeleton skeleton;
+  std::vector<Pose> parts;
+  PlacedSkeleton placed;
+  Field field;
+
+  void place() {
+    place_skeleton(skeleton, parts, placed);
+    index_field(skeleton, placed, field);
+  }
+};
+
+struct BodyOptions {
+  std::uint64_t seed = 1;
+  std::uint32_t parts = 12;
+  std::uint32_t primitives_per_part = 1;
+  double half_width = 1.0;  ///< parts lie in this cube [m]
+  double least_radius = 0.3;
+  double largest_radius = 0.6;
+  bool only_points = false;  ///< Wyvill points instead of every shape and kernel
+};
+
+inline Primitive random_primitive(Random& random, const BodyOptions& options, std::uint32_t part) {
+  Primitive p;
+  p.part = part;
+  const double R = random.uniform(options.least_radius, options.largest_radius);
+  p.kernel = Kernel::wyvill(R);
+  if (options.only_points) return p;
+  p.shape = static_cast<ShapeKind>(random.below(6));
+  p.size = Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1)) * R;
+  p.offset.position = random.in_box(0.2 * R);
+  p.offset.orientation = random.rotation();
+  if (random.below(2) == 1) {
+    const double e = random.uniform(0.3, 0.7) * R;
+    p.kernel = Kernel::gascuel(e, R, random.uniform(0.5, 2.9) * 0.5 / (R - e));
+  }
+  return p;
+}
+
+inline Body random_body(const BodyOptions& options) {
+  Random random(options.seed);
+  Body body;
+  body.skeleton.part_count = options.parts;
+  for (std::uint32_t part = 0; part < options.parts; ++part) {
+    Pose pose;
+    pose.position = random.in_box(options.half_width);
+    pose.orientation = random.rotation();
+    body.parts.push_back(pose);
+    for (std::uint32_t k = 0; k < options.primitives_per_part; ++k) {
+      body.skeleton.primitive.push_back(random_primitive(random, options, part));
+    }
+  }
+  body.place();
+  return body;
+}
+
+/// Primitives given in world axes, one part each.
+inline Body body_of(const std::vector<std::pair<Primitive, Vec3>>& primitives) {
+  Body body;
+  for (const auto& [primitive, position] : primitives) {
+    body.skeleton.primitive.push_back(primitive);
+    body.skeleton.primitive.back().part = body.skeleton.part_count++;
+    body.parts.push_back(Pose{position, Quat::Identity()});
+  }
+  body.place();
+  return body;
+}
+
+inline Primitive wyvill_point(double radius) {
+  Primitive p;
+  p.kernel = Kernel::wyvill(radius);
+  return p;
+}
+
+inline std::vector<Vec3> random_points(std::uint64_t seed, std::size_t count, double half_width) {
+  Random random(seed);
+  std::vector<Vec3> points(count);
+  for (Vec3& p : points) p = random.in_box(half_width);
+  return points;
+}
+
+}  // namespace supple::implicit::testing

@@ -1,0 +1,265 @@
+// Meshes of bodies that touch: space is divided by the largest positive field.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "implicit/analytic_fields.h"
+#include "implicit/bodies.h"
+#include "implicit/mesh_checks.h"
+#include "supple/implicit/polygonise.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+const Vec3 kOffset(0.0137, -0.0071, 0.0229);
+
+Lattice lattice_of(double cell) { return {.origin = kOffset, .cell = cell}; }
+
+std::vector<FieldView> views_of(const std::vector<FunctionField>& fields) { return {fields.begin(), fields.end()}; }
+
+double expect_all_closed(const std::vector<Mesh>& meshes) {
+  double volume = 0.0;
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    const MeshReport report = inspect(meshes[m]);
+    const bool hidden = meshes[m].triangle_count() == 0;  // the body lies inside others
+    EXPECT_TRUE(hidden || report.closed) << m;
+    EXPECT_TRUE(hidden || report.oriented) << m;
+    EXPECT_EQ(meshes[m].normal.size(), meshes[m].vertex_count());
+    EXPECT_EQ(meshes[m].columns.at(0).values.size(), meshes[m].vertex_count());
+    volume += report.volume;
+  }
+  return volume;
+}
+
+double contact_of(const Mesh& mesh, std::uint32_t vertex) { return mesh.columns.at(0).values[vertex]; }
+
+/// Triangles of `mesh` that lie in the contact with body `other`: those whose reverse is in the other mesh.
+std::vector<Corners> contact_triangles(const Mesh& mesh, std::size_t other, bool reversed) {
+  std::vector<Corners> found;
+  for (auto t : mesh.triangle) {
+    const bool touches = std::all_of(t.begin(), t.end(), [&](std::uint32_t v) {
+      return contact_of(mesh, v) == static_cast<double>(other + 1);
+    });
+    if (!touches) continue;
+    if (reversed) std::swap(t[1], t[2]);
+    found.push_back(corners_of(mesh, t));
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<FunctionField> random_spheres(std::uint64_t seed, std::size_t count) {
+  Random random(seed);
+  std::vector<FunctionField> fields;
+  for (std::size_t i = 0; i < count; ++i) fields.push_back(sphere(random.in_box(0.4), random.uniform(0.25, 0.5)));
+  return fields;
+}
+
+TEST(PolygonisePartition, OfOneBodyIsItsMesh) {
+  const Body body = random_body({.seed = 2, .parts = 20});
+  const FieldView view = body.field;
+  std::vector<Mesh> parts = polygonise_partition({&view, 1}, lattice_of(0.06), Executor(1));
+  ASSERT_EQ(parts.size(), 1u);
+  ASSERT_EQ(parts[0].columns.size(), 1u);
+  EXPECT_EQ(parts[0].columns[0].name, "contact");
+  for (const double contact : parts[0].columns[0].values) EXPECT_EQ(contact, 0.0);
+  parts[0].columns.clear();
+  const Mesh mesh = polygonise(body.field, lattice_of(0.06), Executor(1));
+  EXPECT_EQ(hash_of(parts[0]), hash_of(mesh));
+}
+
+TEST(PolygonisePartition, OfTwoBallsSharesTheContactBitForBit) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  const auto views = views_of(balls);
+  PolygoniseCounts counts;
+  const std::vector<Mesh> mesh = polygonise_partition(views, lattice_of(0.04), Executor(1), &counts);
+  expect_all_closed(mesh);
+  EXPECT_EQ(inspect(mesh[0]).euler_characteristic, 2);
+  EXPECT_EQ(inspect(mesh[1]).euler_characteristic, 2);
+  EXPECT_LT(counts.residual, 1e-12);
+
+  const auto here = contact_triangles(mesh[0], 1, false), there = contact_triangles(mesh[1], 0, true);
+  EXPECT_GT(here.size(), 100u);
+  EXPECT_EQ(here, there);
+
+  const auto difference = [&](const Vec3& p) { return views[0].value(p) - views[1].value(p); };
+  for (std::size_t m = 0; m < 2; ++m) {
+    for (std::uint32_t v = 0; v < mesh[m].vertex_count(); ++v) {
+      const Vec3& p = mesh[m].position[v];
+      if (contact_of(mesh[m], v) != 0.0) {
+        ASSERT_LE(std::abs(difference(p)), 1e-12);
+      } else {
+        ASSERT_LE(std::abs(views[m].value(p)), 1e-12);
+      }
+    }
+  }
+}
+
+TEST(PolygonisePartition, VolumesAddUpToTheUnion) {
+  // Two balls of radius r at distance D: the lens in both has the volume pi (4 r + D) (2 r - D)^2 / 12.
+  const double r = 0.5, D = 0.6, ball = 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  const double lens = std::numbers::pi * (4 * r + D) * (2 * r - D) * (2 * r - D) / 12.0;
+  const std::vector<FunctionField> balls{sphere({-0.5 * D, 0, 0}, r), sphere({0.5 * D, 0, 0}, r)};
+  double error[2];
+  for (int k = 0; k < 2; ++k) {
+    const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(std::ldexp(0.05, -k)), Executor(1));
+    error[k] = 2.0 * ball - lens - expect_all_closed(mesh);
+    EXPECT_NEAR(inspect(mesh[0]).volume, inspect(mesh[1]).volume, 2e-4);
+  }
+  EXPECT_NEAR(error[0] / error[1], 4.0, 0.5);  // order 2
+  EXPECT_LT(std::abs(error[1]), 2e-3);
+}
+
+TEST(PolygonisePartition, NormalsAreOppositeInTheContactAndAnalyticOutside) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(0.05), Executor(1));
+  for (std::size_t m = 0; m < 2; ++m) {
+    for (std::uint32_t v = 0; v < mesh[m].vertex_count(); ++v) {
+      const Vec3& p = mesh[m].position[v];
+      Vec3 own, other;
+      (void)balls[m].function(p, own);
+      (void)balls[1 - m].function(p, other);
+      const Vec3 outer = -own.normalized(), inner = -(own - other).normalized();
+      EXPECT_NEAR(mesh[m].normal[v].norm(), 1.0, 1e-14);
+      const bool is_outer = (mesh[m].normal[v] - outer).norm() < 1e-9;
+      const bool is_inner = (mesh[m].normal[v] - inner).norm() < 1e-9;
+      EXPECT_TRUE(contact_of(mesh[m], v) == 0.0 ? is_outer : is_outer || is_inner);
+    }
+  }
+}
+
+TEST(PolygonisePartition, OfThreeAndFourBallsAroundAPointIsClosed) {
+  std::vector<FunctionField> balls;
+  for (int i = 0; i < 3; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 3.0;
+    balls.push_back(sphere({0.3 * std::cos(angle), 0.3 * std::sin(angle), 0.0}, 0.45));
+  }
+  for (const double cell : {0.15, 0.08, 0.04}) {
+    PolygoniseCounts counts;
+    std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(cell), Executor(1), &counts);
+    expect_all_closed(mesh);
+    EXPECT_GT(counts.junctions, 0u);
+    balls.push_back(sphere({0.0, 0.0, 0.35}, 0.4));
+    mesh = polygonise_partition(views_of(balls), lattice_of(cell), Executor(1));
+    expect_all_closed(mesh);
+    for (const Mesh& m : mesh) {
+      EXPECT_EQ(inspect(m).euler_characteristic, 2);
+      EXPECT_EQ(inspect(m).components, 1u);
+    }
+    balls.pop_back();
+  }
+}
+
+TEST(PolygonisePartition, OfManyBallsIsClosedAndFillsTheirUnion) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const std::vector<FunctionField> balls = random_spheres(seed, 8);
+    FunctionField all = balls[0];
+    for (std::size_t i = 1; i < balls.size(); ++i) all = either(all, balls[i]);
+    const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(0.06), Executor(2));
+    const double volume = expect_all_closed(mesh);
+    const double whole = inspect(polygonise(all, lattice_of(0.06), Executor(1))).volume;
+    EXPECT_NEAR(volume, whole, 0.01 * whole);
+  }
+}
+
+TEST(PolygonisePartition, DoesNotCrossItselfOnCoarseRandomBodies) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const std::vector<Mesh> mesh =
+        polygonise_partition(views_of(random_spheres(seed, 6)), lattice_of(0.11), Executor(1));
+    expect_all_closed(mesh);
+    for (const Mesh& m : mesh) EXPECT_EQ(self_intersections(m, 0.11), 0u) << seed;
+  }
+}
+
+TEST(PolygonisePartition, BodiesApartByLessThanACellKeepTheirOwnSurfaces) {
+  constexpr double kCell = 0.05;
+  const std::vector<FunctionField> balls{sphere({-0.51, 0.03, 0}, 0.5), sphere({0.5, 0, 0.02}, 0.5)};
+  ASSERT_LT(Vec3(1.01, -0.03, 0.02).norm(), 1.0 + 0.3 * kCell);
+  PolygoniseCounts counts;
+  const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(kCell), Executor(1), &counts);
+  EXPECT_GT(counts.gaps, 0u);
+  expect_all_closed(mesh);
+  for (std::size_t m = 0; m < 2; ++m) {
+    EXPECT_EQ(self_intersections(mesh[m], kCell), 0u);
+    for (std::uint32_t v = 0; v < mesh[m].vertex_count(); ++v) {
+      const Vec3& p = mesh[m].position[v];
+      EXPECT_LT(std::abs(FieldView(balls[m]).value(p)), 1e-12);
+      EXPECT_EQ(contact_of(mesh[m], v), 0.0);
+      Vec3 gradient;
+      (void)balls[m].function(p, gradient);
+      EXPECT_LT((mesh[m].normal[v] + gradient.normalized()).norm(), 1e-9);
+    }
+  }
+}
+
+TEST(PolygonisePartition, GivesTiesToTheLowerIndex) {
+  const std::vector<FunctionField> twins{sphere(Vec3::Zero(), 0.5), sphere(Vec3::Zero(), 0.5)};
+  const std::vector<Mesh> mesh = polygonise_partition(views_of(twins), lattice_of(0.1), Executor(1));
+  EXPECT_GT(mesh[0].triangle_count(), 0u);
+  EXPECT_EQ(mesh[1].triangle_count(), 0u);
+  expect_all_closed(mesh);
+}
+
+TEST(PolygonisePartition, IsClosedWhenFieldsAgreeExactlyAtNodes) {
+  // The contact plane x = 0 and the rim's plane hold nodes, where F_a - F_b is exactly zero.
+  const std::vector<FunctionField> balls{sphere({-0.375, 0, 0}, 0.625), sphere({0.375, 0, 0}, 0.625)};
+  ASSERT_EQ(FieldView(balls[0]).value({0, 0.5, 0}), 0.0);
+  ASSERT_EQ(FieldView(balls[1]).value({0, 0.5, 0}), 0.0);
+  const std::vector<Mesh> mesh =
+      polygonise_partition(views_of(balls), {.origin = Vec3::Zero(), .cell = 0.125}, Executor(1));
+  expect_all_closed(mesh);
+  EXPECT_EQ(contact_triangles(mesh[0], 1, false), contact_triangles(mesh[1], 0, true));
+  EXPECT_GT(contact_triangles(mesh[0], 1, false).size(), 0u);
+}
+
+TEST(PolygonisePartition, AGroundShapesTheOthersAndHasNoMesh) {
+  const FunctionField ball = sphere({0, 0, 0.3}, 0.5), ground = below(0.0);
+  const std::vector<FieldView> fields{ball, ground};
+  const std::vector<Mesh> mesh = polygonise_partition(fields, lattice_of(0.05), Executor(1));
+  expect_all_closed(mesh);
+  EXPECT_EQ(mesh[1].vertex_count(), 0u);
+  std::size_t touching = 0;
+  for (std::uint32_t v = 0; v < mesh[0].vertex_count(); ++v) {
+    const Vec3& p = mesh[0].position[v];
+    if (contact_of(mesh[0], v) == 0.0) continue;
+    ++touching;
+    EXPECT_EQ(contact_of(mesh[0], v), 2.0);
+    EXPECT_NEAR(fields[0].value(p), fields[1].value(p), 1e-12);
+  }
+  EXPECT_GT(touching, 20u);
+  EXPECT_THROW((void)polygonise_partition({fields.data() + 1, 1}, lattice_of(0.05), Executor(1)), Error);
+}
+
+TEST(PolygonisePartition, DoesNotDependOnThreadsOrOnWhatBoundsSkip) {
+  std::vector<FunctionField> balls = random_spheres(3, 7);
+  PolygoniseCounts counts, all;
+  const std::uint64_t expected =
+      hash_of(polygonise_partition(views_of(balls), lattice_of(0.03), Executor(1), &counts));
+  for (const int threads : {2, 3, 8}) {
+    EXPECT_EQ(hash_of(polygonise_partition(views_of(balls), lattice_of(0.03), Executor(threads))), expected);
+  }
+  for (FunctionField& ball : balls) ball.bounds_everything = true;
+  EXPECT_EQ(hash_of(polygonise_partition(views_of(balls), lattice_of(0.03), Executor(1), &all)), expected);
+  EXPECT_LT(counts.blocks_visited, all.blocks_visited);
+  EXPECT_LT(counts.nodes, all.nodes);
+}
+
+TEST(PolygonisePartition, OfBodiesApartIsTheirOwnMeshes) {
+  const std::vector<FunctionField> balls{sphere({-0.6, 0, 0}, 0.4), sphere({0.6, 0, 0}, 0.4)};
+  const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(0.05), Executor(1));
+  for (std::size_t m = 0; m < 2; ++m) {
+    Mesh own = mesh[m];
+    own.columns.clear();
+    EXPECT_EQ(hash_of(own), hash_of(polygonise(balls[m], lattice_of(0.05), Executor(1))));
+  }
+}
+
+TEST(PolygonisePartition, OfNothingIsEmpty) {
+  EXPECT_TRUE(polygonise_partition({}, lattice_of(0.1), Executor(1)).empty());
+}
+
+}  // namespace
+}  // namespace supple::implicit

@@ -1,0 +1,240 @@
+#include "supple/implicit/surface_grid.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "implicit/analytic_fields.h"
+#include "implicit/bodies.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+constexpr double kCell = 0.05;
+constexpr float kFloatEps = 6e-8F;  // rounding of a value below 1 to float
+const Vec3 kOrigin(0.0125, -0.25, 0.375);
+
+GridOptions options_of(GridContent content) {
+  return {.lattice = {.origin = kOrigin, .cell = kCell}, .content = content, .half_width = 3.0, .name = "ball"};
+}
+
+Vec3 node(int i, int j, int k) { return kOrigin + kCell * Vec3(i, j, k); }
+
+/// A folder of this test program, removed at the end.
+class Folder {
+ public:
+  Folder() : path_(std::filesystem::temp_directory_path() / ("supple_grid_" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+template <class Act>
+void expect_error(const Act& act, ErrorKind kind, const std::string& word) {
+  try {
+    act();
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), kind);
+    EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << word << " in: " << error.what();
+  }
+}
+
+TEST(SurfaceGrid, HoldsTheDistanceInTheBandAndTheSideBeyond) {
+  const FunctionField ball = sphere(kOrigin + Vec3(0.1, 0.2, 0.3), 0.6131);
+  const SurfaceGrid grid = make_surface_grid(ball, options_of(GridContent::SignedDistance), Executor(2));
+  const double band = 3.0 * kCell;
+  std::uint64_t in_band = 0;
+  for (int k = -16; k < 28; ++k) {
+    for (int j = -16; j < 28; ++j) {
+      for (int i = -16; i < 28; ++i) {
+        const double distance = -FieldView(ball).value(node(i, j, k));
+        const double expected = std::clamp(distance, -band, band);
+        ASSERT_NEAR(grid.value(i, j, k), expected, kFloatEps) << i << ' ' << j << ' ' << k;
+        in_band += std::abs(distance) <= band ? 1u : 0u;
+      }
+    }
+  }
+  EXPECT_EQ(grid.active_voxels(), in_band);
+  EXPECT_GT(grid.memory_bytes(), 4 * in_band);
+  EXPECT_LT(grid.value(2, 4, 6), 0.0);        // the centre
+  EXPECT_GT(grid.value(1000, 0, 0), 0.0);     // far away
+}
+
+TEST(SurfaceGrid, OfTheFieldHoldsFWithItsSign) {
+  const Body body = body_of({{wyvill_point(1.0), kOrigin}});
+  const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::Field), Executor(1));
+  std::uint64_t in_band = 0;
+  for (int k = -24; k < 24; ++k) {
+    for (int j = -24; j < 24; ++j) {
+      for (int i = -24; i < 24; ++i) {
+        Vec3 gradient;
+        const double f = FieldView(body.field).value(node(i, j, k), gradient);
+        const double value = grid.value(i, j, k);
+        if (std::abs(f) <= 3.0 * kCell * gradient.norm()) {
+          ++in_band;
+          ASSERT_NEAR(value, f, kFloatEps);
+        } else {
+          ASSERT_EQ(value > 0.0, f > 0.0) << i << ' ' << j << ' ' << k;
+        }
+      }
+    }
+  }
+  EXPECT_EQ(grid.active_voxels(), in_band);
+}
+
+TEST(SurfaceGrid, DistanceOfAFieldIsRightToFirstOrder) {
+  const Body body = body_of({{wyvill_point(1.0), kOrigin}});
+  const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(1));
+  constexpr double kRadius = 0.454202019;
+  int near = 0;
+  for (int k = -12; k <= 12; ++k) {
+    for (int j = -12; j <= 12; ++j) {
+      for (int i = -12; i <= 12; ++i) {
+        const double distance = kCell * Vec3(i, j, k).norm() - kRadius;
+        if (std::abs(distance) > kCell) continue;
+        ++near;
+        // -F/F' errs by |F''/2F'| d^2 + O(d^3), and |F''/F'| is below 3 within a cell of the surface.
+        EXPECT_NEAR(grid.value(i, j, k), distance, 2.0 * distance * distance + 1e-7);
+      }
+    }
+  }
+  EXPECT_GT(near, 500);
+}
+
+TEST(SurfaceGrid, InterpolatesTheDistanceToSecondOrder) {
+  const FunctionField ball = sphere(Vec3::Zero(), 0.6);
+  const SurfaceGrid grid = make_surface_grid(ball, options_of(GridContent::SignedDistance), Executor(1));
+  Random random(4);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 p = 0.6 * random.direction();
+    // Trilinear interpolation errs by at most 3/8 cell^2 times the largest second derivative, 1 / r with r >= 0.5.
+    EXPECT_LT(std::abs(grid.interpolate(p)), 0.375 * kCell * kCell / 0.5 + kFloatEps);
+  }
+  EXPECT_NEAR(grid.interpolate(node(3, 4, 5)), grid.value(3, 4, 5), 1e-12);
+}
+
+TEST(SurfaceGrid, IsReadByPlainOpenVdbAsWritten) {
+  const Folder folder;
+  const auto path = folder / "ball.vdb";
+  const FunctionField ball = sphere(kOrigin, 0.6);
+  std::vector<SurfaceGrid> grids;
+  grids.push_back(make_surface_grid(ball, options_of(GridContent::SignedDistance), Executor(1)));
+  GridOptions field_options = options_of(GridContent::Field);
+  field_options.name = "potential";
+  grids.push_back(make_surface_grid(ball, field_options, Executor(1)));
+  write_grids(path, grids);
+
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open();
+  ASSERT_TRUE(file.hasGrid("ball") && file.hasGrid("potential"));
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("ball"));
+  ASSERT_TRUE(grid);
+  EXPECT_EQ(grid->getGridClass(), openvdb::GRID_LEVEL_SET);
+  EXPECT_EQ(grid->metaValue<std::string>("units"), "m");
+  EXPECT_EQ(grid->metaValue<std::string>("up_axis"), "z");
+  EXPECT_EQ(grid->activeVoxelCount(), grids[0].active_voxels());
+  EXPECT_NEAR(grid->background(), 3.0 * kCell, kFloatEps);
+  const openvdb::Vec3d world = grid->indexToWorld(openvdb::Vec3d(3, -2, 7));
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(world[axis], node(3, -2, 7)[axis], 1e-15);
+  for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) {
+    const openvdb::Coord at = voxel.getCoord();
+    ASSERT_NEAR(*voxel, -FieldView(ball).value(node(at.x(), at.y(), at.z())), kFloatEps);
+  }
+  EXPECT_EQ(grid->tree().getValue({0, 0, 0}), -grid->background());
+  EXPECT_EQ(grid->tree().getValue({99, 0, 0}), grid->background());
+  const auto potential = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("potential"));
+  EXPECT_EQ(potential->getGridClass(), openvdb::GRID_UNKNOWN);
+  EXPECT_GT(potential->tree().getValue({0, 0, 0}), 0.0F);
+
+  const SurfaceGrid back = read_grid(path, "ball");
+  EXPECT_EQ(back.hash(), grids[0].hash());
+  EXPECT_EQ(back.active_voxels(), grids[0].active_voxels());
+  EXPECT_EQ(back.value(5, 6, 7), grids[0].value(5, 6, 7));
+}
+
+TEST(SurfaceGrid, DoesNotDependOnThreads) {
+  const Body body = random_body({.seed = 3, .parts = 25});
+  const auto hash = [&](int threads) {
+    return make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(threads)).hash();
+  };
+  const std::uint64_t expected = hash(1);
+  for (const int threads : {2, 3, 8}) EXPECT_EQ(hash(threads), expected);
+}
+
+TEST(SurfaceGrid, HoldsTheSideOfEveryVoxelOfARandomBody) {
+  const Body body = random_body({.seed = 6, .parts = 25});
+  const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(2));
+  const std::vector<Vec3> points = random_points(8, 4000, 2.0);
+  for (const Vec3& p : points) {
+    const Vec3 at = ((p - kOrigin) / kCell).array().round();
+    const auto i = static_cast<int>(at.x()), j = static_cast<int>(at.y()), k = static_cast<int>(at.z());
+    EXPECT_EQ(grid.value(i, j, k) < 0.0, FieldView(body.field).value(node(i, j, k)) > 0.0);
+  }
+}
+
+TEST(SurfaceGrid, OfNothingIsEmpty) {
+  FunctionField none = sphere(Vec3::Zero(), 0.5);
+  none.box = Box{};
+  const SurfaceGrid grid = make_surface_grid(none, options_of(GridContent::SignedDistance), Executor(1));
+  EXPECT_EQ(grid.active_voxels(), 0u);
+  EXPECT_GT(grid.value(0, 0, 0), 0.0);
+}
+
+TEST(SurfaceGrid, RefusesMoreVoxelsThanAllowedAndNamesTheCellThatFits) {
+  const FunctionField ball = sphere(Vec3::Zero(), 0.5);
+  GridOptions options = options_of(GridContent::SignedDistance);
+  options.max_voxels = 100'000;
+  options.lattice.cell = 0.005;
+  try {
+    (void)make_surface_grid(ball, options, Executor(1));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Limit);
+    EXPECT_NE(std::string(error.what()).find("voxels"), std::string::npos) << error.what();
+    const std::string hint = error.faults().front().hint;
+    options.lattice.cell = std::stod(hint.substr(hint.find_first_of("0123456789")));
+    EXPECT_NO_THROW((void)make_surface_grid(ball, options, Executor(1))) << hint;
+  }
+  options.lattice.cell = 1e-8;  // would need 1e16 voxels: refused at once
+  expect_error([&] { (void)make_surface_grid(ball, options, Executor(1)); }, ErrorKind::Limit, "use cells of at least");
+  expect_error([&] { (void)make_surface_grid(below(0.0), options, Executor(1)); }, ErrorKind::Usage, "bounded box");
+}
+
+TEST(SurfaceGrid, RefusesFilesThatAreAbsentForeignOrChanged) {
+  const Folder folder;
+  expect_error([&] { (void)read_grid(folder / "none.vdb", "ball"); }, ErrorKind::Io, "none.vdb");
+  std::ofstream(folder / "text.vdb") << "no grid";
+  expect_error([&] { (void)read_grid(folder / "text.vdb", "ball"); }, ErrorKind::Corrupt, "expected an OpenVDB file");
+
+  const auto path = folder / "ball.vdb";
+  std::vector<SurfaceGrid> grids;
+  grids.push_back(make_surface_grid(sphere(kOrigin, 0.6), options_of(GridContent::SignedDistance), Executor(1)));
+  write_grids(path, grids);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path.parent_path()), {}), 2);  // no temporary is left
+  expect_error([&] { (void)read_grid(path, "spiral"); }, ErrorKind::Corrupt, "'spiral', found ball");
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  expect_error([&] { (void)read_grid(path, "ball"); }, ErrorKind::Corrupt, "ball.vdb");
+  expect_error([&] { write_grids(folder / "text.vdb" / "ball.vdb", grids); }, ErrorKind::Io, "ball.vdb");
+}
+
+TEST(SurfaceGrid, ThatWasNeverMadeIsACallersMistake) {
+  const SurfaceGrid none;
+  EXPECT_THROW((void)none.active_voxels(), ContractViolation);
+}
+
+}  // namespace
+}  // namespace supple::implicit

@@ -1,0 +1,93 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include "support.h"
+
+namespace supple::render::test {
+namespace {
+
+/// Sets an environment variable for a scope.
+class Environment {
+ public:
+  Environment(const char* name, const std::string& value) : name_(name) { ::setenv(name, value.c_str(), 1); }
+  ~Environment() { ::unsetenv(name_); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  const char* name_;
+};
+
+std::string output_of(const std::string& command) {
+  std::string text;
+  FILE* pipe = ::popen(command.c_str(), "r");
+  if (pipe == nullptr) return text;
+  char buffer[256];
+  while (std::fgets(buffer, sizeof buffer, pipe) != nullptr) text += buffer;
+  ::pclose(pipe);
+  return text;
+}
+
+void write_frames(const Folder& folder, const std::string& stem, int first, int last, int width, int height) {
+  for (int frame = first; frame <= last; ++frame) {
+    Image image{.width = width, .height = height, .pixels = {}};
+    image.pixels.assign(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
+                        static_cast<std::uint8_t>(20 * frame));
+    char name[64];
+    std::snprintf(name, sizeof name, ".%04d.png", frame);
+    write_png(folder / (stem + name), image);
+  }
+}
+
+TEST(Film, HasEveryFrameItsRateAndItsColourTags) {
+  const Folder folder;
+  // A percent sign, a space and an odd size are all a user may give.
+  write_frames(folder, "50% ball", 3, 9, 65, 33);
+  encode_film(folder.path(), "50% ball", 3, 9, 24.0, folder / "film.mp4");
+  const std::string facts = output_of("ffprobe -v error -count_frames -select_streams v:0 -show_entries "
+                                      "stream=width,height,nb_read_frames,pix_fmt,color_space,r_frame_rate "
+                                      "-of default=nw=1 '" + (folder / "film.mp4").string() + "'");
+  for (const char* fact : {"width=66", "height=34", "nb_read_frames=7", "pix_fmt=yuv420p", "color_space=bt709",
+                           "r_frame_rate=24/1"})
+    EXPECT_NE(facts.find(fact), std::string::npos) << facts;
+  EXPECT_EQ(folder.file_count(), 8U);
+
+  // +faststart: the index stands before the pictures.
+  std::ifstream in(folder / "film.mp4", std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  EXPECT_LT(bytes.find("moov"), bytes.find("mdat"));
+}
+
+TEST(Film, NamesThePackageWhenFfmpegIsAbsentAndKeepsTheFrames) {
+  const Folder folder;
+  write_frames(folder, "ball", 1, 2, 16, 16);
+  const Environment program("SUPPLE_FFMPEG", "/no/such/ffmpeg");
+  expect_error(ErrorKind::Io, {"/no/such/ffmpeg", "cannot be started", "apt-get install ffmpeg"},
+               [&] { encode_film(folder.path(), "ball", 1, 2, 24.0, folder / "film.mp4"); });
+  EXPECT_EQ(folder.file_count(), 2U);
+}
+
+TEST(Film, TellsTheLastLineOfAProgramThatFailsAndLeavesNothingBehind) {
+  const Folder folder;
+  write_frames(folder, "ball", 1, 2, 16, 16);
+  std::ofstream(folder / "fails") << "#!/bin/sh\nfor last; do :; done\n: > \"$last\"\necho first >&2\n"
+                                     "echo 'the disk is full' >&2\nexit 3\n";
+  std::filesystem::permissions(folder / "fails", std::filesystem::perms::owner_all);
+  const Environment program("SUPPLE_FFMPEG", (folder / "fails").string());
+  expect_error(ErrorKind::Io, {"film.mp4", "failed: the disk is full", "the frames are kept"},
+               [&] { encode_film(folder.path(), "ball", 1, 2, 24.0, folder / "film.mp4"); });
+  EXPECT_EQ(folder.file_count(), 3U);
+}
+
+TEST(Film, NamesTheFrameThatIsMissing) {
+  const Folder folder;
+  write_frames(folder, "ball", 1, 2, 16, 16);
+  expect_error(ErrorKind::Io, {"ball.0003.png", "missing"},
+               [&] { encode_film(folder.path(), "ball", 1, 4, 24.0, folder / "film.mp4"); });
+}
+
+}  // namespace
+}  // namespace supple::render::test

@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# The command line as users meet it: exit codes, the first words of messages, and nothing half-written.
+#   cli_test.sh SUPPLE SCRATCH
+set -u
+supple=$1
+scratch=$2
+rm -rf "$scratch"
+mkdir -p "$scratch"
+cd "$scratch" || exit 1
+failures=0
+
+head_text='schema: 1
+duration: 0.2 s
+frame_rate: 10'
+ball='  - name: ball
+    particles: {arrange: single, mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]'
+printf '%s\nobjects:\n%s\n' "$head_text" "$ball" > good.yaml
+printf '%s\nobjects:\n%s\n    colur: [1, 0, 0]\n' "$head_text" "$ball" > unknown_key.yaml
+sed 's/radius: 0.5/radius: -0.5/' good.yaml > negative_radius.yaml
+sed 's/mass: 1/mass: .nan/' good.yaml > nan.yaml
+printf '%s\npairs: [{objects: [ball, cube], collide: false}]\n' "$(cat good.yaml)" > missing_object.yaml
+printf '%s\ntime_step: {size: 0.1 s}\nobjects:\n  - name: chain\n' "$head_text" > diverges.yaml
+printf '    particles: {arrange: line, count: 3, spacing: 0.2, spin: [0, 0, 3], mass: 0.01}\n' >> diverges.yaml
+printf '    interactions: [{law: bond_frame, stretch: 1e6, rotation: 10}]\n' >> diverges.yaml
+sed -i 's/duration: 0.2 s/duration: 20 s/' diverges.yaml
+sed 's/time_step: {size: 0.1 s}/time_step: {max_substeps: 2}/' diverges.yaml > too_fine.yaml
+echo 'a plain file' > plain_file
+
+# expect CODE WORDS COMMAND...: exit code and words that standard error must hold.
+expect() {
+  local code=$1 words=$2
+  shift 2
+  "$supple" "$@" > out.txt 2> err.txt < /dev/null
+  local found=$?
+  if [[ $found != "$code" ]] || { [[ -n $words ]] && ! grep -qF -- "$words" err.txt; }; then
+    echo "supple $*: expected exit $code and '$words', found exit $found and:"
+    cat err.txt
+    failures=$((failures + 1))
+  fi
+}
+
+expect 0 '' check good.yaml
+expect 0 '' run good.yaml --out good --progress none
+expect 3 "did you mean 'colour'" check unknown_key.yaml
+expect 3 'negative_radius.yaml:7:62: objects[0].skeleton[0].kernel.radius: expected a length > 0 [m], found -0.5' check negative_radius.yaml
+expect 3 'numbers must be finite' check nan.yaml
+expect 3 "found 'cube'" check missing_object.yaml
+expect 4 'absent.yaml' check absent.yaml
+expect 4 'plain_file' run good.yaml --out plain_file/out --progress none
+expect 4 '--overwrite' run good.yaml --out good --progress none
+expect 2 '' run
+expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
+expect 2 '' query nonsense good.yaml
+expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
+expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
+printf 'x' >> good/states/good.0002.state
+expect 7 'checksum' query forces good.yaml --state good/states/good.0002.state
+
+grep -q '"outcome": "diverged"' diverged/result.json || { echo 'no outcome for the diverged run'; failures=$((failures + 1)); }
+expect 3 '' run nan.yaml --out invalid --progress none
+grep -q '"outcome": "invalid"' invalid/result.json || { echo 'no outcome for the invalid scene'; failures=$((failures + 1)); }
+if find . -name '*.tmp*' | grep -q .; then
+  echo 'temporary files were left:'
+  find . -name '*.tmp*'
+  failures=$((failures + 1))
+fi
+exit $((failures > 0))

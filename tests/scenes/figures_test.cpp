@@ -1,0 +1,81 @@
+/// The experiments of Lombardo & Puech 1995 as acceptance tests on the scenes we ship.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+Scene library_scene(const std::string& name) {
+  return read_scene(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"));
+}
+
+std::size_t object_index(const Simulation& simulation, const std::string& name) {
+  const auto& objects = simulation.model().objects;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (objects[i].name == name) return i;
+  }
+  ADD_FAILURE() << "no object " << name;
+  return 0;
+}
+
+TEST(Figure6, SpiralDeformsVisiblyAndTakesItsShapeBack) {
+  Simulation simulation(library_scene("figures/ball_hits_spiral"));
+  while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
+  const auto& record = simulation.state().record.objects[object_index(simulation, "spiral")];
+  EXPECT_GE(record.largest_deformation, 0.05);
+  EXPECT_LE(record.final_shape_error, 0.001);
+  const Audits audits = simulation.audits();
+  EXPECT_LT(audits.momentum_error, 1e-10);  // steps / frame x frames roundings of 1e-16, pin and ball included
+  EXPECT_LT(audits.angular_momentum_error, 1e-10);
+  EXPECT_LT(audits.contact_residual, 1e-10);
+  EXPECT_GT(audits.largest_overlap, 0.0);
+}
+
+TEST(Figure6, ScenesOfTheTwoMemoriesDifferInTheirMemoryAlone) {
+  Simulation frames(library_scene("figures/ball_hits_spiral"));
+  Simulation curvature(library_scene("figures/spiral_pair_curvature"));
+  const std::size_t spiral = object_index(frames, "spiral");
+  EXPECT_EQ(frames.model().particles.mass, curvature.model().particles.mass);
+  EXPECT_FALSE(frames.model().interactions.bond_frame.empty());
+  EXPECT_TRUE(curvature.model().interactions.bond_frame.empty());
+  while (frames.frame() < 40) {
+    frames.step_frame();
+    curvature.step_frame();
+  }
+  EXPECT_NE(frames.state().record.objects[spiral].largest_deformation,
+            curvature.state().record.objects[spiral].largest_deformation);
+}
+
+TEST(Figure5, SpiralUncoilsToAnEquilibriumAndRecovers) {
+  Simulation simulation(library_scene("figures/spiral_uncoils"));
+  const ObjectModel& spiral = simulation.model().objects[object_index(simulation, "spiral")];
+  ASSERT_FALSE(simulation.model().interactions.external.empty());
+  const double release = simulation.model().interactions.external[0].end;
+  const double ramp = simulation.model().interactions.external[0].ramp;
+  ASSERT_LE(release - ramp, 20.0 + 1e-9);
+
+  double speed_under_load = INFINITY;
+  while (simulation.time() + 1.0 / simulation.scene().frame_rate < release - ramp + 1e-9) {
+    simulation.step_frame();
+    speed_under_load = 0.0;
+    for (const Vec3& v : simulation.state().particles.velocity) {
+      speed_under_load = std::max(speed_under_load, v.norm() / spiral.rest_diameter);
+    }
+  }
+  EXPECT_LT(speed_under_load, 1e-6);
+  const auto& record = simulation.state().record.objects[object_index(simulation, "spiral")];
+  EXPECT_GT(record.final_shape_error, 0.05);  // it is uncoiled now
+
+  while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
+  EXPECT_LE(simulation.state().record.objects[object_index(simulation, "spiral")].final_shape_error, 0.001);
+}
+
+}  // namespace
+}  // namespace supple::scenes

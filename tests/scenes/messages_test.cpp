@@ -1,0 +1,74 @@
+/// What a user reads when a scene is wrong, word for word: tests/golden/messages/NAME.yaml and NAME.txt.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "supple/core/error.h"
+#include "supple/scenes/model.h"
+#include "supple/scenes/read_scene.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+const fs::path& folder() {
+  static const fs::path path = fs::path(SUPPLE_SOURCE_DIR) / "tests/golden/messages";
+  return path;
+}
+
+/// Overrides stand in comments, one a line: "# --set objects.ball.iso=2".
+std::vector<std::string> overrides_of(const std::string& text) {
+  std::vector<std::string> out;
+  std::istringstream lines(text);
+  const std::string mark = "# --set ";
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with(mark)) out.push_back(line.substr(mark.size()));
+  }
+  return out;
+}
+
+std::string message_of(const fs::path& path) {
+  const std::string text = contents(path);
+  try {
+    (void)build_model(parse_scene(text, path.filename().string(), "", overrides_of(text)));
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Scene);
+    return std::string(error.what()) + '\n';
+  }
+  return "no fault\n";
+}
+
+std::vector<std::string> names() {
+  std::vector<std::string> out;
+  for (const auto& entry : fs::directory_iterator(folder())) {
+    if (entry.path().extension() == ".yaml") out.push_back(entry.path().stem().string());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+class Message : public testing::TestWithParam<std::string> {};
+
+TEST_P(Message, ReadsAsAgreed) {
+  EXPECT_EQ(message_of(folder() / (GetParam() + ".yaml")), contents(folder() / (GetParam() + ".txt")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Golden, Message, testing::ValuesIn(names()), [](const auto& instance) { return instance.param; });
+
+TEST(Messages, AreAtLeastForty) { EXPECT_GE(names().size(), 40u); }
+
+}  // namespace
+}  // namespace supple::scenes

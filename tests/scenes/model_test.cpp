@@ -1,0 +1,235 @@
+#include "supple/scenes/model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "supple/core/error.h"
+#include "supple/scenes/read_scene.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+Model model_of(const std::string& text) { return build_model(parse_scene(text, "test.yaml", "")); }
+
+constexpr const char* kHead = "schema: 1\nduration: 1\nobjects:\n";
+constexpr const char* kSpiral = R"(
+  - name: spiral
+    particles: {arrange: spiral, count: 10, inner_radius: 0.15, outer_radius: 0.55, turns: 1.2, normal: radial, mass: 20 g}
+    interactions:
+      - {law: bond_frame, neighbours: 2, stretch: 400, rotation: 1.5}
+      - {law: form, strength: 2}
+      - {law: cohesion, maximum_distance: 0.6, maximum_force: 3}
+      - {law: friction, linear: 0.4, angular: 0.01}
+      - {law: friction, linear: 0.1}
+    skeleton: [{shape: square, half_size: 0.09, kernel: {radius: 0.16}}]
+    contact: {modulus: 2e4, friction: 0.4, dissipation: 0.5}
+    medium: {linear: 2}
+    pins: [{particle: 0, orientation: false}, {particle: -1}]
+    loads: [{particle: -2, force: [0, 1, 0], from: 1, until: 2, ramp: 0.1}]
+)";
+constexpr const char* kBall = R"(
+  - name: ball
+    particles: {at: [-1.4, 0.05, 0], velocity: [2.5, 0, 0], spin: [0, 0, 3], mass: 0.1}
+    skeleton: [{shape: point, kernel: {radius: 0.5}}]
+    contact: {modulus: 1e4, friction: 0.9}
+)";
+// (1 - d^2/R^2)^3 = 1/2 at d = sqrt(1 - 2^(-1/3)) R.
+const double kIso = std::sqrt(1.0 - std::cbrt(0.5));
+
+TEST(Model, CountsWhatTheSceneSays) {
+  const Model model = model_of(std::string(kHead) + kSpiral + kBall);
+  ASSERT_EQ(model.objects.size(), 2u);
+  EXPECT_EQ(model.objects[0].name, "ball");
+  EXPECT_EQ(model.objects[1].first, 1u);
+  EXPECT_EQ(model.objects[1].last, 11u);
+  EXPECT_EQ(model.particles.size(), 11u);
+  ASSERT_EQ(model.interactions.bond_frame.size(), 1u);
+  EXPECT_EQ(model.interactions.bond_frame[0].law.size(), 9u + 8u);
+  EXPECT_EQ(model.interactions.bond_frame[0].name, "spiral/bond_frame");
+  EXPECT_EQ(model.interactions.friction[1].name, "spiral/friction.2");
+  EXPECT_EQ(model.interactions.form[0].law.size(), 9u);
+  EXPECT_EQ(model.objects[1].skeleton.primitive.size(), 10u);
+  EXPECT_GT(model.objects[1].samples.size(), 320u);
+  EXPECT_TRUE(model.objects[0].collides);
+  EXPECT_EQ(model.interactions.medium[0].object, 1u);
+  EXPECT_EQ(model.particles.pinned[1], core::kPinPosition);
+  EXPECT_EQ(model.particles.pinned[10], core::kPinPosition | core::kPinOrientation);
+  EXPECT_EQ(model.interactions.external[0].particle, 9u);
+  EXPECT_EQ(model.interactions.external[0].end, 2.0);
+}
+
+TEST(Model, TakesRestDataFromTheArrangement) {
+  const Model model = model_of(std::string(kHead) + kSpiral);
+  const auto& position = model.rest.position;
+  const auto& form = model.interactions.form[0];
+  for (std::size_t b = 0; b < form.law.size(); ++b) {
+    const std::uint32_t i = form.first[b], j = form.second[b];
+    const Vec3 r = position[j] - position[i];
+    const Vec3 change = model.rest.orientation[j] * Vec3::UnitZ() - model.rest.orientation[i] * Vec3::UnitZ();
+    EXPECT_NEAR(form.law[b].curvature, r.dot(change) / r.squaredNorm(), 1e-12);  // least squares of one curvature a pair
+    EXPECT_GT(form.law[b].curvature, 0.0);
+    EXPECT_NEAR(model.interactions.cohesion[0].law[b].r0, r.norm(), 1e-15);
+  }
+  // At rest no bond is strained: the frame memory has its minimum 0 there.
+  EXPECT_NEAR(model.interactions.bond_frame[0].law[0].rest_a.norm(), (position[1] - position[0]).norm(), 1e-15);
+  double largest = 0.0;
+  for (const Vec3& a : position) {
+    for (const Vec3& b : position) largest = std::max(largest, (a - b).norm());
+  }
+  EXPECT_DOUBLE_EQ(model.objects[0].rest_diameter, largest);
+}
+
+TEST(Model, GivesParticlesTheInertiaOfABall) {
+  const Model model = model_of(std::string(kHead) + kSpiral + kBall);
+  const double a = kIso * 0.5;  // alone: the iso radius
+  EXPECT_NEAR(model.particles.inertia[0].x(), 0.4 * 0.1 * a * a, 1e-15);
+  const double r = (model.rest.position[2] - model.rest.position[1]).norm();
+  EXPECT_NEAR(model.particles.inertia[1].y(), 0.4 * 0.02 * 0.25 * r * r, 1e-15);
+  const Model given = model_of(std::string(kHead) + "  - {name: a, particles: {mass: 2, inertia_radius: 0.5}}\n");
+  EXPECT_DOUBLE_EQ(given.particles.inertia[0].z(), 0.4 * 2 * 0.25);
+}
+
+TEST(Model, FindsNearestNeighboursOfUnevenPoints) {
+  // A pair close together and one far away: each has its own nearest distance.
+  const fs::path folder = fs::path(testing::TempDir()) / "supple_model_points";
+  fs::create_directories(folder);
+  std::ofstream(folder / "points.csv") << "x,y,z\n0,0,0\n0.1,0,0\n5,0,0\n5,3,0\n";
+  const std::string text = std::string(kHead) + "  - {name: a, particles: {arrange: file, file: points.csv}}\n";
+  const Model model = build_model(parse_scene(text, "test.yaml", folder));
+  ASSERT_EQ(model.particles.size(), 4u);
+  const double expected[] = {0.1, 0.1, 3.0, 3.0};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(model.particles.inertia[i].x(), 0.1 * expected[i] * expected[i], 1e-12);
+  EXPECT_NEAR(model.objects[0].rest_diameter, std::hypot(5.0, 3.0), 1e-15);
+}
+
+TEST(Model, StartsAsARigidMotionAboutTheCentreOfMass) {
+  const Model model = model_of(std::string(kHead) +
+                               "  - {name: a, particles: {arrange: line, count: 2, spacing: 2, at: [5, 0, 0], velocity: [1, 0, 0], "
+                               "spin: [0, 0, 3], mass: 2, inertia_radius: 1}}\n");
+  EXPECT_NEAR((model.initial.velocity[0] - Vec3(1, -3, 0)).norm(), 0.0, 1e-15);
+  EXPECT_NEAR((model.initial.velocity[1] - Vec3(1, 3, 0)).norm(), 0.0, 1e-15);
+  EXPECT_NEAR((model.initial.angular_momentum[0] - Vec3(0, 0, 0.8 * 3)).norm(), 0.0, 1e-15);
+  EXPECT_EQ(model.rest.velocity[0], Vec3(0, 0, 0));
+}
+
+TEST(Model, DoesNotDependOnTheOrderOfObjectsInTheFile) {
+  const Model one = model_of(std::string(kHead) + kSpiral + kBall);
+  const Model two = model_of(std::string(kHead) + kBall + kSpiral);
+  ASSERT_EQ(one.particles.size(), two.particles.size());
+  for (std::size_t i = 0; i < one.particles.size(); ++i) {
+    EXPECT_EQ(one.initial.position[i], two.initial.position[i]);
+    EXPECT_EQ(one.initial.orientation[i].coeffs(), two.initial.orientation[i].coeffs());
+    EXPECT_EQ(one.particles.inertia[i], two.particles.inertia[i]);
+  }
+  EXPECT_EQ(one.objects[1].samples.foot, two.objects[1].samples.foot);
+  EXPECT_EQ(one.cell, two.cell);
+  EXPECT_EQ(one.contact_frequency, two.contact_frequency);
+}
+
+TEST(Model, ChoosesCellAndContactFrequencyFromTheSurfaces) {
+  const Model model = model_of(std::string(kHead) + kSpiral + kBall);
+  // The ball with its support is 1 m wide, 64 cells; 8 cells across the plates would be coarser.
+  ASSERT_GT(2.0 * kIso * 0.16 / 8.0, 1.0 / 64.0);
+  EXPECT_NEAR(model.cell, 1.0 / 64.0, 1e-12);
+  EXPECT_NEAR(model.smallest_length, kIso * 0.16, 1e-12);
+  // A linear ball against a rigid plane has the stiffness 2 pi K (a d - d^2) <= pi K a^2 / 2 (theory of contact, 7.8).
+  const double a = kIso * 0.16;
+  const double slope = 6.0 * kIso / 0.16 * std::pow(1.0 - kIso * kIso, 2);
+  EXPECT_NEAR(model.contact_frequency, std::sqrt(2e4 * slope * std::acos(-1.0) * a * (a + 0.09) / 0.02),
+              1e-9 * model.contact_frequency);
+  EXPECT_EQ(model_of(std::string(kHead) + kSpiral).contact_frequency, 0.0);  // nothing to touch
+}
+
+// Hunt & Crossley: y - ln(1 + y) + e y + ln(1 - e y) = 0 with y = d v; table of the theory (7.7).
+TEST(Restitution, GivesTheDissipationOfTheTable) {
+  const double table[][2] = {{0.01, 0.99337745}, {0.1, 0.93747558}, {0.5, 0.74843493}, {1, 0.59362426},
+                             {2, 0.41071969},    {5, 0.19698025},   {20, 0.05000000}};
+  for (const auto& [y, e] : table) {
+    const std::string text = std::string(kHead) + kSpiral + kBall + "pairs: [{objects: [spiral, ball], restitution: {value: " +
+                             std::to_string(e) + "00, at_speed: 2}}]\n";
+    const Model model = model_of(text);
+    ASSERT_EQ(model.rules.overrides.size(), 1u);
+    EXPECT_EQ(model.rules.overrides[0].pair.a, 0u);
+    // The table rounds e at 5e-9, std::to_string at 5e-7; dy/de is 1.5 at small y and y^2 at large y.
+    EXPECT_NEAR(model.rules.overrides[0].material.dissipation * 2.0, y, 6e-7 * std::max(2.0, 2.0 * y * y)) << e;
+    EXPECT_NEAR(model.rules.overrides[0].material.friction, std::sqrt(0.4 * 0.9), 1e-15);
+  }
+}
+
+TEST(Restitution, OfOneNeedsNoDissipation) {
+  const Model model = model_of(std::string(kHead) + kSpiral + kBall +
+                               "pairs: [{objects: [spiral, ball], friction: 0.2, restitution: {value: 1, at_speed: 2}}]\n");
+  EXPECT_EQ(model.rules.overrides[0].material.dissipation, 0.0);
+  EXPECT_EQ(model.rules.overrides[0].material.friction, 0.2);
+}
+
+TEST(Pairs, ThatDoNotCollideRepelWhenBothCan) {
+  const std::string repulsion = "    repulsion: {force: 2, distance: 0.1, length: 0.02}\n";
+  const std::string objects = std::string(kHead) + kSpiral + repulsion + kBall + repulsion;
+  const Model touching = model_of(objects);
+  EXPECT_TRUE(touching.interactions.repulsion.empty());
+  EXPECT_FALSE(touching.rules.allowed);
+  const Model apart = model_of(objects + "pairs: [{objects: [ball, spiral], collide: false}]\n");
+  ASSERT_TRUE(apart.rules.allowed);
+  EXPECT_FALSE(apart.rules.allowed(0, 1));
+  EXPECT_FALSE(apart.rules.allowed(1, 0));
+  EXPECT_TRUE(apart.rules.allowed(0, 2));
+  ASSERT_EQ(apart.interactions.repulsion.size(), 1u);
+  EXPECT_EQ(apart.interactions.repulsion[0].law.force, 2.0);
+  EXPECT_EQ(apart.interactions.repulsion[0].range, apart.interactions.repulsion[0].law.cut_off());
+  EXPECT_EQ(apart.objects[0].samples.size(), 0u);  // nothing left to touch
+}
+
+TEST(Ground, IsTheLastBody) {
+  const Model model = model_of(std::string(kHead) + kBall +
+                               "ground: {height: -0.5, friction: 0.4}\npairs: [{objects: [ground, ball], friction: 0.1}]\n");
+  EXPECT_TRUE(model.has_ground);
+  EXPECT_EQ(model.ground.point.z(), -0.5);
+  ASSERT_EQ(model.rules.overrides.size(), 1u);
+  EXPECT_EQ(model.rules.overrides[0].pair, (collision::BodyPair{0, 1}));
+  EXPECT_GT(model.objects[0].samples.size(), 0u);
+  EXPECT_FALSE(model_of(std::string(kHead) + kBall + "ground: {collides: false}\n").has_ground);
+}
+
+TEST(Skeletons, GoToTheParticlesNamed) {
+  const Model model = model_of(std::string(kHead) + R"(
+  - name: a
+    particles: {arrange: line, count: 3, spacing: 1}
+    skeleton:
+      - {shape: ellipsoid, semi_axes: [0.3, 0.2, 0.4], kernel: {}}
+      - {shape: box, half_sizes: [0.1, 0.2, 0.3], particles: [-1], turn_axis: [0, 0, 2], turn_deg: 90, kernel: {radius: 0.2}}
+      - {shape: rectangle, half_sizes: [0.1, 0.2], particles: [0], kernel: {type: gascuel, radius: 0.2, thickness: 0.1, slope: 5}}
+)");
+  const auto& primitives = model.objects[0].skeleton.primitive;
+  ASSERT_EQ(primitives.size(), 5u);
+  EXPECT_EQ(primitives[0].shape, implicit::ShapeKind::Ellipsoid);
+  EXPECT_EQ(primitives[0].kernel.radius, 0.2);  // its smallest semi-axis
+  EXPECT_EQ(primitives[1].shape, implicit::ShapeKind::Rectangle);
+  EXPECT_EQ(primitives[1].kernel.kind, implicit::KernelKind::Gascuel);
+  EXPECT_EQ(primitives[4].part, 2u);
+  EXPECT_NEAR((primitives[4].offset.orientation * Vec3::UnitX() - Vec3::UnitY()).norm(), 0.0, 1e-15);
+  EXPECT_FALSE(model.objects[0].collides);
+  EXPECT_EQ(model.objects[0].samples.size(), 0u);
+}
+
+TEST(FormRadius, RefusesFlatBonds) {
+  try {
+    (void)model_of(std::string(kHead) + R"(
+  - name: a
+    particles: {arrange: line, count: 5, spacing: 1}
+    interactions: [{law: form_radius, strength: 1}]
+)");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.faults().size(), 1u);
+    EXPECT_EQ(error.faults()[0].key, "objects.a.interactions[0]");
+  }
+}
+
+}  // namespace
+}  // namespace supple::scenes

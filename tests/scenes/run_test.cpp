@@ -1,0 +1,199 @@
+#include "supple/scenes/run.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "supple/core/error.h"
+#include "supple/render/image.h"
+#include "supple/scenes/query.h"
+#include "supple/scenes/read_scene.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr const char* kTiny = R"(
+schema: 1
+title: Two drops
+duration: 0.5 s
+frame_rate: 8
+objects:
+  - name: left
+    particles: {arrange: single, at: [-0.3, 0, 0], velocity: [1, 0, 0], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+    contact: {modulus: 2e3}
+  - name: right
+    particles: {arrange: single, at: [0.3, 0, 0], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+    contact: {modulus: 2e3}
+camera: {from: [0, -3, 1], look_at: [0, 0, 0]}
+output: {images: {size: [96, 64], samples: 1}, film: true, contacts: csv, particles: csv, mesh: ply, grid: vdb}
+)";
+
+class Run : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::remove_all(folder_);
+    scene_ = parse_scene(kTiny, "drops.yaml", ".");
+    scene_.source = "drops.yaml";
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  RunOptions options() const { return {.folder = folder_, .threads = 1}; }
+  json result() const {
+    std::ifstream file(folder_ / "result.json");
+    return json::parse(file);
+  }
+
+  fs::path folder_;
+  Scene scene_;
+};
+
+TEST_F(Run, LeavesFramesFilmTablesStatesAndAResult) {
+  const RunResult done = run_scene(scene_, options());
+  ASSERT_EQ(done.outcome, "done") << done.reason;
+  EXPECT_EQ(done.exit_code, 0);
+  for (const char* file : {"frames/drops.0001.png", "frames/drops.0005.png", "drops.mp4", "drops_sheet.png",
+                           "states/drops.0003.state", "contacts/drops.0003.csv", "particles/drops.0001.csv",
+                           "meshes/drops.left.0001.ply", "grids/drops.0001.vdb", "result.json"}) {
+    EXPECT_TRUE(fs::exists(folder_ / file)) << file;
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "frames/drops.0006.png"));
+  EXPECT_EQ(render::read_png(folder_ / "frames/drops.0005.png").width, 96);
+
+  const json r = result();
+  EXPECT_EQ(r.at("outcome"), "done");
+  EXPECT_EQ(r.at("frames"), 5);
+  EXPECT_EQ(r.at("state_hash").get<std::string>().size(), 16u);
+  for (const char* key : {"momentum_error", "angular_momentum_error", "energy_error", "contact_residual", "largest_overlap"}) {
+    EXPECT_TRUE(r.at("audits").at(key).is_number()) << key;
+  }
+  EXPECT_LT(r.at("audits").at("momentum_error").get<double>(), 1e-12);
+  for (const char* key : {"diameter", "largest_deformation", "final_shape_error"}) {
+    EXPECT_TRUE(r.at("objects").at("left").at(key).is_number()) << key;
+  }
+  for (const StageInfo& stage : stage_table()) {
+    const json& s = r.at("stages").at(std::string(stage.name));
+    for (const char* key : {"calls", "cpu_s", "visited", "present"}) EXPECT_TRUE(s.at(key).is_number()) << key;
+  }
+  EXPECT_GT(r.at("stages").at("solve_contact_surface").at("visited").get<int>(), 0);
+  EXPECT_GT(r.at("peak_memory_mb").get<double>(), 1.0);
+  EXPECT_GT(r.at("wall_s").get<double>(), 0.0);
+}
+
+TEST_F(Run, HasTheSameStateWithAndWithoutOutputs) {
+  const RunResult with = run_scene(scene_, options());
+  RunOptions quiet = options();
+  quiet.folder = folder_ / "quiet";
+  quiet.simulate_only = true;
+  const RunResult without = run_scene(scene_, quiet);
+  EXPECT_EQ(with.state_hash, without.state_hash);
+  EXPECT_FALSE(fs::exists(quiet.folder / "frames"));
+}
+
+TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
+  RunOptions o = options();
+  o.simulate_only = true;
+  (void)run_scene(scene_, o);
+  try {
+    (void)run_scene(scene_, o);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Io);
+    EXPECT_NE(std::string(error.what()).find("--overwrite"), std::string::npos);
+  }
+  o.overwrite = true;
+  EXPECT_EQ(run_scene(scene_, o).outcome, "done");
+}
+
+TEST_F(Run, StopsAtASignalAndResumesToTheSameBits) {
+  RunOptions o = options();
+  o.simulate_only = true;
+  o.folder = folder_ / "whole";
+  const RunResult whole = run_scene(scene_, o);
+
+  std::atomic<int> signal{0};
+  o.folder = folder_ / "stopped";
+  o.interrupt = &signal;
+  o.progress = [&](const Progress& p) { signal = p.frame >= 3 ? 15 : 0; };
+  const RunResult stopped = run_scene(scene_, o);
+  EXPECT_EQ(stopped.outcome, "interrupted");
+  EXPECT_EQ(stopped.exit_code, 143);
+  EXPECT_EQ(stopped.frames, 3);
+
+  o.interrupt = nullptr;
+  o.progress = nullptr;
+  o.resume = true;
+  const RunResult resumed = run_scene(scene_, o);
+  EXPECT_EQ(resumed.outcome, "done");
+  EXPECT_EQ(resumed.state_hash, whole.state_hash);
+}
+
+TEST_F(Run, DrawsFramesAgainFromSavedStates) {
+  (void)run_scene(scene_, options());
+  const render::Image first = render::read_png(folder_ / "frames/drops.0004.png");
+  fs::remove(folder_ / "frames/drops.0004.png");
+  RunOptions again = options();
+  again.frames = {4};
+  EXPECT_EQ(render_run(scene_, again).outcome, "done");
+  EXPECT_EQ(render::read_png(folder_ / "frames/drops.0004.png").pixels, first.pixels);
+}
+
+TEST_F(Run, SaysWhenAFolderCannotBeMade) {
+  std::ofstream(fs::path(testing::TempDir()) / "plain_file") << "x";
+  RunOptions o = options();
+  o.folder = fs::path(testing::TempDir()) / "plain_file" / "out";
+  try {
+    (void)run_scene(scene_, o);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Io);
+    EXPECT_NE(std::string(error.what()).find("plain_file"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Frames, AreRangesWithSteps) {
+  EXPECT_EQ(parse_frames("1-3,7,10-20:5"), (std::set<int>{1, 2, 3, 7, 10, 15, 20}));
+  for (const char* bad : {"", "0", "3-1", "1-5:0", "x", "1,", "1-2-3", "1.5"}) {
+    EXPECT_THROW((void)parse_frames(bad), Error) << bad;
+  }
+}
+
+TEST(Query, AnswersForcesContactFieldAndMeshAsJson) {
+  Scene scene = parse_scene(kTiny, "drops.yaml", ".");
+  scene.objects[0].particles.at = Vec3(-0.2, 0, 0);
+  scene.objects[1].particles.at = Vec3(0.2, 0, 0);
+  Simulation simulation(scene);
+
+  const json forces = json::parse(query_forces(simulation));
+  EXPECT_EQ(forces.at("laws").back().at("name"), "contact");
+  const json contact = json::parse(query_contact(simulation, true));
+  ASSERT_EQ(contact.at("pairs").size(), 1u);
+  const json& pair = contact.at("pairs")[0];
+  EXPECT_EQ(pair.at("a"), "left");
+  EXPECT_LT(pair.at("force_n")[0].get<double>(), 0.0);
+  EXPECT_EQ(pair.at("samples").size(), pair.at("points").get<std::size_t>());
+  // The contact law's force on the left drop is the pair's force.
+  EXPECT_DOUBLE_EQ(forces.at("laws").back().at("particles")[0].at("force")[0].get<double>(),
+                   pair.at("force_n")[0].get<double>());
+
+  const fs::path points = fs::path(testing::TempDir()) / "points.csv";
+  std::ofstream(points) << "x,y,z\n-0.2,0,0\n5,5,5\n";
+  const json field = json::parse(query_field(simulation, points));
+  EXPECT_DOUBLE_EQ(field.at("objects")[0].at("points")[0].at("value").get<double>(), 0.5);
+  EXPECT_DOUBLE_EQ(field.at("objects")[0].at("points")[1].at("value").get<double>(), -0.5);
+
+  const json mesh = json::parse(query_mesh(simulation, {.cells = 24, .out = {}}));
+  EXPECT_TRUE(mesh.at("objects")[0].at("closed").get<bool>());
+  EXPECT_EQ(mesh.at("objects")[0].at("euler_characteristic"), 2);
+}
+
+}  // namespace
+}  // namespace supple::scenes

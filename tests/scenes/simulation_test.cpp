@@ -1,0 +1,277 @@
+#include "supple/scenes/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "supple/core/error.h"
+#include "supple/scenes/read_scene.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+Scene library_scene(const std::string& name, const std::vector<std::string>& overrides = {}) {
+  return read_scene(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"), overrides);
+}
+
+/// Two deformable balls that meet off centre and spin, without friction and damping.
+std::string two_balls(const std::string& extra = "") {
+  return R"(
+schema: 1
+duration: 1 s
+frame_rate: 10
+)" + extra + R"(
+objects:
+  - name: left
+    particles: {arrange: single, at: [-0.6, 0.05, 0], velocity: [2, 0, 0], spin: [0, 1, 2], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 2e3}
+  - name: right
+    particles: {arrange: single, at: [0.6, -0.05, 0.1], velocity: [-1, 0, 0], mass: 0.8}
+    skeleton: [{shape: ellipsoid, semi_axes: [0.7, 0.9, 0.6], kernel: {type: wyvill}}]
+    contact: {modulus: 3e3}
+)";
+}
+
+Simulation make(const std::string& text, SimulationOptions options = {}) {
+  return Simulation(parse_scene(text, "test.yaml", "."), options);
+}
+
+void run(Simulation& simulation, int frames) {
+  while (simulation.frame() < frames) simulation.step_frame();
+}
+
+std::uint64_t hash_after(const Scene& scene, int frames, SimulationOptions options) {
+  Simulation simulation(scene, options);
+  run(simulation, frames);
+  return simulation.state_hash();
+}
+
+TEST(FreeCollision, KeepsMomentumAndAngularMomentumToRoundOffAtEveryStep) {
+  for (const std::string& scene : {std::string("contacts/spiral_free"), std::string("contacts/two_balls")}) {
+    Simulation simulation(library_scene(scene));
+    const core::Motion start = core::measure_motion(simulation.model().particles, simulation.state().particles);
+    double momentum_scale = start.momentum_scale, angular_scale = start.angular_momentum_scale;
+    double momentum = 0.0, angular = 0.0;
+    bool touched = false;
+    while (simulation.time() < 1.5) {
+      simulation.step();
+      const core::Motion now = core::measure_motion(simulation.model().particles, simulation.state().particles);
+      momentum_scale = std::max(momentum_scale, now.momentum_scale);
+      angular_scale = std::max(angular_scale, now.angular_momentum_scale);
+      momentum = std::max(momentum, (now.momentum - start.momentum).norm());
+      angular = std::max(angular, (now.angular_momentum - start.angular_momentum).norm());
+      touched |= (now.momentum_scale != start.momentum_scale);
+    }
+    EXPECT_TRUE(touched) << scene;
+    EXPECT_LT(momentum / momentum_scale, 1e-12) << scene;
+    EXPECT_LT(angular / angular_scale, 1e-12) << scene;
+  }
+}
+
+TEST(FreeCollision, EnergyDriftFallsWithTheSquareOfTheStep) {
+  // Fixed substeps; the drift is the largest |E - E0| over the frames of the bounce.
+  const auto drift = [](int substeps) {
+    Simulation simulation =
+        make(two_balls("time_step: {substeps: " + std::to_string(substeps) + "}\ncontact: {error: 1e-8}"));
+    run(simulation, 11);
+    const Audits audits = simulation.audits();
+    EXPECT_GT(audits.largest_overlap, 0.0);
+    return audits.energy_error;
+  };
+  const double coarse = drift(128), middle = drift(256), fine = drift(512);
+  EXPECT_GT(coarse / middle, 3.0);
+  EXPECT_LT(coarse / middle, 5.5);
+  EXPECT_GT(middle / fine, 3.0);
+  EXPECT_LT(middle / fine, 5.5);
+}
+
+TEST(FreeCollision, BothDeformedSurfacesAgreeOnEveryContactSample) {
+  Simulation simulation = make(two_balls());
+  double residual = 0.0;
+  std::size_t samples = 0;
+  while (simulation.frame() < 11) {
+    simulation.step();
+    for (const auto& s : simulation.contacts().summary) residual = std::max(residual, s.residual);
+    samples += simulation.contacts().point.size();
+  }
+  EXPECT_GT(samples, 100u);
+  EXPECT_LT(residual, 1e-10);
+}
+
+class SceneDeterminism : public testing::TestWithParam<int> {};
+
+TEST_P(SceneDeterminism, StateHashDoesNotDependOnThreadCount) {
+  for (const std::string& name : {std::string("figures/ball_hits_spiral"), std::string("contacts/two_balls")}) {
+    const Scene scene = library_scene(name);
+    EXPECT_EQ(hash_after(scene, 16, {.threads = GetParam()}), hash_after(scene, 16, {.threads = 1})) << name;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Threads, SceneDeterminism, testing::Values(2, 3, 8));
+
+TEST(SceneDeterminism, SwitchingSkipsOffChangesNoBitAndVisitsMore) {
+  const Scene scene = library_scene("figures/ball_hits_spiral");
+  Simulation with(scene, {.skip = true}), without(scene, {.skip = false});
+  run(with, 16);
+  run(without, 16);
+  EXPECT_EQ(with.state_hash(), without.state_hash());
+  const auto index = static_cast<std::size_t>(Stage::IndexField);
+  EXPECT_LT(with.profile()[index].visited, without.profile()[index].visited);
+}
+
+TEST(SceneDeterminism, OutputsAreObservers) {
+  const Scene scene = library_scene("figures/ball_hits_spiral");
+  Simulation quiet(scene), watched(scene);
+  run(quiet, 12);
+  while (watched.frame() < 12) {
+    watched.step_frame();
+    EXPECT_FALSE(watched.meshes().empty());
+    (void)watched.energies();
+  }
+  EXPECT_EQ(quiet.state_hash(), watched.state_hash());
+}
+
+TEST(SceneDeterminism, RestartFromASavedStateGivesTheSameBits) {
+  const Scene scene = library_scene("figures/ball_hits_spiral");
+  Simulation whole(scene);
+  run(whole, 10);
+  for (int k = 0; k < 5; ++k) whole.step();  // in the middle of a frame too
+  const fs::path path = fs::path(testing::TempDir()) / "restart.state";
+  save_state(path, whole.state(), 42);
+  run(whole, 16);
+
+  Simulation resumed(scene);
+  resumed.restore(load_state(path, 42));
+  run(resumed, 16);
+  EXPECT_EQ(whole.state_hash(), resumed.state_hash());
+  EXPECT_THROW((void)load_state(path, 43), Error);
+  fs::remove(path);
+}
+
+TEST(SceneDeterminism, OrderOfObjectsInTheFileChangesNoBit) {
+  const std::string head = "schema: 1\nduration: 1 s\nframe_rate: 10\nobjects:\n";
+  const std::string left = R"(  - name: left
+    particles: {arrange: single, at: [-0.5, 0.05, 0], velocity: [2, 0, 0], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 2e3}
+)";
+  const std::string right = R"(  - name: right
+    particles: {arrange: single, at: [0.5, 0, 0], mass: 0.8}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.7}}]
+    contact: {modulus: 3e3}
+)";
+  EXPECT_EQ(hash_after(parse_scene(head + left + right, "a.yaml", "."), 8, {}),
+            hash_after(parse_scene(head + right + left, "b.yaml", "."), 8, {}));
+}
+
+TEST(Simulation, GivesNoForceWhileBodiesDoNotTouch) {
+  Simulation simulation = make(two_balls());
+  EXPECT_TRUE(simulation.contacts().summary.empty());
+  simulation.step();
+  EXPECT_EQ(simulation.state().particles.velocity[0], Vec3(2, 0, 0));
+}
+
+TEST(Simulation, RestsOnTheGroundAtTheDepthThatCarriesItsWeight) {
+  // A drop onto the ground with medium damping; at rest the contact carries m g.
+  Simulation simulation = make(R"(
+schema: 1
+duration: 6 s
+frame_rate: 10
+gravity: [0, 0, -9.81]
+ground: {height: 0, modulus: 1e6}
+objects:
+  - name: drop
+    particles: {arrange: single, at: [0, 0, 0.25], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+    contact: {modulus: 5e3}
+    medium: {linear: 6, angular: 6}
+)");
+  run(simulation, 61);
+  ASSERT_EQ(simulation.contacts().summary.size(), 1u);
+  EXPECT_NEAR(simulation.contact_forces()[0].z(), 0.2 * 9.81, 1e-6 * 0.2 * 9.81);
+  EXPECT_LT(simulation.audits().momentum_error, 1e-10);
+}
+
+TEST(Simulation, SaysWhatDivergedAndKeepsTheLastFrame) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 10 s
+frame_rate: 10
+time_step: {size: 0.1 s, substeps: 1}
+objects:
+  - name: chain
+    particles: {arrange: line, count: 3, spacing: 0.2, spin: [0, 0, 3], mass: 0.01}
+    interactions: [{law: bond_frame, stretch: 1e6, rotation: 10}]
+)");
+  try {
+    for (int k = 0; k < 100; ++k) simulation.step_frame();
+    FAIL() << "a step of fifty periods cannot be stable";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Diverged);
+    EXPECT_NE(std::string(error.what()).find("of chain, particle"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("fixes its own time step"), std::string::npos) << error.what();
+    EXPECT_TRUE(simulation.state().particles.position[0].allFinite());
+  }
+}
+
+TEST(Simulation, RefusesAStepFinerThanAllowedAndNamesTheKey) {
+  try {
+    (void)make(R"(
+schema: 1
+duration: 1 s
+time_step: {max_substeps: 2}
+objects:
+  - name: chain
+    particles: {arrange: line, count: 3, spacing: 0.2, mass: 0.01}
+    interactions: [{law: bond_frame, stretch: 1e6, rotation: 10}]
+)");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Limit);
+    EXPECT_NE(std::string(error.what()).find("time_step.max_substeps"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Meshes, OfTouchingObjectsCoincideOnTheContactAndAreClosed) {
+  Simulation simulation = make(two_balls());
+  while (simulation.frame() < 11 && simulation.contacts().summary.empty()) simulation.step();
+  for (int k = 0; k < 10; ++k) simulation.step();
+  ASSERT_EQ(simulation.contacts().summary.size(), 1u);
+  const std::vector<Mesh>& meshes = simulation.meshes();
+  ASSERT_EQ(meshes.size(), 2u);
+  std::array<std::vector<std::array<double, 3>>, 2> shared;
+  for (std::size_t m = 0; m < 2; ++m) {
+    const MeshReport report = inspect(meshes[m]);
+    EXPECT_TRUE(report.closed);
+    EXPECT_TRUE(report.oriented);
+    EXPECT_EQ(report.euler_characteristic, 2);
+    const auto column = std::find_if(meshes[m].columns.begin(), meshes[m].columns.end(),
+                                     [](const Mesh::Column& c) { return c.name == "contact"; });
+    ASSERT_NE(column, meshes[m].columns.end());
+    for (std::size_t v = 0; v < meshes[m].vertex_count(); ++v) {
+      const Vec3& p = meshes[m].position[v];
+      if (column->values[v] != 0.0) shared[m].push_back({p.x(), p.y(), p.z()});
+    }
+    std::sort(shared[m].begin(), shared[m].end());
+  }
+  EXPECT_GT(shared[0].size(), 10u);
+  EXPECT_EQ(shared[0], shared[1]);
+}
+
+TEST(Meshes, BulgeAroundTheContactWhenAskedTo) {
+  const auto volume = [](const std::string& extra) {
+    Simulation simulation = make(two_balls(extra));
+    while (simulation.frame() < 11 && simulation.contacts().summary.empty()) simulation.step();
+    for (int k = 0; k < 10; ++k) simulation.step();
+    const std::vector<Mesh>& meshes = simulation.meshes();
+    return inspect(meshes[0]).volume + inspect(meshes[1]).volume;
+  };
+  EXPECT_GT(volume("contact: {bulge: 0.5}"), volume("") * 1.0001);
+  EXPECT_EQ(volume("contact: {bulge: 0}"), volume(""));
+}
+
+}  // namespace
+}  // namespace supple::scenes
