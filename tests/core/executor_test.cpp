@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "core/allocations.h"
+#include "support/allocations.h"
 #include "supple/core/error.h"
 
 namespace {
@@ -76,9 +76,9 @@ TEST(Executor, SumsWithoutAllocatingAfterTheFirstCall) {
   const Executor executor(1);
   const std::function<double(std::size_t)> term = [](std::size_t i) { return static_cast<double>(i); };
   EXPECT_EQ(ordered_sum(executor, 1000, term), 499500.0);
-  const std::uint64_t before = core::test::allocation_count();
+  const std::uint64_t before = supple::test::allocation_count();
   EXPECT_EQ(ordered_sum(executor, 1000, term), 499500.0);
-  EXPECT_EQ(core::test::allocation_count(), before);
+  EXPECT_EQ(supple::test::allocation_count(), before);
 }
 
 TEST(Executor, TakesAllThreadsForZeroAndRefusesNegativeCounts) {

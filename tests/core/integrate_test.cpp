@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/allocations.h"
+#include "support/allocations.h"
 #include "core/support.h"
 #include "supple/core/error.h"
 
@@ -266,9 +266,9 @@ TEST(Steps, AllocateNothingAfterTheFirst) {
     accumulate_interactions(s.p.set, state, s.interactions, t, executor, workspace, out.internal, out.external);
   };
   s.run(forces, 1e-3, 1);
-  const std::uint64_t before = test::allocation_count();
+  const std::uint64_t before = supple::test::allocation_count();
   s.run(forces, 1e-3, 10);
-  EXPECT_EQ(test::allocation_count(), before);
+  EXPECT_EQ(supple::test::allocation_count(), before);
 }
 
 TEST(Steps, RefuseAStepThatIsNotPositive) {

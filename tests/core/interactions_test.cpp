@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/allocations.h"
+#include "support/allocations.h"
 #include "core/support.h"
 #include "supple/core/error.h"
 #include "supple/core/integrate.h"
@@ -180,9 +180,9 @@ TEST(Interactions, AllocateNothingAfterTheFirstCall) {
                               external);
     };
     call();
-    const std::uint64_t before = test::allocation_count();
+    const std::uint64_t before = supple::test::allocation_count();
     call();
-    EXPECT_EQ(test::allocation_count(), before) << threads;
+    EXPECT_EQ(supple::test::allocation_count(), before) << threads;
   }
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "allocations.h"
+#include "support/allocations.h"
 #include "bodies.h"
 #include "supple/core/error.h"
 #include "supple/implicit/polygonise.h"
@@ -246,9 +246,9 @@ TEST_P(SampledBody, AllocateNothingOnceWarm) {
     static_cast<void>(field.surface_box());
   };
   step();
-  const std::uint64_t before = supple::testing::allocation_count();
+  const std::uint64_t before = supple::test::allocation_count();
   step();
-  EXPECT_EQ(supple::testing::allocation_count(), before);
+  EXPECT_EQ(supple::test::allocation_count(), before);
 }
 
 INSTANTIATE_TEST_SUITE_P(
