@@ -200,4 +200,36 @@ void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medi
   }
 }
 
+void add_friction_loads(const ParticleSet& set, const std::vector<Friction>& friction, const ParticleState& state,
+                        Loads& loads) {
+  for (const Friction& law : friction) {
+    for (std::size_t bond = 0; bond < law.first.size(); ++bond) {
+      const std::size_t a = law.first[bond];
+      const std::size_t b = law.second[bond];
+      const Vec3 r = state.position[b] - state.position[a];
+      const Vec3 spin_a = angular_velocity(set, state, a);
+      const Vec3 spin_b = angular_velocity(set, state, b);
+      const Vec3 slip = state.velocity[b] - state.velocity[a] - 0.5 * (spin_a + spin_b).cross(r);
+      const Vec3 force_b = -law.linear * slip;
+      const Vec3 torque = -0.5 * r.cross(force_b);
+      const Vec3 couple_b = -law.angular * (spin_b - spin_a);
+      loads.force[a] -= force_b;
+      loads.force[b] += force_b;
+      loads.torque[a] += torque - couple_b;
+      loads.torque[b] += torque + couple_b;
+    }
+  }
+}
+
+void add_medium_loads(const ParticleSet& set, const std::vector<MediumDamping>& medium, const ParticleState& state,
+                      Loads& loads) {
+  for (const MediumDamping& law : medium) {
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      if (set.object[i] != law.object) continue;
+      loads.force[i] -= law.linear * set.mass[i] * state.velocity[i];
+      loads.torque[i] -= law.angular * state.angular_momentum[i];
+    }
+  }
+}
+
 }  // namespace supple::core

@@ -17,4 +17,10 @@ void apply_friction(const ParticleSet& set, const std::vector<Friction>& frictio
 void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medium, double dt, ParticleState& state,
                   Ledger& ledger);
 
+/// The same as forces and torques at a state, for integrators that know no half steps; added to `loads`.
+void add_friction_loads(const ParticleSet& set, const std::vector<Friction>& friction, const ParticleState& state,
+                        Loads& loads);
+void add_medium_loads(const ParticleSet& set, const std::vector<MediumDamping>& medium, const ParticleState& state,
+                      Loads& loads);
+
 }  // namespace supple::core

@@ -5,29 +5,11 @@
 #include <limits>
 
 #include "damping.h"
+#include "step.h"
 #include "supple/core/error.h"
 
 namespace supple::core {
 namespace {
-
-bool holds_position(const ParticleSet& set, std::size_t i) { return (set.pinned[i] & kPinPosition) != 0; }
-bool holds_orientation(const ParticleSet& set, std::size_t i) { return (set.pinned[i] & kPinOrientation) != 0; }
-
-void stop_pinned(const ParticleSet& set, ParticleState& state) {
-  for (std::size_t i = 0; i < set.size(); ++i) {
-    if (holds_position(set, i)) state.velocity[i].setZero();
-    if (holds_orientation(set, i)) state.angular_momentum[i].setZero();
-  }
-}
-
-void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample) {
-  sample.internal.reset(state.size());
-  sample.external.reset(state.size());
-  sample.force_on_fixed.setZero();
-  sample.moment_on_fixed.setZero();
-  sample.dissipative.reset(0);
-  forces(state, time, sample);
-}
 
 /// Work of the dissipative loads in a kick, exact: each acts along the mean of the velocities before and after.
 double dissipated_by(const ParticleSet& set, const ForceSample& sample, double dt, const ParticleState& before_kick) {
@@ -76,29 +58,40 @@ void kick(const ParticleSet& set, const ForceSample& sample, double dt, Particle
   ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
 }
 
-void drift(const ParticleSet& set, double dt, ParticleState& state) {
+void turn_free(RotationUpdate rotation, Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia,
+               double dt) {
+  if (rotation == RotationUpdate::Splitting) {
+    rotate_free(orientation, angular_momentum, inertia, dt);
+  } else {
+    rotate_free_exponential(orientation, angular_momentum, inertia, dt);
+  }
+}
+
+void drift(const ParticleSet& set, RotationUpdate rotation, double dt, ParticleState& state) {
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (!holds_position(set, i)) state.position[i] += dt * state.velocity[i];
     if (!holds_orientation(set, i) && state.angular_momentum[i] != Vec3::Zero()) {
-      rotate_free(state.orientation[i], state.angular_momentum[i], set.inertia[i], dt);
+      turn_free(rotation, state.orientation[i], state.angular_momentum[i], set.inertia[i], dt);
     }
   }
 }
 
 /// The rotation vector of the drift that led to `state`; the drift is undone, because it is reversible.
-Vec3 drifted_rotation(const ParticleSet& set, const ParticleState& state, std::size_t i, double dt) {
+Vec3 drifted_rotation(const ParticleSet& set, RotationUpdate rotation, const ParticleState& state, std::size_t i,
+                      double dt) {
   Quat before = state.orientation[i];
-  rotate_free(before, state.angular_momentum[i], set.inertia[i], -dt);
+  turn_free(rotation, before, state.angular_momentum[i], set.inertia[i], -dt);
   return rotation_log(state.orientation[i] * before.conjugate());
 }
 
 /// Half the work of the external loads over the drift that led to `state`, velocities and momenta still being its own.
-double half_work(const ParticleSet& set, const Loads& external, const ParticleState& state, double dt) {
+double half_work(const ParticleSet& set, RotationUpdate rotation, const Loads& external, const ParticleState& state,
+                 double dt) {
   double work = 0.0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (!holds_position(set, i)) work += 0.5 * dt * external.force[i].dot(state.velocity[i]);
     if (!holds_orientation(set, i) && external.torque[i] != Vec3::Zero()) {
-      work += 0.5 * external.torque[i].dot(drifted_rotation(set, state, i, dt));
+      work += 0.5 * external.torque[i].dot(drifted_rotation(set, rotation, state, i, dt));
     }
   }
   return work;
@@ -128,6 +121,24 @@ void hash_vector(const Vec3& v, Hasher& hasher) {
 
 }  // namespace
 
+void stop_pinned(const ParticleSet& set, ParticleState& state) {
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (holds_position(set, i)) state.velocity[i].setZero();
+    if (holds_orientation(set, i)) state.angular_momentum[i].setZero();
+  }
+}
+
+void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample) {
+  const std::size_t n = state.size();
+  sample.internal.reset(n);
+  sample.external.reset(n);
+  sample.force_on_fixed.setZero();
+  sample.moment_on_fixed.setZero();
+  sample.dissipative.reset(0);
+  forces(state, time, sample);
+  SUPPLE_EXPECTS(sample.internal.force.size() == n && sample.external.force.size() == n);
+}
+
 void Ledger::save(StateWriter& out) const {
   out.write(external_work);
   out.write(dissipated);
@@ -154,6 +165,7 @@ void Ledger::hash(Hasher& hasher) const {
 
 void KickState::save(StateWriter& out) const {
   out.write(std::uint64_t{valid ? 1U : 0U});
+  out.write(next_step);
   save_loads(sample.internal, out);
   save_loads(sample.external, out);
   save_vector(sample.force_on_fixed, out);
@@ -165,6 +177,7 @@ void KickState::load(StateReader& in) {
   std::uint64_t flag = 0;
   in.read(flag);
   valid = flag != 0;
+  in.read(next_step);
   load_loads(sample.internal, in);
   load_loads(sample.external, in);
   load_vector(sample.force_on_fixed, in);
@@ -174,6 +187,7 @@ void KickState::load(StateReader& in) {
 
 void KickState::hash(Hasher& hasher) const {
   hasher.add(std::uint64_t{valid ? 1U : 0U});
+  hasher.add(next_step);
   if (!valid) return;
   for (const Loads* loads : {&sample.internal, &sample.external, &sample.dissipative}) {
     hasher.add(loads->force);
@@ -184,21 +198,20 @@ void KickState::hash(Hasher& hasher) const {
 }
 
 void advance(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time, double dt,
-             ParticleState& state, KickState& kick_state, Ledger& ledger) {
+             ParticleState& state, KickState& kick_state, Ledger& ledger, RotationUpdate rotation) {
   SUPPLE_EXPECTS(dt > 0.0 && state.size() == set.size());
   ForceSample& sample = kick_state.sample;
   stop_pinned(set, state);
   if (!kick_state.valid) evaluate(forces, state, time, sample);
-  SUPPLE_EXPECTS(sample.internal.force.size() == set.size() && sample.external.force.size() == set.size());
 
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
   kick(set, sample, 0.5 * dt, state, ledger);
-  drift(set, dt, state);
-  ledger.external_work += half_work(set, sample.external, state, dt);
+  drift(set, rotation, dt, state);
+  ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   evaluate(forces, state, time + dt, sample);
   kick_state.valid = true;
-  ledger.external_work += half_work(set, sample.external, state, dt);
+  ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   kick(set, sample, 0.5 * dt, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);

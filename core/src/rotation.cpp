@@ -85,4 +85,25 @@ void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& in
   renormalise(orientation);
 }
 
+void rotate_free_exponential(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt) {
+  if (inertia.x() == inertia.y() && inertia.y() == inertia.z()) {
+    rotate_free(orientation, angular_momentum, inertia, dt);
+    return;
+  }
+  const auto angular_velocity_at = [&](const Quat& q) {
+    return Vec3(q * (q.conjugate() * angular_momentum).cwiseQuotient(inertia));
+  };
+  Vec3 omega = angular_velocity_at(orientation);
+  // The iteration contracts by about |dt omega| / 2; it ends at rounding errors.
+  constexpr int kMostIterations = 60;
+  for (int k = 0; k < kMostIterations; ++k) {
+    const Vec3 next = angular_velocity_at(rotation_exp(0.5 * dt * omega) * orientation);
+    const double change2 = (next - omega).squaredNorm();
+    omega = next;
+    if (!(change2 > 1e-31 * omega.squaredNorm())) break;
+  }
+  orientation = rotation_exp(dt * omega) * orientation;
+  renormalise(orientation);
+}
+
 }  // namespace supple::core

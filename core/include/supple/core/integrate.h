@@ -21,6 +21,13 @@ namespace supple::core {
 /// Free rotation over dt: orientation and world angular momentum, by the axis splitting R3 R2 R1 R2 R3.
 void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt);
 
+/// The same by the midpoint rule on the rotation group: one exponential of the angular velocity at the middle attitude,
+/// which is found by iteration. Second order and reversible; equal to `rotate_free` for equal principal moments.
+void rotate_free_exponential(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt);
+
+/// How a free body turns within a step.
+enum class RotationUpdate : std::uint8_t { Splitting, Exponential };
+
 /// What a step did that a State must remember; part of State.
 struct Ledger {
   double external_work = 0.0;       ///< work of external loads and gravity [J]
@@ -46,10 +53,11 @@ struct ForceSample {
 /// The ordered stages 1 to 7 as one call: loads at a state and a time. Velocities are those of the half step.
 using ForceModel = std::function<void(const ParticleState& state, double time, ForceSample& out)>;
 
-/// The force that the next kick reuses; part of State.
+/// What the next step reuses; part of State.
 struct KickState {
-  ForceSample sample;
-  bool valid = false;
+  ForceSample sample;      ///< the force of the next kick
+  bool valid = false;      ///< whether there is one
+  double next_step = 0.0;  ///< what an adaptive integrator tries next [s]; 0: it has not chosen yet
   void save(StateWriter& out) const;
   void load(StateReader& in);
   void hash(Hasher& hasher) const;
@@ -60,7 +68,8 @@ struct KickState {
 /// exact); medium damping by its exact exponential. Pinned particles do not move; their impulse goes to the ledger.
 /// Calls `forces` once (twice when `kick` is not valid).
 void advance(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time, double dt,
-             ParticleState& state, KickState& kick, Ledger& ledger);
+             ParticleState& state, KickState& kick, Ledger& ledger,
+             RotationUpdate rotation = RotationUpdate::Splitting);
 
 /// Total kinetic energy [J], momentum [N s] and angular momentum about the world origin [N m s].
 struct Motion {

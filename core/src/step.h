@@ -1,0 +1,17 @@
+// What the integrators share.
+#pragma once
+
+#include "supple/core/integrate.h"
+
+namespace supple::core {
+
+inline bool holds_position(const ParticleSet& set, std::size_t i) { return (set.pinned[i] & kPinPosition) != 0; }
+inline bool holds_orientation(const ParticleSet& set, std::size_t i) { return (set.pinned[i] & kPinOrientation) != 0; }
+
+/// Takes the velocity and the angular momentum that a pin holds.
+void stop_pinned(const ParticleSet& set, ParticleState& state);
+
+/// Clears `sample` and asks for the loads.
+void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample);
+
+}  // namespace supple::core
