@@ -10,11 +10,6 @@
 namespace supple::core {
 namespace {
 
-/// Psi = psi / d^2 and its slope -2 psi / d^3 + psi' / d^2.
-Weight::Value over_distance_squared(const Weight::Value& weight, double d) {
-  return {.psi = weight.psi / (d * d), .slope = weight.slope / (d * d) - 2.0 * weight.psi / (d * d * d)};
-}
-
 /// Loads of U = k psi(d) |w|^2 with w = kappa r + radius (n_A - n_B).
 PairLoad form_load(double k, const Weight::Value& weight, double kappa, double radius, const PairPose& pose) {
   const double d = pose.r.norm();
@@ -30,10 +25,20 @@ PairLoad form_load(double k, const Weight::Value& weight, double kappa, double r
 }  // namespace
 
 Weight::Value Weight::at(double distance) const {
-  if (range == 0.0) return {.psi = 1.0, .slope = 0.0};
-  const double rest = 1.0 - distance * distance / (range * range);
-  if (rest <= 0.0) return {.psi = 0.0, .slope = 0.0};
-  return {.psi = rest * rest * rest, .slope = -6.0 * distance / (range * range) * rest * rest};
+  if (range == 0.0) return {.psi = 1.0, .slope = 0.0, .second = 0.0};
+  const double q = distance * distance / (range * range);
+  const double rest = 1.0 - q;
+  if (rest <= 0.0) return {.psi = 0.0, .slope = 0.0, .second = 0.0};
+  return {.psi = rest * rest * rest,
+          .slope = -6.0 * distance / (range * range) * rest * rest,
+          .second = -6.0 / (range * range) * rest * (1.0 - 5.0 * q)};
+}
+
+Weight::Value Weight::Value::over_distance_squared(double d) const {
+  const double d2 = d * d;
+  return {.psi = psi / d2,
+          .slope = slope / d2 - 2.0 * psi / (d2 * d),
+          .second = second / d2 - 4.0 * slope / (d2 * d) + 6.0 * psi / (d2 * d2)};
 }
 
 double Form::fit_curvature(const Vec3& r, const Vec3& normal_a, const Vec3& normal_b) {
@@ -61,7 +66,7 @@ PairLoad evaluate(const Cohesion& law, const PairPose& pose) {
 
 PairLoad evaluate(const Form& law, const PairPose& pose) {
   const double d = pose.r.norm();
-  return form_load(law.strength, over_distance_squared(law.weight.at(d), d), law.curvature, 1.0, pose);
+  return form_load(law.strength, law.weight.at(d).over_distance_squared(d), law.curvature, 1.0, pose);
 }
 
 PairLoad evaluate(const FormRadius& law, const PairPose& pose) {

@@ -6,79 +6,18 @@
 #include <cmath>
 
 #include "core/support.h"
+#include "core/two_bodies.h"
 
 namespace supple::core {
 namespace {
 
 using test::Draw;
+using test::energy;
+using test::expect_gradient;
+using test::expect_no_moment;
+using test::for_each_law;
 using test::turn_about;
-
-/// Two free bodies with body normals, whose poses the tests vary.
-struct TwoBodies {
-  Vec3 x_a, x_b;
-  Quat q_a, q_b;
-  Vec3 e_a, e_b;
-
-  static TwoBodies random(Draw& draw) {
-    return {draw.vector(0.3), Vec3(1.0, 0.2, -0.1) + draw.vector(0.3), draw.rotation(), draw.rotation(),
-            draw.direction(), draw.direction()};
-  }
-  [[nodiscard]] PairPose pose() const { return {x_b - x_a, q_a, q_b, q_a * e_a, q_b * e_b}; }
-};
-
-template <class Law>
-double energy(const Law& law, const TwoBodies& bodies) {
-  return evaluate(law, bodies.pose()).energy;
-}
-
-/// Force and torque by central differences of the energy. Step 1e-5: truncation h^2/6 U''' < 1e-9 U_scale and rounding
-/// eps U / h < 1e-10 U_scale, U_scale about 10 for the gains below.
-template <class Law>
-void expect_gradient(const Law& law, const TwoBodies& at, const std::string& name) {
-  constexpr double kStep = 1e-5, kBound = 1e-7;
-  const PairLoad load = evaluate(law, at.pose());
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 h = kStep * Vec3::Unit(k);
-    const auto slope = [&](auto change) {
-      TwoBodies plus = at, minus = at;
-      change(plus, h);
-      change(minus, Vec3(-h));
-      return (energy(law, plus) - energy(law, minus)) / (2.0 * kStep);
-    };
-    const auto turned = [](const Quat& q, const Vec3& by) { return turn_about(by, by.norm()) * q; };
-    EXPECT_NEAR(-slope([](TwoBodies& b, const Vec3& d) { b.x_b += d; }), load.force_b[k], kBound) << name;
-    EXPECT_NEAR(-slope([](TwoBodies& b, const Vec3& d) { b.x_a += d; }), -load.force_b[k], kBound) << name;
-    const auto turn_a = [&](TwoBodies& b, const Vec3& d) { b.q_a = turned(b.q_a, d); };
-    const auto turn_b = [&](TwoBodies& b, const Vec3& d) { b.q_b = turned(b.q_b, d); };
-    EXPECT_NEAR(-slope(turn_a), load.torque_a[k], kBound) << name;
-    EXPECT_NEAR(-slope(turn_b), load.torque_b[k], kBound) << name;
-  }
-}
-
-/// sum (x x F + tau) = r x F_B + tau_A + tau_B; the forces cancel by their definition.
-template <class Law>
-void expect_no_moment(const Law& law, const TwoBodies& at, const std::string& name) {
-  const PairPose pose = at.pose();
-  const PairLoad load = evaluate(law, pose);
-  const double scale = 1.0 + load.force_b.norm() + load.torque_a.norm() + load.torque_b.norm();
-  EXPECT_LE((pose.r.cross(load.force_b) + load.torque_a + load.torque_b).norm(), 1e-13 * scale) << name;
-}
-
-/// Calls check(law, name) for each kind of law, with and without a range.
-template <class Check>
-void for_each_law(Draw& draw, const Check& check) {
-  for (const double range : {0.0, 2.5}) {
-    const Weight weight{.range = range};
-    check(Form{.strength = 0.8, .curvature = 0.7, .weight = weight}, "form");
-    check(Form{.strength = 0.8, .curvature = 0.0, .weight = weight}, "flat form");
-    check(FormRadius{.strength = 0.6, .radius = 1.3, .weight = weight}, "form radius");
-    check(Coplanarity{.strength = 1.2, .weight = weight}, "coplanarity");
-  }
-  check(Cohesion{.r0 = 0.8, .f0 = 1.5, .a = 4.0}, "cohesion");
-  check(Repulsion{.force = 0.5, .distance = 0.9, .length = 0.3, .tolerance = 1e-3}, "repulsion");
-  const TwoBodies rest = TwoBodies::random(draw);
-  check(BondFrame::from_rest(2.0, 0.7, rest.pose()), "bond frame");
-}
+using test::TwoBodies;
 
 TEST(PairLaws, AreTheGradientOfTheirEnergy) {
   Draw draw(11);
@@ -120,6 +59,7 @@ TEST(WeightFunction, HasItsPrintedValues) {
   const Weight weight{.range = 2.0};
   EXPECT_DOUBLE_EQ(weight.at(1.0).psi, 0.421875);
   EXPECT_DOUBLE_EQ(weight.at(1.0).slope, -0.84375);
+  EXPECT_DOUBLE_EQ(weight.at(1.0).second, 0.28125);
   EXPECT_EQ(weight.at(2.0).psi, 0.0);
   EXPECT_EQ(weight.at(2.0).slope, 0.0);
   EXPECT_EQ(weight.at(3.0).psi, 0.0);

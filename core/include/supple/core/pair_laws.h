@@ -32,6 +32,9 @@ struct Weight {
   struct Value {
     double psi;
     double slope;                     ///< d psi / d d [1/m]
+    double second;                    ///< d^2 psi / d d^2 [1/m^2]
+    /// psi / d^2 and its derivatives; a factor 1/m^2 in every unit.
+    [[nodiscard]] Value over_distance_squared(double distance) const;
   };
   [[nodiscard]] Value at(double distance) const;
 };
