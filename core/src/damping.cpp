@@ -37,23 +37,6 @@ Mat3 inverse_inertia(const ParticleSet& set, const ParticleState& state, const S
   return q * set.inertia[side.index].cwiseInverse().asDiagonal() * q.transpose();
 }
 
-/// Gives particle `side` an impulse and an angular impulse about its centre; what a pin holds, the pin returns.
-void give(const ParticleSet& set, const Side& side, const Vec3& impulse, const Vec3& angular, ParticleState& state,
-          Ledger& ledger) {
-  const std::size_t i = side.index;
-  if ((set.pinned[i] & kPinPosition) != 0) {
-    ledger.pin_impulse -= impulse;
-    ledger.pin_angular_impulse -= state.position[i].cross(impulse);
-  } else {
-    state.velocity[i] += side.inverse_mass * impulse;
-  }
-  if ((set.pinned[i] & kPinOrientation) != 0) {
-    ledger.pin_angular_impulse -= angular;
-  } else {
-    state.angular_momentum[i] += angular;
-  }
-}
-
 Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
@@ -89,8 +72,8 @@ void rub(const ParticleSet& set, const Side& a, const Side& b, double h, Particl
     lost = -impulse.dot(u) - 0.5 * impulse.dot(k * impulse);
   }
   const Vec3 angular = -0.5 * r.cross(impulse);
-  give(set, a, -impulse, angular, state, ledger);
-  give(set, b, impulse, angular, state, ledger);
+  apply_impulse(set, a.index, -impulse, angular, state, ledger);
+  apply_impulse(set, b.index, impulse, angular, state, ledger);
   ledger.dissipated += lost;
 }
 
@@ -107,8 +90,8 @@ void rub_spins(const ParticleSet& set, const Side& a, const Side& b, double h, P
     impulse = implicit_impulse(h * k, h * u);
     lost = -impulse.dot(u) - 0.5 * impulse.dot(k * impulse);
   }
-  give(set, a, Vec3::Zero(), -impulse, state, ledger);
-  give(set, b, Vec3::Zero(), impulse, state, ledger);
+  apply_impulse(set, a.index, Vec3::Zero(), -impulse, state, ledger);
+  apply_impulse(set, b.index, Vec3::Zero(), impulse, state, ledger);
   ledger.dissipated += lost;
 }
 

@@ -5,6 +5,24 @@
 
 namespace supple::core {
 
+/// Gives particle i an impulse and an angular impulse about its centre; what a pin holds is booked as the pin's.
+inline void apply_impulse(const ParticleSet& set, std::size_t i, const Vec3& impulse, const Vec3& angular,
+                          ParticleState& state, Ledger& ledger) {
+  const double inverse_mass = 1.0 / set.mass[i];
+  const std::uint8_t pinned = set.pinned[i];
+  if (pinned == 0) {
+    state.velocity[i] += inverse_mass * impulse;
+    state.angular_momentum[i] += angular;
+    return;
+  }
+  const Vec3 free = free_translation(pinned, impulse);
+  const Vec3 free_angular = free_rotation(pinned, angular);
+  state.velocity[i] += inverse_mass * free;
+  state.angular_momentum[i] += free_angular;
+  ledger.pin_impulse -= impulse - free;
+  ledger.pin_angular_impulse -= state.position[i].cross(impulse - free) + (angular - free_angular);
+}
+
 /// The order in which the pairs are visited: the second half step mirrors the first.
 enum class PairOrder { Forward, Backward };
 

@@ -19,12 +19,12 @@ double dissipated_by(const ParticleSet& set, const ForceSample& sample, double d
     const Vec3& t = sample.dissipative.torque[i];
     if (f == Vec3::Zero() && t == Vec3::Zero()) continue;
     if (!holds_position(set, i)) {
-      const Vec3 gain = 0.5 * dt / set.mass[i] * (sample.internal.force[i] + sample.external.force[i]);
-      work += dt * f.dot(before_kick.velocity[i] + gain);
+      const Vec3 force = free_translation(set.pinned[i], sample.internal.force[i] + sample.external.force[i]);
+      work += dt * f.dot(before_kick.velocity[i] + 0.5 * dt / set.mass[i] * force);
     }
     if (!holds_orientation(set, i)) {
-      const Vec3 mean = before_kick.angular_momentum[i] +
-                        0.5 * dt * (sample.internal.torque[i] + sample.external.torque[i]);
+      const Vec3 torque = free_rotation(set.pinned[i], sample.internal.torque[i] + sample.external.torque[i]);
+      const Vec3 mean = before_kick.angular_momentum[i] + 0.5 * dt * torque;
       const Quat& q = before_kick.orientation[i];
       work += dt * t.dot(q * (q.conjugate() * mean).cwiseQuotient(set.inertia[i]));
     }
@@ -42,17 +42,7 @@ void kick(const ParticleSet& set, const ForceSample& sample, double dt, Particle
     const Vec3 angular = dt * (sample.internal.torque[i] + external_torque);
     ledger.external_impulse += dt * external_force;
     ledger.external_angular_impulse += dt * (x.cross(external_force) + external_torque);
-    if (holds_position(set, i)) {
-      ledger.pin_impulse -= impulse;
-      ledger.pin_angular_impulse -= x.cross(impulse);
-    } else {
-      state.velocity[i] += 1.0 / set.mass[i] * impulse;
-    }
-    if (holds_orientation(set, i)) {
-      ledger.pin_angular_impulse -= angular;
-    } else {
-      state.angular_momentum[i] += angular;
-    }
+    apply_impulse(set, i, impulse, angular, state, ledger);
   }
   ledger.external_impulse -= dt * sample.force_on_fixed;
   ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
@@ -123,8 +113,9 @@ void hash_vector(const Vec3& v, Hasher& hasher) {
 
 void stop_pinned(const ParticleSet& set, ParticleState& state) {
   for (std::size_t i = 0; i < set.size(); ++i) {
-    if (holds_position(set, i)) state.velocity[i].setZero();
-    if (holds_orientation(set, i)) state.angular_momentum[i].setZero();
+    if (set.pinned[i] == 0) continue;
+    state.velocity[i] = free_translation(set.pinned[i], state.velocity[i]);
+    state.angular_momentum[i] = free_rotation(set.pinned[i], state.angular_momentum[i]);
   }
 }
 

@@ -101,14 +101,13 @@ void evaluate_rates(const ParticleSet& set, const Interactions& interactions, co
     rates.acceleration[i] = 1.0 / set.mass[i] * force;
     rates.torque[i] = torque;
     rates.turning[i] = Quat(0.0, 0.5 * omega.x(), 0.5 * omega.y(), 0.5 * omega.z()) * q;
-    if (holds_position(set, i)) {
-      books.pin_impulse -= force;
-      books.pin_angular_impulse -= x.cross(force);
-      rates.acceleration[i].setZero();
-    }
-    if (holds_orientation(set, i)) {
-      books.pin_angular_impulse -= torque;
-      rates.torque[i].setZero();
+    if (set.pinned[i] != 0) {
+      const Vec3 free_force = free_translation(set.pinned[i], force);
+      const Vec3 free_torque = free_rotation(set.pinned[i], torque);
+      books.pin_impulse -= force - free_force;
+      books.pin_angular_impulse -= x.cross(force - free_force) + (torque - free_torque);
+      rates.acceleration[i] = 1.0 / set.mass[i] * free_force;
+      rates.torque[i] = free_torque;
     }
   }
   books.external_impulse -= sample.force_on_fixed;

@@ -368,6 +368,7 @@ void fields(Archive& archive, Scene& d) {
   archive.required("duration", d.duration, above(0.0, kTime), "of the animation; frame n shows t = (n - 1) / frame_rate");
   archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames a second");
   archive("gravity", d.gravity, any(kAcceleration), "z is up");
+  archive("planar", d.planar, {}, "particles keep their z, which must be one for all, and turn about z only");
   archive("time_step", d.time_step, {}, "how finely time is cut");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");

@@ -368,11 +368,27 @@ void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const Objec
   }
 }
 
+/// All particles move in one plane z = const.
+void confine_to_plane(Model& model, ModelFaults& faults) {
+  const double z = model.initial.position.front().z();
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    const double other = model.initial.position[i].z();
+    if (other != z) {
+      const std::string& name = model.objects[model.particles.object[i]].name;
+      faults.add_once("objects." + name + ".particles", "expected all particles at one z in a planar scene",
+                      "z = " + number_text(other) + " m beside z = " + number_text(z) + " m",
+                      "choose 'at' and 'axis' so that they lie in one horizontal plane, or remove 'planar'");
+    }
+    model.particles.pinned[i] |= core::kPlanar;
+  }
+}
+
 /// Pinned particles begin at rest, or the pin would take their momentum in the first step.
 void stop_pinned(Model& model) {
   for (std::size_t i = 0; i < model.particles.size(); ++i) {
-    if ((model.particles.pinned[i] & core::kPinPosition) != 0) model.initial.velocity[i].setZero();
-    if ((model.particles.pinned[i] & core::kPinOrientation) != 0) model.initial.angular_momentum[i].setZero();
+    const std::uint8_t pinned = model.particles.pinned[i];
+    model.initial.velocity[i] = core::free_translation(pinned, model.initial.velocity[i]);
+    model.initial.angular_momentum[i] = core::free_rotation(pinned, model.initial.angular_momentum[i]);
   }
 }
 
@@ -400,6 +416,7 @@ Model build_model(const Scene& scene) {
   model.rest = model.initial;
   for (Vec3& velocity : model.rest.velocity) velocity.setZero();
   for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
+  if (scene.planar) confine_to_plane(model, faults);
   stop_pinned(model);
 
   model.interactions.gravity = scene.gravity;

@@ -390,6 +390,40 @@ TEST(Pins, HoldAndBookTheirImpulse) {
   EXPECT_NEAR(s.energy(), energy + ledger.external_work - ledger.dissipated, 1e-2 * s.energy());
 }
 
+TEST(Planar, KeepsHeightToTheBitAndTurnsAboutTheVerticalOnly) {
+  System s = make_moving_spiral();
+  s.interactions.gravity = Vec3(0.5, 0, -2);
+  s.interactions.friction.push_back({.name = "f", .first = {0, 1}, .second = {1, 2}, .linear = 0.3, .angular = 1e-3});
+  for (std::size_t i = 0; i < s.p.set.size(); ++i) {
+    s.p.set.pinned[i] = kPlanar;
+    s.p.state.position[i].z() = 0.3;
+    s.p.state.velocity[i] = free_translation(kPlanar, s.p.state.velocity[i]);
+    s.p.state.angular_momentum[i] = free_rotation(kPlanar, s.p.state.angular_momentum[i]);
+  }
+  const ParticleState start = s.p.state;
+  const Motion before = measure_motion(s.p.set, start);
+  const double energy = s.energy();
+  s.run(1e-3, 500);
+  for (std::size_t i = 0; i < s.p.set.size(); ++i) {
+    EXPECT_EQ(s.p.state.position[i].z(), 0.3);
+    const Vec3 turn = rotation_log(s.p.state.orientation[i] * start.orientation[i].conjugate());
+    EXPECT_LE(turn.head<2>().norm(), 1e-13);
+  }
+  EXPECT_GT((s.p.state.position[3] - start.position[3]).norm(), 0.01);
+
+  const Motion after = measure_motion(s.p.set, s.p.state);
+  const Ledger& ledger = s.ledger;
+  double mass = 0.0;
+  for (const double m : s.p.set.mass) mass += m;
+  EXPECT_NEAR(ledger.pin_impulse.z(), mass * 2.0 * 0.5, 1e-12);  // what gravity pulls into the plane
+  EXPECT_LE((after.momentum - before.momentum - ledger.external_impulse - ledger.pin_impulse).norm(),
+            1e-12 * (after.momentum_scale + ledger.pin_impulse.norm()));
+  EXPECT_LE((after.angular_momentum - before.angular_momentum - ledger.external_angular_impulse -
+             ledger.pin_angular_impulse).norm(),
+            1e-12 * (after.angular_momentum_scale + ledger.pin_angular_impulse.norm()));
+  EXPECT_NEAR(s.energy(), energy + ledger.external_work - ledger.dissipated, 1e-2 * s.energy());
+}
+
 TEST(StableStep, IsTheSmallestOfItsLimits) {
   EXPECT_EQ(stable_step({}), std::numeric_limits<double>::infinity());
   EXPECT_DOUBLE_EQ(stable_step({.frequency = 100.0}), 0.003);

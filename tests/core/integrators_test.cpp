@@ -328,6 +328,23 @@ TEST(Books, CloseToTheOrderOfTheMethod) {
   }
 }
 
+TEST_P(EveryMethod, KeepsPlanarParticlesAtTheirHeight) {
+  System s = make_spiral(GetParam());
+  s.interactions.gravity = Vec3(0.5, 0, -2);
+  for (std::size_t i = 0; i < s.p.set.size(); ++i) {
+    s.p.set.pinned[i] = kPlanar;
+    s.p.set.inertia[i] = Vec3::Constant(1e-4);
+    s.p.state.position[i].z() = 0.3;
+  }
+  const ParticleState start = s.p.state;
+  s.run(5e-4, 100);
+  for (std::size_t i = 0; i < s.p.set.size(); ++i) {
+    EXPECT_EQ(s.p.state.position[i].z(), 0.3);
+    EXPECT_LE(rotation_log(s.p.state.orientation[i] * start.orientation[i].conjugate()).head<2>().norm(), 1e-13);
+    EXPECT_NE(s.p.state.position[i].x(), start.position[i].x());
+  }
+}
+
 TEST_P(EveryMethod, ContinuesFromASavedStateWithTheSameBits) {
   System s = make_driven(GetParam());
   s.run(2e-3, 10);

@@ -146,6 +146,24 @@ TEST(Model, ChoosesCellAndContactFrequencyFromTheSurfaces) {
 }
 
 // Hunt & Crossley: y - ln(1 + y) + e y + ln(1 - e y) = 0 with y = d v; table of the theory (7.7).
+TEST(Planar, HoldsEveryParticleInOnePlane) {
+  const Model model = model_of("planar: true\n" + std::string(kHead) + kSpiral);
+  EXPECT_EQ(model.particles.pinned[0], core::kPinPosition | core::kPlanar);
+  EXPECT_EQ(model.particles.pinned[5], core::kPlanar);
+  EXPECT_EQ(model_of(std::string(kHead) + kSpiral).particles.pinned[5], 0);
+}
+
+TEST(Planar, RefusesParticlesAtDifferentHeights) {
+  try {
+    (void)model_of("planar: true\n" + std::string(kHead) +
+                   "  - {name: a, particles: {arrange: line, count: 3, spacing: 1, axis: [1, 0, 0], inertia_radius: 1}}\n");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Scene);
+    EXPECT_NE(std::string(error.what()).find("expected all particles at one z"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Restitution, GivesTheDissipationOfTheTable) {
   const double table[][2] = {{0.01, 0.99337745}, {0.1, 0.93747558}, {0.5, 0.74843493}, {1, 0.59362426},
                              {2, 0.41071969},    {5, 0.19698025},   {20, 0.05000000}};

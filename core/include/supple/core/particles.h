@@ -17,13 +17,27 @@ struct ParticleSet {
   std::vector<Vec3> inertia;           ///< principal moments in body axes [kg m^2], > 0, shape [n]
   std::vector<Vec3> normal;            ///< the fixed unit body vector e, n = Q e, shape [n]
   std::vector<std::uint32_t> object;   ///< which object the particle belongs to, shape [n]
-  std::vector<std::uint8_t> pinned;    ///< bit 0: position held, bit 1: orientation held, shape [n]
+  std::vector<std::uint8_t> pinned;    ///< kPinPosition, kPinOrientation, kPlanar, shape [n]
 
   [[nodiscard]] std::size_t size() const noexcept { return mass.size(); }
 };
 
-inline constexpr std::uint8_t kPinPosition = 1;
-inline constexpr std::uint8_t kPinOrientation = 2;
+inline constexpr std::uint8_t kPinPosition = 1;     ///< position held
+inline constexpr std::uint8_t kPinOrientation = 2;  ///< orientation held
+/// Moves in its plane z = const and turns about z only. @pre a principal axis is along z, or all moments are equal
+inline constexpr std::uint8_t kPlanar = 4;
+
+/// The part of a force, impulse or velocity that the pins of a particle leave free.
+[[nodiscard]] inline Vec3 free_translation(std::uint8_t pinned, const Vec3& v) {
+  if ((pinned & kPinPosition) != 0) return Vec3::Zero();
+  return (pinned & kPlanar) != 0 ? Vec3(v.x(), v.y(), 0.0) : v;
+}
+
+/// The part of a torque, angular impulse or angular momentum that the pins of a particle leave free.
+[[nodiscard]] inline Vec3 free_rotation(std::uint8_t pinned, const Vec3& v) {
+  if ((pinned & kPinOrientation) != 0) return Vec3::Zero();
+  return (pinned & kPlanar) != 0 ? Vec3(0.0, 0.0, v.z()) : v;
+}
 
 /// What moves. Angular velocity is derived: omega = Q I^-1 Q^T L. Part of State.
 struct ParticleState {

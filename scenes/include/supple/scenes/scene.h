@@ -217,6 +217,7 @@ struct Scene {
   double duration = 0.0;              ///< [s]
   double frame_rate = 24.0;           ///< [1/s]
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
+  bool planar = false;                ///< particles keep their z and turn about z only
   TimeStepDesc time_step;
   std::vector<ObjectDesc> objects;    ///< sorted by name
   std::vector<PairDesc> pairs;
