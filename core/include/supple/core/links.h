@@ -1,0 +1,91 @@
+/// @file supple/core/links.h
+/// Breaking and plastic flow. A link is a pair of bonded particles with all laws between them; it breaks as a whole.
+/// What happened is a LinkState; `intact` gives the laws that are left, so everything else works on plain Interactions.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "supple/core/integrate.h"
+#include "supple/core/interactions.h"
+#include "supple/core/particles.h"
+
+namespace supple::core {
+
+/// A link breaks when it exceeds any of these; infinity: never.
+struct BreakRule {
+  double stretch = std::numeric_limits<double>::infinity();  ///< d / d0 - 1 [1]
+  double energy = std::numeric_limits<double>::infinity();   ///< of all its laws together [J]
+  /// Beam-like bond: tension / force + (couple on a particle / couple)^2 > 1 (after Potyondy & Cundall 2004).
+  double force = std::numeric_limits<double>::infinity();    ///< [N]
+  double couple = std::numeric_limits<double>::infinity();   ///< [N m]
+};
+
+/// A bond frame whose energy exceeds `energy` takes over the present pose as its rest pose with relaxation time `time`:
+/// d_A += (1 - exp(-dt / time)) (Q_A^T r - d_A), and the same for the relative rotation.
+struct YieldRule {
+  double energy = std::numeric_limits<double>::infinity();  ///< [J]
+  double time = 0.0;                                        ///< [s]; 0: at once
+};
+
+/// Which rule one object has.
+struct LinkRule {
+  std::uint32_t object = 0;
+  BreakRule breaking;
+  YieldRule yield;
+};
+
+/// All links of the objects that have a rule, sorted by (first, second). Part of a Scene.
+struct Links {
+  std::vector<std::uint32_t> first;    ///< particle A, shape [links]
+  std::vector<std::uint32_t> second;   ///< particle B, A < B, shape [links]
+  std::vector<double> rest_distance;   ///< d0 [m], shape [links]
+  std::vector<std::uint32_t> rule;     ///< into `rules`, shape [links]
+  std::vector<LinkRule> rules;
+  std::vector<BondFrame> frame;            ///< the bond frames that may yield, as the scene has them, shape [frames]
+  std::vector<std::uint32_t> frame_link;   ///< their link
+  std::vector<std::uint32_t> frame_list;   ///< where they are: Interactions::bond_frame[list].law[bond]
+  std::vector<std::uint32_t> frame_bond;
+  [[nodiscard]] std::size_t size() const noexcept { return first.size(); }
+};
+
+/// Part of State.
+struct LinkState {
+  std::vector<std::uint8_t> broken;   ///< shape [links]
+  std::vector<Vec3> rest_a, rest_b;   ///< of the bond frames that may yield, shape [frames]
+  std::vector<Quat> turn;             ///< Q_A0* Q_B0 of the same, shape [frames]
+  double released = 0.0;              ///< energy that went with broken links [J]
+  double flowed = 0.0;                ///< energy that went into plastic flow [J]
+  void save(StateWriter& out) const;
+  void load(StateReader& in);
+  void hash(Hasher& hasher) const;
+};
+
+/// @pre bonds of the objects with a rule join particles of one object
+[[nodiscard]] Links make_links(const ParticleSet& set, const ParticleState& rest, const Interactions& interactions,
+                               std::span<const LinkRule> rules);
+/// Nothing broken, rest data as the scene has them.
+[[nodiscard]] LinkState unbroken(const Links& links);
+
+/// What `update_links` changed.
+struct LinkChange {
+  std::uint32_t broke = 0;
+  std::uint32_t yielded = 0;
+  [[nodiscard]] bool any() const noexcept { return broke + yielded > 0; }
+};
+
+/// Between two steps: breaks and yields what must, `dt` after the last call. The energy that goes is booked as
+/// dissipated. `present` is what `intact` gave for `links_state`; after a change it must be made again.
+LinkChange update_links(const ParticleSet& set, const ParticleState& state, const Interactions& present,
+                        const Links& links, double dt, LinkState& links_state, Ledger& ledger);
+
+/// The interactions without the bonds (and friction) of broken links, with the present rest data.
+[[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);
+
+/// The piece that each particle belongs to, named by its smallest particle: shape [particles]. Objects without links are
+/// one piece; the others fall into what unbroken links connect.
+[[nodiscard]] std::vector<std::uint32_t> find_pieces(const ParticleSet& set, const Links& links, const LinkState& state);
+
+}  // namespace supple::core
