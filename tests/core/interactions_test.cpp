@@ -42,6 +42,10 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
   all.form_radius.resize(1);
   all.coplanarity.resize(2);
   all.bond_frame.push_back(test::bond_frames(p, 30.0, 0.5));
+  for (std::size_t i = 0; i < count; ++i) {  // away from rest
+    p.state.position[i] += draw.vector(0.1);
+    p.state.orientation[i] = rotation_exp(draw.vector(0.8)) * p.state.orientation[i];
+  }
   const auto add = [](auto& list, std::uint32_t a, std::uint32_t b, const auto& law) {
     list.first.push_back(a);
     list.second.push_back(b);
