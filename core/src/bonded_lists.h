@@ -10,7 +10,9 @@ namespace supple::core {
 /// References to the lists: `Lists` is Interactions or const Interactions.
 template <class Lists>
 auto bonded_lists(Lists& laws) {
-  return std::tie(laws.cohesion, laws.form, laws.form_radius, laws.bond_frame, laws.coplanarity);
+  return std::tie(laws.cohesion, laws.form, laws.form_radius, laws.bond_frame, laws.coplanarity,
+                  laws.normalised_coplanarity, laws.co_normality, laws.co_circularity, laws.normalised_co_circularity,
+                  laws.lennard_jones);
 }
 
 /// visit(law, first, second) for every bond of every list, in order.

@@ -1,9 +1,9 @@
 // Energies, loads by law and the frequency bound, from the reference laws of pair_laws.cpp.
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 #include <utility>
 
+#include "law_lists.h"
 #include "supple/core/error.h"
 #include "supple/core/interactions.h"
 
@@ -41,23 +41,25 @@ double zero_energy(const BondedLaw<Law>&) {
   return 0.0;
 }
 double zero_energy(const GeometricLaw<Cohesion>& list) { return list.law.energy(list.range); }
-double zero_energy(const GeometricLaw<Repulsion>&) { return 0.0; }
+/// The others vanish there.
+template <class Law>
+double zero_energy(const GeometricLaw<Law>&) {
+  return 0.0;
+}
 
 /// Calls visit(list) for every list of pairs of a scene, in one order.
 template <class Visit>
 void for_each_list(const Interactions& interactions, const Visit& visit) {
-  for (const auto& list : interactions.cohesion) visit(list);
-  for (const auto& list : interactions.form) visit(list);
-  for (const auto& list : interactions.form_radius) visit(list);
-  for (const auto& list : interactions.bond_frame) visit(list);
-  for (const auto& list : interactions.coplanarity) visit(list);
-  for (const auto& list : interactions.geometric_cohesion) visit(list);
-  for (const auto& list : interactions.repulsion) visit(list);
+  const auto visit_all = [&visit](const auto& lists) {
+    for (const auto& list : lists) visit(list);
+  };
+  for_each_bonded(interactions, visit_all);
+  for_each_geometric(interactions, visit_all);
 }
 
 template <class Law>
 Stiffness pair_stiffness(const Law& law, double rest_distance) {
-  if constexpr (std::is_same_v<Law, Form> || std::is_same_v<Law, Coplanarity>) {
+  if constexpr (requires { stiffness(law, rest_distance); }) {
     return stiffness(law, rest_distance);
   } else {
     return stiffness(law);
@@ -65,6 +67,19 @@ Stiffness pair_stiffness(const Law& law, double rest_distance) {
 }
 
 }  // namespace
+
+bool Interactions::bonded_only() const {
+  bool none = true;
+  for_each_geometric(*this, [&none](const auto& lists) { none = none && lists.empty(); });
+  return none;
+}
+
+std::size_t Interactions::law_count() const {
+  std::size_t count = 0;
+  for_each_bonded(*this, [&count](const auto& lists) { count += lists.size(); });
+  for_each_geometric(*this, [&count](const auto& lists) { count += lists.size(); });
+  return count;
+}
 
 double potential_energy(const ParticleSet& set, const ParticleState& state, const Interactions& interactions) {
   double energy = 0.0;
@@ -123,14 +138,14 @@ double largest_frequency(const ParticleSet& set, const ParticleState& rest, cons
     });
   });
   // Objects that only meet later have no pair at rest: one pair each is counted.
-  const auto add_meeting = [&](const auto& list) {
-    const Stiffness k = stiffness(list.law);
-    for (std::uint32_t i = 0; i < set.size(); ++i) {
-      if (set.object[i] == list.object_a || set.object[i] == list.object_b) add(k, i);
+  for_each_geometric(interactions, [&](const auto& lists) {
+    for (const auto& list : lists) {
+      const Stiffness k = stiffness(list.law);
+      for (std::uint32_t i = 0; i < set.size(); ++i) {
+        if (set.object[i] == list.object_a || set.object[i] == list.object_b) add(k, i);
+      }
     }
-  };
-  for (const auto& list : interactions.geometric_cohesion) add_meeting(list);
-  for (const auto& list : interactions.repulsion) add_meeting(list);
+  });
 
   // The Hessian is positive semi-definite up to residual stress, so its largest eigenvalue is at most the sum of those
   // of its translational and its rotational block; a pinned degree of freedom has none.

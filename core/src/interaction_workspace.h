@@ -72,10 +72,12 @@ struct PackedGeometric {
 
 struct InteractionWorkspace::Impl {
   std::tuple<PackedBonds<Cohesion>, PackedBonds<Form>, PackedBonds<FormRadius>, PackedBonds<BondFrame>,
-             PackedBonds<Coplanarity>>
+             PackedBonds<Coplanarity>, PackedBonds<NormalisedCoplanarity>, PackedBonds<CoNormality>,
+             PackedBonds<CoCircularity>, PackedBonds<NormalisedCoCircularity>, PackedBonds<LennardJones>>
       bonded;
-  std::vector<PackedGeometric<Cohesion>> geometric_cohesion;
-  std::vector<PackedGeometric<Repulsion>> repulsion;
+  std::tuple<std::vector<PackedGeometric<Cohesion>>, std::vector<PackedGeometric<LennardJones>>,
+             std::vector<PackedGeometric<Repulsion>>>
+      geometric;
 
   bool needs_orientation = false;
   bool needs_normal = false;

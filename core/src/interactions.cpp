@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "interaction_workspace.h"
+#include "law_lists.h"
 #include "supple/core/error.h"
 
 namespace supple::core {
@@ -308,13 +309,16 @@ double ExternalLoad::factor(double time) const {
 InteractionWorkspace::InteractionWorkspace(const ParticleSet& set, const Interactions& interactions)
     : impl_(std::make_unique<Impl>()) {
   const std::size_t n = set.size();
-  pack_bonds(interactions.cohesion, n, std::get<PackedBonds<Cohesion>>(impl_->bonded));
-  pack_bonds(interactions.form, n, std::get<PackedBonds<Form>>(impl_->bonded));
-  pack_bonds(interactions.form_radius, n, std::get<PackedBonds<FormRadius>>(impl_->bonded));
-  pack_bonds(interactions.bond_frame, n, std::get<PackedBonds<BondFrame>>(impl_->bonded));
-  pack_bonds(interactions.coplanarity, n, std::get<PackedBonds<Coplanarity>>(impl_->bonded));
-  for (const auto& law : interactions.geometric_cohesion) impl_->geometric_cohesion.push_back(pack_geometric(law, set));
-  for (const auto& law : interactions.repulsion) impl_->repulsion.push_back(pack_geometric(law, set));
+  for_each_bonded(interactions, [&]<class Law>(const std::vector<BondedLaw<Law>>& lists) {
+    pack_bonds(lists, n, std::get<PackedBonds<Law>>(impl_->bonded));
+  });
+  for_each_geometric(interactions, [&]<class Law>(const std::vector<GeometricLaw<Law>>& lists) {
+    for (const auto& law : lists) {
+      std::get<std::vector<PackedGeometric<Law>>>(impl_->geometric).push_back(pack_geometric(law, set));
+      impl_->needs_orientation = impl_->needs_orientation || PairKernel<Law>::kOrientation;
+      impl_->needs_normal = impl_->needs_normal || PairKernel<Law>::kNormal;
+    }
+  });
   std::apply(
       [this](const auto&... bonds) {
         const auto note = [this]<class Law>(const PackedBonds<Law>& packed) {
@@ -343,8 +347,10 @@ InteractionCounts accumulate_interactions(const ParticleSet& set, const Particle
 
   stage_poses(set, state, executor, work);
   accumulate_bonds(executor, work);
-  for (auto& law : work.geometric_cohesion) accumulate_geometric(law, state, executor, work, counts);
-  for (auto& law : work.repulsion) accumulate_geometric(law, state, executor, work, counts);
+  const auto accumulate_lists = [&](auto& lists) {
+    for (auto& law : lists) accumulate_geometric(law, state, executor, work, counts);
+  };
+  std::apply([&](auto&... lists) { (accumulate_lists(lists), ...); }, work.geometric);
   for (std::size_t i = 0; i < n; ++i) {
     const StagedLoads& sum = work.sum[i];
     internal.force[i] += Vec3(sum.force[0], sum.force[1], sum.force[2]);

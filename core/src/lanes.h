@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "supple/core/math.h"
 
@@ -35,6 +37,17 @@ inline Lanes fms(Lanes a, Lanes b, Lanes c) { return _mm256_fmsub_pd(a.v, b.v, c
 inline Lanes sqrt(Lanes a) { return _mm256_sqrt_pd(a.v); }
 /// The positive part; 0 where a is NaN or negative.
 inline Lanes positive(Lanes a) { return _mm256_max_pd(a.v, _mm256_setzero_pd()); }
+inline Lanes least(Lanes a, Lanes b) { return _mm256_min_pd(a.v, b.v); }
+/// value where a < b, else 0.
+inline Lanes where_less(Lanes a, Lanes b, Lanes value) {
+  return _mm256_and_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LT_OQ), value.v);
+}
+/// `set` where the highest bit is 1, else `clear`.
+inline Lanes by_highest_bit(Lanes bits, Lanes set, Lanes clear) { return _mm256_blendv_pd(clear.v, set.v, bits.v); }
+/// The 64 bits of each lane moved one up.
+inline Lanes next_bit(Lanes bits) {
+  return _mm256_castsi256_pd(_mm256_slli_epi64(_mm256_castpd_si256(bits.v), 1));
+}
 inline Lanes exp(Lanes a) {
   alignas(32) std::array<double, kLanes> x;
   a.store(x.data());
@@ -45,8 +58,24 @@ inline Lanes exp(Lanes a) {
 inline double fma(double a, double b, double c) { return std::fma(a, b, c); }
 inline double fms(double a, double b, double c) { return std::fma(a, b, -c); }
 inline double positive(double a) { return a > 0.0 ? a : 0.0; }
+inline double least(double a, double b) { return a < b ? a : b; }
+inline double where_less(double a, double b, double value) { return a < b ? value : 0.0; }
+inline double by_highest_bit(double bits, double set, double clear) { return std::signbit(bits) ? set : clear; }
+inline double next_bit(double bits) { return std::bit_cast<double>(std::bit_cast<std::uint64_t>(bits) << 1); }
 inline double exp(double a) { return math::exp(a); }
 using std::sqrt;
+
+/// x to the power whose binary digits are the `count` highest bits of `digits`.
+template <int count, class T>
+T binary_power(const T& x, T digits) {
+  T power = by_highest_bit(digits, x, T(1.0));
+  for (int k = 1; k < count; ++k) {
+    digits = next_bit(digits);
+    power = power * power;
+    power = by_highest_bit(digits, power * x, power);
+  }
+  return power;
+}
 
 template <class T>
 struct Vector {

@@ -1,11 +1,10 @@
-// Hessians of the pair laws. A law of r and the normals is differentiated in z = (r, n_A, n_B) first; z moves with q by
-// dr = dx_B - dx_A and dn = dtheta x n + dtheta x (dtheta x n) / 2.
+// Hessians of the pair laws. A law is differentiated in y = (dr, dtheta_A, dtheta_B) first, dr = dx_B - dx_A; a vector b
+// that a particle carries moves by dtheta x b + dtheta x (dtheta x b) / 2.
 #include "supple/core/pair_hessian.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <span>
+#include <utility>
 
 #include "supple/core/math.h"
 
@@ -15,15 +14,24 @@ namespace {
 using Vec9 = Eigen::Matrix<double, 9, 1>;
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
-/// Places in q and in z.
+/// Places in q and in y.
 enum : int { kXA = 0, kThetaA = 3, kXB = 6, kThetaB = 9 };
-enum : int { kR = 0, kNA = 3, kNB = 6 };
+enum : int { kR = 0, kTurnA = 3, kTurnB = 6 };
 
 /// [v]: the matrix of v x.
 Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
   return m;
+}
+
+/// A vector in y.
+Vec9 stacked(const Vec3& r, const Vec3& turn_a, const Vec3& turn_b) {
+  Vec9 v;
+  v.segment<3>(kR) = r;
+  v.segment<3>(kTurnA) = turn_a;
+  v.segment<3>(kTurnB) = turn_b;
+  return v;
 }
 
 /// What the second-order motion of a body vector b adds to its particle's rotation block, `gradient` being dU/db.
@@ -69,75 +77,84 @@ PairHessian central_hessian(double first, double second, const PairPose& pose, H
   return h;
 }
 
-/// From derivatives in z; a matrix without the second-order motion of the normals for a zero gradient.
-PairHessian from_normal_derivatives(const Vec9& gradient, const Mat9& second, const PairPose& pose) {
-  const Mat3 turn_a = -cross_matrix(pose.normal_a);  // dn_A = turn_a dtheta_A
-  const Mat3 turn_b = -cross_matrix(pose.normal_b);
+/// From second derivatives in y.
+PairHessian from_relative(const Mat9& second) {
   PairHessian h = PairHessian::Zero();
   add_relative(h, second.block<3, 3>(kR, kR));
-  const Mat3 r_a = second.block<3, 3>(kR, kNA) * turn_a;
-  const Mat3 r_b = second.block<3, 3>(kR, kNB) * turn_b;
-  add_block(h, kXA, kThetaA, -r_a);
-  add_block(h, kXB, kThetaA, r_a);
-  add_block(h, kXA, kThetaB, -r_b);
-  add_block(h, kXB, kThetaB, r_b);
-  add_block(h, kThetaA, kThetaB, turn_a.transpose() * second.block<3, 3>(kNA, kNB) * turn_b);
-  h.block<3, 3>(kThetaA, kThetaA) += turn_a.transpose() * second.block<3, 3>(kNA, kNA) * turn_a +
-                                     turning_term(pose.normal_a, gradient.segment<3>(kNA));
-  h.block<3, 3>(kThetaB, kThetaB) += turn_b.transpose() * second.block<3, 3>(kNB, kNB) * turn_b +
-                                     turning_term(pose.normal_b, gradient.segment<3>(kNB));
+  for (const auto& [turn, theta] : {std::pair{kTurnA, kThetaA}, std::pair{kTurnB, kThetaB}}) {
+    add_block(h, kXA, theta, -second.block<3, 3>(kR, turn));
+    add_block(h, kXB, theta, second.block<3, 3>(kR, turn));
+    h.block<3, 3>(theta, theta) += second.block<3, 3>(turn, turn);
+  }
+  add_block(h, kThetaA, kThetaB, second.block<3, 3>(kTurnA, kTurnB));
   mirror(h);
   return h;
 }
 
-/// One term e of an energy k psi(d) sum e^2, with its derivatives in z. `second` is null where e is linear in z.
-struct Residual {
-  double value = 0.0;
-  Vec9 gradient = Vec9::Zero();
-  const Mat9* second = nullptr;
+/// Terms e_1 ... of an energy k psi(d) sum e^2, with their derivatives in y.
+template <int count>
+struct Residuals {
+  Eigen::Matrix<double, count, 1> value;
+  Eigen::Matrix<double, 9, count> gradient;  ///< a column each
+  Mat9 turning = Mat9::Zero();  ///< sum of e times its second derivative
 };
 
-/// Hessian of U = k psi(d) sum e^2. Positive semi-definite: 2 k sum J^T J with J = d(sqrt(psi) e)/dz.
-PairHessian weighted_squares(double k, const Weight::Value& weight, std::span<const Residual> residuals,
-                             const PairPose& pose, HessianKind kind) {
+/// Hessian of U = k psi(d) sum e^2. Positive semi-definite: 2 k sum J^T J with J = d(sqrt(psi) e)/dy.
+template <int count>
+PairHessian weighted_squares(double k, const Weight::Value& weight, const Residuals<count>& e, const PairPose& pose,
+                             HessianKind kind) {
   if (weight.psi == 0.0) return PairHessian::Zero();
-  Vec9 along = Vec9::Zero();
-  along.segment<3>(kR) = pose.r / pose.r.norm();
-  Mat9 second = Mat9::Zero();
+  const Vec9 along = stacked(pose.r / pose.r.norm(), Vec3::Zero(), Vec3::Zero());
   if (kind == HessianKind::PositiveSemiDefinite) {
-    for (const Residual& e : residuals) {
-      const Vec9 j = e.gradient + 0.5 * weight.slope / weight.psi * e.value * along;
-      second += 2.0 * k * weight.psi * j * j.transpose();
-    }
-    return from_normal_derivatives(Vec9::Zero(), second, pose);
+    const Eigen::Matrix<double, 9, count> j =
+        e.gradient + 0.5 * weight.slope / weight.psi * along * e.value.transpose();
+    return from_relative(2.0 * k * weight.psi * j * j.transpose());
   }
-  double squares = 0.0;
-  Vec9 gradient = Vec9::Zero();  // of the sum of squares
-  for (const Residual& e : residuals) {
-    squares += e.value * e.value;
-    gradient += 2.0 * e.value * e.gradient;
-    second += 2.0 * weight.psi * e.gradient * e.gradient.transpose();
-    if (e.second != nullptr) second += 2.0 * weight.psi * e.value * *e.second;
-  }
-  const Mat9 mixed = weight.slope * gradient * along.transpose();
-  second += mixed + mixed.transpose();
-  second.block<3, 3>(kR, kR) += squares * radial_hessian(weight.slope, weight.second, pose.r);
-  return from_normal_derivatives(k * weight.psi * gradient, k * second, pose);
+  const Mat9 mixed = 2.0 * weight.slope * (e.gradient * e.value) * along.transpose();
+  Mat9 second = 2.0 * weight.psi * (e.gradient * e.gradient.transpose() + e.turning) + mixed + mixed.transpose();
+  second.block<3, 3>(kR, kR) += e.value.squaredNorm() * radial_hessian(weight.slope, weight.second, pose.r);
+  return from_relative(k * second);
 }
 
 /// U = k psi |kappa r + radius (n_A - n_B)|^2.
 PairHessian form_hessian(double k, const Weight::Value& weight, double kappa, double radius, const PairPose& pose,
                          HessianKind kind) {
-  const Vec3 w = kappa * pose.r + radius * (pose.normal_a - pose.normal_b);
-  std::array<Residual, 3> residuals;
-  for (int i = 0; i < 3; ++i) {
-    Residual& e = residuals[static_cast<std::size_t>(i)];
-    e.value = w[i];
-    e.gradient[kR + i] = kappa;
-    e.gradient[kNA + i] = radius;
-    e.gradient[kNB + i] = -radius;
-  }
-  return weighted_squares(k, weight, residuals, pose, kind);
+  Residuals<3> e;
+  e.value = kappa * pose.r + radius * (pose.normal_a - pose.normal_b);
+  e.gradient << kappa * Mat3::Identity(), radius * cross_matrix(pose.normal_a), -radius * cross_matrix(pose.normal_b);
+  e.turning.block<3, 3>(kTurnA, kTurnA) = turning_term(pose.normal_a, radius * e.value);
+  e.turning.block<3, 3>(kTurnB, kTurnB) = turning_term(pose.normal_b, -radius * e.value);
+  return weighted_squares(k, weight, e, pose, kind);
+}
+
+/// Adds value times the second derivatives of n . r to `turning`, the normal being that of the particle at `turn`.
+void add_dot_product(Mat9& turning, double value, const Vec3& normal, const Vec3& r, int turn) {
+  const Mat3 mixed = -value * cross_matrix(normal);
+  turning.block<3, 3>(kR, turn) += mixed;
+  turning.block<3, 3>(turn, kR) += mixed.transpose();
+  turning.block<3, 3>(turn, turn) += turning_term(normal, value * r);
+}
+
+/// U = k psi ((n_A . r)^2 + (n_B . r)^2).
+PairHessian coplanarity_hessian(double k, const Weight::Value& weight, const PairPose& pose, HessianKind kind) {
+  Residuals<2> e;
+  e.value << pose.normal_a.dot(pose.r), pose.normal_b.dot(pose.r);
+  e.gradient.col(0) = stacked(pose.normal_a, pose.normal_a.cross(pose.r), Vec3::Zero());
+  e.gradient.col(1) = stacked(pose.normal_b, Vec3::Zero(), pose.normal_b.cross(pose.r));
+  add_dot_product(e.turning, e.value[0], pose.normal_a, pose.r, kTurnA);
+  add_dot_product(e.turning, e.value[1], pose.normal_b, pose.r, kTurnB);
+  return weighted_squares(k, weight, e, pose, kind);
+}
+
+/// U = k psi ((n_A + n_B) . r)^2.
+PairHessian co_circularity_hessian(double k, const Weight::Value& weight, const PairPose& pose, HessianKind kind) {
+  Residuals<1> e;
+  const Vec3 sum = pose.normal_a + pose.normal_b;
+  e.value << sum.dot(pose.r);
+  e.gradient = stacked(sum, pose.normal_a.cross(pose.r), pose.normal_b.cross(pose.r));
+  add_dot_product(e.turning, e.value[0], pose.normal_a, pose.r, kTurnA);
+  add_dot_product(e.turning, e.value[0], pose.normal_b, pose.r, kTurnB);
+  return weighted_squares(k, weight, e, pose, kind);
 }
 
 }  // namespace
@@ -194,19 +211,30 @@ PairHessian hessian(const BondFrame& law, const PairPose& pose, HessianKind kind
 }
 
 PairHessian hessian(const Coplanarity& law, const PairPose& pose, HessianKind kind) {
-  std::array<Residual, 2> residuals;  // n_A . r and n_B . r
-  std::array<Mat9, 2> second{Mat9::Zero(), Mat9::Zero()};
-  const std::array<int, 2> place{kNA, kNB};
-  const std::array<const Vec3*, 2> normal{&pose.normal_a, &pose.normal_b};
-  for (std::size_t k = 0; k < 2; ++k) {
-    residuals[k].value = normal[k]->dot(pose.r);
-    residuals[k].gradient.segment<3>(kR) = *normal[k];
-    residuals[k].gradient.segment<3>(place[k]) = pose.r;
-    second[k].block<3, 3>(kR, place[k]).setIdentity();
-    second[k].block<3, 3>(place[k], kR).setIdentity();
-    residuals[k].second = &second[k];
-  }
-  return weighted_squares(law.strength, law.weight.at(pose.r.norm()), residuals, pose, kind);
+  return coplanarity_hessian(law.strength, law.weight.at(pose.r.norm()), pose, kind);
+}
+
+PairHessian hessian(const NormalisedCoplanarity& law, const PairPose& pose, HessianKind kind) {
+  const double d = pose.r.norm();
+  return coplanarity_hessian(law.strength, law.weight.at(d).over_distance_squared(d), pose, kind);
+}
+
+PairHessian hessian(const CoNormality& law, const PairPose& pose, HessianKind kind) {
+  return form_hessian(law.strength, law.weight.at(pose.r.norm()), 0.0, 1.0, pose, kind);
+}
+
+PairHessian hessian(const CoCircularity& law, const PairPose& pose, HessianKind kind) {
+  return co_circularity_hessian(law.strength, law.weight.at(pose.r.norm()), pose, kind);
+}
+
+PairHessian hessian(const NormalisedCoCircularity& law, const PairPose& pose, HessianKind kind) {
+  const double d = pose.r.norm();
+  return co_circularity_hessian(law.strength, law.weight.at(d).over_distance_squared(d), pose, kind);
+}
+
+PairHessian hessian(const LennardJones& law, const PairPose& pose, HessianKind kind) {
+  const double d = pose.r.norm();
+  return central_hessian(-law.force(d), -law.slope(d), pose, kind);
 }
 
 PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind) {

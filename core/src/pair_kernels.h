@@ -2,7 +2,12 @@
 // Each kernel packs a law into numbers that save work per step; evaluate() in pair_laws.cpp is the reference.
 #pragma once
 
+#include <bit>
+#include <cstdint>
+#include <limits>
+
 #include "lanes.h"
+#include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
 namespace supple::core {
@@ -37,6 +42,18 @@ struct KernelWeight {
     const T rest2 = rest * rest;
     psi = rest2 * rest;
     slope_over_d = T(-6.0) * inverse_h2 * rest2;
+  }
+};
+
+/// psi and psi' / d of a weight divided by d^2, both holding the gain.
+template <class T>
+struct NormalisedKernelWeight {
+  T psi, slope_over_d;
+  NormalisedKernelWeight(const T& gain, const T& d2, const T& inverse_h2) {
+    const KernelWeight<T> weight(d2, inverse_h2);
+    const T inverse = T(1.0) / d2;
+    psi = gain * weight.psi * inverse;
+    slope_over_d = (gain * weight.slope_over_d - T(2.0) * psi) * inverse;
   }
 };
 
@@ -89,6 +106,53 @@ struct PairKernel<Repulsion> {
   }
 };
 
+/// The exponents are packed in binary, highest bit first.
+template <>
+struct PairKernel<LennardJones> {
+  static constexpr bool kOrientation = false, kNormal = false, kTorque = false;
+  static constexpr std::size_t kNumbers = 10;
+  static void pack(const LennardJones& law, double* p) {
+    const double n = law.repulsive, m = law.attractive;
+    const bool shifted = law.cut_off > 0.0 && law.switch_from == 0.0;
+    const bool switched = law.cut_off > 0.0 && law.switch_from > 0.0;
+    p[0] = law.r0;
+    p[1] = packed_exponent(law.repulsive);
+    p[2] = packed_exponent(law.attractive);
+    p[3] = law.depth * n * m / (n - m);
+    p[4] = law.depth * m / (n - m);
+    p[5] = law.depth * n / (n - m);
+    LennardJones whole = law;
+    whole.cut_off = 0.0;
+    p[6] = shifted ? whole.force(law.cut_off) : 0.0;
+    p[7] = law.cut_off > 0.0 ? law.cut_off : std::numeric_limits<double>::infinity();
+    p[8] = law.switch_from;
+    p[9] = switched ? 1.0 / (law.cut_off - law.switch_from) : 0.0;
+  }
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const T d = sqrt(dot(pair.r, pair.r));
+    const T inverse = T(1.0) / d;
+    const T x = p[0] * inverse;
+    const T repulsive = binary_power<kExponentBits>(x, p[1]);
+    const T attractive = binary_power<kExponentBits>(x, p[2]);
+    const T force = p[3] * (repulsive - attractive) * inverse;
+    const T energy = fms(p[4], repulsive, p[5] * attractive);
+    const T t = least(positive((d - p[8]) * p[9]), T(1.0));
+    const T rest = T(1.0) - t;
+    const T share = T(1.0) - t * t * t * (T(10.0) - t * (T(15.0) - T(6.0) * t));
+    const T slope = T(-30.0) * p[9] * (t * t) * (rest * rest);
+    const T total = fms(force, share, fma(energy, slope, p[6]));
+    return {.force_b = where_less(d, p[7], total * inverse) * pair.r, .torque_a = {}, .torque_b = {}};
+  }
+
+ private:
+  static constexpr int kExponentBits = 6;
+  static_assert(LennardJones::kLargestExponent == (1 << kExponentBits) - 1);
+  static double packed_exponent(int exponent) {
+    return std::bit_cast<double>(static_cast<std::uint64_t>(exponent) << (64 - kExponentBits));
+  }
+};
+
 template <>
 struct PairKernel<Form> {
   static constexpr bool kOrientation = false, kNormal = true, kTorque = true;
@@ -100,12 +164,8 @@ struct PairKernel<Form> {
   }
   template <class T>
   static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
-    const T d2 = dot(pair.r, pair.r);
-    const KernelWeight<T> weight(d2, p[2]);
-    const T inverse = T(1.0) / d2;
-    const T psi = p[0] * weight.psi * inverse;
-    const T slope_over_d = (p[0] * weight.slope_over_d - T(2.0) * psi) * inverse;
-    return form_loads(psi, slope_over_d, p[1], T(1.0), pair);
+    const NormalisedKernelWeight<T> weight(p[0], dot(pair.r, pair.r), p[2]);
+    return form_loads(weight.psi, weight.slope_over_d, p[1], T(1.0), pair);
   }
 };
 
@@ -125,26 +185,88 @@ struct PairKernel<FormRadius> {
   }
 };
 
-template <>
-struct PairKernel<Coplanarity> {
+/// The laws of the two normals and r that hold a gain and a weight.
+struct NormalLawKernel {
   static constexpr bool kOrientation = false, kNormal = true, kTorque = true;
   static constexpr std::size_t kNumbers = 2;
-  static void pack(const Coplanarity& law, double* p) {
+  template <class Law>
+  static void pack(const Law& law, double* p) {
     p[0] = law.strength;
     p[1] = packed_range(law.weight);
   }
+};
+
+/// Loads of U = psi ((n_A . r)^2 + (n_B . r)^2), psi holding the gain.
+template <class T>
+KernelLoads<T> coplanarity_loads(const T& psi, const T& slope_over_d, const KernelPair<T>& pair) {
+  const T c_a = dot(pair.normal_a, pair.r);
+  const T c_b = dot(pair.normal_b, pair.r);
+  const T gain = T(-2.0) * psi;
+  const T gain_a = gain * c_a;
+  const T gain_b = gain * c_b;
+  const T central = -(slope_over_d * fma(c_a, c_a, c_b * c_b));
+  return {.force_b = scaled_sum(gain_a, pair.normal_a, scaled_sum(gain_b, pair.normal_b, central * pair.r)),
+          .torque_a = gain_a * cross(pair.normal_a, pair.r),
+          .torque_b = gain_b * cross(pair.normal_b, pair.r)};
+}
+
+template <>
+struct PairKernel<Coplanarity> : NormalLawKernel {
   template <class T>
   static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
     const KernelWeight<T> weight(dot(pair.r, pair.r), p[1]);
-    const T c_a = dot(pair.normal_a, pair.r);
-    const T c_b = dot(pair.normal_b, pair.r);
-    const T gain = T(-2.0) * p[0] * weight.psi;
-    const T gain_a = gain * c_a;
-    const T gain_b = gain * c_b;
-    const T central = -(p[0] * weight.slope_over_d * fma(c_a, c_a, c_b * c_b));
-    return {.force_b = scaled_sum(gain_a, pair.normal_a, scaled_sum(gain_b, pair.normal_b, central * pair.r)),
-            .torque_a = gain_a * cross(pair.normal_a, pair.r),
-            .torque_b = gain_b * cross(pair.normal_b, pair.r)};
+    return coplanarity_loads(p[0] * weight.psi, p[0] * weight.slope_over_d, pair);
+  }
+};
+
+template <>
+struct PairKernel<NormalisedCoplanarity> : NormalLawKernel {
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const NormalisedKernelWeight<T> weight(p[0], dot(pair.r, pair.r), p[1]);
+    return coplanarity_loads(weight.psi, weight.slope_over_d, pair);
+  }
+};
+
+template <>
+struct PairKernel<CoNormality> : NormalLawKernel {
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const KernelWeight<T> weight(dot(pair.r, pair.r), p[1]);
+    const Vector<T> change = pair.normal_a - pair.normal_b;
+    const Vector<T> couple = (T(2.0) * p[0] * weight.psi) * cross(pair.normal_a, pair.normal_b);
+    return {.force_b = -(p[0] * weight.slope_over_d * dot(change, change)) * pair.r,
+            .torque_a = couple,
+            .torque_b = T(-1.0) * couple};
+  }
+};
+
+/// Loads of U = psi ((n_A + n_B) . r)^2, psi holding the gain.
+template <class T>
+KernelLoads<T> co_circularity_loads(const T& psi, const T& slope_over_d, const KernelPair<T>& pair) {
+  const Vector<T> sum = pair.normal_a + pair.normal_b;
+  const T c = dot(sum, pair.r);
+  const T gain = T(-2.0) * psi * c;
+  return {.force_b = scaled_sum(gain, sum, -(slope_over_d * c * c) * pair.r),
+          .torque_a = gain * cross(pair.normal_a, pair.r),
+          .torque_b = gain * cross(pair.normal_b, pair.r)};
+}
+
+template <>
+struct PairKernel<CoCircularity> : NormalLawKernel {
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const KernelWeight<T> weight(dot(pair.r, pair.r), p[1]);
+    return co_circularity_loads(p[0] * weight.psi, p[0] * weight.slope_over_d, pair);
+  }
+};
+
+template <>
+struct PairKernel<NormalisedCoCircularity> : NormalLawKernel {
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const NormalisedKernelWeight<T> weight(p[0], dot(pair.r, pair.r), p[1]);
+    return co_circularity_loads(weight.psi, weight.slope_over_d, pair);
   }
 };
 

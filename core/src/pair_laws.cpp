@@ -22,6 +22,30 @@ PairLoad form_load(double k, const Weight::Value& weight, double kappa, double r
           .torque_b = gain * radius * pose.normal_b.cross(w)};
 }
 
+/// Loads of U = k psi(d) ((n_A . r)^2 + (n_B . r)^2).
+PairLoad coplanarity_load(double k, const Weight::Value& weight, const PairPose& pose) {
+  const double c_a = pose.normal_a.dot(pose.r);
+  const double c_b = pose.normal_b.dot(pose.r);
+  const double sum = c_a * c_a + c_b * c_b;
+  const double gain = 2.0 * k * weight.psi;
+  return {.energy = k * weight.psi * sum,
+          .force_b = -gain * (c_a * pose.normal_a + c_b * pose.normal_b) -
+                     k * sum * weight.slope / pose.r.norm() * pose.r,
+          .torque_a = -gain * c_a * pose.normal_a.cross(pose.r),
+          .torque_b = -gain * c_b * pose.normal_b.cross(pose.r)};
+}
+
+/// Loads of U = k psi(d) ((n_A + n_B) . r)^2.
+PairLoad co_circularity_load(double k, const Weight::Value& weight, const PairPose& pose) {
+  const Vec3 sum = pose.normal_a + pose.normal_b;
+  const double c = sum.dot(pose.r);
+  const double gain = 2.0 * k * weight.psi * c;
+  return {.energy = k * weight.psi * c * c,
+          .force_b = -gain * sum - k * c * c * weight.slope / pose.r.norm() * pose.r,
+          .torque_a = -gain * pose.normal_a.cross(pose.r),
+          .torque_b = -gain * pose.normal_b.cross(pose.r)};
+}
+
 }  // namespace
 
 Weight::Value Weight::at(double distance) const {
@@ -92,17 +116,32 @@ PairLoad evaluate(const BondFrame& law, const PairPose& pose) {
 }
 
 PairLoad evaluate(const Coplanarity& law, const PairPose& pose) {
+  return coplanarity_load(law.strength, law.weight.at(pose.r.norm()), pose);
+}
+
+PairLoad evaluate(const NormalisedCoplanarity& law, const PairPose& pose) {
+  const double d = pose.r.norm();
+  return coplanarity_load(law.strength, law.weight.at(d).over_distance_squared(d), pose);
+}
+
+PairLoad evaluate(const CoNormality& law, const PairPose& pose) {
   const double d = pose.r.norm();
   const Weight::Value weight = law.weight.at(d);
-  const double c_a = pose.normal_a.dot(pose.r);
-  const double c_b = pose.normal_b.dot(pose.r);
-  const double sum = c_a * c_a + c_b * c_b;
-  const double gain = 2.0 * law.strength * weight.psi;
-  return {.energy = law.strength * weight.psi * sum,
-          .force_b = -gain * (c_a * pose.normal_a + c_b * pose.normal_b) -
-                     law.strength * sum * weight.slope / d * pose.r,
-          .torque_a = -gain * c_a * pose.normal_a.cross(pose.r),
-          .torque_b = -gain * c_b * pose.normal_b.cross(pose.r)};
+  const double squares = (pose.normal_a - pose.normal_b).squaredNorm();
+  const Vec3 couple = 2.0 * law.strength * weight.psi * pose.normal_a.cross(pose.normal_b);
+  return {.energy = law.strength * weight.psi * squares,
+          .force_b = -law.strength * squares * weight.slope / d * pose.r,
+          .torque_a = couple,
+          .torque_b = -couple};
+}
+
+PairLoad evaluate(const CoCircularity& law, const PairPose& pose) {
+  return co_circularity_load(law.strength, law.weight.at(pose.r.norm()), pose);
+}
+
+PairLoad evaluate(const NormalisedCoCircularity& law, const PairPose& pose) {
+  const double d = pose.r.norm();
+  return co_circularity_load(law.strength, law.weight.at(d).over_distance_squared(d), pose);
 }
 
 PairLoad evaluate(const Repulsion& law, const PairPose& pose) {
@@ -142,6 +181,25 @@ Stiffness stiffness(const BondFrame& law) {
 Stiffness stiffness(const Coplanarity& law, double rest_distance) {
   const double gain = law.strength * law.weight.at(rest_distance).psi;
   return {.translation = 4.0 * gain, .rotation = gain * rest_distance * rest_distance};
+}
+
+Stiffness stiffness(const NormalisedCoplanarity& law, double rest_distance) {
+  const double gain = law.strength * law.weight.at(rest_distance).psi;
+  return {.translation = 4.0 * gain / (rest_distance * rest_distance), .rotation = gain};
+}
+
+Stiffness stiffness(const CoNormality& law, double rest_distance) {
+  return {.translation = 0.0, .rotation = 2.0 * law.strength * law.weight.at(rest_distance).psi};
+}
+
+Stiffness stiffness(const CoCircularity& law, double rest_distance) {
+  const double gain = 2.0 * law.strength * law.weight.at(rest_distance).psi;
+  return {.translation = 4.0 * gain, .rotation = gain * rest_distance * rest_distance};
+}
+
+Stiffness stiffness(const NormalisedCoCircularity& law, double rest_distance) {
+  const double gain = 2.0 * law.strength * law.weight.at(rest_distance).psi;
+  return {.translation = 4.0 * gain / (rest_distance * rest_distance), .rotation = gain};
 }
 
 Stiffness stiffness(const Repulsion& law) { return {.translation = law.force / law.length, .rotation = 0.0}; }

@@ -26,11 +26,6 @@ std::string count(std::size_t n, const char* one, const char* many) {
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-std::size_t law_count(const core::Interactions& i) {
-  return i.cohesion.size() + i.form.size() + i.form_radius.size() + i.bond_frame.size() + i.coplanarity.size() +
-         i.geometric_cohesion.size() + i.repulsion.size();
-}
-
 std::string list(std::initializer_list<std::pair<bool, const char*>> items) {
   std::string text;
   for (const auto& [on, name] : items) {
@@ -82,7 +77,7 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
     plan.stages.push_back({stage, on, std::move(reason)});
   };
 
-  const std::size_t laws = law_count(model.interactions);
+  const std::size_t laws = model.interactions.law_count();
   const std::size_t loads = model.interactions.external.size();
   const bool gravity = !scene.gravity.isZero();
   const bool driven = laws > 0 || loads > 0 || gravity;

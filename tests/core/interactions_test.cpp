@@ -17,6 +17,9 @@ namespace {
 using test::Draw;
 using test::Particles;
 
+/// Laws on the chain of a crowd, bond frames apart.
+constexpr std::size_t kChainLaws = 9;
+
 /// A crowd with every law at work: bonds of all kinds on a chain, geometric laws within and between two objects.
 struct Crowd {
   Particles p;
@@ -41,6 +44,11 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
   all.form.resize(1);
   all.form_radius.resize(1);
   all.coplanarity.resize(2);
+  all.normalised_coplanarity.resize(1);
+  all.co_normality.resize(1);
+  all.co_circularity.resize(1);
+  all.normalised_co_circularity.resize(1);
+  all.lennard_jones.resize(1);
   all.bond_frame.push_back(test::bond_frames(p, 30.0, 0.5));
   for (std::size_t i = 0; i < count; ++i) {  // away from rest
     p.state.position[i] += draw.vector(0.1);
@@ -57,10 +65,22 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
     add(all.form[0], a, b, Form{.strength = 0.2, .curvature = draw.uniform(-2, 2), .weight = weight});
     add(all.form_radius[0], a, b, FormRadius{.strength = 0.3, .radius = draw.uniform(0.2, 2), .weight = {}});
     add(all.coplanarity[b % 2], a, b, Coplanarity{.strength = 0.4, .weight = weight});
+    add(all.normalised_coplanarity[0], a, b, NormalisedCoplanarity{.strength = 0.3, .weight = weight});
+    add(all.co_normality[0], a, b, CoNormality{.strength = 0.4, .weight = weight});
+    add(all.co_circularity[0], a, b, CoCircularity{.strength = 0.3, .weight = weight});
+    add(all.normalised_co_circularity[0], a, b, NormalisedCoCircularity{.strength = 0.2, .weight = weight});
+    LennardJones lennard_jones{.r0 = draw.uniform(0.2, 0.4), .depth = 0.1, .repulsive = 3 + static_cast<int>(a % 5),
+                               .attractive = 1 + static_cast<int>(b % 2)};
+    if (a % 3 > 0) lennard_jones.cut_off = 3.0 * lennard_jones.r0;
+    if (a % 3 > 1) lennard_jones.switch_from = 0.5 * lennard_jones.r0;
+    add(all.lennard_jones[0], a, b, lennard_jones);
   });
   const Cohesion cohesion{.r0 = 0.3, .f0 = 1.0, .a = 8.0};
   all.geometric_cohesion.push_back(
       {.name = "own", .object_a = 0, .object_b = 0, .range = cohesion.influence_radius(1e-3), .law = cohesion});
+  const LennardJones lennard_jones{.r0 = 0.25, .depth = 0.02, .repulsive = 4, .attractive = 2, .cut_off = 0.6};
+  all.geometric_lennard_jones.push_back(
+      {.name = "both", .object_a = 0, .object_b = 1, .range = lennard_jones.cut_off, .law = lennard_jones});
   const Repulsion repulsion{.force = 1.0, .distance = 0.3, .length = 0.05, .tolerance = 1e-3};
   all.repulsion.push_back(
       {.name = "other", .object_a = 1, .object_b = 0, .range = repulsion.cut_off(), .law = repulsion});
@@ -162,13 +182,14 @@ TEST(Interactions, CountWhatTheyVisit) {
   const Crowd crowd = make_crowd(60, 36);
   const Evaluated loads = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
   const std::size_t chain = 59 + 58 + 57;
-  EXPECT_GE(loads.counts.pairs_present, 4 * chain + 59 + 58);
+  EXPECT_GE(loads.counts.pairs_present, kChainLaws * chain + 59 + 58);
   EXPECT_GE(loads.counts.pairs_visited, loads.counts.pairs_present);
   Interactions bonded = crowd.interactions;
   bonded.geometric_cohesion.clear();
+  bonded.geometric_lennard_jones.clear();
   bonded.repulsion.clear();
   EXPECT_TRUE(bonded.bonded_only());
-  EXPECT_EQ(evaluate_loads(crowd.p, bonded, Executor(1)).counts.pairs_visited, 4 * chain + 59 + 58);
+  EXPECT_EQ(evaluate_loads(crowd.p, bonded, Executor(1)).counts.pairs_visited, kChainLaws * chain + 59 + 58);
 }
 
 TEST(Interactions, AllocateNothingAfterTheFirstCall) {
@@ -248,11 +269,11 @@ TEST(ExternalLoads, AndGravityAreKeptApartFromInternalLoads) {
 TEST(LawReports, NameEveryLawAndAddUpToThePotentialEnergy) {
   const Crowd crowd = make_crowd(30, 39);
   const std::vector<LawReport> reports = report_laws(crowd.p.set, crowd.p.state, crowd.interactions, 0.5);
-  ASSERT_EQ(reports.size(), 10U);
+  ASSERT_EQ(reports.size(), crowd.interactions.law_count() + 2);  // gravity and external loads
   EXPECT_EQ(reports[3].name, "bond_frame");
-  EXPECT_EQ(reports[6].name, "own");
-  EXPECT_EQ(reports[8].name, "gravity");
-  EXPECT_EQ(reports[9].name, "external");
+  EXPECT_EQ(reports[reports.size() - 5].name, "own");
+  EXPECT_EQ(reports[reports.size() - 2].name, "gravity");
+  EXPECT_EQ(reports.back().name, "external");
   double energy = 0.0, size = 0.0;
   for (const LawReport& report : reports) {
     energy += report.energy;

@@ -76,6 +76,52 @@ TEST(CoplanarityLaw, HasItsPrintedValues) {
   EXPECT_DOUBLE_EQ(load.energy, 1.0);
 }
 
+TEST(CoNormalityLaw, HasItsPrintedValues) {
+  const PairPose pose{
+      .r = Vec3(1, 0, 1), .normal_a = Vec3::UnitZ(), .normal_b = Vec3(std::sin(0.5), 0, std::cos(0.5))};
+  const PairLoad load = evaluate(CoNormality{.strength = 1.0, .weight = {}}, pose);
+  EXPECT_LE((load.torque_a - Vec3(0, 0.9588510772, 0)).norm(), 1e-10);
+  EXPECT_EQ(load.torque_b, -load.torque_a);
+  EXPECT_EQ(load.force_b.norm(), 0.0);
+  EXPECT_NEAR(load.energy, 0.2448348762, 1e-10);
+}
+
+TEST(CoCircularityLaw, HasItsPrintedValues) {
+  const PairPose pose{.r = Vec3(1, 0, 1), .normal_a = Vec3::UnitZ(), .normal_b = Vec3::UnitZ()};
+  const PairLoad load = evaluate(CoCircularity{.strength = 1.0, .weight = {}}, pose);
+  EXPECT_LE((load.force_b - Vec3(0, 0, -8)).norm(), 1e-15);
+  EXPECT_LE((load.torque_a - Vec3(0, -4, 0)).norm(), 1e-15);
+  EXPECT_LE((load.torque_b - Vec3(0, -4, 0)).norm(), 1e-15);
+  EXPECT_DOUBLE_EQ(load.energy, 4.0);
+}
+
+TEST(CoCircularityLaw, IsAtRestOnEverySphere) {
+  Draw draw(17);
+  for (int k = 0; k < 50; ++k) {
+    const Vec3 n_a = draw.direction(), n_b = draw.direction();
+    const PairPose pose{.r = draw.uniform(0.5, 2.0) * (n_b - n_a), .normal_a = n_a, .normal_b = n_b};
+    const PairLoad load = evaluate(CoCircularity{.strength = 1.0, .weight = {}}, pose);
+    EXPECT_LE(load.force_b.norm() + load.torque_a.norm() + load.torque_b.norm(), 1e-14);  // roundings of c, times 2 |r|
+  }
+}
+
+TEST(NormalisedLaws, DoNotDependOnScale) {
+  Draw draw(18);
+  for (int k = 0; k < 20; ++k) {
+    const TwoBodies at = TwoBodies::random(draw);
+    PairPose large = at.pose();
+    large.r *= 4.0;
+    const auto check = [&](const auto& law) {
+      const PairLoad here = evaluate(law, at.pose()), there = evaluate(law, large);
+      EXPECT_NEAR(here.energy, there.energy, 1e-15 * (1.0 + here.energy));
+      EXPECT_LE((here.torque_a - there.torque_a).norm(), 1e-15 * (1.0 + here.energy));
+      EXPECT_LE((here.force_b - 4.0 * there.force_b).norm(), 2e-15 * (1.0 + here.force_b.norm()));
+    };
+    check(NormalisedCoplanarity{.strength = 1.0, .weight = {}});
+    check(NormalisedCoCircularity{.strength = 1.0, .weight = {}});
+  }
+}
+
 TEST(FormLaw, HasItsPrintedValues) {
   const PairPose pose{.r = Vec3::UnitX(), .normal_a = Vec3::UnitZ(), .normal_b = Vec3::UnitZ()};
   const PairLoad load = evaluate(FormRadius{.strength = 1.0, .radius = 2.0, .weight = {}}, pose);
@@ -226,8 +272,23 @@ TEST(PairStiffness, BoundsTheSecondVariation) {
     check(form, stiffness(form, d), "form");
     const FormRadius form_radius{.strength = 0.6, .radius = radius, .weight = {}};
     check(form_radius, stiffness(form_radius), "form radius");
+    const CoCircularity co_circularity{.strength = 0.7, .weight = {}};
+    check(co_circularity, stiffness(co_circularity, d), "co-circularity");
+    const NormalisedCoCircularity normalised{.strength = 0.7, .weight = {}};
+    check(normalised, stiffness(normalised, d), "normalised co-circularity");
     const BondFrame frame = BondFrame::from_rest(2.0, 0.7, rest.pose());
     check(frame, stiffness(frame), "bond frame");
+    // Flat laws rest where both normals are parallel and across r.
+    rest.x_b = d * n_a.cross(n_b).normalized();
+    rest.e_b = rest.q_b.conjugate() * n_a;
+    const CoNormality co_normality{.strength = 0.7, .weight = {}};
+    check(co_normality, stiffness(co_normality, d), "co-normality");
+    const Coplanarity coplanarity{.strength = 0.7, .weight = {}};
+    check(coplanarity, stiffness(coplanarity, d), "coplanarity");
+    const NormalisedCoplanarity flat{.strength = 0.7, .weight = {}};
+    check(flat, stiffness(flat, d), "normalised coplanarity");
+    const LennardJones pair = LennardJones::from_gain(d, 0.3, 4);
+    check(pair, stiffness(pair), "Lennard-Jones");
   }
 }
 

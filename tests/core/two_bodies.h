@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/support.h"
+#include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
 namespace supple::core::test {
@@ -45,14 +46,15 @@ inline Eigen::Matrix<double, 12, 1> generalised_force(const PairLoad& load) {
 }
 
 /// Force and torque by central differences of the energy. Step 1e-5: truncation h^2/6 U''' < 1e-9 U_scale and rounding
-/// eps U / h < 1e-10 U_scale, U_scale about 10 for the gains of the tests.
+/// eps U / h < 1e-10 U_scale, U_scale about 10 for the gains of the tests; more where a force is large.
 template <class Law>
 void expect_gradient(const Law& law, const TwoBodies& at, const std::string& name) {
   constexpr double kStep = 1e-5, kBound = 1e-7;
   const Eigen::Matrix<double, 12, 1> load = generalised_force(evaluate(law, at.pose()));
   for (int k = 0; k < 12; ++k) {
     const Eigen::Matrix<double, 12, 1> h = kStep * Eigen::Matrix<double, 12, 1>::Unit(k);
-    EXPECT_NEAR(-(energy(law, at.moved(h)) - energy(law, at.moved(-h))) / (2.0 * kStep), load[k], kBound)
+    EXPECT_NEAR(-(energy(law, at.moved(h)) - energy(law, at.moved(-h))) / (2.0 * kStep), load[k],
+                kBound * (1.0 + std::abs(load[k])))
         << name << ' ' << k;
   }
 }
@@ -75,9 +77,19 @@ void for_each_law(Draw& draw, const Check& check) {
     check(Form{.strength = 0.8, .curvature = 0.0, .weight = weight}, "flat form");
     check(FormRadius{.strength = 0.6, .radius = 1.3, .weight = weight}, "form radius");
     check(Coplanarity{.strength = 1.2, .weight = weight}, "coplanarity");
+    check(NormalisedCoplanarity{.strength = 1.1, .weight = weight}, "normalised coplanarity");
+    check(CoNormality{.strength = 0.9, .weight = weight}, "co-normality");
+    check(CoCircularity{.strength = 0.5, .weight = weight}, "co-circularity");
+    check(NormalisedCoCircularity{.strength = 0.6, .weight = weight}, "normalised co-circularity");
   }
   check(Cohesion{.r0 = 0.8, .f0 = 1.5, .a = 4.0}, "cohesion");
   check(Repulsion{.force = 0.5, .distance = 0.9, .length = 0.3, .tolerance = 1e-3}, "repulsion");
+  LennardJones lennard_jones{.r0 = 0.9, .depth = 0.4, .repulsive = 7, .attractive = 3};
+  check(lennard_jones, "Lennard-Jones");
+  lennard_jones.cut_off = 1.6;
+  check(lennard_jones, "Lennard-Jones with shifted force");
+  lennard_jones.switch_from = 0.7;
+  check(lennard_jones, "Lennard-Jones with switched potential");
   const TwoBodies rest = TwoBodies::random(draw);
   check(BondFrame::from_rest(2.0, 0.7, rest.pose()), "bond frame");
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "supple/core/executor.h"
+#include "supple/core/lennard_jones.h"
 #include "supple/core/neighbours.h"
 #include "supple/core/pair_laws.h"
 #include "supple/core/particles.h"
@@ -66,7 +67,13 @@ struct Interactions {
   std::vector<BondedLaw<FormRadius>> form_radius;
   std::vector<BondedLaw<BondFrame>> bond_frame;
   std::vector<BondedLaw<Coplanarity>> coplanarity;
+  std::vector<BondedLaw<NormalisedCoplanarity>> normalised_coplanarity;
+  std::vector<BondedLaw<CoNormality>> co_normality;
+  std::vector<BondedLaw<CoCircularity>> co_circularity;
+  std::vector<BondedLaw<NormalisedCoCircularity>> normalised_co_circularity;
+  std::vector<BondedLaw<LennardJones>> lennard_jones;
   std::vector<GeometricLaw<Cohesion>> geometric_cohesion;
+  std::vector<GeometricLaw<LennardJones>> geometric_lennard_jones;
   std::vector<GeometricLaw<Repulsion>> repulsion;
   std::vector<Friction> friction;
   std::vector<MediumDamping> medium;
@@ -74,7 +81,9 @@ struct Interactions {
   Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
 
   /// True when no law needs the neighbour search.
-  [[nodiscard]] bool bonded_only() const { return geometric_cohesion.empty() && repulsion.empty(); }
+  [[nodiscard]] bool bonded_only() const;
+  /// Number of pair laws; friction and external loads are not counted.
+  [[nodiscard]] std::size_t law_count() const;
 };
 
 /// Energy [J], forces and torques of one law, for `query forces` and for audits.

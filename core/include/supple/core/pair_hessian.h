@@ -2,6 +2,7 @@
 /// Second derivatives of the pair laws, for implicit integration and for modes about a rest shape.
 #pragma once
 
+#include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
 namespace supple::core {
@@ -24,6 +25,11 @@ enum class HessianKind : std::uint8_t { Exact, PositiveSemiDefinite };
 [[nodiscard]] PairHessian hessian(const FormRadius& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const BondFrame& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const Coplanarity& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const NormalisedCoplanarity& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const CoNormality& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const CoCircularity& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const NormalisedCoCircularity& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const LennardJones& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind);
 
 }  // namespace supple::core

@@ -97,6 +97,31 @@ struct Coplanarity {
   Weight weight;
 };
 
+/// The same, made independent of scale: psi / d^2 instead of psi (Lombardo & Puech 1995, footnote 6), as part of the
+/// energy and differentiated with it.
+struct NormalisedCoplanarity {
+  double strength = 0.0;  ///< k [J]
+  Weight weight;
+};
+
+/// Co-normality (Szeliski & Tonnesen 1992): U = k psi |n_A - n_B|^2.
+struct CoNormality {
+  double strength = 0.0;  ///< k [J]
+  Weight weight;
+};
+
+/// Co-circularity (Szeliski & Tonnesen 1992): U = k psi ((n_A + n_B) . r)^2; zero on circles and spheres of any radius.
+struct CoCircularity {
+  double strength = 0.0;  ///< k [N/m]
+  Weight weight;
+};
+
+/// Co-circularity with psi / d^2 instead of psi.
+struct NormalisedCoCircularity {
+  double strength = 0.0;  ///< k [J]
+  Weight weight;
+};
+
 /// Exponential repulsion, force-shifted to vanish at the cut-off d_c = d0 + lambda ln(F_r / F_tol).
 struct Repulsion {
   double force = 0.0;        ///< F_r [N], the (unshifted) force at d0
@@ -112,6 +137,10 @@ struct Repulsion {
 [[nodiscard]] PairLoad evaluate(const FormRadius& law, const PairPose& pose);
 [[nodiscard]] PairLoad evaluate(const BondFrame& law, const PairPose& pose);
 [[nodiscard]] PairLoad evaluate(const Coplanarity& law, const PairPose& pose);
+[[nodiscard]] PairLoad evaluate(const NormalisedCoplanarity& law, const PairPose& pose);
+[[nodiscard]] PairLoad evaluate(const CoNormality& law, const PairPose& pose);
+[[nodiscard]] PairLoad evaluate(const CoCircularity& law, const PairPose& pose);
+[[nodiscard]] PairLoad evaluate(const NormalisedCoCircularity& law, const PairPose& pose);
 [[nodiscard]] PairLoad evaluate(const Repulsion& law, const PairPose& pose);
 
 /// Upper bounds of the stiffness of a law near its rest pose, for the choice of the time step. The second variation of
@@ -126,6 +155,10 @@ struct Stiffness {
 [[nodiscard]] Stiffness stiffness(const FormRadius& law);
 [[nodiscard]] Stiffness stiffness(const BondFrame& law);
 [[nodiscard]] Stiffness stiffness(const Coplanarity& law, double rest_distance);
+[[nodiscard]] Stiffness stiffness(const NormalisedCoplanarity& law, double rest_distance);
+[[nodiscard]] Stiffness stiffness(const CoNormality& law, double rest_distance);
+[[nodiscard]] Stiffness stiffness(const CoCircularity& law, double rest_distance);
+[[nodiscard]] Stiffness stiffness(const NormalisedCoCircularity& law, double rest_distance);
 [[nodiscard]] Stiffness stiffness(const Repulsion& law);
 
 }  // namespace supple::core
