@@ -89,6 +89,9 @@ double strongest_attraction(double a) {
   return v;
 }
 
+/// a of the law that attracts most at v.
+double shape_of(double v) { return (2.0 * v + 3.0) / (2.0 * v * v * (1.0 + v)); }
+
 }  // namespace
 
 Cohesion Cohesion::from_gain(double r0, double gain, double alpha) {
@@ -99,8 +102,13 @@ Cohesion Cohesion::from_gain(double r0, double gain, double alpha) {
 Cohesion Cohesion::from_maximum(double r0, double r_m, double f_max) {
   SUPPLE_EXPECTS(r0 > 0.0 && r_m > r0 && f_max > 0.0);
   const double v = r_m / r0 - 1.0;
-  const double a = (2.0 * v + 3.0) / (2.0 * v * v * (1.0 + v));
+  const double a = shape_of(v);
   return {.r0 = r0, .f0 = f_max * (1.0 + v) / (v * v * v) * math::exp(a * v * v), .a = a};
+}
+
+Cohesion Cohesion::from_ratio(double r0, double ratio, double f0) {
+  SUPPLE_EXPECTS(r0 > 0.0 && ratio > 1.0 && f0 > 0.0);
+  return {.r0 = r0, .f0 = f0, .a = shape_of(ratio - 1.0)};
 }
 
 double Cohesion::force(double distance) const { return -f0 * attraction(a, distance / r0 - 1.0); }

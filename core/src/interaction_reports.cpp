@@ -40,12 +40,11 @@ template <class Law>
 double zero_energy(const BondedLaw<Law>&) {
   return 0.0;
 }
-double zero_energy(const GeometricLaw<Cohesion>& list) { return list.law.energy(list.range); }
-/// The others vanish there.
 template <class Law>
-double zero_energy(const GeometricLaw<Law>&) {
-  return 0.0;
+double zero_energy(const GeometricLaw<Law>& list) {
+  return list.law.energy(list.range);
 }
+double zero_energy(const GeometricLaw<Repulsion>&) { return 0.0; }
 
 /// Calls visit(list) for every list of pairs of a scene, in one order.
 template <class Visit>

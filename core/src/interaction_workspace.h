@@ -73,9 +73,11 @@ struct PackedGeometric {
 struct InteractionWorkspace::Impl {
   std::tuple<PackedBonds<Cohesion>, PackedBonds<Form>, PackedBonds<FormRadius>, PackedBonds<BondFrame>,
              PackedBonds<Coplanarity>, PackedBonds<NormalisedCoplanarity>, PackedBonds<CoNormality>,
-             PackedBonds<CoCircularity>, PackedBonds<NormalisedCoCircularity>, PackedBonds<LennardJones>>
+             PackedBonds<CoCircularity>, PackedBonds<NormalisedCoCircularity>, PackedBonds<LennardJones>,
+             PackedBonds<LinearCohesion>, PackedBonds<DirectedCohesion>, PackedBonds<TabulatedCohesion>>
       bonded;
-  std::tuple<std::vector<PackedGeometric<Cohesion>>, std::vector<PackedGeometric<LennardJones>>,
+  std::tuple<std::vector<PackedGeometric<Cohesion>>, std::vector<PackedGeometric<LinearCohesion>>,
+             std::vector<PackedGeometric<TabulatedCohesion>>, std::vector<PackedGeometric<LennardJones>>,
              std::vector<PackedGeometric<Repulsion>>>
       geometric;
 

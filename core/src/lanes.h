@@ -55,6 +55,17 @@ inline Lanes exp(Lanes a) {
   return Lanes::load(x.data());
 }
 
+/// function(a, b) of each lane.
+template <class Function>
+Lanes lane_by_lane(const Function& function, Lanes a, Lanes b) {
+  alignas(32) std::array<double, kLanes> x;
+  alignas(32) std::array<double, kLanes> y;
+  a.store(x.data());
+  b.store(y.data());
+  for (std::size_t k = 0; k < kLanes; ++k) x[k] = function(x[k], y[k]);
+  return Lanes::load(x.data());
+}
+
 inline double fma(double a, double b, double c) { return std::fma(a, b, c); }
 inline double fms(double a, double b, double c) { return std::fma(a, b, -c); }
 inline double positive(double a) { return a > 0.0 ? a : 0.0; }
@@ -62,6 +73,10 @@ inline double least(double a, double b) { return a < b ? a : b; }
 inline double where_less(double a, double b, double value) { return a < b ? value : 0.0; }
 inline double by_highest_bit(double bits, double set, double clear) { return std::signbit(bits) ? set : clear; }
 inline double next_bit(double bits) { return std::bit_cast<double>(std::bit_cast<std::uint64_t>(bits) << 1); }
+template <class Function>
+double lane_by_lane(const Function& function, double a, double b) {
+  return function(a, b);
+}
 inline double exp(double a) { return math::exp(a); }
 using std::sqrt;
 

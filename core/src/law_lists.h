@@ -17,6 +17,8 @@ void for_each_bonded(All& laws, const Visit& visit) {
 template <class All, class Visit>
 void for_each_geometric(All& laws, const Visit& visit) {
   visit(laws.geometric_cohesion);
+  visit(laws.geometric_linear_cohesion);
+  visit(laws.geometric_tabulated_cohesion);
   visit(laws.geometric_lennard_jones);
   visit(laws.repulsion);
 }

@@ -237,6 +237,54 @@ PairHessian hessian(const LennardJones& law, const PairPose& pose, HessianKind k
   return central_hessian(-law.force(d), -law.slope(d), pose, kind);
 }
 
+PairHessian hessian(const LinearCohesion& law, const PairPose& pose, HessianKind kind) {
+  const double d = pose.r.norm();
+  return central_hessian(-law.force(d), -law.slope(d), pose, kind);
+}
+
+PairHessian hessian(const TabulatedCohesion& law, const PairPose& pose, HessianKind kind) {
+  const double d = pose.r.norm();
+  return central_hessian(-law.force(d), -law.slope(d), pose, kind);
+}
+
+PairHessian hessian(const DirectedCohesion& law, const PairPose& pose, HessianKind kind) {
+  // s = d^2 / h with h = h_A + h_B, h_X = sqrt(r . M r) and M = Q D^2 Q^T: turning X by dtheta is turning r by -dtheta.
+  const Vec3& r = pose.r;
+  double h = 0.0;
+  Vec9 gradient = Vec9::Zero();  // of h
+  Mat9 second = Mat9::Zero();    // of h
+  const auto add = [&](const Vec3& semi_axes, const Quat& orientation, int turn) {
+    const Mat3 q = orientation.toRotationMatrix();
+    const Mat3 m = q * semi_axes.cwiseAbs2().asDiagonal() * q.transpose();
+    const double value = std::sqrt(r.dot(m * r));
+    const Vec3 g = m * r / value;
+    const Mat3 hessian_r = (m - g * g.transpose()) / value;
+    const Mat3 lever = cross_matrix(r);
+    h += value;
+    gradient.segment<3>(kR) += g;
+    gradient.segment<3>(turn) -= r.cross(g);
+    second.block<3, 3>(kR, kR) += hessian_r;
+    second.block<3, 3>(turn, turn) += lever.transpose() * hessian_r * lever + turning_term(r, g);
+    const Mat3 mixed = hessian_r * lever - cross_matrix(g);
+    second.block<3, 3>(kR, turn) += mixed;
+    second.block<3, 3>(turn, kR) += mixed.transpose();
+  };
+  add(law.semi_axes_a, pose.orientation_a, kTurnA);
+  add(law.semi_axes_b, pose.orientation_b, kTurnB);
+
+  const double s = r.squaredNorm() / h;
+  const Cohesion unit{.r0 = 1.0, .f0 = law.scale, .a = law.a};
+  const double bend = -unit.slope(s);  // W''
+  const Vec9 d2_gradient = stacked(2.0 * r, Vec3::Zero(), Vec3::Zero());
+  const Vec9 slope = (d2_gradient - s * gradient) / h;
+  if (kind == HessianKind::PositiveSemiDefinite) {
+    return from_relative(std::max(bend, 0.0) * slope * slope.transpose());
+  }
+  Mat9 second_s = -(slope * gradient.transpose() + gradient * slope.transpose()) - s * second;
+  second_s.block<3, 3>(kR, kR) += 2.0 * Mat3::Identity();
+  return from_relative(bend * slope * slope.transpose() - unit.force(s) / h * second_s);
+}
+
 PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind) {
   const double d = pose.r.norm();
   if (d >= law.cut_off()) return PairHessian::Zero();

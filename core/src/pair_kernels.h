@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "lanes.h"
+#include "supple/core/cohesion_variants.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
@@ -86,6 +87,88 @@ struct PairKernel<Cohesion> {
     const T v2 = v * v;
     return {.force_b = (p[1] * (v2 * v) * exp(p[2] * v2) / (s * s)) * pair.r, .torque_a = {}, .torque_b = {}};
   }
+};
+
+template <>
+struct PairKernel<LinearCohesion> {
+  static constexpr bool kOrientation = false, kNormal = false, kTorque = false;
+  static constexpr std::size_t kNumbers = 4;
+  static void pack(const LinearCohesion& law, double* p) {
+    p[0] = 1.0 / law.r0;
+    p[1] = -law.f0 / law.r0;
+    p[2] = -law.a;
+    p[3] = law.eta;
+  }
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const T s = sqrt(dot(pair.r, pair.r)) * p[0];
+    const T v = s - T(1.0);
+    const T v2 = v * v;
+    return {.force_b = (p[1] * v * (p[3] + v2) * exp(p[2] * v2) / s) * pair.r, .torque_a = {}, .torque_b = {}};
+  }
+};
+
+/// s = d^2 / (h_A + h_B) with h = sqrt(r . M r), M = Q D^2 Q^T, so that no unit vector is needed.
+template <>
+struct PairKernel<DirectedCohesion> {
+  static constexpr bool kOrientation = true, kNormal = false, kTorque = true;
+  static constexpr std::size_t kNumbers = 8;
+  static void pack(const DirectedCohesion& law, double* p) {
+    p[0] = law.scale;
+    p[1] = -law.a;
+    for (int k = 0; k < 3; ++k) {
+      p[2 + k] = law.semi_axes_a[k] * law.semi_axes_a[k];
+      p[5 + k] = law.semi_axes_b[k] * law.semi_axes_b[k];
+    }
+  }
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const Ellipsoid<T> a(p + 2, pair.orientation_a, pair.r);
+    const Ellipsoid<T> b(p + 5, pair.orientation_b, pair.r);
+    const T inverse = T(1.0) / (a.h + b.h);
+    const T d2 = dot(pair.r, pair.r);
+    const T s = d2 * inverse;
+    const T v = s - T(1.0);
+    const T v2 = v * v;
+    const T slope = p[0] * (v2 * v) * exp(p[1] * v2) / s;  // W'
+    const T turning = slope * s * inverse;
+    return {.force_b = scaled_sum(T(-2.0) * slope * inverse, pair.r, turning * (a.gradient + b.gradient)),
+            .torque_a = T(-1.0) * turning * cross(pair.r, a.gradient),
+            .torque_b = T(-1.0) * turning * cross(pair.r, b.gradient)};
+  }
+
+ private:
+  template <class T>
+  struct Ellipsoid {
+    T h;
+    Vector<T> gradient;  ///< of h with respect to r
+    Ellipsoid(const T* squares, const Rotation<T>& q, const Vector<T>& r) {
+      const Vector<T> y = rotate(Rotation<T>{T(-1.0) * q.u, q.w}, r);
+      const Vector<T> m_y{squares[0] * y.x, squares[1] * y.y, squares[2] * y.z};
+      h = sqrt(dot(y, m_y));
+      gradient = (T(1.0) / h) * rotate(q, m_y);
+    }
+  };
+};
+
+/// The address of the table travels in a number.
+template <>
+struct PairKernel<TabulatedCohesion> {
+  static constexpr bool kOrientation = false, kNormal = false, kTorque = false;
+  static constexpr std::size_t kNumbers = 3;
+  static void pack(const TabulatedCohesion& law, double* p) {
+    p[0] = 1.0 / law.r0;
+    p[1] = law.f0;
+    p[2] = std::bit_cast<double>(law.table.get());
+  }
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const T d = sqrt(dot(pair.r, pair.r));
+    const T force = lane_by_lane(
+        [](double s, double table) { return std::bit_cast<const CohesionTable*>(table)->force(s); }, d * p[0], p[2]);
+    return {.force_b = (p[1] * force / d) * pair.r, .torque_a = {}, .torque_b = {}};
+  }
+  static_assert(sizeof(double) == sizeof(const CohesionTable*));
 };
 
 template <>

@@ -18,7 +18,7 @@ using test::Draw;
 using test::Particles;
 
 /// Laws on the chain of a crowd, bond frames apart.
-constexpr std::size_t kChainLaws = 9;
+constexpr std::size_t kChainLaws = 12;
 
 /// A crowd with every law at work: bonds of all kinds on a chain, geometric laws within and between two objects.
 struct Crowd {
@@ -49,6 +49,10 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
   all.co_circularity.resize(1);
   all.normalised_co_circularity.resize(1);
   all.lennard_jones.resize(1);
+  all.linear_cohesion.resize(1);
+  all.directed_cohesion.resize(1);
+  all.tabulated_cohesion.resize(1);
+  const auto table = std::make_shared<const CohesionTable>(CohesionTable::with_error(4.0, 1e-4));
   all.bond_frame.push_back(test::bond_frames(p, 30.0, 0.5));
   for (std::size_t i = 0; i < count; ++i) {  // away from rest
     p.state.position[i] += draw.vector(0.1);
@@ -74,10 +78,24 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
     if (a % 3 > 0) lennard_jones.cut_off = 3.0 * lennard_jones.r0;
     if (a % 3 > 1) lennard_jones.switch_from = 0.5 * lennard_jones.r0;
     add(all.lennard_jones[0], a, b, lennard_jones);
+    add(all.linear_cohesion[0], a, b,
+        LinearCohesion{.r0 = draw.uniform(0.3, 0.8), .f0 = 0.5, .a = 4.0, .eta = draw.uniform(0.0, 0.3)});
+    add(all.directed_cohesion[0], a, b,
+        DirectedCohesion{.scale = 0.5,
+                         .a = 3.0,
+                         .semi_axes_a = Vec3(0.2, 0.3, 0.25),
+                         .semi_axes_b = Vec3(0.3, 0.2, draw.uniform(0.1, 0.3))});
+    add(all.tabulated_cohesion[0], a, b, TabulatedCohesion{.r0 = draw.uniform(0.3, 0.8), .f0 = 0.5, .table = table});
   });
   const Cohesion cohesion{.r0 = 0.3, .f0 = 1.0, .a = 8.0};
   all.geometric_cohesion.push_back(
       {.name = "own", .object_a = 0, .object_b = 0, .range = cohesion.influence_radius(1e-3), .law = cohesion});
+  const LinearCohesion linear{.r0 = 0.3, .f0 = 0.4, .a = 8.0, .eta = 0.1};
+  all.geometric_linear_cohesion.push_back(
+      {.name = "linear", .object_a = 1, .object_b = 1, .range = linear.influence_radius(1e-3), .law = linear});
+  const TabulatedCohesion tabulated{.r0 = 0.2, .f0 = 0.4, .table = table};
+  all.geometric_tabulated_cohesion.push_back(
+      {.name = "table", .object_a = 0, .object_b = 1, .range = 0.2 * table->end(), .law = tabulated});
   const LennardJones lennard_jones{.r0 = 0.25, .depth = 0.02, .repulsive = 4, .attractive = 2, .cut_off = 0.6};
   all.geometric_lennard_jones.push_back(
       {.name = "both", .object_a = 0, .object_b = 1, .range = lennard_jones.cut_off, .law = lennard_jones});
@@ -186,6 +204,8 @@ TEST(Interactions, CountWhatTheyVisit) {
   EXPECT_GE(loads.counts.pairs_visited, loads.counts.pairs_present);
   Interactions bonded = crowd.interactions;
   bonded.geometric_cohesion.clear();
+  bonded.geometric_linear_cohesion.clear();
+  bonded.geometric_tabulated_cohesion.clear();
   bonded.geometric_lennard_jones.clear();
   bonded.repulsion.clear();
   EXPECT_TRUE(bonded.bonded_only());
@@ -271,7 +291,7 @@ TEST(LawReports, NameEveryLawAndAddUpToThePotentialEnergy) {
   const std::vector<LawReport> reports = report_laws(crowd.p.set, crowd.p.state, crowd.interactions, 0.5);
   ASSERT_EQ(reports.size(), crowd.interactions.law_count() + 2);  // gravity and external loads
   EXPECT_EQ(reports[3].name, "bond_frame");
-  EXPECT_EQ(reports[reports.size() - 5].name, "own");
+  EXPECT_EQ(reports[reports.size() - 7].name, "own");
   EXPECT_EQ(reports[reports.size() - 2].name, "gravity");
   EXPECT_EQ(reports.back().name, "external");
   double energy = 0.0, size = 0.0;

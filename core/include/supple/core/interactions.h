@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "supple/core/cohesion_variants.h"
 #include "supple/core/executor.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/neighbours.h"
@@ -72,7 +73,12 @@ struct Interactions {
   std::vector<BondedLaw<CoCircularity>> co_circularity;
   std::vector<BondedLaw<NormalisedCoCircularity>> normalised_co_circularity;
   std::vector<BondedLaw<LennardJones>> lennard_jones;
+  std::vector<BondedLaw<LinearCohesion>> linear_cohesion;
+  std::vector<BondedLaw<DirectedCohesion>> directed_cohesion;
+  std::vector<BondedLaw<TabulatedCohesion>> tabulated_cohesion;
   std::vector<GeometricLaw<Cohesion>> geometric_cohesion;
+  std::vector<GeometricLaw<LinearCohesion>> geometric_linear_cohesion;
+  std::vector<GeometricLaw<TabulatedCohesion>> geometric_tabulated_cohesion;
   std::vector<GeometricLaw<LennardJones>> geometric_lennard_jones;
   std::vector<GeometricLaw<Repulsion>> repulsion;
   std::vector<Friction> friction;

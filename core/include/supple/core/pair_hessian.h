@@ -2,6 +2,7 @@
 /// Second derivatives of the pair laws, for implicit integration and for modes about a rest shape.
 #pragma once
 
+#include "supple/core/cohesion_variants.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
@@ -30,6 +31,10 @@ enum class HessianKind : std::uint8_t { Exact, PositiveSemiDefinite };
 [[nodiscard]] PairHessian hessian(const CoCircularity& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const NormalisedCoCircularity& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const LennardJones& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const LinearCohesion& law, const PairPose& pose, HessianKind kind);
+/// Positive semi-definite: W'' J^T J with J = ds/dq and W'' raised to 0.
+[[nodiscard]] PairHessian hessian(const DirectedCohesion& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const TabulatedCohesion& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind);
 
 }  // namespace supple::core

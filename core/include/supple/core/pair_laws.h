@@ -51,6 +51,8 @@ struct Cohesion {
   /// From the distance r_m > r0 of the largest attraction and its size F_max [N].
   /// a = (2 v + 3) / (2 v^2 (1 + v)), F0 = F_max (1 + v) / v^3 exp(a v^2), v = r_m / r0 - 1.
   [[nodiscard]] static Cohesion from_maximum(double r0, double r_m, double f_max);
+  /// From F0 and the ratio r_m / r0 > 1: then f / F0 is one function of d / r0 for every rest distance.
+  [[nodiscard]] static Cohesion from_ratio(double r0, double ratio, double f0);
 
   [[nodiscard]] double force(double distance) const;      ///< f [N]
   [[nodiscard]] double slope(double distance) const;      ///< df/dd [N/m]
