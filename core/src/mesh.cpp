@@ -32,6 +32,20 @@ void Mesh::clear() {
   columns.clear();
 }
 
+void append(Mesh& mesh, const Mesh& other) {
+  const auto offset = static_cast<std::uint32_t>(mesh.vertex_count());
+  mesh.position.insert(mesh.position.end(), other.position.begin(), other.position.end());
+  mesh.normal.insert(mesh.normal.end(), other.normal.begin(), other.normal.end());
+  for (const auto& t : other.triangle) mesh.triangle.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  for (const Mesh::Column& column : other.columns) {
+    auto own = std::find_if(mesh.columns.begin(), mesh.columns.end(),
+                            [&column](const Mesh::Column& c) { return c.name == column.name; });
+    if (own == mesh.columns.end()) own = mesh.columns.insert(own, {column.name, std::vector<double>(offset, 0.0)});
+    own->values.insert(own->values.end(), column.values.begin(), column.values.end());
+  }
+  for (Mesh::Column& column : mesh.columns) column.values.resize(mesh.vertex_count(), 0.0);
+}
+
 MeshReport inspect(const Mesh& mesh) {
   MeshReport report;
   const std::size_t vertex_count = mesh.vertex_count();

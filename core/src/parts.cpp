@@ -7,24 +7,29 @@
 
 namespace supple::core {
 
-void gather_poses(const ParticleState& state, std::uint32_t first, std::uint32_t last, std::vector<Pose>& out) {
-  SUPPLE_EXPECTS(first <= last && last <= state.size());
-  out.resize(last - first);
-  for (std::uint32_t i = first; i < last; ++i) out[i - first] = {state.position[i], state.orientation[i]};
+void gather_poses(const ParticleState& state, std::span<const std::uint32_t> particles, std::vector<Pose>& out) {
+  out.resize(particles.size());
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    out[k] = {state.position[particles[k]], state.orientation[particles[k]]};
+  }
 }
 
-void gather_spins(const ParticleSet& set, const ParticleState& state, std::uint32_t first, std::uint32_t last,
-                  std::vector<Vec3>& out) {
-  SUPPLE_EXPECTS(first <= last && last <= state.size());
-  out.resize(last - first);
-  for (std::uint32_t i = first; i < last; ++i) out[i - first] = angular_velocity(set, state, i);
+void gather_motion(const ParticleSet& set, const ParticleState& state, std::span<const std::uint32_t> particles,
+                   std::vector<Vec3>& velocity, std::vector<Vec3>& spin) {
+  velocity.resize(particles.size());
+  spin.resize(particles.size());
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    velocity[k] = state.velocity[particles[k]];
+    spin[k] = angular_velocity(set, state, particles[k]);
+  }
 }
 
-void add_part_loads(std::span<const Vec3> force, std::span<const Vec3> torque, std::uint32_t first, Loads& loads) {
-  SUPPLE_EXPECTS(force.size() == torque.size() && first + force.size() <= loads.force.size());
+void add_part_loads(std::span<const Vec3> force, std::span<const Vec3> torque, std::span<const std::uint32_t> particles,
+                    Loads& loads) {
+  SUPPLE_EXPECTS(force.size() == torque.size() && force.size() == particles.size());
   for (std::size_t k = 0; k < force.size(); ++k) {
-    loads.force[first + k] += force[k];
-    loads.torque[first + k] += torque[k];
+    loads.force[particles[k]] += force[k];
+    loads.torque[particles[k]] += torque[k];
   }
 }
 

@@ -175,6 +175,21 @@ void fields(Archive& archive, MediumDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, BreakingDesc& d) {
+  archive("stretch", d.stretch, above(0.0, kNumber), "d / d0 - 1 of the pair");
+  archive("energy", d.energy, above(0.0, kEnergy), "of all laws of the pair");
+  archive("force", d.force, above(0.0, kForce), "tension F_c; with couple: F / F_c + (M / M_c)^2 > 1 breaks");
+  archive("couple", d.couple, above(0.0, kTorque), "M_c, on either particle");
+  archive.check(d.stretch || d.energy || d.force || d.couple, "", "expected stretch, energy, force or couple", "none of them", "");
+}
+
+template <class Archive>
+void fields(Archive& archive, YieldingDesc& d) {
+  archive.required("energy", d.energy, at_least(0.0, kEnergy), "of a bond frame, from which it flows");
+  archive("time", d.time, at_least(0.0, kTime), "in which the rest pose follows to 1/e; 0: at once");
+}
+
+template <class Archive>
 void fields(Archive& archive, PinDesc& d) {
   archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "from 0; negative counts from the end");
   archive("position", d.position, {}, "held");
@@ -233,10 +248,14 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("contact", d.contact, {}, "what the surface does on contact; absent or false: it touches nothing");
   archive("repulsion", d.repulsion, {}, "exponential repulsion from other objects that have it, where contact is off");
   archive("medium", d.medium, {}, "drag of a surrounding medium; absent: none");
+  archive("breaking", d.breaking, {}, "when bonded pairs come apart; absent: never. What no bond joins any more is a body of its own");
+  archive("yielding", d.yielding, {}, "when bond frames take the present pose as their rest pose; absent: never");
   archive("pins", d.pins, {}, "particles that do not move");
   archive("loads", d.loads, {}, "external forces and torques");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
+  archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
+                "add 'interactions' or remove 'breaking'");
   archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",
                 "add 'skeleton' or remove 'contact'");
   check_particles(archive, d);

@@ -3,6 +3,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "supple/collision/deformed_field.h"
 #include "supple/core/parts.h"
@@ -25,36 +26,40 @@ Box box_of(const implicit::PlacedSkeleton& placed) {
   return box;
 }
 
-bool has_surface(const ObjectModel& object) { return !object.skeleton.primitive.empty(); }
+bool has_surface(const Body& body) { return !body.skeleton.primitive.empty(); }
+
+bool collides(const StageContext& context, const Body& body) {
+  return has_surface(body) && context.model.objects[body.object].collides;
+}
 
 void place(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
-  const ObjectModel& object = context.model.objects[i];
-  core::gather_poses(particles, object.first, object.last, frame.pose[i]);
-  implicit::place_skeleton(object.skeleton, frame.pose[i], frame.placed[i]);
+  const Body& body = context.bodies[i];
+  core::gather_poses(particles, body.particle, frame.pose[i]);
+  implicit::place_skeleton(body.skeleton, frame.pose[i], frame.placed[i]);
   frame.reach[i] = box_of(frame.placed[i]);
   frame.indexed[i] = 0;
 }
 
 void index(const StageContext& context, std::size_t i, Frame& frame) {
   if (frame.indexed[i]) return;
-  implicit::index_field(context.model.objects[i].skeleton, frame.placed[i], frame.field[i]);
+  implicit::index_field(context.bodies[i].skeleton, frame.placed[i], frame.field[i]);
   frame.indexed[i] = 1;
 }
 
-/// The bodies of contact: objects by index, then the ground. Objects without contact keep an empty view.
+/// The bodies of contact by index, then the ground. Bodies without contact keep an empty view.
 void view_bodies(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   const Model& model = context.model;
   static const Pose kStill{};
   static const Vec3 kZero = Vec3::Zero();
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    const ObjectModel& object = model.objects[i];
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    const Body& own = context.bodies[i];
     collision::ContactBody& body = frame.bodies[i];
-    if (!object.collides) continue;
-    core::gather_spins(model.particles, particles, object.first, object.last, frame.spin[i]);
+    if (!collides(context, own)) continue;
+    core::gather_motion(model.particles, particles, own.particle, frame.velocity[i], frame.spin[i]);
     body.field = frame.field[i];
-    body.material = object.material;
+    body.material = model.objects[own.object].material;
     body.pose = frame.pose[i];
-    body.velocity = std::span(particles.velocity).subspan(object.first, object.last - object.first);
+    body.velocity = frame.velocity[i];
     body.angular_velocity = frame.spin[i];
     body.samples = &frame.samples[i];
   }
@@ -70,31 +75,30 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
 }
 
 Box body_reach(const StageContext& context, const Frame& frame, std::size_t body) {
-  return body < context.model.objects.size() ? frame.reach[body] : context.model.ground.surface_box();
+  return body < context.bodies.size() ? frame.reach[body] : context.model.ground.surface_box();
 }
 
 bool may_touch(const StageContext& context, std::size_t body) {
-  return body < context.model.objects.size() ? context.model.objects[body].collides : context.model.has_ground;
+  return body < context.bodies.size() ? collides(context, context.bodies[body]) : context.model.has_ground;
 }
 
-/// Flags the parts of each object whose supports reach another body: the only ones that are sampled. A rule on State
+/// Flags the parts of each body whose supports reach another body: the only ones that are sampled. A rule on State
 /// alone, so it decides which kept distances move on.
 void flag_active_parts(const StageContext& context, Frame& frame) {
-  const Model& model = context.model;
-  const std::size_t bodies = model.objects.size() + (model.has_ground ? 1 : 0);
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    const ObjectModel& object = model.objects[i];
-    frame.active[i].assign(object.last - object.first, 0);
-    if (!object.collides) continue;
-    for (std::size_t j = 0; j < bodies; ++j) {
+  const std::size_t count = context.bodies.size() + (context.model.has_ground ? 1 : 0);
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    const Body& body = context.bodies[i];
+    frame.active[i].assign(body.particle.size(), 0);
+    if (!collides(context, body)) continue;
+    for (std::size_t j = 0; j < count; ++j) {
       if (j == i || !may_touch(context, j)) continue;
       const auto low = static_cast<std::uint32_t>(std::min(i, j));
       const auto high = static_cast<std::uint32_t>(std::max(i, j));
-      if (model.rules.allowed && !model.rules.allowed(low, high)) continue;
+      if (!context.rules.allowed(low, high)) continue;
       const Box other = body_reach(context, frame, j);
       if (!frame.reach[i].overlaps(other)) continue;
       for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
-        if (frame.placed[i].support[k].overlaps(other)) frame.active[i][object.skeleton.primitive[k].part] = 1;
+        if (frame.placed[i].support[k].overlaps(other)) frame.active[i][body.skeleton.primitive[k].part] = 1;
       }
     }
   }
@@ -106,17 +110,17 @@ bool any_active(const std::vector<std::uint8_t>& flags) {
 
 }  // namespace
 
-Frame::Frame(const Model& model)
-    : pose(model.objects.size()),
-      velocity(model.objects.size()),
-      spin(model.objects.size()),
-      placed(model.objects.size()),
-      reach(model.objects.size()),
-      field(model.objects.size()),
-      indexed(model.objects.size(), 0),
-      active(model.objects.size()),
-      samples(model.objects.size()),
-      bodies(model.objects.size() + (model.has_ground ? 1 : 0)),
+Frame::Frame(const Model& model, std::size_t body_count)
+    : pose(body_count),
+      velocity(body_count),
+      spin(body_count),
+      placed(body_count),
+      reach(body_count),
+      field(body_count),
+      indexed(body_count, 0),
+      active(body_count),
+      samples(body_count),
+      bodies(body_count + (model.has_ground ? 1 : 0)),
       loads(bodies.size()),
       dissipative(bodies.size()) {}
 
@@ -135,8 +139,8 @@ StageTimer::~StageTimer() {
 }
 
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
-  for (std::size_t i = 0; i < context.model.objects.size(); ++i) {
-    if (!has_surface(context.model.objects[i])) continue;
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    if (!has_surface(context.bodies[i])) continue;
     place(context, particles, i, frame);
     index(context, i, frame);
   }
@@ -145,18 +149,18 @@ void place_and_index_all(const StageContext& context, const core::ParticleState&
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
                           std::vector<implicit::SampleState>& samples, Frame& frame) {
   const Model& model = context.model;
-  const std::size_t objects = model.objects.size();
+  const std::vector<Body>& bodies = context.bodies;
   const auto profile = [&](Stage stage) -> StageProfile& {
     return context.profile[static_cast<std::size_t>(stage)];
   };
   frame.surface.clear();
   {
     StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
-    for (std::size_t i = 0; i < objects; ++i) {
-      profile(Stage::PlaceSkeleton).present += model.objects[i].skeleton.primitive.size();
-      if (!model.objects[i].collides) continue;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      profile(Stage::PlaceSkeleton).present += bodies[i].skeleton.primitive.size();
+      if (!collides(context, bodies[i])) continue;
       place(context, particles, i, frame);
-      profile(Stage::PlaceSkeleton).visited += model.objects[i].skeleton.primitive.size();
+      profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size();
     }
     flag_active_parts(context, frame);
   }
@@ -164,42 +168,41 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   bool near = false;
   {
     StageTimer timer(profile(Stage::IndexField), context.every_call);
-    for (std::size_t i = 0; i < objects; ++i) {
-      if (!model.objects[i].collides) continue;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (!collides(context, bodies[i])) continue;
       ++profile(Stage::IndexField).present;
       if (context.skip && !any_active(frame.active[i])) continue;
       index(context, i, frame);
       ++profile(Stage::IndexField).visited;
     }
-    for (std::size_t i = 0; i < objects; ++i) near |= any_active(frame.active[i]);
+    for (std::size_t i = 0; i < bodies.size(); ++i) near |= any_active(frame.active[i]);
   }
   view_bodies(context, particles, frame);
   if (context.skip && !near) return;
   {
     StageTimer timer(profile(Stage::SampleSurface), context.every_call);
-    for (std::size_t i = 0; i < objects; ++i) {
-      const ObjectModel& object = model.objects[i];
-      if (!object.collides) continue;
-      profile(Stage::SampleSurface).present += object.samples.size();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Body& body = bodies[i];
+      if (!collides(context, body)) continue;
+      profile(Stage::SampleSurface).present += body.samples.size();
       if (!any_active(frame.active[i])) {
         frame.samples[i] = {};
         continue;
       }
-      implicit::sample_surface(object.skeleton, object.samples, frame.pose[i], frame.field[i], frame.active[i],
+      implicit::sample_surface(body.skeleton, body.samples, frame.pose[i], frame.field[i], frame.active[i],
                                context.executor, samples[i], frame.samples[i]);
       profile(Stage::SampleSurface).visited += frame.samples[i].visited;
     }
   }
   {
     StageTimer timer(profile(Stage::FindContacts), context.every_call);
-    collision::ContactRules rules = model.rules;
     const auto allowed = [&](std::uint32_t a, std::uint32_t b) {
       const auto usable = [&](std::uint32_t i) {
-        return i == objects || (model.objects[i].collides && frame.indexed[i] != 0);
+        return i == bodies.size() || (collides(context, bodies[i]) && frame.indexed[i] != 0);
       };
-      return usable(a) && usable(b) && (!model.rules.allowed || model.rules.allowed(a, b));
+      return usable(a) && usable(b) && context.rules.allowed(a, b);
     };
-    rules.allowed = allowed;
+    const collision::ContactRules rules{.overrides = {}, .allowed = std::ref(allowed)};
     std::uint64_t present = 0;
     frame.pairs = collision::broad_phase(frame.bodies, rules, &present);
     profile(Stage::FindContacts).present += present;
@@ -229,15 +232,16 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
       loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
     }
   }
-  frame.reaction = collision::react(frame.bodies, model.rules, frame.surface, model.reaction, frame.loads,
+  frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, frame.loads,
                                     &frame.traction_force, frame.dissipative);
   if (frame.reaction.dissipated_power != 0.0) out.dissipative.reset(model.particles.size());
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    if (frame.bodies[i].pose.empty()) continue;
+    const std::vector<std::uint32_t>& particle = context.bodies[i].particle;
     if (frame.reaction.dissipated_power != 0.0) {
-      core::add_part_loads(frame.dissipative[i].force, frame.dissipative[i].torque, model.objects[i].first,
-                           out.dissipative);
+      core::add_part_loads(frame.dissipative[i].force, frame.dissipative[i].torque, particle, out.dissipative);
     }
-    core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, model.objects[i].first, out.internal);
+    core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, particle, out.internal);
   }
   if (model.has_ground) {
     out.force_on_fixed += frame.loads.back().force[0];
@@ -249,17 +253,25 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
 
 std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) {
   const Model& model = context.model;
+  const std::vector<Body>& bodies = context.bodies;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
   StageTimer timer(profile, true);
   const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = model.cell};
-  std::vector<Mesh> meshes(model.objects.size());
+  std::vector<Mesh> surfaces(bodies.size());
   implicit::PolygoniseCounts counts;
 
-  // Objects that touch are divided together on one lattice; the ground divides nothing, it is flat and opaque.
+  // Bodies that touch are divided together on one lattice; the ground divides nothing, it is flat and opaque. Pieces of
+  // one object are divided where they still overlap.
   std::vector<std::uint32_t> touching;
   for (const auto& s : frame.surface.summary) {
     for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
-      if (body < model.objects.size()) touching.push_back(body);
+      if (body < bodies.size()) touching.push_back(body);
+    }
+  }
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (frame.bodies[i].pose.empty()) continue;
+    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+      if (frame.field[i].surface_box().overlaps(frame.field[j].surface_box())) touching.insert(touching.end(), {i, j});
     }
   }
   std::sort(touching.begin(), touching.end());
@@ -277,12 +289,21 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) 
     const std::vector<implicit::FieldView> views(claims.begin(), claims.end());
     std::vector<Mesh> parts = implicit::polygonise_partition(views, lattice, context.executor, &counts);
     add_counts();
-    for (std::size_t k = 0; k < touching.size(); ++k) meshes[touching[k]] = std::move(parts[k]);
+    for (std::size_t k = 0; k < touching.size(); ++k) surfaces[touching[k]] = std::move(parts[k]);
   }
-  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
-    if (!has_surface(model.objects[i]) || std::binary_search(touching.begin(), touching.end(), i)) continue;
-    meshes[i] = implicit::polygonise(frame.field[i], lattice, context.executor, &counts);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (!has_surface(bodies[i]) || std::binary_search(touching.begin(), touching.end(), i)) continue;
+    surfaces[i] = implicit::polygonise(frame.field[i], lattice, context.executor, &counts);
     add_counts();
+  }
+  std::vector<Mesh> meshes(model.objects.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    Mesh& mesh = meshes[bodies[i].object];
+    if (mesh.position.empty()) {
+      mesh = std::move(surfaces[i]);
+    } else {
+      append(mesh, surfaces[i]);
+    }
   }
   return meshes;
 }

@@ -14,7 +14,7 @@
 namespace supple::scenes {
 
 struct Frame {
-  // place_skeleton and index_field, by object
+  // place_skeleton and index_field, by body
   std::vector<std::vector<Pose>> pose;
   std::vector<std::vector<Vec3>> velocity;
   std::vector<std::vector<Vec3>> spin;
@@ -22,11 +22,11 @@ struct Frame {
   std::vector<Box> reach;                     ///< box of all supports; holds the surface box
   std::vector<implicit::Field> field;
   std::vector<std::uint8_t> indexed;          ///< 1: `field` belongs to this frame
-  // sample_surface, by object
+  // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;
   // find_contacts, solve_contact_surface, react
-  std::vector<collision::ContactBody> bodies;
+  std::vector<collision::ContactBody> bodies;         ///< and the ground, last
   std::vector<collision::BodyPair> pairs;
   collision::ContactCandidates candidates;
   collision::ContactSurface surface;
@@ -35,7 +35,7 @@ struct Frame {
   collision::ReactionReport reaction;
   std::vector<Vec3> traction_force;           ///< by pair of `surface`
 
-  explicit Frame(const Model& model);
+  Frame(const Model& model, std::size_t body_count);
 };
 
 /// Measures one call of a stage; every 64th call is timed and counted 64-fold, or every call when profiling.
@@ -54,13 +54,15 @@ class StageTimer {
 
 struct StageContext {
   const Model& model;
+  const std::vector<Body>& bodies;
+  const collision::ContactRules& rules;
   const Executor& executor;
   Profile& profile;
   bool skip = true;
   bool every_call = false;
 };
 
-/// Stages 2 and 3 for every object with a surface.
+/// Stages 2 and 3 for every body with a surface.
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 
 /// Stages 2 to 6: from particles to the contact surface. Warm starts are read from and written to `samples`.
@@ -70,7 +72,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
 /// Stage 7: loads of the contact surface on particles; the loads on the ground are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
 
-/// Stage 9 on the deformed fields, one mesh an object.
+/// Stage 9 on the deformed fields, one mesh an object; of several pieces the meshes lie side by side in it.
 [[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame);
 
 }  // namespace supple::scenes

@@ -368,6 +368,18 @@ void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const Objec
   }
 }
 
+core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
+  core::LinkRule rule{.object = object, .breaking = {}, .yield = {}};
+  if (d.breaking) {
+    rule.breaking.stretch = d.breaking->stretch.value_or(rule.breaking.stretch);
+    rule.breaking.energy = d.breaking->energy.value_or(rule.breaking.energy);
+    rule.breaking.force = d.breaking->force.value_or(rule.breaking.force);
+    rule.breaking.couple = d.breaking->couple.value_or(rule.breaking.couple);
+  }
+  if (d.yielding) rule.yield = {d.yielding->energy, d.yielding->time};
+  return rule;
+}
+
 /// All particles move in one plane z = const.
 void confine_to_plane(Model& model, ModelFaults& faults) {
   const double z = model.initial.position.front().z();
@@ -406,6 +418,7 @@ Model build_model(const Scene& scene) {
     if (d.contact) {
       object.material = {d.contact->modulus, d.contact->friction, d.contact->dissipation};
       object.collides = !object.skeleton.primitive.empty();
+      object.breaks = d.breaking.has_value();
     }
     add_pins_and_loads(d, key, object, model, faults);
     model.objects.push_back(std::move(object));
@@ -420,16 +433,19 @@ Model build_model(const Scene& scene) {
   stop_pinned(model);
 
   model.interactions.gravity = scene.gravity;
+  std::vector<core::LinkRule> link_rules;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const ObjectDesc& d = scene.objects[i];
     LawBuilder laws(model, faults, model.objects[i], "objects." + d.name);
     for (std::size_t k = 0; k < d.interactions.size(); ++k) laws.add(d.interactions[k], k);
+    if (d.breaking || d.yielding) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
     if (d.medium) {
       model.interactions.medium.push_back({static_cast<std::uint32_t>(i), d.medium->linear, d.medium->angular});
     }
   }
   build_contact(scene, model, faults);
   faults.raise();
+  model.links = core::make_links(model.particles, model.rest, model.interactions, link_rules);
 
   double cell = std::numeric_limits<double>::infinity();
   Box everything;

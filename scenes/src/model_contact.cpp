@@ -180,7 +180,7 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   for (std::uint32_t i = 0; i < count; ++i) {
     ObjectModel& object = model.objects[i];
     if (!object.collides) continue;
-    bool touches = false;
+    bool touches = object.breaks;
     for (std::uint32_t j = 0; j <= count && !touches; ++j) {
       const bool other = j == count ? model.has_ground : j != i && model.objects[j].collides;
       touches = other && (!model.rules.allowed || model.rules.allowed(i, j));

@@ -91,14 +91,14 @@ void write_mesh_files(const fs::path& folder, const std::string& name, int frame
 }
 
 void write_grid_file(const fs::path& folder, const std::string& name, int frame, Simulation& simulation) {
-  const Model& model = simulation.model();
+  const std::vector<Body>& bodies = simulation.bodies();
   const Executor executor(1);
   std::vector<implicit::SurfaceGrid> grids;
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    if (model.objects[i].skeleton.primitive.empty()) continue;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty()) continue;
     implicit::GridOptions options;
-    options.lattice.cell = model.cell;
-    options.name = model.objects[i].name;
+    options.lattice.cell = simulation.cell();
+    options.name = bodies[i].name;
     grids.push_back(implicit::make_surface_grid(simulation.fields()[i], options, executor));
   }
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);

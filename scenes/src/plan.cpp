@@ -48,7 +48,7 @@ std::size_t contact_body_count(const Model& model) {
       partner = b != a && collides(b) &&
                 (!model.rules.allowed || model.rules.allowed(std::min(a, b), std::max(a, b)));
     }
-    bodies += partner;
+    bodies += a != n && model.objects[a].breaks ? 2 : partner ? 1 : 0;  // an object that breaks touches its own pieces
   }
   return bodies;
 }

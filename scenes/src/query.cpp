@@ -26,8 +26,8 @@ double thread_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-std::string body_name(const Model& model, std::uint32_t body) {
-  return body < model.objects.size() ? model.objects[body].name : "ground";
+std::string body_name(const Simulation& simulation, std::uint32_t body) {
+  return body < simulation.bodies().size() ? simulation.bodies()[body].name : "ground";
 }
 
 std::string rule_name(collision::ContactRule rule) {
@@ -60,7 +60,7 @@ std::string query_forces(Simulation& simulation) {
   json["objects"] = objects;
   ordered_json laws = ordered_json::array();
   for (const core::LawReport& law :
-       core::report_laws(model.particles, simulation.state().particles, model.interactions, simulation.time())) {
+       core::report_laws(model.particles, simulation.state().particles, simulation.laws(), simulation.time())) {
     laws.push_back({{"name", law.name}, {"energy_j", law.energy}, {"particles", loads_json(law.loads)}});
   }
   const collision::ContactSurface& surface = simulation.contacts();
@@ -72,7 +72,6 @@ std::string query_forces(Simulation& simulation) {
 }
 
 std::string query_contact(Simulation& simulation, bool samples) {
-  const Model& model = simulation.model();
   const double begin = thread_cpu_seconds();
   const collision::ContactSurface& surface = simulation.contacts();
   const double cpu_us = 1e6 * (thread_cpu_seconds() - begin);
@@ -82,8 +81,8 @@ std::string query_contact(Simulation& simulation, bool samples) {
   ordered_json pairs = ordered_json::array();
   for (std::size_t k = 0; k < surface.summary.size(); ++k) {
     const auto& s = surface.summary[k];
-    ordered_json pair = {{"a", body_name(model, s.bodies.a)},
-                         {"b", body_name(model, s.bodies.b)},
+    ordered_json pair = {{"a", body_name(simulation, s.bodies.a)},
+                         {"b", body_name(simulation, s.bodies.b)},
                          {"rule", rule_name(s.rule)},
                          {"force_n", vector(s.force)},
                          {"moment_nm", vector(s.moment)},
@@ -116,14 +115,14 @@ std::string query_contact(Simulation& simulation, bool samples) {
 
 std::string query_field(Simulation& simulation, const fs::path& points) {
   const std::vector<Vec3> at = io::read_points_csv(points);
-  const Model& model = simulation.model();
+  const std::vector<Body>& bodies = simulation.bodies();
   const std::vector<implicit::Field>& fields = simulation.fields();
   ordered_json json;
   json["time_s"] = simulation.time();
   json["convention"] = "value > 0 inside; the outward normal is -gradient / |gradient|";
   ordered_json objects = ordered_json::array();
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    if (model.objects[i].skeleton.primitive.empty()) continue;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty()) continue;
     std::vector<double> values(at.size());
     std::vector<Vec3> gradients(at.size());
     fields[i].evaluate(at, values, gradients);
@@ -131,7 +130,7 @@ std::string query_field(Simulation& simulation, const fs::path& points) {
     for (std::size_t p = 0; p < at.size(); ++p) {
       rows.push_back({{"point", vector(at[p])}, {"value", values[p]}, {"gradient_1_m", vector(gradients[p])}});
     }
-    objects.push_back({{"name", model.objects[i].name}, {"points", rows}});
+    objects.push_back({{"name", bodies[i].name}, {"points", rows}});
   }
   json["objects"] = objects;
   return text(json);

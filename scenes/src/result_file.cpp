@@ -1,5 +1,6 @@
 #include "result_file.h"
 
+#include <algorithm>
 #include <sys/resource.h>
 
 #include <nlohmann/json.hpp>
@@ -48,6 +49,8 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
                       {"largest_overlap", audits.largest_overlap},
                       {"largest_overlap_share", audits.largest_overlap_share},
                       {"dissipated_j", state.ledger.dissipated},
+                      {"broken_j", state.links.released},
+                      {"yielded_j", state.links.flowed},
                       {"external_work_j", state.ledger.external_work},
                       {"external_impulse_ns", vector(state.ledger.external_impulse)},
                       {"pin_impulse_ns", vector(state.ledger.pin_impulse)},
@@ -57,7 +60,10 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
     for (std::size_t i = 0; i < model.objects.size(); ++i) {
       const ObjectModel& o = model.objects[i];
       const auto& record = state.record.objects[i];
+      const auto pieces = std::count_if(simulation->bodies().begin(), simulation->bodies().end(),
+                                        [i](const Body& body) { return body.object == i; });
       objects[o.name] = {{"particles", o.last - o.first},
+                         {"pieces", pieces},
                          {"diameter", o.rest_diameter},
                          {"largest_deformation", record.largest_deformation},
                          {"final_shape_error", record.final_shape_error}};

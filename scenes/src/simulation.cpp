@@ -32,6 +32,10 @@ struct Simulation::Impl {
   Profile profile{};
   State state;
   State last_frame;
+  // What State::links and State::apart leave of the model.
+  core::Interactions laws;
+  std::vector<Body> bodies;
+  collision::ContactRules rules;
   Frame frame;
   core::InteractionWorkspace workspace;
   double pair_frequency = 0.0;
@@ -50,20 +54,106 @@ struct Simulation::Impl {
         options(o),
         executor(o.threads),
         plan(plan_step(scene, model, requested_outputs(scene))),
-        frame(model),
-        workspace(model.particles, model.interactions),
+        laws(model.interactions),
+        frame(model, 0),
+        workspace(model.particles, laws),
         pair_frequency(core::largest_frequency(model.particles, model.rest, model.interactions)),
-        pulled(model) {
+        pulled(model, 0) {
     state.particles = model.initial;
-    state.samples.resize(model.objects.size());
-    for (std::size_t i = 0; i < model.objects.size(); ++i) {
-      state.samples[i].distance.assign(model.objects[i].samples.size(), -1.0);
-    }
+    state.links = core::unbroken(model.links);
+    form_bodies();
+    for (const Body& body : bodies) state.samples.push_back({.distance = std::vector<double>(body.samples.size(), -1.0)});
     choose_step();
     book_audits();
   }
 
-  StageContext context() { return {model, executor, profile, options.skip, options.profile}; }
+  StageContext context() { return {model, bodies, rules, executor, profile, options.skip, options.profile}; }
+
+  /// Bodies, rules and frames for the present pieces.
+  void form_bodies() {
+    bodies = make_bodies(model, state.links);
+    rules = make_body_rules(model, bodies, state.apart);
+    frame = Frame(model, bodies.size());
+    pulled = Frame(model, bodies.size());
+  }
+
+  /// The laws that are left, and what is made from them.
+  void form_laws() {
+    laws = core::intact(model.interactions, model.links, state.links);
+    workspace = core::InteractionWorkspace(model.particles, laws);
+  }
+
+  void take(State other) {
+    state = std::move(other);
+    form_laws();
+    form_bodies();
+    SUPPLE_EXPECTS(state.samples.size() == bodies.size());
+  }
+
+  /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces.
+  void update_links() {
+    if (model.links.size() == 0) return;
+    const core::LinkChange change = core::update_links(model.particles, state.particles, laws, model.links, dt(),
+                                                       state.links, state.ledger);
+    if (!change.any()) return;
+    form_laws();
+    state.kick.valid = false;
+    if (change.broke == 0) return;
+    const std::vector<Body> before = std::move(bodies);
+    form_bodies();
+    if (bodies.size() == before.size()) return;
+    inherit_apart(before);
+    std::vector<implicit::SampleState> samples;
+    for (const Body& body : bodies) {
+      const auto same = std::find_if(before.begin(), before.end(),
+                                     [&body](const Body& old) { return old.particle == body.particle; });
+      samples.push_back(same != before.end() ? state.samples[static_cast<std::size_t>(same - before.begin())]
+                                             : implicit::SampleState{std::vector<double>(body.samples.size(), -1.0)});
+    }
+    state.samples = std::move(samples);
+    rules = make_body_rules(model, bodies, state.apart);
+  }
+
+  /// Two pieces are apart when those that they broke from were.
+  void inherit_apart(const std::vector<Body>& before) {
+    const auto origin = [&before](const Body& body) {
+      for (const Body& old : before) {
+        if (std::binary_search(old.particle.begin(), old.particle.end(), body.particle.front())) return old.particle.front();
+      }
+      return body.particle.front();
+    };
+    const ApartPairs old_pairs = std::move(state.apart);
+    state.apart.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+        const auto [low, high] = std::minmax(origin(bodies[i]), origin(bodies[j]));
+        if (std::binary_search(old_pairs.begin(), old_pairs.end(), collision::BodyPair{low, high})) {
+          state.apart.push_back({bodies[i].particle.front(), bodies[j].particle.front()});
+        }
+      }
+    }
+  }
+
+  /// Pieces of one object whose surfaces are in separate boxes at the start of a step touch from then on.
+  void note_apart() {
+    if (bodies.size() == model.objects.size()) return;
+    ApartPairs fresh;
+    bool placed = false;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+        const collision::BodyPair pair{bodies[i].particle.front(), bodies[j].particle.front()};
+        if (std::binary_search(state.apart.begin(), state.apart.end(), pair)) continue;
+        if (bodies[i].skeleton.primitive.empty() || bodies[j].skeleton.primitive.empty()) continue;
+        if (!placed) place_and_index_all(context(), state.particles, pulled);
+        placed = true;
+        if (!pulled.field[i].surface_box().overlaps(pulled.field[j].surface_box())) fresh.push_back(pair);
+      }
+    }
+    if (fresh.empty()) return;
+    state.apart.insert(state.apart.end(), fresh.begin(), fresh.end());
+    std::sort(state.apart.begin(), state.apart.end());
+    rules = make_body_rules(model, bodies, state.apart);
+  }
 
   [[nodiscard]] double frame_time() const { return 1.0 / scene.frame_rate; }
   [[nodiscard]] double dt() const { return std::ldexp(frame_time(), -state.halvings); }
@@ -113,7 +203,7 @@ struct Simulation::Impl {
       StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
       StageTimer timer(p, options.profile);
       const core::InteractionCounts counts = core::accumulate_interactions(
-          model.particles, particles, model.interactions, at, executor, workspace, out.internal, out.external);
+          model.particles, particles, laws, at, executor, workspace, out.internal, out.external);
       p.visited += counts.pairs_visited;
       p.present += counts.pairs_present;
     }
@@ -129,6 +219,7 @@ struct Simulation::Impl {
       last_frame = state;
       choose_step();
     }
+    note_apart();
     const core::ForceModel forces = [this](const core::ParticleState& particles, double at, core::ForceSample& out) {
       evaluate_forces(particles, at, out);
     };
@@ -136,7 +227,7 @@ struct Simulation::Impl {
       StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
       // Timed with the force evaluation inside, whose share `Simulation::profile` takes off again.
       StageTimer timer(p, options.profile);
-      core::advance(model.particles, model.interactions, forces, time(), dt(), state.particles, state.kick,
+      core::advance(model.particles, laws, forces, time(), dt(), state.particles, state.kick,
                     state.ledger);
       p.visited += model.particles.size();
       p.present += model.particles.size();
@@ -149,9 +240,10 @@ struct Simulation::Impl {
     if (divergence.found) {
       const std::uint64_t step = state.steps;
       const double at = time();
-      if (last_frame.record.valid) state = last_frame;
+      if (last_frame.record.valid) take(last_frame);
       throw_diverged(divergence, step, at);
     }
+    update_links();
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
       ++state.frame;
@@ -187,7 +279,7 @@ struct Simulation::Impl {
     if (contact_on()) {
       std::vector<implicit::SampleState> trial = state.samples;
       Profile unused{};
-      const StageContext quiet{model, executor, unused, options.skip, false};
+      const StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
       find_contact_surface(quiet, state.particles, trial, pulled);
       pulled_sample.internal.reset(model.particles.size());
       apply_reactions(quiet, pulled, pulled_sample);
@@ -200,7 +292,7 @@ struct Simulation::Impl {
     pull_contacts();
     if (pulled_fields) return;
     Profile unused{};
-    place_and_index_all({model, executor, unused, options.skip, false}, state.particles, pulled);
+    place_and_index_all({model, bodies, rules, executor, unused, options.skip, false}, state.particles, pulled);
     pulled_fields = true;
   }
 
@@ -216,7 +308,7 @@ struct Simulation::Impl {
     pull_contacts();
     Energies e;
     e.kinetic = core::measure_motion(model.particles, state.particles).kinetic_energy;
-    e.interaction = core::potential_energy(model.particles, state.particles, model.interactions);
+    e.interaction = core::potential_energy(model.particles, state.particles, laws);
     for (const auto& s : pulled.surface.summary) e.contact += s.energy;
     return e;
   }
@@ -249,7 +341,7 @@ struct Simulation::Impl {
       r.largest_overlap = std::max(r.largest_overlap, s.largest_overlap);
       double thickness = std::numeric_limits<double>::infinity();
       for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
-        if (body < model.objects.size()) thickness = std::min(thickness, 2.0 * model.objects[body].iso_radius);
+        if (body < bodies.size()) thickness = std::min(thickness, 2.0 * model.objects[bodies[body].object].iso_radius);
       }
       r.largest_overlap_share = std::max(r.largest_overlap_share, s.largest_overlap / thickness);
     }
@@ -273,6 +365,8 @@ Simulation& Simulation::operator=(Simulation&&) noexcept = default;
 const Scene& Simulation::scene() const { return impl_->scene; }
 const Model& Simulation::model() const { return impl_->model; }
 const State& Simulation::state() const { return impl_->state; }
+const std::vector<Body>& Simulation::bodies() const { return impl_->bodies; }
+const core::Interactions& Simulation::laws() const { return impl_->laws; }
 int Simulation::frame() const { return impl_->state.frame; }
 double Simulation::time() const { return impl_->time(); }
 double Simulation::time_step() const { return impl_->dt(); }
@@ -287,9 +381,9 @@ void Simulation::step_frame() {
 
 void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());
-  SUPPLE_EXPECTS(state.samples.size() == impl_->model.objects.size());
+  SUPPLE_EXPECTS(state.links.broken.size() == impl_->model.links.size());
   impl_->drop_results();
-  impl_->state = std::move(state);
+  impl_->take(std::move(state));
 }
 
 const std::vector<Mesh>& Simulation::meshes() { return impl_->pull_meshes(); }
@@ -322,8 +416,8 @@ void Simulation::set_cells(int cells) {
   SUPPLE_EXPECTS(cells > 0);
   impl_->pull_fields();
   Box all;
-  for (std::size_t i = 0; i < impl_->model.objects.size(); ++i) {
-    if (!impl_->model.objects[i].skeleton.primitive.empty()) all = all.united(impl_->pulled.field[i].surface_box());
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
+    if (!impl_->bodies[i].skeleton.primitive.empty()) all = all.united(impl_->pulled.field[i].surface_box());
   }
   if (!all.empty()) impl_->model.cell = all.extent().maxCoeff() / cells;
   impl_->pulled_meshes = false;

@@ -80,6 +80,11 @@ std::uint64_t State::hash() const {
   particles.hash(hasher);
   kick.hash(hasher);
   ledger.hash(hasher);
+  links.hash(hasher);
+  for (const auto& pair : apart) {
+    hasher.add(std::uint64_t{pair.a});
+    hasher.add(std::uint64_t{pair.b});
+  }
   for (const auto& s : samples) s.hash(hasher);
   return hasher.value();
 }
@@ -96,6 +101,12 @@ void save_state(const std::filesystem::path& path, const State& state, std::uint
   state.particles.save(out);
   state.kick.save(out);
   state.ledger.save(out);
+  state.links.save(out);
+  out.write(std::uint64_t{state.apart.size()});
+  for (const auto& pair : state.apart) {
+    out.write(std::uint64_t{pair.a});
+    out.write(std::uint64_t{pair.b});
+  }
   out.write(std::uint64_t{state.samples.size()});
   for (const auto& s : state.samples) s.save(out);
   save_record(out, state.record);
@@ -136,7 +147,15 @@ State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
   state.particles.load(in);
   state.kick.load(in);
   state.ledger.load(in);
+  state.links.load(in);
   std::uint64_t n = 0;
+  in.read(n);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    std::uint64_t a = 0, b = 0;
+    in.read(a);
+    in.read(b);
+    state.apart.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)});
+  }
   in.read(n);
   for (std::uint64_t i = 0; i < n; ++i) {
     implicit::SampleState samples;

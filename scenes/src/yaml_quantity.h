@@ -32,6 +32,7 @@ inline constexpr Quantity kSpin{"angular speed", "rad/s", {0, 0, -1, 1}};
 inline constexpr Quantity kAcceleration{"acceleration", "m/s^2", {1, 0, -2, 0}};
 inline constexpr Quantity kForce{"force", "N", {1, 1, -2, 0}};
 inline constexpr Quantity kTorque{"torque", "N m", {2, 1, -2, 0}};
+inline constexpr Quantity kEnergy{"energy", "J", {2, 1, -2, 0}};
 inline constexpr Quantity kPressure{"pressure", "Pa", {-1, 1, -2, 0}};
 inline constexpr Quantity kStiffness{"stiffness", "N/m", {0, 1, -2, 0}};
 inline constexpr Quantity kBending{"bending strength", "J m^2", {4, 1, -2, 0}};

@@ -235,6 +235,113 @@ objects:
   }
 }
 
+/// Two blobs that are pulled apart until their bond breaks, and then thrown against each other.
+std::string dumbbell(const std::string& extra = "breaking: {stretch: 0.3}") {
+  return R"(
+schema: 1
+duration: 2 s
+frame_rate: 20
+objects:
+  - name: dumbbell
+    particles: {arrange: line, count: 2, spacing: 0.5, mass: 0.5}
+    interactions: [{law: bond_frame, stretch: 200, rotation: 1}]
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+    contact: {modulus: 2e3}
+    loads:
+      - {particle: 0, force: [-40, 0, 0], until: 0.07 s}
+      - {particle: 1, force: [40, 0, 0], until: 0.07 s}
+      - {particle: 0, force: [40, 0, 0], from: 0.2 s, until: 0.29 s}
+      - {particle: 1, force: [-40, 0, 0], from: 0.2 s, until: 0.29 s}
+    )" + extra + "\n";
+}
+
+TEST(Pieces, TouchEachOtherOnceTheyHaveBeenApart) {
+  Simulation simulation = make(dumbbell());
+  EXPECT_EQ(simulation.bodies().size(), 1u);
+  run(simulation, 4);
+  ASSERT_EQ(simulation.bodies().size(), 2u);
+  EXPECT_EQ(simulation.bodies()[1].name, "dumbbell.2");
+  EXPECT_EQ(simulation.bodies()[1].particle, (std::vector<std::uint32_t>{1}));
+  EXPECT_EQ(simulation.state().links.broken, (std::vector<std::uint8_t>{1}));
+  EXPECT_GT(simulation.state().links.released, 0.5 * 200.0 * 0.15 * 0.15);
+  bool touched = false;
+  double nearest = 10.0;
+  while (simulation.frame() < 30) {
+    simulation.step_frame();
+    touched |= !simulation.contacts().summary.empty();
+    const auto& x = simulation.state().particles.position;
+    nearest = std::min(nearest, x[1].x() - x[0].x());
+  }
+  EXPECT_TRUE(touched);
+  EXPECT_LT(nearest, 0.45);  // twice the iso radius: they pressed on each other
+  EXPECT_GT(nearest, 0.0);
+  EXPECT_GT(simulation.state().particles.velocity[1].x(), 0.1);  // and flew apart again
+  EXPECT_LT(simulation.audits().momentum_error, 1e-12);
+  EXPECT_LT(simulation.audits().energy_error, 1e-2);
+}
+
+TEST(Pieces, FreshFromABreakDoNotPressOnEachOther) {
+  // At the break the surfaces still overlap: their contact would be energy from nowhere.
+  Simulation simulation = make(dumbbell("breaking: {stretch: 0.02}"));
+  while (simulation.bodies().size() == 1) simulation.step();
+  const auto& x = simulation.state().particles.position;
+  ASSERT_LT(x[1].x() - x[0].x(), 0.54);
+  EXPECT_TRUE(simulation.contacts().summary.empty());
+  EXPECT_TRUE(simulation.state().apart.empty());
+  run(simulation, 6);
+  EXPECT_EQ(simulation.state().apart.size(), 1u);
+}
+
+TEST(Pieces, AreOneBodyWithoutBreaking) {
+  Simulation simulation = make(dumbbell(""));
+  run(simulation, 6);
+  EXPECT_EQ(simulation.bodies().size(), 1u);
+  EXPECT_NE(simulation.state_hash(), hash_after(parse_scene(dumbbell(), "test.yaml", "."), 6, {}));
+}
+
+TEST(Pieces, ContinueFromASavedStateWithTheSameBits) {
+  const Scene scene = parse_scene(dumbbell(), "test.yaml", ".");
+  Simulation whole(scene), first(scene), second(scene);
+  run(first, 5);
+  ASSERT_EQ(first.bodies().size(), 2u);
+  second.restore(first.state());
+  EXPECT_EQ(second.bodies().size(), 2u);
+  run(whole, 20);
+  run(second, 20);
+  EXPECT_EQ(second.state_hash(), whole.state_hash());
+}
+
+TEST(Pieces, DoNotDependOnThreadsOrSkips) {
+  const Scene scene = parse_scene(dumbbell(), "test.yaml", ".");
+  const std::uint64_t one = hash_after(scene, 20, {});
+  EXPECT_EQ(hash_after(scene, 20, {.threads = 3}), one);
+  EXPECT_EQ(hash_after(scene, 20, {.skip = false}), one);
+}
+
+TEST(Pieces, OfThePlateAreTwo) {
+  Simulation simulation(library_scene("objects/plate_breaks"));
+  run(simulation, 14);
+  ASSERT_EQ(simulation.bodies().size(), 2u);
+  EXPECT_EQ(simulation.bodies()[0].particle.size(), 20u);
+  EXPECT_EQ(simulation.bodies()[1].particle.size(), 20u);
+  const std::vector<Mesh>& meshes = simulation.meshes();
+  ASSERT_EQ(meshes.size(), 1u);
+  const MeshReport report = inspect(meshes[0]);
+  EXPECT_TRUE(report.closed && report.oriented);
+  EXPECT_EQ(report.components, 2u);
+}
+
+TEST(Yielding, KeepsPartOfTheDeformation) {
+  const auto stretch = [](const std::string& extra) {
+    Simulation simulation = make(dumbbell(extra + "\n    medium: {linear: 20}"));
+    run(simulation, 41);
+    const auto& x = simulation.state().particles.position;
+    return x[1].x() - x[0].x() - 0.5;
+  };
+  EXPECT_NEAR(stretch(""), 0.0, 1e-3);
+  EXPECT_GT(std::abs(stretch("yielding: {energy: 0.5, time: 0.05 s}")), 0.01);
+}
+
 TEST(Meshes, OfTouchingObjectsCoincideOnTheContactAndAreClosed) {
   Simulation simulation = make(two_balls());
   while (simulation.frame() < 11 && simulation.contacts().summary.empty()) simulation.step();

@@ -28,6 +28,9 @@ struct Mesh {
   void clear();
 };
 
+/// Puts `other` beside `mesh`. A column that only one of them has is 0 for the vertices of the other.
+void append(Mesh& mesh, const Mesh& other);
+
 /// What a closed surface must satisfy, measured.
 struct MeshReport {
   bool closed = false;              ///< every edge has exactly two triangles

@@ -1,5 +1,5 @@
 /// @file supple/core/parts.h
-/// The particles [first, last) of one object as the parts of a body: what the field and contact modules take and return.
+/// Some particles as the parts of a body: what the field and contact modules take and return.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,16 @@
 
 namespace supple::core {
 
-/// Poses of the particles, shape [last - first].
-void gather_poses(const ParticleState& state, std::uint32_t first, std::uint32_t last, std::vector<Pose>& out);
+/// Poses of the particles listed, shape [particles].
+void gather_poses(const ParticleState& state, std::span<const std::uint32_t> particles, std::vector<Pose>& out);
 
-/// Angular velocities [rad/s], world axes, shape [last - first].
-void gather_spins(const ParticleSet& set, const ParticleState& state, std::uint32_t first, std::uint32_t last,
-                  std::vector<Vec3>& out);
+/// Velocities of the centres [m/s] and angular velocities [rad/s], world axes, shape [particles].
+void gather_motion(const ParticleSet& set, const ParticleState& state, std::span<const std::uint32_t> particles,
+                   std::vector<Vec3>& velocity, std::vector<Vec3>& spin);
 
-/// Adds loads of parts 0, 1 ... to the particles first, first + 1 ...
-void add_part_loads(std::span<const Vec3> force, std::span<const Vec3> torque, std::uint32_t first, Loads& loads);
+/// Adds the loads of part k to particle particles[k].
+void add_part_loads(std::span<const Vec3> force, std::span<const Vec3> torque, std::span<const std::uint32_t> particles,
+                    Loads& loads);
 
 /// Largest speed [m/s] and angular speed [rad/s] of all particles.
 struct Speeds {

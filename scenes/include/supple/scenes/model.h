@@ -9,6 +9,7 @@
 #include "supple/collision/react.h"
 #include "supple/core/integrate.h"
 #include "supple/core/interactions.h"
+#include "supple/core/links.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/surface_samples.h"
 #include "supple/scenes/scene.h"
@@ -24,6 +25,7 @@ struct ObjectModel {
   implicit::SampleLayout samples;         ///< empty unless it can touch something
   collision::ContactMaterial material;
   bool collides = false;                  ///< has `contact` and a surface
+  bool breaks = false;                    ///< has `breaking`, so it may fall into pieces
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
 };
@@ -32,7 +34,8 @@ struct Model {
   core::ParticleSet particles;
   core::ParticleState initial;
   core::ParticleState rest;               ///< rest poses (the initial arrangement)
-  core::Interactions interactions;
+  core::Interactions interactions;        ///< of the unbroken scene
+  core::Links links;                      ///< what can break or yield
   std::vector<ObjectModel> objects;       ///< in the order of the scene (by name)
   bool has_ground = false;                ///< the ground collides: it is the last contact body
   implicit::HalfSpace ground;
@@ -50,5 +53,24 @@ struct Model {
 /// @throws Error{Scene} for what only the whole scene shows (a pair naming an absent object, an iso value that no kernel
 /// reaches, two particles at one place with a bond between them ...), with the key concerned.
 [[nodiscard]] Model build_model(const Scene& scene);
+
+/// What has a surface of its own: a whole object, or a piece of one that broke. Contact bodies are these, by index.
+struct Body {
+  std::uint32_t object = 0;
+  std::string name;                        ///< of the object; of several pieces "name.1", "name.2" ...
+  std::vector<std::uint32_t> particle;     ///< its parts are these, ascending
+  implicit::Skeleton skeleton;
+  implicit::SampleLayout samples;
+};
+
+/// Pieces of one object that have been apart from each other, named by their smallest particles, sorted; only these
+/// touch each other: a fresh crack must first open. Part of State.
+using ApartPairs = std::vector<collision::BodyPair>;
+
+/// The bodies at a state, in the order of objects and of smallest particles.
+[[nodiscard]] std::vector<Body> make_bodies(const Model& model, const core::LinkState& links);
+/// Model::rules for these bodies; the ground is bodies.size().
+[[nodiscard]] collision::ContactRules make_body_rules(const Model& model, const std::vector<Body>& bodies,
+                                                      const ApartPairs& apart);
 
 }  // namespace supple::scenes

@@ -112,6 +112,20 @@ struct MediumDesc {
   double angular = 0.0;               ///< gamma_r [1/s]
 };
 
+/// objects[].breaking: a bonded pair of particles that exceeds one of these loses all its laws
+struct BreakingDesc {
+  std::optional<double> stretch;      ///< d / d0 - 1
+  std::optional<double> energy;       ///< [J]
+  std::optional<double> force;        ///< [N]
+  std::optional<double> couple;       ///< [N m]
+};
+
+/// objects[].yielding: bond frames above an energy take over the present pose as their rest pose
+struct YieldingDesc {
+  double energy = 0.0;                ///< [J]
+  double time = 0.0;                  ///< [s]
+};
+
 /// objects[].pins[]
 struct PinDesc {
   int particle = 0;                   ///< negative counts from the end: -1 is the last
@@ -138,6 +152,8 @@ struct ObjectDesc {
   std::optional<MaterialDesc> contact;      ///< absent: the object touches nothing
   std::optional<RepulsionDesc> repulsion;
   std::optional<MediumDesc> medium;
+  std::optional<BreakingDesc> breaking;
+  std::optional<YieldingDesc> yielding;
   std::vector<PinDesc> pins;
   std::vector<LoadDesc> loads;
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB

@@ -66,6 +66,8 @@ class Simulation {
   [[nodiscard]] const Scene& scene() const;
   [[nodiscard]] const Model& model() const;
   [[nodiscard]] const State& state() const;
+  [[nodiscard]] const std::vector<Body>& bodies() const;         ///< objects, or the pieces they broke into
+  [[nodiscard]] const core::Interactions& laws() const;          ///< those that nothing has broken
   [[nodiscard]] int frame() const;              ///< the last frame reached; 1 at the start
   [[nodiscard]] double time() const;            ///< [s]
   [[nodiscard]] double time_step() const;       ///< of the current frame interval [s]
@@ -79,16 +81,16 @@ class Simulation {
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
 
-  /// Surfaces of the current state, one a object in the order of the scene (empty without skeleton); deformed by
+  /// Surfaces of the current state, one an object in the order of the scene (empty without skeleton); deformed by
   /// contact, with columns "contact" and "pressure" [Pa]. Kept until the next step.
   [[nodiscard]] const std::vector<Mesh>& meshes();
-  /// Contacts of the current state; body indices as in Model::rules. Kept until the next step.
+  /// Contacts of the current state between `bodies()`, the ground being the last. Kept until the next step.
   [[nodiscard]] const collision::ContactSurface& contacts();
   /// Total force on body A of each contact, damping and friction included [N], shape [contacts().summary].
   [[nodiscard]] const std::vector<Vec3>& contact_forces();
   /// Loads of contact on all particles at the current state.
   [[nodiscard]] const core::Loads& contact_loads();
-  /// Fields of the objects at the current state, by object; valid until the next step.
+  /// Fields of the bodies at the current state; valid until the next step.
   [[nodiscard]] const std::vector<implicit::Field>& fields();
 
   /// Edge of a lattice cell of `meshes` [m], and its choice by a number of cells along the longest side of all surfaces.

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "supple/core/integrate.h"
+#include "supple/core/links.h"
 #include "supple/core/particles.h"
 #include "supple/implicit/surface_samples.h"
+#include "supple/scenes/model.h"
 
 namespace supple::scenes {
 
@@ -42,7 +44,9 @@ struct State {
   core::ParticleState particles;
   core::KickState kick;
   core::Ledger ledger;
-  std::vector<implicit::SampleState> samples;  ///< by object
+  core::LinkState links;               ///< what broke and yielded
+  ApartPairs apart;                    ///< pieces of one object that touch each other by now
+  std::vector<implicit::SampleState> samples;  ///< by body
   RunRecord record;
 
   [[nodiscard]] std::uint64_t hash() const;    ///< of everything but the record

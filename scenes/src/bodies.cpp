@@ -1,0 +1,91 @@
+#include <algorithm>
+
+#include "supple/scenes/model.h"
+
+namespace supple::scenes {
+namespace {
+
+constexpr std::uint32_t kElsewhere = 0xffffffff;
+
+/// The primitives and seeds that the particles of a piece carry.
+void take_part(const ObjectModel& object, Body& body) {
+  std::vector<std::uint32_t> part(object.last - object.first, kElsewhere);
+  for (std::uint32_t k = 0; k < body.particle.size(); ++k) part[body.particle[k] - object.first] = k;
+
+  body.skeleton.part_count = static_cast<std::uint32_t>(body.particle.size());
+  body.skeleton.iso = object.skeleton.iso;
+  std::vector<std::uint32_t> primitive(object.skeleton.primitive.size(), kElsewhere);
+  for (std::size_t k = 0; k < object.skeleton.primitive.size(); ++k) {
+    implicit::Primitive copy = object.skeleton.primitive[k];
+    if (part[copy.part] == kElsewhere) continue;
+    copy.part = part[copy.part];
+    primitive[k] = static_cast<std::uint32_t>(body.skeleton.primitive.size());
+    body.skeleton.primitive.push_back(copy);
+  }
+  const implicit::SampleLayout& all = object.samples;
+  for (std::size_t s = 0; s < all.size(); ++s) {
+    if (part[all.part[s]] == kElsewhere) continue;
+    body.samples.primitive.push_back(primitive[all.primitive[s]]);
+    body.samples.part.push_back(part[all.part[s]]);
+    body.samples.foot.push_back(all.foot[s]);
+    body.samples.direction.push_back(all.direction[s]);
+    body.samples.reach.push_back(all.reach[s]);
+    body.samples.spread.push_back(all.spread[s]);
+  }
+}
+
+}  // namespace
+
+std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) {
+  const std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, links);
+  std::vector<Body> bodies;
+  for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
+    const ObjectModel& object = model.objects[o];
+    const std::size_t begin = bodies.size();
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      if (piece[i] == i) bodies.push_back({.object = o, .name = object.name, .particle = {}, .skeleton = {}, .samples = {}});
+      const auto owner = std::find_if(bodies.begin() + static_cast<std::ptrdiff_t>(begin), bodies.end(), [&](const Body& b) {
+        return b.particle.empty() ? piece[i] == i : b.particle.front() == piece[i];
+      });
+      owner->particle.push_back(i);
+    }
+    const std::size_t pieces = bodies.size() - begin;
+    for (std::size_t k = 0; k < pieces; ++k) {
+      Body& body = bodies[begin + k];
+      if (pieces > 1) body.name += '.' + std::to_string(k + 1);
+      take_part(object, body);
+    }
+  }
+  return bodies;
+}
+
+collision::ContactRules make_body_rules(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
+  const auto ground = static_cast<std::uint32_t>(bodies.size());
+  std::vector<std::uint32_t> object(bodies.size() + 1), leader(bodies.size() + 1, kElsewhere);
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    object[k] = bodies[k].object;
+    leader[k] = bodies[k].particle.front();
+  }
+  object[ground] = static_cast<std::uint32_t>(model.objects.size());
+
+  collision::ContactRules rules;
+  for (const auto& override : model.rules.overrides) {
+    for (std::uint32_t a = 0; a <= ground; ++a) {
+      for (std::uint32_t b = a + 1; b <= ground; ++b) {
+        if (collision::BodyPair{object[a], object[b]} == override.pair) {
+          rules.overrides.push_back({{a, b}, override.material});
+        }
+      }
+    }
+  }
+  std::sort(rules.overrides.begin(), rules.overrides.end(),
+            [](const auto& x, const auto& y) { return x.pair < y.pair; });
+  rules.allowed = [&allowed = model.rules.allowed, object, leader, apart](std::uint32_t a, std::uint32_t b) {
+    if (object[a] != object[b]) return !allowed || allowed(object[a], object[b]);
+    return std::binary_search(apart.begin(), apart.end(),
+                              collision::BodyPair{std::min(leader[a], leader[b]), std::max(leader[a], leader[b])});
+  };
+  return rules;
+}
+
+}  // namespace supple::scenes
