@@ -1,4 +1,4 @@
-// All lists of bonded laws of a scene, in one order.
+// All lists of bonded laws of a scene that have an energy, in one order.
 #pragma once
 
 #include <tuple>
@@ -12,7 +12,8 @@ template <class Lists>
 auto bonded_lists(Lists& laws) {
   return std::tie(laws.cohesion, laws.form, laws.form_radius, laws.bond_frame, laws.coplanarity,
                   laws.normalised_coplanarity, laws.co_normality, laws.co_circularity, laws.normalised_co_circularity,
-                  laws.lennard_jones, laws.linear_cohesion, laws.directed_cohesion, laws.tabulated_cohesion);
+                  laws.lennard_jones, laws.linear_cohesion, laws.directed_cohesion, laws.tabulated_cohesion,
+                  laws.directed_form);
 }
 
 /// visit(law, first, second) for every bond of every list, in order.

@@ -74,7 +74,7 @@ bool Interactions::bonded_only() const {
 }
 
 std::size_t Interactions::law_count() const {
-  std::size_t count = 0;
+  std::size_t count = literal_form.size();
   for_each_bonded(*this, [&count](const auto& lists) { count += lists.size(); });
   for_each_geometric(*this, [&count](const auto& lists) { count += lists.size(); });
   return count;
@@ -112,6 +112,9 @@ std::vector<LawReport> report_laws(const ParticleSet& set, const ParticleState& 
       report.loads.torque[b] += load.torque_b;
     });
   });
+  for (const BondedLaw<LiteralForm>& list : interactions.literal_form) {
+    accumulate_literal_form(list, set, state, add_report(list.name).loads);
+  }
   LawReport& gravity = add_report("gravity");
   for (std::size_t i = 0; i < set.size(); ++i) gravity.loads.force[i] = set.mass[i] * interactions.gravity;
   LawReport& external = add_report("external");
@@ -136,6 +139,12 @@ double largest_frequency(const ParticleSet& set, const ParticleState& rest, cons
       add(k, b);
     });
   });
+  for (const BondedLaw<LiteralForm>& list : interactions.literal_form) {
+    for (std::size_t k = 0; k < list.law.size(); ++k) {
+      add(stiffness(list.law[k]), list.first[k]);
+      add(stiffness(list.law[k]), list.second[k]);
+    }
+  }
   // Objects that only meet later have no pair at rest: one pair each is counted.
   for_each_geometric(interactions, [&](const auto& lists) {
     for (const auto& list : lists) {

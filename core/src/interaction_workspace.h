@@ -74,7 +74,8 @@ struct InteractionWorkspace::Impl {
   std::tuple<PackedBonds<Cohesion>, PackedBonds<Form>, PackedBonds<FormRadius>, PackedBonds<BondFrame>,
              PackedBonds<Coplanarity>, PackedBonds<NormalisedCoplanarity>, PackedBonds<CoNormality>,
              PackedBonds<CoCircularity>, PackedBonds<NormalisedCoCircularity>, PackedBonds<LennardJones>,
-             PackedBonds<LinearCohesion>, PackedBonds<DirectedCohesion>, PackedBonds<TabulatedCohesion>>
+             PackedBonds<LinearCohesion>, PackedBonds<DirectedCohesion>, PackedBonds<TabulatedCohesion>,
+             PackedBonds<DirectedForm>>
       bonded;
   std::tuple<std::vector<PackedGeometric<Cohesion>>, std::vector<PackedGeometric<LinearCohesion>>,
              std::vector<PackedGeometric<TabulatedCohesion>>, std::vector<PackedGeometric<LennardJones>>,

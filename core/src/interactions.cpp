@@ -351,6 +351,11 @@ InteractionCounts accumulate_interactions(const ParticleSet& set, const Particle
     for (auto& law : lists) accumulate_geometric(law, state, executor, work, counts);
   };
   std::apply([&](auto&... lists) { (accumulate_lists(lists), ...); }, work.geometric);
+  for (const BondedLaw<LiteralForm>& list : interactions.literal_form) {
+    accumulate_literal_form(list, set, state, internal);
+    counts.pairs_visited += list.law.size();
+    counts.pairs_present += list.law.size();
+  }
   for (std::size_t i = 0; i < n; ++i) {
     const StagedLoads& sum = work.sum[i];
     internal.force[i] += Vec3(sum.force[0], sum.force[1], sum.force[2]);

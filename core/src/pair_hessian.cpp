@@ -285,6 +285,34 @@ PairHessian hessian(const DirectedCohesion& law, const PairPose& pose, HessianKi
   return from_relative(bend * slope * slope.transpose() - unit.force(s) / h * second_s);
 }
 
+PairHessian hessian(const DirectedForm& law, const PairPose& pose, HessianKind kind) {
+  const double d = pose.r.norm();
+  const Mat3 q_a = pose.orientation_a.toRotationMatrix();
+  const Mat3 q_b = pose.orientation_b.toRotationMatrix();
+  const Mat3 s_a = q_a * law.shape_a * q_a.transpose();
+  const Mat3 s_b = q_b * law.shape_b * q_b.transpose();
+  const Mat3 mean = 0.5 * (s_a + s_b);
+  const Mat3 lever = cross_matrix(pose.r);
+  Residuals<3> e;
+  e.value = mean * pose.r + pose.normal_a - pose.normal_b;
+  const Vec3& w = e.value;
+  e.gradient.block<3, 3>(kR, 0) = mean;
+  const auto add = [&](const Mat3& s, const Vec3& normal, double sign, int turn) {
+    const Mat3 by_turn = 0.5 * (s * lever - cross_matrix(s * pose.r)) - sign * cross_matrix(normal);
+    e.gradient.block<3, 3>(turn, 0) = by_turn.transpose();
+    // Second derivatives of w . S r / 2 with fixed w, S turning by dtheta.
+    const Mat3 mixed = 0.5 * (s * cross_matrix(w) - cross_matrix(s * w));
+    const Mat3 both = 0.5 * cross_matrix(w).transpose() * s * lever;
+    e.turning.block<3, 3>(kR, turn) += mixed;
+    e.turning.block<3, 3>(turn, kR) += mixed.transpose();
+    e.turning.block<3, 3>(turn, turn) += both + both.transpose() + turning_term(pose.r, 0.5 * s * w) +
+                                         turning_term(w, 0.5 * s * pose.r) + turning_term(normal, sign * w);
+  };
+  add(s_a, pose.normal_a, 1.0, kTurnA);
+  add(s_b, pose.normal_b, -1.0, kTurnB);
+  return weighted_squares(law.strength, law.weight.at(d).over_distance_squared(d), e, pose, kind);
+}
+
 PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind) {
   const double d = pose.r.norm();
   if (d >= law.cut_off()) return PairHessian::Zero();

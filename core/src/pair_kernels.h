@@ -8,6 +8,7 @@
 
 #include "lanes.h"
 #include "supple/core/cohesion_variants.h"
+#include "supple/core/directed_form.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
@@ -249,6 +250,47 @@ struct PairKernel<Form> {
   static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
     const NormalisedKernelWeight<T> weight(p[0], dot(pair.r, pair.r), p[2]);
     return form_loads(weight.psi, weight.slope_over_d, p[1], T(1.0), pair);
+  }
+};
+
+/// A symmetric matrix: xx, yy, zz, xy, xz, yz.
+template <class T>
+Vector<T> symmetric_product(const T* m, const Vector<T>& v) {
+  return {fma(m[0], v.x, fma(m[3], v.y, m[4] * v.z)), fma(m[3], v.x, fma(m[1], v.y, m[5] * v.z)),
+          fma(m[4], v.x, fma(m[5], v.y, m[2] * v.z))};
+}
+
+template <>
+struct PairKernel<DirectedForm> {
+  static constexpr bool kOrientation = true, kNormal = true, kTorque = true;
+  static constexpr std::size_t kNumbers = 14;
+  static void pack(const DirectedForm& law, double* p) {
+    p[0] = law.strength;
+    p[1] = packed_range(law.weight);
+    for (const Mat3* m : {&law.shape_a, &law.shape_b}) {
+      double* const out = p + (m == &law.shape_a ? 2 : 8);
+      for (int k = 0; k < 3; ++k) out[k] = (*m)(k, k);
+      out[3] = (*m)(0, 1);
+      out[4] = (*m)(0, 2);
+      out[5] = (*m)(1, 2);
+    }
+  }
+  template <class T>
+  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
+    const NormalisedKernelWeight<T> weight(p[0], dot(pair.r, pair.r), p[1]);
+    const auto shape = [](const T* m, const Rotation<T>& q, const Vector<T>& v) {
+      return rotate(q, symmetric_product(m, rotate(Rotation<T>{T(-1.0) * q.u, q.w}, v)));
+    };
+    const T half(0.5);
+    const Vector<T> r_a = half * shape(p + 2, pair.orientation_a, pair.r);
+    const Vector<T> r_b = half * shape(p + 8, pair.orientation_b, pair.r);
+    const Vector<T> w = (r_a + r_b) + (pair.normal_a - pair.normal_b);
+    const Vector<T> w_a = half * shape(p + 2, pair.orientation_a, w);
+    const Vector<T> w_b = half * shape(p + 8, pair.orientation_b, w);
+    const T gain = T(-2.0) * weight.psi;
+    return {.force_b = scaled_sum(gain, w_a + w_b, -(weight.slope_over_d * dot(w, w)) * pair.r),
+            .torque_a = gain * (cross(pair.normal_a + r_a, w) - cross(pair.r, w_a)),
+            .torque_b = gain * (cross(r_b - pair.normal_b, w) - cross(pair.r, w_b))};
   }
 };
 

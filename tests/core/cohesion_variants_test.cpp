@@ -170,6 +170,10 @@ TEST(CohesionTableEnergy, IsTheIntegralOfItsForce) {
       EXPECT_NEAR(-(table.energy(s + h) - table.energy(s - h)) / (2.0 * h), table.force(s), 1e-9) << s;
     }
     EXPECT_NEAR(table.energy(0.25 - 1e-12), table.energy(0.25 + 1e-12), 1e-11);
+    for (int k = 1; k <= 16; ++k) {
+      const double knot = 0.25 + 2.75 * k / 16;
+      EXPECT_NEAR(table.energy(knot - 1e-12), table.energy(knot + 1e-12), 1e-12) << knot;  // |f| < 0.2
+    }
     EXPECT_EQ(table.force(3.0), 0.0);
     EXPECT_EQ(table.energy(5.0), table.energy(3.0));
   }

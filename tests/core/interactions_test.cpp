@@ -18,7 +18,7 @@ using test::Draw;
 using test::Particles;
 
 /// Laws on the chain of a crowd, bond frames apart.
-constexpr std::size_t kChainLaws = 12;
+constexpr std::size_t kChainLaws = 13;
 
 /// A crowd with every law at work: bonds of all kinds on a chain, geometric laws within and between two objects.
 struct Crowd {
@@ -52,6 +52,7 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
   all.linear_cohesion.resize(1);
   all.directed_cohesion.resize(1);
   all.tabulated_cohesion.resize(1);
+  all.directed_form.resize(1);
   const auto table = std::make_shared<const CohesionTable>(CohesionTable::with_error(4.0, 1e-4));
   all.bond_frame.push_back(test::bond_frames(p, 30.0, 0.5));
   for (std::size_t i = 0; i < count; ++i) {  // away from rest
@@ -85,6 +86,10 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
                          .a = 3.0,
                          .semi_axes_a = Vec3(0.2, 0.3, 0.25),
                          .semi_axes_b = Vec3(0.3, 0.2, draw.uniform(0.1, 0.3))});
+    DirectedForm directed_form{.strength = 0.1, .shape_a = Mat3::Zero(), .shape_b = Mat3::Zero(), .weight = weight};
+    directed_form.shape_a << 0.7, 0.1, -0.3, 0.1, -0.4, 0.2, -0.3, 0.2, draw.uniform(-1, 1);
+    directed_form.shape_b << 0.2, -0.3, 0.1, -0.3, 0.9, 0.6, 0.1, 0.6, draw.uniform(-1, 1);
+    add(all.directed_form[0], a, b, directed_form);
     add(all.tabulated_cohesion[0], a, b, TabulatedCohesion{.r0 = draw.uniform(0.3, 0.8), .f0 = 0.5, .table = table});
   });
   const Cohesion cohesion{.r0 = 0.3, .f0 = 1.0, .a = 8.0};

@@ -7,6 +7,7 @@
 
 #include "core/support.h"
 #include "supple/core/cohesion_variants.h"
+#include "supple/core/directed_form.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
@@ -82,6 +83,12 @@ void for_each_law(Draw& draw, const Check& check) {
     check(CoNormality{.strength = 0.9, .weight = weight}, "co-normality");
     check(CoCircularity{.strength = 0.5, .weight = weight}, "co-circularity");
     check(NormalisedCoCircularity{.strength = 0.6, .weight = weight}, "normalised co-circularity");
+  }
+  for (const double range : {0.0, 2.5}) {
+    DirectedForm law{.strength = 0.4, .shape_a = Mat3::Zero(), .shape_b = Mat3::Zero(), .weight = {.range = range}};
+    law.shape_a << 0.7, 0.1, 0.0, 0.1, -0.4, 0.2, 0.0, 0.2, 0.1;
+    law.shape_b << 0.2, -0.3, 0.1, -0.3, 0.9, 0.0, 0.1, 0.0, 0.0;
+    check(law, "directed form");
   }
   check(Cohesion{.r0 = 0.8, .f0 = 1.5, .a = 4.0}, "cohesion");
   check(Repulsion{.force = 0.5, .distance = 0.9, .length = 0.3, .tolerance = 1e-3}, "repulsion");

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "supple/core/cohesion_variants.h"
+#include "supple/core/directed_form.h"
 #include "supple/core/executor.h"
 #include "supple/core/lennard_jones.h"
+#include "supple/core/literal_form.h"
 #include "supple/core/neighbours.h"
 #include "supple/core/pair_laws.h"
 #include "supple/core/particles.h"
@@ -76,6 +78,8 @@ struct Interactions {
   std::vector<BondedLaw<LinearCohesion>> linear_cohesion;
   std::vector<BondedLaw<DirectedCohesion>> directed_cohesion;
   std::vector<BondedLaw<TabulatedCohesion>> tabulated_cohesion;
+  std::vector<BondedLaw<DirectedForm>> directed_form;
+  std::vector<BondedLaw<LiteralForm>> literal_form;  ///< counted with energy 0: it has none
   std::vector<GeometricLaw<Cohesion>> geometric_cohesion;
   std::vector<GeometricLaw<LinearCohesion>> geometric_linear_cohesion;
   std::vector<GeometricLaw<TabulatedCohesion>> geometric_tabulated_cohesion;

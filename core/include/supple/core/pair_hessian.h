@@ -3,6 +3,7 @@
 #pragma once
 
 #include "supple/core/cohesion_variants.h"
+#include "supple/core/directed_form.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
@@ -35,6 +36,7 @@ enum class HessianKind : std::uint8_t { Exact, PositiveSemiDefinite };
 /// Positive semi-definite: W'' J^T J with J = ds/dq and W'' raised to 0.
 [[nodiscard]] PairHessian hessian(const DirectedCohesion& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const TabulatedCohesion& law, const PairPose& pose, HessianKind kind);
+[[nodiscard]] PairHessian hessian(const DirectedForm& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind);
 
 }  // namespace supple::core
