@@ -88,4 +88,14 @@ ShapeError shape_error(std::span<const Vec3> rest, std::span<const Vec3> now) {
   return error;
 }
 
+double oscillation(std::span<const Vec3> before, std::span<const Vec3> after) {
+  SUPPLE_EXPECTS(before.size() == after.size() && !before.empty());
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t i = 0; i < before.size(); ++i) mean += after[i] - before[i];
+  mean /= static_cast<double>(before.size());
+  double sum = 0.0;
+  for (std::size_t i = 0; i < before.size(); ++i) sum += (after[i] - before[i] - mean).squaredNorm();
+  return std::sqrt(sum);
+}
+
 }  // namespace supple::core

@@ -43,9 +43,17 @@ Mat3 cross_matrix(const Vec3& v) {
   return m;
 }
 
-/// -(1 + K)^-1 u for K symmetric and positive semi-definite.
-Vec3 implicit_impulse(const Mat3& k, const Vec3& u) {
-  return -(Mat3::Identity() + k).llt().solve(u);
+/// What relative velocity u turns into impulse over h: -(1 - exp(-h k)) / k u to second order in z = h k, by
+/// exp(-z) ~ 1 / (1 + z + z^2 / 2), which tends to 0 with growing z as the exponential does.
+double gain(double h, double k) {
+  const double z = h * k;
+  return -h * (1.0 + 0.5 * z) / (1.0 + z + 0.5 * z * z);
+}
+
+/// The same for a symmetric positive semi-definite matrix z = h K.
+Vec3 implicit_impulse(const Mat3& z, const Vec3& u) {
+  const Mat3 one = Mat3::Identity();
+  return -(one + z + 0.5 * z * z).llt().solve(u + 0.5 * z * u);
 }
 
 void rub(const ParticleSet& set, const Side& a, const Side& b, double h, ParticleState& state, Ledger& ledger) {
@@ -60,8 +68,8 @@ void rub(const ParticleSet& set, const Side& a, const Side& b, double h, Particl
     const double d2 = r.squaredNorm();
     const double across_term = mass_term + 0.25 * (a.inverse_inertia + b.inverse_inertia) * d2;
     const Vec3 u_along = d2 > 0.0 ? Vec3(u.dot(r) / d2 * r) : Vec3(Vec3::Zero());
-    const Vec3 along = -h / (1.0 + h * mass_term) * u_along;
-    const Vec3 across = -h / (1.0 + h * across_term) * (u - u_along);
+    const Vec3 along = gain(h, mass_term) * u_along;
+    const Vec3 across = gain(h, across_term) * (u - u_along);
     impulse = along + across;
     lost = -impulse.dot(u) - 0.5 * (mass_term * along.squaredNorm() + across_term * across.squaredNorm());
   } else {
@@ -83,7 +91,7 @@ void rub_spins(const ParticleSet& set, const Side& a, const Side& b, double h, P
   double lost = 0.0;
   if (a.isotropic && b.isotropic) {
     const double k = a.inverse_inertia + b.inverse_inertia;
-    impulse = -h / (1.0 + h * k) * u;
+    impulse = gain(h, k) * u;
     lost = -impulse.dot(u) - 0.5 * k * impulse.squaredNorm();
   } else {
     const Mat3 k = inverse_inertia(set, state, a) + inverse_inertia(set, state, b);
@@ -108,9 +116,9 @@ void rub_free_isotropic(const ParticleSet& set, std::size_t a, std::size_t b, do
   const double d2 = r.squaredNorm();
   const double across_term = std::fma(0.25 * spin_term, d2, mass_term);
   const double along_share = d2 > 0.0 ? 1.0 / d2 : 0.0;
-  const double gain_along = -h / (1.0 + h * mass_term);
-  const double gain_across = -h / (1.0 + h * across_term);
-  const double gain_spin = -h_spin / (1.0 + h_spin * spin_term);
+  const double gain_along = gain(h, mass_term);
+  const double gain_across = gain(h, across_term);
+  const double gain_spin = gain(h_spin, spin_term);
 
   Vec3 momentum_a = state.angular_momentum[a];
   Vec3 momentum_b = state.angular_momentum[b];

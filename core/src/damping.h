@@ -26,8 +26,9 @@ inline void apply_impulse(const ParticleSet& set, std::size_t i, const Vec3& imp
 /// The order in which the pairs are visited: the second half step mirrors the first.
 enum class PairOrder { Forward, Backward };
 
-/// Friction of all pairs over dt, each pair implicitly: J = -(1 + dt c K)^-1 dt c u at its mid point, u the relative
-/// velocity and K the inverse effective mass there. Momentum is exact, the energy lost is booked exactly.
+/// Friction of all pairs over dt, each pair implicitly: J = -(1 + Z + Z^2/2)^-1 (1 + Z/2) dt c u at its mid point, u the
+/// relative velocity, K the inverse effective mass there and Z = dt c K: second order, and stable for any Z. Momentum is
+/// exact, the energy lost is booked exactly.
 void apply_friction(const ParticleSet& set, const std::vector<Friction>& friction, double dt, PairOrder order,
                     ParticleState& state, Ledger& ledger);
 
@@ -35,10 +36,16 @@ void apply_friction(const ParticleSet& set, const std::vector<Friction>& frictio
 void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medium, double dt, ParticleState& state,
                   Ledger& ledger);
 
+/// Stiffness damping of all pairs over dt, each pair implicitly as friction is, with its 12 x 12 stiffness. Allocates.
+void apply_stiffness_damping(const ParticleSet& set, const Interactions& interactions, double dt, PairOrder order,
+                             ParticleState& state, Ledger& ledger);
+
 /// The same as forces and torques at a state, for integrators that know no half steps; added to `loads`.
 void add_friction_loads(const ParticleSet& set, const std::vector<Friction>& friction, const ParticleState& state,
                         Loads& loads);
 void add_medium_loads(const ParticleSet& set, const std::vector<MediumDamping>& medium, const ParticleState& state,
                       Loads& loads);
+void add_stiffness_damping_loads(const ParticleSet& set, const Interactions& interactions, const ParticleState& state,
+                                 Loads& loads);
 
 }  // namespace supple::core

@@ -196,6 +196,7 @@ void advance(const ParticleSet& set, const Interactions& interactions, const For
   if (!kick_state.valid) evaluate(forces, state, time, sample);
 
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+  apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Forward, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
   kick(set, sample, 0.5 * dt, state, ledger);
   drift(set, rotation, dt, state);
@@ -205,6 +206,7 @@ void advance(const ParticleSet& set, const Interactions& interactions, const For
   ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   kick(set, sample, 0.5 * dt, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
+  apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "law_lists.h"
+#include "pair_hessians.h"
 #include "supple/core/error.h"
 #include "supple/core/interactions.h"
 
@@ -166,6 +167,15 @@ double largest_frequency(const ParticleSet& set, const ParticleState& rest, cons
     }
   }
   return std::sqrt(2.0 * (translation + rotation));
+}
+
+void for_each_hessian(const ParticleSet& set, const ParticleState& state, const Interactions& interactions,
+                      HessianKind kind, const PairHessianVisitor& visit) {
+  for_each_list(interactions, [&](const auto& list) {
+    for_each_pair(list, set, state, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
+      visit(a, b, hessian(law, pair_pose(set, state, a, b), kind));
+    });
+  });
 }
 
 }  // namespace supple::core

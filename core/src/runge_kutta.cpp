@@ -72,6 +72,7 @@ void evaluate_rates(const ParticleSet& set, const Interactions& interactions, co
   buffers.friction.reset(n);
   buffers.medium.reset(n);
   add_friction_loads(set, interactions.friction, state, buffers.friction);
+  add_stiffness_damping_loads(set, interactions, state, buffers.friction);
   add_medium_loads(set, interactions.medium, state, buffers.medium);
 
   rates.ledger = {};
@@ -194,7 +195,7 @@ class Stepper {
   }
   /// The last stage of an accepted step is the first of the next.
   void hand_on() { std::swap(buffers_.stage[0], buffers_.stage[tableau_.c.size() - 1]); }
-  [[nodiscard]] int evaluations() const { return evaluations_; }
+  [[nodiscard]] std::int64_t evaluations() const { return evaluations_; }
 
  private:
   void rates_at(const ParticleState& state, double time, std::size_t stage) {
@@ -207,7 +208,7 @@ class Stepper {
   const Interactions& interactions_;
   const ForceModel& forces_;
   RungeKuttaBuffers& buffers_;
-  int evaluations_ = 0;
+  std::int64_t evaluations_ = 0;
 };
 
 StepReport advance_adaptively(const IntegratorSettings& settings, double time, double dt, ParticleState& state,

@@ -162,5 +162,83 @@ TEST(MediumDamping, BooksItsImpulseAndEnergyAndSparesOtherObjects) {
   EXPECT_NEAR(before.kinetic_energy - after.kinetic_energy, d.ledger.dissipated, 1e-13 * before.kinetic_energy);
 }
 
+/// Six anisotropic particles, every pair bonded and away from rest, that move at random.
+Damped make_prestressed(double time, std::uint64_t seed) {
+  Damped d = make_rubbing(true, 0.0, 0.0, seed);
+  d.interactions.friction.clear();
+  d.interactions.bond_frame.push_back(test::bond_frames(d.p, 30.0, 4.0, 5));
+  d.interactions.coplanarity.push_back(test::coplanarities(d.p, 2.0, 5));
+  Draw draw(seed + 1);
+  for (Vec3& x : d.p.state.position) x += draw.vector(0.2);
+  d.interactions.stiffness_damping.push_back({.object = 0, .time = time});
+  return d;
+}
+
+TEST(StiffnessDamping, KeepsMomentumAndBooksExactlyTheEnergyItTakes) {
+  for (const double time : {0.1, 1e8}) {
+    Damped d = make_prestressed(time, 71);
+    for (int k = 0; k < 10; ++k) {
+      const Motion before = d.motion();
+      const double taken = d.ledger.dissipated;
+      d.step(1e-9);
+      const Motion after = d.motion();
+      ASSERT_LE((after.momentum - before.momentum).norm(), 1e-14 * before.momentum_scale);
+      ASSERT_LE((after.angular_momentum - before.angular_momentum).norm(), 1e-13 * before.angular_momentum_scale);
+      ASSERT_GE(d.ledger.dissipated, taken - 1e-14 * taken);
+      ASSERT_NEAR(before.kinetic_energy - after.kinetic_energy, d.ledger.dissipated - taken,
+                  1e-12 * before.kinetic_energy + 1e-8 * (d.ledger.dissipated - taken));
+    }
+  }
+}
+
+TEST(StiffnessDamping, DoesNothingToARigidMotionAwayFromRest) {
+  Damped d = make_prestressed(1.0, 72);
+  move_rigidly(d.p, Vec3(1, -2, 0.5), Vec3(0.3, 0.7, -0.4));
+  const ParticleState before = d.p.state;
+  d.step(1e-12);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_LE((d.p.state.velocity[i] - before.velocity[i]).norm(), 1e-11);
+    EXPECT_LE((d.p.state.angular_momentum[i] - before.angular_momentum[i]).norm(), 1e-11);
+  }
+}
+
+TEST(StiffnessDamping, SparesPinsAndOtherObjects) {
+  Damped d = make_prestressed(0.5, 73);
+  d.p.set.object[2] = 1;
+  d.p.set.pinned[4] = kPinPosition | kPinOrientation;
+  const Vec3 untouched = d.p.state.velocity[2];
+  const double start = d.motion().kinetic_energy;
+  for (int k = 0; k < 3; ++k) d.step(1e-6);
+  EXPECT_LE((d.p.state.velocity[2] - untouched).norm(), 1e-15);
+  EXPECT_EQ(d.p.state.velocity[4], Vec3::Zero());
+  EXPECT_LT(d.motion().kinetic_energy, start);
+  EXPECT_GT(d.ledger.pin_impulse.norm(), 0.0);
+}
+
+TEST(StiffnessDamping, GivesABondTheRatioOfItsFrequency) {
+  // U = |r|^2 / 2 between masses 1: omega^2 = 2, ratio beta omega / 2, r = exp(-omega^2 beta t / 2) cos(omega_d t) + ...
+  const double beta = 0.1, omega2 = 2.0, decay = 0.5 * beta * omega2, omega_d = std::sqrt(omega2 - decay * decay);
+  const auto error = [&](double dt) {
+    Damped d;
+    d.p.add(Vec3(-0.5, 0, 0));
+    d.p.add(Vec3(0.5, 0, 0));
+    d.interactions.form_radius.push_back({"spring", {0}, {1}, {{.strength = 0.5, .radius = 0.0, .weight = {}}}});
+    d.interactions.stiffness_damping.push_back({.object = 0, .time = beta});
+    const Executor executor(1);
+    InteractionWorkspace pairs(d.p.set, d.interactions);
+    const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
+      accumulate_interactions(d.p.set, state, d.interactions, t, executor, pairs, out.internal, out.external);
+    };
+    const double end = 2.0;
+    const int steps = static_cast<int>(std::lround(end / dt));
+    for (int k = 0; k < steps; ++k) advance(d.p.set, d.interactions, forces, 0.0, dt, d.p.state, d.kick, d.ledger);
+    const double exact =
+        std::exp(-decay * end) * (std::cos(omega_d * end) + decay / omega_d * std::sin(omega_d * end));
+    return std::abs(d.p.state.position[1].x() - d.p.state.position[0].x() - exact);
+  };
+  EXPECT_LT(error(0.01), 1e-4);
+  EXPECT_NEAR(std::log2(error(0.02) / error(0.01)), 2.0, 0.05);
+}
+
 }  // namespace
 }  // namespace supple::core

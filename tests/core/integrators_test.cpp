@@ -33,16 +33,22 @@ struct System {
     const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
       accumulate_interactions(p.set, state, interactions, t, executor, pairs, out.internal, out.external);
     };
-    run(forces, dt, steps);
+    run(forces, dt, steps, executor, pairs);
   }
   void run(const ForceModel& forces, double dt, int steps) {
+    InteractionWorkspace pairs(p.set, interactions);
+    run(forces, dt, steps, Executor(1), pairs);
+  }
+  void run(const ForceModel& forces, double dt, int steps, const Executor& executor, InteractionWorkspace& pairs) {
     for (int k = 0; k < steps; ++k) {
       const StepReport step =
-          advance(settings, p.set, interactions, forces, time, dt, p.state, kick, ledger, workspace);
+          advance(settings, p.set, interactions, forces, time, dt, p.state, kick, ledger, executor, pairs, workspace);
       report.substeps += step.substeps;
       report.rejected += step.rejected;
       report.force_evaluations += step.force_evaluations;
       report.within_tolerance = report.within_tolerance && step.within_tolerance;
+      report.newton_iterations += step.newton_iterations;
+      report.gradient_iterations += step.gradient_iterations;
       time += dt;
     }
   }
@@ -73,6 +79,9 @@ const Method kSplitting{"Splitting", Integrator::Symplectic, RotationUpdate::Spl
 const Method kExponential{"Exponential", Integrator::Symplectic, RotationUpdate::Exponential, 2.0};
 const Method kRungeKutta4{"RungeKutta4", Integrator::RungeKutta4, RotationUpdate::Splitting, 4.0};
 const Method kAdaptive{"Adaptive", Integrator::Adaptive, RotationUpdate::Splitting, 5.0};
+
+const Method kBackwardEuler{"BackwardEuler", Integrator::BackwardEuler, RotationUpdate::Splitting, 1.0};
+const Method kMidpoint{"ImplicitMidpoint", Integrator::ImplicitMidpoint, RotationUpdate::Splitting, 2.0};
 
 void choose(const Method& method, System& s) {
   s.settings.method = method.method;
@@ -121,17 +130,23 @@ System make_spiral(const Method& method, std::uint64_t seed = 51) {
 }
 
 class EveryMethod : public testing::TestWithParam<Method> {};
+class ExplicitMethod : public testing::TestWithParam<Method> {};
 class FixedStep : public testing::TestWithParam<Method> {};
+class ImplicitMethod : public testing::TestWithParam<Method> {};
 const auto kNameOf = [](const auto& info) { return std::string(info.param.name); };
-INSTANTIATE_TEST_SUITE_P(Methods, EveryMethod, testing::Values(kSplitting, kExponential, kRungeKutta4, kAdaptive),
+INSTANTIATE_TEST_SUITE_P(Methods, EveryMethod,
+                         testing::Values(kSplitting, kExponential, kRungeKutta4, kAdaptive, kBackwardEuler, kMidpoint),
                          kNameOf);
-INSTANTIATE_TEST_SUITE_P(Methods, FixedStep, testing::Values(kSplitting, kExponential, kRungeKutta4), kNameOf);
+INSTANTIATE_TEST_SUITE_P(Methods, ExplicitMethod, testing::Values(kSplitting, kExponential, kRungeKutta4, kAdaptive),
+                         kNameOf);
+INSTANTIATE_TEST_SUITE_P(Methods, FixedStep,
+                         testing::Values(kSplitting, kExponential, kRungeKutta4, kBackwardEuler, kMidpoint), kNameOf);
+INSTANTIATE_TEST_SUITE_P(Methods, ImplicitMethod, testing::Values(kBackwardEuler, kMidpoint), kNameOf);
 
 TEST_P(FixedStep, HasItsOrderOnAHarmonicBond) {
-  const double coarse = spring_error(GetParam(), 0.04), middle = spring_error(GetParam(), 0.02),
-               fine = spring_error(GetParam(), 0.01);
-  EXPECT_NEAR(order_of(coarse, middle), GetParam().order, 0.05);
-  EXPECT_NEAR(order_of(middle, fine), GetParam().order, 0.05);
+  // The next term of the error is smaller by omega dt (backward Euler) or its square.
+  const double coarse = spring_error(GetParam(), 0.02), fine = spring_error(GetParam(), 0.01);
+  EXPECT_NEAR(order_of(coarse, fine), GetParam().order, 0.05);
 }
 
 TEST_P(FixedStep, HasTheStatedErrorOnTheAsymmetricTop) {
@@ -152,6 +167,12 @@ TEST_P(FixedStep, HasTheStatedErrorOnTheAsymmetricTop) {
     EXPECT_LT(error(0.1), 4.5e-6);
     EXPECT_NEAR(order_of(error(0.1), error(0.05)), 4.0, 0.2);
     EXPECT_NEAR(order_of(error(0.05), error(0.025)), 4.0, 0.1);
+    return;
+  }
+  if (GetParam().method == Integrator::ImplicitMidpoint) {
+    // A free body turns by two splittings of half the step.
+    EXPECT_NEAR(error(0.1), 5.4e-4, 5e-6);
+    EXPECT_NEAR(error(0.05), 1.4e-4, 5e-6);
     return;
   }
   const bool exponential = GetParam().rotation == RotationUpdate::Exponential;
@@ -375,16 +396,16 @@ TEST_P(EveryMethod, HasTheSameBitsForEveryNumberOfThreads) {
   for (const int threads : {2, 3, 8}) EXPECT_EQ(hash_after(threads), one);
 }
 
-TEST_P(EveryMethod, AllocatesNothingAfterTheFirstStep) {
+TEST_P(ExplicitMethod, AllocatesNothingAfterTheFirstStep) {
   System s = make_driven(GetParam());
   const Executor executor(1);
   InteractionWorkspace pairs(s.p.set, s.interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
     accumulate_interactions(s.p.set, state, s.interactions, t, executor, pairs, out.internal, out.external);
   };
-  s.run(forces, 1e-3, 1);
+  s.run(forces, 1e-3, 1, executor, pairs);
   const std::uint64_t before = supple::test::allocation_count();
-  s.run(forces, 1e-3, 10);
+  s.run(forces, 1e-3, 10, executor, pairs);
   EXPECT_EQ(supple::test::allocation_count(), before);
 }
 
@@ -408,7 +429,7 @@ TEST(Adaptive, ErrsInProportionToItsTolerance) {
     EXPECT_LT(error, 6.0 * tolerance) << tolerance;
     EXPECT_GT(error, 1e-3 * tolerance) << tolerance;
   }
-  const double growth = static_cast<double>(run(1e-10).second) / run(1e-5).second;
+  const double growth = static_cast<double>(run(1e-10).second) / static_cast<double>(run(1e-5).second);
   EXPECT_NEAR(growth, 10.0, 2.5);
 }
 
@@ -452,6 +473,169 @@ TEST(Adaptive, EndsWithForcesThatAreNotNumbers) {
   s.run([](const ParticleState&, double, ForceSample& out) { out.internal.force[0].x() = std::nan(""); }, 1.0, 1);
   EXPECT_FALSE(s.report.within_tolerance);
   EXPECT_FALSE(s.p.state.position[0].allFinite());
+}
+
+TEST(BackwardEuler, IsItsRecurrenceOnAHarmonicBond) {
+  // r_1 (1 + (omega dt)^2) = r_0 + dt v_0: amplitude (1 + (omega dt)^2)^(-1/2) and phase atan(omega dt) a step.
+  const double omega = std::numbers::sqrt2;
+  for (const double product : {0.1, 1.0, 50.0}) {
+    System s = make_spring(kBackwardEuler);
+    s.p.state.velocity = {Vec3::Zero(), Vec3::Zero()};
+    s.settings.tolerance = 1e-12;
+    const int steps = 10;
+    s.run(product / omega, steps);
+    const double expected = std::pow(1.0 + product * product, -0.5 * steps) * std::cos(steps * std::atan(product));
+    EXPECT_NEAR(s.p.state.position[1].x() - s.p.state.position[0].x(), expected, 1e-13) << product;
+    EXPECT_LE(s.report.newton_iterations, 2 * steps) << product;  // one finds the minimum, one sees that it did
+  }
+}
+
+TEST(BackwardEuler, DampsByHalfTheProductOfFrequencyAndStep) {
+  // ln(amplitude) per radian of phase: ln sqrt(1 + p^2) / atan(p) = p / 2 - p^3 / 12 ...
+  const double omega = std::numbers::sqrt2, product = 0.05;
+  System s = make_spring(kBackwardEuler);
+  s.p.state.velocity = {Vec3::Zero(), Vec3::Zero()};
+  const double start = s.energy();
+  const int steps = 200;
+  s.run(product / omega, steps);
+  // Energy over a whole phase, of which the amplitude is the root.
+  const double ratio = -0.5 * std::log(s.energy() / start) / (steps * std::atan(product));
+  EXPECT_NEAR(ratio, 0.5 * product, 0.01 * product);
+}
+
+TEST(ImplicitMidpoint, IsItsRecurrenceOnAHarmonicBond) {
+  // The Cayley transform: no damping, phase 2 atan(omega dt / 2) a step.
+  const double omega = std::numbers::sqrt2;
+  for (const double product : {0.1, 1.0, 50.0}) {
+    System s = make_spring(kMidpoint);
+    s.p.state.velocity = {Vec3::Zero(), Vec3::Zero()};
+    s.settings.tolerance = 1e-12;
+    s.run(product / omega, 10);
+    EXPECT_NEAR(s.p.state.position[1].x() - s.p.state.position[0].x(), std::cos(20 * std::atan(0.5 * product)), 1e-12)
+        << product;
+    EXPECT_NEAR(s.energy(), 0.5, 1e-12) << product;
+  }
+}
+
+class AgreesWithRungeKutta4 : public testing::TestWithParam<Method> {};
+INSTANTIATE_TEST_SUITE_P(Methods, AgreesWithRungeKutta4,
+                         testing::Values(kSplitting, kExponential, kBackwardEuler, kMidpoint), kNameOf);
+TEST_P(AgreesWithRungeKutta4, InTheLimitAtItsOrder) {
+  // Large rotations of anisotropic bodies with friction, drag, pins and driving loads.
+  const auto end = [](const Method& method, double dt) {
+    System s = make_driven(method);
+    s.settings.tolerance = 1e-10;
+    s.run_until(0.04, dt);
+    EXPECT_TRUE(s.report.within_tolerance);
+    return s.p.state;
+  };
+  const ParticleState exact = end(kRungeKutta4, 2.5e-5);
+  const auto error = [&](double dt) {
+    const ParticleState state = end(GetParam(), dt);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      largest = std::max({largest, (state.position[i] - exact.position[i]).norm(),
+                          0.1 * rotation_log(state.orientation[i] * exact.orientation[i].conjugate()).norm()});
+    }
+    return largest;
+  };
+  const double dt = GetParam().order < 1.5 ? 1.25e-5 : 5e-5;
+  const double coarse = error(2.0 * dt), fine = error(dt);
+  EXPECT_LT(fine, GetParam().order < 1.5 ? 1e-4 : 1e-5);
+  EXPECT_NEAR(order_of(coarse, fine), GetParam().order, 0.1);
+}
+
+TEST_P(ImplicitMethod, KeepsItsOrderWithForcesOutsideThePairLaws) {
+  // The spring is pulled back by a force model of its own as well: omega^2 = 2 + 3.
+  const auto error = [&](double dt) {
+    System s = make_spring(GetParam());
+    s.p.state.velocity = {Vec3::Zero(), Vec3::Zero()};
+    const Executor executor(1);
+    InteractionWorkspace pairs(s.p.set, s.interactions);
+    const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
+      accumulate_interactions(s.p.set, state, s.interactions, t, executor, pairs, out.internal, out.external);
+      const Vec3 pull = 1.5 * (state.position[1] - state.position[0]);
+      out.internal.force[0] += pull;
+      out.internal.force[1] -= pull;
+    };
+    s.run(forces, dt, static_cast<int>(std::lround(2.0 / dt)));
+    return std::abs(s.p.state.position[1].x() - s.p.state.position[0].x() - std::cos(std::sqrt(5.0) * 2.0));
+  };
+  EXPECT_NEAR(order_of(error(0.005), error(0.0025)), GetParam().order, 0.1);
+}
+
+TEST_P(ImplicitMethod, StaysStableFarBeyondTheExplicitLimit) {
+  System s = make_spiral(GetParam());
+  for (BondFrame& law : s.interactions.bond_frame[0].law) {
+    law.stretch = 4e5;
+    law.rotation = 5e3;
+  }
+  const double dt = 1e-2;
+  EXPECT_GT(dt * largest_frequency(s.p.set, s.p.state, s.interactions), 300.0);
+  const double start = s.energy();
+  const Motion before = measure_motion(s.p.set, s.p.state);
+  for (int k = 0; k < 200; ++k) {
+    s.run(dt, 1);
+    ASSERT_LE(s.energy(), (GetParam().method == Integrator::BackwardEuler ? 1.0 : 1.5) * start + 1e-12) << k;
+  }
+  EXPECT_TRUE(s.report.within_tolerance);
+  const Motion after = measure_motion(s.p.set, s.p.state);
+  EXPECT_LE((after.momentum - before.momentum).norm(), 1e-9 * before.momentum_scale);
+  const ShapeError shape = shape_error(test::make_spiral().state.position, s.p.state.position);
+  EXPECT_LT(shape.largest, 0.02);
+}
+
+TEST(ImplicitMidpoint, KeepsMomentumAndAngularMomentum) {
+  System s = make_spiral(kMidpoint);
+  s.settings.tolerance = 1e-10;
+  const Motion start = measure_motion(s.p.set, s.p.state);
+  for (int k = 0; k < 200; ++k) {
+    s.run(2e-3, 1);
+    const Motion now = measure_motion(s.p.set, s.p.state);
+    ASSERT_LE((now.momentum - start.momentum).norm(), 1e-12 * now.momentum_scale) << k;
+    // x_1 = 2 x_m - x_0 holds the mean of the velocities as well as Newton's method ended: 1e-10 of a length a step.
+    ASSERT_LE((now.angular_momentum - start.angular_momentum).norm(), 1e-9 * now.angular_momentum_scale) << k;
+  }
+}
+
+TEST(BackwardEuler, RestsWhereTheForcesBalance) {
+  // A chain hung up at both ends comes to rest without velocity, and with the static force of the pins.
+  System s;
+  choose(kBackwardEuler, s);
+  for (int i = 0; i < 6; ++i) s.p.add(Vec3(0.1 * i, 0, 0), 0.1, 1e-3);
+  s.p.set.pinned[0] = s.p.set.pinned[5] = kPinPosition;
+  s.interactions.bond_frame.push_back(test::bond_frames(s.p, 500.0, 2.0, 1));
+  s.interactions.gravity = Vec3(0, 0, -9.81);
+  s.settings.tolerance = 1e-13;
+  s.run(0.5, 60);
+  for (const Vec3& v : s.p.state.velocity) EXPECT_LE(v.norm(), 1e-10);
+  const Vec3 before = s.ledger.pin_impulse;
+  s.run(0.5, 1);
+  EXPECT_NEAR((s.ledger.pin_impulse - before).z() / 0.5, 6 * 0.1 * 9.81, 1e-9);
+}
+
+TEST_P(ImplicitMethod, GivesTheSameByConjugateGradients) {
+  System direct = make_driven(GetParam()), iterative = make_driven(GetParam());
+  iterative.settings.direct_unknowns = 0;
+  direct.settings.tolerance = iterative.settings.tolerance = 1e-10;
+  direct.run(2e-3, 30);
+  iterative.run(2e-3, 30);
+  EXPECT_EQ(direct.report.gradient_iterations, 0);
+  EXPECT_GT(iterative.report.gradient_iterations, 0);
+  EXPECT_TRUE(iterative.report.within_tolerance);
+  for (std::size_t i = 0; i < direct.p.set.size(); ++i) {
+    EXPECT_LE((direct.p.state.position[i] - iterative.p.state.position[i]).norm(), 1e-7) << i;
+  }
+}
+
+TEST_P(ImplicitMethod, ReportsWhatNewtonsMethodLeaves) {
+  System s = make_spiral(GetParam());
+  for (Vec3& v : s.p.state.velocity) v *= 30.0;
+  s.settings.max_iterations = 1;
+  s.run(0.05, 1);
+  EXPECT_FALSE(s.report.within_tolerance);
+  EXPECT_EQ(s.report.newton_iterations, 1);
+  for (const Vec3& x : s.p.state.position) EXPECT_TRUE(x.allFinite());
 }
 
 }  // namespace

@@ -99,6 +99,10 @@ struct ShapeError {
 };
 [[nodiscard]] ShapeError shape_error(std::span<const Vec3> rest, std::span<const Vec3> now);
 
+/// How much points shake between two times [m]: O^2 = sum_i |dx_i - mean dx|^2 = sum |dx_i|^2 - |sum dx_i|^2 / N, which
+/// a common translation leaves at 0 (Lombardo & Puech 1995, sec. 3, with the 1/N that a printed formula lacks).
+[[nodiscard]] double oscillation(std::span<const Vec3> before, std::span<const Vec3> after);
+
 /// Largest step [s] allowed by the stability limits: c1/omega_max, c2 r0/v_max, c4/|omega|_max
 /// (harmonic limit omega dt < 2; c1 = .3 keeps the energy error below 1 %).
 struct StepLimits {

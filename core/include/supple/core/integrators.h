@@ -6,9 +6,18 @@
 /// | Symplectic       | 2     | 2              | momentum, angular momentum; energy without drift                    |
 /// | RungeKutta4      | 4     | 2.83           | momentum; angular momentum and energy to its order                  |
 /// | Adaptive         | 5     | by tolerance   | the same; the step follows the error of Dormand & Prince 1980       |
+/// | BackwardEuler    | 1     | none           | momentum; damps a mode of frequency omega by the ratio omega dt / 2 |
+/// | ImplicitMidpoint | 2     | none           | momentum, angular momentum; quadratic energies                      |
 ///
-/// Omega is the largest angular frequency [rad/s]. Damping enters `Symplectic` by exact or implicit half steps
-/// (integrate.h) and the Runge-Kutta methods as forces, so that their order holds.
+/// Omega is the largest angular frequency [rad/s]. Damping enters the Runge-Kutta methods as forces, so that their order
+/// holds, and the others by exact or implicit half steps (integrate.h).
+///
+/// Backward Euler takes the pose that minimises the incremental potential (e.g. Martin et al. 2011, eq. 4)
+///   Pi = 1/(2 h^2) sum_i (m |x - x~|^2 + delta^T I delta) + U(x, q),   delta = log(q~^-1 q) in body axes,
+/// with x~, q~ the free flight over h under the loads outside U; implicit midpoint takes it with h = dt/2 as its middle
+/// and continues by the mirrored half step. The minimum is sought by Newton's method with the Hessians of the pair laws
+/// and a line search. Loads that are not in `Interactions` (contact) are frozen over the step: at its start in backward
+/// Euler, at the middle of free flight in the midpoint rule. They keep the limit omega dt < 2 of their own frequency.
 #pragma once
 
 #include <memory>
@@ -18,24 +27,34 @@
 
 namespace supple::core {
 
-enum class Integrator : std::uint8_t { Symplectic, RungeKutta4, Adaptive };
+enum class Integrator : std::uint8_t { Symplectic, RungeKutta4, Adaptive, BackwardEuler, ImplicitMidpoint };
+
+[[nodiscard]] constexpr bool is_implicit(Integrator method) {
+  return method == Integrator::BackwardEuler || method == Integrator::ImplicitMidpoint;
+}
 
 struct IntegratorSettings {
   Integrator method = Integrator::Symplectic;
   RotationUpdate rotation = RotationUpdate::Splitting;  ///< of `Symplectic`
-  /// Adaptive: largest local error of a substep, of positions over `length` and of angles in radians [1].
+  /// Adaptive: largest local error of a substep. Implicit methods: Newton's method ends with the first step that is not
+  /// larger. Of positions over `length` and of angles in radians [1].
   double tolerance = 1e-6;
-  double length = 1.0;      ///< what errors of position are relative to [m]
-  double first_step = 0.0;  ///< Adaptive: first substep tried [s]; 0: the whole step
-  int max_substeps = 4096;  ///< Adaptive: a substep of dt / max_substeps is taken whatever its error
+  double length = 1.0;        ///< what errors of position are relative to [m]
+  double first_step = 0.0;    ///< Adaptive: first substep tried [s]; 0: the whole step
+  int max_substeps = 4096;    ///< Adaptive: a substep of dt / max_substeps is taken whatever its error
+  int max_iterations = 50;    ///< of Newton's method
+  int direct_unknowns = 12000;  ///< larger systems are solved by conjugate gradients instead of a Cholesky factor
 };
 
 /// What a step needed; the caller decides what is too much.
 struct StepReport {
-  int substeps = 0;         ///< accepted
-  int rejected = 0;         ///< tried and taken back
-  int force_evaluations = 0;
-  bool within_tolerance = true;  ///< false: some substep was taken at the smallest size with a larger error
+  std::int64_t substeps = 0;           ///< accepted
+  std::int64_t rejected = 0;           ///< tried and taken back
+  std::int64_t force_evaluations = 0;  ///< calls of the force model
+  bool within_tolerance = true;  ///< false: a substep at the smallest size, or Newton's method, left a larger error
+  std::int64_t newton_iterations = 0;
+  std::int64_t gradient_iterations = 0;  ///< of conjugate gradients, all together
+  double last_correction = 0.0;  ///< size of the last Newton step, as `tolerance` measures it [1]
 };
 
 /// Buffers of the integrators; capacity is kept between steps. Frame data.
@@ -53,10 +72,13 @@ class IntegratorWorkspace {
 };
 
 /// One step of size dt by the chosen method. Books work, dissipation and impulses to `ledger` by the quadrature of the
-/// method. The substep that `Adaptive` would try next is kept in `kick`, so that a run continues with the same bits.
-/// Deterministic: substeps follow from the state alone. Allocates nothing after the first step.
+/// method. `pairs` is the workspace of `interactions`; the implicit methods use it. The substep that `Adaptive` would try next is kept in `kick`, so that a run continues with the same bits.
+/// Momentum is exact in every method: velocities change by the loads alone, not by what Newton's method left.
+/// Deterministic: substeps and iterations follow from the state alone. The explicit methods allocate nothing after the
+/// first step.
 StepReport advance(const IntegratorSettings& settings, const ParticleSet& set, const Interactions& interactions,
                    const ForceModel& forces, double time, double dt, ParticleState& state, KickState& kick,
-                   Ledger& ledger, IntegratorWorkspace& workspace);
+                   Ledger& ledger, const Executor& executor, InteractionWorkspace& pairs,
+                   IntegratorWorkspace& workspace);
 
 }  // namespace supple::core

@@ -53,6 +53,14 @@ struct MediumDamping {
   double angular = 0.0;  ///< gamma_r [1/s]
 };
 
+/// Rayleigh's damping of deformation in one object, F = -beta K q': K is the stiffness of each of its pairs, the positive
+/// semi-definite Hessian at the present pose without the rigid motions of the pair. A mode of frequency omega gets the
+/// damping ratio beta omega / 2; momentum and angular momentum stay.
+struct StiffnessDamping {
+  std::uint32_t object = 0;
+  double time = 0.0;  ///< beta [s]
+};
+
 /// A force and a torque on one particle during a time window, ramped linearly at both ends.
 struct ExternalLoad {
   std::uint32_t particle = 0;
@@ -87,6 +95,7 @@ struct Interactions {
   std::vector<GeometricLaw<Repulsion>> repulsion;
   std::vector<Friction> friction;
   std::vector<MediumDamping> medium;
+  std::vector<StiffnessDamping> stiffness_damping;
   std::vector<ExternalLoad> external;
   Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
 
