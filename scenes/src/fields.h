@@ -35,6 +35,18 @@ void fields(Archive& archive, TimeStepDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, IntegratorDesc& d) {
+  using enum MethodName;
+  archive("method", d.method, {},
+          "auto: symplectic unless stiffness makes backward_euler cheaper by far; `supple explain` says which and why");
+  archive("rotation", d.rotation, Rule{}.only("method", d.method, {Auto, Symplectic}),
+          "of free bodies: about one principal axis after another, or about the axis of the middle attitude");
+  archive("tolerance", d.tolerance,
+          between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint}),
+          "local error (adaptive) or last correction (implicit) over the smallest length, or in radians; auto: 1e-6 and 1e-9");
+}
+
+template <class Archive>
 void fields(Archive& archive, ParticlesDesc& d) {
   using enum ArrangeKind;
   const auto only = [&d](const Rule& rule, std::initializer_list<ArrangeKind> kinds) {
@@ -59,6 +71,12 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive("mass", d.mass, above(0.0, kMass), "of one particle");
   archive("inertia_radius", d.inertia_radius, above(0.0, kLength).or_auto(),
           "a in the inertia 2/5 m a^2; auto: half the distance of the nearest neighbour, or the iso radius when alone");
+  archive("inertia_axes", d.inertia_axes, at_least(0.0, kLength),
+          "instead: semi-axes of a solid ellipsoid in each particle's frame; zero: not given");
+  if (archive.given("inertia_axes")) {
+    archive.check(d.inertia_axes.minCoeff() > 0.0, "inertia_axes", "expected three lengths > 0 [m]", "a zero", "");
+    archive.check(!d.inertia_radius, "inertia_axes", "expected either inertia_radius or inertia_axes", "both", "");
+  }
   if (d.arrange == Spiral) {
     archive.check(d.count >= 2, "count", "expected a whole number >= 2 for a spiral", std::to_string(d.count), "");
     archive.check(d.inner_radius < d.outer_radius, "outer_radius",
@@ -190,6 +208,12 @@ void fields(Archive& archive, YieldingDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, RayleighDesc& d) {
+  archive("mass", d.mass, at_least(0.0, kRate), "alpha: drag -alpha M q', as of a medium");
+  archive("stiffness", d.stiffness, at_least(0.0, kTime), "beta: -beta K q' against deformation; a mode gets the ratio beta omega / 2");
+}
+
+template <class Archive>
 void fields(Archive& archive, PinDesc& d) {
   archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "from 0; negative counts from the end");
   archive("position", d.position, {}, "held");
@@ -250,6 +274,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("medium", d.medium, {}, "drag of a surrounding medium; absent: none");
   archive("breaking", d.breaking, {}, "when bonded pairs come apart; absent: never. What no bond joins any more is a body of its own");
   archive("yielding", d.yielding, {}, "when bond frames take the present pose as their rest pose; absent: never");
+  archive("rayleigh", d.rayleigh, {}, "damping of motion and deformation by alpha M + beta K; absent: none");
   archive("pins", d.pins, {}, "particles that do not move");
   archive("loads", d.loads, {}, "external forces and torques");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
@@ -389,6 +414,7 @@ void fields(Archive& archive, Scene& d) {
   archive("gravity", d.gravity, any(kAcceleration), "z is up");
   archive("planar", d.planar, {}, "particles keep their z, which must be one for all, and turn about z only");
   archive("time_step", d.time_step, {}, "how finely time is cut");
+  archive("integrator", d.integrator, {}, "how a step is made");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
   archive("contact", d.contact, {}, "how contact is computed");
@@ -398,6 +424,12 @@ void fields(Archive& archive, Scene& d) {
   archive("output", d.output, {}, "what is written");
   archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",
                 number_text(std::floor(d.duration * d.frame_rate)), "");
+  for (std::size_t i = 0; i < d.objects.size(); ++i) {
+    const Vec3& axes = d.objects[i].particles.inertia_axes;
+    archive.check(!d.planar || (axes.x() == axes.y() && axes.y() == axes.z()),
+                  "objects[" + std::to_string(i) + "].particles.inertia_axes", "expected three equal ones in a planar scene",
+                  "different ones", "a planar particle turns about z only: use inertia_radius");
+  }
   check_names(archive, d);
 }
 

@@ -21,6 +21,13 @@ namespace supple::scenes {
 /// Names of an enum's values in files, in the order of the enumerators (which count from 0).
 template <class E>
 struct EnumNames;
+template <> struct EnumNames<MethodName> {
+  static constexpr std::array<std::string_view, 6> names{"auto",     "symplectic",     "rk4",
+                                                         "adaptive", "backward_euler", "implicit_midpoint"};
+};
+template <> struct EnumNames<RotationName> {
+  static constexpr std::array<std::string_view, 2> names{"splitting", "exponential"};
+};
 template <> struct EnumNames<ArrangeKind> {
   static constexpr std::array<std::string_view, 6> names{"single", "line", "ring", "grid", "spiral", "file"};
 };

@@ -299,7 +299,13 @@ class LawBuilder {
   std::array<int, EnumNames<LawKind>::names.size()> counts_{};
 };
 
-/// Particles of one object, with the inertia of a ball, 2/5 m a^2.
+/// Principal moments: of a solid ellipsoid, m/5 (b^2 + c^2, ...), or of a ball of radius a.
+Vec3 principal_moments(const ParticlesDesc& d, double a) {
+  const Vec3 squares = (d.inertia_axes.isZero() ? Vec3::Constant(a) : d.inertia_axes).cwiseAbs2();
+  return 0.2 * d.mass * (Vec3::Constant(squares.sum()) - squares);
+}
+
+/// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
   const core::Arrangement arrangement = arrange(scene, d.particles);
@@ -322,20 +328,21 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
   centre /= n;  // all masses of an object are equal
   for (std::uint32_t i = 0; i < n; ++i) {
     const double a = d.particles.inertia_radius.value_or(n > 1 ? 0.5 * nearest[i] : object.iso_radius);
-    if (!(a > 0.0)) {
+    if (!(a > 0.0) && d.particles.inertia_axes.isZero()) {
       faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
                       n > 1 ? "two particles lie at one place, so give it" : "a single particle without a surface needs it");
     }
-    const double inertia = 0.4 * d.particles.mass * a * a;
+    const Vec3 inertia = principal_moments(d.particles, a);
+    const Quat& q = arrangement.orientation[i];
     model.particles.mass.push_back(d.particles.mass);
-    model.particles.inertia.emplace_back(inertia, inertia, inertia);
+    model.particles.inertia.push_back(inertia);
     model.particles.normal.push_back(Vec3::UnitZ());
     model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
     model.particles.pinned.push_back(0);
     model.initial.position.push_back(arrangement.position[i]);
     model.initial.orientation.push_back(arrangement.orientation[i]);
     model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
-    model.initial.angular_momentum.push_back(inertia * d.particles.spin);
+    model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
     if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : a);
     model.smallest_length = std::min({model.smallest_length, nearest[i], n == 1 ? 0.5 * object.rest_diameter : nearest[i]});
   }
@@ -439,6 +446,11 @@ Model build_model(const Scene& scene) {
     LawBuilder laws(model, faults, model.objects[i], "objects." + d.name);
     for (std::size_t k = 0; k < d.interactions.size(); ++k) laws.add(d.interactions[k], k);
     if (d.breaking || d.yielding) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
+    if (d.rayleigh) {
+      const auto object = static_cast<std::uint32_t>(i);
+      if (d.rayleigh->mass > 0.0) model.interactions.medium.push_back({object, d.rayleigh->mass, d.rayleigh->mass});
+      if (d.rayleigh->stiffness > 0.0) model.interactions.stiffness_damping.push_back({object, d.rayleigh->stiffness});
+    }
     if (d.medium) {
       model.interactions.medium.push_back({static_cast<std::uint32_t>(i), d.medium->linear, d.medium->angular});
     }

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+
+#include "fields_rules.h"
+#include "read_scene_faults.h"
 
 namespace supple::scenes {
 namespace {
@@ -113,7 +117,7 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
   add(Stage::FindContacts, contact, contact_reason);
   add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair" : contact_reason);
   add(Stage::React, contact, contact ? "runs when a contact surface was found" : contact_reason);
-  add(Stage::Integrate, true, "always");
+  add(Stage::Integrate, true, plan_integrator(scene, model).reason);
 
   const bool mesh = mesh_wanted && surfaces;
   add(Stage::Polygonise, mesh,
@@ -126,6 +130,68 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
                     {outputs.grids, "grid files"}, {outputs.contacts, "contact tables"},
                     {outputs.particles, "particle tables"}})
             : "no output file is requested");
+  return plan;
+}
+
+core::StepLimits step_limits(const Scene& scene, const Model& model, double frequency, const core::Speeds& speeds) {
+  return {.frequency = frequency,
+          .length = model.smallest_length,
+          .speed = speeds.linear + scene.gravity.norm() / scene.frame_rate,
+          .angular_speed = speeds.angular};
+}
+
+IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
+  using core::Integrator;
+  const double frame = 1.0 / scene.frame_rate;
+  const core::Speeds speeds = core::largest_speeds(model.particles, model.initial);
+  IntegratorPlan plan;
+  plan.pair_frequency = core::largest_frequency(model.particles, model.rest, model.interactions);
+  const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
+  const auto steps_a_frame = [&](double frequency) {
+    const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
+    return step < frame ? std::ldexp(1.0, core::halvings(frame, step)) : 1.0;
+  };
+  const double explicit_steps = steps_a_frame(all);
+  const double implicit_steps = steps_a_frame(model.contact_frequency);
+  const bool fixed = scene.time_step.size || scene.time_step.substeps;
+
+  plan.settings.rotation = scene.integrator.rotation == RotationName::Splitting ? core::RotationUpdate::Splitting
+                                                                               : core::RotationUpdate::Exponential;
+  plan.settings.length = model.smallest_length;
+  plan.settings.max_substeps = scene.time_step.max_substeps;
+  switch (scene.integrator.method) {
+    case MethodName::Auto: {
+      plan.chosen = !fixed;
+      const bool refused = explicit_steps > scene.time_step.max_substeps;
+      const bool dearer = explicit_steps > kImplicitCost * implicit_steps;
+      const bool implicit = plan.chosen && (refused || dearer);
+      plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
+      const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet a frame";
+      if (fixed) {
+        plan.reason = "symplectic: the scene fixes the step";
+      } else if (!implicit) {
+        plan.reason = "symplectic: " + counts + " at the start";
+      } else {
+        plan.reason = "backward_euler: in place of " + counts + ", " + number_text(implicit_steps) +
+                      (refused ? "; more than time_step.max_substeps" : "; it damps what it does not resolve");
+      }
+      break;
+    }
+    case MethodName::Symplectic: plan.settings.method = Integrator::Symplectic; break;
+    case MethodName::Rk4: plan.settings.method = Integrator::RungeKutta4; break;
+    case MethodName::Adaptive: plan.settings.method = Integrator::Adaptive; break;
+    case MethodName::BackwardEuler: plan.settings.method = Integrator::BackwardEuler; break;
+    case MethodName::ImplicitMidpoint: plan.settings.method = Integrator::ImplicitMidpoint; break;
+  }
+  if (plan.reason.empty()) plan.reason = std::string(name_of(scene.integrator.method)) + ": the scene asks for it";
+  const bool implicit = core::is_implicit(plan.settings.method);
+  plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? 1e-9 : 1e-6);
+  plan.limiting_frequency = implicit ? model.contact_frequency : all;
+  if (plan.settings.method == Integrator::Adaptive) {
+    plan.limiting_frequency = 0.0;
+    plan.settings.first_step = core::stable_step({.frequency = all});
+    if (!std::isfinite(plan.settings.first_step)) plan.settings.first_step = 0.0;
+  }
   return plan;
 }
 

@@ -41,6 +41,14 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
     json["steps"] = state.steps;
     json["time_step_s"] = simulation->time_step();
     json["simulated_s"] = simulation->time();
+    const core::StepReport& work = simulation->integration();
+    json["integrator"] = {{"choice", simulation->integrator().reason},
+                          {"substeps", work.substeps},
+                          {"rejected", work.rejected},
+                          {"force_evaluations", work.force_evaluations},
+                          {"newton_iterations", work.newton_iterations},
+                          {"last_correction", work.last_correction},
+                          {"within_tolerance", work.within_tolerance}};
     const Audits audits = simulation->audits();
     json["audits"] = {{"momentum_error", audits.momentum_error},
                       {"angular_momentum_error", audits.angular_momentum_error},

@@ -38,7 +38,9 @@ struct Simulation::Impl {
   collision::ContactRules rules;
   Frame frame;
   core::InteractionWorkspace workspace;
-  double pair_frequency = 0.0;
+  IntegratorPlan integrator;
+  core::IntegratorWorkspace integrator_workspace;
+  core::StepReport work;  ///< of all steps of this object
 
   // Results pulled at the current state; their own frame, so that pulling cannot disturb stepping.
   Frame pulled;
@@ -57,7 +59,7 @@ struct Simulation::Impl {
         laws(model.interactions),
         frame(model, 0),
         workspace(model.particles, laws),
-        pair_frequency(core::largest_frequency(model.particles, model.rest, model.interactions)),
+        integrator(plan_integrator(scene, model)),
         pulled(model, 0) {
     state.particles = model.initial;
     state.links = core::unbroken(model.links);
@@ -172,11 +174,7 @@ struct Simulation::Impl {
       return;
     }
     const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
-    const core::StepLimits limits{.frequency = std::hypot(pair_frequency, model.contact_frequency),
-                                  .length = model.smallest_length,
-                                  .speed = speeds.linear + scene.gravity.norm() * frame_time(),
-                                  .angular_speed = speeds.angular};
-    const double step = core::stable_step(limits);
+    const double step = core::stable_step(step_limits(scene, model, integrator.limiting_frequency, speeds));
     const int k = step < frame_time() ? core::halvings(frame_time(), step) : 0;
     if (k > log2_of(desc.max_substeps)) {
       throw Error(ErrorKind::Limit,
@@ -227,8 +225,10 @@ struct Simulation::Impl {
       StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
       // Timed with the force evaluation inside, whose share `Simulation::profile` takes off again.
       StageTimer timer(p, options.profile);
-      core::advance(model.particles, laws, forces, time(), dt(), state.particles, state.kick,
-                    state.ledger);
+      const core::StepReport report =
+          core::advance(integrator.settings, model.particles, laws, forces, time(), dt(), state.particles,
+                        state.kick, state.ledger, executor, workspace, integrator_workspace);
+      book_work(report);
       p.visited += model.particles.size();
       p.present += model.particles.size();
     }
@@ -248,6 +248,27 @@ struct Simulation::Impl {
       state.substep = 0;
       ++state.frame;
     }
+  }
+
+  void book_work(const core::StepReport& report) {
+    work.substeps += report.substeps;
+    work.rejected += report.rejected;
+    work.force_evaluations += report.force_evaluations;
+    work.newton_iterations += report.newton_iterations;
+    work.gradient_iterations += report.gradient_iterations;
+    work.last_correction = std::max(work.last_correction, report.last_correction);
+    if (report.within_tolerance) return;
+    work.within_tolerance = false;
+    if (integrator.settings.method != core::Integrator::Adaptive) return;
+    if (last_frame.record.valid) state = last_frame;
+    throw Error(ErrorKind::Limit,
+                Fault{.place = scene.source.string(),
+                      .key = "time_step.max_substeps",
+                      .expected = "expected the error of a step within integrator.tolerance = " +
+                                  std::to_string(integrator.settings.tolerance),
+                      .found = "more in steps of " + std::to_string(dt() / integrator.settings.max_substeps) +
+                               " s at frame " + std::to_string(state.frame),
+                      .hint = "raise integrator.tolerance or time_step.max_substeps, or soften what is stiff"});
   }
 
   [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const {
@@ -409,6 +430,9 @@ const core::Loads& Simulation::contact_loads() {
   impl_->pulled_sample.internal.torque.resize(impl_->model.particles.size(), Vec3::Zero());
   return impl_->pulled_sample.internal;
 }
+
+const IntegratorPlan& Simulation::integrator() const { return impl_->integrator; }
+const core::StepReport& Simulation::integration() const { return impl_->work; }
 
 double Simulation::cell() const { return impl_->model.cell; }
 

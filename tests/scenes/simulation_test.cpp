@@ -223,6 +223,7 @@ TEST(Simulation, RefusesAStepFinerThanAllowedAndNamesTheKey) {
 schema: 1
 duration: 1 s
 time_step: {max_substeps: 2}
+integrator: {method: symplectic}
 objects:
   - name: chain
     particles: {arrange: line, count: 3, spacing: 0.2, mass: 0.01}

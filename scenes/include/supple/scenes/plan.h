@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "supple/core/integrators.h"
+#include "supple/core/parts.h"
 #include "supple/scenes/model.h"
 
 namespace supple::scenes {
@@ -74,6 +76,28 @@ struct StepPlan {
   std::vector<PlannedStage> stages;  ///< all of them, in order
   [[nodiscard]] bool on(Stage stage) const;
 };
+
+/// How a scene is integrated, and why.
+struct IntegratorPlan {
+  core::IntegratorSettings settings;
+  double pair_frequency = 0.0;  ///< largest of the pair laws about rest [rad/s]
+  bool chosen = false;          ///< by the cost model: `integrator.method` is auto and the step is not fixed
+  std::string reason;
+  /// Frequency that limits the step [rad/s]: implicit methods leave out the pair laws, the adaptive one finds its own.
+  double limiting_frequency = 0.0;
+};
+
+/// `auto` takes velocity Verlet unless a frame needs more of its steps than `time_step.max_substeps`, or more by
+/// kImplicitCost than backward Euler does at the limits that remain to it: a count of steps, never a clock.
+[[nodiscard]] IntegratorPlan plan_integrator(const Scene& scene, const Model& model);
+
+/// What a step of backward Euler costs in steps of velocity Verlet: about four corrections, each with the Hessian of every
+/// pair, a factor and a few potentials.
+inline constexpr int kImplicitCost = 256;
+
+/// The limits of a step for particles of these speeds [m/s], [rad/s]; gravity adds what it gives in a frame.
+[[nodiscard]] core::StepLimits step_limits(const Scene& scene, const Model& model, double frequency,
+                                           const core::Speeds& speeds);
 
 /// Every stage with the reason it is on or off.
 /// @post well_formed(plan)

@@ -21,6 +21,16 @@ struct TimeStepDesc {
   int max_substeps = 4096;           ///< refuse to go finer than this
 };
 
+enum class MethodName : std::uint8_t { Auto, Symplectic, Rk4, Adaptive, BackwardEuler, ImplicitMidpoint };
+enum class RotationName : std::uint8_t { Splitting, Exponential };
+
+/// integrator
+struct IntegratorDesc {
+  MethodName method = MethodName::Auto;
+  RotationName rotation = RotationName::Splitting;
+  std::optional<double> tolerance;   ///< absent: 1e-6 (adaptive) or 1e-9 (implicit methods)
+};
+
 enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File };
 enum class NormalKind : std::uint8_t { Axis, Radial };
 
@@ -44,6 +54,7 @@ struct ParticlesDesc {
   Vec3 spin = Vec3::Zero();           ///< initial, rigid, about the centre of mass [rad/s]
   double mass = 1.0;                  ///< of one particle [kg]
   std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance, or the iso radius
+  Vec3 inertia_axes = Vec3::Zero();   ///< instead: semi-axes of a solid ellipsoid in the particle's frame [m]; zero: absent
 };
 
 enum class LawKind : std::uint8_t { Cohesion, Form, FormRadius, BondFrame, Coplanarity, Friction };
@@ -126,6 +137,12 @@ struct YieldingDesc {
   double time = 0.0;                  ///< [s]
 };
 
+/// objects[].rayleigh
+struct RayleighDesc {
+  double mass = 0.0;                  ///< alpha [1/s]
+  double stiffness = 0.0;             ///< beta [s]
+};
+
 /// objects[].pins[]
 struct PinDesc {
   int particle = 0;                   ///< negative counts from the end: -1 is the last
@@ -154,6 +171,7 @@ struct ObjectDesc {
   std::optional<MediumDesc> medium;
   std::optional<BreakingDesc> breaking;
   std::optional<YieldingDesc> yielding;
+  std::optional<RayleighDesc> rayleigh;
   std::vector<PinDesc> pins;
   std::vector<LoadDesc> loads;
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
@@ -235,6 +253,7 @@ struct Scene {
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
   bool planar = false;                ///< particles keep their z and turn about z only
   TimeStepDesc time_step;
+  IntegratorDesc integrator;
   std::vector<ObjectDesc> objects;    ///< sorted by name
   std::vector<PairDesc> pairs;
   ContactDesc contact;

@@ -72,6 +72,9 @@ class Simulation {
   [[nodiscard]] double time() const;            ///< [s]
   [[nodiscard]] double time_step() const;       ///< of the current frame interval [s]
   [[nodiscard]] std::uint64_t state_hash() const;
+  [[nodiscard]] const IntegratorPlan& integrator() const;
+  /// What the steps of this object needed so far: sums, the largest last correction, and whether all met the tolerance.
+  [[nodiscard]] const core::StepReport& integration() const;
 
   /// One time step, frame time / 2^halvings. @throws Error{Diverged} naming particle, cause and value; the state is then
   /// that of the last frame.
