@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::uint32_t kCellBlock = 256;
 constexpr std::size_t kPointBlock = 4096;
+static_assert(kCellBlock % packed::kTile == 0 && packed::kReachUp % packed::kTile == 0);
+
 /// Cells on each side of the points that have no particle.
 constexpr std::array<std::uint32_t, 3> kRing{packed::kReach, packed::kReach, packed::kReachUp};
 /// Extent in ranges up to which the squares of floats are finite with room to spare.
@@ -124,6 +126,8 @@ void NeighbourList::Impl::lay_cells() {
   };
   while (cells_along(0) * cells_along(1) * cells_along(2) > static_cast<double>(cell_limit(points))) edge *= 1.26;
   for (std::size_t k = 0; k < 3; ++k) grid.cells[k] = static_cast<std::uint32_t>(cells_along(k));
+  const std::uint32_t inner = grid.cells[2] - 2 * kRing[2];
+  grid.cells[2] = (inner + packed::kTile - 1) / packed::kTile * packed::kTile + 2 * kRing[2];
   // Coordinates are rounded to 2^-24 of the extent, so differences are known to four times that.
   const double margin = 0x1p-22 * extent.maxCoeff();
   grid.range2 = static_cast<float>((reach_range + margin) * (reach_range + margin) * (1.0 + 0x1p-20));
@@ -131,9 +135,11 @@ void NeighbourList::Impl::lay_cells() {
   const Vec3 inverse = edge.cwiseInverse();
   cell.resize(points);
   grid.start.assign(std::size_t{grid.cells[0]} * grid.cells[1] * grid.cells[2] + 1, 0);
+  const std::array<std::uint32_t, 3> limit{grid.cells[0] - 2 * kRing[0] - 1, grid.cells[1] - 2 * kRing[1] - 1,
+                                           grid.cells[2] - 2 * kRing[2] - 1};
   const auto cell_along = [&](double u, std::size_t k) {
     const double c = u * inverse[static_cast<int>(k)];
-    return std::min(static_cast<std::uint32_t>(c), grid.cells[k] - 2 * kRing[k] - 1) + kRing[k];
+    return std::min(static_cast<std::uint32_t>(c), limit[k]) + kRing[k];
   };
   for (std::uint32_t p = 0; p < points; ++p) {
     const Vec3 u = at(p) - bounds.lower;
@@ -247,9 +253,10 @@ void accumulate_geometric(NeighbourList& list, const SurfaceLaws& law, std::span
                                        .conormality = law.conormality,
                                        .conormality2 = 2.0 * law.conormality,
                                        .cocircularity = law.cocircularity};
+  const auto filler = static_cast<std::uint32_t>(4 * impl.source.size());
   impl.for_lists(executor, [&](const packed::ListBlock& block, std::size_t begin, std::size_t end) {
     std::array<packed::Row, kListBlock> force, torque;
-    packed::surface_loads(numbers, block, begin, end, impl.position.data(), impl.normal.data(), force.data(),
+    packed::surface_loads(numbers, block, begin, end, filler, impl.position.data(), impl.normal.data(), force.data(),
                           torque.data());
     for (std::size_t k = begin; k < end; ++k) {
       const std::uint32_t i = impl.source[block.point[k]];
@@ -294,7 +301,7 @@ std::size_t NeighbourList::bytes() const {
   const Impl& l = *impl_;
   std::size_t total = size_of(l.reference, l.source, l.shift, l.position, l.normal, l.image_shift, l.image_source,
                               l.cell, l.grid.start, l.grid.x, l.grid.y, l.grid.z, l.grid.image, l.block, l.block_move2);
-  for (const packed::ListBlock& b : l.block) total += size_of(b.point, b.first, b.last, b.neighbour);
+  for (const packed::ListBlock& b : l.block) total += size_of(b.point, b.first, b.last, b.neighbour, b.near_x, b.near_y, b.near_z, b.near_index);
   return total;
 }
 

@@ -18,9 +18,11 @@ struct alignas(32) Row {
   double x = 0.0, y = 0.0, z = 0.0, w = 0.0;
 };
 
-/// Cells are range / 2 wide and range / 4 high: few points are looked at in vain, and those of a row fit a vector.
+/// Cells are range / 2 wide and range / 4 high, so that few points are looked at in vain.
 inline constexpr int kReach = 2;
-inline constexpr int kReachUp = 4;
+inline constexpr std::uint32_t kReachUp = 4;
+/// Cells above each other that are searched together; a column holds whole tiles.
+inline constexpr std::uint32_t kTile = 4;
 
 /// Points in cells, those of a cell after each other, z fastest; the cells at the sides are empty or hold images.
 struct CellGrid {
@@ -37,9 +39,12 @@ struct ListBlock {
   std::vector<std::uint32_t> first;      ///< first neighbour of each particle, shape [particles]
   std::vector<std::uint32_t> last;       ///< one past its last
   std::vector<std::uint32_t> neighbour;  ///< lists of whole batches, the last one filled with `filler`; and room
+
+  std::vector<float> near_x, near_y, near_z;  ///< the points in reach of a tile
+  std::vector<std::uint32_t> near_index;
 };
 
-/// Lists of the particles in the cells [begin, end).
+/// Lists of the particles in the cells [begin, end), whole tiles.
 /// @param filler  row that no particle has within its range
 void search_cells(const CellGrid& grid, std::uint32_t begin, std::uint32_t end, std::uint32_t filler, ListBlock& out);
 
@@ -70,8 +75,9 @@ struct SurfaceNumbers {
   double cocircularity = 0.0;///< k_c
 };
 /// Forces and torques on the particles [begin, end) of a block, shape [end - begin].
+/// @param filler  four times the row that fills batches; its normal is 0
 void surface_loads(const SurfaceNumbers& law, const ListBlock& list, std::size_t begin, std::size_t end,
-                   const Row* position, const Row* normal, Row* force, Row* torque);
+                   std::uint32_t filler, const Row* position, const Row* normal, Row* force, Row* torque);
 
 /// Largest squared distance of two sets of points, shape [points][3].
 double largest_move2(const double* now, const double* before, std::size_t points);

@@ -1,0 +1,339 @@
+/// @file core_bench.cpp
+/// Times of oriented particles, one JSON object a line: name, particles, time, size, hash of what was computed, peak
+/// memory. Times are the least of several repeats, CPU time of the process; lines of two threads give wall time.
+#include <sys/resource.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/support.h"
+#include "supple/core/hash.h"
+#include "supple/core/integrate.h"
+#include "supple/core/neighbour_list.h"
+
+namespace {
+
+using namespace supple;
+using namespace supple::core;
+
+double seconds(clockid_t clock) {
+  timespec t{};
+  clock_gettime(clock, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+double peak_megabytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+/// Least time of `work` over at least `repeats` runs and 0.3 s [s].
+double least_time(int repeats, clockid_t clock, const std::function<void()>& work) {
+  double best = std::numeric_limits<double>::infinity();
+  double total = 0.0;
+  for (int k = 0; k < 10000 && (k < repeats || total < 0.3); ++k) {
+    const double start = seconds(clock);
+    work();
+    const double time = seconds(clock) - start;
+    best = std::min(best, time);
+    total += time;
+  }
+  return best;
+}
+
+struct Line {
+  std::string name;
+  std::size_t particles = 0;
+  int threads = 1;
+  double time = 0.0;   ///< of one item [s]
+  std::string rate;    ///< further fields, ", "-separated JSON
+  std::uint64_t hash = 0;
+};
+
+void print(const Line& line) {
+  std::printf("{\"name\": \"core/%s\", \"particles\": %zu, \"threads\": %d, \"ns_per_particle\": %.4g, \"us\": %.5g%s%s, "
+              "\"peak_mb\": %.1f, \"hash\": \"%s\"}\n",
+              line.name.c_str(), line.particles, line.threads, 1e9 * line.time / static_cast<double>(line.particles),
+              1e6 * line.time, line.rate.empty() ? "" : ", ", line.rate.c_str(), peak_megabytes(),
+              to_hex(line.hash).c_str());
+  std::fflush(stdout);
+}
+
+std::string field(const char* name, double value) {
+  char text[96];
+  std::snprintf(text, sizeof text, "\"%s\": %.10g", name, value);
+  return text;
+}
+
+std::uint64_t hash_of(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  Hasher hasher;
+  hasher.add(a);
+  hasher.add(b);
+  return hasher.value();
+}
+
+/// Lennard-Jones atoms in reduced units: m = epsilon = sigma = 1, cut-off 2.5, skin 0.3, time step 0.005.
+struct Melt {
+  PeriodicBox box;
+  std::vector<Vec3> x, v;
+  Loads loads;
+  NeighbourList list{2.5, 0.3};
+  std::size_t builds = 0;
+
+  /// fcc of density 0.8442 with cells^3 unit cells, at temperature 3.
+  explicit Melt(int cells) {
+    const double edge = std::cbrt(4.0 / 0.8442);
+    box.length = Vec3::Constant(cells * edge);
+    std::mt19937_64 engine(87287);
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < cells * cells * cells; ++i) {
+      const Vec3 corner(i / cells / cells, i / cells % cells, i % cells);
+      for (const Vec3& basis : {Vec3(0, 0, 0), Vec3(0.5, 0.5, 0), Vec3(0.5, 0, 0.5), Vec3(0, 0.5, 0.5)}) {
+        x.push_back(edge * (corner + basis));
+        v.push_back(Vec3(normal(engine), normal(engine), normal(engine)));
+      }
+    }
+    Vec3 mean = Vec3::Zero();
+    for (const Vec3& u : v) mean += u / static_cast<double>(v.size());
+    double squares = 0.0;
+    for (Vec3& u : v) squares += (u -= mean).squaredNorm();
+    const double scale = std::sqrt(9.0 * static_cast<double>(v.size() - 1) / squares);
+    for (Vec3& u : v) u *= scale;
+  }
+  /// Box length, positions and velocities as doubles in a file.
+  explicit Melt(const std::string& path) {
+    std::ifstream in(path, std::ios::binary | std::ios::ate);
+    if (!in) {
+      std::fprintf(stderr, "%s: cannot be read\n", path.c_str());
+      std::exit(2);
+    }
+    std::vector<double> values(static_cast<std::size_t>(in.tellg()) / sizeof(double));
+    in.seekg(0);
+    in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(double)));
+    box.length = Vec3(values[0], values[1], values[2]);
+    const std::size_t n = (values.size() - 3) / 6;
+    for (std::size_t i = 0; i < n; ++i) {
+      x.emplace_back(values[3 + 3 * i], values[4 + 3 * i], values[5 + 3 * i]);
+      v.emplace_back(values[3 + 3 * (n + i)], values[4 + 3 * (n + i)], values[5 + 3 * (n + i)]);
+    }
+  }
+
+  void start(const Executor& executor) {
+    list = NeighbourList(2.5, 0.3, box);
+    forces(executor);
+    builds = 0;
+  }
+  void forces(const Executor& executor) {
+    builds += list.update(x, executor) ? 1 : 0;
+    loads.force.assign(x.size(), Vec3::Zero());
+    accumulate_geometric(list, TwelveSix{}, executor, loads);
+  }
+  /// Velocity Verlet.
+  void step(const Executor& executor) {
+    static constexpr double kStep = 0.005;
+    constexpr std::size_t kBlock = 4096;
+    const auto kick_and_drift = [this](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        v[i] += 0.5 * kStep * loads.force[i];
+        x[i] += kStep * v[i];
+      }
+    };
+    const auto kick = [this](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) v[i] += 0.5 * kStep * loads.force[i];
+    };
+    executor.for_blocks(x.size(), kBlock, std::cref(kick_and_drift));
+    forces(executor);
+    executor.for_blocks(x.size(), kBlock, std::cref(kick));
+  }
+  /// Temperature, potential and total energy per atom, and pressure, by the plain formulas over the pairs of the list.
+  [[nodiscard]] std::string thermo(const std::string& prefix) const {
+    double potential = 0.0, virial = 0.0, squares = 0.0;
+    for (const IndexPair& pair : list.pairs()) {
+      const double d2 = box.nearest_image(x[pair.second] - x[pair.first]).squaredNorm();
+      if (d2 >= 6.25) continue;
+      const double i6 = 1.0 / (d2 * d2 * d2);
+      potential += 4.0 * (i6 * i6 - i6);
+      virial += 48.0 * i6 * i6 - 24.0 * i6;
+    }
+    for (const Vec3& u : v) squares += u.squaredNorm();
+    const auto n = static_cast<double>(x.size());
+    return field((prefix + "_temperature").c_str(), squares / (3.0 * (n - 1.0))) + ", " +
+           field((prefix + "_potential").c_str(), potential / n) + ", " +
+           field((prefix + "_energy").c_str(), (potential + 0.5 * squares) / n) + ", " +
+           field((prefix + "_pressure").c_str(), (squares + virial) / (3.0 * box.length.prod()));
+  }
+};
+
+void bench_melt(Melt melt, int steps, int repeats) {
+  const Executor executor(1);
+  const std::vector<Vec3> x = melt.x, v = melt.v;
+  double best = std::numeric_limits<double>::infinity();
+  std::string thermo;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    melt.x = x;
+    melt.v = v;
+    melt.start(executor);
+    thermo = melt.thermo("first");
+    const double start = seconds(CLOCK_PROCESS_CPUTIME_ID);
+    for (int k = 0; k < steps; ++k) melt.step(executor);
+    best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - start) / steps);
+  }
+  const double n = static_cast<double>(x.size());
+  print({.name = "melt/steps=" + std::to_string(steps),
+         .particles = x.size(),
+         .time = best,
+         .rate = field("steps_per_build", static_cast<double>(steps) / static_cast<double>(melt.builds)) + ", " +
+                 field("list_bytes_per_particle", static_cast<double>(melt.list.bytes()) / n) + ", " +
+                 field("atom_steps_per_s", n / best) + ", " + thermo + ", " + melt.thermo("last"),
+         .hash = hash_of(melt.x, melt.v)});
+}
+
+void bench_threads() {
+  double one = 0.0;
+  for (const int threads : {1, 2}) {
+    Melt melt(32);
+    const Executor executor(threads);
+    melt.start(executor);
+    const double time = least_time(5, CLOCK_MONOTONIC, [&] {
+      for (int k = 0; k < 10; ++k) melt.step(executor);
+    });
+    if (threads == 1) one = time;
+    print({.name = "melt/threads",
+           .particles = melt.x.size(),
+           .threads = threads,
+           .time = time / 10,
+           .rate = field("speed_up", one / time),
+           .hash = 0});
+  }
+}
+
+/// Particles with normals on a disturbed cubic lattice of spacing 1 in open space.
+struct Crowd {
+  std::vector<Vec3> position, normal;
+  explicit Crowd(std::size_t count) {
+    test::Draw draw(17);
+    const auto side = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<double>(count))));
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto z = static_cast<double>(i % side), y = static_cast<double>(i / side % side);
+      position.push_back(Vec3(static_cast<double>(i / side / side), y, z) + draw.vector(0.2));
+      normal.push_back(draw.direction());
+    }
+  }
+};
+
+void bench_surface_laws(std::size_t count) {
+  const Crowd crowd(count);
+  const Executor executor(1);
+  constexpr double kRange = 2.5;
+  const SurfaceLaws laws{.cohesion = {.r0 = 1.0, .f0 = 1.0, .a = 4.0},
+                         .form = 0.5,
+                         .curvature = 0.3,
+                         .coplanarity = 0.4,
+                         .conormality = 0.2,
+                         .cocircularity = 0.1};
+  NeighbourList list(kRange, 0.25);
+  list.update(crowd.position, executor);
+  std::size_t pairs = 0;
+  for (const IndexPair& pair : list.pairs()) {
+    if ((crowd.position[pair.first] - crowd.position[pair.second]).norm() < kRange) ++pairs;
+  }
+  Loads loads;
+  const double time = least_time(10, CLOCK_PROCESS_CPUTIME_ID, [&] {
+    loads.reset(count);
+    accumulate_geometric(list, laws, crowd.normal, executor, loads);
+  });
+  const auto n = static_cast<double>(count);
+  print({.name = "surface_laws",
+         .particles = count,
+         .time = time,
+         .rate = field("pairs_per_s", static_cast<double>(pairs) / time) + ", " +
+                 field("pairs_per_particle", static_cast<double>(pairs) / n) + ", " +
+                 field("list_entries_per_particle", static_cast<double>(list.entries()) / n),
+         .hash = hash_of(loads.force, loads.torque)});
+}
+
+void bench_lists(std::size_t count) {
+  const Crowd crowd(count);
+  std::vector<Vec3> moved = crowd.position;
+  for (Vec3& x : moved) x.x() += 0.15;
+  const Executor executor(1);
+  NeighbourList list(2.5, 0.25);
+  bool there = false;
+  const double time = least_time(6, CLOCK_PROCESS_CPUTIME_ID, [&] {
+    list.update(there ? crowd.position : moved, executor);
+    there = !there;
+  });
+  Hasher hasher;
+  list.hash(hasher);
+  print({.name = "list_build",
+         .particles = count,
+         .time = time,
+         .rate = field("list_bytes_per_particle", static_cast<double>(list.bytes()) / static_cast<double>(count)) +
+                 ", " + field("list_entries_per_particle", static_cast<double>(list.entries()) / static_cast<double>(count)),
+         .hash = hasher.value()});
+}
+
+/// A spiral with bond frames and co-planarity to second neighbours and friction, stepped by `advance`.
+void bench_spiral(int count) {
+  const test::Particles spiral = test::make_spiral(count);
+  Interactions all;
+  all.bond_frame.push_back(test::bond_frames(spiral, 400.0, 1.5));
+  all.coplanarity.push_back(test::coplanarities(spiral, 2.0));
+  Friction friction{.name = "friction", .first = {}, .second = {}, .linear = 0.2, .angular = 1e-3};
+  friction.first = all.bond_frame[0].first;
+  friction.second = all.bond_frame[0].second;
+  all.friction.push_back(friction);
+  all.external.push_back({.particle = 0, .force = Vec3(0.1, 0.0, 0.0), .torque = Vec3::Zero(), .begin = 0.0, .end = 1e9});
+  const Executor executor(1);
+  InteractionWorkspace workspace(spiral.set, all);
+  const ForceModel forces = [&](const ParticleState& state, double time, ForceSample& out) {
+    accumulate_interactions(spiral.set, state, all, time, executor, workspace, out.internal, out.external);
+  };
+  ParticleState state = spiral.state;
+  KickState kick;
+  Ledger ledger;
+  constexpr int kSteps = 1000;
+  constexpr double kStep = 1e-4;
+  const auto run = [&] {
+    state = spiral.state;
+    kick.valid = false;
+    ledger = {};
+    for (int k = 0; k < kSteps; ++k) advance(spiral.set, all, forces, kStep * k, kStep, state, kick, ledger);
+  };
+  const double time = least_time(20, CLOCK_PROCESS_CPUTIME_ID, run) / kSteps;
+  print({.name = "spiral_step",
+         .particles = static_cast<std::size_t>(count),
+         .time = time,
+         .rate = field("bonds", static_cast<double>(all.bond_frame[0].first.size())),
+         .hash = hash_of(state.position, state.velocity)});
+}
+
+}  // namespace
+
+/// @param argv  melt [FILE [STEPS]], threads, surface, lists, spiral; all when absent
+int main(int argc, char** argv) {
+  const std::string_view what = argc > 1 ? argv[1] : "";
+  const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };
+  if (wanted("melt")) bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), argc > 3 ? std::atoi(argv[3]) : 100, 3);
+  if (wanted("surface")) {
+    for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_surface_laws(count);
+  }
+  if (wanted("lists")) {
+    for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_lists(count);
+  }
+  if (wanted("spiral")) {
+    for (const int count : {10, 100}) bench_spiral(count);
+  }
+  if (wanted("threads")) bench_threads();
+  return 0;
+}
