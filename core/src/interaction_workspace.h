@@ -66,7 +66,8 @@ struct PackedGeometric {
   std::vector<std::uint32_t> particle;  ///< ascending
   std::vector<std::uint8_t> side;       ///< whether it belongs to object_b
   std::vector<Vec3> position;
-  std::vector<IndexPair> near;          ///< indices into `particle`
+  std::vector<Vec3> reference;          ///< positions at which `near` was found
+  std::vector<IndexPair> near;          ///< nearer than the range and a skin then; indices into `particle`
   PackedPairs pairs;
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "interaction_workspace.h"
+#include "packed_lanes.h"
 #include "law_lists.h"
 #include "supple/core/error.h"
 
@@ -15,6 +16,10 @@ namespace {
 constexpr std::size_t kSerialPairs = 1024;
 constexpr std::size_t kBatchBlock = 128;
 constexpr std::size_t kParticleBlock = 512;
+/// Skin of the kept pairs of a geometric law, in ranges.
+constexpr double kSkin = 0.15;
+/// Square of the largest move, in skins: half of one, less the rounding of distances.
+constexpr double kMoveLimit2 = 0.2499;
 
 void load_rows(const double* a, const double* b, const double* c, const double* d, std::array<Lanes, 4>& columns) {
   columns = {Lanes::load(a), Lanes::load(b), Lanes::load(c), Lanes::load(d)};
@@ -190,16 +195,38 @@ void accumulate_bonds(const Executor& executor, InteractionWorkspace::Impl& work
   gather(executor, work);
 }
 
+double dot(const Vec3& a, const Vec3& b) { return fma(a.x(), b.x(), fma(a.y(), b.y(), a.z() * b.z())); }
+
+/// Pairs nearer than the range and a skin, kept until a particle has moved by half the skin. Only pairs in range act,
+/// in their order, so that no bit depends on when the pairs were found.
+template <class Law>
+void find_near_pairs(PackedGeometric<Law>& law, const ParticleState& state, const Executor& executor,
+                     InteractionWorkspace::Impl& work, InteractionCounts& counts) {
+  law.position.resize(law.particle.size());
+  for (std::size_t k = 0; k < law.particle.size(); ++k) law.position[k] = state.position[law.particle[k]];
+  if (law.position.empty()) return;
+  const double skin = kSkin * law.range;
+  const bool kept = law.reference.size() == law.position.size() &&
+                    packed::largest_move2(law.position[0].data(), law.reference[0].data(), law.position.size()) <=
+                        kMoveLimit2 * skin * skin;
+  if (kept) {
+    counts.pairs_visited += law.near.size();
+    return;
+  }
+  counts.pairs_visited += work.grid.find(law.position, law.range + skin, executor, law.near);
+  law.reference = law.position;
+}
+
 template <class Law>
 void accumulate_geometric(PackedGeometric<Law>& law, const ParticleState& state, const Executor& executor,
                           InteractionWorkspace::Impl& work, InteractionCounts& counts) {
-  law.position.resize(law.particle.size());
-  for (std::size_t k = 0; k < law.particle.size(); ++k) law.position[k] = state.position[law.particle[k]];
-  counts.pairs_visited += work.grid.find(law.position, law.range, executor, law.near);
+  find_near_pairs(law, state, executor, work, counts);
   law.pairs.clear();
+  const double range2 = law.range * law.range;
   for (const IndexPair& pair : law.near) {
     if (!law.same_object && law.side[pair.first] == law.side[pair.second]) continue;
-    law.pairs.add(law.particle[pair.first], law.particle[pair.second]);
+    const Vec3 r = law.position[pair.first] - law.position[pair.second];
+    if (dot(r, r) < range2) law.pairs.add(law.particle[pair.first], law.particle[pair.second]);
   }
   law.pairs.pad();
   counts.pairs_present += law.pairs.count;
