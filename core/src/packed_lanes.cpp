@@ -382,33 +382,6 @@ void SurfaceLoads(const SurfaceNumbers& given, const ListBlock& list, std::size_
   flush();
 }
 
-/// Puts particles with lists of equal length after each other, so that the ends of loops can be foretold. Groups are
-/// small: neighbours of neighbouring particles are still in the cache.
-void order_by_length(ListBlock& out) {
-  constexpr std::size_t kGroup = 64;
-  constexpr std::uint32_t kLengths = 32;
-  const std::size_t n = out.point.size();
-  std::array<std::uint32_t, kGroup> point, first, last;
-  for (std::size_t begin = 0; begin < n; begin += kGroup) {
-    const std::size_t count = std::min(kGroup, n - begin);
-    std::array<std::uint32_t, kLengths + 1> start{};
-    const auto length = [&](std::size_t k) {
-      return std::min<std::uint32_t>((out.last[begin + k] - out.first[begin + k]) / kBatch, kLengths - 1);
-    };
-    for (std::size_t k = 0; k < count; ++k) ++start[length(k) + 1];
-    for (std::size_t l = 0; l < kLengths; ++l) start[l + 1] += start[l];
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::uint32_t to = start[length(k)]++;
-      point[to] = out.point[begin + k];
-      first[to] = out.first[begin + k];
-      last[to] = out.last[begin + k];
-    }
-    std::copy_n(point.begin(), count, out.point.begin() + static_cast<std::ptrdiff_t>(begin));
-    std::copy_n(first.begin(), count, out.first.begin() + static_cast<std::ptrdiff_t>(begin));
-    std::copy_n(last.begin(), count, out.last.begin() + static_cast<std::ptrdiff_t>(begin));
-  }
-}
-
 /// Copies the points of the rows of cells round the tile that begins at `cell`. @return how many
 HWY_INLINE std::uint32_t collect(const CellGrid& grid, std::uint32_t cell, ListBlock& out) {
   const F f;
@@ -503,7 +476,6 @@ void SearchCells(const CellGrid& grid, std::uint32_t begin, std::uint32_t end, s
       out.last.push_back(used);
     }
   }
-  order_by_length(out);
 }
 
 double LargestMove2(const double* HWY_RESTRICT now, const double* HWY_RESTRICT before, std::size_t points) {

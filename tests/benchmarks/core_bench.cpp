@@ -61,8 +61,8 @@ struct Line {
 };
 
 void print(const Line& line) {
-  std::printf("{\"name\": \"core/%s\", \"particles\": %zu, \"threads\": %d, \"ns_per_particle\": %.4g, \"us\": %.5g%s%s, "
-              "\"peak_mb\": %.1f, \"hash\": \"%s\"}\n",
+  std::printf("{\"name\": \"core/%s\", \"particles\": %zu, \"threads\": %d, \"ns_per_particle\": %.4g, \"us\": %.5g"
+              "%s%s, \"peak_mb\": %.1f, \"hash\": \"%s\"}\n",
               line.name.c_str(), line.particles, line.threads, 1e9 * line.time / static_cast<double>(line.particles),
               1e6 * line.time, line.rate.empty() ? "" : ", ", line.rate.c_str(), peak_megabytes(),
               to_hex(line.hash).c_str());
@@ -275,25 +275,29 @@ void bench_lists(std::size_t count) {
   });
   Hasher hasher;
   list.hash(hasher);
+  const auto n = static_cast<double>(count);
   print({.name = "list_build",
          .particles = count,
          .time = time,
-         .rate = field("list_bytes_per_particle", static_cast<double>(list.bytes()) / static_cast<double>(count)) +
-                 ", " + field("list_entries_per_particle", static_cast<double>(list.entries()) / static_cast<double>(count)),
+         .rate = field("list_bytes_per_particle", static_cast<double>(list.bytes()) / n) + ", " +
+                 field("list_entries_per_particle", static_cast<double>(list.entries()) / n),
          .hash = hasher.value()});
 }
 
-/// A spiral with bond frames and co-planarity to second neighbours and friction, stepped by `advance`.
-void bench_spiral(int count) {
+/// A spiral with bond frames and co-planarity to second neighbours, with or without friction, stepped by `advance`.
+void bench_spiral(int count, bool rubs) {
   const test::Particles spiral = test::make_spiral(count);
   Interactions all;
   all.bond_frame.push_back(test::bond_frames(spiral, 400.0, 1.5));
   all.coplanarity.push_back(test::coplanarities(spiral, 2.0));
-  Friction friction{.name = "friction", .first = {}, .second = {}, .linear = 0.2, .angular = 1e-3};
-  friction.first = all.bond_frame[0].first;
-  friction.second = all.bond_frame[0].second;
-  all.friction.push_back(friction);
-  all.external.push_back({.particle = 0, .force = Vec3(0.1, 0.0, 0.0), .torque = Vec3::Zero(), .begin = 0.0, .end = 1e9});
+  if (rubs) {
+    all.friction.push_back({.name = "friction",
+                            .first = all.bond_frame[0].first,
+                            .second = all.bond_frame[0].second,
+                            .linear = 0.2,
+                            .angular = 1e-3});
+  }
+  all.external.push_back({.particle = 0, .force = Vec3(0.1, 0.0, 0.0), .begin = 0.0, .end = 1e9});
   const Executor executor(1);
   InteractionWorkspace workspace(spiral.set, all);
   const ForceModel forces = [&](const ParticleState& state, double time, ForceSample& out) {
@@ -311,7 +315,7 @@ void bench_spiral(int count) {
     for (int k = 0; k < kSteps; ++k) advance(spiral.set, all, forces, kStep * k, kStep, state, kick, ledger);
   };
   const double time = least_time(20, CLOCK_PROCESS_CPUTIME_ID, run) / kSteps;
-  print({.name = "spiral_step",
+  print({.name = rubs ? "spiral_step/friction" : "spiral_step",
          .particles = static_cast<std::size_t>(count),
          .time = time,
          .rate = field("bonds", static_cast<double>(all.bond_frame[0].first.size())),
@@ -332,7 +336,9 @@ int main(int argc, char** argv) {
     for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_lists(count);
   }
   if (wanted("spiral")) {
-    for (const int count : {10, 100}) bench_spiral(count);
+    for (const int count : {10, 100}) {
+      for (const bool rubs : {false, true}) bench_spiral(count, rubs);
+    }
   }
   if (wanted("threads")) bench_threads();
   return 0;
