@@ -87,6 +87,54 @@ Arrangement arrange_grid(int columns, int rows, double spacing) {
   return out;
 }
 
+Arrangement arrange_geodesic(int frequency, double radius) {
+  SUPPLE_EXPECTS(frequency >= 1 && frequency <= 31 && radius > 0.0);
+  const double golden = 0.5 * (1.0 + std::sqrt(5.0));
+  std::vector<Vec3> corner;
+  for (const double one : {1.0, -1.0}) {
+    for (const double phi : {golden, -golden}) {
+      corner.emplace_back(0.0, one, phi);
+      corner.emplace_back(one, phi, 0.0);
+      corner.emplace_back(phi, 0.0, one);
+    }
+  }
+  std::swap(corner[9], corner[11]);  // the last is opposite to the first
+  const auto adjacent = [&corner](std::size_t a, std::size_t b) { return (corner[a] - corner[b]).squaredNorm() < 4.5; };
+
+  Arrangement out;
+  const auto add = [&](const Vec3& direction) {
+    const Vec3 normal = direction.normalized();
+    Eigen::Index least = 0;
+    normal.cwiseAbs().minCoeff(&least);
+    Mat3 frame;
+    frame.col(2) = normal;
+    frame.col(0) = Vec3::Unit(least).cross(normal).normalized();
+    frame.col(1) = normal.cross(frame.col(0));
+    out.position.emplace_back(radius * normal);
+    out.orientation.emplace_back(frame);
+  };
+  for (const Vec3& c : corner) add(c);
+  for (std::size_t a = 0; a < corner.size(); ++a) {
+    for (std::size_t b = a + 1; b < corner.size(); ++b) {
+      if (!adjacent(a, b)) continue;
+      for (int i = 1; i < frequency; ++i) add((frequency - i) * corner[a] + i * corner[b]);
+    }
+  }
+  for (std::size_t a = 0; a < corner.size(); ++a) {
+    for (std::size_t b = a + 1; b < corner.size(); ++b) {
+      for (std::size_t c = b + 1; c < corner.size(); ++c) {
+        if (!adjacent(a, b) || !adjacent(b, c) || !adjacent(a, c)) continue;
+        for (int i = 1; i < frequency; ++i) {
+          for (int j = 1; i + j < frequency; ++j) {
+            add((frequency - i - j) * corner[a] + i * corner[b] + j * corner[c]);
+          }
+        }
+      }
+    }
+  }
+  return out;
+}
+
 Arrangement arrange_single() { return {{Vec3::Zero()}, {Quat::Identity()}}; }
 
 void place(Arrangement& arrangement, const Pose& pose) {

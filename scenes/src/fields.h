@@ -54,7 +54,9 @@ void fields(Archive& archive, ParticlesDesc& d) {
   };
   archive("arrange", d.arrange, {}, "how the particles lie; generators lie in the x-y plane");
   archive.required("count", d.count, only(between(1.0, kMostCount, kNumber), {Line, Ring, Spiral}), "how many");
-  archive.required("radius", d.radius, only(above(0.0, kLength), {Ring}), "of the circle");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Ring, Geodesic}), "of the circle or sphere");
+  archive.required("frequency", d.frequency, only(between(1.0, 31.0, kNumber), {Geodesic}),
+                   "parts of each edge of an icosahedron; 10 frequency^2 + 2 particles");
   archive.required("inner_radius", d.inner_radius, only(at_least(0.0, kLength), {Spiral}), "where the spiral begins");
   archive.required("outer_radius", d.outer_radius, only(above(0.0, kLength), {Spiral}), "where the spiral ends");
   archive("turns", d.turns, only(up_to(1000.0, kNumber), {Spiral}), "of the spiral");
@@ -239,6 +241,7 @@ void fields(Archive& archive, LoadDesc& d) {
     case ArrangeKind::Ring:
     case ArrangeKind::Spiral: return d.count;
     case ArrangeKind::Grid: return d.columns * d.rows;
+    case ArrangeKind::Geodesic: return 10 * d.frequency * d.frequency + 2;
     case ArrangeKind::File: break;
   }
   return std::nullopt;

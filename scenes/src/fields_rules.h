@@ -29,7 +29,8 @@ template <> struct EnumNames<RotationName> {
   static constexpr std::array<std::string_view, 2> names{"splitting", "exponential"};
 };
 template <> struct EnumNames<ArrangeKind> {
-  static constexpr std::array<std::string_view, 6> names{"single", "line", "ring", "grid", "spiral", "file"};
+  static constexpr std::array<std::string_view, 7> names{"single", "line",   "ring",    "grid",
+                                                         "spiral", "file", "geodesic"};
 };
 template <> struct EnumNames<NormalKind> {
   static constexpr std::array<std::string_view, 2> names{"axis", "radial"};

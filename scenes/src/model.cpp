@@ -47,6 +47,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
     case ArrangeKind::Spiral:
       out = core::arrange_spiral(d.count, d.inner_radius, d.outer_radius, d.turns, direction_of(d.normal));
       break;
+    case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
     case ArrangeKind::File:
       out.position = io::read_points_csv(scene.source.parent_path() / d.file);
       out.orientation.assign(out.position.size(), Quat::Identity());

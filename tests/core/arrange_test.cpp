@@ -113,5 +113,21 @@ TEST(Spiral, RefusesWhatIsNoSpiral) {
   EXPECT_THROW((void)arrange_spiral(5, 0.5, 0.5, 1.0, NormalDirection::Axis), ContractViolation);
 }
 
+TEST(Geodesic, CoversTheSphereWithTrianglesOfNearlyOneSize) {
+  for (const int frequency : {1, 2, 5, 31}) {
+    const Arrangement shell = arrange_geodesic(frequency, 0.5);
+    ASSERT_EQ(shell.size(), static_cast<std::size_t>(10 * frequency * frequency + 2));
+    for (std::size_t i = 0; i < shell.size(); ++i) {
+      EXPECT_NEAR(shell.position[i].norm(), 0.5, 1e-15);
+      EXPECT_LE((shell.orientation[i] * Vec3::UnitZ() - shell.position[i] / 0.5).norm(), 1e-14);
+    }
+    EXPECT_LE((shell.position[0] + shell.position[11]).norm(), 1e-15);
+    // A closed triangulation has 3 (n - 2) edges: up to 1.323 radius / frequency at the middle of a face, where the second
+    // neighbours are farther than the 1.549 of those at a corner.
+    const auto n = static_cast<std::uint32_t>(shell.size());
+    EXPECT_EQ(bonds_within(shell.position, 0, n, 1.42 * 0.5 / frequency).first.size(), 3u * (n - 2)) << frequency;
+  }
+}
+
 }  // namespace
 }  // namespace supple::core

@@ -77,5 +77,49 @@ TEST(Figure5, SpiralUncoilsToAnEquilibriumAndRecovers) {
   EXPECT_LE(simulation.state().record.objects[object_index(simulation, "spiral")].final_shape_error, 0.001);
 }
 
+/// The largest distance of a particle from its rest place so far, over a length, and the shape error at the end.
+struct Dent {
+  double depth = 0.0;
+  double final_shape_error = 0.0;
+};
+
+Dent dent(const std::string& name, std::size_t particle, double length) {
+  Simulation simulation(library_scene(name));
+  Dent out;
+  const Vec3 rest = simulation.model().rest.position[particle];
+  while (simulation.frame() < simulation.scene().frame_count()) {
+    simulation.step_frame();
+    out.depth = std::max(out.depth, (simulation.state().particles.position[particle] - rest).norm() / length);
+  }
+  out.final_shape_error = simulation.state().record.objects[0].final_shape_error;
+  EXPECT_LT(simulation.audits().momentum_error, 1e-10);
+  return out;
+}
+
+TEST(Objects, AShellIsDentedAndTakesItsShapeBack) {
+  const Dent shell = dent("objects/shell_dents", 0, 0.5);
+  EXPECT_GT(shell.depth, 0.3);
+  EXPECT_LT(shell.final_shape_error, 0.005);
+}
+
+TEST(Objects, ASheetIsDentedAndTakesItsShapeBack) {
+  const Dent sheet = dent("objects/sheet_dents", 40, 0.8);
+  EXPECT_GT(sheet.depth, 0.2);
+  EXPECT_LT(sheet.final_shape_error, 0.005);
+}
+
+TEST(Figure4, TheSceneOfCohesionComesBackFromSixtyPercentAndFliesApartFromFiftyFive) {
+  const auto side_after = [](double ratio) {
+    Scene scene = library_scene("figures/oscillation_cohesion");
+    scene.objects[0].particles.radius = ratio / std::sqrt(3.0);
+    Simulation simulation(scene);
+    while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
+    const auto& x = simulation.state().particles.position;
+    return (x[1] - x[0]).norm();
+  };
+  EXPECT_NEAR(side_after(0.60), 1.0, 0.02);
+  EXPECT_GT(side_after(0.55), 3.0);
+}
+
 }  // namespace
 }  // namespace supple::scenes

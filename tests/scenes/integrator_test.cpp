@@ -127,6 +127,11 @@ TEST(IntegratorKey, ChoosesBackwardEulerWhereVelocityVerletWouldNeedFarMoreSteps
   EXPECT_NE(explain(soft).find("symplectic: "), std::string::npos) << explain(soft);
   run(stiff, 8);
   EXPECT_TRUE(stiff.integration().within_tolerance);
+  // Also where Verlet is allowed all the steps it needs, 2^14 a frame instead of 2^2.
+  Simulation allowed = make(chain("time_step: {max_substeps: 1048576}", "1e9"));
+  EXPECT_EQ(allowed.integrator().settings.method, core::Integrator::BackwardEuler);
+  EXPECT_EQ(make(chain("time_step: {max_substeps: 1048576}", "1e5")).integrator().settings.method,
+            core::Integrator::Symplectic);
   // A step that the scene fixes is taken as it is.
   Simulation fixed = make(chain("time_step: {substeps: 4}", "1e9"));
   EXPECT_EQ(fixed.integrator().settings.method, core::Integrator::Symplectic);

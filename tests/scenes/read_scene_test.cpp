@@ -261,7 +261,7 @@ TEST(SceneReference, SchemaSaysWhatIsRequiredAndForWhich) {
   EXPECT_EQ(particles["additionalProperties"], false);
   bool ring = false;
   for (const auto& condition : particles["allOf"]) {
-    ring = ring || (condition["if"]["properties"]["arrange"]["enum"] == nlohmann::json({"ring"}) &&
+    ring = ring || (condition["if"]["properties"]["arrange"]["enum"] == nlohmann::json({"ring", "geodesic"}) &&
                     condition["then"]["required"] == nlohmann::json({"radius"}));
   }
   EXPECT_TRUE(ring);

@@ -33,6 +33,9 @@ enum class NormalDirection : std::uint8_t {
 [[nodiscard]] Arrangement arrange_line(int count, double spacing);
 /// Rectangular grid, `columns` along x and `rows` along y, centred; normals +z.
 [[nodiscard]] Arrangement arrange_grid(int columns, int rows, double spacing);
+/// A closed shell: the icosahedron, each edge cut in `frequency` and its faces in triangles, projected to the sphere about
+/// the origin; 10 frequency^2 + 2 particles, normals outward, the first and the twelfth opposite. @pre frequency <= 31
+[[nodiscard]] Arrangement arrange_geodesic(int frequency, double radius);
 /// One particle at the origin, normal +z.
 [[nodiscard]] Arrangement arrange_single();
 

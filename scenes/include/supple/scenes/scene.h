@@ -31,14 +31,15 @@ struct IntegratorDesc {
   std::optional<double> tolerance;   ///< absent: 1e-6 (adaptive) or 1e-9 (implicit methods)
 };
 
-enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File };
+enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File, Geodesic };
 enum class NormalKind : std::uint8_t { Axis, Radial };
 
 /// objects[].particles
 struct ParticlesDesc {
   ArrangeKind arrange = ArrangeKind::Single;
   int count = 1;                      ///< line, ring, spiral
-  double radius = 0.0;                ///< ring [m]
+  double radius = 0.0;                ///< ring, geodesic [m]
+  int frequency = 1;                  ///< geodesic: parts of each edge of the icosahedron
   double inner_radius = 0.0;          ///< spiral [m]
   double outer_radius = 0.0;          ///< spiral [m]
   double turns = 1.0;                 ///< spiral
