@@ -32,7 +32,7 @@ void for_each_pair(const GeometricLaw<Law>& list, const ParticleSet& set, const 
     const auto lower = std::min(set.object[pair.first], set.object[pair.second]);
     const auto upper = std::max(set.object[pair.first], set.object[pair.second]);
     if (lower != std::min(list.object_a, list.object_b) || upper != std::max(list.object_a, list.object_b)) continue;
-    visit(list.law, pair.first, pair.second);
+    if (list.takes(set, pair.first, pair.second)) visit(list.law, pair.first, pair.second);
   }
 }
 

@@ -65,6 +65,8 @@ struct PackedGeometric {
   std::array<LaneRow, PairKernel<Law>::kNumbers> numbers;
   std::vector<std::uint32_t> particle;  ///< ascending
   std::vector<std::uint8_t> side;       ///< whether it belongs to object_b
+  PairKinds kinds = PairKinds::Any;
+  std::vector<std::uint32_t> kind;      ///< of `particle`; empty: all of one type
   std::vector<Vec3> position;
   std::vector<Vec3> reference;          ///< positions at which `near` was found
   std::vector<IndexPair> near;          ///< nearer than the range and a skin then; indices into `particle`

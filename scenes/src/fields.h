@@ -182,10 +182,20 @@ void fields(Archive& archive, MaterialDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, KindDesc& d) {
+  archive("hinge", d.hinge, {}, "joins what is around it");
+  archive("type", d.type, between(0.0, kMostCount, kNumber), "of standard particles; those of different types only repel");
+  archive.required("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
+                   "from 0, negative from the end");
+  archive.check(!(d.hinge && archive.given("type")), "type", "expected either hinge or type", "both", "");
+}
+
+template <class Archive>
 void fields(Archive& archive, RepulsionDesc& d) {
   archive.required("force", d.force, above(0.0, kForce), "at the distance d0");
   archive.required("distance", d.distance, above(0.0, kLength), "d0");
   archive.required("length", d.length, above(0.0, kLength), "over which the force falls by e");
+  archive("own", d.own, {}, "also between all particles of the object; without it, only between those that kinds keep apart");
 }
 
 template <class Archive>
@@ -258,6 +268,11 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
   };
   for (std::size_t k = 0; k < d.pins.size(); ++k) check("pins[" + std::to_string(k) + "].particle", d.pins[k].particle);
   for (std::size_t k = 0; k < d.loads.size(); ++k) check("loads[" + std::to_string(k) + "].particle", d.loads[k].particle);
+  for (std::size_t k = 0; k < d.kinds.size(); ++k) {
+    for (std::size_t j = 0; j < d.kinds[k].particles.size(); ++j) {
+      check("kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.kinds[k].particles[j]);
+    }
+  }
   for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
     for (std::size_t j = 0; j < d.skeleton[k].particles.size(); ++j) {
       check("skeleton[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.skeleton[k].particles[j]);
@@ -269,6 +284,8 @@ template <class Archive>
 void fields(Archive& archive, ObjectDesc& d) {
   archive.required("name", d.name, identifier(), "unique; objects are numbered in the order of their names");
   archive.required("particles", d.particles, {}, "who is there");
+  archive("kinds", d.kinds, {}, "hinges and types; particles not named are standard, of type 0");
+  archive("hinges_join", d.hinges_join, {}, "whether the interactions act between two hinges");
   archive("interactions", d.interactions, {}, "what holds them together");
   archive("skeleton", d.skeleton, {}, "what they look like; without it the object has no surface");
   archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");

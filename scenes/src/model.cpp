@@ -189,6 +189,33 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
   return skeleton;
 }
 
+/// Which particles are hinges, and the types of the others.
+void set_kinds(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model, ModelFaults& faults) {
+  const std::uint32_t n = object.last - object.first;
+  for (std::size_t k = 0; k < d.kinds.size(); ++k) {
+    for (std::size_t j = 0; j < d.kinds[k].particles.size(); ++j) {
+      if (const auto index = particle_index(d.kinds[k].particles[j], n)) {
+        model.particles.kind[object.first + *index] =
+            d.kinds[k].hinge ? core::kHinge : static_cast<std::uint32_t>(d.kinds[k].type);
+      } else {
+        fail_index(faults, key + ".kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']',
+                   d.kinds[k].particles[j], n);
+      }
+    }
+  }
+}
+
+/// Those bonds whose particles interact completely.
+core::Bonds complete_bonds(const core::Bonds& bonds, const core::ParticleSet& set, bool hinges_join) {
+  core::Bonds complete;
+  for (std::size_t b = 0; b < bonds.first.size(); ++b) {
+    if (!core::interact_completely(set.kind[bonds.first[b]], set.kind[bonds.second[b]], hinges_join)) continue;
+    complete.first.push_back(bonds.first[b]);
+    complete.second.push_back(bonds.second[b]);
+  }
+  return complete;
+}
+
 /// Adds the laws of one object.
 class LawBuilder {
  public:
@@ -197,11 +224,13 @@ class LawBuilder {
 
   void add(const InteractionDesc& d, std::size_t index) {
     const std::string key = key_ + ".interactions[" + std::to_string(index) + ']';
-    const core::Bonds bonds = d.within ? core::bonds_within(model_.rest.position, object_.first, object_.last, *d.within)
-                                       : core::bonds_along(object_.first, object_.last, d.neighbours);
+    const core::Bonds near = d.within ? core::bonds_within(model_.rest.position, object_.first, object_.last, *d.within)
+                                      : core::bonds_along(object_.first, object_.last, d.neighbours);
+    const core::Bonds bonds = complete_bonds(near, model_.particles, object_.hinges_join);
     if (bonds.first.empty()) {
       faults_.add(key, "expected a bond", "none",
-                  d.within ? "no two particles are nearer than " + number_text(*d.within) + " m"
+                  !near.first.empty() ? "'kinds' keeps all neighbours apart"
+                  : d.within ? "no two particles are nearer than " + number_text(*d.within) + " m"
                            : "the object has a single particle");
       return;
     }
@@ -340,6 +369,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     model.particles.normal.push_back(Vec3::UnitZ());
     model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
     model.particles.pinned.push_back(0);
+    model.particles.kind.push_back(0);
     model.initial.position.push_back(arrangement.position[i]);
     model.initial.orientation.push_back(arrangement.orientation[i]);
     model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
@@ -428,6 +458,8 @@ Model build_model(const Scene& scene) {
       object.collides = !object.skeleton.primitive.empty();
       object.breaks = d.breaking.has_value();
     }
+    set_kinds(d, key, object, model, faults);
+    object.hinges_join = d.hinges_join;
     add_pins_and_loads(d, key, object, model, faults);
     model.objects.push_back(std::move(object));
   }

@@ -128,6 +128,23 @@ void add_repulsion(const Scene& scene, Model& model, const std::vector<BodyPair>
   }
 }
 
+/// Inside one object: between all particles, or between those that have no other law between them.
+void add_own_repulsion(const Scene& scene, Model& model) {
+  for (std::uint32_t a = 0; a < scene.objects.size(); ++a) {
+    const ObjectDesc& d = scene.objects[a];
+    if (!d.repulsion || !(d.repulsion->own || !d.kinds.empty())) continue;
+    core::GeometricLaw<core::Repulsion> law;
+    law.name = d.name + "/repulsion";
+    law.object_a = law.object_b = a;
+    law.law = {.force = d.repulsion->force, .distance = d.repulsion->distance, .length = d.repulsion->length};
+    law.range = law.law.cut_off();
+    if (!d.repulsion->own) {
+      law.kinds = d.hinges_join ? core::PairKinds::IncompleteButHinges : core::PairKinds::Incomplete;
+    }
+    model.interactions.repulsion.push_back(law);
+  }
+}
+
 }  // namespace
 
 double iso_radius(const implicit::Primitive& primitive, double iso) {
@@ -170,6 +187,7 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   std::vector<BodyPair> forbidden;
   add_pairs(scene, model, faults, forbidden);
   add_repulsion(scene, model, forbidden);
+  add_own_repulsion(scene, model);
   if (!forbidden.empty()) {
     model.rules.allowed = [forbidden](std::uint32_t a, std::uint32_t b) {
       return !std::binary_search(forbidden.begin(), forbidden.end(), BodyPair{std::min(a, b), std::max(a, b)});

@@ -159,6 +159,40 @@ TEST(Interactions, AddUpToTheReferenceLaws) {
   }
 }
 
+TEST(Kinds, FollowTheRuleTable) {
+  for (const bool join : {false, true}) {
+    EXPECT_TRUE(interact_completely(kHinge, 1, join) && interact_completely(1, kHinge, join));
+    EXPECT_TRUE(interact_completely(3, 3, join));
+    EXPECT_FALSE(interact_completely(3, 4, join));
+    EXPECT_EQ(interact_completely(kHinge, kHinge, join), join);
+  }
+}
+
+TEST(Kinds, DecideWhichPairsAGeometricLawTakes) {
+  // A row 1 1 H H 2 2, all within range of each other: each particle is pushed by those that it does not interact with.
+  Particles p;
+  for (int i = 0; i < 6; ++i) p.add(Vec3(0.1 * i, 0, 0));
+  p.set.kind = {1, 1, kHinge, kHinge, 2, 2};
+  const Repulsion law{.force = 1.0, .distance = 0.5, .length = 0.1};
+  const auto push = [&](int a, int b) {
+    return -evaluate(law, {.r = Vec3(0.1 * (b - a), 0, 0)}).force_b.x();
+  };
+  for (const PairKinds kinds : {PairKinds::Any, PairKinds::Incomplete, PairKinds::IncompleteButHinges}) {
+    Interactions all;
+    all.repulsion.push_back({.name = "r", .range = law.cut_off(), .law = law, .kinds = kinds});
+    const Evaluated loads = evaluate_loads(p, all, Executor(1));
+    const auto reports = report_laws(p.set, p.state, all, 0.0);
+    const double first = kinds == PairKinds::Any ? push(0, 1) + push(0, 2) + push(0, 3) + push(0, 4) + push(0, 5)
+                                                 : push(0, 4) + push(0, 5);
+    const double hinge = kinds == PairKinds::Any ? push(2, 3) + push(2, 4) + push(2, 5) - push(1, 2) - push(0, 2)
+                         : kinds == PairKinds::Incomplete ? push(2, 3) : 0.0;
+    EXPECT_NEAR(loads.internal.force[0].x(), first, 1e-12 * std::abs(first));
+    EXPECT_NEAR(loads.internal.force[2].x(), hinge, 1e-12 * std::abs(first));
+    EXPECT_NEAR(reports[0].loads.force[2].x(), hinge, 1e-12 * std::abs(first));
+    EXPECT_EQ(loads.counts.pairs_present, kinds == PairKinds::Any ? 15u : kinds == PairKinds::Incomplete ? 5u : 4u);
+  }
+}
+
 TEST(Interactions, GiveNoForceAndNoMomentToTheWhole) {
   const Crowd crowd = make_crowd(200, 32);
   const Evaluated loads = evaluate_loads(crowd.p, crowd.interactions, Executor(1));

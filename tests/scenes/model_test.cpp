@@ -164,6 +164,36 @@ TEST(Planar, RefusesParticlesAtDifferentHeights) {
   }
 }
 
+constexpr const char* kHinged = R"(
+  - name: bar
+    particles: {arrange: line, count: 7, spacing: 0.1}
+    kinds: [{type: 1, particles: [0, 1, 2]}, {hinge: true, particles: [3]}, {type: 2, particles: [4, 5, -1]}]
+    interactions: [{law: bond_frame, neighbours: 2, stretch: 100, rotation: 1}]
+    repulsion: {force: 1, distance: 0.05, length: 0.01}
+)";
+
+TEST(Kinds, KeepTheBondsThatInteractCompletely) {
+  const Model model = model_of(std::string(kHead) + kHinged);
+  const auto& law = model.interactions.bond_frame.at(0);
+  for (std::size_t k = 0; k < law.law.size(); ++k) {
+    EXPECT_FALSE(law.first[k] < 3 && law.second[k] > 3) << law.first[k] << ' ' << law.second[k];
+  }
+  EXPECT_EQ(law.law.size(), 6u + 5u - 1u);  // all but 2-4
+  ASSERT_EQ(model.interactions.repulsion.size(), 1u);
+  EXPECT_EQ(model.interactions.repulsion[0].kinds, core::PairKinds::Incomplete);
+  const Model own = model_of(std::string(kHead) + kHinged + "    hinges_join: true\n");
+  EXPECT_EQ(own.interactions.repulsion[0].kinds, core::PairKinds::IncompleteButHinges);
+}
+
+TEST(Kinds, DoNotApplyToRepulsionBetweenAllOwnParticles) {
+  const Model model = model_of(std::string(kHead) +
+                               "  - {name: a, particles: {arrange: line, count: 3, spacing: 1},"
+                               " repulsion: {force: 1, distance: 0.5, length: 0.1, own: true}}\n");
+  ASSERT_EQ(model.interactions.repulsion.size(), 1u);
+  EXPECT_EQ(model.interactions.repulsion[0].kinds, core::PairKinds::Any);
+  EXPECT_EQ(model.interactions.repulsion[0].object_a, model.interactions.repulsion[0].object_b);
+}
+
 TEST(Restitution, GivesTheDissipationOfTheTable) {
   const double table[][2] = {{0.01, 0.99337745}, {0.1, 0.93747558}, {0.5, 0.74843493}, {1, 0.59362426},
                              {2, 0.41071969},    {5, 0.19698025},   {20, 0.05000000}};

@@ -27,6 +27,13 @@ struct BondedLaw {
   std::vector<Law> law;                ///< shape [bonds]
 };
 
+/// Which pairs a geometric law takes, by the kinds of the particles.
+enum class PairKinds : std::uint8_t {
+  Any,
+  Incomplete,            ///< those that do not interact completely, two hinges among them
+  IncompleteButHinges,   ///< the same without two hinges
+};
+
 /// A law between every two particles of two objects (or of one) that are nearer than its range.
 template <class Law>
 struct GeometricLaw {
@@ -35,6 +42,11 @@ struct GeometricLaw {
   std::uint32_t object_b = 0;  ///< may equal object_a
   double range = 0.0;          ///< [m]; the law must vanish there
   Law law;
+  PairKinds kinds = PairKinds::Any;
+  [[nodiscard]] bool takes(const ParticleSet& set, std::uint32_t a, std::uint32_t b) const {
+    return kinds == PairKinds::Any || set.kind.empty() ||
+           !interact_completely(set.kind[a], set.kind[b], kinds == PairKinds::IncompleteButHinges);
+  }
 };
 
 /// Friction between particles, momentum-conserving: a force -c v_rel at the mid point of the pair, v_rel being the

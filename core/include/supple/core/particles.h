@@ -18,6 +18,7 @@ struct ParticleSet {
   std::vector<Vec3> normal;            ///< the fixed unit body vector e, n = Q e, shape [n]
   std::vector<std::uint32_t> object;   ///< which object the particle belongs to, shape [n]
   std::vector<std::uint8_t> pinned;    ///< kPinPosition, kPinOrientation, kPlanar, shape [n]
+  std::vector<std::uint32_t> kind;     ///< kHinge, or the type of a standard particle, shape [n]; empty: all of one type
 
   [[nodiscard]] std::size_t size() const noexcept { return mass.size(); }
 };
@@ -26,6 +27,16 @@ inline constexpr std::uint8_t kPinPosition = 1;     ///< position held
 inline constexpr std::uint8_t kPinOrientation = 2;  ///< orientation held
 /// Moves in its plane z = const and turns about z only. @pre a principal axis is along z, or all moments are equal
 inline constexpr std::uint8_t kPlanar = 4;
+
+/// Lombardo & Puech 1995, sec. 5: a hinge joins what is around it, standard particles of different types repel.
+inline constexpr std::uint32_t kHinge = 0xffffffff;
+
+/// Whether two particles of one object have all laws between them; if not, they only repel. The paper leaves two hinges
+/// open: `hinges_join` decides.
+[[nodiscard]] inline bool interact_completely(std::uint32_t kind_a, std::uint32_t kind_b, bool hinges_join) {
+  if (kind_a == kHinge && kind_b == kHinge) return hinges_join;
+  return kind_a == kHinge || kind_b == kHinge || kind_a == kind_b;
+}
 
 /// The part of a force, impulse or velocity that the pins of a particle leave free.
 [[nodiscard]] inline Vec3 free_translation(std::uint8_t pinned, const Vec3& v) {

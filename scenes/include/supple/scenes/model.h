@@ -25,6 +25,7 @@ struct ObjectModel {
   implicit::SampleLayout samples;         ///< empty unless it can touch something
   collision::ContactMaterial material;
   bool collides = false;                  ///< has `contact` and a surface
+  bool hinges_join = false;               ///< the laws act between two hinges
   bool breaks = false;                    ///< has `breaking`, so it may fall into pieces
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface

@@ -111,11 +111,19 @@ struct MaterialDesc {
   double dissipation = 0.0;           ///< d [s/m]
 };
 
+/// objects[].kinds[]: hinges join what is around them, standard particles of different types only repel
+struct KindDesc {
+  bool hinge = false;
+  int type = 0;                       ///< of standard particles
+  std::vector<int> particles;         ///< negative counts from the end
+};
+
 /// objects[].repulsion: exponential repulsion against other objects that have it, where contact is off
 struct RepulsionDesc {
   double force = 0.0;                 ///< [N]
   double distance = 0.0;              ///< d0 [m]
   double length = 0.0;                ///< lambda [m]
+  bool own = false;                   ///< also between all particles of the object
 };
 
 /// objects[].medium
@@ -164,6 +172,8 @@ struct LoadDesc {
 struct ObjectDesc {
   std::string name;
   ParticlesDesc particles;
+  std::vector<KindDesc> kinds;              ///< particles not named are standard, of type 0
+  bool hinges_join = false;                 ///< two hinges have all laws between them
   std::vector<InteractionDesc> interactions;
   std::vector<SkeletonDesc> skeleton;
   double iso = 0.5;
