@@ -18,6 +18,7 @@
 
 #include "fields_rules.h"
 #include "read_scene_faults.h"
+#include "supple/core/lennard_jones.h"
 
 namespace supple::scenes {
 
@@ -97,44 +98,112 @@ void fields(Archive& archive, ParticlesDesc& d) {
   }
 }
 
+/// Whether an object has a law without energy.
+inline bool literal_laws(const ObjectDesc& d) {
+  return std::any_of(d.interactions.begin(), d.interactions.end(), [](const InteractionDesc& i) { return i.paper_literal; });
+}
+
+/// What the keys of the cohesion law must say together.
+template <class Archive>
+void check_cohesion(Archive& archive, const InteractionDesc& d) {
+  const bool by_maximum = d.maximum_distance || d.maximum_ratio || d.maximum_force || d.scale_force;
+  const bool by_gain = d.gain || d.alpha;
+  archive.check(by_maximum || by_gain, "", "expected maximum_distance and maximum_force, or gain and alpha", "none of them", "");
+  archive.check(!(by_maximum && by_gain), d.gain ? "gain" : "alpha",
+                "expected either maximum_distance and maximum_force, or gain and alpha", "keys of both", "");
+  archive.check(by_gain || !by_maximum || ((d.maximum_distance || d.maximum_ratio) && (d.maximum_force || d.scale_force)),
+                d.maximum_force   ? "maximum_force"
+                : d.scale_force   ? "scale_force"
+                : d.maximum_ratio ? "maximum_ratio"
+                                  : "maximum_distance",
+                "expected maximum_distance and maximum_force together", "one of them",
+                d.maximum_ratio || d.scale_force ? "maximum_ratio stands for maximum_distance, scale_force for maximum_force" : "");
+  archive.check(!(d.maximum_distance && d.maximum_ratio), "maximum_ratio", "expected either maximum_distance or maximum_ratio",
+                "both", "");
+  archive.check(!(d.maximum_force && d.scale_force), "scale_force", "expected either maximum_force or scale_force", "both", "");
+  archive.check(by_maximum || !by_gain || (d.gain && d.alpha), d.gain ? "gain" : "alpha", "expected gain and alpha together",
+                "one of them", "");
+  if (d.rest_distance && d.maximum_distance) {
+    archive.check(*d.maximum_distance > *d.rest_distance, "maximum_distance",
+                  "expected more than rest_distance = " + number_text(*d.rest_distance) + " [m]",
+                  number_text(*d.maximum_distance), "");
+  }
+}
+
+/// What the keys of the Lennard-Jones law must say together.
+template <class Archive>
+void check_lennard_jones(Archive& archive, const InteractionDesc& d) {
+  archive.check(d.depth || d.scale_force, "", "expected depth or scale_force", "neither", "");
+  archive.check(!(d.depth && d.scale_force), "depth", "expected either depth or scale_force", "both", "");
+  archive.check(d.repulsive > d.attractive, "repulsive", "expected more than attractive = " + std::to_string(d.attractive),
+                std::to_string(d.repulsive), "");
+  archive.check(!d.switch_from || d.cut_off, "switch_from", "expected a cut_off to switch to", "none", "");
+  if (d.switch_from && d.cut_off) {
+    archive.check(*d.switch_from < *d.cut_off, "switch_from", "expected less than cut_off = " + number_text(*d.cut_off) + " [m]",
+                  number_text(*d.switch_from), "");
+  }
+  archive.check(!d.geometric || d.cut_off, "cut_off", "expected a cut-off for a geometric law", "none", "");
+}
+
 template <class Archive>
 void fields(Archive& archive, InteractionDesc& d) {
   using enum LawKind;
   const auto only = [&d](const Rule& rule, std::initializer_list<LawKind> laws) { return rule.only("law", d.law, laws); };
   archive.required("law", d.law, {}, "what acts between bonded particles");
   archive("neighbours", d.neighbours, between(1.0, 1000.0, kNumber), "bonds join particles up to this many apart in their order");
-  archive("within", d.within, above(0.0, kLength), "instead: bonds join particles nearer than this at rest");
+  archive("within", d.within, above(0.0, kLength),
+          "instead: bonds join particles nearer than this at rest; with geometric: the range of the law");
+  archive("geometric", d.geometric, only({}, {Cohesion, LinearCohesion, LennardJones}),
+          "instead of bonds: all pairs of the object in range, found anew each step");
+  archive("normalised", d.normalised, only({}, {Coplanarity, CoCircularity}),
+          "weight psi / d^2 instead of psi, so that scale does not matter; strength is then in J");
+  archive("paper_literal", d.paper_literal, only({}, {FormRadius}),
+          "as printed by Lombardo & Puech 1995, for comparison: it conserves neither energy nor momentum");
   archive.required("stretch", d.stretch, only(at_least(0.0, kStiffness), {BondFrame}), "k_s");
   archive.required("rotation", d.rotation, only(at_least(0.0, kTorque), {BondFrame}), "k_theta");
-  archive.required("strength", d.strength, only(at_least(0.0, kBending), {Form}), "k; a chain bends like a beam of EI = 2 k / spacing");
-  archive.required("strength", d.strength, only(at_least(0.0, kStiffness), {FormRadius, Coplanarity}), "k");
+  archive.required("strength", d.strength, only(at_least(0.0, kBending), {Form, DirectedForm}),
+                   "k; a chain bends like a beam of EI = 2 k / spacing");
+  archive.required("strength", d.strength,
+                   only(at_least(0.0, d.normalised ? kEnergy : kStiffness), {FormRadius, Coplanarity, CoCircularity}), "k");
+  archive.required("strength", d.strength, only(at_least(0.0, kEnergy), {CoNormality}), "k");
   archive("linear", d.linear, only(at_least(0.0, kDamping), {Friction}), "c, against relative velocity");
   archive("angular", d.angular, only(at_least(0.0, kAngularDamping), {Friction}), "c_r, against relative spin");
-  archive("rest_distance", d.rest_distance, only(above(0.0, kLength).or_auto(), {Cohesion}), "r0; auto: of each bond at rest");
+  archive("rest_distance", d.rest_distance, only(above(0.0, kLength).or_auto(), {Cohesion, LinearCohesion, LennardJones}),
+          "r0; auto: of each bond at rest");
   archive("maximum_distance", d.maximum_distance, only(above(0.0, kLength), {Cohesion}), "r_m, of the largest attraction");
+  archive("maximum_ratio", d.maximum_ratio, only(above(1.0, kNumber), {Cohesion}),
+          "r_m / r0, instead of maximum_distance: the same curve for every rest distance");
   archive("maximum_force", d.maximum_force, only(above(0.0, kForce), {Cohesion}), "F_max, the largest attraction");
+  archive("scale_force", d.scale_force, only(above(0.0, kForce), {Cohesion, LinearCohesion, DirectedCohesion, LennardJones}),
+          "F0 of the cohesion laws (of cohesion instead of maximum_force); E of lennard_jones, instead of depth");
   archive("gain", d.gain, only(above(0.0, kPressure), {Cohesion}), "E, instead of maximum_distance and maximum_force");
   archive("alpha", d.alpha, only(above(0.0, kInverseArea), {Cohesion}), "alpha, with gain");
-  archive("range", d.range, only(above(0.0, kLength), {Form, FormRadius, Coplanarity}),
+  archive("table_error", d.table_error, only(between(1e-9, 0.1, kNumber), {Cohesion}),
+          "force from a table with at most this error over F_max; absent: no table");
+  archive("shape", d.shape, only(above(0.0, kNumber), {LinearCohesion, DirectedCohesion}), "a, how fast the force falls off");
+  archive("eta", d.eta, only(at_least(0.0, kNumber), {LinearCohesion}), "stiffness at rest over F0 / r0");
+  archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {DirectedCohesion}),
+                   "of each particle's ellipsoid, along its own x, y, z; bonded particles rest where theirs touch");
+  archive("depth", d.depth, only(above(0.0, kEnergy), {LennardJones}), "binding energy");
+  archive("repulsive", d.repulsive, only(between(2.0, core::LennardJones::kLargestExponent, kNumber), {LennardJones}),
+          "n of (r0/d)^n");
+  archive("attractive", d.attractive, only(between(1.0, core::LennardJones::kLargestExponent - 1, kNumber), {LennardJones}),
+          "m of (r0/d)^m");
+  archive("cut_off", d.cut_off, only(above(0.0, kLength), {LennardJones}), "where force and energy become 0; absent: nowhere");
+  archive("switch_from", d.switch_from, only(above(0.0, kLength), {LennardJones}),
+          "where the potential begins to be switched off; absent: the force is shifted");
+  archive("range", d.range,
+          only(above(0.0, kLength), {Form, FormRadius, DirectedForm, Coplanarity, CoNormality, CoCircularity}),
           "h of the weight (1 - d^2/h^2)^3; absent: weight 1");
   archive.check(!(archive.given("neighbours") && d.within), "within", "expected either neighbours or within", "both", "");
-  if (d.law == Cohesion) {
-    const bool by_maximum = d.maximum_distance || d.maximum_force;
-    const bool by_gain = d.gain || d.alpha;
-    archive.check(by_maximum || by_gain, "", "expected maximum_distance and maximum_force, or gain and alpha", "none of them", "");
-    archive.check(!(by_maximum && by_gain), d.gain ? "gain" : "alpha",
-                  "expected either maximum_distance and maximum_force, or gain and alpha", "keys of both", "");
-    archive.check(by_gain || !by_maximum || (d.maximum_distance && d.maximum_force),
-                  d.maximum_force ? "maximum_force" : "maximum_distance", "expected maximum_distance and maximum_force together",
-                  "one of them", "");
-    archive.check(by_maximum || !by_gain || (d.gain && d.alpha), d.gain ? "gain" : "alpha", "expected gain and alpha together",
-                  "one of them", "");
-    if (d.rest_distance && d.maximum_distance) {
-      archive.check(*d.maximum_distance > *d.rest_distance, "maximum_distance",
-                    "expected more than rest_distance = " + number_text(*d.rest_distance) + " [m]",
-                    number_text(*d.maximum_distance), "");
-    }
+  archive.check(!(archive.given("neighbours") && d.geometric), "neighbours", "expected either neighbours or geometric", "both", "");
+  archive.check(!d.geometric || d.rest_distance, "rest_distance", "expected a length > 0 [m] for a geometric law", "nothing", "");
+  if (d.law == Cohesion) check_cohesion(archive, d);
+  if (d.law == LennardJones) check_lennard_jones(archive, d);
+  if (d.law == LinearCohesion || d.law == DirectedCohesion) {
+    archive.check(d.scale_force.has_value(), "scale_force", "expected a force > 0 [N]", "nothing", "this key is required");
   }
+  archive.check(!(d.geometric && d.law == LennardJones && d.within), "within", "expected cut_off alone for the range", "both", "");
 }
 
 template <class Archive>
@@ -301,6 +370,10 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
+  const bool geometric = std::any_of(d.interactions.begin(), d.interactions.end(), [](const auto& i) { return i.geometric; });
+  archive.check(!(geometric && !d.kinds.empty()), "kinds", "expected no geometric law beside kinds", "one",
+                "a geometric law takes all particles of the object: put those of another kind into an object of their own");
+  archive.check(!(d.breaking && literal_laws(d)), "breaking", "expected no law with paper_literal, which has no energy", "one", "");
   archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",
                 "add 'skeleton' or remove 'contact'");
   check_particles(archive, d);
@@ -450,6 +523,11 @@ void fields(Archive& archive, Scene& d) {
                   "objects[" + std::to_string(i) + "].particles.inertia_axes", "expected three equal ones in a planar scene",
                   "different ones", "a planar particle turns about z only: use inertia_radius");
   }
+  const bool implicit = d.integrator.method == MethodName::BackwardEuler || d.integrator.method == MethodName::ImplicitMidpoint;
+  const bool literal = std::any_of(d.objects.begin(), d.objects.end(), [](const ObjectDesc& o) { return literal_laws(o); });
+  archive.check(!(implicit && literal), "integrator.method",
+                "expected an explicit method beside a law with paper_literal, which has no energy",
+                std::string(name_of(d.integrator.method)), "use 'symplectic' or 'rk4'");
   check_names(archive, d);
 }
 

@@ -164,7 +164,8 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
       plan.chosen = !fixed;
       const bool refused = explicit_steps > scene.time_step.max_substeps;
       const bool dearer = explicit_steps > kImplicitCost * implicit_steps;
-      const bool implicit = plan.chosen && (refused || dearer);
+      const bool energies = model.interactions.literal_form.empty();  // implicit methods minimise one
+      const bool implicit = plan.chosen && energies && (refused || dearer);
       plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
       const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet a frame";
       if (fixed) {

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 
 #include "supple/core/error.h"
+#include "supple/core/interactions.h"
 #include "supple/scenes/read_scene.h"
 
 namespace supple::scenes {
@@ -277,6 +279,140 @@ TEST(FormRadius, RefusesFlatBonds) {
     EXPECT_EQ(error.faults().size(), 1u);
     EXPECT_EQ(error.faults()[0].key, "objects.a.interactions[0]");
   }
+}
+
+/// Laws of a ring of eight around z, radius 1, normals outward; `interaction` is one mapping.
+Model ring_with(const std::string& interaction) {
+  return model_of(std::string(kHead) + R"(
+  - name: ring
+    particles: {arrange: ring, count: 8, radius: 1, normal: radial}
+    interactions: [)" +
+                  interaction + "]\n");
+}
+
+TEST(CohesionLaws, AreGivenByARatioForEveryRestDistance) {
+  const Model model = ring_with("{law: cohesion, neighbours: 2, maximum_ratio: 1.5, maximum_force: 2}");
+  for (const core::Cohesion& law : model.interactions.cohesion[0].law) {
+    EXPECT_NEAR(law.a, 16.0 / 3.0, 1e-13);
+    EXPECT_NEAR(law.force(law.maximum_distance()), -2.0, 1e-13);
+  }
+  const Model scaled = ring_with("{law: cohesion, maximum_ratio: 1.5, scale_force: 3}");
+  EXPECT_EQ(scaled.interactions.cohesion[0].law[0].f0, 3.0);
+}
+
+TEST(CohesionLaws, ShareATableWhenAnErrorIsGiven) {
+  const Model model = ring_with("{law: cohesion, maximum_ratio: 1.5, maximum_force: 2, table_error: 1e-3}");
+  EXPECT_TRUE(model.interactions.cohesion.empty());
+  ASSERT_EQ(model.interactions.tabulated_cohesion.size(), 1u);
+  const auto& laws = model.interactions.tabulated_cohesion[0].law;
+  const core::Cohesion exact = core::Cohesion::from_maximum(laws[0].r0, 1.5 * laws[0].r0, 2.0);
+  const double difference = laws[0].force(1.3 * laws[0].r0) - exact.force(1.3 * laws[0].r0);
+  EXPECT_NE(difference, 0.0);
+  EXPECT_LE(std::abs(difference), 1e-3 * 2.0);
+  const Model finer = ring_with("{law: cohesion, maximum_ratio: 1.5, maximum_force: 2, table_error: 1e-6}");
+  EXPECT_GT(finer.interactions.tabulated_cohesion[0].law[0].table->intervals(), laws[0].table->intervals());
+}
+
+TEST(CohesionLaws, TakeLinearStiffness) {
+  const Model model = ring_with("{law: linear_cohesion, scale_force: 3, shape: 5, eta: 0.2}");
+  const core::LinearCohesion& law = model.interactions.linear_cohesion[0].law[0];
+  EXPECT_NEAR(law.r0, 2.0 * std::sin(std::numbers::pi / 8), 1e-15);
+  EXPECT_EQ(law.a, 5.0);
+  EXPECT_NEAR(-law.slope(law.r0), 3.0 * 0.2 / law.r0, 1e-15);
+  EXPECT_EQ(ring_with("{law: linear_cohesion, scale_force: 3}").interactions.linear_cohesion[0].law[0].eta, 0.0);
+}
+
+TEST(CohesionLaws, TakeARestDistanceByDirection) {
+  const Model model = ring_with("{law: directed_cohesion, scale_force: 3, semi_axes: [0.5, 0.3, 0.2]}");
+  const core::DirectedCohesion& law = model.interactions.directed_cohesion[0].law[0];
+  EXPECT_EQ(law.semi_axes_b, Vec3(0.5, 0.3, 0.2));
+  const auto pose = [&](std::size_t a, std::size_t b) {
+    return core::PairPose{.r = model.rest.position[b] - model.rest.position[a],
+                          .orientation_a = model.rest.orientation[a],
+                          .orientation_b = model.rest.orientation[b],
+                          .normal_a = Vec3::UnitZ(),
+                          .normal_b = Vec3::UnitZ()};
+  };
+  EXPECT_NEAR(law.scale, 3.0 * law.rest_distance(pose(0, 1)), 1e-14);
+  EXPECT_GT(core::evaluate(law, pose(0, 1)).force_b.norm(), 0.0);  // the ring rests elsewhere
+}
+
+TEST(GeometricLaws, ComeWithTheRangeOfTheLawOrTheirOwn) {
+  const char* cohesion = "{law: cohesion, geometric: true, rest_distance: 0.5, maximum_ratio: 1.5, maximum_force: 2}";
+  const Model model = ring_with(cohesion);
+  ASSERT_EQ(model.interactions.geometric_cohesion.size(), 1u);
+  const auto& list = model.interactions.geometric_cohesion[0];
+  EXPECT_EQ(list.name, "ring/cohesion");
+  EXPECT_EQ(list.range, list.law.influence_radius(1e-3));
+  EXPECT_EQ(list.object_a, 0u);
+  EXPECT_EQ(list.object_b, 0u);
+  EXPECT_TRUE(model.interactions.cohesion.empty());
+  const Model own = ring_with(
+      "{law: cohesion, geometric: true, within: 0.9, rest_distance: 0.5, maximum_ratio: 1.5, maximum_force: 2}");
+  EXPECT_EQ(own.interactions.geometric_cohesion[0].range, 0.9);
+  const Model table = ring_with(
+      "{law: cohesion, geometric: true, rest_distance: 0.5, maximum_ratio: 1.5, maximum_force: 2, table_error: 1e-4}");
+  EXPECT_EQ(table.interactions.geometric_tabulated_cohesion.size(), 1u);
+  const Model linear = ring_with("{law: linear_cohesion, geometric: true, rest_distance: 0.5, scale_force: 2}");
+  EXPECT_EQ(linear.interactions.geometric_linear_cohesion[0].law.r0, 0.5);
+  const Model pair = ring_with("{law: lennard_jones, geometric: true, rest_distance: 0.5, depth: 2, cut_off: 1.2}");
+  EXPECT_EQ(pair.interactions.geometric_lennard_jones[0].range, 1.2);
+}
+
+TEST(LennardJonesLaws, TakeTheDepthOrTheForceOfThePaper) {
+  const Model model = ring_with("{law: lennard_jones, depth: 2, cut_off: 3, switch_from: 2}");
+  const core::LennardJones& law = model.interactions.lennard_jones[0].law[0];
+  EXPECT_EQ(law.depth, 2.0);
+  EXPECT_EQ(law.repulsive, 12);
+  EXPECT_EQ(law.attractive, 6);
+  EXPECT_EQ(law.cut_off, 3.0);
+  EXPECT_EQ(law.switch_from, 2.0);
+  const Model paper = ring_with("{law: lennard_jones, scale_force: 3, repulsive: 8, attractive: 4}");
+  const core::LennardJones& from_force = paper.interactions.lennard_jones[0].law[0];
+  EXPECT_NEAR(from_force.depth, core::LennardJones::from_gain(from_force.r0, 3.0, 4).depth, 1e-15);
+  EXPECT_EQ(from_force.cut_off, 0.0);
+}
+
+TEST(NormalLaws, KnowTheirNormalisedForm) {
+  const Model model = ring_with(
+      "{law: coplanarity, strength: 1 N/m}, {law: coplanarity, normalised: true, strength: 2 J}, "
+      "{law: co_normality, strength: 3}, {law: co_circularity, strength: 4, range: 2}, "
+      "{law: co_circularity, normalised: true, strength: 5 J}");
+  EXPECT_EQ(model.interactions.coplanarity[0].law[0].strength, 1.0);
+  EXPECT_EQ(model.interactions.normalised_coplanarity[0].law[0].strength, 2.0);
+  EXPECT_EQ(model.interactions.co_normality[0].law[0].strength, 3.0);
+  EXPECT_EQ(model.interactions.co_circularity[0].law[0].weight.range, 2.0);
+  EXPECT_EQ(model.interactions.normalised_co_circularity[0].law[0].strength, 5.0);
+  EXPECT_EQ(model.interactions.normalised_co_circularity[0].name, "ring/co_circularity.2");
+}
+
+TEST(DirectedForms, RestOnTheirArrangement) {
+  const Model model = ring_with("{law: directed_form, strength: 2}");
+  ASSERT_EQ(model.interactions.directed_form.size(), 1u);
+  // About a vertical ring of radius 1 the curvature along it is 1 and nothing is known across it. Chords: |w| is
+  // second order in the angle between neighbours, so far from the 2 sin(pi/8) of a flat shape.
+  for (const auto& law : model.interactions.directed_form[0].law) {
+    EXPECT_NEAR(law.shape_a.norm(), 1.0, 0.1);
+  }
+  const double energy = core::potential_energy(model.particles, model.rest, model.interactions);
+  EXPECT_LE(energy, 0.05 * 8.0 * 2.0);  // a flat shape would have k |dn|^2 / d^2 = k for each bond
+}
+
+TEST(LiteralForms, GiveEachParticleItsOwnRadius) {
+  const Model model = model_of(std::string(kHead) + R"(
+  - name: spiral
+    particles: {arrange: spiral, count: 10, inner_radius: 0.15, outer_radius: 0.55, turns: 1.2, normal: radial}
+    interactions: [{law: form_radius, strength: 3, paper_literal: true}]
+)");
+  EXPECT_TRUE(model.interactions.form_radius.empty());
+  ASSERT_EQ(model.interactions.literal_form.size(), 1u);
+  const auto& list = model.interactions.literal_form[0];
+  EXPECT_EQ(list.name, "spiral/form_radius");
+  EXPECT_EQ(list.law[0].strength, 3.0);
+  EXPECT_NE(list.law[0].radius_a, list.law[0].radius_b);
+  EXPECT_EQ(list.law[0].radius_b, list.law[1].radius_a);  // the radius belongs to the particle
+  const Model ring = ring_with("{law: form_radius, strength: 1, paper_literal: true}");
+  for (const core::LiteralForm& law : ring.interactions.literal_form[0].law) EXPECT_NEAR(law.radius_a, 1.0, 1e-14);
 }
 
 }  // namespace

@@ -58,23 +58,41 @@ struct ParticlesDesc {
   Vec3 inertia_axes = Vec3::Zero();   ///< instead: semi-axes of a solid ellipsoid in the particle's frame [m]; zero: absent
 };
 
-enum class LawKind : std::uint8_t { Cohesion, Form, FormRadius, BondFrame, Coplanarity, Friction };
+enum class LawKind : std::uint8_t {
+  Cohesion, LinearCohesion, DirectedCohesion, LennardJones, Form, FormRadius, DirectedForm, BondFrame, Coplanarity,
+  CoNormality, CoCircularity, Friction
+};
 
 /// objects[].interactions[]
 struct InteractionDesc {
   LawKind law = LawKind::BondFrame;
   int neighbours = 1;                 ///< bonds between particles up to this many apart in their order
   std::optional<double> within;       ///< instead: bonds between particles nearer than this at rest [m]
+  bool geometric = false;             ///< instead of bonds: all particles in range, found anew each step
+  bool normalised = false;            ///< coplanarity, co_circularity: psi / d^2 instead of psi
+  bool paper_literal = false;         ///< form_radius as printed, which is no energy
   double stretch = 0.0;               ///< bond_frame k_s [N/m]
   double rotation = 0.0;              ///< bond_frame k_theta [N m]
-  double strength = 0.0;              ///< form [J m^2], form_radius [N/m], coplanarity [N/m]
+  double strength = 0.0;              ///< form, directed_form [J m^2]; form_radius, coplanarity, co_circularity [N/m];
+                                      ///< co_normality and normalised laws [J]
   double linear = 0.0;                ///< friction c [N s/m]
   double angular = 0.0;               ///< friction c_r [N m s]
-  std::optional<double> rest_distance;     ///< cohesion r0 [m]; absent: the rest distance of each bond
+  std::optional<double> rest_distance;     ///< r0 of distance laws [m]; absent: the rest distance of each bond
   std::optional<double> maximum_distance;  ///< cohesion r_m [m]
+  std::optional<double> maximum_ratio;     ///< cohesion r_m / r0
   std::optional<double> maximum_force;     ///< cohesion F_max [N]
+  std::optional<double> scale_force;       ///< F0 of the cohesion laws, E of lennard_jones [N]
   std::optional<double> gain;              ///< cohesion E [N/m^2]
   std::optional<double> alpha;             ///< cohesion alpha [1/m^2]
+  std::optional<double> table_error;       ///< cohesion from a table: largest error of the force over F_max
+  double shape = 4.0;                      ///< linear_cohesion, directed_cohesion a
+  double eta = 0.0;                        ///< linear_cohesion eta
+  Vec3 semi_axes = Vec3::Zero();           ///< directed_cohesion, of every particle in its own axes [m]
+  std::optional<double> depth;             ///< lennard_jones [J]
+  int repulsive = 12;                      ///< lennard_jones n
+  int attractive = 6;                      ///< lennard_jones m
+  std::optional<double> cut_off;           ///< lennard_jones r1 [m]; absent: none
+  std::optional<double> switch_from;       ///< lennard_jones r_s [m]; absent: the force is shifted
   std::optional<double> range;             ///< weight range h [m]; absent: psi = 1 (bonded)
 };
 
