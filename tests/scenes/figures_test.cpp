@@ -108,17 +108,19 @@ TEST(Objects, ASheetIsDentedAndTakesItsShapeBack) {
   EXPECT_LT(sheet.final_shape_error, 0.005);
 }
 
-TEST(Figure4, TheSceneOfCohesionComesBackFromSixtyPercentAndFliesApartFromFiftyFive) {
-  const auto side_after = [](double ratio) {
-    Scene scene = library_scene("figures/oscillation_cohesion");
+TEST(Figure4, TheScenesComeBackOrFlyApartOnTheirSideOfTheThreshold) {
+  const auto side_after = [](const std::string& law, double ratio) {
+    Scene scene = library_scene("figures/oscillation_" + law);
     scene.objects[0].particles.radius = ratio / std::sqrt(3.0);
     Simulation simulation(scene);
     while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
     const auto& x = simulation.state().particles.position;
     return (x[1] - x[0]).norm();
   };
-  EXPECT_NEAR(side_after(0.60), 1.0, 0.02);
-  EXPECT_GT(side_after(0.55), 3.0);
+  EXPECT_NEAR(side_after("cohesion", 0.60), 1.0, 0.02);
+  EXPECT_GT(side_after("cohesion", 0.55), 3.0);
+  EXPECT_NEAR(side_after("lennard_jones", 0.85), 1.0, 0.02);
+  EXPECT_GT(side_after("lennard_jones", 0.80), 3.0);
 }
 
 }  // namespace
