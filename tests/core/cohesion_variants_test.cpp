@@ -151,8 +151,8 @@ TEST(CohesionTableError, IsBelowThePromisedOne) {
     const CohesionTable table = CohesionTable::with_error(kShape, error);
     EXPECT_LE(largest_error(table, 0.01, 6.0), error) << table.intervals();
     if (table.intervals() > 8) {
-      const auto half =
-          CohesionTable::with_intervals(kShape, table.end(), table.intervals() / 2, CohesionTable::Interpolation::CubicHermite);
+      const auto half = CohesionTable::with_intervals(kShape, table.end(), table.intervals() / 2,
+                                                      CohesionTable::Interpolation::CubicHermite);
       EXPECT_GT(largest_error(half, 0.25, 6.0), 0.5 * error);  // no finer than needed
     }
   }
@@ -183,7 +183,8 @@ TEST(CohesionTableEnergy, IsTheIntegralOfItsForce) {
 }
 
 TEST(CohesionTableSlope, IsTheDerivativeOfItsForce) {
-  const CohesionTable table = CohesionTable::with_intervals(kShape, 3.0, 16, CohesionTable::Interpolation::CubicHermite);
+  const CohesionTable table =
+      CohesionTable::with_intervals(kShape, 3.0, 16, CohesionTable::Interpolation::CubicHermite);
   const double h = 1e-7;
   for (double s = 0.0913; s < 3.2; s += 0.0377) {
     EXPECT_NEAR((table.force(s + h) - table.force(s - h)) / (2.0 * h), table.slope(s), 1e-5) << s;

@@ -17,6 +17,10 @@ PairPose on_sphere(double radius, const Vec3& n_a, const Vec3& n_b) {
   return {.r = radius * (n_b - n_a), .normal_a = n_a, .normal_b = n_b};
 }
 
+PairPose random_pose(Draw& draw) {
+  return {.r = Vec3(1, 0, 0) + draw.vector(0.3), .normal_a = draw.direction(), .normal_b = draw.direction()};
+}
+
 TEST(LiteralForm, TurnsATiltedNormalAwayFromRest) {
   const double radius = 1.3, tilt = 0.05;
   PairPose pose = on_sphere(radius, Vec3::UnitZ(), Vec3(std::sin(0.7), 0, std::cos(0.7)));
@@ -32,8 +36,9 @@ TEST(LiteralForm, TurnsATiltedNormalAwayFromRest) {
 TEST(LiteralForm, HasTheForcesOfTheConsistentLawForOneRadiusAndNoWeight) {
   Draw draw(91);
   for (int k = 0; k < 20; ++k) {
-    const PairPose pose{.r = Vec3(1, 0, 0) + draw.vector(0.3), .normal_a = draw.direction(), .normal_b = draw.direction()};
-    const LiteralFormLoad literal = evaluate(LiteralForm{.strength = 0.7, .radius_a = 1.3, .radius_b = 1.3, .weight = {}}, pose);
+    const PairPose pose = random_pose(draw);
+    const LiteralForm law{.strength = 0.7, .radius_a = 1.3, .radius_b = 1.3, .weight = {}};
+    const LiteralFormLoad literal = evaluate(law, pose);
     const PairLoad consistent = evaluate(FormRadius{.strength = 0.7, .radius = 1.3, .weight = {}}, pose);
     EXPECT_LE((literal.force_b - consistent.force_b).norm(), 1e-14);
     EXPECT_LE((literal.force_a + consistent.force_b).norm(), 1e-14);
@@ -45,7 +50,7 @@ TEST(LiteralForm, HasTheForcesOfTheConsistentLawForOneRadiusAndNoWeight) {
 TEST(LiteralForm, LosesMomentumWhereTheRadiiDiffer) {
   Draw draw(92);
   for (int k = 0; k < 20; ++k) {
-    const PairPose pose{.r = Vec3(1, 0, 0) + draw.vector(0.3), .normal_a = draw.direction(), .normal_b = draw.direction()};
+    const PairPose pose = random_pose(draw);
     const LiteralForm law{.strength = 1.0, .radius_a = 1.3, .radius_b = 0.9, .weight = {.range = 2.5}};
     const LiteralFormLoad load = evaluate(law, pose);
     const Vec3 expected = 2.0 * 0.4 * law.weight.at(pose.r.norm()).psi * (pose.normal_a - pose.normal_b);
@@ -57,8 +62,9 @@ TEST(LiteralForm, LosesAngularMomentumEvenForOneRadius) {
   Draw draw(93);
   double largest = 0.0;
   for (int k = 0; k < 20; ++k) {
-    const PairPose pose{.r = Vec3(1, 0, 0) + draw.vector(0.3), .normal_a = draw.direction(), .normal_b = draw.direction()};
-    const LiteralFormLoad load = evaluate(LiteralForm{.strength = 1.0, .radius_a = 1.3, .radius_b = 1.3, .weight = {}}, pose);
+    const PairPose pose = random_pose(draw);
+    const LiteralForm law{.strength = 1.0, .radius_a = 1.3, .radius_b = 1.3, .weight = {}};
+    const LiteralFormLoad load = evaluate(law, pose);
     largest = std::max(largest, (pose.r.cross(load.force_b) + load.torque_a + load.torque_b).norm());
   }
   EXPECT_GT(largest, 1.0);
@@ -68,7 +74,8 @@ TEST(LiteralForm, LosesAngularMomentumEvenForOneRadius) {
 /// side is exact to side^3 / steps^2.
 template <class ForceOnB>
 double work_around(const ForceOnB& force, int steps) {
-  const std::array<Vec3, 5> corner{Vec3(0.8, 0, 0), Vec3(1.2, 0, 0), Vec3(1.2, 0, 0.4), Vec3(0.8, 0, 0.4), Vec3(0.8, 0, 0)};
+  const std::array<Vec3, 5> corner{Vec3(0.8, 0, 0), Vec3(1.2, 0, 0), Vec3(1.2, 0, 0.4), Vec3(0.8, 0, 0.4),
+                                   Vec3(0.8, 0, 0)};
   double work = 0.0;
   for (std::size_t side = 0; side < 4; ++side) {
     const Vec3 along = (corner[side + 1] - corner[side]) / steps;

@@ -99,8 +99,9 @@ void for_each_law(Draw& draw, const Check& check) {
   lennard_jones.switch_from = 0.7;
   check(lennard_jones, "Lennard-Jones with switched potential");
   check(LinearCohesion{.r0 = 0.8, .f0 = 1.5, .a = 3.0, .eta = 0.2}, "linear cohesion");
-  check(DirectedCohesion{.scale = 1.2, .a = 4.0, .semi_axes_a = Vec3(0.3, 0.5, 0.4), .semi_axes_b = Vec3(0.6, 0.2, 0.4)},
-        "directed cohesion");
+  const DirectedCohesion directed_cohesion{
+      .scale = 1.2, .a = 4.0, .semi_axes_a = Vec3(0.3, 0.5, 0.4), .semi_axes_b = Vec3(0.6, 0.2, 0.4)};
+  check(directed_cohesion, "directed cohesion");
   const TwoBodies rest = TwoBodies::random(draw);
   check(BondFrame::from_rest(2.0, 0.7, rest.pose()), "bond frame");
 }
