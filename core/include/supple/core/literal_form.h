@@ -1,5 +1,6 @@
 /// @file supple/core/literal_form.h
-/// The form interaction exactly as Lombardo & Puech 1995, sec. 4 print it. For comparison only: use `FormRadius` or `Form`.
+/// The form interaction exactly as Lombardo & Puech 1995, sec. 4 print it. For comparison only: use `FormRadius` or
+/// `Form`.
 #pragma once
 
 #include <vector>
