@@ -12,6 +12,7 @@ namespace {
 
 /// Beyond this many scene lengths from the start, or this many scene lengths in a frame, numbers have left the scene.
 constexpr double kBelievable = 1e4;
+constexpr std::uint64_t kStepsPerRefinement = 4;
 
 int log2_of(int n) {
   int k = 0;
@@ -173,8 +174,29 @@ struct Simulation::Impl {
       state.halvings = core::halvings(frame_time(), *desc.size);
       return;
     }
+    state.halvings = needed_halvings();
+  }
+
+  /// Within a frame a step may only become finer: substeps stay on the grid of the frame.
+  void refine_step() {
+    if (scene.time_step.substeps || scene.time_step.size || state.steps % kStepsPerRefinement != 0) return;
+    const int needed = needed_halvings();
+    if (needed <= state.halvings) return;
+    state.substep <<= needed - state.halvings;
+    state.halvings = needed;
+  }
+
+  /// The coarsest step that is stable now; laws get stiffer where particles come close.
+  [[nodiscard]] int needed_halvings() const {
+    const TimeStepDesc& desc = scene.time_step;
     const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
-    const double step = core::stable_step(step_limits(scene, model, integrator.limiting_frequency, speeds));
+    double frequency = integrator.limiting_frequency;
+    const core::Integrator method = integrator.settings.method;
+    if (method == core::Integrator::Symplectic || method == core::Integrator::RungeKutta4) {
+      frequency = std::max(frequency, std::hypot(core::largest_frequency(model.particles, state.particles, laws),
+                                                 model.contact_frequency));
+    }
+    const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
     const int k = step < frame_time() ? core::halvings(frame_time(), step) : 0;
     if (k > log2_of(desc.max_substeps)) {
       throw Error(ErrorKind::Limit,
@@ -187,7 +209,7 @@ struct Simulation::Impl {
                         .hint = "soften the stiffest interaction or contact, make the lightest particle heavier, or "
                                 "raise time_step.max_substeps"});
     }
-    state.halvings = k;
+    return k;
   }
 
   void evaluate_forces(const core::ParticleState& particles, double at, core::ForceSample& out) {
@@ -216,6 +238,8 @@ struct Simulation::Impl {
     if (state.substep == 0) {
       last_frame = state;
       choose_step();
+    } else {
+      refine_step();
     }
     note_apart();
     const core::ForceModel forces = [this](const core::ParticleState& particles, double at, core::ForceSample& out) {

@@ -256,6 +256,21 @@ objects:
     )" + extra + "\n";
 }
 
+TEST(Simulation, RefinesTheStepWithinAFrame) {
+  Simulation simulation = make(dumbbell());
+  bool refined = false;
+  while (simulation.frame() < 4) {
+    const int before = simulation.state().halvings;
+    const bool inside = simulation.state().substep != 0;
+    const double time = simulation.time();
+    simulation.step();
+    refined |= inside && simulation.state().halvings > before;
+    EXPECT_NEAR(simulation.time(), time + simulation.time_step(), 1e-12);
+  }
+  EXPECT_TRUE(refined);
+  EXPECT_NEAR(simulation.time(), 3.0 / 20.0, 1e-12);
+}
+
 TEST(Pieces, TouchEachOtherOnceTheyHaveBeenApart) {
   Simulation simulation = make(dumbbell());
   EXPECT_EQ(simulation.bodies().size(), 1u);
