@@ -118,7 +118,8 @@ void Labeller::add_edge_vertices(const LabelledBlock& block, PartitionVertices& 
 
 /// Where the values at two nodes with different labels put their interface on the line between them.
 Vec3 Labeller::crossing(std::size_t node_a, std::size_t node_b) const {
-  const auto [low, high] = std::minmax(label_[node_a], label_[node_b]);
+  const auto low = std::min(label_[node_a], label_[node_b]);
+  const auto high = std::max(label_[node_a], label_[node_b]);
   const auto f = [&](std::size_t node) {
     return low == 0 ? value(slot_of(high), node) : value(slot_of(low), node) - value(slot_of(high), node);
   };

@@ -129,8 +129,8 @@ struct Simulation::Impl {
     state.apart.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-        const auto [low, high] = std::minmax(origin(bodies[i]), origin(bodies[j]));
-        if (std::binary_search(old_pairs.begin(), old_pairs.end(), collision::BodyPair{low, high})) {
+        const auto [a, b] = std::minmax({origin(bodies[i]), origin(bodies[j])});
+        if (std::binary_search(old_pairs.begin(), old_pairs.end(), collision::BodyPair{a, b})) {
           state.apart.push_back({bodies[i].particle.front(), bodies[j].particle.front()});
         }
       }
