@@ -77,6 +77,24 @@ TEST(Figure5, SpiralUncoilsToAnEquilibriumAndRecovers) {
   EXPECT_LE(simulation.state().record.objects[object_index(simulation, "spiral")].final_shape_error, 0.001);
 }
 
+TEST(Figure5, OfPairCurvaturesIsConservativeAndForgetsPartOfTheShape) {
+  Simulation simulation(library_scene("figures/spiral_uncoils_pair_curvature"));
+  while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
+  EXPECT_LT(simulation.audits().angular_momentum_error, 1e-11);
+  EXPECT_LT(simulation.audits().energy_error, 1e-3);
+  const double error = simulation.state().record.objects[0].final_shape_error;
+  EXPECT_GT(error, 0.05);
+  EXPECT_LT(error, 0.5);
+}
+
+TEST(Figure5, OfTheLawAsPrintedKeepsNeitherEnergyNorAngularMomentum) {
+  Simulation simulation(library_scene("figures/spiral_uncoils_literal"));
+  while (simulation.frame() < 200) simulation.step_frame();
+  EXPECT_GT(simulation.audits().angular_momentum_error, 0.1);
+  EXPECT_GT(simulation.audits().energy_error, 1.0);
+  EXPECT_GT(simulation.state().record.objects[0].final_shape_error, 0.5);
+}
+
 /// The largest distance of a particle from its rest place so far, over a length, and the shape error at the end.
 struct Dent {
   double depth = 0.0;
