@@ -185,11 +185,13 @@ std::string explain(const Simulation& simulation) {
     row.pop_back();
     out += row + "\n";
   };
-  line("%zu objects, %zu particles, %d frames at %g a second", model.objects.size(), model.particles.size(),
-       scene.frame_count(), scene.frame_rate);
+  const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
+  line("%zu object%s, %zu particle%s, %d frames at %g a second", model.objects.size(), plural(model.objects.size()),
+       model.particles.size(), plural(model.particles.size()), scene.frame_count(), scene.frame_rate);
   for (const ObjectModel& o : model.objects) {
-    line("  %-16s %u particles, %zu primitives, %zu surface samples%s", o.name.c_str(), o.last - o.first,
-         o.skeleton.primitive.size(), o.samples.size(), o.collides ? "" : ", no contact");
+    const std::size_t primitives = o.skeleton.primitive.size();
+    line("  %-16s %u particle%s, %zu primitive%s, %zu surface samples%s", o.name.c_str(), o.last - o.first,
+         plural(o.last - o.first), primitives, plural(primitives), o.samples.size(), o.collides ? "" : ", no contact");
   }
   line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
        scene.time_step.size || scene.time_step.substeps ? ", fixed by the scene" : ", by the stability limits at frame 1");
