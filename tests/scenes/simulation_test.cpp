@@ -237,7 +237,7 @@ objects:
 }
 
 /// Two blobs that are pulled apart until their bond breaks, and then thrown against each other.
-std::string dumbbell(const std::string& extra = "breaking: {stretch: 0.3}") {
+std::string dumbbell(const std::string& extra = "breaking: {stretch: 0.3}", const std::string& radius = "0.5") {
   return R"(
 schema: 1
 duration: 2 s
@@ -246,7 +246,7 @@ objects:
   - name: dumbbell
     particles: {arrange: line, count: 2, spacing: 0.5, mass: 0.5}
     interactions: [{law: bond_frame, stretch: 200, rotation: 1}]
-    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: )" + radius + R"(}}]
     contact: {modulus: 2e3}
     loads:
       - {particle: 0, force: [-40, 0, 0], until: 0.07 s}
@@ -309,10 +309,11 @@ TEST(Pieces, TouchEachOtherOnceTheyHaveBeenApart) {
 
 TEST(Pieces, FreshFromABreakDoNotPressOnEachOther) {
   // At the break the surfaces still overlap: their contact would be energy from nowhere.
-  Simulation simulation = make(dumbbell("breaking: {stretch: 0.02}"));
+  Simulation simulation = make(dumbbell("breaking: {stretch: 0.02}", "0.7"));
   while (simulation.bodies().size() == 1) simulation.step();
   const auto& x = simulation.state().particles.position;
   ASSERT_LT(x[1].x() - x[0].x(), 0.54);
+  ASSERT_LT(x[1].x() - x[0].x(), 2.0 * 0.454202 * 0.7);  // of the iso radii: they overlap
   EXPECT_TRUE(simulation.contacts().summary.empty());
   EXPECT_TRUE(simulation.state().apart.empty());
   run(simulation, 6);
