@@ -120,6 +120,24 @@ TEST_P(FrictionBetweenParticles, HasThePowerOfItsLaw) {
   EXPECT_NEAR(d.ledger.dissipated / dt, power, 1e-4 * power);
 }
 
+TEST(Friction, DecaysAsTheExponentialToSecondOrder) {
+  // Along the bond u' = -c (1/m_A + 1/m_B) u = -0.75 u.
+  const auto error = [](int steps) {
+    test::Particles p;
+    p.add(Vec3::Zero(), 1.0);
+    p.add(Vec3(1, 0, 0), 2.0);
+    p.state.velocity[1] = Vec3(0.1, 0, 0);
+    Interactions laws;
+    laws.friction.push_back({.name = "f", .first = {0}, .second = {1}, .linear = 0.5});
+    KickState kick;
+    Ledger ledger;
+    for (int k = 0; k < steps; ++k) advance(p.set, laws, kNoForces, 0.0, 1.0 / steps, p.state, kick, ledger);
+    return std::abs(p.state.velocity[1].x() - p.state.velocity[0].x() - 0.1 * std::exp(-0.75));
+  };
+  const double coarse = error(8), fine = error(16);
+  EXPECT_NEAR(std::log2(coarse / fine), 2.0, 0.1);
+}
+
 TEST(Friction, GivesTheSameOnTheIsotropicAndTheGeneralPath) {
   Damped isotropic = make_rubbing(false, 5.0, 1.0, 65);
   Damped general = isotropic;
