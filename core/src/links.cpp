@@ -100,6 +100,10 @@ void forget_broken(const Links& links, const LinkState& state, std::vector<std::
 
 }  // namespace
 
+bool BreakRule::ever() const noexcept {
+  return std::isfinite(stretch) || std::isfinite(energy) || std::isfinite(force) || std::isfinite(couple);
+}
+
 void LinkState::save(StateWriter& out) const {
   out.write(std::span<const std::uint8_t>(broken));
   out.write(std::span<const Vec3>(rest_a));
@@ -262,12 +266,14 @@ std::vector<std::uint32_t> find_pieces(const ParticleSet& set, const Links& link
     const std::uint32_t x = root(a), y = root(b);
     piece[std::max(x, y)] = std::min(x, y);
   };
-  const auto has_links = [&](std::uint32_t object) {
-    return std::any_of(links.rules.begin(), links.rules.end(),
-                       [object](const LinkRule& rule) { return rule.object == object; });
-  };
+  std::vector<std::uint32_t> breakable;  // objects
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    if (links.rules[links.rule[k]].breaking.ever()) breakable.push_back(set.object[links.first[k]]);
+  }
+  std::sort(breakable.begin(), breakable.end());
   for (std::uint32_t i = 1; i < set.size(); ++i) {
-    if (set.object[i] == set.object[i - 1] && !has_links(set.object[i])) join(i - 1, i);
+    if (set.object[i] != set.object[i - 1]) continue;
+    if (!std::binary_search(breakable.begin(), breakable.end(), set.object[i])) join(i - 1, i);
   }
   for (std::size_t k = 0; k < links.size(); ++k) {
     if (state.broken[k] == 0) join(links.first[k], links.second[k]);

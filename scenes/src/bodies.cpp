@@ -38,16 +38,17 @@ void take_part(const ObjectModel& object, Body& body) {
 
 std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) {
   const std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, links);
+  std::vector<std::size_t> body_of(piece.size());  // by the particle that names the piece, its smallest
   std::vector<Body> bodies;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const ObjectModel& object = model.objects[o];
     const std::size_t begin = bodies.size();
     for (std::uint32_t i = object.first; i < object.last; ++i) {
-      if (piece[i] == i) bodies.push_back({.object = o, .name = object.name, .particle = {}, .skeleton = {}, .samples = {}});
-      const auto owner = std::find_if(bodies.begin() + static_cast<std::ptrdiff_t>(begin), bodies.end(), [&](const Body& b) {
-        return b.particle.empty() ? piece[i] == i : b.particle.front() == piece[i];
-      });
-      owner->particle.push_back(i);
+      if (piece[i] == i) {
+        body_of[i] = bodies.size();
+        bodies.push_back({.object = o, .name = object.name, .particle = {}, .skeleton = {}, .samples = {}});
+      }
+      bodies[body_of[piece[i]]].particle.push_back(i);
     }
     const std::size_t pieces = bodies.size() - begin;
     for (std::size_t k = 0; k < pieces; ++k) {

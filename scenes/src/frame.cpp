@@ -138,11 +138,14 @@ StageTimer::~StageTimer() {
   if (weight_ > 0.0) profile_.cpu_s += weight_ * (process_cpu_seconds() - begin_);
 }
 
+void place_and_index(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame) {
+  place(context, particles, body, frame);
+  index(context, body, frame);
+}
+
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   for (std::size_t i = 0; i < context.bodies.size(); ++i) {
-    if (!has_surface(context.bodies[i])) continue;
-    place(context, particles, i, frame);
-    index(context, i, frame);
+    if (has_surface(context.bodies[i])) place_and_index(context, particles, i, frame);
   }
 }
 
@@ -268,9 +271,12 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) 
       if (body < bodies.size()) touching.push_back(body);
     }
   }
+  std::vector<collision::ContactBody> drawn = frame.bodies;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (frame.bodies[i].pose.empty()) continue;
+    if (!has_surface(bodies[i])) continue;
+    if (drawn[i].pose.empty()) drawn[i].field = frame.field[i];
     for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+      if (!has_surface(bodies[j])) continue;
       if (frame.field[i].surface_box().overlaps(frame.field[j].surface_box())) touching.insert(touching.end(), {i, j});
     }
   }
@@ -285,7 +291,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) 
   if (!touching.empty()) {
     std::vector<collision::ClaimField> claims;
     claims.reserve(touching.size());
-    for (const std::uint32_t i : touching) claims.emplace_back(frame.bodies, i, frame.surface, model.bulge);
+    for (const std::uint32_t i : touching) claims.emplace_back(drawn, i, frame.surface, model.bulge);
     const std::vector<implicit::FieldView> views(claims.begin(), claims.end());
     std::vector<Mesh> parts = implicit::polygonise_partition(views, lattice, context.executor, &counts);
     add_counts();

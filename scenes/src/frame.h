@@ -62,7 +62,10 @@ struct StageContext {
   bool every_call = false;
 };
 
-/// Stages 2 and 3 for every body with a surface.
+/// Stages 2 and 3 for one body.
+void place_and_index(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame);
+
+/// The same for every body with a surface.
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 
 /// Stages 2 to 6: from particles to the contact surface. Warm starts are read from and written to `samples`.

@@ -141,15 +141,18 @@ struct Simulation::Impl {
   void note_apart() {
     if (bodies.size() == model.objects.size()) return;
     ApartPairs fresh;
-    bool placed = false;
+    std::vector<std::uint8_t> placed(bodies.size(), 0);
+    const auto surface_box = [&](std::size_t i) {
+      if (placed[i] == 0) place_and_index(context(), state.particles, i, pulled);
+      placed[i] = 1;
+      return pulled.field[i].surface_box();
+    };
     for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (!model.objects[bodies[i].object].collides || bodies[i].skeleton.primitive.empty()) continue;
       for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
         const collision::BodyPair pair{bodies[i].particle.front(), bodies[j].particle.front()};
-        if (std::binary_search(state.apart.begin(), state.apart.end(), pair)) continue;
-        if (bodies[i].skeleton.primitive.empty() || bodies[j].skeleton.primitive.empty()) continue;
-        if (!placed) place_and_index_all(context(), state.particles, pulled);
-        placed = true;
-        if (!pulled.field[i].surface_box().overlaps(pulled.field[j].surface_box())) fresh.push_back(pair);
+        if (bodies[j].skeleton.primitive.empty() || std::binary_search(state.apart.begin(), state.apart.end(), pair)) continue;
+        if (!surface_box(i).overlaps(surface_box(j))) fresh.push_back(pair);
       }
     }
     if (fresh.empty()) return;
@@ -284,7 +287,7 @@ struct Simulation::Impl {
     if (report.within_tolerance) return;
     work.within_tolerance = false;
     if (integrator.settings.method != core::Integrator::Adaptive) return;
-    if (last_frame.record.valid) state = last_frame;
+    if (last_frame.record.valid) take(last_frame);
     throw Error(ErrorKind::Limit,
                 Fault{.place = scene.source.string(),
                       .key = "time_step.max_substeps",

@@ -122,6 +122,24 @@ TEST(Pieces, AreWhatUnbrokenLinksConnect) {
   EXPECT_EQ(find_pieces(chain.p.set, chain.links, chain.state), (std::vector<std::uint32_t>{0, 0, 0, 3, 3, 5, 5}));
 }
 
+TEST(Pieces, OfAnObjectThatCannotBreakAreOne) {
+  // Two bonds that do not connect: with a limit to break they are two bodies, without one body.
+  Particles p;
+  for (int i = 0; i < 4; ++i) p.add(Vec3(i, 0, 0));
+  Interactions laws;
+  laws.cohesion.push_back({"c", {0, 2}, {1, 3}, {{.r0 = 1, .f0 = 1}, {.r0 = 1, .f0 = 1}}});
+  const auto pieces = [&](const LinkRule& rule, const Interactions& all) {
+    const std::array rules{rule};
+    const Links links = make_links(p.set, p.state, all, rules);
+    return find_pieces(p.set, links, unbroken(links));
+  };
+  const LinkRule breaks{.object = 0, .breaking = {.stretch = 0.1}, .yield = {}};
+  const LinkRule yields{.object = 0, .breaking = {}, .yield = {.energy = 1.0}};
+  EXPECT_EQ(pieces(breaks, laws), (std::vector<std::uint32_t>{0, 0, 2, 2}));
+  EXPECT_EQ(pieces(yields, laws), (std::vector<std::uint32_t>{0, 0, 0, 0}));
+  EXPECT_EQ(pieces(breaks, {}), (std::vector<std::uint32_t>{0, 0, 0, 0}));  // nothing that could break
+}
+
 TEST(Yield, AtOnceMakesThePresentPoseTheRestPose) {
   Chain chain({.object = 0, .breaking = {}, .yield = {.energy = 0.01}});
   chain.p.state.position[4] = Vec3(4.2, 0.1, 0);

@@ -21,6 +21,7 @@ struct BreakRule {
   /// Beam-like bond: tension / force + (couple on a particle / couple)^2 > 1 (after Potyondy & Cundall 2004).
   double force = std::numeric_limits<double>::infinity();    ///< [N]
   double couple = std::numeric_limits<double>::infinity();   ///< [N m]
+  [[nodiscard]] bool ever() const noexcept;                  ///< false: no limit is set
 };
 
 /// A bond frame whose energy exceeds `energy` takes over the present pose as its rest pose with relaxation time `time`:
@@ -84,8 +85,8 @@ LinkChange update_links(const ParticleSet& set, const ParticleState& state, cons
 /// The interactions without the bonds (and friction) of broken links, with the present rest data.
 [[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);
 
-/// The piece that each particle belongs to, named by its smallest particle: shape [particles]. Objects without links are
-/// one piece; the others fall into what unbroken links connect.
+/// The piece that each particle belongs to, named by its smallest particle: shape [particles]. Objects that cannot break
+/// are one piece; the others fall into what unbroken links connect.
 [[nodiscard]] std::vector<std::uint32_t> find_pieces(const ParticleSet& set, const Links& links, const LinkState& state);
 
 }  // namespace supple::core
