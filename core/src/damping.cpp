@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "cross_matrix.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 
@@ -35,12 +36,6 @@ Mat3 inverse_inertia(const ParticleSet& set, const ParticleState& state, const S
   if (side.isotropic) return side.inverse_inertia * Mat3::Identity();
   const Mat3 q = state.orientation[side.index].toRotationMatrix();
   return q * set.inertia[side.index].cwiseInverse().asDiagonal() * q.transpose();
-}
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
 }
 
 /// What relative velocity u turns into impulse over h: -(1 - exp(-h k)) / k u to second order in z = h k, by

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cross_matrix.h"
 #include "damping.h"
 #include "pair_hessians.h"
 #include "step.h"
@@ -10,12 +11,6 @@
 
 namespace supple::core {
 namespace {
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
 
 /// Inverse of the right Jacobian of the exponential: log(exp(delta) exp(phi)) = delta + J_r^-1 phi + O(phi^2).
 Mat3 inverse_right_jacobian(const Vec3& delta) {

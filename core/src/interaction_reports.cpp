@@ -11,14 +11,6 @@
 namespace supple::core {
 namespace {
 
-PairPose pair_pose(const ParticleSet& set, const ParticleState& state, std::uint32_t a, std::uint32_t b) {
-  return {.r = state.position[b] - state.position[a],
-          .orientation_a = state.orientation[a],
-          .orientation_b = state.orientation[b],
-          .normal_a = state.orientation[a] * set.normal[a],
-          .normal_b = state.orientation[b] * set.normal[b]};
-}
-
 /// Calls visit(law, a, b) for every pair on which a list acts, in order.
 template <class Law, class Visit>
 void for_each_pair(const BondedLaw<Law>& list, const ParticleSet&, const ParticleState&, const Visit& visit) {

@@ -33,14 +33,6 @@ std::size_t find_link(const Links& links, std::uint32_t a, std::uint32_t b) {
   return low < links.size() && Pair(links.first[low], links.second[low]) == wanted ? low : kNone;
 }
 
-PairPose pose_of(const ParticleSet& set, const ParticleState& state, std::uint32_t a, std::uint32_t b) {
-  return {.r = state.position[b] - state.position[a],
-          .orientation_a = state.orientation[a],
-          .orientation_b = state.orientation[b],
-          .normal_a = state.orientation[a] * set.normal[a],
-          .normal_b = state.orientation[b] * set.normal[b]};
-}
-
 /// Energy of a link, and its loads with A the smaller particle.
 struct LinkLoad {
   double energy = 0.0;
@@ -195,7 +187,7 @@ LinkChange update_links(const ParticleSet& set, const ParticleState& state, cons
     for_each_bond(present, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
       const std::size_t link = find_link(links, a, b);
       if (link == kNone) return;
-      const PairLoad one = evaluate(law, pose_of(set, state, a, b));
+      const PairLoad one = evaluate(law, pair_pose(set, state, a, b));
       LinkLoad& sum = load[link];
       sum.energy += one.energy;
       sum.force_b += a < b ? one.force_b : Vec3(-one.force_b);
@@ -207,7 +199,7 @@ LinkChange update_links(const ParticleSet& set, const ParticleState& state, cons
   if (loads_decide) add_loads();
   for (std::size_t k = 0; k < links.size(); ++k) {
     if (links_state.broken[k] != 0) continue;
-    const PairPose pose = pose_of(set, state, links.first[k], links.second[k]);
+    const PairPose pose = pair_pose(set, state, links.first[k], links.second[k]);
     if (exceeds(links.rules[links.rule[k]].breaking, links.rest_distance[k], pose, load[k])) breaking.push_back(k);
   }
   if (!breaking.empty() && !loads_decide) add_loads();  // for the books
@@ -222,7 +214,7 @@ LinkChange update_links(const ParticleSet& set, const ParticleState& state, cons
     const std::uint32_t link = links.frame_link[frame];
     if (links_state.broken[link] != 0) continue;
     const YieldRule& rule = links.rules[links.rule[link]].yield;
-    const PairPose pose = pose_of(set, state, links.first[link], links.second[link]);
+    const PairPose pose = pair_pose(set, state, links.first[link], links.second[link]);
     const double before = evaluate(present_frame(links, links_state, frame), pose).energy;
     if (!(before > rule.energy)) continue;
     flow(pose, rule.time > 0.0 ? 1.0 - math::exp(-dt / rule.time) : 1.0, frame, links_state);

@@ -29,11 +29,7 @@ void accumulate_literal_form(const BondedLaw<LiteralForm>& list, const ParticleS
                              Loads& loads) {
   for (std::size_t k = 0; k < list.law.size(); ++k) {
     const std::uint32_t a = list.first[k], b = list.second[k];
-    const LiteralFormLoad load = evaluate(list.law[k], PairPose{.r = state.position[b] - state.position[a],
-                                                                .orientation_a = state.orientation[a],
-                                                                .orientation_b = state.orientation[b],
-                                                                .normal_a = state.orientation[a] * set.normal[a],
-                                                                .normal_b = state.orientation[b] * set.normal[b]});
+    const LiteralFormLoad load = evaluate(list.law[k], pair_pose(set, state, a, b));
     loads.force[a] += load.force_a;
     loads.force[b] += load.force_b;
     loads.torque[a] += load.torque_a;

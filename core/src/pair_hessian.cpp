@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "cross_matrix.h"
 #include "supple/core/math.h"
 
 namespace supple::core {
@@ -17,13 +18,6 @@ using Mat9 = Eigen::Matrix<double, 9, 9>;
 /// Places in q and in y.
 enum : int { kXA = 0, kThetaA = 3, kXB = 6, kThetaB = 9 };
 enum : int { kR = 0, kTurnA = 3, kTurnB = 6 };
-
-/// [v]: the matrix of v x.
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
 
 /// A vector in y.
 Vec9 stacked(const Vec3& r, const Vec3& turn_a, const Vec3& turn_b) {

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "cross_matrix.h"
 #include "damping.h"
 #include "pair_hessians.h"
 
@@ -10,12 +11,6 @@ namespace {
 
 using Mat12 = Eigen::Matrix<double, 12, 12>;
 using Vec12 = Eigen::Matrix<double, 12, 1>;
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
 
 /// The damping time of a pair, 0 unless both are of one object that has one.
 double damping_time(const ParticleSet& set, const std::vector<StiffnessDamping>& damping, std::uint32_t a,

@@ -429,12 +429,7 @@ class LawBuilder {
   }
 
   [[nodiscard]] core::PairPose rest_pose(std::uint32_t a, std::uint32_t b) const {
-    const core::ParticleState& rest = model_.rest;
-    return {.r = rest.position[b] - rest.position[a],
-            .orientation_a = rest.orientation[a],
-            .orientation_b = rest.orientation[b],
-            .normal_a = rest.orientation[a] * model_.particles.normal[a],
-            .normal_b = rest.orientation[b] * model_.particles.normal[b]};
+    return core::pair_pose(model_.particles, model_.rest, a, b);
   }
 
   template <class Law, class Make>

@@ -83,11 +83,22 @@ inline Particles make_spiral(int count = 10, double mass = 0.02, double inertia 
 }
 
 inline PairPose pair_pose(const Particles& p, std::uint32_t a, std::uint32_t b) {
-  return {.r = p.state.position[b] - p.state.position[a],
-          .orientation_a = p.state.orientation[a],
-          .orientation_b = p.state.orientation[b],
-          .normal_a = p.state.orientation[a] * p.set.normal[a],
-          .normal_b = p.state.orientation[b] * p.set.normal[b]};
+  return core::pair_pose(p.set, p.state, a, b);
+}
+
+/// Hands what a checkpoint holds of `from` to `to`; whether all of it was taken.
+template <class System>
+[[nodiscard]] bool restart(const System& from, System& to) {
+  StateWriter out;
+  from.p.state.save(out);
+  from.kick.save(out);
+  from.ledger.save(out);
+  StateReader in(out.bytes());
+  to.time = from.time;
+  to.p.state.load(in);
+  to.kick.load(in);
+  to.ledger.load(in);
+  return in.at_end();
 }
 
 /// Calls visit(a, b) for all pairs at most `steps` apart in their order.

@@ -5,6 +5,7 @@
 /// r x F_B + tau_A + tau_B = 0 (docs/notation.md); every law here is such an energy and is tested for both.
 #pragma once
 
+#include "supple/core/particles.h"
 #include "supple/core/types.h"
 
 namespace supple::core {
@@ -17,6 +18,16 @@ struct PairPose {
   Vec3 normal_a = Vec3::UnitZ();      ///< unit normals in world axes
   Vec3 normal_b = Vec3::UnitZ();
 };
+
+/// The pose of particles a (A) and b (B).
+[[nodiscard]] inline PairPose pair_pose(const ParticleSet& set, const ParticleState& state, std::uint32_t a,
+                                        std::uint32_t b) {
+  return {.r = state.position[b] - state.position[a],
+          .orientation_a = state.orientation[a],
+          .orientation_b = state.orientation[b],
+          .normal_a = state.orientation[a] * set.normal[a],
+          .normal_b = state.orientation[b] * set.normal[b]};
+}
 
 /// What it answers; the force on A is -force_b.
 struct PairLoad {
