@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks.h"
 #include "progress_bar.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -40,6 +41,8 @@ struct Arguments {
   std::string points;
   std::string state;
   std::string query;
+  std::string group;
+  std::vector<std::string> words;
   int threads = 0;
   int cells = 0;
   double error = 0.0;
@@ -50,6 +53,7 @@ struct Arguments {
   bool quiet = false;
   bool samples = false;
   bool json = false;
+  bool list = false;
 };
 
 void print_profile(const fs::path& folder) {
@@ -163,6 +167,12 @@ int query(const Arguments& arguments) {
   return 0;
 }
 
+int bench(const Arguments& arguments) {
+  if (!arguments.list && !arguments.group.empty()) tool::run_benchmark(arguments.group, arguments.words);
+  std::fputs(tool::list_benchmarks().c_str(), stdout);
+  return 0;
+}
+
 void scene_option(CLI::App* verb, Arguments& a) {
   verb->add_option("scene", a.scene, "scene file (YAML)")->required();
   verb->add_option("--set", a.set, "override a key, e.g. --set objects.ball.particles.mass=2")->take_all();
@@ -224,6 +234,13 @@ int parse_and_call(int argc, char** argv) {
   query_verb->add_flag("--json", a.json, "JSON (always; accepted for scripts)");
   query_verb->footer("Example: supple query contact scenes/library/contacts/two_balls.yaml --error 1e-6");
 
+  CLI::App* bench_verb = app.add_subcommand("bench", "benchmarks of a source tree: time beside size, error and hash");
+  bench_verb->add_option("group", a.group, "group or group/name, e.g. core or core/melt");
+  bench_verb->add_option("words", a.words, "handed to the program of the group");
+  bench_verb->add_flag("--list", a.list, "the groups");
+  bench_verb->add_flag("--json", a.json, "JSON lines (always where there are lines; accepted for scripts)");
+  bench_verb->footer("Example: supple bench core/integrators integrators.svg");
+
   CLI::App* reference_verb = app.add_subcommand("reference", "print every key of scene files, with defaults and units");
   reference_verb->add_flag("--schema", a.json, "as a JSON Schema, for editors");
   reference_verb->footer("Example: supple reference --schema > supple.schema.json");
@@ -240,6 +257,7 @@ int parse_and_call(int argc, char** argv) {
   if (render_verb->parsed()) return render(a);
   if (check_verb->parsed()) return check(a);
   if (explain_verb->parsed()) return explain(a);
+  if (bench_verb->parsed()) return bench(a);
   if (reference_verb->parsed()) {
     std::fputs((a.json ? scenes::scene_json_schema() : scenes::scene_reference()).c_str(), stdout);
     return 0;

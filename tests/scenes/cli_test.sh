@@ -52,6 +52,8 @@ expect 4 '--overwrite' run good.yaml --out good --progress none
 expect 2 '' run
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
 expect 2 '' query nonsense good.yaml
+expect 0 '' bench --list
+expect 2 '--list' bench cores
 expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
 printf 'x' >> good/states/good.0002.state

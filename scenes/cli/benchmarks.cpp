@@ -1,0 +1,79 @@
+#include "benchmarks.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "supple/core/error.h"
+
+namespace supple::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Group {
+  std::string_view name;
+  std::string_view program;
+  std::string_view measures;
+};
+
+constexpr std::array<Group, 5> kGroups{{
+    {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)"},
+    {"core/integrators", "integrator_bench", "time against error of every integrator; a file name after it: plot (SVG)"},
+    {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
+    {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)"},
+    {"collision", "contact_bench", "one contact query: time, points and error"},
+}};
+
+fs::path program_path(const Group& group) { return fs::read_symlink("/proc/self/exe").parent_path() / group.program; }
+
+}  // namespace
+
+std::string list_benchmarks() {
+  std::string text;
+  for (const Group& group : kGroups) {
+    std::string line(group.name);
+    line.resize(20, ' ');
+    line += fs::exists(program_path(group)) ? "built      " : "not built  ";
+    text += line.append(group.measures) + '\n';
+  }
+  return text;
+}
+
+void run_benchmark(const std::string& group, std::span<const std::string> arguments) {
+  // The longest name that leads: "core/stability" before "core", whose program takes the rest of the name.
+  const Group* found = nullptr;
+  for (const Group& known : kGroups) {
+    const bool leads = group == known.name || group.starts_with(std::string(known.name) + '/');
+    if (leads && (found == nullptr || known.name.size() > found->name.size())) found = &known;
+  }
+  if (found == nullptr) {
+    throw Error(ErrorKind::Usage, Fault{.place = "bench",
+                                        .key = {},
+                                        .expected = "expected a group of benchmarks",
+                                        .found = "'" + group + "'",
+                                        .hint = "supple bench --list names them"});
+  }
+  const fs::path program = program_path(*found);
+  std::vector<std::string> words{program.string()};
+  if (group.size() > found->name.size()) words.push_back(group.substr(found->name.size() + 1));
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  execv(program.c_str(), argv.data());
+  const bool absent = errno == ENOENT;
+  throw Error(ErrorKind::Io, Fault{.place = program.string(),
+                                   .key = {},
+                                   .expected = "expected the program of these benchmarks beside the tool",
+                                   .found = absent ? "none" : std::strerror(errno),
+                                   .hint = "in a source tree: cmake --build build/release --target benchmarks"});
+}
+
+}  // namespace supple::tool
