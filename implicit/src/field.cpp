@@ -251,7 +251,7 @@ Mat3 Field::hessian(const Vec3& point) const {
     const PackedShape& shape = index_->shape[i];
     Mat3 A = Mat3::Identity();
     const bool is_point = p.kind == PackedKind::PointWyvill || p.kind == PackedKind::PointGascuel;
-    const bool is_disc = p.kind == PackedKind::DiscWyvill || p.kind == PackedKind::DiscGascuel;
+    const bool is_disc = shape.foot == PackedFoot::Disc;
     if (!is_point) A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
     const Vec3 y = A * (point - Vec3(p.position[0], p.position[1], p.position[2]));
     const Vec3 half(shape.half[0], shape.half[1], shape.half[2]);

@@ -36,7 +36,7 @@ DistanceRange distance_range(const PackedPrimitive& p, const PackedShape& shape,
   Vec3 near = (y.cwiseAbs() - spread).cwiseMax(0.0);
   Vec3 far = y.cwiseAbs() + spread;
   double here2 = 0.0;  // of the centre
-  const bool is_disc = p.kind == PackedKind::DiscWyvill || p.kind == PackedKind::DiscGascuel;
+  const bool is_disc = shape.foot == PackedFoot::Disc;
   if (is_disc) {
     const double r = shape.half[0];
     const auto rim = [r](double a, double b) { return std::max(std::sqrt(a * a + b * b) - r, 0.0); };
@@ -160,8 +160,7 @@ Box find_surface_box(const Field::Index& index, const Field& field) {
     box = box.united(index.support[i]);
     if (!(shape.peak > index.iso)) continue;
     const Kernel& k = shape.kernel;
-    if (last_kernel == nullptr || last_kernel->kind != k.kind || last_kernel->radius != k.radius ||
-        last_kernel->thickness != k.thickness || last_kernel->slope != k.slope || last_kernel->iso != k.iso) {
+    if (last_kernel == nullptr || *last_kernel != k) {
       last_reach = index.iso > 0.0 ? iso_distance(k, index.iso) : k.radius;
       last_kernel = &k;
     }

@@ -15,6 +15,7 @@ constexpr double kSlack = 1e-12;
 
 PackedKind kind_of(const Primitive& p) noexcept {
   const bool wyvill = p.kernel.kind == KernelKind::Wyvill;
+  if (!wyvill && p.kernel.kind != KernelKind::Gascuel) return PackedKind::General;
   switch (p.shape) {
     case ShapeKind::Point: return wyvill ? PackedKind::PointWyvill : PackedKind::PointGascuel;
     case ShapeKind::Disc: return wyvill ? PackedKind::DiscWyvill : PackedKind::DiscGascuel;
@@ -65,19 +66,22 @@ void pack(const Primitive& p, const Vec3& position, const Mat3& rotation, Packed
   }
   rounded.reach2 = reach * reach * (1.0 + 4.0 * kSlack);
   shape.kernel = p.kernel;
-  shape.peak = 1.0;
+  shape.foot = p.shape == ShapeKind::Disc ? PackedFoot::Disc : PackedFoot::Slab;
+  shape.peak = peak(p.kernel);
   if (p.kernel.kind == KernelKind::Gascuel) {
     const double w = R - p.kernel.thickness;
     shape.outer_square = p.kernel.iso / (w * w);
     shape.outer_cubic = (2.0 * p.kernel.iso / w - p.kernel.slope) / (w * w);
-    shape.peak = p.kernel.iso + p.kernel.slope * p.kernel.thickness;
   }
   shape.lipschitz = shape.distance_scale * lipschitz(p.kernel);
 }
 
 double feature_of(const Primitive& p) noexcept {
   const Kernel& k = p.kernel;
-  const double kernel = k.kind == KernelKind::Wyvill ? k.radius : std::min(k.thickness, k.radius - k.thickness);
+  // The slope of Wyvill's kernel sets what counts as a feature of the others.
+  const double kernel = k.kind == KernelKind::Gascuel ? std::min(k.thickness, k.radius - k.thickness)
+                        : k.kind == KernelKind::Wyvill ? k.radius
+                                                       : std::min(k.radius, 1.717300207 / lipschitz(k));
   return p.shape == ShapeKind::Ellipsoid ? kernel * (p.size.minCoeff() / k.radius) : kernel;
 }
 

@@ -14,8 +14,13 @@ namespace supple::implicit {
 
 /// Shapes as the evaluation tells them apart. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
 /// the vector from the foot point is v = y - clamp(y, -half, half) and q = |v|^2. For an ellipsoid half = 0 and
-/// A = R D^-1 Q^T, otherwise A = Q^T.
-enum class PackedKind : std::uint32_t { PointWyvill, PointGascuel, SlabWyvill, SlabGascuel, DiscWyvill, DiscGascuel };
+/// A = R D^-1 Q^T, otherwise A = Q^T. The common pairs of shape and kernel have loops of their own.
+enum class PackedKind : std::uint32_t {
+  PointWyvill, PointGascuel, SlabWyvill, SlabGascuel, DiscWyvill, DiscGascuel,
+  General,  ///< any foot with any kernel
+};
+/// How the foot point of a general primitive is found.
+enum class PackedFoot : std::uint8_t { Slab, Disc };
 
 /// What the hot loop reads of a primitive; one cache line.
 struct alignas(64) PackedPrimitive {
@@ -36,6 +41,7 @@ struct PackedShape {
   double distance_scale = 1.0;  ///< largest |grad d|: 1, or R / smallest semi-axis of an ellipsoid
   double peak = 0.0;            ///< f(0)
   double lipschitz = 0.0;       ///< largest |grad f| [1/m]
+  PackedFoot foot = PackedFoot::Slab;
   bool scales = false;          ///< level sets are scaled copies of each other (ellipsoid), not offsets
 };
 

@@ -73,6 +73,103 @@ HWY_INLINE KernelLanes<V> gascuel(D d, const PackedShape& shape, V q) {
   return out;
 }
 
+/// e^x for -200 < x <= 0, as math::exp computes it.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V exponential(D d, V x) {
+  constexpr double kShift = 0x1.8p52;  // leaves no bits for a fraction
+  const hn::RebindToSigned<D> di;
+  const V shifted = hn::Add(hn::Mul(x, hn::Set(d, 0x1.71547652b82fep+0)), hn::Set(d, kShift));
+  const V k = hn::Sub(shifted, hn::Set(d, kShift));
+  const V high = hn::NegMulAdd(k, hn::Set(d, 0x1.62e42fefa39efp-1), x);
+  const V low = hn::Mul(hn::Neg(k), hn::Set(d, 0x1.abc9e3b39803fp-56));
+  const V r = hn::Add(high, low);
+  const V rest = hn::Add(hn::Sub(high, r), low);
+  V series = hn::Set(d, 1.0 / 6227020800.0);  // 1/13!
+  double factorial = 6227020800.0;
+  for (int i = 13; i > 2; --i) {
+    factorial /= i;
+    series = hn::MulAdd(series, r, hn::Set(d, 1.0 / factorial));
+  }
+  const V value = hn::Add(hn::Set(d, 1.0), hn::Add(r, hn::MulAdd(hn::Mul(r, r), series, rest)));
+  // The low bits of `shifted` hold k.
+  const auto exponent = hn::ShiftLeft<52>(hn::Add(hn::BitCast(di, shifted), hn::Set(di, 1023)));
+  return hn::Mul(value, hn::BitCast(d, exponent));
+}
+
+/// Any kernel; the formulas are those of in_square in kernel.cpp.
+template <bool kGradient, class D, class V = hn::Vec<D>>
+HWY_INLINE KernelLanes<V> any_kernel(D d, const PackedPrimitive& p, const PackedShape& shape, V q) {
+  const Kernel& k = shape.kernel;
+  if (k.kind == KernelKind::Gascuel) return gascuel<kGradient>(d, shape, q);
+  if (k.kind == KernelKind::Wyvill) return wyvill<kGradient>(d, p, q);
+  const V one = hn::Set(d, 1.0);
+  const V u = hn::Min(hn::Mul(q, hn::Set(d, p.inverse_r2)), one);
+  const V w = hn::Sub(one, u);
+  V f = hn::Zero(d), first = hn::Zero(d);  // f and df/du
+  switch (k.kind) {
+    case KernelKind::Wyvill:
+    case KernelKind::Gascuel: break;
+    case KernelKind::SoftObject: {
+      const V a = hn::NegMulAdd(u, hn::Set(d, 4.0 / 9.0), hn::Set(d, 17.0 / 9.0));
+      f = hn::MulAdd(u, hn::MulAdd(u, a, hn::Set(d, -22.0 / 9.0)), one);
+      const V b = hn::NegMulAdd(u, hn::Set(d, 12.0 / 9.0), hn::Set(d, 34.0 / 9.0));
+      first = hn::MulAdd(u, b, hn::Set(d, -22.0 / 9.0));
+      break;
+    }
+    case KernelKind::Murakami:
+      f = hn::Mul(w, w);
+      first = hn::Mul(hn::Set(d, -2.0), w);
+      break;
+    case KernelKind::Nishimura: {
+      const V rho = hn::Sqrt(u);
+      const V beyond = hn::Sub(one, rho);
+      const auto inner = hn::Le(u, hn::Set(d, 1.0 / 9.0));
+      const V outer_slope = hn::Div(hn::Mul(hn::Set(d, -1.5), beyond), hn::Max(rho, hn::Set(d, 0.25)));
+      f = hn::IfThenElse(inner, hn::NegMulAdd(u, hn::Set(d, 3.0), one),
+                         hn::Mul(hn::Set(d, 1.5), hn::Mul(beyond, beyond)));
+      first = hn::IfThenElse(inner, hn::Set(d, -3.0), outer_slope);
+      break;
+    }
+    case KernelKind::Blinn:
+    case KernelKind::Cauchy: {
+      const V a = hn::Set(d, k.shape * k.shape);
+      const V gain = hn::Set(d, k.gain), floor = hn::Set(d, k.floor), tilt = hn::Set(d, k.tilt);
+      V g, fall;  // g and -dg/du
+      if (k.kind == KernelKind::Blinn) {
+        g = exponential(d, hn::Neg(hn::Mul(a, u)));
+        fall = hn::Mul(a, g);
+      } else {
+        const V r = hn::Div(one, hn::MulAdd(a, u, one));
+        g = hn::Mul(r, r);
+        fall = hn::Mul(hn::Add(a, a), hn::Mul(g, r));
+      }
+      f = hn::Mul(gain, hn::Max(hn::NegMulAdd(floor, hn::MulAdd(tilt, w, one), g), hn::Zero(d)));
+      first = hn::Mul(gain, hn::Sub(hn::Mul(floor, tilt), fall));
+      break;
+    }
+    case KernelKind::BlancSchlick: {
+      const double h = k.shape;
+      const V beyond = hn::Sub(u, hn::Set(d, 0.25));
+      const auto inner = hn::Le(beyond, hn::Zero(d));
+      const V b = hn::IfThenElse(inner, hn::Set(d, 4.5 - 4.0 * h), hn::Set(d, 1.5 + 4.0 * h));
+      const V bottom = hn::MulAdd(b, beyond, hn::Set(d, 1.125));
+      const V share = hn::Div(one, bottom);
+      const V near = hn::NegMulAdd(hn::Mul(hn::Set(d, 9.0), u), hn::Mul(u, share), one);
+      f = hn::IfThenElse(inner, near, hn::Mul(hn::Mul(w, w), share));
+      const V near_first = hn::Mul(hn::Mul(hn::Set(d, -9.0), u), hn::MulAdd(b, u, hn::Set(d, 2.0 * h)));
+      const V far_first = hn::Neg(hn::Mul(w, hn::MulAdd(b, w, hn::Add(bottom, bottom))));
+      first = hn::Mul(hn::IfThenElse(inner, near_first, far_first), hn::Mul(share, share));
+      break;
+    }
+  }
+  const auto reached = hn::Lt(u, one);
+  KernelLanes<V> out{hn::IfThenElseZero(reached, f), one, hn::Zero(d)};
+  if constexpr (kGradient) {
+    out.s = hn::IfThenElseZero(reached, hn::Mul(first, hn::Set(d, 2.0 * p.inverse_r2)));
+  }
+  return out;
+}
+
 /// Adds the primitives ids[0..n), all of one kind, to the sums.
 template <PackedKind kKind, bool kGradient, class D, std::size_t K>
 HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_RESTRICT ids, std::size_t n,
@@ -80,6 +177,7 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
   using V = hn::Vec<D>;
   constexpr bool kPoint = kKind == PackedKind::PointWyvill || kKind == PackedKind::PointGascuel;
   constexpr bool kDisc = kKind == PackedKind::DiscWyvill || kKind == PackedKind::DiscGascuel;
+  constexpr bool kGeneral = kKind == PackedKind::General;
   constexpr bool kWyvill =
       kKind == PackedKind::PointWyvill || kKind == PackedKind::SlabWyvill || kKind == PackedKind::DiscWyvill;
   Tile<D, K, kGradient> t = tile;
@@ -100,7 +198,7 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
                             hn::MulAdd(hn::Set(d, a[1]), vy, hn::Mul(hn::Set(d, a[0]), vx)));
         };
         const V y0 = local(0), y1 = local(1), y2 = local(2);
-        if constexpr (kDisc) {
+        if (kDisc || (kGeneral && shape.foot == PackedFoot::Disc)) {
           const V r = hn::Set(d, shape.half[0]);
           const V rho = hn::Sqrt(hn::MulAdd(y1, y1, hn::Mul(y0, y0)));
           const V share = hn::IfThenElseZero(hn::Gt(rho, r), hn::Div(hn::Sub(rho, r), rho));
@@ -121,6 +219,8 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
       KernelLanes<V> kernel;
       if constexpr (kWyvill) {
         kernel = wyvill<kGradient>(d, p, q);
+      } else if constexpr (kGeneral) {
+        kernel = any_kernel<kGradient>(d, p, shape, q);
       } else {
         kernel = gascuel<kGradient>(d, shape, q);
       }
@@ -163,6 +263,7 @@ HWY_NOINLINE void add_ids(D d, const Primitives& in, const std::uint32_t* ids, s
       case PackedKind::SlabGascuel: add_run<PackedKind::SlabGascuel>(d, in, ids + i, j - i, tile); break;
       case PackedKind::DiscWyvill: add_run<PackedKind::DiscWyvill>(d, in, ids + i, j - i, tile); break;
       case PackedKind::DiscGascuel: add_run<PackedKind::DiscGascuel>(d, in, ids + i, j - i, tile); break;
+      case PackedKind::General: add_run<PackedKind::General>(d, in, ids + i, j - i, tile); break;
     }
     i = j;
   }

@@ -39,51 +39,163 @@ InDistance gascuel_at(const Kernel& k, double d) noexcept {
   return {k.iso * u * u * (D * d + G), k.iso * u * (2.0 * (D * d + G) + D * u)};
 }
 
+/// f of u = d^2 / R^2 with its first two derivatives, 0 <= u < 1; every kernel but Gascuel's.
+struct InSquare {
+  double value, first, second;
+};
+InSquare in_square(const Kernel& k, double u) noexcept {
+  const double w = 1.0 - u;
+  switch (k.kind) {
+    case KernelKind::Gascuel: break;
+    case KernelKind::Wyvill: return {w * w * w, -3.0 * w * w, 6.0 * w};
+    case KernelKind::SoftObject:
+      return {1.0 + u * (-22.0 / 9.0 + u * (17.0 / 9.0 - u * (4.0 / 9.0))),
+              -22.0 / 9.0 + u * (34.0 / 9.0 - u * (12.0 / 9.0)), 34.0 / 9.0 - u * (24.0 / 9.0)};
+    case KernelKind::Murakami: return {w * w, -2.0 * w, 2.0};
+    case KernelKind::Nishimura: {
+      if (u <= 1.0 / 9.0) return {1.0 - 3.0 * u, -3.0, 0.0};
+      const double rho = std::sqrt(u);
+      return {1.5 * (1.0 - rho) * (1.0 - rho), -1.5 * (1.0 - rho) / rho, 0.75 / (rho * u)};
+    }
+    case KernelKind::Blinn: {
+      const double a = k.shape * k.shape;
+      const double g = math::exp(-a * u);
+      return {k.gain * std::max(g - k.floor * (1.0 + k.tilt * w), 0.0), -k.gain * (a * g - k.floor * k.tilt), k.gain * a * a * g};
+    }
+    case KernelKind::Cauchy: {
+      const double a = k.shape * k.shape;
+      const double r = 1.0 / (1.0 + a * u);
+      const double g = r * r;
+      return {k.gain * std::max(g - k.floor * (1.0 + k.tilt * w), 0.0), -k.gain * (2.0 * a * g * r - k.floor * k.tilt),
+              k.gain * 6.0 * a * a * g * g};
+    }
+    case KernelKind::BlancSchlick: {
+      const double p = k.shape;
+      const double beyond = u - 0.25;  // both denominators are 9/8 at the joint
+      if (beyond <= 0.0) {
+        const double b = 4.5 - 4.0 * p;
+        const double D = 1.125 + b * beyond;
+        return {1.0 - 9.0 * u * u / D, -9.0 * u * (2.0 * p + b * u) / (D * D), -18.0 * p * p / (D * D * D)};
+      }
+      const double b = 1.5 + 4.0 * p;
+      const double D = 1.125 + b * beyond;
+      const double end = 2.25 + 3.0 * p;  // D at u = 1
+      return {w * w / D, -w * (2.0 * D + b * w) / (D * D), 2.0 * end * end / (D * D * D)};
+    }
+  }
+  return {0.0, 0.0, 0.0};
+}
+
+[[noreturn]] void refuse(const char* key, std::string expected, double found, std::string hint = "") {
+  throw Error(ErrorKind::Scene, Fault{.place = "",
+                                      .key = key,
+                                      .expected = std::move(expected),
+                                      .found = number(found),
+                                      .hint = std::move(hint)});
+}
+
+void expect_radius(double radius) {
+  if (!(radius > 0.0) || !std::isfinite(radius)) refuse("kernel.radius", "expected a length > 0 [m]", radius);
+}
+
+void expect_within(const char* key, double value, double least, double largest) {
+  if (value >= least && value <= largest) return;
+  refuse(key, "expected a number in [" + number(least) + ", " + number(largest) + "]", value);
+}
+
+/// Where d2f/dd2 = 2 df/du + 4 u d2f/du2 (over R^2) changes its sign from - to +; it does once.
+double inflection(const Kernel& k) {
+  double low = 0.0;
+  double high = 1.0;
+  for (int i = 0; i < 200; ++i) {
+    const double u = 0.5 * (low + high);
+    if (u <= low || u >= high) break;
+    const InSquare g = in_square(k, u);
+    (g.first + 2.0 * u * g.second < 0.0 ? low : high) = u;
+  }
+  return k.radius * std::sqrt(low);
+}
+
 }  // namespace
 
 Kernel Kernel::wyvill(double radius) {
-  if (!(radius > 0.0) || !std::isfinite(radius)) {
-    throw Error(ErrorKind::Scene, Fault{.place = "",
-                                        .key = "kernel.radius",
-                                        .expected = "expected a length > 0 [m]",
-                                        .found = number(radius),
-                                        .hint = ""});
-  }
-  return {.kind = KernelKind::Wyvill, .radius = radius};
+  expect_radius(radius);
+  return {.kind = KernelKind::Wyvill, .radius = radius, .steepest = radius / std::sqrt(5.0)};
+}
+
+Kernel Kernel::soft_object(double radius) {
+  expect_radius(radius);
+  // f'' = 0: 30 u^2 - 51 u + 11 = 0.
+  const double u = (51.0 - std::sqrt(1281.0)) / 60.0;
+  return {.kind = KernelKind::SoftObject, .radius = radius, .steepest = radius * std::sqrt(u)};
+}
+
+Kernel Kernel::murakami(double radius) {
+  expect_radius(radius);
+  return {.kind = KernelKind::Murakami, .radius = radius, .steepest = radius / std::sqrt(3.0)};
+}
+
+Kernel Kernel::nishimura(double radius) {
+  expect_radius(radius);
+  return {.kind = KernelKind::Nishimura, .radius = radius, .steepest = radius / 3.0};
+}
+
+Kernel Kernel::blinn(double radius, double sharpness) {
+  expect_radius(radius);
+  expect_within("kernel.sharpness", sharpness, kLeastSharpness, kLargestSharpness);
+  const double a = sharpness * sharpness;
+  Kernel k{.kind = KernelKind::Blinn, .radius = radius, .shape = sharpness, .floor = math::exp(-a), .tilt = a};
+  k.gain = 1.0 / (1.0 - k.floor * (1.0 + k.tilt));
+  k.steepest = inflection(k);
+  return k;
+}
+
+Kernel Kernel::cauchy(double radius, double sharpness) {
+  expect_radius(radius);
+  expect_within("kernel.sharpness", sharpness, kLeastSharpness, kLargestSharpness);
+  const double a = sharpness * sharpness;
+  Kernel k{.kind = KernelKind::Cauchy,
+           .radius = radius,
+           .shape = sharpness,
+           .floor = 1.0 / ((1.0 + a) * (1.0 + a)),
+           .tilt = 2.0 * a / (1.0 + a)};
+  k.gain = 1.0 / (1.0 - k.floor * (1.0 + k.tilt));
+  k.steepest = inflection(k);
+  return k;
+}
+
+Kernel Kernel::blanc_schlick(double radius, double hardness) {
+  expect_radius(radius);
+  expect_within("kernel.hardness", hardness, kLeastHardness, kLargestHardness);
+  // |df/dd| rises up to the joint and falls after it, for every hardness in this range.
+  return {.kind = KernelKind::BlancSchlick, .radius = radius, .shape = hardness, .steepest = 0.5 * radius};
 }
 
 Kernel Kernel::gascuel(double thickness, double radius, double slope, double iso) {
-  const auto fail = [](const char* key, std::string expected, double found, std::string hint) {
-    throw Error(ErrorKind::Scene, Fault{.place = "",
-                                        .key = key,
-                                        .expected = std::move(expected),
-                                        .found = number(found),
-                                        .hint = std::move(hint)});
-  };
-  if (!(iso > 0.0) || !std::isfinite(iso)) fail("kernel.iso", "expected an iso value > 0", iso, "");
-  if (!(radius > 0.0) || !std::isfinite(radius)) fail("kernel.radius", "expected a length > 0 [m]", radius, "");
+  if (!(iso > 0.0) || !std::isfinite(iso)) refuse("kernel.iso", "expected an iso value > 0", iso);
+  expect_radius(radius);
   if (!(thickness > 0.0 && thickness < radius)) {
-    fail("kernel.thickness", "expected 0 < thickness < radius = " + number(radius) + " [m]", thickness, "");
+    refuse("kernel.thickness", "expected 0 < thickness < radius = " + number(radius) + " [m]", thickness);
   }
-  if (!(slope > 0.0) || !std::isfinite(slope)) fail("kernel.slope", "expected a slope > 0 [1/m]", slope, "");
+  if (!(slope > 0.0) || !std::isfinite(slope)) refuse("kernel.slope", "expected a slope > 0 [1/m]", slope);
   const double w = radius - thickness;
   if (slope * w > 3.0 * iso) {
-    fail("kernel.slope",
-         "expected slope (radius - thickness) <= 3 iso = " + number(3.0 * iso) +
-             ", so that the field does not dip below zero",
-         slope * w,
-         "use a slope of at most " + number(3.0 * iso / w) + " or a radius of at most " +
-             number(thickness + 3.0 * iso / slope));
+    refuse("kernel.slope",
+           "expected slope (radius - thickness) <= 3 iso = " + number(3.0 * iso) +
+               ", so that the field does not dip below zero",
+           slope * w,
+           "use a slope of at most " + number(3.0 * iso / w) + " or a radius of at most " +
+               number(thickness + 3.0 * iso / slope));
   }
   return {.kind = KernelKind::Gascuel, .radius = radius, .thickness = thickness, .slope = slope, .iso = iso};
 }
 
 KernelSample evaluate(const Kernel& kernel, double q) noexcept {
   const double R2 = kernel.radius * kernel.radius;
-  if (kernel.kind == KernelKind::Wyvill) {
+  if (kernel.kind != KernelKind::Gascuel) {
     if (q >= R2) return {.value = 0.0, .slope = 0.0};
-    const double t = 1.0 - q / R2;
-    return {.value = t * t * t, .slope = -3.0 / R2 * t * t};
+    const InSquare g = in_square(kernel, q / R2);
+    return {.value = g.value, .slope = g.first / R2};
   }
   const double d = std::sqrt(q);
   const InDistance g = gascuel_at(kernel, d);
@@ -93,7 +205,7 @@ KernelSample evaluate(const Kernel& kernel, double q) noexcept {
 double second_slope(const Kernel& kernel, double q) noexcept {
   const double R2 = kernel.radius * kernel.radius;
   if (q >= R2) return 0.0;
-  if (kernel.kind == KernelKind::Wyvill) return 6.0 / (R2 * R2) * (1.0 - q / R2);
+  if (kernel.kind != KernelKind::Gascuel) return in_square(kernel, q / R2).second / (R2 * R2);
   if (q <= 0.0) return 0.0;
   const double d = std::sqrt(q);
   const double g1 = gascuel_at(kernel, d).derivative;
@@ -105,6 +217,10 @@ double second_slope(const Kernel& kernel, double q) noexcept {
   return (g2 - g1 / d) / (4.0 * q);
 }
 
+double peak(const Kernel& kernel) noexcept {
+  return kernel.kind == KernelKind::Gascuel ? kernel.iso + kernel.slope * kernel.thickness : 1.0;
+}
+
 double lipschitz(const Kernel& kernel) noexcept { return lipschitz(kernel, 0.0, kernel.radius); }
 
 double lipschitz(const Kernel& kernel, double near, double far) noexcept {
@@ -112,10 +228,9 @@ double lipschitz(const Kernel& kernel, double near, double far) noexcept {
   if (near >= R || far < near) return 0.0;
   near = std::max(near, 0.0);
   far = std::min(far, R);
-  if (kernel.kind == KernelKind::Wyvill) {
-    const double d = std::clamp(R / std::sqrt(5.0), near, far);  // where |df/dd| peaks
-    const double t = 1.0 - d * d / (R * R);
-    return 6.0 * d / (R * R) * t * t;
+  if (kernel.kind != KernelKind::Gascuel) {
+    const double d = std::clamp(kernel.steepest, near, far);
+    return 2.0 * d / (R * R) * std::abs(in_square(kernel, d * d / (R * R)).first);
   }
   double largest = near <= kernel.thickness ? kernel.slope : 0.0;
   if (far <= kernel.thickness) return largest;
@@ -133,19 +248,23 @@ double lipschitz(const Kernel& kernel, double near, double far) noexcept {
 
 double iso_distance(const Kernel& kernel, double iso) {
   const double R = kernel.radius;
+  SUPPLE_EXPECTS(iso > 0.0 && iso < peak(kernel));
   if (kernel.kind == KernelKind::Wyvill) {
-    SUPPLE_EXPECTS(iso > 0.0 && iso < 1.0);
     double root = math::pow(iso, 1.0 / 3.0);
     root -= (root * root * root - iso) / (3.0 * root * root);
     return R * std::sqrt(1.0 - root);
   }
-  SUPPLE_EXPECTS(iso > 0.0 && iso < kernel.iso + kernel.slope * kernel.thickness);
-  if (iso >= kernel.iso) return kernel.thickness - (iso - kernel.iso) / kernel.slope;
-  double low = kernel.thickness;  // f(low) >= iso > f(high)
+  if (kernel.kind == KernelKind::Gascuel && iso >= kernel.iso) return kernel.thickness - (iso - kernel.iso) / kernel.slope;
+  const auto at = [&](double d) -> InDistance {
+    if (kernel.kind == KernelKind::Gascuel) return gascuel_at(kernel, d);
+    const KernelSample g = evaluate(kernel, d * d);
+    return {g.value, 2.0 * d * g.slope};
+  };
+  double low = kernel.thickness;  // f(low) >= iso > f(high); thickness is 0 but for Gascuel's
   double high = R;
   double d = 0.5 * (low + high);
   for (int i = 0; i < 100 && low < high; ++i) {
-    const InDistance g = gascuel_at(kernel, d);
+    const InDistance g = at(d);
     (g.value >= iso ? low : high) = d;
     double next = d - (g.value - iso) / g.derivative;
     if (!(next > low && next < high)) next = 0.5 * (low + high);

@@ -19,6 +19,7 @@
 #include "fields_rules.h"
 #include "read_scene_faults.h"
 #include "supple/core/lennard_jones.h"
+#include "supple/implicit/kernel.h"
 
 namespace supple::scenes {
 
@@ -209,11 +210,18 @@ void fields(Archive& archive, InteractionDesc& d) {
 template <class Archive>
 void fields(Archive& archive, KernelDesc& d) {
   using enum KernelName;
-  archive("type", d.type, {}, "wyvill: (1 - d^2/R^2)^3; gascuel: linear down to the thickness, then cubic");
+  archive("type", d.type, {}, "wyvill: (1 - d^2/R^2)^3; gascuel: linear down to the thickness, then cubic; murakami: (1 - d^2/R^2)^2; "
+                              "blinn: Gaussian; all others by their papers, all 0 beyond R");
   archive("radius", d.radius, above(0.0, kLength), "support R; required, except for an ellipsoid (its smallest semi-axis)");
   archive.required("thickness", d.thickness, above(0.0, kLength).only("type", d.type, {Gascuel}), "e: distance of the surface");
   archive.required("slope", d.slope, above(0.0, kSlope).only("type", d.type, {Gascuel}),
                    "steepness at the surface; slope (radius - thickness) <= 3 iso");
+  archive("sharpness", d.sharpness,
+          between(implicit::Kernel::kLeastSharpness, implicit::Kernel::kLargestSharpness, kNumber).only("type", d.type, {Blinn, Cauchy}),
+          "s of exp(-s^2 d^2/R^2) and (1 + s^2 d^2/R^2)^-2, of which the tangent at R is taken off");
+  archive("hardness", d.hardness,
+          between(implicit::Kernel::kLeastHardness, implicit::Kernel::kLargestHardness, kNumber).only("type", d.type, {BlancSchlick}),
+          "p: the slope at R/2 is 2 + 16 p/9, over R");
   if (d.thickness && d.radius > 0.0) {
     archive.check(*d.thickness < d.radius, "thickness", "expected less than radius = " + number_text(d.radius) + " [m]",
                   number_text(*d.thickness), "");

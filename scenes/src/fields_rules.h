@@ -45,7 +45,8 @@ template <> struct EnumNames<ShapeName> {
                                                          "disc",  "box",     "ellipsoid"};
 };
 template <> struct EnumNames<KernelName> {
-  static constexpr std::array<std::string_view, 2> names{"wyvill", "gascuel"};
+  static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",
+                                                         "nishimura", "blinn",   "cauchy",      "blanc_schlick"};
 };
 template <> struct EnumNames<SplitName> {
   static constexpr std::array<std::string_view, 2> names{"energy", "contribution"};

@@ -141,6 +141,22 @@ Vec3 size_of(const SkeletonDesc& d) {
   return d.semi_axes;
 }
 
+/// @throws Error where the kernel's numbers do not fit together
+implicit::Kernel kernel_of(const KernelDesc& d, double radius, double iso) {
+  using implicit::Kernel;
+  switch (d.type) {
+    case KernelName::Wyvill: break;
+    case KernelName::Gascuel: return Kernel::gascuel(d.thickness.value_or(0.0), radius, d.slope.value_or(0.0), iso);
+    case KernelName::SoftObject: return Kernel::soft_object(radius);
+    case KernelName::Murakami: return Kernel::murakami(radius);
+    case KernelName::Nishimura: return Kernel::nishimura(radius);
+    case KernelName::Blinn: return Kernel::blinn(radius, d.sharpness);
+    case KernelName::Cauchy: return Kernel::cauchy(radius, d.sharpness);
+    case KernelName::BlancSchlick: return Kernel::blanc_schlick(radius, d.hardness);
+  }
+  return Kernel::wyvill(radius);
+}
+
 implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object, std::uint32_t n, ModelFaults& faults) {
   implicit::Skeleton skeleton;
   skeleton.part_count = n;
@@ -156,17 +172,16 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
     primitive.size = size_of(s);
     primitive.offset = {s.at, turned(s.turn_axis.normalized(), s.turn)};
     try {
-      primitive.kernel = s.kernel.type == KernelName::Wyvill
-                             ? implicit::Kernel::wyvill(radius)
-                             : implicit::Kernel::gascuel(s.kernel.thickness.value_or(0.0), radius,
-                                                         s.kernel.slope.value_or(0.0), d.iso);
+      primitive.kernel = kernel_of(s.kernel, radius, d.iso);
     } catch (const Error& error) {
       const Fault& fault = error.faults().front();
       faults.add(key + '.' + fault.key, fault.expected, fault.found, fault.hint);
       continue;
     }
-    if (s.kernel.type == KernelName::Wyvill && !(d.iso > 0.0 && d.iso < 1.0)) {
-      faults.add(object + ".iso", "expected an iso value in (0, 1), which a kernel reaches", number_text(d.iso), "");
+    if (!(d.iso > 0.0 && d.iso < implicit::peak(primitive.kernel))) {
+      faults.add(object + ".iso",
+                 "expected an iso value in (0, " + number_text(implicit::peak(primitive.kernel)) + "), which a kernel reaches",
+                 number_text(d.iso), "");
       continue;
     }
     std::vector<std::uint32_t> carriers;

@@ -70,7 +70,16 @@ inline Primitive random_primitive(Random& random, const BodyOptions& options, st
   p.size = Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1)) * R;
   p.offset.position = random.in_box(0.2 * R);
   p.offset.orientation = random.rotation();
-  if (random.below(2) == 1) {
+  switch (random.below(10)) {
+    case 0: p.kernel = Kernel::soft_object(R); break;
+    case 1: p.kernel = Kernel::murakami(R); break;
+    case 2: p.kernel = Kernel::nishimura(R); break;
+    case 3: p.kernel = Kernel::blinn(R, random.uniform(1.0, 3.0)); break;
+    case 4: p.kernel = Kernel::cauchy(R, random.uniform(1.0, 3.0)); break;
+    case 5: p.kernel = Kernel::blanc_schlick(R, random.uniform(0.05, 1.0)); break;
+    default: break;
+  }
+  if (p.kernel.kind == KernelKind::Wyvill && random.below(2) == 1) {
     const double e = random.uniform(0.3, 0.7) * R;
     p.kernel = Kernel::gascuel(e, R, random.uniform(0.5, 2.9) * 0.5 / (R - e));
   }

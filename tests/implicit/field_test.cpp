@@ -216,13 +216,13 @@ INSTANTIATE_TEST_SUITE_P(
                                            .largest_radius = 0.15,
                                            .only_points = true}));
 
-class EveryPrimitive : public ::testing::TestWithParam<std::tuple<ShapeKind, KernelKind>> {};
+class EveryPrimitive : public ::testing::TestWithParam<std::tuple<ShapeKind, Kernel>> {};
 
 TEST_P(EveryPrimitive, GradientMatchesCentralDifferences) {
   Primitive p;
   p.shape = std::get<0>(GetParam());
   p.size = {0.8, 0.6, 0.5};
-  p.kernel = std::get<1>(GetParam()) == KernelKind::Wyvill ? Kernel::wyvill(1.0) : Kernel::gascuel(0.5, 1.0, 1.2);
+  p.kernel = std::get<1>(GetParam());
   p.offset.orientation = Quat(Eigen::AngleAxisd(0.7, Vec3(2, -1, 2) / 3.0));
   const Body body = body_of({{p, Vec3(0.1, 0.2, -0.1)}});
   const double h = 1e-6;
@@ -246,7 +246,11 @@ INSTANTIATE_TEST_SUITE_P(Primitives, EveryPrimitive,
                          ::testing::Combine(::testing::Values(ShapeKind::Point, ShapeKind::Segment,
                                                               ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Box,
                                                               ShapeKind::Ellipsoid),
-                                            ::testing::Values(KernelKind::Wyvill, KernelKind::Gascuel)));
+                                            ::testing::Values(Kernel::wyvill(1.0), Kernel::gascuel(0.5, 1.0, 1.2),
+                                                              Kernel::soft_object(1.0), Kernel::murakami(1.0),
+                                                              Kernel::nishimura(1.0), Kernel::blinn(1.0, 2.0),
+                                                              Kernel::cauchy(1.0, 2.0),
+                                                              Kernel::blanc_schlick(1.0, 0.5))));
 
 TEST(Field, MeanCurvatureOfAPointsSurfaceIsOneOverItsRadius) {
   const Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});

@@ -6,9 +6,18 @@
 
 namespace supple::implicit {
 
+/// With rho = d/R and u = rho^2; all but Gascuel's are 1 at d = 0. rho_c is where f = 0.5, so where the surface of a lone
+/// point lies at that iso value.
 enum class KernelKind : std::uint8_t {
-  Wyvill,   ///< (1 - d^2/R^2)^3; C^2; at iso 0.5 the surface of a point is at 0.454202019 R
-  Gascuel,  ///< linear with slope -k down to the thickness e, then cubic to 0 at R; C^1 (Gascuel 1993, field function)
+  Wyvill,        ///< (1 - u)^3; C^2; rho_c = 0.454202019
+  Gascuel,       ///< linear with slope -k down to the thickness e, then cubic to 0 at R; C^1 (Gascuel 1993, field function)
+  SoftObject,    ///< 1 - 22/9 u + 17/9 u^2 - 4/9 u^3; C^1; rho_c = 0.5 (Wyvill, McPheeters & Wyvill 1986)
+  Murakami,      ///< (1 - u)^2; C^1; rho_c = 0.541196100 (Murakami & Ichihara 1987)
+  Nishimura,     ///< 1 - 3 u up to rho = 1/3, then 3/2 (1 - rho)^2; C^1; rho_c = 0.422649731 (Nishimura et al. 1985)
+  Blinn,         ///< exp(-s^2 u), made compact; C^1 (Blinn 1982)
+  Cauchy,        ///< (1 + s^2 u)^-2, made compact; C^1 (McCormack & Sherstyuk 1998)
+  BlancSchlick,  ///< 1 - 9 u^2 / (p + (9/2 - 4p) u) up to rho = 1/2, then (1-u)^2 / (3/4 - p + (3/2 + 4p) u); C^1;
+                 ///< rho_c = 0.5 and slope 2 + 16 p/9 there for every hardness p (Blanc & Schlick 1995)
 };
 
 /// Value and derivative with respect to q = d^2: every caller has q, and grad f = 2 slope (p - foot).
@@ -23,19 +32,41 @@ struct Kernel {
   double thickness = 0.0;  ///< Gascuel: e [m], 0 < e < R, where f = iso
   double slope = 0.0;      ///< Gascuel: -f'(e) = -f'(d <= e) [1/m], > 0; needs slope (R - e) <= 3 iso
   double iso = 0.5;        ///< the iso value c that Gascuel's kernel is scaled to: f(e) = c
+  double shape = 0.0;      ///< Blinn, Cauchy: sharpness s [1]; BlancSchlick: hardness p [1]
+  /// Blinn, Cauchy: f = gain (g(u) - floor (1 + tilt (1 - u))) with g convex in u: its tangent at the support is taken off,
+  /// so that value and slope vanish there, and f(0) = 1.
+  double floor = 0.0;
+  double tilt = 0.0;
+  double gain = 1.0;
+  double steepest = 0.0;  ///< distance of the largest |df/dd| [m]; all but Gascuel, whose slope has a plateau
 
+  bool operator==(const Kernel&) const = default;
+
+  static constexpr double kLeastSharpness = 1.0, kLargestSharpness = 10.0;
+  static constexpr double kLeastHardness = 0.02, kLargestHardness = 20.0;
+
+  /// All throw Error{Scene} for a radius that is not > 0, and where a number leaves the range given here.
   [[nodiscard]] static Kernel wyvill(double radius);
   /// @throws Error{Scene} when slope (R - e) > 3 iso (the field would dip below zero), or 0 < e < R does not hold.
   [[nodiscard]] static Kernel gascuel(double thickness, double radius, double slope, double iso = 0.5);
+  [[nodiscard]] static Kernel soft_object(double radius);
+  [[nodiscard]] static Kernel murakami(double radius);
+  [[nodiscard]] static Kernel nishimura(double radius);
+  /// @param sharpness  s in [1, 10]
+  [[nodiscard]] static Kernel blinn(double radius, double sharpness);
+  [[nodiscard]] static Kernel cauchy(double radius, double sharpness);
+  /// @param hardness  p in [0.02, 20]
+  [[nodiscard]] static Kernel blanc_schlick(double radius, double hardness);
 };
 
-/// Wyvill: f = (1 - q/R^2)^3.
 /// Gascuel: f = c (1 + k' (e - d)) for d <= e, c (d - R)^2 (D d + G) for e <= d <= R, k' = slope / c, w = R - e,
-/// D = (2/w - k') / w^2, G = 1/w^2 - D e. At d = 0 its slope (a cone) is given as 0.
+/// D = (2/w - k') / w^2, G = 1/w^2 - D e. At d = 0 its slope (a cone) is given as 0. The others: see KernelKind.
 /// @param q  squared distance [m^2], >= 0
 [[nodiscard]] KernelSample evaluate(const Kernel& kernel, double q) noexcept;
 /// Second derivative d2f/dq2 [1/m^4].
 [[nodiscard]] double second_slope(const Kernel& kernel, double q) noexcept;
+/// f at d = 0 [1]: what an iso value must stay below.
+[[nodiscard]] double peak(const Kernel& kernel) noexcept;
 /// max over d of |df/dd| [1/m] (Wyvill: 96 / (25 sqrt 5) / R).
 [[nodiscard]] double lipschitz(const Kernel& kernel) noexcept;
 /// max of |df/dd| for d in [near, far] [1/m].

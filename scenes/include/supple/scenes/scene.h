@@ -97,7 +97,9 @@ struct InteractionDesc {
 };
 
 enum class ShapeName : std::uint8_t { Point, Segment, Square, Rectangle, Disc, Box, Ellipsoid };
-enum class KernelName : std::uint8_t { Wyvill, Gascuel };
+enum class KernelName : std::uint8_t {
+  Wyvill, Gascuel, SoftObject, Murakami, Nishimura, Blinn, Cauchy, BlancSchlick
+};
 
 /// objects[].skeleton[].kernel
 struct KernelDesc {
@@ -105,6 +107,8 @@ struct KernelDesc {
   double radius = 0.0;                ///< support R [m]
   std::optional<double> thickness;    ///< gascuel: e [m]
   std::optional<double> slope;        ///< gascuel: -f' at the surface [1/m]
+  double sharpness = 2.0;             ///< blinn, cauchy: s
+  double hardness = 0.5;              ///< blanc_schlick: p
 };
 
 /// objects[].skeleton[]
