@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
 constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so that columns stay inside the rim
+constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
+constexpr double kUnseen = 5e-5;         // what a kink near the rim can do between the nodes of the two coarsest rules
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -55,6 +57,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, d
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   std::size_t open = n;
+  rim_error_ = 0.0;
   for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
     for (std::size_t k = 0; k < n; ++k) {
       const Vec3 e = rule.cosine[k] * frame_.u + rule.sine[k] * frame_.v;
@@ -89,6 +92,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, d
         if (!(-at > kLeastOverhang * ga.norm()) || !(bt > kLeastOverhang * gb.norm())) return false;
         done_[k] = 1;
         --open;
+        // Newton's method leaves about half the square of its last step, which the area feels twice.
+        rim_error_ = std::max(rim_error_, step * step / (radius * radius));
       }
       radius = next;
       rim_height_[k] += lift;
@@ -153,6 +158,7 @@ bool PolarRuleSolver::integrate(const PolarRule& rule) {
   normal_.resize(n);
   pressure_.resize(n);
   fine_ = {};
+  lift_ = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 across = node_.slope_b[i] - node_.slope_a[i];
     normal_[i] = across / across.norm();
@@ -160,6 +166,7 @@ bool PolarRuleSolver::integrate(const PolarRule& rule) {
     // On Sigma to first order: the round-off of a steep body counts little.
     const double fall = -node_.slope_a[i].dot(frame_.axis), rise = node_.slope_b[i].dot(frame_.axis);
     const double p = (node_.a[i] * rise + node_.b[i] * fall) / (rise + fall);
+    lift_ = std::max(lift_, std::abs(node_.a[i] - node_.b[i]) / (rise + fall));
     if (!(cosine > kLeastCosine) || !(p > -residual_)) return false;
     area_[i] = weight_[i] / cosine;
     pressure_[i] = std::max(p, 0.0);
@@ -233,11 +240,19 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, const PolarRule& rule,
   return true;
 }
 
+/// What the rim and the heights are off by, and what rounding of the coordinates does to so thin an overlap.
+double PolarRuleSolver::algebraic_error() const {
+  const double coordinates = frame_.origin.lpNorm<Eigen::Infinity>() + size_;
+  const double rounding = 16.0 * kEpsilon * (1.0 + coordinates / frame_.thickness);
+  return 2.0 * rim_error_ + lift_ / std::sqrt(fine_.area) + rounding;
+}
+
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, double error, int refinements,
                             double extent, PatchPoints& points) {
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   extent_ = extent;
+  size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   estimate_ = 1.0;
   const std::span<const PolarRule> rules = polar_rules();
   const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(refinements, 1)));
@@ -249,8 +264,9 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, doub
     coarse_ = fine_;
     if (!integrate(rules[r])) return false;
     if (r == first) continue;
-    estimate_ = std::max(relative_difference(fine_, coarse_), 16.0 * kEpsilon);
-    if (estimate_ > error && r < last) continue;
+    const double difference = kSafety * relative_difference(fine_, coarse_) + (r == 1 ? kUnseen : 0.0);
+    if (difference > error && r < last) continue;
+    estimate_ = difference + algebraic_error();
     if (!add_columns(pressure, rules[r], error, points)) return false;
     for (std::size_t i = 0; i < node_.size(); ++i) {
       points.point.push_back(node_.point[i]);

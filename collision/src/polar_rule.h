@@ -33,6 +33,7 @@ class PolarRuleSolver {
   bool add_columns(PairPressure& pressure, const PolarRule& rule, double error, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance);
   void start_rim(const PolarRule& rule, bool first);
+  [[nodiscard]] double algebraic_error() const;
 
   PeakFrame frame_;
   double jacobian_ = 0.0;  // |u| |v|
@@ -45,6 +46,9 @@ class PolarRuleSolver {
   std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
   std::vector<double> line_value_;
   double residual_ = 0.0;
+  double rim_error_ = 0.0;  // relative, of the area
+  double lift_ = 0.0;       // largest distance of a node from Sigma
+  double size_ = 0.0;       // of the bodies' features
   PatchSums fine_, coarse_;
   double estimate_ = 1.0;
   double thickness_ = 0.0;
