@@ -88,6 +88,7 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
                        [&](const PolarCover& cover) { return cover.contains(x, slack); });
   };
   for (const Vec3& hill : starts_.hill) {
+    if (covered(hill, 0.0)) continue;
     const std::optional<PeakFrame> frame = finder_.climb(pressure, hill, extent);
     if (!frame || covered(frame->origin, 0.0)) continue;
     const double largest_before = out.summary.largest_pressure;
