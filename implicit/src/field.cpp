@@ -249,39 +249,12 @@ Mat3 Field::hessian(const Vec3& point) const {
     if (!index_->support[i].contains(point)) continue;
     const PackedPrimitive& p = index_->primitive[i];
     const PackedShape& shape = index_->shape[i];
-    Mat3 A = Mat3::Identity();
-    const bool is_point = p.kind == PackedKind::PointWyvill || p.kind == PackedKind::PointGascuel;
-    const bool is_disc = shape.foot == PackedFoot::Disc;
-    if (!is_point) A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
-    const Vec3 y = A * (point - Vec3(p.position[0], p.position[1], p.position[2]));
-    const Vec3 half(shape.half[0], shape.half[1], shape.half[2]);
-    Vec3 v = y;
-    Mat3 second = 2.0 * Mat3::Identity();  // of q in the local frame
-    if (is_disc) {
-      const double rho = std::hypot(y.x(), y.y());
-      const double r = half.x();
-      second.topLeftCorner<2, 2>().setZero();
-      v.head<2>().setZero();
-      if (rho > r) {
-        v.head<2>() = (rho - r) / rho * y.head<2>();
-        const Eigen::Vector2d n = y.head<2>() / rho;
-        second.topLeftCorner<2, 2>() =
-            2.0 * (n * n.transpose() + (rho - r) / rho * (Eigen::Matrix2d::Identity() - n * n.transpose()));
-      }
-    } else {
-      for (int k = 0; k < 3; ++k) {
-        if (half[k] > 0.0 && std::abs(y[k]) <= half[k]) {
-          v[k] = 0.0;
-          second(k, k) = 0.0;
-        } else {
-          v[k] = y[k] - std::clamp(y[k], -half[k], half[k]);
-        }
-      }
-    }
-    const double q = v.squaredNorm();
-    const Vec3 g = A.transpose() * (2.0 * v);
-    sum += second_slope(shape.kernel, q) * g * g.transpose() +
-           supple::implicit::evaluate(shape.kernel, q).slope * A.transpose() * second * A;
+    const Mat3 A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
+    Mat3 second;  // of q in the local frame
+    const FootSample sample = foot(shape.view, A * (point - Vec3(p.position[0], p.position[1], p.position[2])), &second);
+    const Vec3 g = 2.0 * A.transpose() * sample.half_gradient;
+    sum += second_slope(shape.kernel, sample.q) * g * g.transpose() +
+           supple::implicit::evaluate(shape.kernel, sample.q).slope * A.transpose() * second * A;
   }
   return sum;
 }
@@ -292,7 +265,7 @@ double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed
   for (std::size_t k = 0; k < skeleton.primitive.size(); ++k) {
     const Primitive& p = skeleton.primitive[k];
     const Vec3 y = placed.rotation[k].transpose() * (point - placed.position[k]);
-    const ShapeSample shape = evaluate(p.shape, p.size, p.kernel.radius, y);
+    const ShapeSample shape = evaluate(p, y);
     const KernelSample kernel = evaluate(p.kernel, shape.q);
     sum += kernel.value;
     slope += kernel.slope * (placed.rotation[k] * shape.gradient);

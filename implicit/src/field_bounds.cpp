@@ -30,6 +30,15 @@ DistanceRange distance_range(const PackedPrimitive& p, const PackedShape& shape,
   const Vec3 centre = 0.5 * (lower + upper);
   const Vec3 half_box = 0.5 * (upper - lower);
   const Vec3 y = A * centre;
+  // Distance changes by at most distance_scale per length, which is the better bound for boxes turned by 45 degrees.
+  const double steps = shape.distance_scale * half_box.norm() * (1.0 + 1e-14);
+  if (shape.foot == PackedFoot::Scalar) {
+    const double here = std::sqrt(foot(shape.view, y).q);
+    // Round-off: of y, and of the foot point on curves, whose polynomials cancel.
+    const double change = steps + 1e-13 * shape.distance_scale * (centre.norm() + half_box.norm() + shape.kernel.radius);
+    const double least = std::max(here - change, 0.0);
+    return {least * least, (here + change) * (here + change)};
+  }
   // The box of the turned box, wider by the round-off of turning it.
   const Mat3 A_abs = A.cwiseAbs();
   const Vec3 spread = A_abs * (half_box + 8.0 * kEps * (centre.cwiseAbs() + half_box));
@@ -49,8 +58,7 @@ DistanceRange distance_range(const PackedPrimitive& p, const PackedShape& shape,
     far = (far - half).cwiseMax(0.0);
     here2 = (y.cwiseAbs() - half).cwiseMax(0.0).squaredNorm();
   }
-  // Distance changes by at most distance_scale per length, which is the better bound for boxes turned by 45 degrees.
-  const double change = shape.distance_scale * half_box.norm() * (1.0 + 1e-14) + 1e-15 * spread.sum();
+  const double change = steps + 1e-15 * spread.sum();
   const double here = std::sqrt(here2);
   const double least = std::max(here * (1.0 - 1e-14) - change, 0.0);
   const double most = here * (1.0 + 1e-14) + change;
@@ -165,12 +173,9 @@ Box find_surface_box(const Field::Index& index, const Field& field) {
       last_kernel = &k;
     }
     const Box& support = index.support[i];
-    if (shape.scales) {
-      const Vec3 half = 0.5 * last_reach / k.radius * support.extent();
-      inner = inner.united({support.centre() - half, support.centre() + half});
-    } else {
-      inner = inner.united(support.inflated(last_reach - k.radius));
-    }
+    const Vec3 beyond = (1.0 - last_reach / k.radius) * shape.rounding;
+    const Box own{support.lower + beyond, support.upper - beyond};
+    if (!own.empty()) inner = inner.united(own);
   }
   if (box.empty()) return box;
   const double size = box.extent().maxCoeff();

@@ -13,18 +13,30 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Relative widening of reaches: far above the round-off of q, far below anything that costs time.
 constexpr double kSlack = 1e-12;
 
-PackedKind kind_of(const Primitive& p) noexcept {
-  const bool wyvill = p.kernel.kind == KernelKind::Wyvill;
-  if (!wyvill && p.kernel.kind != KernelKind::Gascuel) return PackedKind::General;
+PackedFoot foot_of(const Primitive& p) noexcept {
   switch (p.shape) {
-    case ShapeKind::Point: return wyvill ? PackedKind::PointWyvill : PackedKind::PointGascuel;
-    case ShapeKind::Disc: return wyvill ? PackedKind::DiscWyvill : PackedKind::DiscGascuel;
-    default: return wyvill ? PackedKind::SlabWyvill : PackedKind::SlabGascuel;
+    case ShapeKind::Segment: return p.taper == 1.0 ? PackedFoot::Slab : PackedFoot::Scalar;
+    case ShapeKind::Point:
+    case ShapeKind::Rectangle:
+    case ShapeKind::Box:
+    case ShapeKind::Ellipsoid: return PackedFoot::Slab;
+    case ShapeKind::Disc: return PackedFoot::Disc;
+    default: return PackedFoot::Scalar;
   }
 }
 
-void pack(const Primitive& p, const Vec3& position, const Mat3& rotation, PackedPrimitive& packed, PackedShape& shape,
-          RoundedBox& rounded) noexcept {
+PackedKind kind_of(const Primitive& p) noexcept {
+  const bool wyvill = p.kernel.kind == KernelKind::Wyvill;
+  const PackedFoot foot = foot_of(p);
+  if ((!wyvill && p.kernel.kind != KernelKind::Gascuel) || foot == PackedFoot::Scalar) return PackedKind::General;
+  if (foot == PackedFoot::Disc) return wyvill ? PackedKind::DiscWyvill : PackedKind::DiscGascuel;
+  if (p.shape == ShapeKind::Point && p.stretch == Vec3::Ones()) return wyvill ? PackedKind::PointWyvill : PackedKind::PointGascuel;
+  return wyvill ? PackedKind::SlabWyvill : PackedKind::SlabGascuel;
+}
+
+/// @param control  where the primitive's control points have been copied to
+void pack(const Primitive& p, const Vec3* control, const Vec3& position, const Mat3& rotation, PackedPrimitive& packed,
+          PackedShape& shape, RoundedBox& rounded) noexcept {
   const double R = p.kernel.radius;
   packed.position = {position.x(), position.y(), position.z()};
   packed.inverse_r2 = 1.0 / (R * R);
@@ -32,41 +44,37 @@ void pack(const Primitive& p, const Vec3& position, const Mat3& rotation, Packed
   packed.kind = kind_of(p);
   packed.part = p.part;
 
-  Mat3 A = rotation.transpose();
-  Vec3 half = Vec3::Zero();       // of the flat part, primitive frame
-  Vec3 core_half = Vec3::Zero();  // world half extents of what the support is a rounding of
-  double reach = R;
-  shape.distance_scale = 1.0;
-  shape.scales = p.shape == ShapeKind::Ellipsoid;
+  Vec3 half = Vec3::Zero();  // of the flat part, primitive frame
+  shape.view = view_of(p);
+  shape.view.control = {control, p.control.size()};
+  Vec3 scale = p.stretch;
   switch (p.shape) {
-    case ShapeKind::Point: break;
-    case ShapeKind::Segment: half = {p.size.x(), 0.0, 0.0}; break;
+    case ShapeKind::Segment:
+    case ShapeKind::Disc: half = {p.size.x(), 0.0, 0.0}; break;
     case ShapeKind::Rectangle: half = {p.size.x(), p.size.y(), 0.0}; break;
     case ShapeKind::Box: half = p.size; break;
-    case ShapeKind::Disc:
-      half = {p.size.x(), 0.0, 0.0};
-      core_half = rotation.leftCols<2>().rowwise().norm() * p.size.x();
+    case ShapeKind::Ellipsoid:
+      scale = scale.cwiseProduct(p.size / R);
+      shape.view.kind = ShapeKind::Point;
       break;
-    case ShapeKind::Ellipsoid: {
-      // By Minkowski's inequality the ellipsoid lies within its least semi-axis b of the one with semi-axes size - b.
-      reach = p.size.minCoeff();
-      shape.distance_scale = R / reach;
-      core_half = (rotation * (p.size - Vec3::Constant(reach)).asDiagonal()).rowwise().norm();
-      A = (R * p.size.cwiseInverse()).asDiagonal() * rotation.transpose();
-      break;
-    }
+    default: break;
   }
-  if (p.shape != ShapeKind::Disc && p.shape != ShapeKind::Ellipsoid) core_half = rotation.cwiseAbs() * half;
+  const Mat3 A = scale.cwiseInverse().asDiagonal() * rotation.transpose();
+  const Support support = support_of(p, rotation);
+  shape.rounding = support.rounding;
   for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
     for (int j = 0; j < 3; ++j) shape.to_local[static_cast<std::size_t>(3 * i + j)] = A(i, j);
-    const double slack = kSlack * (core_half.maxCoeff() + R) + 1e-15 * std::abs(position[i]);
-    rounded.lower[static_cast<std::size_t>(i)] = position[i] - core_half[i] - slack * (core_half[i] > 0.0);
-    rounded.upper[static_cast<std::size_t>(i)] = position[i] + core_half[i] + slack * (core_half[i] > 0.0);
-    shape.half[static_cast<std::size_t>(i)] = half[i];
+    const double low = support.core.lower[i], high = support.core.upper[i];
+    const double slack = kSlack * (support.core.extent().maxCoeff() + R) + 1e-15 * std::abs(position[i]);
+    rounded.lower[k] = position[i] + low - slack * (low != 0.0);  // exact for a point
+    rounded.upper[k] = position[i] + high + slack * (high != 0.0);
+    shape.half[k] = half[i];
   }
-  rounded.reach2 = reach * reach * (1.0 + 4.0 * kSlack);
+  rounded.reach2 = support.reach * support.reach * (1.0 + 4.0 * kSlack);
   shape.kernel = p.kernel;
-  shape.foot = p.shape == ShapeKind::Disc ? PackedFoot::Disc : PackedFoot::Slab;
+  shape.foot = foot_of(p);
+  shape.distance_scale = distance_scale(p);
   shape.peak = peak(p.kernel);
   if (p.kernel.kind == KernelKind::Gascuel) {
     const double w = R - p.kernel.thickness;
@@ -79,10 +87,10 @@ void pack(const Primitive& p, const Vec3& position, const Mat3& rotation, Packed
 double feature_of(const Primitive& p) noexcept {
   const Kernel& k = p.kernel;
   // The slope of Wyvill's kernel sets what counts as a feature of the others.
-  const double kernel = k.kind == KernelKind::Gascuel ? std::min(k.thickness, k.radius - k.thickness)
+  const double kernel = k.kind == KernelKind::Gascuel  ? std::min(k.thickness, k.radius - k.thickness)
                         : k.kind == KernelKind::Wyvill ? k.radius
                                                        : std::min(k.radius, 1.717300207 / lipschitz(k));
-  return p.shape == ShapeKind::Ellipsoid ? kernel * (p.size.minCoeff() / k.radius) : kernel;
+  return kernel / distance_scale(p);
 }
 
 /// The ten bits of x, two zeros between each and the next.
@@ -208,9 +216,13 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   index.uniform = true;
   index.surface_box.reset();
   double extent = 0.0;
+  index.control.clear();
+  for (const Primitive& p : skeleton.primitive) index.control.insert(index.control.end(), p.control.begin(), p.control.end());
+  const Vec3* control = index.control.data();
   for (std::size_t i = 0; i < n; ++i) {
-    pack(skeleton.primitive[i], placed.position[i], placed.rotation[i], index.primitive[i], index.shape[i],
+    pack(skeleton.primitive[i], control, placed.position[i], placed.rotation[i], index.primitive[i], index.shape[i],
          index.rounded[i]);
+    control += skeleton.primitive[i].control.size();
     index.feature_size = std::min(index.feature_size, feature_of(skeleton.primitive[i]));
     index.uniform = index.uniform && index.primitive[i].kind == index.primitive[0].kind;
     extent += placed.support[i].extent().sum();

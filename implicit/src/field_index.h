@@ -8,19 +8,20 @@
 #include <optional>
 #include <vector>
 
+#include "shapes.h"
 #include "supple/implicit/field.h"
 
 namespace supple::implicit {
 
 /// Shapes as the evaluation tells them apart. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
 /// the vector from the foot point is v = y - clamp(y, -half, half) and q = |v|^2. For an ellipsoid half = 0 and
-/// A = R D^-1 Q^T, otherwise A = Q^T. The common pairs of shape and kernel have loops of their own.
+/// A = R D^-1 Q^T, otherwise A = S^-1 Q^T with the stretch S. The common pairs of shape and kernel have loops of their own.
 enum class PackedKind : std::uint32_t {
   PointWyvill, PointGascuel, SlabWyvill, SlabGascuel, DiscWyvill, DiscGascuel,
   General,  ///< any foot with any kernel
 };
 /// How the foot point of a general primitive is found.
-enum class PackedFoot : std::uint8_t { Slab, Disc };
+enum class PackedFoot : std::uint8_t { Slab, Disc, Scalar };
 
 /// What the hot loop reads of a primitive; one cache line.
 struct alignas(64) PackedPrimitive {
@@ -38,11 +39,12 @@ struct PackedShape {
   Kernel kernel;
   double outer_cubic = 0.0;     ///< Gascuel: iso D
   double outer_square = 0.0;    ///< Gascuel: iso / (R - e)^2
-  double distance_scale = 1.0;  ///< largest |grad d|: 1, or R / smallest semi-axis of an ellipsoid
+  double distance_scale = 1.0;  ///< largest |grad d|, see skeleton.h
   double peak = 0.0;            ///< f(0)
   double lipschitz = 0.0;       ///< largest |grad f| [1/m]
   PackedFoot foot = PackedFoot::Slab;
-  bool scales = false;          ///< level sets are scaled copies of each other (ellipsoid), not offsets
+  ShapeView view;               ///< of y = A (x - p); an ellipsoid is a point there
+  Vec3 rounding = Vec3::Zero();  ///< how far the kernel widens the shape along the world axes, on each side [m]
 };
 
 /// The support of a primitive, {f > 0}, lies within `reach` of the box [lower, upper]; a point's box is the point.
@@ -84,6 +86,7 @@ struct Field::Index {
   std::vector<PackedShape> shape;          ///< by id
   std::vector<RoundedBox> rounded;         ///< by id
   std::vector<Box> support;                ///< by id
+  std::vector<Vec3> control;               ///< of all shapes, which hold spans of it
   std::vector<LeafPack> leaf;              ///< by id up to kScanLimit primitives, else along a Morton curve
   std::vector<std::vector<NodePack>> level;  ///< level[0] bounds the leaves, level[l + 1] bounds level[l]
   std::size_t level_count = 0;

@@ -170,6 +170,25 @@ HWY_INLINE KernelLanes<V> any_kernel(D d, const PackedPrimitive& p, const Packed
   return out;
 }
 
+/// Squared distance and half its gradient of shapes that are measured point by point.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V scalar_foot(D d, const ShapeView& view, V& x, V& y, V& z) {
+  constexpr std::size_t kLanes = hn::MaxLanes(D());
+  alignas(64) double at[3][kLanes], q[kLanes];
+  hn::Store(x, d, at[0]);
+  hn::Store(y, d, at[1]);
+  hn::Store(z, d, at[2]);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const FootSample sample = foot(view, Vec3(at[0][lane], at[1][lane], at[2][lane]));
+    q[lane] = sample.q;
+    for (std::size_t k = 0; k < 3; ++k) at[k][lane] = sample.half_gradient[static_cast<Eigen::Index>(k)];
+  }
+  x = hn::Load(d, at[0]);
+  y = hn::Load(d, at[1]);
+  z = hn::Load(d, at[2]);
+  return hn::Load(d, q);
+}
+
 /// Adds the primitives ids[0..n), all of one kind, to the sums.
 template <PackedKind kKind, bool kGradient, class D, std::size_t K>
 HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_RESTRICT ids, std::size_t n,
@@ -198,7 +217,11 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
                             hn::MulAdd(hn::Set(d, a[1]), vy, hn::Mul(hn::Set(d, a[0]), vx)));
         };
         const V y0 = local(0), y1 = local(1), y2 = local(2);
-        if (kDisc || (kGeneral && shape.foot == PackedFoot::Disc)) {
+        if (kGeneral && shape.foot == PackedFoot::Scalar) {
+          vx = y0;
+          vy = y1;
+          vz = y2;
+        } else if (kDisc || (kGeneral && shape.foot == PackedFoot::Disc)) {
           const V r = hn::Set(d, shape.half[0]);
           const V rho = hn::Sqrt(hn::MulAdd(y1, y1, hn::Mul(y0, y0)));
           const V share = hn::IfThenElseZero(hn::Gt(rho, r), hn::Div(hn::Sub(rho, r), rho));
@@ -215,7 +238,12 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
           vz = outside(y2, 2);
         }
       }
-      const V q = hn::MulAdd(vz, vz, hn::MulAdd(vy, vy, hn::Mul(vx, vx)));
+      V q;
+      if (kGeneral && shape.foot == PackedFoot::Scalar) {
+        q = scalar_foot(d, shape.view, vx, vy, vz);
+      } else {
+        q = hn::MulAdd(vz, vz, hn::MulAdd(vy, vy, hn::Mul(vx, vx)));
+      }
       KernelLanes<V> kernel;
       if constexpr (kWyvill) {
         kernel = wyvill<kGradient>(d, p, q);

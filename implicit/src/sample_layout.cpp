@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "shapes.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 #include "supple/implicit/surface_samples.h"
@@ -53,7 +54,7 @@ void for_sphere(int m, const Use& use) {
 
 class LayoutBuilder {
  public:
-  LayoutBuilder(const Skeleton& skeleton, double spacing) : skeleton_(skeleton), spacing_(spacing) {}
+  LayoutBuilder(const Skeleton& skeleton, double spacing) : skeleton_(skeleton), asked_(spacing) {}
 
   SampleLayout build() {
     for (std::size_t i = 0; i < skeleton_.primitive.size(); ++i) {
@@ -63,20 +64,50 @@ class LayoutBuilder {
       const double peak = evaluate(kernel, 0.0).value;
       rho_ = skeleton_.iso < peak ? iso_distance(kernel, skeleton_.iso) : 0.5 * kernel.radius;
       const Vec3& size = primitive_->size;
+      spacing_ = asked_ / primitive_->stretch.maxCoeff();
+      view_ = view_of(*primitive_);
       switch (primitive_->shape) {
         case ShapeKind::Point: slab(Vec3::Zero()); break;
-        case ShapeKind::Segment: slab({size.x(), 0.0, 0.0}); break;
+        case ShapeKind::Segment:
+          if (primitive_->taper == 1.0) {
+            slab({size.x(), 0.0, 0.0});
+          } else {
+            const std::array<Vec3, 2> ends{Vec3(-size.x(), 0.0, 0.0), Vec3(size.x(), 0.0, 0.0)};
+            curve(ends);
+          }
+          break;
         case ShapeKind::Rectangle: slab({size.x(), size.y(), 0.0}); break;
         case ShapeKind::Box: slab(size); break;
         case ShapeKind::Disc: disc(size.x()); break;
-        case ShapeKind::Ellipsoid: ellipsoid(size); break;
+        case ShapeKind::Ellipsoid:
+        case ShapeKind::Superquadric:
+        case ShapeKind::Directed: star(); break;
+        case ShapeKind::Triangle:
+        case ShapeKind::Polygon: polygon(primitive_->control); break;
+        case ShapeKind::Curve: curve(primitive_->control); break;
+        case ShapeKind::Ring: arc(size.x(), kPi); break;
+        case ShapeKind::Arc: arc(size.x(), size.y()); break;
       }
     }
     return std::move(layout_);
   }
 
  private:
+  /// A seed of the unstretched shape.
   void add(const Vec3& foot, const Vec3& direction, double reach, const Vec3& spread) {
+    const Vec3& stretch = primitive_->stretch;
+    if (stretch == Vec3::Ones()) {
+      push(foot, direction, reach, spread);
+      return;
+    }
+    // A ray's volume element (a + b t + c t^2) dt grows by det S, and t by |S u|.
+    const Vec3 image = stretch.cwiseProduct(direction);
+    const double l = image.norm();
+    push(stretch.cwiseProduct(foot), image / l, reach * l,
+         stretch.prod() / l * Vec3(spread.x(), spread.y() / l, spread.z() / (l * l)));
+  }
+
+  void push(const Vec3& foot, const Vec3& direction, double reach, const Vec3& spread) {
     layout_.primitive.push_back(id_);
     layout_.part.push_back(primitive_->part);
     layout_.foot.push_back(primitive_->offset.to_world(foot));
@@ -161,18 +192,141 @@ class LayoutBuilder {
     }
   }
 
-  void ellipsoid(const Vec3& size) {
-    const int m = sphere_count(rho_ / primitive_->kernel.radius * size.maxCoeff());
+  /// Rays from the centre of what is star-shaped, the solid angles those of an ellipsoid with the same semi-axes.
+  void star() {
+    const double R = primitive_->kernel.radius;
+    Vec3 size = primitive_->size;
+    if (primitive_->shape == ShapeKind::Directed) size = 0.5 * (size + primitive_->control[0]);
+    const int m = sphere_count(rho_ / R * size.maxCoeff());
     for_sphere(m, [&](const Vec3& s) {
       // x = D s maps solid angles by abc / |D s|^3.
       const Vec3 x = size.cwiseProduct(s);
       const double length = x.norm();
-      add(Vec3::Zero(), x / length, length, {0.0, 0.0, 2.0 * kPi / (m * m) * size.prod() / (length * length * length)});
+      const double reach = length * R / std::sqrt(foot(view_, x).q);  // u is homogeneous of degree one
+      add(Vec3::Zero(), x / length, reach, {0.0, 0.0, 2.0 * kPi / (m * m) * size.prod() / (length * length * length)});
     });
   }
 
+  /// Two unit vectors that complete z to a right-handed frame.
+  static Mat3 frame_of(const Vec3& z) {
+    Eigen::Index least;
+    z.cwiseAbs().minCoeff(&least);
+    Mat3 frame;
+    frame.col(2) = z.normalized();
+    frame.col(0) = Vec3::Unit(least).cross(frame.col(2)).normalized();
+    frame.col(1) = frame.col(2).cross(frame.col(0));
+    return frame;
+  }
+
+  /// The half sphere around `outward` at the end of a curve.
+  void cap(const Vec3& end, const Vec3& outward, double reach) {
+    const Mat3 frame = frame_of(outward);
+    const int m = sphere_count(rho_ * reach / primitive_->kernel.radius);
+    for_sphere(m, [&](const Vec3& u) {
+      if (u.z() > 0.0) add(end, frame * u, reach, {0.0, 0.0, 2.0 * kPi / (m * m)});
+    });
+  }
+
+  /// The tube of radius rho around a piece of a curve of length l at `point`: (1 - rho k.u) l rho d(turn), k the curvature
+  /// vector and u the direction.
+  void belt(const Vec3& point, const Vec3& tangent, const Vec3& curvature, double length, double reach) {
+    const Mat3 frame = frame_of(tangent);
+    const int turns = count_for(2.0 * kPi * rho_ * reach / primitive_->kernel.radius / spacing_, 4, 8);
+    const double turn = 2.0 * kPi / turns;
+    for (int i = 0; i < turns; ++i) {
+      const auto [sin, cos] = math::sin_cos((i + 0.5) * turn);
+      const Vec3 u = frame * Vec3(cos, sin, 0.0);
+      add(point, u, reach, {0.0, length * turn, -length * turn * curvature.dot(u)});
+    }
+  }
+
+  void curve(std::span<const Vec3> control) {
+    const double R = primitive_->kernel.radius;
+    const double widest = std::max(1.0, primitive_->taper);
+    double length = 0.0;
+    for (std::size_t i = 1; i < control.size(); ++i) length += (control[i] - control[i - 1]).norm();
+    const int cells = count_for(length / spacing_, 1, 4);
+    for (int i = 0; i < cells; ++i) {
+      const double t = (i + 0.5) / cells;
+      const BezierPoint p = bezier(control, t);
+      const double speed = p.first.norm();
+      if (!(speed > 0.0)) continue;
+      const Vec3 tangent = p.first / speed;
+      const Vec3 curvature = (p.second - p.second.dot(tangent) * tangent) / (speed * speed);
+      belt(p.point, tangent, curvature, speed / cells, R * widest);
+    }
+    cap(control.front(), -end_tangent(control, true), R * widest);
+    cap(control.back(), end_tangent(control, false), R * widest);
+  }
+
+  /// Direction of a curve at an end; where control points coincide, towards the next that differs.
+  static Vec3 end_tangent(std::span<const Vec3> control, bool front) {
+    const std::size_t n = control.size();
+    for (std::size_t i = 1; i < n; ++i) {
+      const Vec3 d = front ? Vec3(control[i] - control[0]) : Vec3(control[n - 1] - control[n - 1 - i]);
+      if (d.norm() > 0.0) return d.normalized();
+    }
+    return Vec3::UnitX();
+  }
+
+  void arc(double r, double half_angle) {
+    const double R = primitive_->kernel.radius;
+    const int cells = count_for(2.0 * half_angle * (r + rho_) / spacing_, 1, 8);
+    for (int i = 0; i < cells; ++i) {
+      const auto [sin, cos] = math::sin_cos(half_angle * ((2.0 * i + 1.0) / cells - 1.0));
+      belt({r * cos, r * sin, 0.0}, {-sin, cos, 0.0}, Vec3(-cos, -sin, 0.0) / r, 2.0 * half_angle * r / cells, R);
+    }
+    if (primitive_->shape == ShapeKind::Ring) return;
+    const auto [sin, cos] = math::sin_cos(half_angle);
+    cap({r * cos, r * sin, 0.0}, {-sin, cos, 0.0}, R);
+    cap({r * cos, -r * sin, 0.0}, {-sin, -cos, 0.0}, R);
+  }
+
+  void polygon(std::span<const Vec3> corner) {
+    const double R = primitive_->kernel.radius;
+    const std::size_t n = corner.size();
+    Vec3 area = Vec3::Zero();
+    for (std::size_t i = 1; i + 1 < n; ++i) area += (corner[i] - corner[0]).cross(corner[i + 1] - corner[0]);
+    const Vec3 normal = area.normalized();
+    for (std::size_t i = 1; i + 1 < n; ++i) {  // both faces of the fan's triangles, each in k^2 alike
+      const Vec3 a = corner[i] - corner[0], b = corner[i + 1] - corner[0];
+      const int k = count_for(std::max({a.norm(), b.norm(), (a - b).norm()}) / (1.5 * spacing_), 1, 1);
+      const double share = 0.5 * a.cross(b).dot(normal) / (k * k);
+      for (int p = 0; p < k; ++p) {
+        for (int q = 0; p + q < k; ++q) {
+          for (const double third : {1.0 / 3.0, 2.0 / 3.0}) {
+            if (third > 0.5 && p + q + 1 >= k) continue;
+            const Vec3 at = corner[0] + (p + third) / k * a + (q + third) / k * b;
+            for (const double side : {1.0, -1.0}) add(at, side * normal, R, {share, 0.0, 0.0});
+          }
+        }
+      }
+    }
+    const int m = sphere_count(rho_);
+    const int turns = count_for(kPi * rho_ / spacing_, 2, 4);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3& here = corner[i];
+      const Vec3 ahead = corner[i + 1 < n ? i + 1 : 0] - here;
+      const Vec3 behind = corner[i > 0 ? i - 1 : n - 1] - here;
+      const Vec3 out = ahead.cross(normal).normalized();
+      const int cells = count_for(ahead.norm() / spacing_, 1, 1);
+      for (int c = 0; c < cells; ++c) {
+        for (int t = 0; t < turns; ++t) {
+          const auto [sin, cos] = math::sin_cos(kPi * ((t + 0.5) / turns - 0.5));
+          add(here + (c + 0.5) / cells * ahead, cos * out + sin * normal, R, {0.0, ahead.norm() / cells * (kPi / turns), 0.0});
+        }
+      }
+      // Every direction has one corner that lies farthest along it.
+      for_sphere(m, [&](const Vec3& u) {
+        if (u.dot(ahead) <= 0.0 && u.dot(behind) < 0.0) add(here, u, R, {0.0, 0.0, 2.0 * kPi / (m * m)});
+      });
+    }
+  }
+
   const Skeleton& skeleton_;
-  double spacing_;
+  double asked_;          ///< spacing on the surface [m]
+  double spacing_ = 0.0;  ///< of the unstretched shape [m]
+  ShapeView view_;
   const Primitive* primitive_ = nullptr;
   std::uint32_t id_ = 0;
   double rho_ = 0.0;  ///< distance of the lone primitive's surface [m]

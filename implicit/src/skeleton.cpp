@@ -3,55 +3,182 @@
 #include <algorithm>
 #include <cmath>
 
+#include "shapes.h"
 #include "supple/core/error.h"
 
 namespace supple::implicit {
 namespace {
 
-/// max(|x| - h, 0) with the sign of x.
-double outside(double x, double h) noexcept { return std::copysign(std::max(std::abs(x) - h, 0.0), x); }
+/// Largest n r with n on the unit sphere and r = r_axis n^2 + m (1 - n^2): how far a Directed support reaches along an
+/// axis of radius r_axis when no other radius exceeds m.
+double directed_reach(double r_axis, double m) noexcept {
+  if (r_axis >= 2.0 / 3.0 * m) return std::max(r_axis, 0.0);
+  return 2.0 / 3.0 * m * std::sqrt(m / (3.0 * (m - r_axis)));
+}
 
-/// Half extents [m] along the axes of the primitive's frame of its shape without the kernel's rounding.
-Vec3 half_extent(const Primitive& primitive) noexcept {
-  const Vec3& s = primitive.size;
-  switch (primitive.shape) {
-    case ShapeKind::Point: return Vec3::Zero();
-    case ShapeKind::Segment: return {s.x(), 0.0, 0.0};
-    case ShapeKind::Rectangle: return {s.x(), s.y(), 0.0};
-    case ShapeKind::Disc: return {s.x(), s.x(), 0.0};
-    case ShapeKind::Box:
-    case ShapeKind::Ellipsoid: return s;
+/// The control points of a segment, curve or polygon with the support radius there; the support is the hull of these
+/// balls at most.
+template <class Use>
+void for_control(const Primitive& p, const Use& use) {
+  if (p.shape == ShapeKind::Segment) {
+    use(Vec3(-p.size.x(), 0.0, 0.0), 1.0);
+    use(Vec3(p.size.x(), 0.0, 0.0), p.taper);
+    return;
   }
-  return s;
+  if (p.shape != ShapeKind::Curve) {
+    for (const Vec3& corner : p.control) use(corner, 1.0);
+    return;
+  }
+  // The control points of pieces of the curve lie closer to it.
+  constexpr int kPieces = 4;
+  const double h = 1.0 / kPieces;
+  const double degree = static_cast<double>(p.control.size()) - 1.0;
+  const auto width = [&](double t) { return 1.0 + (p.taper - 1.0) * t; };
+  for (int i = 0; i <= kPieces; ++i) {
+    const BezierPoint at = bezier(p.control, i * h);
+    use(at.point, width(i * h));
+    if (i > 0) use(at.point - h / degree * at.first, width((i - 1.0 / degree) * h));
+    if (i < kPieces) use(at.point + h / degree * at.first, width((i + 1.0 / degree) * h));
+  }
+}
+
+bool has_control(ShapeKind shape) noexcept {
+  return shape == ShapeKind::Segment || shape == ShapeKind::Triangle || shape == ShapeKind::Polygon ||
+         shape == ShapeKind::Curve;
+}
+
+/// Box of the shape itself (q = 0), own frame [m].
+Box shape_box(const Primitive& primitive) noexcept {
+  const Vec3& s = primitive.size;
+  Vec3 half = Vec3::Zero();
+  switch (primitive.shape) {
+    case ShapeKind::Point:
+    case ShapeKind::Ellipsoid:
+    case ShapeKind::Superquadric:
+    case ShapeKind::Directed: break;
+    case ShapeKind::Segment: half = {s.x(), 0.0, 0.0}; break;
+    case ShapeKind::Rectangle: half = {s.x(), s.y(), 0.0}; break;
+    case ShapeKind::Disc:
+    case ShapeKind::Ring:
+    case ShapeKind::Arc: half = {s.x(), s.x(), 0.0}; break;
+    case ShapeKind::Box: half = s; break;
+    case ShapeKind::Triangle:
+    case ShapeKind::Polygon:
+    case ShapeKind::Curve: {
+      Box box;
+      for (const Vec3& p : primitive.control) box.include(p.cwiseProduct(primitive.stretch));
+      return box;
+    }
+  }
+  half = half.cwiseProduct(primitive.stretch);
+  Box box{-half, half};
+  if (primitive.shape == ShapeKind::Arc) {
+    const auto [cos, sin] = view_of(primitive).pair;
+    box.lower.x() = cos * half.x();
+    if (cos > 0.0) {
+      box.lower.y() = -sin * half.y();
+      box.upper.y() = sin * half.y();
+    }
+  }
+  return box;
 }
 
 }  // namespace
 
-ShapeSample evaluate(ShapeKind shape, const Vec3& size, double radius, const Vec3& y) noexcept {
-  Vec3 v = y;  // from the foot point to y
-  switch (shape) {
-    case ShapeKind::Point: break;
-    case ShapeKind::Segment: v.x() = outside(y.x(), size.x()); break;
-    case ShapeKind::Rectangle:
-      v.x() = outside(y.x(), size.x());
-      v.y() = outside(y.y(), size.y());
-      break;
-    case ShapeKind::Box:
-      for (int k = 0; k < 3; ++k) v[k] = outside(y[k], size[k]);
-      break;
-    case ShapeKind::Disc: {
-      const double rho = std::sqrt(y.x() * y.x() + y.y() * y.y());
-      const double share = rho > size.x() ? (rho - size.x()) / rho : 0.0;
-      v.x() *= share;
-      v.y() *= share;
+Box support_box(const Primitive& primitive) noexcept { return support_of(primitive, Mat3::Identity()).whole; }
+
+ShapeSample evaluate(const Primitive& primitive, const Vec3& y) noexcept {
+  const FootSample sample = foot(view_of(primitive), y.cwiseQuotient(primitive.stretch));
+  return {.q = sample.q, .gradient = 2.0 * sample.half_gradient.cwiseQuotient(primitive.stretch)};
+}
+
+Mat3 second_derivative(const Primitive& primitive, const Vec3& y) noexcept {
+  Mat3 second;
+  static_cast<void>(foot(view_of(primitive), y.cwiseQuotient(primitive.stretch), &second));
+  const Vec3 inverse = primitive.stretch.cwiseInverse();
+  return inverse.asDiagonal() * second * inverse.asDiagonal();
+}
+
+double distance_scale(const Primitive& primitive) noexcept {
+  const double R = primitive.kernel.radius;
+  double scale = 1.0;
+  switch (primitive.shape) {
+    case ShapeKind::Ellipsoid:
+    case ShapeKind::Superquadric: scale = R / primitive.size.minCoeff(); break;  // u is a norm whose unit ball holds the ellipsoid
+    case ShapeKind::Directed: {
+      // |grad d|^2 = 1/r^2 + |tangential grad r|^2 / r^4; the latter is twice the deviation of r_k under the weights n_k^2.
+      const double least = std::min(primitive.size.minCoeff(), primitive.control[0].minCoeff());
+      const double most = std::max(primitive.size.maxCoeff(), primitive.control[0].maxCoeff());
+      const double turn = (most - least) / least;
+      scale = R / least * std::sqrt(1.0 + turn * turn);
       break;
     }
-    case ShapeKind::Ellipsoid: {
-      const Vec3 u = y.cwiseQuotient(size);
-      return {.q = radius * radius * u.squaredNorm(), .gradient = 2.0 * radius * radius * u.cwiseQuotient(size)};
-    }
+    case ShapeKind::Segment:
+    case ShapeKind::Curve: scale = 1.0 / std::min(1.0, primitive.taper); break;
+    default: break;
   }
-  return {.q = v.squaredNorm(), .gradient = 2.0 * v};
+  return scale / primitive.stretch.minCoeff();
+}
+
+Support support_of(const Primitive& p, const Mat3& rotation) noexcept {
+  const double R = p.kernel.radius;
+  const auto turned = [&](const Vec3& half) -> Vec3 { return rotation.cwiseAbs() * half; };
+  const auto spun = [&](const Vec3& semi_axes) -> Vec3 { return (rotation * semi_axes.asDiagonal()).rowwise().norm(); };
+  if (p.shape == ShapeKind::Ellipsoid) {
+    // By Minkowski's inequality the ellipsoid lies within its least semi-axis b of the one with semi-axes size - b.
+    const Vec3 axes = p.size.cwiseProduct(p.stretch);
+    const double b = axes.minCoeff();
+    const Vec3 core = spun(axes - Vec3::Constant(b)), whole = spun(axes);
+    return {.core = {-core, core}, .reach = b, .whole = {-whole, whole}, .rounding = whole};
+  }
+  if (p.shape == ShapeKind::Superquadric || p.shape == ShapeKind::Directed) {
+    Box own{-p.size, p.size};
+    if (p.shape == ShapeKind::Directed) {
+      const double most = std::max(p.size.maxCoeff(), p.control[0].maxCoeff());
+      for (int k = 0; k < 3; ++k) {
+        own.lower[k] = -directed_reach(p.control[0][k], most);
+        own.upper[k] = directed_reach(p.size[k], most);
+      }
+    }
+    own = {own.lower.cwiseProduct(p.stretch), own.upper.cwiseProduct(p.stretch)};
+    const Vec3 middle = rotation * own.centre();
+    const Vec3 half = turned(0.5 * own.extent());
+    const Box whole{middle - half, middle + half};
+    return {.core = whole, .reach = 0.0, .whole = whole, .rounding = half};
+  }
+  // The shape, swept by the ellipsoid with semi-axes R stretch, which in turn is a ball swept by a smaller ellipsoid.
+  const Vec3 axes = R * p.stretch;
+  const double b = axes.minCoeff();
+  const Vec3 core_axes = spun(axes - Vec3::Constant(b)), whole_axes = spun(axes);
+  Support support;
+  if (has_control(p.shape)) {
+    double widest = 0.0;
+    for_control(p, [&](const Vec3& point, double w) {
+      const Vec3 at = rotation * point.cwiseProduct(p.stretch);
+      widest = std::max(widest, w);
+      support.core = support.core.united({at, at});
+      support.whole = support.whole.united({at - w * whole_axes, at + w * whole_axes});
+    });
+    support.core = {support.core.lower - widest * core_axes, support.core.upper + widest * core_axes};
+    support.reach = widest * b;
+    support.rounding = widest * whole_axes;
+    return support;
+  }
+  Box shape;
+  if (p.shape == ShapeKind::Disc || p.shape == ShapeKind::Ring) {
+    // A disc reaches r sqrt(1 - n_k^2) = r |(t1_k, t2_k)| along world axis k.
+    const Vec3 half = spun(p.size.x() * Vec3(p.stretch.x(), p.stretch.y(), 0.0));
+    shape = {-half, half};
+  } else {
+    const Box own = shape_box(p);
+    const Vec3 middle = rotation * own.centre();
+    const Vec3 half = turned(0.5 * own.extent());
+    shape = {middle - half, middle + half};
+  }
+  return {.core = {shape.lower - core_axes, shape.upper + core_axes},
+          .reach = b,
+          .whole = {shape.lower - whole_axes, shape.upper + whole_axes},
+          .rounding = whole_axes};
 }
 
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out) {
@@ -63,27 +190,36 @@ void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, Place
   for (std::size_t i = 0; i < n; ++i) {
     const Primitive& primitive = skeleton.primitive[i];
     SUPPLE_EXPECTS(primitive.part < parts.size());
-    SUPPLE_EXPECTS(primitive.kernel.radius > 0.0);
-    SUPPLE_EXPECTS(primitive.shape != ShapeKind::Ellipsoid || (primitive.size.array() > 0.0).all());
+    SUPPLE_EXPECTS(well_formed(primitive));
     const Pose& part = parts[primitive.part];
     const Vec3 position = part.to_world(primitive.offset.position);
     const Mat3 rotation = part.orientation.toRotationMatrix() * primitive.offset.orientation.toRotationMatrix();
     out.position[i] = position;
     out.rotation[i] = rotation;
-    const Vec3 half = half_extent(primitive);
-    const double R = primitive.kernel.radius;
-    Vec3 reach;
-    if (primitive.shape == ShapeKind::Ellipsoid) {
-      reach = (rotation * half.asDiagonal()).rowwise().norm();
-    } else if (primitive.shape == ShapeKind::Disc) {
-      // A disc reaches r sqrt(1 - n_k^2) = r |(t1_k, t2_k)| along world axis k.
-      reach = rotation.leftCols<2>().rowwise().norm() * half.x() + Vec3::Constant(R);
-    } else {
-      reach = rotation.cwiseAbs() * half + Vec3::Constant(R);
-    }
+    Box box = support_of(primitive, rotation).whole;
     // Wider than f's round-off, so that what lies outside is exactly zero.
-    reach += Vec3::Constant(1e-12 * reach.maxCoeff()) + 1e-15 * position.cwiseAbs();
-    out.support[i] = {position - reach, position + reach};
+    const double reach = std::max(-box.lower.minCoeff(), box.upper.maxCoeff());
+    const Vec3 slack = Vec3::Constant(1e-12 * reach) + 1e-15 * position.cwiseAbs();
+    out.support[i] = {position + box.lower - slack, position + box.upper + slack};
+  }
+}
+
+bool well_formed(const Primitive& p) noexcept {
+  const auto positive = [](const Vec3& v) { return (v.array() > 0.0).all() && v.allFinite(); };
+  if (!(p.kernel.radius > 0.0) || !positive(p.stretch) || !(p.taper > 0.0)) return false;
+  switch (p.shape) {
+    case ShapeKind::Ellipsoid: return positive(p.size);
+    case ShapeKind::Superquadric: {
+      const auto [least, most] = std::minmax(p.exponent[0], p.exponent[1]);
+      return positive(p.size) && least >= 0.2 && most <= 1.0;
+    }
+    case ShapeKind::Directed: return positive(p.size) && p.control.size() == 1 && positive(p.control[0]);
+    case ShapeKind::Ring: return p.size.x() > 0.0;
+    case ShapeKind::Arc: return p.size.x() > 0.0 && p.size.y() > 0.0 && p.size.y() <= 3.1415926535897936;
+    case ShapeKind::Triangle: return p.control.size() == 3;
+    case ShapeKind::Polygon: return p.control.size() >= 3;
+    case ShapeKind::Curve: return p.control.size() >= 2 && p.control.size() <= 4;
+    default: return true;
   }
 }
 

@@ -261,7 +261,7 @@ class BlockProjector {
   [[nodiscard]] double contribution(std::size_t primitive, const Vec3& x) const {
     const Primitive& p = task_.skeleton.primitive[primitive];
     const Vec3 y = p.offset.to_body(task_.parts[p.part].to_body(x));
-    return supple::implicit::evaluate(p.kernel, supple::implicit::evaluate(p.shape, p.size, p.kernel.radius, y).q)
+    return supple::implicit::evaluate(p.kernel, supple::implicit::evaluate(p, y).q)
         .value;
   }
 
@@ -277,7 +277,8 @@ class BlockProjector {
     if (!seed.valid) return;
     const Vec3& spread = task_.layout.spread[seed.id];
     const double cosine = std::max(task_.out.normal[seed.id].dot(seed.direction), kLeastCosine);
-    task_.out.area[seed.id] = (spread.x() + t * (spread.y() + t * spread.z())) / cosine;
+    // Negative beyond the centre of curvature of a curve, where its other pieces count.
+    task_.out.area[seed.id] = std::max(spread.x() + t * (spread.y() + t * spread.z()), 0.0) / cosine;
     task_.out.valid[seed.id] = 1;
   }
 

@@ -212,7 +212,7 @@ void fields(Archive& archive, KernelDesc& d) {
   using enum KernelName;
   archive("type", d.type, {}, "wyvill: (1 - d^2/R^2)^3; gascuel: linear down to the thickness, then cubic; murakami: (1 - d^2/R^2)^2; "
                               "blinn: Gaussian; all others by their papers, all 0 beyond R");
-  archive("radius", d.radius, above(0.0, kLength), "support R; required, except for an ellipsoid (its smallest semi-axis)");
+  archive("radius", d.radius, above(0.0, kLength), "support R; required, except where the shape gives the support itself (then its smallest semi-axis or radius)");
   archive.required("thickness", d.thickness, above(0.0, kLength).only("type", d.type, {Gascuel}), "e: distance of the surface");
   archive.required("slope", d.slope, above(0.0, kSlope).only("type", d.type, {Gascuel}),
                    "steepness at the surface; slope (radius - thickness) <= 3 iso");
@@ -228,6 +228,37 @@ void fields(Archive& archive, KernelDesc& d) {
   }
 }
 
+/// Corners span an area and control points a line; polygons are plane and convex.
+template <class Archive>
+void check_points(Archive& archive, const SkeletonDesc& d) {
+  using enum ShapeName;
+  const std::vector<Vec3>& p = d.points;
+  const std::size_t n = p.size();
+  if (d.shape == Curve && n >= 2) {
+    double length = 0.0;
+    for (std::size_t i = 1; i < n; ++i) length += (p[i] - p[i - 1]).norm();
+    archive.check(length > 0.0, "points", "expected a curve of some length", "all points at one place", "");
+  }
+  if ((d.shape != Triangle && d.shape != Polygon) || n < 3) return;
+  Vec3 area = Vec3::Zero();
+  double largest = 0.0;
+  for (std::size_t i = 1; i + 1 < n; ++i) area += 0.5 * (p[i] - p[0]).cross(p[i + 1] - p[0]);
+  for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, (p[i] - p[0]).norm());
+  const bool spans = area.norm() > 1e-9 * largest * largest;
+  archive.check(spans, "points", "expected corners that span an area", number_text(area.norm()) + " m^2", "");
+  if (!spans || d.shape == Triangle) return;
+  const Vec3 normal = area.normalized();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3& here = p[i];
+    const Vec3 ahead = p[(i + 1) % n] - here, next = p[(i + 2) % n] - p[(i + 1) % n];
+    const double off = std::abs(normal.dot(here - p[0]));
+    const std::string key = "points[" + std::to_string(i) + ']';
+    archive.check(off <= 1e-9 * largest, key, "expected a corner in the plane of the others", short_text(off) + " m off it", "");
+    archive.check(normal.dot(ahead.cross(next)) >= -1e-12 * largest * largest && ahead.norm() > 0.0, key,
+                  "expected corners of a convex polygon, in order", "a turn to the other side", "");
+  }
+}
+
 template <class Archive>
 void fields(Archive& archive, SkeletonDesc& d) {
   using enum ShapeName;
@@ -239,15 +270,29 @@ void fields(Archive& archive, SkeletonDesc& d) {
   archive.required("half_length", d.half_length, only(above(0.0, kLength), {Segment}), "along x");
   archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength).items(d.shape == Rectangle ? 2 : 3, 3), {Rectangle, Box}),
                    "along x, y (and z for a box)");
-  archive.required("radius", d.radius, only(above(0.0, kLength), {Disc}), "of the disc");
-  archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {Ellipsoid}), "of the support, along x, y, z");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Disc, Ring, Arc}), "of the disc or circle");
+  archive.required("half_angle_deg", d.half_angle, only(degrees(0.1, 180.0), {Arc}), "the arc goes as far to either side of the x axis");
+  archive.required("points", d.points, only(any(kLength).items(3, 3), {Triangle}), "corners");
+  archive.required("points", d.points, only(any(kLength).items(3, 32), {Polygon}), "corners of a plane convex polygon, in order");
+  archive.required("points", d.points, only(any(kLength).items(2, 4), {Curve}),
+                   "control points of a Bezier curve: 2 for a line, 3 quadratic, 4 cubic");
+  archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {Ellipsoid, Superquadric}), "of the support, along x, y, z");
+  archive("exponents", d.exponents, only(between(0.2, 1.0, kNumber).items(2, 2), {Superquadric}),
+          "e1 (seen from the side) and e2 (seen from above): 1 is round, 0.2 nearly square");
+  archive.required("radii", d.radii, only(above(0.0, kLength), {Directed}), "of the support, along x, y, z");
+  archive("radii_behind", d.radii_behind, only(above(0.0, kLength), {Directed}), "along -x, -y, -z; absent: as radii");
+  archive("end_radius", d.end_radius, only(above(0.0, kLength), {Segment, Curve}),
+          "support radius at the end, kernel.radius being that at the beginning; absent: the same");
+  archive("stretch", d.stretch, between(1e-3, 1e3, kNumber), "of shape and support along the primitive's axes");
   archive("at", d.at, any(kLength), "offset in the particle's frame");
   archive("turn_axis", d.turn_axis, direction(), "in the particle's frame, with turn_deg");
   archive("turn_deg", d.turn, degrees(-360.0, 360.0), "rotation in the particle's frame");
   archive("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
           "which particles carry it, from 0, negative from the end; absent: all");
   archive.required("kernel", d.kernel, {}, "how the field falls off");
-  archive.check(d.kernel.radius > 0.0 || d.shape == Ellipsoid, "kernel.radius", "expected a length > 0 [m]", "nothing",
+  const bool own_scale = d.shape == Ellipsoid || d.shape == Superquadric || d.shape == Directed;
+  check_points(archive, d);
+  archive.check(d.kernel.radius > 0.0 || own_scale, "kernel.radius", "expected a length > 0 [m]", "nothing",
                 "this key is required");
 }
 

@@ -52,6 +52,8 @@ std::string expectation(FieldType type, std::span<const std::string_view> choice
     case FieldType::Vector:
       return rule.direction ? "a direction: a list of 3 numbers"
                             : "a list of " + count_text(rule, 3, 3) + ", each " + rule_text(rule, false);
+    case FieldType::Vectors:
+      return "a list of " + count_text(rule, 0, 0) + " points, each a list of 3, each " + rule_text(rule, false);
     case FieldType::Wholes:
       return (rule.least_items != 0 ? "a list of " + count_text(rule, 0, 0) : std::string("a list")) + ", each " + rule_text(rule, true);
     case FieldType::Texts: return std::to_string(rule.least_items) + " names";

@@ -13,7 +13,7 @@
 
 namespace supple::scenes {
 
-enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Vector, Wholes, Texts, Mapping, Mappings };
+enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Vector, Vectors, Wholes, Texts, Mapping, Mappings };
 
 struct FieldInfo {
   std::string_view key;
@@ -75,6 +75,7 @@ template <> struct FieldKind<int> { static constexpr FieldType type = FieldType:
 template <> struct FieldKind<bool> { static constexpr FieldType type = FieldType::Boolean; };
 template <> struct FieldKind<std::string> { static constexpr FieldType type = FieldType::Text; };
 template <> struct FieldKind<Vec3> { static constexpr FieldType type = FieldType::Vector; };
+template <> struct FieldKind<std::vector<Vec3>> { static constexpr FieldType type = FieldType::Vectors; };
 template <> struct FieldKind<std::vector<int>> { static constexpr FieldType type = FieldType::Wholes; };
 template <> struct FieldKind<std::vector<std::string>> { static constexpr FieldType type = FieldType::Texts; };
 template <class E>

@@ -68,6 +68,10 @@ Json value_schema(const FieldInfo& info) {
       return info.rule.name ? Json{{"type", "string"}, {"pattern", "^[A-Za-z_][A-Za-z0-9_.-]*$"}} : Json{{"type", "string"}};
     case FieldType::Choice: return {{"enum", info.choices}};
     case FieldType::Vector: return list_schema(number_schema(info.rule, false), info.rule, 3, 3);
+    case FieldType::Vectors: {
+      const Json point = list_schema(number_schema(info.rule, false), {}, 3, 3);
+      return list_schema(point, info.rule, 0, kAny);
+    }
     case FieldType::Wholes: return list_schema(number_schema(info.rule, true), info.rule, 0, kAny);
     case FieldType::Texts: return list_schema({{"type", "string"}}, info.rule, 0, kAny);
     case FieldType::Mapping: {

@@ -41,8 +41,9 @@ template <> struct EnumNames<LawKind> {
       "bond_frame", "coplanarity",     "co_normality",      "co_circularity", "friction"};
 };
 template <> struct EnumNames<ShapeName> {
-  static constexpr std::array<std::string_view, 7> names{"point", "segment", "square",   "rectangle",
-                                                         "disc",  "box",     "ellipsoid"};
+  static constexpr std::array<std::string_view, 14> names{"point",     "segment",  "square",  "rectangle", "disc",
+                                                          "box",       "ellipsoid", "triangle", "polygon",  "ring",
+                                                          "arc",       "curve",    "superquadric", "directed"};
 };
 template <> struct EnumNames<KernelName> {
   static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",

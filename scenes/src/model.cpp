@@ -124,6 +124,13 @@ implicit::ShapeKind shape_of(ShapeName name) {
     case ShapeName::Disc: return implicit::ShapeKind::Disc;
     case ShapeName::Box: return implicit::ShapeKind::Box;
     case ShapeName::Ellipsoid: break;
+    case ShapeName::Triangle: return implicit::ShapeKind::Triangle;
+    case ShapeName::Polygon: return implicit::ShapeKind::Polygon;
+    case ShapeName::Ring: return implicit::ShapeKind::Ring;
+    case ShapeName::Arc: return implicit::ShapeKind::Arc;
+    case ShapeName::Curve: return implicit::ShapeKind::Curve;
+    case ShapeName::Superquadric: return implicit::ShapeKind::Superquadric;
+    case ShapeName::Directed: return implicit::ShapeKind::Directed;
   }
   return implicit::ShapeKind::Ellipsoid;
 }
@@ -134,11 +141,29 @@ Vec3 size_of(const SkeletonDesc& d) {
     case ShapeName::Segment: return {d.half_length, 0.0, 0.0};
     case ShapeName::Square: return {d.half_size, d.half_size, 0.0};
     case ShapeName::Rectangle: return {d.half_sizes.x(), d.half_sizes.y(), 0.0};
-    case ShapeName::Disc: return {d.radius, 0.0, 0.0};
+    case ShapeName::Disc:
+    case ShapeName::Ring: return {d.radius, 0.0, 0.0};
+    case ShapeName::Arc: return {d.radius, d.half_angle, 0.0};
     case ShapeName::Box: return d.half_sizes;
-    case ShapeName::Ellipsoid: break;
+    case ShapeName::Triangle:
+    case ShapeName::Polygon:
+    case ShapeName::Curve: return Vec3::Zero();
+    case ShapeName::Directed: return d.radii;
+    case ShapeName::Ellipsoid:
+    case ShapeName::Superquadric: break;
   }
   return d.semi_axes;
+}
+
+/// Smallest radius or semi-axis of a support that its shape gives; 0 for the others.
+double own_radius(const SkeletonDesc& d) {
+  switch (d.shape) {
+    case ShapeName::Ellipsoid:
+    case ShapeName::Superquadric: return d.semi_axes.minCoeff();
+    case ShapeName::Directed:
+      return d.radii_behind.isZero() ? d.radii.minCoeff() : std::min(d.radii.minCoeff(), d.radii_behind.minCoeff());
+    default: return 0.0;
+  }
 }
 
 /// @throws Error where the kernel's numbers do not fit together
@@ -164,12 +189,16 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
   for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
     const SkeletonDesc& s = d.skeleton[k];
     const std::string key = object + ".skeleton[" + std::to_string(k) + ']';
-    // For an ellipsoid the radius is but the scale of its kernel.
-    const bool own_scale = s.kernel.radius == 0.0 && s.shape == ShapeName::Ellipsoid;
-    const double radius = own_scale ? s.semi_axes.minCoeff() : s.kernel.radius;
+    // For an ellipsoid and its like the radius is but the scale of the kernel.
+    const double radius = s.kernel.radius == 0.0 ? own_radius(s) : s.kernel.radius;
     implicit::Primitive primitive;
     primitive.shape = shape_of(s.shape);
     primitive.size = size_of(s);
+    primitive.control = s.points;
+    if (s.shape == ShapeName::Directed) primitive.control = {s.radii_behind.isZero() ? s.radii : s.radii_behind};
+    primitive.exponent = {s.exponents.x(), s.exponents.y()};
+    primitive.stretch = s.stretch;
+    if (s.end_radius > 0.0) primitive.taper = s.end_radius / radius;
     primitive.offset = {s.at, turned(s.turn_axis.normalized(), s.turn)};
     try {
       primitive.kernel = kernel_of(s.kernel, radius, d.iso);
@@ -502,6 +531,14 @@ Vec3 principal_moments(const ParticlesDesc& d, double a) {
   return 0.2 * d.mass * (Vec3::Constant(squares.sum()) - squares);
 }
 
+/// Of a ball around the primitive's origin that holds its support.
+double largest_radius(const implicit::Primitive& p) {
+  const bool plain = p.shape <= implicit::ShapeKind::Ellipsoid && p.taper == 1.0 && p.stretch == Vec3::Ones();
+  if (plain) return p.size.norm() + p.kernel.radius;
+  const Box box = implicit::support_box(p);
+  return box.lower.cwiseAbs().cwiseMax(box.upper).norm();
+}
+
 /// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
@@ -666,7 +703,7 @@ Model build_model(const Scene& scene) {
     for (const implicit::Primitive& primitive : object.skeleton.primitive) {
       const double thickness = 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive));
       cell = std::min(cell, thickness / kCellsAcross);
-      reach = std::max(reach, primitive.offset.position.norm() + primitive.size.norm() + primitive.kernel.radius);
+      reach = std::max(reach, primitive.offset.position.norm() + largest_radius(primitive));
     }
     Box own;
     for (std::uint32_t p = object.first; p < object.last; ++p) {

@@ -42,12 +42,10 @@ double contact_frequency(const ObjectModel& object, const core::ParticleSet& par
   double largest = 0.0;
   for (const implicit::Primitive& primitive : object.skeleton.primitive) {
     const double a = iso_radius(primitive, object.skeleton.iso);
-    const double half = primitive.shape == implicit::ShapeKind::Ellipsoid
-                            ? primitive.size.maxCoeff() / primitive.size.minCoeff() * a - a
-                            : primitive.size.maxCoeff();
-    const double scale = primitive.shape == implicit::ShapeKind::Ellipsoid
-                             ? primitive.kernel.radius / primitive.size.minCoeff()
-                             : 1.0;
+    const double scale = implicit::distance_scale(primitive);
+    const Vec3 support = 0.5 * implicit::support_box(primitive).extent();
+    const double least = primitive.kernel.radius / scale;
+    const double half = std::max(support.maxCoeff() - least, 0.0) * (implicit::scales(primitive) ? a / least : 1.0);
     const double slope = implicit::iso_slope(primitive.kernel, object.skeleton.iso) * scale;
     const double stiffness = object.material.modulus * slope * std::numbers::pi * a * (a + half);
     largest = std::max(largest, stiffness / particles.mass[object.first + primitive.part]);
@@ -149,12 +147,12 @@ void add_own_repulsion(const Scene& scene, Model& model) {
 
 double iso_radius(const implicit::Primitive& primitive, double iso) {
   const double distance = implicit::iso_distance(primitive.kernel, iso);
-  if (primitive.shape != implicit::ShapeKind::Ellipsoid) return distance;
-  return distance * primitive.size.minCoeff() / primitive.kernel.radius;  // there q = R^2 |D^-1 y|^2
+  return distance / implicit::distance_scale(primitive);
 }
 
 double solid_half_size(const implicit::Primitive& primitive) {
-  return primitive.shape == implicit::ShapeKind::Box ? primitive.size.minCoeff() : 0.0;
+  if (primitive.shape != implicit::ShapeKind::Box) return 0.0;
+  return primitive.size.cwiseProduct(primitive.stretch).minCoeff();
 }
 
 double dissipation_for(double restitution, double speed) {

@@ -180,12 +180,22 @@ bool ReadArchive::read_items(const Node& node, const std::string& path, const Ru
   }
   if (node.items.size() < rule.least_items || node.items.size() > rule.most_items) {
     fault(node, path,
-          rule.least_items == rule.most_items ? "expected " + std::to_string(rule.least_items) + ' ' + std::string(noun)
-                                              : "expected a list of at least " + std::to_string(rule.least_items),
+          rule.least_items == rule.most_items      ? "expected " + std::to_string(rule.least_items) + ' ' + std::string(noun)
+          : node.items.size() > rule.most_items ? "expected a list of at most " + std::to_string(rule.most_items)
+                                                : "expected a list of at least " + std::to_string(rule.least_items),
           "");
     return false;
   }
   return true;
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, std::vector<Vec3>& value, const Rule& rule) {
+  if (!read_items(node, path, rule, "points")) return;
+  value.assign(node.items.size(), Vec3::Zero());
+  const Rule each = rule.items(3, 3);
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    read(*node.items[i], path + '[' + std::to_string(i) + ']', value[i], each);
+  }
 }
 
 void ReadArchive::read(const Node& node, const std::string& path, std::vector<int>& value, const Rule& rule) {

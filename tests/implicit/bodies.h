@@ -2,6 +2,7 @@
 /// Bodies and points for tests, the same on every run.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <random>
 #include <vector>
@@ -57,8 +58,31 @@ struct BodyOptions {
   double half_width = 1.0;  ///< parts lie in this cube [m]
   double least_radius = 0.3;
   double largest_radius = 0.6;
-  bool only_points = false;  ///< Wyvill points instead of every shape and kernel
+  bool only_points = false;  ///< Wyvill points instead of many shapes and kernels
+  bool every_shape = false;  ///< also those that are measured point by point, tapered and stretched
 };
+
+/// Control points, angles, exponents, taper and stretch for a shape of about the size R.
+inline void set_details(Primitive& p, Random& random, double R) {
+  const auto add = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) p.control.push_back(random.in_box(R));
+  };
+  switch (p.shape) {
+    case ShapeKind::Triangle: add(3); break;
+    case ShapeKind::Polygon: {
+      const Quat turn = random.rotation();
+      for (const double angle : {0.2, 1.4, 2.5, 4.0, 5.1}) p.control.push_back(R * (turn * Vec3(std::cos(angle), std::sin(angle), 0.0)));
+      break;
+    }
+    case ShapeKind::Curve: add(2 + random.below(3)); break;
+    case ShapeKind::Arc: p.size.y() = random.uniform(0.3, 3.1); break;
+    case ShapeKind::Superquadric: p.exponent = {random.uniform(0.3, 1.0), random.uniform(0.3, 1.0)}; break;
+    case ShapeKind::Directed: p.control = {Vec3(random.uniform(0.5, 1), random.uniform(0.5, 1), random.uniform(0.5, 1)) * R}; break;
+    default: break;
+  }
+  if (random.below(3) == 0) p.taper = random.uniform(0.5, 1.6);
+  if (random.below(4) == 0) p.stretch = {random.uniform(0.6, 1.4), random.uniform(0.6, 1.4), random.uniform(0.6, 1.4)};
+}
 
 inline Primitive random_primitive(Random& random, const BodyOptions& options, std::uint32_t part) {
   Primitive p;
@@ -66,8 +90,9 @@ inline Primitive random_primitive(Random& random, const BodyOptions& options, st
   const double R = random.uniform(options.least_radius, options.largest_radius);
   p.kernel = Kernel::wyvill(R);
   if (options.only_points) return p;
-  p.shape = static_cast<ShapeKind>(random.below(6));
+  p.shape = static_cast<ShapeKind>(random.below(options.every_shape ? 13 : 6));
   p.size = Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1)) * R;
+  if (options.every_shape) set_details(p, random, R);
   p.offset.position = random.in_box(0.2 * R);
   p.offset.orientation = random.rotation();
   switch (random.below(10)) {

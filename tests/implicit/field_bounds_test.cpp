@@ -19,7 +19,7 @@ class BoundedBody : public ::testing::TestWithParam<testing::BodyOptions> {
 };
 
 TEST_P(BoundedBody, TrueRangeLiesInsideTheInterval) {
-  // 25,000 boxes of all sizes for each of four bodies, values and gradients at the corners and inside.
+  // 25,000 boxes of all sizes for each body, values and gradients at the corners and inside.
   Random random(77);
   std::vector<Vec3> points(24);
   std::vector<double> values(24);
@@ -81,6 +81,7 @@ TEST_P(BoundedBody, SurfaceBoxHoldsTheBodyAndIsClose) {
 INSTANTIATE_TEST_SUITE_P(
     Bodies, BoundedBody,
     ::testing::Values(testing::BodyOptions{.seed = 1, .parts = 3}, testing::BodyOptions{.seed = 2, .parts = 12},
+                      testing::BodyOptions{.seed = 7, .parts = 40, .half_width = 1.3, .every_shape = true},
                       testing::BodyOptions{
                           .seed = 5, .parts = 300, .half_width = 1.2, .least_radius = 0.2, .largest_radius = 0.3},
                       testing::BodyOptions{.seed = 6,

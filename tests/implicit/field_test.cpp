@@ -207,6 +207,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(testing::BodyOptions{.seed = 1, .parts = 3}, testing::BodyOptions{.seed = 2, .parts = 12},
                       testing::BodyOptions{.seed = 3, .parts = 20, .primitives_per_part = 3},
                       testing::BodyOptions{.seed = 4, .parts = 65, .half_width = 1.4},
+                      testing::BodyOptions{.seed = 7, .parts = 50, .every_shape = true},
+                      testing::BodyOptions{.seed = 8, .parts = 80, .half_width = 1.4, .every_shape = true},
                       testing::BodyOptions{
                           .seed = 5, .parts = 700, .half_width = 1.2, .least_radius = 0.1, .largest_radius = 0.25},
                       testing::BodyOptions{.seed = 6,
@@ -222,6 +224,10 @@ TEST_P(EveryPrimitive, GradientMatchesCentralDifferences) {
   Primitive p;
   p.shape = std::get<0>(GetParam());
   p.size = {0.8, 0.6, 0.5};
+  if (p.shape == ShapeKind::Triangle) p.control = {{-0.4, -0.3, 0.1}, {0.5, -0.2, -0.1}, {0.1, 0.5, 0.2}};
+  if (p.shape == ShapeKind::Curve) p.control = {{-0.5, -0.3, 0.1}, {0.1, 0.6, -0.1}, {0.5, -0.2, 0.2}};
+  if (p.shape == ShapeKind::Directed) p.control = {{0.6, 0.5, 0.7}};
+  if (p.shape == ShapeKind::Superquadric) p.exponent = {0.5, 0.8};
   p.kernel = std::get<1>(GetParam());
   p.offset.orientation = Quat(Eigen::AngleAxisd(0.7, Vec3(2, -1, 2) / 3.0));
   const Body body = body_of({{p, Vec3(0.1, 0.2, -0.1)}});
@@ -245,7 +251,9 @@ TEST_P(EveryPrimitive, GradientMatchesCentralDifferences) {
 INSTANTIATE_TEST_SUITE_P(Primitives, EveryPrimitive,
                          ::testing::Combine(::testing::Values(ShapeKind::Point, ShapeKind::Segment,
                                                               ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Box,
-                                                              ShapeKind::Ellipsoid),
+                                                              ShapeKind::Ellipsoid, ShapeKind::Triangle,
+                                                              ShapeKind::Ring, ShapeKind::Curve,
+                                                              ShapeKind::Superquadric, ShapeKind::Directed),
                                             ::testing::Values(Kernel::wyvill(1.0), Kernel::gascuel(0.5, 1.0, 1.2),
                                                               Kernel::soft_object(1.0), Kernel::murakami(1.0),
                                                               Kernel::nishimura(1.0), Kernel::blinn(1.0, 2.0),

@@ -55,7 +55,7 @@ class Field {
 /// Stage 3. Rebuilds `field` for the placed primitives; capacity is reused.
 void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& field);
 
-/// The clear reference: sums every primitive through `evaluate(Kernel)` and `evaluate(ShapeKind)`, no index, no batch.
+/// The clear reference: sums every primitive through `evaluate(Kernel)` and `evaluate(Primitive)`, no index, no batch.
 [[nodiscard]] double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed, const Vec3& point,
                                         Vec3* gradient = nullptr);
 

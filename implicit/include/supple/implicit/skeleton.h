@@ -3,6 +3,7 @@
 /// one part (particle) of its body.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,23 +13,25 @@
 
 namespace supple::implicit {
 
-/// Each shape in its own frame, with the meaning of `size`. q is the squared distance that the kernel sees.
+/// Each shape in its own frame, with the meaning of `size` and `control`. q is the squared distance that the kernel sees:
+/// that to the nearest point of the shape, unless it says otherwise. R is the kernel's radius.
 enum class ShapeKind : std::uint8_t {
-  Point,      ///< q = |y|^2
-  Segment,    ///< from -size.x to +size.x along x
-  Rectangle,  ///< |x| <= size.x, |y| <= size.y, z = 0: q = max(|x|-h_x,0)^2 + max(|y|-h_y,0)^2 + z^2
-  Disc,       ///< radius size.x in z = 0
-  Box,        ///< half sizes size; solid (q = 0 inside)
-  Ellipsoid,  ///< support semi-axes size: q = R^2 |D^-1 y|^2, so f = 0 on the ellipsoid with these semi-axes
+  Point,         ///< q = |y|^2
+  Segment,       ///< from -size.x to +size.x along x; `taper`
+  Rectangle,     ///< |x| <= size.x, |y| <= size.y, z = 0: q = max(|x|-h_x,0)^2 + max(|y|-h_y,0)^2 + z^2
+  Disc,          ///< radius size.x in z = 0
+  Box,           ///< half sizes size; solid (q = 0 inside)
+  Ellipsoid,     ///< support semi-axes size: q = R^2 |D^-1 y|^2, so f = 0 on the ellipsoid with these semi-axes
+  Triangle,      ///< control: three corners
+  Polygon,       ///< control: the corners of a plane convex polygon, in order
+  Ring,          ///< circle of radius size.x in z = 0
+  Arc,           ///< the part of that circle within the angle size.y [rad] of the x axis, 0 < size.y <= pi
+  Curve,         ///< Bezier curve of 2, 3 (quadratic) or 4 (cubic) control points; `taper`
+  Superquadric,  ///< support semi-axes size: q = R^2 u^2, u = ((|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1))^(e1/2),
+                 ///< `exponent` = {e1, e2} in [0.2, 1]: 1 is an ellipsoid, 0.2 nearly a box (Barr 1981)
+  Directed,      ///< radius by direction: q = R^2 d^2 / r(n)^2, n = y/d, r(n) = sum_k r_k n_k^2 with r_k = size_k where
+                 ///< n_k >= 0 and control[0]_k elsewhere: the support ends at these radii on the axes, smoothly between
 };
-
-/// Foot-point distance of a shape in its own frame.
-struct ShapeSample {
-  double q = 0.0;            ///< squared distance [m^2]
-  Vec3 gradient = Vec3::Zero();  ///< grad q [m], own frame
-};
-/// @param radius  kernel radius R [m]; only Ellipsoid uses it
-[[nodiscard]] ShapeSample evaluate(ShapeKind shape, const Vec3& size, double radius, const Vec3& y) noexcept;
 
 struct Primitive {
   std::uint32_t part = 0;  ///< which part of the body carries it
@@ -36,7 +39,35 @@ struct Primitive {
   Vec3 size = Vec3::Zero();  ///< [m], by shape
   Pose offset;               ///< primitive frame -> part frame
   Kernel kernel;
+  std::vector<Vec3> control;  ///< [m], own frame, by shape
+  /// Segment, Curve: support radius at the end over that at the beginning, > 0, linear in the parameter t between them:
+  /// q = min over t of |y - g(t)|^2 / (1 + (taper - 1) t)^2.
+  double taper = 1.0;
+  std::array<double, 2> exponent{1.0, 1.0};
+  /// The field is stretched by these factors along the own axes, shape and support alike: f(y / stretch). An anisotropic
+  /// metric for any shape.
+  Vec3 stretch = Vec3::Ones();
 };
+
+/// Distance of a primitive's shape in the frame of the primitive.
+struct ShapeSample {
+  double q = 0.0;                ///< squared distance [m^2]
+  Vec3 gradient = Vec3::Zero();  ///< grad q [m]
+};
+[[nodiscard]] ShapeSample evaluate(const Primitive& primitive, const Vec3& y) noexcept;
+/// Second derivatives of q [1] where they exist; they jump where the foot point goes to another piece of the shape.
+[[nodiscard]] Mat3 second_derivative(const Primitive& primitive, const Vec3& y) noexcept;
+
+/// Largest |grad sqrt(q)|: 1 for plain shapes; more where stretch, taper or radii less than R bring level sets together.
+[[nodiscard]] double distance_scale(const Primitive& primitive) noexcept;
+
+/// Whether level sets are scaled copies of each other (q = R^2 u^2, u homogeneous) instead of offsets of a shape.
+[[nodiscard]] inline bool scales(const Primitive& p) noexcept {
+  return p.shape == ShapeKind::Ellipsoid || p.shape == ShapeKind::Superquadric || p.shape == ShapeKind::Directed;
+}
+
+/// Box of {f > 0}, own frame [m].
+[[nodiscard]] Box support_box(const Primitive& primitive) noexcept;
 
 /// All primitives of one body, sorted by part; const in a Scene.
 struct Skeleton {

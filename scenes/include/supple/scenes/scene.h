@@ -96,7 +96,9 @@ struct InteractionDesc {
   std::optional<double> range;             ///< weight range h [m]; absent: psi = 1 (bonded)
 };
 
-enum class ShapeName : std::uint8_t { Point, Segment, Square, Rectangle, Disc, Box, Ellipsoid };
+enum class ShapeName : std::uint8_t {
+  Point, Segment, Square, Rectangle, Disc, Box, Ellipsoid, Triangle, Polygon, Ring, Arc, Curve, Superquadric, Directed
+};
 enum class KernelName : std::uint8_t {
   Wyvill, Gascuel, SoftObject, Murakami, Nishimura, Blinn, Cauchy, BlancSchlick
 };
@@ -117,8 +119,15 @@ struct SkeletonDesc {
   double half_size = 0.0;             ///< square [m]
   double half_length = 0.0;           ///< segment, along the primitive's x [m]
   Vec3 half_sizes = Vec3::Zero();     ///< box; rectangle uses x and y [m]
-  double radius = 0.0;                ///< disc [m]
-  Vec3 semi_axes = Vec3::Zero();      ///< ellipsoid: of the support [m]
+  double radius = 0.0;                ///< disc, ring, arc [m]
+  double half_angle = 0.0;            ///< arc, on either side of the x axis [rad] (key half_angle_deg)
+  std::vector<Vec3> points;           ///< triangle, polygon: corners; curve: Bezier control points [m]
+  Vec3 semi_axes = Vec3::Zero();      ///< ellipsoid, superquadric: of the support [m]
+  Vec3 exponents = Vec3(0.5, 0.5, 0.0);  ///< superquadric: e1, e2
+  Vec3 radii = Vec3::Zero();          ///< directed: of the support, along +x, +y, +z [m]
+  Vec3 radii_behind = Vec3::Zero();   ///< directed: along -x, -y, -z [m]; zero: as radii
+  double end_radius = 0.0;            ///< segment, curve: support radius at the end [m]; zero: as kernel.radius
+  Vec3 stretch = Vec3::Ones();        ///< of shape and support along the primitive's axes
   Vec3 at = Vec3::Zero();             ///< offset in the particle's frame [m]
   Vec3 turn_axis = Vec3::UnitZ();     ///< with turn: rotation in the particle's frame
   double turn = 0.0;                  ///< [rad] (key turn_deg)
