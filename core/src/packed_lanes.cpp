@@ -59,38 +59,93 @@ HWY_INLINE Vector load_rows(const double* HWY_RESTRICT rows, const std::uint32_t
 #endif
 }
 
-/// Eight sums of four numbers, in kParts vectors.
-struct Sums {
-  struct Part {
-    Vector v;
-    V w;
-  };
-  Part part[kParts];
+#if HWY_TARGET <= HWY_AVX3
+/// Eight vectors as rows; those of lanes k and k + 2 in one register. What stands in `w` is of no account.
+struct Rows {
+  __m512d r02, r46, r13, r57;
 };
 
-HWY_INLINE void clear(Sums& sums) {
-  for (Sums::Part& p : sums.part) p.v.x = p.v.y = p.v.z = p.w = hn::Zero(D());
+HWY_INLINE Rows rows_of(const Vector (&v)[kParts]) {
+  const __m512d even = _mm512_unpacklo_pd(v[0].x.raw, v[0].y.raw), odd = _mm512_unpackhi_pd(v[0].x.raw, v[0].y.raw);
+  const auto with_z = [&](__m512d xy, long long k) HWY_ATTR {
+    const __m512i from = _mm512_setr_epi64(k & 6, (k & 6) + 1, 8 + k, 8 + k, (k & 6) + 2, (k & 6) + 3, 10 + k, 10 + k);
+    return _mm512_permutex2var_pd(xy, from, v[0].z.raw);
+  };
+  return {with_z(even, 0), with_z(even, 4), with_z(odd, 1), with_z(odd, 5)};
 }
 
-HWY_INLINE __m256d half_sum(V first, [[maybe_unused]] V last) {
-#if HWY_TARGET <= HWY_AVX3
-  return _mm256_add_pd(_mm512_castpd512_pd256(first.raw), _mm512_extractf64x4_pd(first.raw, 1));
+/// ((r0 + r4) + (r1 + r5)) + ((r2 + r6) + (r3 + r7)).
+HWY_INLINE __m256d total(const Rows& r) {
+  const __m512d sum = _mm512_add_pd(_mm512_add_pd(r.r02, r.r46), _mm512_add_pd(r.r13, r.r57));
+  return _mm256_add_pd(_mm512_castpd512_pd256(sum), _mm512_extractf64x4_pd(sum, 1));
+}
+
+/// Each of the rows of eight particles combined with its own.
+template <class Combine>
+HWY_INLINE void combine_rows(const Rows& r, const std::uint32_t* HWY_RESTRICT j, double* HWY_RESTRICT rows,
+                             const Combine& combine) {
+  // Two rows at a time: the compiler would keep more indices in vector registers.
+  const auto two = [&](std::size_t k, __m512d v) HWY_ATTR {
+    double* const low = rows + j[k];
+    double* const high = rows + j[k + 2];
+    v = combine(_mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(low)), _mm256_load_pd(high), 1), v);
+    _mm256_store_pd(low, _mm512_castpd512_pd256(v));
+    _mm256_store_pd(high, _mm512_extractf64x4_pd(v, 1));
+  };
+  two(0, r.r02);
+  two(4, r.r46);
+  two(1, r.r13);
+  two(5, r.r57);
+}
 #else
-  return _mm256_add_pd(first.raw, last.raw);
-#endif
+/// Eight vectors as rows. What stands in `w` is of no account.
+struct Rows {
+  __m256d r[kBatch];
+};
+
+HWY_INLINE Rows rows_of(const Vector (&v)[kParts]) {
+  Rows out;
+  for (std::size_t p = 0; p < kParts; ++p) {
+    const __m256d even = _mm256_unpacklo_pd(v[p].x.raw, v[p].y.raw), odd = _mm256_unpackhi_pd(v[p].x.raw, v[p].y.raw);
+    const __m256d z_even = _mm256_unpacklo_pd(v[p].z.raw, v[p].z.raw);
+    const __m256d z_odd = _mm256_unpackhi_pd(v[p].z.raw, v[p].z.raw);
+    __m256d* const r = out.r + p * kLanes;
+    r[0] = _mm256_permute2f128_pd(even, z_even, 0x20);
+    r[1] = _mm256_permute2f128_pd(odd, z_odd, 0x20);
+    r[2] = _mm256_permute2f128_pd(even, z_even, 0x31);
+    r[3] = _mm256_permute2f128_pd(odd, z_odd, 0x31);
+  }
+  return out;
 }
 
-/// ((s0 + s4) + (s1 + s5)) + ((s2 + s6) + (s3 + s7)) of each number.
-HWY_INLINE Row total(const Sums& sums) {
-  const Sums::Part& a = sums.part[0];
-  const Sums::Part& b = sums.part[kParts - 1];
-  const __m256d x = half_sum(a.v.x, b.v.x), y = half_sum(a.v.y, b.v.y);
-  const __m256d z = half_sum(a.v.z, b.v.z), w = half_sum(a.w, b.w);
-  const __m256d xy = _mm256_add_pd(_mm256_unpacklo_pd(x, y), _mm256_unpackhi_pd(x, y));
-  const __m256d zw = _mm256_add_pd(_mm256_unpacklo_pd(z, w), _mm256_unpackhi_pd(z, w));
-  Row out;
-  _mm256_store_pd(&out.x, _mm256_add_pd(_mm256_permute2f128_pd(xy, zw, 0x20), _mm256_permute2f128_pd(xy, zw, 0x31)));
-  return out;
+/// ((r0 + r4) + (r1 + r5)) + ((r2 + r6) + (r3 + r7)).
+HWY_INLINE __m256d total(const Rows& rows) {
+  const __m256d* const r = rows.r;
+  return _mm256_add_pd(_mm256_add_pd(_mm256_add_pd(r[0], r[4]), _mm256_add_pd(r[1], r[5])),
+                       _mm256_add_pd(_mm256_add_pd(r[2], r[6]), _mm256_add_pd(r[3], r[7])));
+}
+
+/// Each of the rows of eight particles combined with its own.
+template <class Combine>
+HWY_INLINE void combine_rows(const Rows& r, const std::uint32_t* HWY_RESTRICT j, double* HWY_RESTRICT rows,
+                             const Combine& combine) {
+  for (std::size_t k = 0; k < kBatch; ++k) _mm256_store_pd(rows + j[k], combine(_mm256_load_pd(rows + j[k]), r.r[k]));
+}
+#endif
+
+HWY_INLINE void add_rows(const Rows& r, const std::uint32_t* j, double* rows) {
+  combine_rows(r, j, rows, [](auto a, auto b) HWY_ATTR { return a + b; });
+}
+HWY_INLINE void subtract_rows(const Rows& r, const std::uint32_t* j, double* rows) {
+  combine_rows(r, j, rows, [](auto a, auto b) HWY_ATTR { return a - b; });
+}
+
+/// Adds the sum of eight rows to one.
+HWY_INLINE void add_total(const Rows& r, double* row) {
+  _mm256_store_pd(row, _mm256_add_pd(_mm256_load_pd(row), total(r)));
+}
+HWY_INLINE void subtract_total(const Rows& r, double* row) {
+  _mm256_store_pd(row, _mm256_sub_pd(_mm256_load_pd(row), total(r)));
 }
 
 HWY_INLINE V dot(const Vector& a, const Vector& b) {
@@ -98,306 +153,240 @@ HWY_INLINE V dot(const Vector& a, const Vector& b) {
 }
 HWY_INLINE V squared(const Vector& r) { return dot(r, r); }
 
-HWY_INLINE void add_scaled(V s, const Vector& v, Vector& sum) {
-  sum.x = hn::MulAdd(s, v.x, sum.x);
-  sum.y = hn::MulAdd(s, v.y, sum.y);
-  sum.z = hn::MulAdd(s, v.z, sum.z);
+HWY_INLINE Vector scaled(V s, const Vector& v) { return {hn::Mul(s, v.x), hn::Mul(s, v.y), hn::Mul(s, v.z)}; }
+/// s v + w.
+HWY_INLINE Vector scaled_sum(V s, const Vector& v, const Vector& w) {
+  return {hn::MulAdd(s, v.x, w.x), hn::MulAdd(s, v.y, w.y), hn::MulAdd(s, v.z, w.z)};
 }
 
 HWY_INLINE Vector minus(const Vector& a, const Vector& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
-HWY_INLINE Vector broadcast(const Row& row) { return {set(row.x), set(row.y), set(row.z)}; }
+HWY_INLINE Vector broadcast(const double* row) { return {set(row[0]), set(row[1]), set(row[2])}; }
 
-/// Two batches of neighbours, which share a division.
-struct TwoBatches {
-  Vector a, b;
-  V a2, b2, inverse;
-};
-
-HWY_INLINE TwoBatches load_two(const double* HWY_RESTRICT rows, const std::uint32_t* HWY_RESTRICT j, const Vector& x) {
-  TwoBatches out;
-  out.a = minus(load_rows(rows, j), x);
-  out.b = minus(load_rows(rows, j + kBatch), x);
-  out.a2 = squared(out.a);
-  out.b2 = squared(out.b);
-  out.inverse = hn::Div(set(1.0), hn::Mul(out.a2, out.b2));
-  return out;
-}
-
-/// Calls use(r, d^2, 1 / d^2, part) for all vectors of neighbours of particle k.
-template <class Use>
-HWY_INLINE void for_neighbours(const ListBlock& list, std::size_t k, const Row* HWY_RESTRICT position, const Use& use) {
-  const double* HWY_RESTRICT rows = &position->x;
-  const Vector x = broadcast(position[list.point[k]]);
-  const std::uint32_t* HWY_RESTRICT j = list.neighbour.data() + list.first[k];
-  const std::uint32_t* const end = list.neighbour.data() + list.last[k];
-  if (j + kBatch < end) {
-    TwoBatches now[kParts];
-    for (std::size_t p = 0; p < kParts; ++p) now[p] = load_two(rows, j + p * kLanes, x);
-    j += 2 * kBatch;
-    // The next two are divided while these are used: one after the other they would wait for each other.
-    for (; j + kBatch < end; j += 2 * kBatch) {
-      for (std::size_t p = 0; p < kParts; ++p) {
-        const TwoBatches next = load_two(rows, j + p * kLanes, x);
-        use(now[p].a, now[p].a2, hn::Mul(now[p].inverse, now[p].b2), p);
-        use(now[p].b, now[p].b2, hn::Mul(now[p].inverse, now[p].a2), p);
-        now[p] = next;
-      }
-    }
-    for (std::size_t p = 0; p < kParts; ++p) {
-      use(now[p].a, now[p].a2, hn::Mul(now[p].inverse, now[p].b2), p);
-      use(now[p].b, now[p].b2, hn::Mul(now[p].inverse, now[p].a2), p);
-    }
-  }
-  if (j < end) {
-    for (std::size_t p = 0; p < kParts; ++p) {
-      const Vector a = minus(load_rows(rows, j + p * kLanes), x);
-      const V a2 = squared(a);
-      use(a, a2, hn::Div(set(1.0), a2), p);
-    }
-  }
-}
-
-void TwelveSixForces(const TwelveSixNumbers& law, const ListBlock& list, std::size_t begin, std::size_t end,
-                     const Row* HWY_RESTRICT position, Row* HWY_RESTRICT force) {
+void TwelveSixForces(const TwelveSixNumbers& law, const ListBlock& list, const Row* HWY_RESTRICT position,
+                     Row* HWY_RESTRICT force) {
   const V range2 = set(law.range2), twelve = set(law.twelve), six = set(law.six);
-  for (std::size_t k = begin; k < end; ++k) {
-    Sums sums;
-    clear(sums);
-    for_neighbours(list, k, position,
-                   [&](const Vector& r, V d2, V inverse, std::size_t p) HWY_ATTR {
-                     const V i6 = hn::Mul(hn::Mul(inverse, inverse), inverse);
-                     const V g = hn::Mul(hn::Mul(i6, inverse), hn::NegMulAdd(twelve, i6, six));
-                     add_scaled(hn::IfThenElseZero(hn::Lt(d2, range2), g), r, sums.part[p].v);
-                   });
-    force[k - begin] = total(sums);
+  const double* HWY_RESTRICT rows = &position->x;
+  double* HWY_RESTRICT forces = &force->x;
+  for (std::size_t b = 0; b < list.batches; ++b) {
+    const std::uint32_t i = list.owner[b];
+    const std::uint32_t* HWY_RESTRICT j = list.neighbour.data() + kBatch * b;
+    const Vector x = broadcast(rows + i);
+    Vector push[kParts];
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const Vector r = minus(load_rows(rows, j + p * kLanes), x);
+      const V d2 = squared(r);
+      const V inverse = hn::Div(set(1.0), d2);
+      const V i6 = hn::Mul(hn::Mul(inverse, inverse), inverse);
+      const V g = hn::Mul(hn::Mul(i6, inverse), hn::MulSub(twelve, i6, six));
+      push[p] = scaled(hn::IfThenElseZero(hn::Lt(d2, range2), g), r);
+    }
+    const Rows out = rows_of(push);
+    subtract_total(out, forces + i);
+    add_rows(out, j, forces);
   }
+}
+
+/// Vectors that are worked on in step: the results of one arrive while the others are begun.
+constexpr std::size_t kChains = 4;
+static_assert(kChains / kParts <= kSpareBatches + 1);
+template <class Step>
+HWY_INLINE void in_step(const Step& step) {
+  for (std::size_t c = 0; c < kChains; ++c) step(c);
 }
 
 /// e^x for x <= 0; error about 2 ulp, below e^-700 that.
-HWY_INLINE V exp_negative(V x) {
+HWY_INLINE void exp_negative(V (&x)[kChains]) {
   const D d;
   const hn::RebindToSigned<D> whole;
-  x = hn::Max(x, set(-700.0));
+  V n[kChains], shifted[kChains], r[kChains], r2[kChains], c0[kChains], c4[kChains], c8[kChains];
   // The sum with 3 2^51 rounds to a whole number and leaves it in the low bits.
   const V magic = set(0x1.8p52);
-  const V shifted = hn::MulAdd(x, set(0x1.71547652b82fep0), magic);
-  const V n = hn::Sub(shifted, magic);
-  const V r = hn::NegMulAdd(n, set(0x1.abc9e3b39803fp-56), hn::NegMulAdd(n, set(0x1.62e42fefa39efp-1), x));
-  const V r2 = hn::Mul(r, r), r4 = hn::Mul(r2, r2);
+  in_step([&](std::size_t c) HWY_ATTR { x[c] = hn::Max(x[c], set(-700.0)); });
+  in_step([&](std::size_t c) HWY_ATTR { shifted[c] = hn::MulAdd(x[c], set(0x1.71547652b82fep0), magic); });
+  in_step([&](std::size_t c) HWY_ATTR { n[c] = hn::Sub(shifted[c], magic); });
+  in_step([&](std::size_t c) HWY_ATTR { r[c] = hn::NegMulAdd(n[c], set(0x1.62e42fefa39efp-1), x[c]); });
+  in_step([&](std::size_t c) HWY_ATTR { r[c] = hn::NegMulAdd(n[c], set(0x1.abc9e3b39803fp-56), r[c]); });
   // The series to r^12 / 12!: |r| < 0.35 leaves 2e-16.
-  const auto two = [&](double low, double high) HWY_ATTR { return hn::MulAdd(r, set(high), set(low)); };
-  const V c0 = hn::MulAdd(r2, two(1.0 / 2, 1.0 / 6), two(1.0, 1.0));
-  const V c4 = hn::MulAdd(r2, two(1.0 / 720, 1.0 / 5040), two(1.0 / 24, 1.0 / 120));
-  const V c8 = hn::MulAdd(r2, two(1.0 / 3628800, 1.0 / 39916800), two(1.0 / 40320, 1.0 / 362880));
-  const V high = hn::MulAdd(r4, set(1.0 / 479001600), c8);
-  const V series = hn::MulAdd(r4, hn::MulAdd(r4, high, c4), c0);
-  return hn::BitCast(d, hn::Add(hn::BitCast(whole, series), hn::ShiftLeft<52>(hn::BitCast(whole, shifted))));
-}
-
-/// 1 / sqrt(x) to about 1 ulp for x in [1e-300, 1e300], without the divider and with the same bits everywhere.
-HWY_INLINE V inverse_sqrt(V x) {
-  const D d;
-  const hn::RebindToUnsigned<D> bits;
-  // Halving the exponent is right to 3.5 %; two steps of the binomial series of (1 - e)^(-1/2) follow.
-  V y = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5fe6eb50c7b537a9ULL), hn::ShiftRight<1>(hn::BitCast(bits, x))));
-  V e = hn::NegMulAdd(hn::Mul(x, y), y, set(1.0));
-  const V series = hn::MulAdd(hn::MulAdd(hn::MulAdd(e, set(35.0 / 128), set(5.0 / 16)), e, set(3.0 / 8)), e, set(0.5));
-  y = hn::MulAdd(hn::Mul(y, e), series, y);
-  e = hn::NegMulAdd(hn::Mul(x, y), y, set(1.0));
-  return hn::MulAdd(hn::Mul(y, e), hn::MulAdd(e, set(3.0 / 8), set(0.5)), y);
-}
-
-/// Neighbours in range of some particles, in the order of their lists; whole batches, filled up with such that add 0.
-/// Passes after each other fill the columns: each is so short that a processor works on several vectors of it at once.
-struct InRange {
-  static constexpr std::size_t kRoom = 328;       ///< neighbours: all columns fit the first cache
-  static constexpr std::size_t kLongest = 256;    ///< of one segment, before those out of range are left out
-  static constexpr std::size_t kSegments = 8;
-  struct Segment {
-    std::size_t particle, begin, end;
+  const auto four = [&](V (&out)[kChains], double k0, double k1, double k2, double k3) HWY_ATTR {
+    V low[kChains], high[kChains];
+    in_step([&](std::size_t c) HWY_ATTR { low[c] = hn::MulAdd(r[c], set(k1), set(k0)); });
+    in_step([&](std::size_t c) HWY_ATTR { high[c] = hn::MulAdd(r[c], set(k3), set(k2)); });
+    in_step([&](std::size_t c) HWY_ATTR { out[c] = hn::MulAdd(r2[c], high[c], low[c]); });
   };
-  alignas(64) std::uint32_t index[kRoom + 2 * kBatch];
-  alignas(64) double x[kRoom], y[kRoom], z[kRoom], d2[kRoom];          ///< r and its square
-  alignas(64) double mx[kRoom], my[kRoom], mz[kRoom];                  ///< normals
-  alignas(64) double a[kRoom], b[kRoom], unlike[kRoom];                ///< n_i . r, n_j . r, 1 - n_i . n_j
-  alignas(64) double inverse[kRoom], rest[kRoom];                      ///< 1 / d^2, 1 - d^2 / h^2
-  alignas(64) double well[kRoom];                                      ///< slope of cohesion over d
-  Segment segment[kSegments];
-  std::size_t segments = 0;
-  std::size_t count = 0;
-};
-
-/// Appends the neighbours in range among [j, end) as a segment.
-HWY_INLINE void keep_in_range(const double* HWY_RESTRICT rows, const Vector& x, double range2, std::uint32_t filler,
-                              std::size_t particle, const std::uint32_t* HWY_RESTRICT j, const std::uint32_t* end,
-                              InRange& out) {
-  const V limit = set(range2);
-  std::size_t count = out.count;
-  for (; j < end; j += kLanes) {
-    const auto near = hn::Lt(squared(minus(load_rows(rows, j), x)), limit);
-#if HWY_TARGET <= HWY_AVX3
-    const __m256i index = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(j));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out.index + count), _mm256_maskz_compress_epi32(near.raw, index));
-    count += static_cast<std::size_t>(__builtin_popcount(near.raw));
-#else
-    for (auto bits = static_cast<unsigned>(_mm256_movemask_pd(near.raw)); bits != 0; bits &= bits - 1U) {
-      out.index[count++] = j[__builtin_ctz(bits)];
-    }
-#endif
-  }
-  for (std::size_t k = 0; k < kBatch; ++k) out.index[count + k] = filler;
-  const std::size_t begin = out.count;
-  out.count = (count + kBatch - 1) / kBatch * kBatch;
-  out.segment[out.segments++] = {particle, begin, out.count};
+  in_step([&](std::size_t c) HWY_ATTR { r2[c] = hn::Mul(r[c], r[c]); });
+  four(c8, 1.0 / 40320, 1.0 / 362880, 1.0 / 3628800, 1.0 / 39916800);
+  in_step([&](std::size_t c) HWY_ATTR { x[c] = hn::Mul(r2[c], r2[c]); });
+  in_step([&](std::size_t c) HWY_ATTR { c8[c] = hn::MulAdd(x[c], set(1.0 / 479001600), c8[c]); });
+  four(c4, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040);
+  in_step([&](std::size_t c) HWY_ATTR { c4[c] = hn::MulAdd(x[c], c8[c], c4[c]); });
+  four(c0, 1.0, 1.0, 1.0 / 2, 1.0 / 6);
+  in_step([&](std::size_t c) HWY_ATTR { c0[c] = hn::MulAdd(x[c], c4[c], c0[c]); });
+  in_step([&](std::size_t c) HWY_ATTR {
+    x[c] = hn::BitCast(d, hn::Add(hn::BitCast(whole, c0[c]), hn::ShiftLeft<52>(hn::BitCast(whole, shifted[c]))));
+  });
 }
 
-HWY_INLINE void load_segment(const double* HWY_RESTRICT rows, const double* HWY_RESTRICT normals, const Vector& x,
-                             const Vector& n, const InRange::Segment& segment, InRange& near) {
+/// What is known of a batch. Short passes over some batches fill it: a processor works on several of them at once, where
+/// one long pass would wait for its own results.
+struct Near {
+  alignas(64) double x[kBatch], y[kBatch], z[kBatch];  ///< r
+  double d[kBatch];                                    ///< its length
+  double pull[kBatch];                                 ///< slope of cohesion times d
+  double mx[kBatch], my[kBatch], mz[kBatch];           ///< n_j
+  double g[kBatch], u_a[kBatch], u_b[kBatch], u_c[kBatch];
+
+  [[nodiscard]] HWY_INLINE Vector r(std::size_t k) const {
+    return {hn::Load(D(), x + k), hn::Load(D(), y + k), hn::Load(D(), z + k)};
+  }
+  [[nodiscard]] HWY_INLINE Vector m(std::size_t k) const {
+    return {hn::Load(D(), mx + k), hn::Load(D(), my + k), hn::Load(D(), mz + k)};
+  }
+};
+constexpr std::size_t kNear = 16;  ///< batches that stay in the first cache, twice
+
+HWY_INLINE void place_batch(std::uint32_t owner, const std::uint32_t* HWY_RESTRICT j, const double* HWY_RESTRICT rows,
+                            Near& near) {
   const D d;
-  for (std::size_t k = segment.begin; k < segment.end; k += kLanes) {
-    const Vector r = minus(load_rows(rows, near.index + k), x);
+  const Vector x = broadcast(rows + owner);
+  for (std::size_t k = 0; k < kBatch; k += kLanes) {
+    const Vector r = minus(load_rows(rows, j + k), x);
     hn::Store(r.x, d, near.x + k);
     hn::Store(r.y, d, near.y + k);
     hn::Store(r.z, d, near.z + k);
-    hn::Store(squared(r), d, near.d2 + k);
-    hn::Store(dot(n, r), d, near.a + k);
-  }
-  for (std::size_t k = segment.begin; k < segment.end; k += kLanes) {
-    const Vector m = load_rows(normals, near.index + k);
-    const Vector r{hn::Load(d, near.x + k), hn::Load(d, near.y + k), hn::Load(d, near.z + k)};
-    hn::Store(m.x, d, near.mx + k);
-    hn::Store(m.y, d, near.my + k);
-    hn::Store(m.z, d, near.mz + k);
-    hn::Store(dot(m, r), d, near.b + k);
-    hn::Store(hn::Sub(set(1.0), dot(n, m)), d, near.unlike + k);
+    hn::Store(hn::Sqrt(squared(r)), d, near.d + k);
   }
 }
 
-/// The columns that depend on the distance alone. The slope of cohesion over d is F0 r0 v^3 exp(-a v^2) / d^2.
-HWY_INLINE void evaluate_distances(const SurfaceNumbers& law, InRange& near) {
+/// The slope of cohesion times d is F0 r0 v^3 exp(-a v^2), v = d / r0 - 1.
+HWY_INLINE void evaluate_cohesion(const SurfaceNumbers& law, Near* HWY_RESTRICT near) {
   const D d;
-  for (std::size_t k = 0; k < near.count; k += kLanes) {
-    const V d2 = hn::Load(d, near.d2 + k);
-    const V y = inverse_sqrt(d2);
-    hn::Store(hn::Mul(y, y), d, near.inverse + k);
-    hn::Store(hn::MulSub(hn::Mul(d2, y), set(law.inverse_r0), set(1.0)), d, near.well + k);
-    hn::Store(hn::Max(hn::NegMulAdd(d2, set(law.inverse_h2), set(1.0)), hn::Zero(d)), d, near.rest + k);
-  }
-  for (std::size_t k = 0; k < near.count; k += kLanes) {
-    const V v = hn::Load(d, near.well + k);
+  V gain[kChains], bell[kChains];
+  in_step([&](std::size_t c) HWY_ATTR {
+    const V length = hn::Load(d, near[c / kParts].d + c % kParts * kLanes);
+    const V v = hn::MulSub(length, set(law.inverse_r0), set(1.0));
     const V v2 = hn::Mul(v, v);
-    const V bell = exp_negative(hn::Mul(set(-law.a), v2));
-    const V gain = hn::Mul(hn::Mul(v2, v), hn::Mul(set(law.cohesion), hn::Load(d, near.inverse + k)));
-    const V near_enough = hn::IfThenElseZero(hn::Lt(hn::Load(d, near.d2 + k), set(law.range2)), gain);
-    hn::Store(hn::Mul(near_enough, bell), d, near.well + k);
-  }
+    bell[c] = hn::Mul(set(-law.a), v2);
+    gain[c] = hn::IfThenElseZero(hn::Lt(length, set(law.range)), hn::Mul(hn::Mul(v2, v), set(law.cohesion)));
+  });
+  exp_negative(bell);
+  in_step([&](std::size_t c) HWY_ATTR {
+    hn::Store(hn::Mul(gain[c], bell[c]), d, near[c / kParts].pull + c % kParts * kLanes);
+  });
 }
 
-/// With a = n_i . r, b = n_j . r, c = n_i . n_j the energy of a pair is
-/// U_c(d) + psi E, E = k_f (kappa^2 + 2 w / d^2) + k_p (a^2 + b^2) + k_c (a + b)^2 + 2 k_n (1 - c),
-/// w = kappa (a - b) + 1 - c, so that dU/dr = G r + U_a n_i + U_b n_j and dU/dn_i = U_a r + U_c n_j.
-HWY_INLINE void add_surface_loads(const SurfaceNumbers& law, std::size_t begin, const InRange& near, Sums& pull,
-                                  Sums& turn) {
+/// With a = n_i . r, b = n_j . r, c = n_i . n_j the energy of a pair is U_c(d) + psi E,
+/// E = k_f (kappa^2 + 2 w / d^2) + a q_a + b q_b + 2 k_n (1 - c), w = kappa (a - b) + 1 - c,
+/// q_a = k_p a + k_c (a + b), q_b = k_p b + k_c (a + b),
+/// so that dU/dr = G r + U_a n_i + U_b n_j, dU/dn_i = U_a r + U_c n_j and dU/dn_j = U_b r + U_c n_i.
+HWY_INLINE void evaluate_gains(const SurfaceNumbers& law, std::size_t k, const Vector& n, const Vector& m, Near& near) {
   const D d;
-  for (std::size_t p = 0; p < kParts; ++p) {
-    const std::size_t k = begin + p * kLanes;
-    const Vector r{hn::Load(d, near.x + k), hn::Load(d, near.y + k), hn::Load(d, near.z + k)};
-    const Vector m{hn::Load(d, near.mx + k), hn::Load(d, near.my + k), hn::Load(d, near.mz + k)};
-    const V a = hn::Load(d, near.a + k), b = hn::Load(d, near.b + k), unlike = hn::Load(d, near.unlike + k);
-    const V inverse = hn::Load(d, near.inverse + k), rest = hn::Load(d, near.rest + k);
-    const V rest2 = hn::Mul(rest, rest);
-    const V psi2 = hn::Mul(rest2, hn::Add(rest, rest));
-    const V form = hn::Mul(set(law.form), inverse);
-    const V bend = hn::Mul(set(law.curvature), form);
-    const V both = hn::Add(a, b);
-    const V circle = hn::Mul(set(law.cocircularity), both);
-    const V w = hn::MulAdd(set(law.curvature), hn::Sub(a, b), unlike);
-    const V half = hn::Mul(form, w);
-    const V twice = hn::Add(half, half);
-    const V flat = hn::MulAdd(a, a, hn::Mul(b, b));
-    const V e = hn::Add(hn::MulAdd(set(law.conormality2), unlike, hn::Add(twice, set(law.form_offset))),
-                        hn::MulAdd(circle, both, hn::Mul(set(law.coplanarity), flat)));
-    const V well = hn::NegMulAdd(psi2, hn::Mul(twice, inverse), hn::Load(d, near.well + k));
-    const V g = hn::MulAdd(hn::Mul(rest2, set(law.slope)), e, well);
-    const V u_a = hn::Mul(psi2, hn::MulAdd(set(law.coplanarity), a, hn::Add(circle, bend)));
-    const V u_b = hn::Mul(psi2, hn::MulAdd(set(law.coplanarity), b, hn::Sub(circle, bend)));
-    const V u_c = hn::Mul(psi2, hn::Sub(set(-law.conormality), form));
-    Sums::Part& f = pull.part[p];
-    Sums::Part& t = turn.part[p];
-    add_scaled(g, r, f.v);
-    add_scaled(u_b, m, f.v);
-    f.w = hn::Add(f.w, u_a);
-    add_scaled(u_a, r, t.v);
-    add_scaled(u_c, m, t.v);
-  }
+  const Vector r = near.r(k);
+  const V d2 = squared(r);
+  const V inverse = hn::Div(set(1.0), d2);
+  const V rest = hn::Max(hn::NegMulAdd(d2, set(law.inverse_h2), set(1.0)), hn::Zero(d));
+  const V a = dot(n, r), b = dot(m, r);
+  const V unlike = hn::NegMulAdd(n.x, m.x, hn::NegMulAdd(n.y, m.y, hn::NegMulAdd(n.z, m.z, set(1.0))));
+  const V rest2 = hn::Mul(rest, rest);
+  const V psi = hn::Mul(rest2, rest);
+  const V form = hn::Mul(set(law.form4), inverse);
+  const V bend = hn::Mul(set(law.half_curvature), form);
+  const V q_a = hn::MulAdd(set(law.flatness2), a, hn::Mul(set(law.cocircularity2), b));
+  const V q_b = hn::MulAdd(set(law.flatness2), b, hn::Mul(set(law.cocircularity2), a));
+  const V bent = hn::Mul(form, hn::MulAdd(set(law.curvature), hn::Sub(a, b), unlike));
+  const V e2 = hn::Add(hn::MulAdd(set(law.conormality4), unlike, hn::Add(bent, set(law.form_offset2))),
+                       hn::MulAdd(a, q_a, hn::Mul(b, q_b)));
+  const V radial = hn::Mul(inverse, hn::NegMulAdd(psi, bent, hn::Load(d, near.pull + k)));
+  hn::Store(m.x, d, near.mx + k);
+  hn::Store(m.y, d, near.my + k);
+  hn::Store(m.z, d, near.mz + k);
+  hn::Store(hn::MulAdd(hn::Mul(rest2, set(law.slope)), e2, radial), d, near.g + k);
+  hn::Store(hn::Mul(psi, hn::Add(q_a, bend)), d, near.u_a + k);
+  hn::Store(hn::Mul(psi, hn::Sub(q_b, bend)), d, near.u_b + k);
+  hn::Store(hn::Mul(psi, hn::NegMulAdd(set(0.5), form, set(-law.conormality2))), d, near.u_c + k);
 }
 
-void SurfaceLoads(const SurfaceNumbers& given, const ListBlock& list, std::size_t begin, std::size_t end,
-                  std::uint32_t filler, const Row* HWY_RESTRICT position, const Row* HWY_RESTRICT normal,
-                  Row* HWY_RESTRICT force, Row* HWY_RESTRICT torque) {
+HWY_INLINE void add_surface_loads(std::uint32_t i, const std::uint32_t* HWY_RESTRICT j, const Near& near,
+                                  const double* HWY_RESTRICT normals, double* HWY_RESTRICT forces,
+                                  double* HWY_RESTRICT turns) {
+  const D d;
+  const Vector n = broadcast(normals + i);
+  Vector push[kParts], turn_i[kParts], turn_j[kParts];
+  for (std::size_t p = 0; p < kParts; ++p) {
+    const std::size_t k = p * kLanes;
+    const Vector r = near.r(k), m = near.m(k);
+    const V u_a = hn::Load(d, near.u_a + k), u_b = hn::Load(d, near.u_b + k), u_c = hn::Load(d, near.u_c + k);
+    push[p] = scaled_sum(u_b, m, scaled_sum(u_a, n, scaled(hn::Load(d, near.g + k), r)));
+    turn_i[p] = scaled_sum(u_c, m, scaled(u_a, r));
+    turn_j[p] = scaled_sum(u_c, n, scaled(u_b, r));
+  }
+  const Rows gradient = rows_of(push);
+  add_total(gradient, forces + i);
+  subtract_rows(gradient, j, forces);
+  add_total(rows_of(turn_i), turns + i);
+  add_rows(rows_of(turn_j), j, turns);
+}
+
+void SurfaceLoads(const SurfaceNumbers& given, const ListBlock& list, const Row* HWY_RESTRICT position,
+                  const Row* HWY_RESTRICT normal, Row* HWY_RESTRICT force, Row* HWY_RESTRICT turn) {
   const SurfaceNumbers law = given;
   const double* HWY_RESTRICT rows = &position->x;
   const double* HWY_RESTRICT normals = &normal->x;
-  InRange near;
-  const auto flush = [&]() HWY_ATTR {
-    for (std::size_t s = 0; s < near.segments; ++s) {
-      const std::uint32_t point = list.point[near.segment[s].particle];
-      load_segment(rows, normals, broadcast(position[point]), broadcast(normal[point]), near.segment[s], near);
-    }
-    evaluate_distances(law, near);
-    for (std::size_t s = 0; s < near.segments; ++s) {
-      const InRange::Segment& segment = near.segment[s];
-      const Row& own = normal[list.point[segment.particle]];
-      Sums pull, turn;
-      clear(pull);
-      clear(turn);
-      for (std::size_t b = segment.begin; b < segment.end; b += kBatch) {
-        add_surface_loads(law, b, near, pull, turn);
-      }
-      const Row f = total(pull), t = total(turn);
-      Row& out_f = force[segment.particle - begin];
-      Row& out_t = torque[segment.particle - begin];
-      out_f = {out_f.x + (f.x + f.w * own.x), out_f.y + (f.y + f.w * own.y), out_f.z + (f.z + f.w * own.z), 0.0};
-      out_t = {out_t.x + (own.z * t.y - own.y * t.z), out_t.y + (own.x * t.z - own.z * t.x),
-               out_t.z + (own.y * t.x - own.x * t.y), 0.0};
-    }
-    near.segments = 0;
-    near.count = 0;
-  };
-  for (std::size_t k = begin; k < end; ++k) {
-    force[k - begin] = torque[k - begin] = {};
-    const Vector x = broadcast(position[list.point[k]]);
-    const std::uint32_t* const last = list.neighbour.data() + list.last[k];
-    for (const std::uint32_t* j = list.neighbour.data() + list.first[k]; j < last;) {
-      const std::uint32_t* const stop = last - j > std::ptrdiff_t{InRange::kLongest} ? j + InRange::kLongest : last;
-      const std::size_t room = static_cast<std::size_t>(stop - j) + kBatch;
-      if (near.segments == InRange::kSegments || near.count + room > InRange::kRoom) flush();
-      keep_in_range(rows, x, law.range2, filler, k, j, stop, near);
-      j = stop;
-    }
+  double* HWY_RESTRICT forces = &force->x;
+  double* HWY_RESTRICT turns = &turn->x;
+  const std::size_t batches = list.batches;
+  Near buffer[2][kNear];
+  Near* HWY_RESTRICT now = buffer[0];
+  Near* HWY_RESTRICT next = buffer[1];
+  std::size_t count = std::min(batches, kNear);
+  for (std::size_t b = 0; b < count; ++b) {
+    place_batch(list.owner[b], list.neighbour.data() + kBatch * b, rows, now[b]);
   }
-  flush();
+  for (std::size_t begin = 0; begin < batches; begin += kNear) {
+    const std::uint32_t* HWY_RESTRICT owner = list.owner.data() + begin;
+    const std::uint32_t* HWY_RESTRICT neighbour = list.neighbour.data() + kBatch * begin;
+    // Past the last batch stand lengths of earlier ones, or nothing.
+    for (std::size_t b = 0; b < count; b += kChains / kParts) evaluate_cohesion(law, now + b);
+    for (std::size_t b = 0; b < count; ++b) {
+      const Vector n = broadcast(normals + owner[b]);
+      for (std::size_t k = 0; k < kBatch; k += kLanes) {
+        evaluate_gains(law, k, n, load_rows(normals, neighbour + kBatch * b + k), now[b]);
+      }
+    }
+    // Square roots of the next batches are taken while loads are added.
+    const std::size_t coming = std::min(batches - begin - count, kNear);
+    for (std::size_t b = 0; b < count; ++b) {
+      add_surface_loads(owner[b], neighbour + kBatch * b, now[b], normals, forces, turns);
+      if (b < coming) place_batch(owner[kNear + b], neighbour + kBatch * (kNear + b), rows, next[b]);
+    }
+    std::swap(now, next);
+    count = coming;
+  }
 }
 
-/// Copies the points of the rows of cells round the tile that begins at `cell`. @return how many
+/// Copies the points that the particles of the tile that begins at `cell` may have in their lists: those from the
+/// tile upwards in its own column, then those of the columns behind. @return how many
 HWY_INLINE std::uint32_t collect(const CellGrid& grid, std::uint32_t cell, ListBlock& out) {
   const F f;
   const U u;
   constexpr auto kStep = static_cast<std::uint32_t>(hn::MaxLanes(F()));
-  const auto ny = static_cast<std::int32_t>(grid.cells[1]), nz = static_cast<std::int32_t>(grid.cells[2]);
-  std::array<std::uint32_t, (2 * kReach + 1) * (2 * kReach + 1)> begin, end;
+  const std::uint32_t ny = grid.cells[1], nz = grid.cells[2];
+  std::array<std::uint32_t, 1 + kReach + kReach * (2 * kReach + 1)> begin, end;
   std::uint32_t room = 2 * kFloatRoom;
   std::size_t rows = 0;
-  for (int dx = -kReach; dx <= kReach; ++dx) {
-    for (int dy = -kReach; dy <= kReach; ++dy, ++rows) {
-      const std::uint32_t row = cell + static_cast<std::uint32_t>((dx * ny + dy) * nz);
-      begin[rows] = grid.start[row - kReachUp];
-      end[rows] = grid.start[row + kTile + kReachUp];
-      room += end[rows] - begin[rows];
-    }
+  const auto take = [&](std::uint32_t from, std::uint32_t row) {
+    begin[rows] = grid.start[from];
+    end[rows] = grid.start[row + kTile + kReachUp];
+    room += end[rows] - begin[rows];
+    ++rows;
+  };
+  take(cell, cell);
+  const auto take_row = [&](std::uint32_t row) { take(row - kReachUp, row); };
+  for (std::uint32_t dy = 1; dy <= kReach; ++dy) take_row(cell + dy * nz);
+  for (std::uint32_t dx = 1; dx <= kReach; ++dx) {
+    for (std::uint32_t dy = 0; dy <= 2 * kReach; ++dy) take_row(cell + (dx * ny + dy - kReach) * nz);
   }
   if (out.near_index.size() < room) {
     for (std::vector<float>* v : {&out.near_x, &out.near_y, &out.near_z}) v->resize(room);
@@ -429,52 +418,67 @@ HWY_INLINE std::uint32_t collect(const CellGrid& grid, std::uint32_t cell, ListB
   return count;
 }
 
-void SearchCells(const CellGrid& grid, std::uint32_t begin, std::uint32_t end, std::uint32_t filler, ListBlock& out) {
+/// Appends the lists of the particles of a tile.
+HWY_INLINE void search_tile(const CellGrid& grid, std::uint32_t cell, ListBlock& out) {
   const F f;
   const U u;
   constexpr auto kStep = static_cast<std::uint32_t>(hn::MaxLanes(F()));
-  out.point.clear();
-  out.first.clear();
-  out.last.clear();
+  constexpr auto kWhole = static_cast<std::uint32_t>(kBatch);
+  const std::uint32_t first = grid.start[cell], last = grid.start[cell + kTile];
+  bool particles = false;
+  for (std::uint32_t i = first; i < last; ++i) particles = particles || grid.image[i] == 0;
+  if (!particles) return;
+  const std::uint32_t count = collect(grid, cell, out);
+  const std::size_t room = out.batches + std::size_t{last - first} * (count / kWhole + 1);
+  if (out.owner.size() < room + kFloatRoom) {
+    out.owner.resize(room + room / 2 + kFloatRoom);
+    out.neighbour.resize(kWhole * out.owner.size());
+  }
   const auto range2 = hn::Set(f, grid.range2);
-  std::uint32_t used = 0;
-  for (std::uint32_t cell = begin; cell < end; cell += kTile) {
-    const std::uint32_t first = grid.start[cell], last = grid.start[cell + kTile];
-    bool particles = false;
-    for (std::uint32_t i = first; i < last; ++i) particles = particles || grid.image[i] == 0;
-    if (!particles) continue;
-    const std::uint32_t count = collect(grid, cell, out);
-    const std::size_t room = used + std::size_t{last - first} * (count + kBatch) + 2 * kFloatRoom;
-    if (out.neighbour.size() < room) out.neighbour.resize(room + room / 2);
-    const float* HWY_RESTRICT near_x = out.near_x.data();
-    const float* HWY_RESTRICT near_y = out.near_y.data();
-    const float* HWY_RESTRICT near_z = out.near_z.data();
-    const std::uint32_t* HWY_RESTRICT near_index = out.near_index.data();
-    for (std::uint32_t i = first; i < last; ++i) {
-      if (grid.image[i] != 0) continue;
-      std::uint32_t* const list = out.neighbour.data() + used;
-      std::uint32_t* HWY_RESTRICT to = list;
-      const auto x = hn::Set(f, grid.x[i]), y = hn::Set(f, grid.y[i]), z = hn::Set(f, grid.z[i]);
-      const auto own = hn::Set(u, 4 * i);
-      for (std::uint32_t k = 0; k < count; k += kStep) {
-        const auto dx = hn::Sub(hn::LoadU(f, near_x + k), x);
-        const auto dy = hn::Sub(hn::LoadU(f, near_y + k), y);
-        const auto dz = hn::Sub(hn::LoadU(f, near_z + k), z);
-        const auto d2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
-        const auto index = hn::LoadU(u, near_index + k);
-        const auto near = hn::And(hn::Ne(index, own), hn::RebindMask(u, hn::Lt(d2, range2)));
-        hn::StoreU(hn::Compress(index, near), u, to);
-        to += hn::CountTrue(u, near);
-      }
-      // Whole batches: whatever stands after them is overwritten.
-      const auto length = static_cast<std::uint32_t>(to - list);
-      hn::StoreU(hn::Set(u, 4 * filler), u, to);
-      out.point.push_back(i);
-      out.first.push_back(used);
-      constexpr auto kWhole = static_cast<std::uint32_t>(kBatch);
-      used += (length + kWhole - 1) / kWhole * kWhole;
-      out.last.push_back(used);
+  const auto filler = hn::Set(u, out.filler);
+  const float* HWY_RESTRICT near_x = out.near_x.data();
+  const float* HWY_RESTRICT near_y = out.near_y.data();
+  const float* HWY_RESTRICT near_z = out.near_z.data();
+  const std::uint32_t* HWY_RESTRICT near_index = out.near_index.data();
+  for (std::uint32_t i = first; i < last; ++i) {
+    if (grid.image[i] != 0) continue;
+    std::uint32_t* const list = out.neighbour.data() + kWhole * out.batches;
+    std::uint32_t* HWY_RESTRICT to = list;
+    const auto x = hn::Set(f, grid.x[i]), y = hn::Set(f, grid.y[i]), z = hn::Set(f, grid.z[i]);
+    for (std::uint32_t k = i + 1 - first; k < count; k += kStep) {
+      const auto dx = hn::Sub(hn::LoadU(f, near_x + k), x);
+      const auto dy = hn::Sub(hn::LoadU(f, near_y + k), y);
+      const auto dz = hn::Sub(hn::LoadU(f, near_z + k), z);
+      const auto d2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
+      const auto near = hn::RebindMask(u, hn::Lt(d2, range2));
+      hn::StoreU(hn::Compress(hn::LoadU(u, near_index + k), near), u, to);
+      to += hn::CountTrue(u, near);
     }
+    // Whole batches: whatever stands after them is overwritten.
+    hn::StoreU(filler, u, to);
+    const auto batches = (static_cast<std::uint32_t>(to - list) + kWhole - 1) / kWhole;
+    for (std::uint32_t b = 0; b < batches; b += kStep) {
+      hn::StoreU(hn::Set(u, 4 * i), u, out.owner.data() + out.batches + b);
+    }
+    out.batches += batches;
+  }
+}
+
+void SearchCells(const CellGrid& grid, const CellBlock& cells, ListBlock& out) {
+  out.batches = 0;
+  for (std::uint32_t z = cells.lowest; z < cells.highest; z += kTile) {
+    for (std::uint32_t y = cells.begin[1]; y < cells.end[1]; ++y) {
+      for (std::uint32_t x = cells.begin[0]; x < cells.end[0]; ++x) {
+        search_tile(grid, (x * grid.cells[1] + y) * grid.cells[2] + z, out);
+      }
+    }
+  }
+  // Loops work on several batches at once and may read some past the last.
+  out.owner.resize(std::max(out.owner.size(), out.batches + kFloatRoom));
+  out.neighbour.resize(std::max(out.neighbour.size(), kBatch * (out.batches + kSpareBatches)));
+  for (std::size_t b = out.batches; b < out.batches + kSpareBatches; ++b) {
+    out.owner[b] = out.filler;
+    std::fill_n(out.neighbour.begin() + static_cast<std::ptrdiff_t>(kBatch * b), kBatch, out.filler);
   }
 }
 
@@ -508,18 +512,17 @@ HWY_EXPORT(TwelveSixForces);
 HWY_EXPORT(SurfaceLoads);
 HWY_EXPORT(LargestMove2);
 
-void search_cells(const CellGrid& grid, std::uint32_t begin, std::uint32_t end, std::uint32_t filler, ListBlock& out) {
-  HWY_DYNAMIC_DISPATCH(SearchCells)(grid, begin, end, filler, out);
+void search_cells(const CellGrid& grid, const CellBlock& cells, ListBlock& out) {
+  HWY_DYNAMIC_DISPATCH(SearchCells)(grid, cells, out);
 }
 
-void twelve_six_forces(const TwelveSixNumbers& law, const ListBlock& list, std::size_t begin, std::size_t end,
-                       const Row* position, Row* force) {
-  HWY_DYNAMIC_DISPATCH(TwelveSixForces)(law, list, begin, end, position, force);
+void twelve_six_forces(const TwelveSixNumbers& law, const ListBlock& list, const Row* position, Row* force) {
+  HWY_DYNAMIC_DISPATCH(TwelveSixForces)(law, list, position, force);
 }
 
-void surface_loads(const SurfaceNumbers& law, const ListBlock& list, std::size_t begin, std::size_t end,
-                   std::uint32_t filler, const Row* position, const Row* normal, Row* force, Row* torque) {
-  HWY_DYNAMIC_DISPATCH(SurfaceLoads)(law, list, begin, end, filler, position, normal, force, torque);
+void surface_loads(const SurfaceNumbers& law, const ListBlock& list, const Row* position, const Row* normal,
+                   Row* force, Row* turn) {
+  HWY_DYNAMIC_DISPATCH(SurfaceLoads)(law, list, position, normal, force, turn);
 }
 
 double largest_move2(const double* now, const double* before, std::size_t points) {

@@ -1,5 +1,5 @@
-// The loops of neighbour lists on the widest vectors that the processor has. A batch is eight neighbours on every
-// width, lane k of each batch goes to sum k, and the eight sums are added in one order: the width changes no bit.
+// The loops of neighbour lists on the widest vectors that the processor has. A batch is eight neighbours of one particle
+// on every width; what they do to the particle is added in one order and then to its row: the width changes no bit.
 #pragma once
 
 #include <array>
@@ -12,6 +12,8 @@ namespace supple::core::packed {
 inline constexpr std::size_t kBatch = 8;
 /// Floats that a vector reads or writes past the end of what it is given.
 inline constexpr std::size_t kFloatRoom = 16;
+/// Batches after the last of a list that may be read.
+inline constexpr std::size_t kSpareBatches = 4;
 
 /// A position or a normal; 32 bytes, so that a neighbour is one load.
 struct alignas(32) Row {
@@ -19,7 +21,7 @@ struct alignas(32) Row {
 };
 
 /// Cells are range / 2 wide and range / 4 high, so that few points are looked at in vain.
-inline constexpr int kReach = 2;
+inline constexpr std::uint32_t kReach = 2;
 inline constexpr std::uint32_t kReachUp = 4;
 /// Cells above each other that are searched together; a column holds whole tiles.
 inline constexpr std::uint32_t kTile = 4;
@@ -33,51 +35,57 @@ struct CellGrid {
   std::vector<std::uint8_t> image;   ///< whether a point is an image, not a particle
 };
 
-/// The lists of some particles. Neighbours are four times the index of their row, so that no product is needed.
+/// Cells that lists are made of together: columns [begin, end) in x and y, from the lowest tile to the highest.
+struct CellBlock {
+  std::array<std::uint32_t, 2> begin{}, end{};
+  std::uint32_t lowest = 0, highest = 0;
+};
+
+/// The pairs of the particles of some cells, each pair once: a particle has the points that follow it in its own column
+/// of cells and those of the columns behind. Indices are four times those of rows, so that no product is needed.
 struct ListBlock {
-  std::vector<std::uint32_t> point;      ///< row of each particle
-  std::vector<std::uint32_t> first;      ///< first neighbour of each particle, shape [particles]
-  std::vector<std::uint32_t> last;       ///< one past its last
-  std::vector<std::uint32_t> neighbour;  ///< lists of whole batches, the last one filled with `filler`; and room
+  std::uint32_t filler = 0;              ///< of the row that fills the last batch of a particle; no other block has it
+  std::size_t batches = 0;
+  std::vector<std::uint32_t> owner;      ///< the particle of each batch, shape [batches]; and room
+  std::vector<std::uint32_t> neighbour;  ///< kBatch of each batch; and room
 
   std::vector<float> near_x, near_y, near_z;  ///< the points in reach of a tile
   std::vector<std::uint32_t> near_index;
 };
 
-/// Lists of the particles in the cells [begin, end), whole tiles.
-/// @param filler  row that no particle has within its range
-void search_cells(const CellGrid& grid, std::uint32_t begin, std::uint32_t end, std::uint32_t filler, ListBlock& out);
+/// Lists of the particles in some cells; sets all of `out` but the filler, which no particle has within its range.
+void search_cells(const CellGrid& grid, const CellBlock& cells, ListBlock& out);
 
-/// The force on a particle is the sum of r (six / d^8 - twelve / d^14), r pointing to the neighbour.
+/// The force on a neighbour is r (twelve / d^14 - six / d^8), r pointing to it.
 struct TwelveSixNumbers {
   double range2 = 0.0;
   double twelve = 0.0;  ///< 48 eps sigma^12
   double six = 0.0;     ///< 24 eps sigma^6
 };
-/// Forces on the particles [begin, end) of a block, shape [end - begin].
-void twelve_six_forces(const TwelveSixNumbers& law, const ListBlock& list, std::size_t begin, std::size_t end,
-                       const Row* position, Row* force);
+/// Adds the forces of the pairs of a block to the rows of both particles.
+void twelve_six_forces(const TwelveSixNumbers& law, const ListBlock& list, const Row* position, Row* force);
 
 /// Gains of the laws of surface elements; the weight vanishes at the range h.
 struct SurfaceNumbers {
-  double range2 = 0.0;       ///< h^2
-  double inverse_h2 = 0.0;   ///< 1 / h^2
-  double slope = 0.0;        ///< -6 / h^2
+  double range = 0.0;           ///< h
+  double inverse_h2 = 0.0;      ///< 1 / h^2
+  double slope = 0.0;           ///< -3 / h^2
   double inverse_r0 = 0.0;
-  double cohesion = 0.0;     ///< F0 r0
+  double cohesion = 0.0;        ///< F0 r0
   double a = 0.0;
-  double form = 0.0;         ///< k_f
-  double curvature = 0.0;    ///< kappa
-  double form_offset = 0.0;  ///< k_f kappa^2
-  double coplanarity = 0.0;  ///< k_p
-  double conormality = 0.0;  ///< k_n
-  double conormality2 = 0.0; ///< 2 k_n
-  double cocircularity = 0.0;///< k_c
+  double form4 = 0.0;           ///< 4 k_f
+  double curvature = 0.0;       ///< kappa
+  double half_curvature = 0.0;  ///< kappa / 2
+  double form_offset2 = 0.0;    ///< 2 k_f kappa^2
+  double flatness2 = 0.0;       ///< 2 (k_p + k_c)
+  double conormality2 = 0.0;    ///< 2 k_n
+  double conormality4 = 0.0;    ///< 4 k_n
+  double cocircularity2 = 0.0;  ///< 2 k_c
 };
-/// Forces and torques on the particles [begin, end) of a block, shape [end - begin].
-/// @param filler  four times the row that fills batches; its normal is 0
-void surface_loads(const SurfaceNumbers& law, const ListBlock& list, std::size_t begin, std::size_t end,
-                   std::uint32_t filler, const Row* position, const Row* normal, Row* force, Row* torque);
+/// Adds forces, and the derivatives dU/dn of the energy by the normals, to the rows of both particles of each pair.
+/// @param normal  that of the filler is 0
+void surface_loads(const SurfaceNumbers& law, const ListBlock& list, const Row* position, const Row* normal,
+                   Row* force, Row* turn);
 
 /// Largest squared distance of two sets of points, shape [points][3].
 double largest_move2(const double* now, const double* before, std::size_t points);

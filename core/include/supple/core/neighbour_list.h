@@ -50,7 +50,7 @@ class NeighbourList {
 
   /// All pairs of the list (i < j), sorted: those nearer than the range, and some up to range + skin.
   [[nodiscard]] std::vector<IndexPair> pairs() const;
-  /// Entries of the list: each pair twice, and what fills the last batch of a particle.
+  /// Entries of the list: each pair once, and what fills the last batch of a particle.
   [[nodiscard]] std::size_t entries() const;
   [[nodiscard]] std::size_t bytes() const;  ///< memory of the list and its buffers
 
