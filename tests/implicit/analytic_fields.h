@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "implicit/bodies.h"
 #include "supple/implicit/field_view.h"
 
 namespace supple::implicit::testing {
@@ -79,6 +80,31 @@ inline FunctionField either(const FunctionField& a, const FunctionField& b) {
               },
           .lipschitz = std::max(a.lipschitz, b.lipschitz),
           .box = a.box.united(b.box)};
+}
+
+/// Noise with features of about a cell, inside a ball: every case of the case table, many times.
+inline FunctionField noise(std::uint64_t seed, double wavelength) {
+  Random random(seed);
+  std::vector<std::pair<Vec3, double>> waves;
+  for (int i = 0; i < 12; ++i) {
+    waves.emplace_back(random.direction() * (2.0 * std::numbers::pi / (wavelength * random.uniform(0.7, 2.0))),
+                       random.uniform(0.0, 6.28));
+  }
+  return {.function =
+              [=](const Vec3& p, Vec3& gradient) {
+                const double n = p.norm(), ball = 2.0 * (1.0 - n);
+                double sum = 0.0;
+                gradient.setZero();
+                for (const auto& [k, phase] : waves) {
+                  sum += std::sin(k.dot(p) + phase);
+                  gradient += std::cos(k.dot(p) + phase) * k;
+                }
+                if (sum <= ball) return sum;
+                gradient = n > 0.0 ? Vec3(-2.0 * p / n) : Vec3::Zero();
+                return ball;
+              },
+          .lipschitz = 12.0 * 2.0 * std::numbers::pi / (0.7 * wavelength),
+          .box = Box{Vec3::Constant(-1.0), Vec3::Constant(1.0)}};
 }
 
 /// The half-space z <= height with unbounded box.

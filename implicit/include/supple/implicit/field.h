@@ -46,6 +46,8 @@ class Field {
   void set_culling(bool on);
 
   struct Index;
+  /// What the loops of this module read; private to it.
+  [[nodiscard]] const Index& index() const noexcept { return *index_; }
 
  private:
   friend void index_field(const Skeleton&, const PlacedSkeleton&, Field&);

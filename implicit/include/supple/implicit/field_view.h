@@ -13,6 +13,8 @@
 
 namespace supple::implicit {
 
+class Field;
+
 /// Contributions of single parts (particles) to a field at many points, as rows: row i holds the parts whose support
 /// reaches point i, in rising order. The parts' values sum to F + iso, their gradients to grad F.
 struct FieldParts {
@@ -72,6 +74,8 @@ class FieldView {
     evaluate({&p, 1}, {&v, 1}, {&gradient, 1});
     return v;
   }
+  /// The viewed object if it is a Field, else null: some loops are faster when they see the primitives.
+  [[nodiscard]] const Field* as_field() const noexcept { return self_ != nullptr ? table_->as_field(self_) : nullptr; }
   explicit operator bool() const noexcept { return self_ != nullptr; }
 
  private:
@@ -83,6 +87,7 @@ class FieldView {
     double (*gradient_bound)(const void*, const Box&);
     Box (*surface_box)(const void*);
     double (*feature_size)(const void*);
+    const Field* (*as_field)(const void*);
   };
   template <class T>
   static constexpr Table kTable{
@@ -94,7 +99,14 @@ class FieldView {
       [](const void* f, const Box& b) { return static_cast<const T*>(f)->bound(b); },
       [](const void* f, const Box& b) { return static_cast<double>(static_cast<const T*>(f)->gradient_bound(b)); },
       [](const void* f) { return static_cast<const T*>(f)->surface_box(); },
-      [](const void* f) { return static_cast<double>(static_cast<const T*>(f)->feature_size()); }};
+      [](const void* f) { return static_cast<double>(static_cast<const T*>(f)->feature_size()); },
+      []([[maybe_unused]] const void* f) -> const Field* {
+        if constexpr (std::same_as<T, Field>) {
+          return static_cast<const Field*>(f);
+        } else {
+          return nullptr;
+        }
+      }};
 
   const void* self_ = nullptr;
   const Table* table_ = nullptr;

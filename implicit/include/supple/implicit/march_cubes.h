@@ -1,0 +1,61 @@
+/// @file supple/implicit/march_cubes.h
+/// Fast surface meshes of one body on the world lattice of polygonise.h: marching cubes with vertices at the roots of the
+/// field on the lattice's edges. Bodies of Wyvill points are sampled in single precision, only where bounds admit a
+/// surface; other fields are sampled through their view in double precision.
+///
+/// The mesh is closed and oriented, and cannot cross itself whatever the field: all triangles of a cell lie in it and are
+/// fans that do not meet (see Lorensen & Cline 1987 for the method; faces are decided by the signs of their corners
+/// alone). A node with F = 0 counts as outside. Vertices keep 2^-17 of a cell from the nodes, so no two coincide.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "supple/implicit/polygonise.h"
+
+namespace supple::implicit {
+
+struct MarchCounts {
+  std::uint64_t blocks = 0;         ///< blocks of 16^3 cells within reach of the body
+  std::uint64_t blocks_sampled = 0; ///< of these, looked into in this call
+  std::uint64_t leaves = 0;         ///< leaves of 8^3 nodes that hold values
+  std::uint64_t nodes = 0;          ///< values held
+  std::uint64_t bytes = 0;          ///< held besides the mesh
+  bool single_precision = false;    ///< the body is nothing but Wyvill points
+};
+
+/// Lattice nodes in the box of a body that may be asked for.
+inline constexpr std::uint64_t kMarchNodes = 1'000'000'000;
+inline constexpr int kMostRefinements = 4;
+
+struct MarchOptions {
+  Lattice lattice;
+  int refinements = 0;  ///< times that every triangle is cut into four, new vertices moved to the surface; 0..4
+};
+
+/// Meshes one body again and again; memory is kept from call to call.
+class CubeMesher {
+ public:
+  CubeMesher();
+  ~CubeMesher();
+  CubeMesher(CubeMesher&&) noexcept;
+  CubeMesher& operator=(CubeMesher&&) noexcept;
+
+  /// The closed surface F = 0, outward oriented, with the normals of the field; valid until the next call.
+  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges, so that a
+  /// refined mesh is free of crossings only as far as the cells resolve the surface.
+  /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes.
+  const Mesh& make(const FieldView& field, const MarchOptions& options, const Executor& executor,
+                   MarchCounts* counts = nullptr);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The same, once.
+[[nodiscard]] Mesh march_cubes(const FieldView& field, const MarchOptions& options, const Executor& executor,
+                               MarchCounts* counts = nullptr);
+
+}  // namespace supple::implicit

@@ -1,0 +1,107 @@
+#include "blob_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "field_index.h"
+#include "supple/core/error.h"
+
+namespace supple::implicit::blobs {
+namespace {
+
+/// Bins are made larger until there are at most this many for a blob.
+constexpr std::int64_t kBinsPerBlob = 64;
+constexpr std::int64_t kFewBins = 1 << 16;
+
+std::int64_t floor_divide(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
+
+}  // namespace
+
+void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice& lattice) {
+  const std::size_t n = primitives.size();
+  const double per_cell = 1.0 / lattice.cell;
+  cells_.resize(3 * n);
+  std::array<double, 3> low, high;
+  low.fill(1e300);
+  high.fill(-1e300);
+  double least_inverse = 1e300;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const auto axis = static_cast<std::size_t>(k);
+      const double u = (primitives[i].position[axis] - lattice.origin[k]) * per_cell;
+      cells_[3 * i + axis] = u;
+      low[axis] = std::min(low[axis], u);
+      high[axis] = std::max(high[axis], u);
+    }
+    least_inverse = std::min(least_inverse, primitives[i].inverse_r2);
+  }
+  reach_ = n == 0 ? 0.0 : per_cell / std::sqrt(least_inverse);
+  support_ = {};
+  count_.fill(0);
+  bin_ = 8;
+  if (n > 0) {
+    while (static_cast<double>(2 * bin_) < reach_) bin_ *= 2;
+    for (;; bin_ *= 2) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        first_[k] = floor_divide(static_cast<std::int64_t>(std::floor(low[k])), bin_);
+        count_[k] = floor_divide(static_cast<std::int64_t>(std::floor(high[k])), bin_) - first_[k] + 1;
+      }
+      const double bins = static_cast<double>(count_[0]) * static_cast<double>(count_[1]) * static_cast<double>(count_[2]);
+      if (bins <= static_cast<double>(std::max(kFewBins, kBinsPerBlob * static_cast<std::int64_t>(n)))) break;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      support_.lower[k] = static_cast<std::int64_t>(std::floor(low[k] - reach_)) - 1;
+      support_.upper[k] = static_cast<std::int64_t>(std::floor(high[k] + reach_)) + 1;
+    }
+  }
+  const auto bins = static_cast<std::size_t>(count_[0] * count_[1] * count_[2]);
+  start_.assign(bins + 1, 0);
+  bin_of_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::array<std::int64_t, 3> at{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      at[k] = floor_divide(static_cast<std::int64_t>(std::floor(cells_[3 * i + k])), bin_) - first_[k];
+    }
+    bin_of_[i] = static_cast<std::uint32_t>((at[2] * count_[1] + at[1]) * count_[0] + at[0]);
+    ++start_[bin_of_[i] + 1];
+  }
+  for (std::size_t b = 0; b < bins; ++b) start_[b + 1] += start_[b];
+  for (auto* array : {&x_, &y_, &z_}) array->resize(n + kLanes);
+  scale_.resize(n + kLanes);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t to = start_[bin_of_[i]]++;
+    x_[to] = cells_[3 * i];
+    y_[to] = cells_[3 * i + 1];
+    z_[to] = cells_[3 * i + 2];
+    scale_[to] = static_cast<float>(lattice.cell * std::sqrt(primitives[i].inverse_r2));
+  }
+  for (std::size_t b = bins; b > 0; --b) start_[b] = start_[b - 1];
+  start_[0] = 0;
+}
+
+void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const {
+  list.count = 0;
+  const auto reach = static_cast<std::int64_t>(std::ceil(reach_)) + 1 + margin;
+  Cells from{}, to{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    from[k] = std::max<std::int64_t>(floor_divide(base[k] - reach, bin_) - first_[k], 0);
+    to[k] = std::min<std::int64_t>(floor_divide(base[k] + size + reach, bin_) - first_[k], count_[k] - 1);
+  }
+  const BlobArrays all{x_.data(), y_.data(), z_.data(), scale_.data()};
+  const std::array<double, 3> corner{static_cast<double>(base[0]), static_cast<double>(base[1]),
+                                     static_cast<double>(base[2])};
+  if (from[0] <= to[0]) {
+    for (std::int64_t z = from[2]; z <= to[2]; ++z) {
+      for (std::int64_t y = from[1]; y <= to[1]; ++y) {
+        const auto row = static_cast<std::size_t>((z * count_[1] + y) * count_[0]);
+        const std::size_t begin = start_[row + static_cast<std::size_t>(from[0])];
+        const std::size_t end = start_[row + static_cast<std::size_t>(to[0]) + 1];
+        if (begin < end) blobs::gather(all, begin, end, corner, static_cast<double>(size),
+                                         static_cast<double>(margin), list);
+      }
+    }
+  }
+  list.pad();
+}
+
+}  // namespace supple::implicit::blobs

@@ -1,0 +1,76 @@
+/// @file blob_grid.h
+/// Wyvill points sorted into bins of lattice cells, so that those near a box are a few runs of the arrays. The order is
+/// by bin and within a bin by id; bins lie on the lattice, so blobs that stay keep their order when others move.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "blob_lanes.h"
+#include "supple/implicit/polygonise.h"
+
+namespace supple::implicit {
+struct PackedPrimitive;
+}
+
+namespace supple::implicit::blobs {
+
+using Cells = std::array<std::int64_t, 3>;
+
+/// Inclusive box of lattice cells; empty when an upper is below its lower.
+struct CellBox {
+  Cells lower{0, 0, 0};
+  Cells upper{-1, -1, -1};
+  [[nodiscard]] bool empty() const {
+    return upper[0] < lower[0] || upper[1] < lower[1] || upper[2] < lower[2];
+  }
+};
+
+class BlobGrid {
+ public:
+  /// @pre all primitives are Wyvill points
+  void build(std::span<const PackedPrimitive> primitives, const Lattice& lattice);
+  [[nodiscard]] std::size_t size() const noexcept { return scale_.empty() ? 0 : scale_.size() - kLanes; }
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return (x_.capacity() + y_.capacity() + z_.capacity() + cells_.capacity()) * sizeof(double) +
+           scale_.capacity() * sizeof(float) + (start_.capacity() + bin_of_.capacity()) * sizeof(std::uint32_t);
+  }
+  /// Largest R [cells].
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+  /// Cells that the supports reach.
+  [[nodiscard]] const CellBox& support() const noexcept { return support_; }
+  /// Edge of a bin [cells].
+  [[nodiscard]] std::int64_t bin() const noexcept { return bin_; }
+
+  /// Blobs whose support may meet the cube of `size` cells above `base`, wider by `margin`; in the frame of `base`.
+  void gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const;
+  /// Calls use(box) for each bin that holds blobs, with the cells that their centres lie in.
+  template <class Use>
+  void for_bins(const Use& use) const {
+    std::size_t b = 0;
+    for (std::int64_t z = 0; z < count_[2]; ++z) {
+      for (std::int64_t y = 0; y < count_[1]; ++y) {
+        for (std::int64_t x = 0; x < count_[0]; ++x, ++b) {
+          if (start_[b] == start_[b + 1]) continue;
+          const Cells low{bin_ * (first_[0] + x), bin_ * (first_[1] + y), bin_ * (first_[2] + z)};
+          use(CellBox{low, {low[0] + bin_ - 1, low[1] + bin_ - 1, low[2] + bin_ - 1}});
+        }
+      }
+    }
+  }
+
+ private:
+  std::int64_t bin_ = 8;
+  Cells first_{}, count_{};  ///< lowest bin, bins along each axis
+  double reach_ = 0.0;
+  CellBox support_;
+  std::vector<std::uint32_t> start_;  ///< blobs of bin b are [start_[b], start_[b + 1])
+  std::vector<double> x_, y_, z_;     ///< [cells]
+  std::vector<float> scale_;          ///< cell / R
+  std::vector<std::uint32_t> bin_of_;
+  std::vector<double> cells_;
+};
+
+}  // namespace supple::implicit::blobs

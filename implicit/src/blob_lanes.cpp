@@ -1,0 +1,451 @@
+// Baseline and AVX-512 variants only; AES support must not decide which variant a processor gets.
+#define HWY_DISABLE_PCLMUL_AES
+
+#include "blob_lanes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "blob_lanes.cpp"  // NOLINT
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace supple::implicit::blobs::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+namespace {
+
+using D = hn::CappedTag<float, kLanes>;
+using V = hn::Vec<D>;
+constexpr std::size_t kWidth = hn::MaxLanes(D());
+
+/// A support is kept when the box lies within this of it, squared and relative: more than round-off.
+constexpr float kReach2 = 1.0001F;
+
+/// The sum of a few lanes, in an order that does not depend on the width.
+HWY_INLINE float sum_of_lanes(const float* lane) {
+  float sum[kLanes / 2];
+  for (std::size_t i = 0; i < kLanes / 2; ++i) sum[i] = lane[i] + lane[i + kLanes / 2];
+  for (std::size_t n = kLanes / 4; n > 0; n /= 2) {
+    for (std::size_t i = 0; i < n; ++i) sum[i] += sum[i + n];
+  }
+  return sum[0];
+}
+
+void Gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std::array<double, 3>& base, double size,
+            double margin, BlobList& list) {
+  const hn::CappedTag<double, 8> d;
+  const hn::Rebind<float, decltype(d)> df;
+  using VD = hn::Vec<decltype(d)>;
+  constexpr std::size_t kWide = hn::MaxLanes(decltype(d)());
+  list.reserve(list.count + (end - begin));
+  const VD half = hn::Set(d, 0.5 * size), reach = hn::Set(d, 0.5 * size + margin);
+  const VD bx = hn::Set(d, base[0]), by = hn::Set(d, base[1]), bz = hn::Set(d, base[2]);
+  for (std::size_t i = begin; i < end; i += kWide) {
+    const VD x = hn::Sub(hn::LoadU(d, all.x + i), bx);
+    const VD y = hn::Sub(hn::LoadU(d, all.y + i), by);
+    const VD z = hn::Sub(hn::LoadU(d, all.z + i), bz);
+    const auto s = hn::LoadU(df, all.scale + i);
+    const VD scale = hn::PromoteTo(d, s);
+    const auto gap = [&](VD v) HWY_ATTR { return hn::Max(hn::Sub(hn::Abs(hn::Sub(v, half)), reach), hn::Zero(d)); };
+    const VD gx = gap(x), gy = gap(y), gz = gap(z);
+    const VD q = hn::Mul(hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx))), hn::Mul(scale, scale));
+    auto keep = hn::Lt(hn::DemoteTo(df, q), hn::Set(df, kReach2));
+    if (end - i < kWide) keep = hn::And(keep, hn::FirstN(df, end - i));
+    hn::StoreU(hn::Compress(s, keep), df, list.scale.data() + list.count);
+    hn::StoreU(hn::Compress(hn::DemoteTo(df, hn::Mul(x, scale)), keep), df, list.x.data() + list.count);
+    hn::StoreU(hn::Compress(hn::DemoteTo(df, hn::Mul(y, scale)), keep), df, list.y.data() + list.count);
+    hn::StoreU(hn::Compress(hn::DemoteTo(df, hn::Mul(z, scale)), keep), df, list.z.data() + list.count);
+    list.count += hn::CountTrue(df, keep);
+  }
+}
+
+/// Distances of eight or sixteen blobs to a cube, scaled by their radius.
+struct Distances {
+  V near2, far2;
+};
+HWY_INLINE Distances distances(const BlobList& list, std::size_t i, V cx, V cy, V cz, V half, V& s, V& x, V& y, V& z) {
+  const D d;
+  s = hn::LoadU(d, list.scale.data() + i);
+  x = hn::LoadU(d, list.x.data() + i);
+  y = hn::LoadU(d, list.y.data() + i);
+  z = hn::LoadU(d, list.z.data() + i);
+  const V reach = hn::Mul(s, half);
+  const V dx = hn::Abs(hn::MulSub(s, cx, x)), dy = hn::Abs(hn::MulSub(s, cy, y)), dz = hn::Abs(hn::MulSub(s, cz, z));
+  const auto near = [&](V v) HWY_ATTR { return hn::Max(hn::Sub(v, reach), hn::Zero(d)); };
+  const V nx = near(dx), ny = near(dy), nz = near(dz);
+  const V fx = hn::Add(dx, reach), fy = hn::Add(dy, reach), fz = hn::Add(dz, reach);
+  return {hn::MulAdd(nz, nz, hn::MulAdd(ny, ny, hn::Mul(nx, nx))),
+          hn::MulAdd(fz, fz, hn::MulAdd(fy, fy, hn::Mul(fx, fx)))};
+}
+
+/// What the sums and the evaluation of single points may be off by.
+HWY_INLINE float round_off(std::size_t count, float size) {
+  return (4e-6F + 1e-7F * static_cast<float>(count)) * (1.0F + size);
+}
+
+HWY_INLINE V cube(V t) { return hn::Mul(t, hn::Mul(t, t)); }
+
+PotentialBounds Select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
+  const D d;
+  list.reserve(from.count);
+  const V cx = hn::Set(d, centre[0]), cy = hn::Set(d, centre[1]), cz = hn::Set(d, centre[2]);
+  const V around = hn::Set(d, half), one = hn::Set(d, 1.0F);
+  float *scale = list.scale.data(), *px = list.x.data(), *py = list.y.data(), *pz = list.z.data();
+  std::size_t count = 0;
+  alignas(64) float lower[kLanes] = {}, upper[kLanes] = {};
+  for (std::size_t i = 0; i < from.count; i += kWidth) {
+    V s, x, y, z;
+    const Distances q = distances(from, i, cx, cy, cz, around, s, x, y, z);
+    const auto keep = hn::Lt(q.near2, hn::Set(d, kReach2));
+    const V most = hn::Max(hn::Sub(one, q.near2), hn::Zero(d)), least = hn::Max(hn::Sub(one, q.far2), hn::Zero(d));
+    float *low = lower + i % kLanes, *high = upper + i % kLanes;
+    hn::Store(hn::Add(hn::Load(d, high), cube(most)), d, high);
+    hn::Store(hn::Add(hn::Load(d, low), cube(least)), d, low);
+    hn::StoreU(hn::Compress(s, keep), d, scale + count);
+    hn::StoreU(hn::Compress(x, keep), d, px + count);
+    hn::StoreU(hn::Compress(y, keep), d, py + count);
+    hn::StoreU(hn::Compress(z, keep), d, pz + count);
+    count += hn::CountTrue(d, keep);
+  }
+  list.count = count;
+  list.pad();
+  const float high = sum_of_lanes(upper);
+  const float error = round_off(count, high);
+  return {sum_of_lanes(lower) - error, high + error};
+}
+
+// With t = 1 - rho^2 the second derivatives of (1 - rho^2)^3 along unit vectors lie between -6 t^2 and
+// max(0, t (24 - 30 t)), which is largest at t = 0.4; F then lies within half of that times the squared distance to the
+// centre of what the gradient there predicts.
+PotentialBounds Expand(const BlobList& list, const std::array<float, 3>& centre, float half) {
+  const D d;
+  const V cx = hn::Set(d, centre[0]), cy = hn::Set(d, centre[1]), cz = hn::Set(d, centre[2]);
+  const V around = hn::Set(d, half), one = hn::Set(d, 1.0F), zero = hn::Zero(d);
+  alignas(64) float value[kLanes] = {}, gx[kLanes] = {}, gy[kLanes] = {}, gz[kLanes] = {}, up[kLanes] = {},
+                    down[kLanes] = {};
+  const auto add = [&](float* sums, std::size_t lane, V v) HWY_ATTR {
+    hn::Store(hn::Add(hn::Load(d, sums + lane), v), d, sums + lane);
+  };
+  for (std::size_t i = 0; i < list.count; i += kWidth) {
+    V s, x, y, z;
+    const Distances q = distances(list, i, cx, cy, cz, around, s, x, y, z);
+    const V dx = hn::MulSub(s, cx, x), dy = hn::MulSub(s, cy, y), dz = hn::MulSub(s, cz, z);
+    const V t = hn::Max(hn::NegMulAdd(dz, dz, hn::NegMulAdd(dy, dy, hn::NegMulAdd(dx, dx, one))), zero);
+    const V near = hn::Max(hn::Sub(one, q.near2), zero), far = hn::Max(hn::Sub(one, q.far2), zero);
+    const std::size_t lane = i % kLanes;
+    const V t2s = hn::Mul(hn::Mul(t, t), s), s2 = hn::Mul(s, s);
+    add(value, lane, cube(t));
+    add(gx, lane, hn::Mul(t2s, dx));
+    add(gy, lane, hn::Mul(t2s, dy));
+    add(gz, lane, hn::Mul(t2s, dz));
+    const V steep = hn::Min(hn::Max(hn::Set(d, 0.4F), far), near);
+    const V bend = hn::Mul(steep, hn::NegMulAdd(hn::Set(d, 30.0F), steep, hn::Set(d, 24.0F)));
+    add(up, lane, hn::Mul(s2, hn::Max(bend, zero)));
+    add(down, lane, hn::Mul(s2, hn::Mul(near, near)));
+  }
+  const float middle = sum_of_lanes(value);
+  const float turn = 6.0F * half * (std::abs(sum_of_lanes(gx)) + std::abs(sum_of_lanes(gy)) + std::abs(sum_of_lanes(gz)));
+  const float diagonal2 = 3.0F * half * half;
+  const float rise = 0.5F * diagonal2 * sum_of_lanes(up), fall = 3.0F * diagonal2 * sum_of_lanes(down);
+  const float error = round_off(list.count, middle + turn + rise + fall);
+  return {middle - turn - fall - error, middle + turn + rise + error};
+}
+
+std::uint64_t EvaluateTile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values) {
+  const D d;
+  constexpr std::size_t kPlane = std::size_t{kTile} * kTile;
+  constexpr std::size_t kParts = kPlane / kWidth;
+  alignas(64) float nodes[2][kPlane];
+  for (std::size_t i = 0; i < kPlane; ++i) {
+    nodes[0][i] = corner[0] + static_cast<float>(i % kTile);
+    nodes[1][i] = corner[1] + static_cast<float>(i / kTile);
+  }
+  V x[kParts], y[kParts], sum[kTile][kParts];
+  for (std::size_t p = 0; p < kParts; ++p) {
+    x[p] = hn::Load(d, nodes[0] + p * kWidth);
+    y[p] = hn::Load(d, nodes[1] + p * kWidth);
+    for (std::size_t k = 0; k < kTile; ++k) sum[k][p] = hn::Zero(d);
+  }
+  V z[kTile];
+  for (std::size_t k = 0; k < kTile; ++k) z[k] = hn::Set(d, corner[2] + static_cast<float>(k));
+  const V one = hn::Set(d, 1.0F), zero = hn::Zero(d);
+  const float *scale = list.scale.data(), *px = list.x.data(), *py = list.y.data(), *pz = list.z.data();
+  for (std::size_t i = 0; i < list.count; ++i) {
+    const V s = hn::Set(d, scale[i]), cx = hn::Set(d, px[i]), cy = hn::Set(d, py[i]), cz = hn::Set(d, pz[i]);
+    V rest[kParts];
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const V dx = hn::MulSub(s, x[p], cx), dy = hn::MulSub(s, y[p], cy);
+      rest[p] = hn::NegMulAdd(dy, dy, hn::NegMulAdd(dx, dx, one));
+    }
+    for (std::size_t k = 0; k < kTile; ++k) {
+      const V dz = hn::MulSub(s, z[k], cz);
+      for (std::size_t p = 0; p < kParts; ++p) {
+        const V t = hn::Max(hn::NegMulAdd(dz, dz, rest[p]), zero);
+        sum[k][p] = hn::MulAdd(hn::Mul(t, t), t, sum[k][p]);
+      }
+    }
+  }
+  const V level = hn::Set(d, iso);
+  std::uint64_t inside = 0;
+  for (std::size_t k = 0; k < kTile; ++k) {
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const std::size_t at = k * kPlane + p * kWidth;
+      const V f = hn::Sub(sum[k][p], level);
+      hn::StoreU(f, d, values + at);
+      std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(d, hn::Gt(f, zero), bits);
+      inside |= std::uint64_t{static_cast<unsigned>(bits[0]) | static_cast<unsigned>(bits[1]) << 8} << at;
+    }
+  }
+  return inside;
+}
+
+/// The potential and S = sum t^2 scale (scale x - centre), so that grad F = -6 S.
+struct PointSums {
+  V f, x, y, z;
+};
+HWY_INLINE PointSums sum_at(const BlobList& list, V x, V y, V z) {
+  const D d;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0F);
+  const float *scale = list.scale.data(), *px = list.x.data(), *py = list.y.data(), *pz = list.z.data();
+  PointSums sum{zero, zero, zero, zero};
+  for (std::size_t i = 0; i < list.count; ++i) {
+    const V s = hn::Set(d, scale[i]);
+    const V dx = hn::MulSub(s, x, hn::Set(d, px[i]));
+    const V dy = hn::MulSub(s, y, hn::Set(d, py[i]));
+    const V dz = hn::MulSub(s, z, hn::Set(d, pz[i]));
+    const V t = hn::Max(hn::NegMulAdd(dz, dz, hn::NegMulAdd(dy, dy, hn::NegMulAdd(dx, dx, one))), zero);
+    const V t2 = hn::Mul(t, t);
+    sum.f = hn::MulAdd(t2, t, sum.f);
+    const V w = hn::Mul(t2, s);
+    sum.x = hn::MulAdd(w, dx, sum.x);
+    sum.y = hn::MulAdd(w, dy, sum.y);
+    sum.z = hn::MulAdd(w, dz, sum.z);
+  }
+  return sum;
+}
+
+constexpr float kClose = 4e-3F;  ///< a Newton step this short leaves an error below 1e-5 of a cell
+
+void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges) {
+  const D d;
+  constexpr float kLeast = 0x1p-17F;     // roots stay this far from the nodes, so that no two vertices coincide
+  constexpr float kResolution = 0x1p-18F;
+  constexpr int kMaxRounds = 60;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F), level = hn::Set(d, iso);
+  const V least = hn::Set(d, kLeast), most = hn::Set(d, 1.0F - kLeast);
+  for (std::size_t v = 0; v < edges.count; v += kWidth) {
+    const auto load = [&](const EdgeBatch::Row& from) HWY_ATTR { return hn::Load(d, from.data() + v); };
+    const V x0 = load(edges.x), y0 = load(edges.y), z0 = load(edges.z);
+    const V axis = load(edges.axis);
+    const auto unit = [&](float k) HWY_ATTR { return hn::IfThenElseZero(hn::Eq(axis, hn::Set(d, k)), one); };
+    const V ax = unit(0.0F), ay = unit(1.0F), az = unit(2.0F);
+    const V f0 = load(edges.low), f1 = load(edges.high);
+    const auto starts_inside = hn::Gt(f0, zero);
+    const auto both_known = hn::Ne(f1, zero);
+    V t = hn::IfThenElse(both_known, hn::Div(f0, hn::Sub(f0, f1)), half);
+    t = hn::Min(hn::Max(t, least), most);
+    V low = zero, high = one, last = one, found = t, gx = zero, gy = zero, gz = zero;
+    auto open = hn::FirstN(d, edges.count - v);
+    for (int round = 0; round < kMaxRounds; ++round) {
+      const V x = hn::MulAdd(ax, t, x0), y = hn::MulAdd(ay, t, y0), z = hn::MulAdd(az, t, z0);
+      const auto [potential, sx, sy, sz] = sum_at(list, x, y, z);
+      const V f = hn::Sub(potential, level);
+      gx = hn::IfThenElse(open, sx, gx);
+      gy = hn::IfThenElse(open, sy, gy);
+      gz = hn::IfThenElse(open, sz, gz);
+      const V slope = hn::Mul(hn::Set(d, -6.0F), hn::MulAdd(az, sz, hn::MulAdd(ay, sy, hn::Mul(ax, sx))));
+      V next = hn::Sub(t, hn::Div(f, slope));
+      if (round == 0) {
+        // The cubic with values f0, f, f1 at 0, t, 1 and this slope at t: f + slope w + w^2 (q0 (1 - x) + q1 x), w = x - t.
+        const V rest = hn::Sub(one, t);
+        const V q0 = hn::Div(hn::MulAdd(slope, t, hn::Sub(f0, f)), hn::Mul(t, t));
+        const V q1 = hn::Div(hn::NegMulAdd(slope, rest, hn::Sub(f1, f)), hn::Mul(rest, rest));
+        V root = next;
+        for (int k = 0; k < 2; ++k) {
+          const V w = hn::Sub(root, t), q = hn::MulAdd(q1, root, hn::NegMulAdd(q0, root, q0));
+          const V value = hn::MulAdd(w, hn::MulAdd(w, q, slope), f);
+          const V change = hn::MulAdd(w, hn::MulAdd(w, hn::Sub(q1, q0), hn::Add(q, q)), slope);
+          root = hn::Sub(root, hn::Div(value, change));
+        }
+        const auto apart = hn::And(hn::Gt(t, hn::Set(d, 0.02F)), hn::Lt(t, hn::Set(d, 0.98F)));
+        next = hn::IfThenElse(hn::And(apart, both_known), root, next);
+      }
+      const auto same_side = hn::Xor(hn::Gt(f, zero), hn::Not(starts_inside));
+      low = hn::IfThenElse(same_side, t, low);
+      high = hn::IfThenElse(same_side, high, t);
+      const V step = hn::Abs(hn::Sub(next, t));
+      // False for values that are no numbers.
+      const auto newton = hn::And(hn::And(hn::Ge(next, low), hn::Le(next, high)), hn::Le(step, hn::Mul(half, last)));
+      next = hn::IfThenElse(newton, next, hn::Mul(half, hn::Add(low, high)));
+      found = hn::IfThenElse(open, next, found);
+      last = hn::IfThenElse(newton, step, last);
+      const auto closed = hn::Or(hn::And(newton, hn::Lt(step, hn::Set(d, kClose))),
+                                 hn::Lt(hn::Sub(high, low), hn::Set(d, kResolution)));
+      open = hn::AndNot(closed, open);
+      if (hn::AllFalse(d, open)) break;
+      t = found;
+    }
+    const auto store = [&](V value, EdgeBatch::Row& to) HWY_ATTR { hn::Store(value, d, to.data() + v); };
+    store(hn::Min(hn::Max(found, least), most), edges.t);
+    store(gx, edges.nx);
+    store(gy, edges.ny);
+    store(gz, edges.nz);
+  }
+}
+
+void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals) {
+  const hn::CappedTag<double, 8> d;
+  const hn::Rebind<float, decltype(d)> df;
+  using VD = hn::Vec<decltype(d)>;
+  constexpr std::size_t kWide = hn::MaxLanes(decltype(d)());
+  const VD zero = hn::Zero(d), one = hn::Set(d, 1.0), cell = hn::Set(d, placement.cell);
+  for (std::size_t v = 0; v < edges.count; v += kWide) {
+    const auto load = [&](const EdgeBatch::Row& from) HWY_ATTR { return hn::PromoteTo(d, hn::Load(df, from.data() + v)); };
+    const VD t = load(edges.t), axis = load(edges.axis);
+    const VD gx = load(edges.nx), gy = load(edges.ny), gz = load(edges.nz);
+    const VD norm2 = hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx)));
+    const auto sloped = hn::Gt(norm2, zero);
+    const VD inverse = hn::Div(one, hn::Sqrt(hn::IfThenElse(sloped, norm2, one)));
+    VD position[3], normal[3];
+    const auto along = [&](std::size_t k, VD low, VD g) HWY_ATTR {
+      const auto moves = hn::Eq(axis, hn::Set(d, static_cast<double>(k)));
+      const VD node = hn::Add(hn::Set(d, placement.base[k]), low);
+      const VD at = hn::Add(node, hn::IfThenElseZero(moves, t));
+      position[k] = hn::Add(hn::Set(d, placement.origin[k]), hn::Mul(cell, at));
+      normal[k] = hn::IfThenElse(sloped, hn::Mul(g, inverse), hn::IfThenElseZero(moves, one));
+    };
+    along(0, load(edges.x), gx);
+    along(1, load(edges.y), gy);
+    along(2, load(edges.z), gz);
+    if (edges.count - v >= kWide) {
+      hn::StoreInterleaved3(position[0], position[1], position[2], d, positions + 3 * v);
+      hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, normals + 3 * v);
+      continue;
+    }
+    alignas(64) double last[2][3 * kWide];
+    hn::StoreInterleaved3(position[0], position[1], position[2], d, last[0]);
+    hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, last[1]);
+    std::copy_n(last[0], 3 * (edges.count - v), positions + 3 * v);
+    std::copy_n(last[1], 3 * (edges.count - v), normals + 3 * v);
+  }
+}
+
+void ProjectPoints(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
+                   std::size_t count) {
+  const D d;
+  constexpr int kMaxRounds = 12;
+  const V zero = hn::Zero(d), level = hn::Set(d, iso), longest = hn::Set(d, 0.5F);
+  const double per_cell = 1.0 / placement.cell;
+  alignas(64) float at[3][kLanes], slope[3][kLanes];
+  for (std::size_t v = 0; v < count; v += kWidth) {
+    const std::size_t n = std::min(kWidth, count - v);
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const double* p = positions + 3 * (v + std::min(i, n - 1));
+      for (std::size_t k = 0; k < 3; ++k) {
+        at[k][i] = static_cast<float>((p[k] - placement.origin[k]) * per_cell - placement.base[k]);
+      }
+    }
+    V x = hn::Load(d, at[0]), y = hn::Load(d, at[1]), z = hn::Load(d, at[2]);
+    V gx = zero, gy = zero, gz = zero;
+    for (int round = 0; round < kMaxRounds; ++round) {
+      const PointSums sum = sum_at(list, x, y, z);
+      gx = sum.x;
+      gy = sum.y;
+      gz = sum.z;
+      const V norm2 = hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx)));
+      const V norm = hn::Sqrt(norm2);
+      // x - F grad F / |grad F|^2 = x + F S / (6 |S|^2)
+      const V wanted = hn::Div(hn::Sub(sum.f, level), hn::Mul(hn::Set(d, 6.0F), norm));
+      const V step = hn::Max(hn::Min(wanted, longest), hn::Neg(longest));
+      const V factor = hn::IfThenElseZero(hn::Gt(norm, zero), hn::Div(step, norm));
+      x = hn::MulAdd(factor, gx, x);
+      y = hn::MulAdd(factor, gy, y);
+      z = hn::MulAdd(factor, gz, z);
+      if (hn::AllTrue(d, hn::Lt(hn::Abs(step), hn::Set(d, kClose)))) break;
+    }
+    hn::Store(x, d, at[0]);
+    hn::Store(y, d, at[1]);
+    hn::Store(z, d, at[2]);
+    hn::Store(gx, d, slope[0]);
+    hn::Store(gy, d, slope[1]);
+    hn::Store(gz, d, slope[2]);
+    for (std::size_t i = 0; i < n; ++i) {
+      double* p = positions + 3 * (v + i);
+      double* normal = normals + 3 * (v + i);
+      double norm2 = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        p[k] = placement.origin[k] + placement.cell * (placement.base[k] + static_cast<double>(at[k][i]));
+        normal[k] = static_cast<double>(slope[k][i]);
+        norm2 += normal[k] * normal[k];
+      }
+      const double inverse = norm2 > 0.0 ? 1.0 / std::sqrt(norm2) : 0.0;
+      for (std::size_t k = 0; k < 3; ++k) normal[k] *= inverse;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace supple::implicit::blobs::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace supple::implicit::blobs {
+
+HWY_EXPORT(Gather);
+HWY_EXPORT(Select);
+HWY_EXPORT(Expand);
+HWY_EXPORT(EvaluateTile);
+HWY_EXPORT(SolveEdges);
+HWY_EXPORT(PlaceVertices);
+HWY_EXPORT(ProjectPoints);
+
+void BlobList::reserve(std::size_t blobs) {
+  const std::size_t room = blobs + 2 * kLanes;
+  if (x.size() >= room) return;
+  const std::size_t grown = room + room / 2;
+  for (auto* array : {&scale, &x, &y, &z}) array->resize(grown);
+}
+
+void BlobList::pad() {
+  reserve(count);
+  for (std::size_t i = count; i < count + kLanes; ++i) {
+    scale[i] = y[i] = z[i] = 0.0F;
+    x[i] = 2.0F;
+  }
+}
+
+void gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std::array<double, 3>& base, double size,
+            double margin, BlobList& list) {
+  HWY_DYNAMIC_DISPATCH(Gather)(all, begin, end, base, size, margin, list);
+}
+
+PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
+  return HWY_DYNAMIC_DISPATCH(Select)(from, centre, half, list);
+}
+
+PotentialBounds expand(const BlobList& list, const std::array<float, 3>& centre, float half) {
+  return HWY_DYNAMIC_DISPATCH(Expand)(list, centre, half);
+}
+
+std::uint64_t evaluate_tile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values) {
+  return HWY_DYNAMIC_DISPATCH(EvaluateTile)(list, corner, iso, values);
+}
+
+void solve_edges(const BlobList& list, float iso, EdgeBatch& edges) {
+  HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges);
+}
+
+void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals) {
+  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, placement, positions, normals);
+}
+
+void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
+                    std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(ProjectPoints)(list, iso, placement, positions, normals, count);
+}
+
+}  // namespace supple::implicit::blobs
+#endif  // HWY_ONCE

@@ -1,0 +1,90 @@
+/// @file blob_lanes.h
+/// Sums of Wyvill points on the nodes and edges of a lattice, in single precision and in cells of the lattice: vector
+/// loops for AVX2 and AVX-512, chosen at run time. Lanes hold points (or blobs, where they are selected) and a point's
+/// sum runs in the order of the list by explicit fused operations, so neither the width of the vectors nor a blob that
+/// adds an exact zero changes a bit.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace supple::implicit::blobs {
+
+inline constexpr int kTile = 4;  ///< nodes along the edge of a tile
+inline constexpr std::size_t kTileNodes = std::size_t{kTile} * kTile * kTile;
+inline constexpr std::size_t kLanes = 16;  ///< widest vector; lists may be read and written this far beyond their end
+
+/// Blobs near a block, f(x) = (1 - |scale x - centre|^2)^3 with x in cells from the block's lowest node,
+/// scale = cell / R and centre already scaled.
+struct BlobList {
+  std::vector<float> scale, x, y, z;
+  std::size_t count = 0;
+
+  void reserve(std::size_t blobs);
+  /// Fills the slots that vectors read beyond the end with blobs that reach nothing.
+  void pad();
+};
+
+/// Blobs as a grid keeps them: centres in cells from the lattice's origin.
+struct BlobArrays {
+  const double *x, *y, *z;
+  const float* scale;
+};
+
+/// Appends those of the blobs [begin, end) whose support may meet the cube that reaches from `margin` cells below `base`
+/// to `size + margin` above it; in the frame of `base`.
+void gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std::array<double, 3>& base, double size,
+            double margin, BlobList& list);
+
+/// Bounds of the potential on a box from the nearest and farthest distance of each blob; round-off included.
+struct PotentialBounds {
+  float lower = 0.0F;
+  float upper = 0.0F;
+};
+
+/// Those whose support may meet the cube of half edge `half` around `centre`, and bounds of the potential on it.
+[[nodiscard]] PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half,
+                                     BlobList& list);
+
+/// Tighter bounds on the same cube: Taylor's expansion around the centre, with bounds of the second derivatives.
+[[nodiscard]] PotentialBounds expand(const BlobList& list, const std::array<float, 3>& centre, float half);
+
+/// F = sum f - iso at the kTileNodes nodes of the tile whose lowest node is `corner`; x fastest.
+/// @return bit per node: F > 0
+std::uint64_t evaluate_tile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values);
+
+/// Edges of one tile that the surface crosses.
+struct EdgeBatch {
+  static constexpr std::size_t kRoom = 3 * kTileNodes + kLanes;
+  using Row = std::array<float, kRoom>;
+  alignas(64) Row x, y, z;     ///< lower end [cells]
+  alignas(64) Row axis;        ///< 0, 1 or 2
+  alignas(64) Row low, high;   ///< F at the ends, of different sign (zero is outside); high = 0: only the sign is known
+  alignas(64) Row t;           ///< found: position of the root along the edge, inside (0, 1)
+  alignas(64) Row nx, ny, nz;  ///< found: -grad F next to the root, up to a positive factor
+  std::size_t count = 0;
+};
+
+/// Newton's method in brackets, first step by the cubic through both ends.
+void solve_edges(const BlobList& list, float iso, EdgeBatch& edges);
+
+/// Where the frame of a block lies in the world.
+struct Placement {
+  std::array<double, 3> origin;  ///< of the lattice [m]
+  std::array<double, 3> base;    ///< lowest node of the block [cells]
+  double cell;                   ///< [m]
+};
+
+/// World positions and unit normals of the solved edges, three numbers each. Where F has no gradient the normal is the
+/// direction of the edge. @param positions, normals  room for count vectors
+void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals);
+
+/// Moves points [m] that lie near the surface to it, by Newton's method along the gradient, and gives their unit normals;
+/// three numbers each. Steps are at most half a cell.
+void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
+                    std::size_t count);
+
+}  // namespace supple::implicit::blobs

@@ -1,0 +1,77 @@
+/// @file march_sampling.h
+/// How marching cubes gets at a field: values on the blocks that may hold surface, and roots on crossed edges.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "march_leaves.h"
+#include "supple/core/executor.h"
+#include "supple/implicit/field_view.h"
+#include "supple/implicit/polygonise.h"
+
+namespace supple::implicit::march {
+
+class Sampler {
+ public:
+  virtual ~Sampler() = default;
+  /// Lays out the table: every block that the surface may enter. @throws Error{Limit} before taking memory
+  virtual void prepare(const Executor& executor, BlockTable& table) = 0;
+  /// Fills blocks with leaves, signs and values.
+  virtual void sample(const Executor& executor, BlockTable& table) = 0;
+  /// Vertices of a block at their place in the mesh: positions, normals, and `along`, where they lie on their edges.
+  virtual void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const = 0;
+  /// Called on a thread before it projects points.
+  virtual void begin_projection() const {}
+  /// Moves points near a tile to the surface.
+  virtual void project(const Block& block, const Leaf& leaf, unsigned tile, std::span<Vec3> points,
+                       std::span<Vec3> normals) const = 0;
+  [[nodiscard]] virtual bool single_precision() const = 0;
+};
+
+/// In single precision for a body of Wyvill points, through the view for any other.
+/// @param grid  kept by the caller, for its memory
+[[nodiscard]] std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice,
+                                                    blobs::BlobGrid& grid);
+
+/// Values of the tile that holds a node of the block or beyond its upper faces, null where there are none.
+[[nodiscard]] const float* tile_at(const BlockTable& table, const Block& block, int x, int y, int z);
+
+/// F at a node of the block or of one beyond its upper faces, 0 where only the sign is known. @pre 0 <= x, y, z <= 16
+[[nodiscard]] float value_at(const BlockTable& table, const Block& block, int x, int y, int z);
+
+/// Lays out the table for the nodes [lower, upper].
+void lay_out(BlockTable& table, const blobs::Cells& lower, const blobs::Cells& upper, const Lattice& lattice);
+
+/// The triangles of one tile, a range of the mesh.
+struct TileTriangles {
+  const Block* block;
+  const Leaf* leaf;
+  unsigned tile;
+  std::size_t first, count;
+};
+
+/// What building a mesh needs besides the mesh; kept for its memory.
+struct MeshScratch {
+  std::vector<float> along;          ///< where vertices lie on their edges
+  std::vector<TileTriangles> tiles;
+  std::vector<std::array<std::uint32_t, 3>> triangle, middle;
+  std::vector<std::uint32_t> start, target, edge;
+  [[nodiscard]] std::size_t bytes() const {
+    return along.capacity() * sizeof(float) + tiles.capacity() * sizeof(TileTriangles) +
+           (triangle.capacity() + middle.capacity()) * sizeof(triangle[0]) +
+           (start.capacity() + target.capacity() + edge.capacity()) * sizeof(std::uint32_t);
+  }
+};
+
+/// Counts, numbers, solves and joins everything.
+void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice, const Executor& executor,
+              MeshScratch& scratch, Mesh& mesh);
+
+/// Cuts every triangle into four at the middles of its edges, which are moved to the surface.
+/// @pre the mesh is closed and oriented
+void refine(const Sampler& sampler, const Lattice& lattice, const Executor& executor, MeshScratch& scratch, Mesh& mesh);
+
+}  // namespace supple::implicit::march

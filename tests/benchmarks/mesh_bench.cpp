@@ -1,0 +1,264 @@
+/// @file mesh_bench.cpp
+/// Surface meshes timed beside their error, one JSON object a line: CPU times of the index and of the mesh, triangles,
+/// memory, a hash, and the distances of vertices and of triangle centroids to the exact surface in cells (RMS; Newton's
+/// method along the analytic gradient, in double precision).
+///
+///   mesh_bench [PREFIX]                        e.g. w3/128 or w3/128/cubes; all when absent
+///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
+///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <ctime>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "benchmarks/field_bodies.h"
+#include "blob_grid.h"
+#include "field_index.h"
+#include "march_sampling.h"
+#include "supple/core/hash.h"
+#include "supple/implicit/march_cubes.h"
+#include "supple/implicit/polygonise.h"
+
+namespace {
+
+using namespace supple;
+using namespace supple::implicit;
+using benchmarks::Body;
+
+/// The cube that holds all supports with 2 % to spare, and its cells.
+struct Frame {
+  Vec3 lower = Vec3::Zero();
+  double side = 0.0;
+  [[nodiscard]] Lattice lattice(int cells) const { return {.origin = lower, .cell = side / cells}; }
+};
+
+Frame frame_of(const Body& body) {
+  Box box;
+  for (const Box& support : body.placed.support) box = box.united(support);
+  const double side = 1.02 * box.extent().maxCoeff();
+  return {.lower = box.centre() - Vec3::Constant(0.5 * side), .side = side};
+}
+
+Body make_body(std::string_view name) {
+  if (name == "w1") return benchmarks::plate_spiral();
+  return benchmarks::blobs(name == "w2" ? 1000u : name == "w3" ? 10000u : 100000u);
+}
+
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// RMS distance of points to the surface.
+double rms_distance(const Field& field, std::span<const Vec3> points) {
+  constexpr std::size_t kMost = 200'000;
+  constexpr std::size_t kBatch = 1024;
+  const std::size_t stride = 1 + points.size() / kMost;
+  std::vector<Vec3> start;
+  for (std::size_t i = 0; i < points.size(); i += stride) start.push_back(points[i]);
+  double sum = 0.0;
+  std::vector<double> values(kBatch);
+  std::vector<Vec3> gradients(kBatch);
+  for (std::size_t begin = 0; begin < start.size(); begin += kBatch) {
+    const std::size_t n = std::min(kBatch, start.size() - begin);
+    std::vector<Vec3> at(start.begin() + static_cast<std::ptrdiff_t>(begin),
+                         start.begin() + static_cast<std::ptrdiff_t>(begin + n));
+    for (int round = 0; round < 5; ++round) {
+      field.evaluate(at, std::span(values).first(n), std::span(gradients).first(n));
+      for (std::size_t i = 0; i < n; ++i) {
+        const double g2 = gradients[i].squaredNorm();
+        if (g2 > 0.0) at[i] -= values[i] / g2 * gradients[i];
+      }
+    }
+    for (std::size_t i = 0; i < n; ++i) sum += (at[i] - start[begin + i]).squaredNorm();
+  }
+  return start.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(start.size()));
+}
+
+std::vector<Vec3> centroids(const Mesh& mesh) {
+  std::vector<Vec3> points;
+  points.reserve(mesh.triangle_count());
+  for (const auto& t : mesh.triangle) {
+    points.push_back((mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0);
+  }
+  return points;
+}
+
+std::string hash_of(const Mesh& mesh) {
+  Hasher hasher;
+  hasher.add(std::span<const Vec3>(mesh.position));
+  hasher.add(std::span<const Vec3>(mesh.normal));
+  for (const auto& t : mesh.triangle) {
+    for (const std::uint32_t v : t) hasher.add(std::uint64_t{v});
+  }
+  return to_hex(hasher.value());
+}
+
+struct Method {
+  std::string_view name;
+  int refinements;  ///< -1: tetrahedra
+};
+/// "refined" starts from a lattice of twice the cell, "refined_twice" of four times.
+constexpr std::array<Method, 4> kMethods{{{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}}};
+
+std::uint64_t bytes_of(const Mesh& mesh) {
+  return mesh.position.capacity() * sizeof(Vec3) + mesh.normal.capacity() * sizeof(Vec3) +
+         mesh.triangle.capacity() * sizeof(mesh.triangle[0]);
+}
+
+void measure(const std::string& name, Body& body, const Lattice& lattice, const Method& method) {
+  const Executor executor(1);
+  double index = 1e300, best = 1e300, total = 0.0;
+  Mesh mesh;
+  CubeMesher mesher;
+  MarchCounts counts;
+  const Mesh* made = &mesh;
+  Lattice coarse = lattice;
+  coarse.cell *= std::ldexp(1.0, std::max(method.refinements, 0));
+  for (int repeat = 0; repeat < 200 && (repeat < 3 || total < 0.6); ++repeat) {
+    const double begin = cpu_seconds();
+    body.place();
+    const double indexed = cpu_seconds();
+    if (method.refinements < 0) {
+      mesh = polygonise(body.field, lattice, executor);
+    } else {
+      made = &mesher.make(body.field, {.lattice = coarse, .refinements = method.refinements}, executor, &counts);
+    }
+    const double end = cpu_seconds();
+    index = std::min(index, indexed - begin);
+    best = std::min(best, end - indexed);
+    total += end - begin;
+  }
+  const std::uint64_t bytes = counts.bytes;
+  if (made != &mesh) mesh = *made;
+  const double vertex_error = rms_distance(body.field, mesh.position) / lattice.cell;
+  const double centroid_error = rms_distance(body.field, centroids(mesh)) / lattice.cell;
+  std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"index_cpu_ms\": %.4g, "
+              "\"items\": %zu, \"items_per_s\": %.4g, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", "
+              "\"rms_vertex_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"hash\": \"%s\"}\n",
+              name.c_str(), 1e3 * best, 1e3 * index, mesh.triangle_count(),
+              static_cast<double>(mesh.triangle_count()) / best, centroid_error, vertex_error,
+              1e-6 * static_cast<double>(bytes_of(mesh)), 1e-6 * static_cast<double>(bytes), hash_of(mesh).c_str());
+  std::fflush(stdout);
+}
+
+/// Errors of a mesh that another program made.
+int report_errors(Body& body, const Lattice& lattice, const char* path) {
+  std::ifstream in(path, std::ios::binary);
+  std::int64_t counts[2] = {};
+  in.read(reinterpret_cast<char*>(counts), sizeof counts);
+  Mesh mesh;
+  mesh.position.resize(static_cast<std::size_t>(counts[0]));
+  mesh.triangle.resize(static_cast<std::size_t>(counts[1]));
+  in.read(reinterpret_cast<char*>(mesh.position.data()), counts[0] * static_cast<std::int64_t>(sizeof(Vec3)));
+  in.read(reinterpret_cast<char*>(mesh.triangle.data()), counts[1] * std::int64_t{12});
+  if (!in) {
+    std::fprintf(stderr, "%s: too short\n", path);
+    return 1;
+  }
+  std::printf("{\"items\": %zu, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", \"rms_vertex_over_h\": %.3g}\n",
+              mesh.triangle_count(), rms_distance(body.field, centroids(mesh)) / lattice.cell,
+              rms_distance(body.field, mesh.position) / lattice.cell);
+  return 0;
+}
+
+/// The field on all nodes in single precision, x fastest, for other meshers: node count, origin and cell as float64, then
+/// the values. Times: evaluating wherever a support reaches, and only where bounds admit a surface.
+int write_grid(Body& body, const Lattice& lattice, int cells, const char* path) {
+  const Executor executor(1);
+  const auto n = static_cast<std::int64_t>(cells) + 1;
+  const auto iso = static_cast<float>(body.skeleton.iso);
+  std::vector<float> values(static_cast<std::size_t>(n * n * n), -iso);
+  const std::span<const PackedPrimitive> primitives = body.field.index().primitive;
+  double touched = 1e300, surface = 1e300;
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    double begin = cpu_seconds();
+    blobs::BlobGrid grid;
+    grid.build(primitives, lattice);
+    blobs::BlobList block, leaf, tile;
+    alignas(64) float tile_values[blobs::kTileNodes];
+    const auto for_corners = [](int edge, const auto& use) {
+      for (int c = 0; c < 8; ++c) use(edge * (c & 1), edge * (c >> 1 & 1), edge * (c >> 2));
+    };
+    const auto centre = [](int x, int y, int z, float half) {
+      return std::array{static_cast<float>(x) + half, static_cast<float>(y) + half, static_cast<float>(z) + half};
+    };
+    for (std::int64_t bz = 0; bz < n; bz += 16) {
+      for (std::int64_t by = 0; by < n; by += 16) {
+        for (std::int64_t bx = 0; bx < n; bx += 16) {
+          grid.gather({bx, by, bz}, 16, 0, block);
+          if (block.count == 0) continue;
+          for_corners(8, [&](int lx, int ly, int lz) {
+            (void)blobs::select(block, centre(lx, ly, lz, 4.0F), 4.0F, leaf);
+            if (leaf.count == 0) return;
+            for_corners(4, [&](int tx, int ty, int tz) {
+              const int x0 = lx + tx, y0 = ly + ty, z0 = lz + tz;
+              (void)blobs::select(leaf, centre(x0, y0, z0, 2.0F), 2.0F, tile);
+              if (tile.count == 0) return;
+              blobs::evaluate_tile(tile, centre(x0, y0, z0, 0.0F), iso, tile_values);
+              for (int row = 0; row < 16; ++row) {
+                const std::int64_t y = by + y0 + row % 4, z = bz + z0 + row / 4, x = bx + x0;
+                if (y >= n || z >= n || x >= n) continue;
+                std::copy_n(tile_values + 4 * row, std::min<std::int64_t>(4, n - x),
+                            values.begin() + (z * n + y) * n + x);
+              }
+            });
+          });
+        }
+      }
+    }
+    touched = std::min(touched, cpu_seconds() - begin);
+    begin = cpu_seconds();
+    march::BlockTable table;
+    blobs::BlobGrid kept;
+    const auto sampler = march::make_sampler(body.field, lattice, kept);
+    sampler->prepare(executor, table);
+    sampler->sample(executor, table);
+    surface = std::min(surface, cpu_seconds() - begin);
+  }
+  std::ofstream out(path, std::ios::binary);
+  const double header[5] = {static_cast<double>(n), lattice.origin.x(), lattice.origin.y(), lattice.origin.z(),
+                            lattice.cell};
+  out.write(reinterpret_cast<const char*>(header), sizeof header);
+  out.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(4 * values.size()));
+  std::printf("{\"cpu_ms_touched\": %.5g, \"cpu_ms_surface\": %.5g}\n", 1e3 * touched, 1e3 * surface);
+  return out.good() ? 0 : 1;
+}
+
+bool starts_alike(std::string_view a, std::string_view b) {
+  const std::size_t n = std::min(a.size(), b.size());
+  return a.substr(0, n) == b.substr(0, n);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 5 && std::string_view(argv[1]) == "--errors") {
+    Body body = make_body(argv[2]);
+    return report_errors(body, frame_of(body).lattice(std::stoi(argv[3])), argv[4]);
+  }
+  if (argc == 5 && std::string_view(argv[1]) == "--grid") {
+    Body body = make_body(argv[2]);
+    const int cells = std::stoi(argv[3]);
+    return write_grid(body, frame_of(body).lattice(cells), cells, argv[4]);
+  }
+  const std::string_view filter = argc > 1 ? argv[1] : "";
+  for (const std::string body_name : {"w1", "w2", "w3", "w4"}) {
+    if (!starts_alike(filter, body_name)) continue;
+    Body body = make_body(body_name);
+    const Frame frame = frame_of(body);
+    for (const int cells : {64, 128, 256, 512}) {
+      for (const Method& method : kMethods) {
+        const std::string name = body_name + '/' + std::to_string(cells) + '/' + std::string(method.name);
+        if (name.compare(0, filter.size(), filter) != 0) continue;
+        measure(name, body, frame.lattice(cells), method);
+      }
+    }
+  }
+  return 0;
+}

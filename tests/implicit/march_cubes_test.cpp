@@ -1,0 +1,353 @@
+#include "supple/implicit/march_cubes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "implicit/analytic_fields.h"
+#include "implicit/bodies.h"
+#include "implicit/mesh_checks.h"
+#include "march_cases.h"
+#include "supple/core/error.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+const Vec3 kOffset(0.0137, -0.0071, 0.0229);  // puts no node on a surface
+
+Lattice lattice_of(double cell) { return {.origin = kOffset, .cell = cell}; }
+
+MeshReport expect_closed(const Mesh& mesh) {
+  const MeshReport report = inspect(mesh);
+  EXPECT_GT(mesh.triangle_count(), 0u);
+  EXPECT_TRUE(report.closed);
+  EXPECT_TRUE(report.oriented);
+  EXPECT_EQ(mesh.normal.size(), mesh.vertex_count());
+  return report;
+}
+
+/// A Field that the mesher cannot recognise: it then takes the path in double precision.
+struct Seen {
+  const Field& field;
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const { field.evaluate(points, values); }
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+    field.evaluate(points, values, gradients);
+  }
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { field.evaluate_parts(points, parts); }
+  [[nodiscard]] Interval bound(const Box& box) const { return field.bound(box); }
+  [[nodiscard]] double gradient_bound(const Box& box) const { return field.gradient_bound(box); }
+  [[nodiscard]] Box surface_box() const { return field.surface_box(); }
+  [[nodiscard]] double feature_size() const { return field.feature_size(); }
+};
+
+Body blobs(std::uint64_t seed, std::uint32_t count, double least_radius = 0.3, double largest_radius = 0.6) {
+  return random_body({.seed = seed, .parts = count, .least_radius = least_radius, .largest_radius = largest_radius,
+                      .only_points = true});
+}
+
+// Each loop of a case separates the inside corners of one component from the outside ones; the volume enclosed by the
+// mesh of a lattice with any signs is positive and every edge has two triangles.
+TEST(CellCases, JoinInsideCornersAlongEdgesOnlyAndFaceOutwards) {
+  for (unsigned inside = 0; inside < 256; ++inside) {
+    const march::CellLoops& c = march::kCellLoops[inside];
+    // Components of inside corners, joined along edges.
+    std::array<unsigned, 8> component{};
+    for (unsigned k = 0; k < 8; ++k) component[k] = k;
+    for (int round = 0; round < 8; ++round) {
+      for (const march::CellEdge& edge : march::kCellEdge) {
+        const unsigned a = edge.corner, b = edge.corner | 1u << edge.axis;
+        if ((inside >> a & 1u) != 0 && (inside >> b & 1u) != 0) component[a] = component[b] = std::min(component[a], component[b]);
+      }
+    }
+    std::set<unsigned> crossed;
+    for (std::size_t l = 0; l < c.loops; ++l) {
+      std::set<unsigned> parts;
+      Vec3 area = Vec3::Zero(), towards = Vec3::Zero();
+      const auto middle = [&](std::size_t k) {
+        const march::CellEdge edge = march::kCellEdge[c.loop[l].edge[k % c.loop[l].size]];
+        const unsigned a = edge.corner, b = a | 1u << edge.axis;
+        const auto at = [](unsigned corner) { return Vec3(corner & 1u, corner >> 1 & 1u, corner >> 2); };
+        const bool first = (inside >> a & 1u) != 0;
+        EXPECT_NE(first, (inside >> b & 1u) != 0);
+        parts.insert(component[first ? a : b]);
+        towards += first ? Vec3(at(b) - at(a)) : Vec3(at(a) - at(b));
+        return Vec3(0.5 * (at(a) + at(b)));
+      };
+      for (std::size_t k = 0; k < c.loop[l].size; ++k) {
+        EXPECT_TRUE(crossed.insert(c.loop[l].edge[k]).second);
+        area += middle(k).cross(middle(k + 1));
+      }
+      EXPECT_EQ(parts.size(), 1u) << inside;
+      EXPECT_GT(area.dot(towards), 0.0) << inside;
+    }
+    std::size_t edges = 0;
+    for (const march::CellEdge& edge : march::kCellEdge) {
+      edges += (inside >> edge.corner & 1u) != (inside >> (edge.corner | 1u << edge.axis) & 1u) ? 1u : 0u;
+    }
+    EXPECT_EQ(crossed.size(), edges) << inside;
+  }
+}
+
+// Wyvill 1986: a point with R = 1 and iso 1/2 has its surface at 0.454202019.
+TEST(MarchCubes, MeetsAreaAndVolumeOfTheWyvillSphereWithOrderTwo) {
+  constexpr double kRadius = 0.454202019, kArea = 2.592435660, kVolume = 0.392496505;
+  const Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});
+  const Executor executor(1);
+  for (const int refinements : {0, 1}) {
+    std::array<double, 3> area_error{}, volume_error{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double cell = std::ldexp(0.08, -static_cast<int>(k));
+      MarchCounts counts;
+      const Mesh mesh =
+          march_cubes(body.field, {.lattice = lattice_of(cell), .refinements = refinements}, executor, &counts);
+      EXPECT_TRUE(counts.single_precision);
+      const MeshReport report = expect_closed(mesh);
+      EXPECT_EQ(report.euler_characteristic, 2);
+      for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+        ASSERT_NEAR(mesh.position[v].norm(), kRadius, 1e-4 * cell);
+        ASSERT_NEAR(mesh.normal[v].norm(), 1.0, 1e-14);
+        // The gradient is taken within 4e-3 of a cell of the vertex, on a sphere of radius 0.45.
+        ASSERT_LT((mesh.normal[v] - mesh.position[v].normalized()).norm(), 0.02 * cell);
+      }
+      area_error[k] = kArea - report.area;
+      volume_error[k] = kVolume - report.volume;
+      EXPECT_GT(volume_error[k], 0.0);
+      EXPECT_LT(volume_error[k], kArea * 0.75 * cell * cell / (2.0 * kRadius));
+    }
+    for (std::size_t k = 0; k < 2; ++k) {  // 4 for order 2; how the lattice lies on the sphere moves it a little
+      EXPECT_NEAR(area_error[k] / area_error[k + 1], 4.0, 0.4) << refinements;
+      EXPECT_NEAR(volume_error[k] / volume_error[k + 1], 4.0, 0.4) << refinements;
+    }
+  }
+}
+
+TEST(MarchCubes, FindsOneBodyBelowTheMergingDistanceAndTwoAbove) {
+  const auto components = [](double D) {
+    const Body body = body_of({{wyvill_point(1.0), Vec3(-0.5 * D, 0, 0)}, {wyvill_point(1.0), Vec3(0.5 * D, 0, 0)}});
+    return expect_closed(march_cubes(body.field, {.lattice = lattice_of(0.02)}, Executor(2))).components;
+  };
+  EXPECT_EQ(components(1.21), 1u);
+  EXPECT_EQ(components(1.22), 2u);
+}
+
+// Blobs of very different size, some of two cells only, some alone: none may be missed by bounds.
+TEST(MarchCubes, FindsEveryComponentOfScatteredBlobs) {
+  constexpr double kCell = 0.05;
+  std::vector<std::pair<Primitive, Vec3>> blobs;
+  Random random(11);
+  for (int k = 0; k < 6; ++k) {
+    for (int j = 0; j < 6; ++j) {
+      for (int i = 0; i < 6; ++i) {
+        // A support of 4.5 cells or more: the surface at 0.45 R then holds a node.
+        blobs.emplace_back(wyvill_point(random.uniform(0.225, 0.49)), Vec3(i, j, k) + random.in_box(0.01));
+      }
+    }
+  }
+  const Body body = body_of(blobs);
+  const MeshReport report = expect_closed(march_cubes(body.field, {.lattice = lattice_of(kCell)}, Executor(2)));
+  EXPECT_EQ(report.components, 216u);
+  EXPECT_EQ(report.euler_characteristic, 2 * 216);
+}
+
+class MarchedBody : public ::testing::TestWithParam<std::uint64_t> {};
+
+// The path in single precision against the one through the view in double precision: same signs at the nodes (none is
+// closer to the surface than round-off), so the same vertices on the same edges.
+TEST_P(MarchedBody, AgreesWithThePathInDoublePrecision) {
+  constexpr double kCell = 0.037;
+  const Body body = blobs(GetParam(), 60, 0.15, 0.5);
+  MarchCounts fast, clear;
+  const MarchOptions options{.lattice = lattice_of(kCell)};
+  const Mesh mesh = march_cubes(body.field, options, Executor(2), &fast);
+  const Mesh expected = march_cubes(Seen{body.field}, options, Executor(2), &clear);
+  EXPECT_TRUE(fast.single_precision);
+  EXPECT_FALSE(clear.single_precision);
+  EXPECT_LT(fast.nodes, clear.nodes);
+  expect_closed(mesh);
+  ASSERT_EQ(mesh.vertex_count(), expected.vertex_count());
+  ASSERT_EQ(mesh.triangle_count(), expected.triangle_count());
+  double sum = 0.0;
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+    const double error = (mesh.position[v] - expected.position[v]).norm() / kCell;
+    sum += error * error;
+    ASSERT_LT(error, 1e-3);  // grazing edges see the surface at a small angle
+    ASSERT_LT((mesh.normal[v] - expected.normal[v]).norm(), 5e-3);
+  }
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(mesh.vertex_count())), 1e-4);
+  // Diagonals may differ where both are as long.
+  std::size_t differ = 0;
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) differ += mesh.triangle[t] != expected.triangle[t] ? 1u : 0u;
+  EXPECT_LT(differ, 20u);
+}
+
+TEST_P(MarchedBody, IsClosedOnAllShapesAndKernels) {
+  const Body body = random_body({.seed = GetParam(), .parts = 30});
+  MarchCounts counts;
+  const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.06), .refinements = 1}, Executor(2), &counts);
+  EXPECT_FALSE(counts.single_precision);
+  const MeshReport report = expect_closed(mesh);
+  EXPECT_EQ(report.euler_characteristic % 2, 0);
+  EXPECT_GT(report.volume, 0.0);
+}
+
+TEST_P(MarchedBody, DoesNotDependOnThreads) {
+  const Body body = blobs(GetParam(), 80);
+  for (const int refinements : {0, 2}) {
+    const MarchOptions options{.lattice = lattice_of(0.05), .refinements = refinements};
+    const std::uint64_t expected = hash_of(march_cubes(body.field, options, Executor(1)));
+    for (const int threads : {2, 3, 8}) {
+      EXPECT_EQ(hash_of(march_cubes(body.field, options, Executor(threads))), expected) << threads;
+    }
+  }
+}
+
+TEST_P(MarchedBody, RefinesTheSameSurface) {
+  const Body body = blobs(GetParam(), 60);
+  const double cell = 0.05;
+  const Mesh coarse = march_cubes(body.field, {.lattice = lattice_of(cell)}, Executor(1));
+  const Mesh fine = march_cubes(body.field, {.lattice = lattice_of(cell), .refinements = 2}, Executor(1));
+  const MeshReport before = expect_closed(coarse), after = expect_closed(fine);
+  EXPECT_EQ(fine.triangle_count(), 16 * coarse.triangle_count());
+  EXPECT_EQ(after.euler_characteristic, before.euler_characteristic);
+  EXPECT_EQ(after.components, before.components);
+  for (std::size_t v = 0; v < coarse.vertex_count(); ++v) ASSERT_EQ(fine.position[v], coarse.position[v]);
+  const FieldView field(body.field);
+  double sum = 0.0;
+  for (std::size_t v = 0; v < fine.vertex_count(); ++v) {
+    Vec3 gradient;
+    const double f = field.value(fine.position[v], gradient);
+    sum += std::pow(f / (gradient.norm() * cell), 2);
+    ASSERT_GT(fine.normal[v].dot(-gradient.normalized()), 0.999);
+  }
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(fine.vertex_count())), 1e-4);
+  EXPECT_EQ(self_intersections(fine, cell), 0u);
+}
+INSTANTIATE_TEST_SUITE_P(Seeds, MarchedBody, ::testing::Values(1, 2, 3));
+
+TEST(MarchCubes, StaysClosedWhereTheSurfaceIsRougherThanTheLattice) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    for (const double cell : {0.07, 0.11}) {
+      const Mesh mesh = march_cubes(noise(seed, 0.15), {.lattice = lattice_of(cell)}, Executor(1));
+      const MeshReport report = expect_closed(mesh);
+      EXPECT_EQ(report.euler_characteristic % 2, 0);
+      EXPECT_GT(mesh.triangle_count(), 1000u);
+      EXPECT_EQ(self_intersections(mesh, cell), 0u);
+    }
+  }
+  // Blobs of less than a cell in single precision.
+  const Body dust = random_body({.seed = 4, .parts = 3000, .least_radius = 0.05, .largest_radius = 0.2, .only_points = true});
+  const Mesh mesh = march_cubes(dust.field, {.lattice = lattice_of(0.07)}, Executor(1));
+  expect_closed(mesh);
+  EXPECT_EQ(self_intersections(mesh, 0.07), 0u);
+}
+
+TEST(MarchCubes, IsClosedWhenTheSurfacePassesThroughNodes) {
+  const Executor executor(1);
+  // |(3, 4, 0)| / 8 = 5 / 8 in exact binary arithmetic: nodes at distance r have F = 0 exactly, and count as outside.
+  const FunctionField ball = sphere(Vec3::Zero(), 0.625);
+  ASSERT_EQ(FieldView(ball).value({0.375, 0.5, 0.0}), 0.0);
+  const MarchOptions options{.lattice = {.origin = Vec3::Zero(), .cell = 0.125}};
+  EXPECT_EQ(expect_closed(march_cubes(ball, options, executor)).euler_characteristic, 2);
+  // One Wyvill point with iso 27/64 = (1 - 1/4)^3, R = 1/2: F = 0 exactly at a distance of 1/4, two cells.
+  Body body;
+  body.skeleton.primitive.push_back(wyvill_point(0.5));
+  body.skeleton.part_count = 1;
+  body.skeleton.iso = 27.0 / 64.0;
+  body.parts.push_back(Pose{});
+  body.place();
+  ASSERT_EQ(FieldView(body.field).value({0.0, 0.25, 0.0}), 0.0);
+  MarchCounts counts;
+  const Mesh mesh = march_cubes(body.field, options, executor, &counts);
+  EXPECT_TRUE(counts.single_precision);
+  EXPECT_EQ(expect_closed(mesh).euler_characteristic, 2);
+  std::set<std::array<double, 3>> places;
+  for (const Vec3& p : mesh.position) {
+    EXPECT_NEAR(p.norm(), 0.25, 1e-4 * 0.125);
+    EXPECT_TRUE(places.insert({p.x(), p.y(), p.z()}).second) << "two vertices at " << p.transpose();
+  }
+}
+
+TEST(MarchCubes, SurvivesAFieldWithoutGradient) {
+  FunctionField steps = sphere(Vec3::Zero(), 0.5);  // a jump: no root, no gradient anywhere
+  steps.function = [](const Vec3& p, Vec3& gradient) {
+    gradient = Vec3::Zero();
+    return p.norm() < 0.5 ? 1.0 : -1.0;
+  };
+  steps.bounds_everything = true;
+  const Mesh mesh = march_cubes(steps, {.lattice = lattice_of(0.1)}, Executor(1));
+  expect_closed(mesh);
+  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
+    EXPECT_NEAR(mesh.position[i].norm(), 0.5, 2e-6);  // vertices keep 2^-17 of a cell from the nodes
+    EXPECT_GT(mesh.normal[i].dot(mesh.position[i]), 0.0);
+  }
+}
+
+TEST(MarchCubes, KeepsItsShapeAtAnyScaleAndFarFromTheOrigin) {
+  const auto count = [&](double scale, const Vec3& shift) {
+    const Body body =
+        body_of({{wyvill_point(scale), shift}, {wyvill_point(scale), Vec3(shift + Vec3(0.7 * scale, 0, 0))}});
+    const Mesh mesh =
+        march_cubes(body.field, {.lattice = {.origin = scale * kOffset, .cell = 0.0625 * scale}}, Executor(1));
+    expect_closed(mesh);
+    return std::pair(mesh.vertex_count(), mesh.triangle_count());
+  };
+  const auto expected = count(1.0, Vec3::Zero());
+  for (const double scale : {0x1p-10, 0x1p10}) EXPECT_EQ(count(scale, Vec3::Zero()), expected) << scale;
+  EXPECT_EQ(count(1.0, Vec3(4096.0, -8192.0, 1024.0)), expected);
+}
+
+TEST(MarchCubes, ForgetsWhatItKeptFromAnotherBody) {
+  CubeMesher mesher;
+  const MarchOptions options{.lattice = lattice_of(0.05), .refinements = 1};
+  for (const std::uint64_t seed : {1u, 2u, 3u, 2u}) {
+    const Body body = blobs(seed, 40);
+    EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(1))), hash_of(march_cubes(body.field, options, Executor(1))));
+  }
+  const Body none = body_of({{wyvill_point(0.01), Vec3(0.3, 0.3, 0.3)}});  // between the nodes
+  EXPECT_EQ(mesher.make(none.field, options, Executor(1)).vertex_count(), 0u);
+}
+
+void expect_message(const std::function<void()>& act, ErrorKind kind, const std::vector<std::string>& words) {
+  try {
+    act();
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), kind);
+    for (const std::string& word : words) {
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << word << " in: " << error.what();
+    }
+  }
+}
+
+TEST(MarchCubes, RefusesABillionNodesBeforeTakingMemory) {
+  const Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});
+  expect_message([&] { (void)march_cubes(body.field, {.lattice = lattice_of(0.0018)}, Executor(1)); }, ErrorKind::Limit,
+                 {"lattice.cell", "1000000000 lattice nodes", "1.38e+09", "0.0018 m", "use cells of at least 0.00"});
+  expect_message([&] { (void)march_cubes(body.field, {.lattice = lattice_of(1e-12)}, Executor(1)); }, ErrorKind::Limit,
+                 {"lattice.cell", "node numbers", "use cells of at least"});
+  EXPECT_THROW((void)march_cubes(body.field, {.lattice = lattice_of(0.0)}, Executor(1)), ContractViolation);
+  EXPECT_THROW((void)march_cubes(body.field, {.lattice = lattice_of(0.1), .refinements = 5}, Executor(1)),
+               ContractViolation);
+}
+
+/// A ball whose bounds deny it on one side.
+struct HidingBall : FunctionField {
+  HidingBall() : FunctionField(sphere(Vec3::Zero(), 0.5)) {}
+  [[nodiscard]] Interval bound(const Box& b) const {
+    return b.lower.x() > 0.1 ? Interval{-1.0, -0.5} : FunctionField::bound(b);
+  }
+};
+
+TEST(MarchCubes, ReportsBoundsThatHideTheSurfaceInsteadOfLeavingAHole) {
+  const HidingBall ball;
+  expect_message([&] { (void)march_cubes(ball, {.lattice = lattice_of(0.03)}, Executor(1)); }, ErrorKind::Internal,
+                 {"surface in block", "bounds exclude"});
+}
+
+}  // namespace
+}  // namespace supple::implicit
