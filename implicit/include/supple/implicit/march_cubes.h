@@ -1,6 +1,6 @@
 /// @file supple/implicit/march_cubes.h
 /// Fast surface meshes of one body on the world lattice of polygonise.h: marching cubes with vertices at the roots of the
-/// field on the lattice's edges. Bodies of Wyvill points are sampled in single precision, only where bounds admit a
+/// field on the lattice's edges. A body of Wyvill points is sampled in single precision, only where bounds admit a
 /// surface; other fields are sampled through their view in double precision.
 ///
 /// The mesh is closed and oriented, and cannot cross itself whatever the field: all triangles of a cell lie in it and are
@@ -43,8 +43,8 @@ class CubeMesher {
   CubeMesher& operator=(CubeMesher&&) noexcept;
 
   /// The closed surface F = 0, outward oriented, with the normals of the field; valid until the next call.
-  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges, so that a
-  /// refined mesh is free of crossings only as far as the cells resolve the surface.
+  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges: where
+  /// the surface turns by more than a right angle within a cell, as at a neck about to close, refined triangles can fold.
   /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes.
   const Mesh& make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                    MarchCounts* counts = nullptr);
