@@ -20,7 +20,13 @@ std::int64_t floor_divide(std::int64_t a, std::int64_t b) { return a >= 0 ? a / 
 void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice& lattice) {
   const std::size_t n = primitives.size();
   const double per_cell = 1.0 / lattice.cell;
+  const bool same_lattice = lattice.cell == lattice_.cell && lattice.origin == lattice_.origin;
+  const std::int64_t last_bin = bin_;
+  lattice_ = lattice;
+  cells_.swap(last_cells_);
+  radius_.swap(last_radius_);
   cells_.resize(3 * n);
+  radius_.resize(n);
   std::array<double, 3> low, high;
   low.fill(1e300);
   high.fill(-1e300);
@@ -33,6 +39,7 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
       low[axis] = std::min(low[axis], u);
       high[axis] = std::max(high[axis], u);
     }
+    radius_[i] = per_cell / std::sqrt(primitives[i].inverse_r2);
     least_inverse = std::min(least_inverse, primitives[i].inverse_r2);
   }
   reach_ = n == 0 ? 0.0 : per_cell / std::sqrt(least_inverse);
@@ -54,6 +61,7 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
       support_.upper[k] = static_cast<std::int64_t>(std::floor(high[k] + reach_)) + 1;
     }
   }
+  compare(same_lattice && last_bin == bin_ && last_radius_.size() == n);
   const auto bins = static_cast<std::size_t>(count_[0] * count_[1] * count_[2]);
   start_.assign(bins + 1, 0);
   bin_of_.resize(n);
@@ -77,6 +85,34 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
   }
   for (std::size_t b = bins; b > 0; --b) start_[b] = start_[b - 1];
   start_[0] = 0;
+}
+
+void BlobGrid::compare(bool comparable) {
+  change_.cells.clear();
+  change_.all = !comparable;
+  if (!comparable) return;
+  // Wider than what the search for blobs near a box lets through, so that all else sees the same lists.
+  const auto reached = [](const double* centre, double radius) {
+    CellBox box;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double reach = 1.001 * radius + 0.01;
+      box.lower[k] = static_cast<std::int64_t>(std::floor(centre[k] - reach));
+      box.upper[k] = static_cast<std::int64_t>(std::ceil(centre[k] + reach));
+    }
+    return box;
+  };
+  const std::size_t n = radius_.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double *now = &cells_[3 * i], *last = &last_cells_[3 * i];
+    if (now[0] == last[0] && now[1] == last[1] && now[2] == last[2] && radius_[i] == last_radius_[i]) continue;
+    change_.cells.push_back(reached(last, last_radius_[i]));
+    change_.cells.push_back(reached(now, radius_[i]));
+    if (4 * change_.cells.size() > n + 64) {  // looking at all is then cheaper
+      change_.all = true;
+      change_.cells.clear();
+      return;
+    }
+  }
 }
 
 void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const {

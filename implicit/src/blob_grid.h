@@ -30,11 +30,20 @@ struct CellBox {
 
 class BlobGrid {
  public:
+  /// What is different from the last build: everything, or the cells that supports left and entered.
+  struct Change {
+    bool all = true;
+    std::vector<CellBox> cells;
+  };
   /// @pre all primitives are Wyvill points
   void build(std::span<const PackedPrimitive> primitives, const Lattice& lattice);
+  [[nodiscard]] const Change& change() const noexcept { return change_; }
+  /// The next build has no last one.
+  void forget() { radius_.clear(); }
   [[nodiscard]] std::size_t size() const noexcept { return scale_.empty() ? 0 : scale_.size() - kLanes; }
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return (x_.capacity() + y_.capacity() + z_.capacity() + cells_.capacity()) * sizeof(double) +
+    return (x_.capacity() + y_.capacity() + z_.capacity() + cells_.capacity() + last_cells_.capacity() +
+            radius_.capacity() + last_radius_.capacity()) * sizeof(double) +
            scale_.capacity() * sizeof(float) + (start_.capacity() + bin_of_.capacity()) * sizeof(std::uint32_t);
   }
   /// Largest R [cells].
@@ -70,7 +79,12 @@ class BlobGrid {
   std::vector<double> x_, y_, z_;     ///< [cells]
   std::vector<float> scale_;          ///< cell / R
   std::vector<std::uint32_t> bin_of_;
-  std::vector<double> cells_;
+  std::vector<double> cells_, last_cells_;    ///< centres by id, of this build and the last
+  std::vector<double> radius_, last_radius_;  ///< R [cells] by id
+  Lattice lattice_;
+  Change change_;
+
+  void compare(bool comparable);
 };
 
 }  // namespace supple::implicit::blobs

@@ -333,45 +333,89 @@ void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* p
   }
 }
 
-void ProjectPoints(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
-                   std::size_t count) {
+/// Those whose support may meet a box, in its frame.
+HWY_INLINE void cut(const BlobList& from, const float (&centre)[3], const float (&half)[3], BlobList& list) {
+  const D d;
+  list.reserve(from.count);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < from.count; i += kWidth) {
+    const V s = hn::LoadU(d, from.scale.data() + i);
+    V near2 = hn::Zero(d), at[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      at[k] = hn::LoadU(d, (k == 0 ? from.x : k == 1 ? from.y : from.z).data() + i);
+      const V away = hn::Abs(hn::MulSub(s, hn::Set(d, centre[k]), at[k]));
+      const V gap = hn::Max(hn::NegMulAdd(s, hn::Set(d, half[k]), away), hn::Zero(d));
+      near2 = hn::MulAdd(gap, gap, near2);
+    }
+    const auto keep = hn::Lt(near2, hn::Set(d, kReach2));
+    hn::StoreU(hn::Compress(s, keep), d, list.scale.data() + count);
+    hn::StoreU(hn::Compress(at[0], keep), d, list.x.data() + count);
+    hn::StoreU(hn::Compress(at[1], keep), d, list.y.data() + count);
+    hn::StoreU(hn::Compress(at[2], keep), d, list.z.data() + count);
+    count += hn::CountTrue(d, keep);
+  }
+  list.count = count;
+}
+
+/// Newton's method along the gradient for a vector of points. @return whether all stayed within `margin` of their start
+HWY_INLINE bool project_vector(const BlobList& list, float iso, float margin, float (&at)[3][kLanes],
+                               float (&slope)[3][kLanes]) {
   const D d;
   constexpr int kMaxRounds = 12;
   const V zero = hn::Zero(d), level = hn::Set(d, iso), longest = hn::Set(d, 0.5F);
+  V x = hn::Load(d, at[0]), y = hn::Load(d, at[1]), z = hn::Load(d, at[2]);
+  const V x0 = x, y0 = y, z0 = z;
+  V gx = zero, gy = zero, gz = zero, far = zero;
+  auto open = hn::FirstN(d, kWidth);
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const PointSums sum = sum_at(list, x, y, z);
+    gx = hn::IfThenElse(open, sum.x, gx);
+    gy = hn::IfThenElse(open, sum.y, gy);
+    gz = hn::IfThenElse(open, sum.z, gz);
+    const V norm2 = hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx)));
+    const V norm = hn::Sqrt(norm2);
+    // x - F grad F / |grad F|^2 = x + F S / (6 |S|^2)
+    const V wanted = hn::Div(hn::Sub(sum.f, level), hn::Mul(hn::Set(d, 6.0F), norm));
+    const V step = hn::Max(hn::Min(wanted, longest), hn::Neg(longest));
+    const V factor = hn::IfThenElseZero(hn::And(open, hn::Gt(norm, zero)), hn::Div(step, norm));
+    x = hn::MulAdd(factor, gx, x);
+    y = hn::MulAdd(factor, gy, y);
+    z = hn::MulAdd(factor, gz, z);
+    far = hn::Max(far, hn::Max(hn::Abs(hn::Sub(x, x0)), hn::Max(hn::Abs(hn::Sub(y, y0)), hn::Abs(hn::Sub(z, z0)))));
+    if (!hn::AllTrue(d, hn::Lt(far, hn::Set(d, margin)))) return false;
+    open = hn::AndNot(hn::Lt(hn::Abs(step), hn::Set(d, kClose)), open);
+    if (hn::AllFalse(d, open)) break;
+  }
+  hn::Store(x, d, at[0]);
+  hn::Store(y, d, at[1]);
+  hn::Store(z, d, at[2]);
+  hn::Store(gx, d, slope[0]);
+  hn::Store(gy, d, slope[1]);
+  hn::Store(gz, d, slope[2]);
+  return true;
+}
+
+void ProjectPoints(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
+                   std::size_t count, BlobList& near) {
+  constexpr float kMargin = 0.25F;  // most middles move less
   const double per_cell = 1.0 / placement.cell;
   alignas(64) float at[3][kLanes], slope[3][kLanes];
   for (std::size_t v = 0; v < count; v += kWidth) {
     const std::size_t n = std::min(kWidth, count - v);
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      const double* p = positions + 3 * (v + std::min(i, n - 1));
-      for (std::size_t k = 0; k < 3; ++k) {
-        at[k][i] = static_cast<float>((p[k] - placement.origin[k]) * per_cell - placement.base[k]);
+    float centre[3], half[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      float low = 1e30F, high = -1e30F;
+      for (std::size_t i = 0; i < kWidth; ++i) {
+        const double p = positions[3 * (v + std::min(i, n - 1)) + k];
+        at[k][i] = static_cast<float>((p - placement.origin[k]) * per_cell - placement.base[k]);
+        low = std::min(low, at[k][i]);
+        high = std::max(high, at[k][i]);
       }
+      centre[k] = 0.5F * (low + high);
+      half[k] = 0.5F * (high - low) + kMargin;
     }
-    V x = hn::Load(d, at[0]), y = hn::Load(d, at[1]), z = hn::Load(d, at[2]);
-    V gx = zero, gy = zero, gz = zero;
-    for (int round = 0; round < kMaxRounds; ++round) {
-      const PointSums sum = sum_at(list, x, y, z);
-      gx = sum.x;
-      gy = sum.y;
-      gz = sum.z;
-      const V norm2 = hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx)));
-      const V norm = hn::Sqrt(norm2);
-      // x - F grad F / |grad F|^2 = x + F S / (6 |S|^2)
-      const V wanted = hn::Div(hn::Sub(sum.f, level), hn::Mul(hn::Set(d, 6.0F), norm));
-      const V step = hn::Max(hn::Min(wanted, longest), hn::Neg(longest));
-      const V factor = hn::IfThenElseZero(hn::Gt(norm, zero), hn::Div(step, norm));
-      x = hn::MulAdd(factor, gx, x);
-      y = hn::MulAdd(factor, gy, y);
-      z = hn::MulAdd(factor, gz, z);
-      if (hn::AllTrue(d, hn::Lt(hn::Abs(step), hn::Set(d, kClose)))) break;
-    }
-    hn::Store(x, d, at[0]);
-    hn::Store(y, d, at[1]);
-    hn::Store(z, d, at[2]);
-    hn::Store(gx, d, slope[0]);
-    hn::Store(gy, d, slope[1]);
-    hn::Store(gz, d, slope[2]);
+    cut(list, centre, half, near);
+    if (!project_vector(near, iso, kMargin, at, slope)) (void)project_vector(list, iso, 1e30F, at, slope);
     for (std::size_t i = 0; i < n; ++i) {
       double* p = positions + 3 * (v + i);
       double* normal = normals + 3 * (v + i);
@@ -443,8 +487,8 @@ void place_vertices(const EdgeBatch& edges, const Placement& placement, double* 
 }
 
 void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
-                    std::size_t count) {
-  HWY_DYNAMIC_DISPATCH(ProjectPoints)(list, iso, placement, positions, normals, count);
+                    std::size_t count, BlobList& near) {
+  HWY_DYNAMIC_DISPATCH(ProjectPoints)(list, iso, placement, positions, normals, count, near);
 }
 
 }  // namespace supple::implicit::blobs

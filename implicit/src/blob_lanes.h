@@ -84,7 +84,8 @@ void place_vertices(const EdgeBatch& edges, const Placement& placement, double* 
 
 /// Moves points [m] that lie near the surface to it, by Newton's method along the gradient, and gives their unit normals;
 /// three numbers each. Steps are at most half a cell.
+/// @param near  scratch
 void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
-                    std::size_t count);
+                    std::size_t count, BlobList& near);
 
 }  // namespace supple::implicit::blobs

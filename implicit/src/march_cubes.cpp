@@ -3,7 +3,9 @@
 #include <immintrin.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <utility>
 
 #include "field_index.h"
 #include "march_cases.h"
@@ -32,14 +34,15 @@ class Neighbourhood {
         there |= (x & 1u) << k;
       }
       const Block* owner = at == block.coord ? &block : table.find(at);
-      block_[step] = owner;
       const std::int8_t index = owner == nullptr ? kOutside : owner->leaf_of[there];
+      if (owner != nullptr && (owner->changed >> there & 1u) != 0) changed_ = true;
       leaf_[step] = index >= 0 ? &owner->leaf[static_cast<std::size_t>(index)] : nullptr;
       whole_[step] = index == kInside ? ~Plane{0} : Plane{0};
     }
   }
   [[nodiscard]] const Leaf* leaf(unsigned step) const { return leaf_[step]; }
-  [[nodiscard]] const Block* block(unsigned step) const { return block_[step]; }
+  /// Whether any of them was sampled anew.
+  [[nodiscard]] bool changed() const { return changed_; }
 
   /// Signs of the 8 x 8 nodes that lie `step` (bits x, y) away from those of this leaf in plane z, 0..8.
   [[nodiscard]] Plane plane(unsigned step, int z) const {
@@ -61,8 +64,8 @@ class Neighbourhood {
 
  private:
   std::array<const Leaf*, 8> leaf_{};
-  std::array<const Block*, 8> block_{};
   std::array<Plane, 8> whole_{};
+  bool changed_ = false;
 };
 
 /// Four bits for each node of a plane: its own sign and those one step along x, y and both; 16 nodes a word.
@@ -137,17 +140,19 @@ void count_leaf(const Neighbourhood& around, Leaf& leaf, std::vector<std::uint8_
   corners.resize(static_cast<std::size_t>(out - corners.data()));
 }
 
+/// Counts the leaves of a block and finds those whose vertices change; a whole block where any does.
 void count_block(const BlockTable& table, Block& block) {
-  block.vertices = block.triangles = 0;
+  bool any = block.changed != 0;
+  for (Leaf& leaf : block.leaf) {
+    leaf.solve = Neighbourhood(table, block, leaf.slot).changed();
+    any = any || leaf.solve;
+  }
+  if (!any) return;
   block.corners.clear();
   for (Leaf& leaf : block.leaf) {
-    leaf.first_vertex = block.vertices;
-    leaf.first_triangle = block.triangles;
     leaf.first_cell = static_cast<std::uint32_t>(block.corners.size());
     leaf.vertices = leaf.triangles = 0;
     count_leaf(Neighbourhood(table, block, leaf.slot), leaf, block.corners);
-    block.vertices += leaf.vertices;
-    block.triangles += leaf.triangles;
   }
 }
 
@@ -170,7 +175,7 @@ class VertexTable {
 
  private:
   static std::uint32_t first_of(const Neighbourhood& around, unsigned step) {
-    return static_cast<std::uint32_t>(around.block(step)->first_vertex) + around.leaf(step)->first_vertex;
+    return static_cast<std::uint32_t>(around.leaf(step)->first_vertex);
   }
   void set(int x, int y, int z, int axis, std::uint32_t vertex) {
     vertex_[static_cast<std::size_t>(axis * kAxis + place(x, y, z))] = vertex;
@@ -298,12 +303,37 @@ void expect_owned(const Neighbourhood& around, const BlockCoord& block) {
   }
 }
 
+/// Triangles that stay: only the numbers of their vertices move, each with its leaf.
+void renumber(const Neighbourhood& around, const Leaf& leaf, std::array<std::uint32_t, 3>* triangle) {
+  const auto shift_of = [](const Leaf& l) { return static_cast<std::uint32_t>(l.first_vertex - l.old_vertex); };
+  const std::uint32_t own = shift_of(leaf);
+  bool alike = true;
+  for (unsigned step = 1; step < 8; ++step) {
+    alike = alike && (around.leaf(step) == nullptr || shift_of(*around.leaf(step)) == own);
+  }
+  if (alike && own == 0) return;
+  for (std::size_t i = 0; i < leaf.triangles; ++i) {
+    for (std::uint32_t& v : triangle[i]) {
+      std::uint32_t shift = own;
+      for (unsigned step = 1; step < 8 && !alike; ++step) {
+        const Leaf* other = around.leaf(step);
+        if (other != nullptr && v - other->old_vertex < other->vertices) shift = shift_of(*other);
+      }
+      v += shift;
+    }
+  }
+}
+
 void emit_triangles(const BlockTable& table, const Block& block, const std::vector<float>& along, Mesh& mesh) {
   thread_local VertexTable vertices;
   thread_local std::array<std::array<std::uint32_t, 3>, (512 + 1) * kMostTriangles> found;
   for (const Leaf& leaf : block.leaf) {
     if (leaf.triangles == 0) continue;
     const Neighbourhood around(table, block, leaf.slot);
+    if (!leaf.emit) {
+      renumber(around, leaf, mesh.triangle.data() + leaf.first_triangle);
+      continue;
+    }
     expect_owned(around, block.coord);
     vertices.fill(around);
     std::array<std::uint32_t, 3>* out = found.data();
@@ -320,8 +350,34 @@ void emit_triangles(const BlockTable& table, const Block& block, const std::vect
         out += c.count;
       });
     }
-    std::copy(found.data(), out, mesh.triangle.data() + block.first_triangle + leaf.first_triangle);
+    std::copy(found.data(), out, mesh.triangle.data() + leaf.first_triangle);
   }
+}
+
+}  // namespace
+
+namespace {
+
+/// Moves the numbers of kept leaves from where they were to where they are now, in place: those that move down in rising
+/// order, then those that move up in falling order, so that nothing is overwritten before it has moved.
+template <class Item, class First, class Last, class Count>
+void shift_kept(const std::vector<const Leaf*>& kept, std::vector<Item>& items, std::size_t count, const First& old_first,
+                const Last& new_first, const Count& count_of) {
+  if (items.size() < count) items.resize(count);
+  Item* data = items.data();
+  for (const Leaf* leaf : kept) {
+    if (new_first(*leaf) < old_first(*leaf)) {
+      std::copy(data + old_first(*leaf), data + old_first(*leaf) + count_of(*leaf), data + new_first(*leaf));
+    }
+  }
+  for (auto it = kept.rbegin(); it != kept.rend(); ++it) {
+    const Leaf& leaf = **it;
+    if (new_first(leaf) > old_first(leaf)) {
+      std::copy_backward(data + old_first(leaf), data + old_first(leaf) + count_of(leaf),
+                         data + new_first(leaf) + count_of(leaf));
+    }
+  }
+  items.resize(count);
 }
 
 }  // namespace
@@ -338,31 +394,50 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
     });
   };
   for_each_block([&](Block& block) { count_block(table, block); });
-  std::uint64_t vertices = 0, triangles = 0;
+  // Triangles follow the vertices of a leaf and its upper neighbours.
+  for_each_block([&](Block& block) {
+    for (Leaf& leaf : block.leaf) {
+      const Neighbourhood around(table, block, leaf.slot);
+      leaf.emit = around.changed();
+      for (unsigned step = 0; step < 8; ++step) {
+        leaf.emit = leaf.emit || (around.leaf(step) != nullptr && around.leaf(step)->solve);
+      }
+    }
+  });
+  std::size_t vertices = 0, triangles = 0;
+  std::vector<const Leaf*> same_vertices, same_triangles;
   for (const std::uint32_t b : blocks) {
-    Block& block = table.block[b];
-    block.first_vertex = vertices;
-    block.first_triangle = triangles;
-    vertices += block.vertices;
-    triangles += block.triangles;
+    for (Leaf& leaf : table.block[b].leaf) {
+      leaf.old_vertex = std::exchange(leaf.first_vertex, vertices);
+      leaf.old_triangle = std::exchange(leaf.first_triangle, triangles);
+      vertices += leaf.vertices;
+      triangles += leaf.triangles;
+      if (!leaf.solve) same_vertices.push_back(&leaf);
+      if (!leaf.emit) same_triangles.push_back(&leaf);
+    }
   }
   lattice::expect_indexable(vertices, lattice);
-  mesh.clear();
-  mesh.position.resize(vertices);
-  mesh.normal.resize(vertices);
-  mesh.triangle.resize(triangles);
-  scratch.along.resize(vertices);
+  mesh.columns.clear();
+  const auto shift_vertices = [&](auto& items) {
+    shift_kept(same_vertices, items, vertices, [](const Leaf& l) { return l.old_vertex; },
+               [](const Leaf& l) { return l.first_vertex; }, [](const Leaf& l) { return l.vertices; });
+  };
+  shift_vertices(mesh.position);
+  shift_vertices(mesh.normal);
+  shift_vertices(scratch.along);
+  shift_kept(same_triangles, mesh.triangle, triangles, [](const Leaf& l) { return l.old_triangle; },
+             [](const Leaf& l) { return l.first_triangle; }, [](const Leaf& l) { return l.triangles; });
   for_each_block([&](Block& block) { sampler.solve(table, block, mesh, scratch.along); });
   for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.along, mesh); });
-  scratch.tiles.clear();
-  for (const std::uint32_t b : blocks) {
-    const Block& block = table.block[b];
+}
+
+void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles) {
+  tiles.clear();
+  for (const Block& block : table.block) {
     for (const Leaf& leaf : block.leaf) {
       for (unsigned tile = 0; tile < 8; ++tile) {
         const std::size_t count = leaf.tile_triangle[tile + 1] - std::size_t{leaf.tile_triangle[tile]};
-        if (count == 0) continue;
-        scratch.tiles.push_back({&block, &leaf, tile, block.first_triangle + leaf.first_triangle + leaf.tile_triangle[tile],
-                                 count});
+        if (count > 0) tiles.push_back({&block, &leaf, tile, leaf.first_triangle + leaf.tile_triangle[tile], count});
       }
     }
   }
@@ -449,7 +524,9 @@ struct CubeMesher::Impl {
   blobs::BlobGrid grid;
   march::BlockTable table;
   march::MeshScratch scratch;
-  Mesh mesh;
+  Mesh mesh, refined;
+  double iso = 0.0;
+  bool kept = false;  ///< table and mesh are those of the grid's last build
 };
 
 CubeMesher::CubeMesher() : impl_(std::make_unique<Impl>()) {}
@@ -461,27 +538,41 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
                              MarchCounts* counts) {
   SUPPLE_EXPECTS(options.refinements >= 0 && options.refinements <= kMostRefinements);
   Impl& kept = *impl_;
+  const Field* points = field.as_field();
+  const double iso = points != nullptr ? points->index().iso : 0.0;
+  if (!kept.kept || iso != kept.iso) {
+    kept.grid.forget();
+  }
+  kept.kept = false;
+  kept.iso = iso;
   const std::unique_ptr<march::Sampler> sampler = march::make_sampler(field, options.lattice, kept.grid);
   sampler->prepare(executor, kept.table);
   sampler->sample(executor, kept.table);
   march::assemble(kept.table, *sampler, options.lattice, executor, kept.scratch, kept.mesh);
-  for (int level = 0; level < options.refinements; ++level) {
-    march::refine(*sampler, options.lattice, executor, kept.scratch, kept.mesh);
-  }
+  kept.kept = sampler->single_precision();
   if (counts != nullptr) {
     *counts = {};
     counts->blocks = kept.table.block.size();
     counts->single_precision = sampler->single_precision();
     for (const march::Block& block : kept.table.block) {
       counts->leaves += block.leaf.size();
+      counts->leaves_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
       counts->nodes += block.values.size();
       counts->bytes += sizeof(march::Block) + block.leaf.capacity() * sizeof(march::Leaf) +
                        block.values.capacity() * sizeof(float) + block.corners.capacity();
     }
     counts->bytes += kept.scratch.bytes() + kept.grid.bytes();
   }
-  return kept.mesh;
+  if (options.refinements == 0) return kept.mesh;
+  kept.refined = kept.mesh;
+  march::list_tiles(kept.table, kept.scratch.tiles);
+  for (int level = 0; level < options.refinements; ++level) {
+    march::refine(*sampler, options.lattice, executor, kept.scratch, kept.refined);
+  }
+  return kept.refined;
 }
+
+void CubeMesher::forget() { impl_->kept = false; }
 
 Mesh march_cubes(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   CubeMesher mesher;

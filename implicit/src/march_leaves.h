@@ -29,8 +29,11 @@ struct Leaf {
   std::uint8_t active = 0;       ///< bit tx + 2 ty + 4 tz: the tile holds values
   std::uint32_t first_tile = 0;  ///< of those with values, in Block::values
   std::uint32_t vertices = 0, triangles = 0;
-  std::uint32_t first_vertex = 0, first_triangle = 0;  ///< within the block
-  std::uint32_t first_cell = 0;                        ///< in Block::corners
+  std::size_t first_vertex = 0, first_triangle = 0;  ///< in the mesh
+  std::size_t old_vertex = 0, old_triangle = 0;      ///< in the mesh of the last call, if the leaf was kept
+  std::uint32_t first_cell = 0;                      ///< in Block::corners
+  bool solve = true;   ///< its vertices are not those of the last call
+  bool emit = true;    ///< its triangles are not those of the last call, but for their numbers
   std::array<std::uint16_t, 9> tile_vertex{}, tile_triangle{};  ///< those before each tile's
   std::array<Plane, kLeafNodes> inside{};      ///< F > 0
   std::array<Plane, kLeafNodes> cells{};       ///< crossed
@@ -77,8 +80,7 @@ struct Block {
   std::vector<Leaf> leaf;     ///< by slot
   std::vector<float> values;  ///< F, tile by tile, x fastest
   std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, leaf by leaf tile by tile
-  std::uint32_t vertices = 0, triangles = 0;
-  std::uint64_t first_vertex = 0, first_triangle = 0;  ///< in the mesh
+  std::uint8_t changed = 0;  ///< bit by slot: sampled anew in this call
 
   /// All outside, memory kept.
   void clear() {
@@ -86,7 +88,7 @@ struct Block {
     leaf.clear();
     values.clear();
     corners.clear();
-    vertices = triangles = 0;
+    changed = 0;
   }
   [[nodiscard]] bool uniform() const { return leaf.empty(); }
   [[nodiscard]] blobs::Cells base() const {

@@ -66,21 +66,21 @@ class BlobSampler final : public Sampler {
   }
 
   void sample(const Executor& executor, BlockTable& table) override {
-    for (Block& block : table.block) block.clear();
-    const std::vector<std::uint32_t> reached = reached_blocks(table);
-    executor.for_blocks(reached.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    const std::vector<std::uint32_t> blocks = grid_.change().all ? all_blocks(table) : changed_blocks(table);
+    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
       Workspace& work = Workspace::of_thread();
-      for (std::size_t i = begin; i < end; ++i) sample_block(table.block[reached[i]], work);
+      for (std::size_t i = begin; i < end; ++i) sample_block(table.block[blocks[i]], work);
     });
   }
 
   void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const override {
-    if (block.vertices == 0) return;
+    const auto wanted = [](const Leaf& leaf) { return leaf.solve && leaf.vertices > 0; };
+    if (std::none_of(block.leaf.begin(), block.leaf.end(), wanted)) return;
     Workspace& work = Workspace::of_thread();
     const blobs::Placement placement = placement_of(block);
     grid_.gather(block.base(), kBlockNodes, 0, work.block);
     for (const Leaf& leaf : block.leaf) {
-      if (leaf.vertices == 0) continue;
+      if (!wanted(leaf)) continue;
       const auto corner = corner_of(leaf.slot, kLeafNodes);
       (void)blobs::select(work.block, centre_of(corner, kLeafNodes), 0.5F * kLeafNodes, work.leaf);
       for (unsigned tile = 0; tile < 8; ++tile) {
@@ -92,7 +92,7 @@ class BlobSampler final : public Sampler {
         collect_edges(table, block, leaf, tile, corner, work.edges);
         (void)blobs::select(work.leaf, centre_of(tile_corner, kTile), 0.5F * kTile, work.tile);
         blobs::solve_edges(work.tile, iso_, work.edges);
-        const std::size_t first = block.first_vertex + leaf.first_vertex + leaf.tile_vertex[tile];
+        const std::size_t first = leaf.first_vertex + leaf.tile_vertex[tile];
         blobs::place_vertices(work.edges, placement, mesh.position[first].data(), mesh.normal[first].data());
         std::copy_n(work.edges.t.begin(), count, along.begin() + static_cast<std::ptrdiff_t>(first));
       }
@@ -126,18 +126,20 @@ class BlobSampler final : public Sampler {
     (void)blobs::select(work.around_leaf, centre_of({corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]}, kTile),
                         0.5F * kTile + static_cast<float>(kAround), work.tile);
     blobs::project_points(work.tile, iso_, placement_of(block), points.data()->data(), normals.data()->data(),
-                          points.size());
+                          points.size(), work.near);
   }
 
   [[nodiscard]] bool single_precision() const override { return true; }
 
  private:
   struct Workspace {
-    BlobList block, leaf, tile;
+    BlobList block, leaf, tile, near;
     BlobList around_block, around_leaf;    // of the block and leaf that points were last projected near
     const Block* near_block = nullptr;
     const Leaf* near_leaf = nullptr;
     blobs::EdgeBatch edges;
+    std::vector<Leaf> old_leaf;
+    std::vector<float> old_values;
     static Workspace& of_thread() {
       thread_local Workspace work;
       return work;
@@ -185,26 +187,62 @@ class BlobSampler final : public Sampler {
     edges.count = n;
   }
 
-  /// Blocks that a support may enter.
-  [[nodiscard]] std::vector<std::uint32_t> reached_blocks(const BlockTable& table) const {
-    std::vector<std::uint8_t> reached(table.block.size(), 0);
+  /// Calls use(block index) for the blocks that hold the cells and lie in the table.
+  template <class Use>
+  static void for_blocks_in(const BlockTable& table, const blobs::CellBox& cells, const Use& use) {
+    BlockCoord low{}, high{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::max(static_cast<std::int32_t>(cells.lower[k] >> 4), table.lower[k]);
+      high[k] = std::min(static_cast<std::int32_t>(cells.upper[k] >> 4), table.lower[k] + table.count[k] - 1);
+    }
+    for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+      for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+        for (std::int32_t x = low[0]; x <= high[0]; ++x) use(table.index({x, y, z}));
+      }
+    }
+  }
+
+  /// Empties the table; @return the blocks that a support may enter, all leaves marked.
+  [[nodiscard]] std::vector<std::uint32_t> all_blocks(BlockTable& table) const {
+    for (Block& block : table.block) block.clear();
     const auto reach = static_cast<std::int64_t>(std::ceil(grid_.reach())) + 1;
     grid_.for_bins([&](const blobs::CellBox& bin) {
-      BlockCoord low{}, high{};
+      blobs::CellBox around = bin;
       for (std::size_t k = 0; k < 3; ++k) {
-        low[k] = std::max(static_cast<std::int32_t>((bin.lower[k] - reach) >> 4), table.lower[k]);
-        high[k] = std::min(static_cast<std::int32_t>((bin.upper[k] + 1 + reach) >> 4), table.lower[k] + table.count[k] - 1);
+        around.lower[k] -= reach;
+        around.upper[k] += reach + 1;
       }
-      for (std::int32_t z = low[2]; z <= high[2]; ++z) {
-        for (std::int32_t y = low[1]; y <= high[1]; ++y) {
-          const std::size_t row = table.index({low[0], y, z});
-          std::fill_n(reached.begin() + static_cast<std::ptrdiff_t>(row), high[0] - low[0] + 1, std::uint8_t{1});
-        }
-      }
+      for_blocks_in(table, around, [&](std::size_t b) { table.block[b].changed = 0xff; });
     });
+    return marked_blocks(table);
+  }
+
+  /// Marks the leaves whose closed boxes meet what has changed.
+  [[nodiscard]] std::vector<std::uint32_t> changed_blocks(BlockTable& table) const {
+    for (Block& block : table.block) block.changed = 0;
+    for (blobs::CellBox cells : grid_.change().cells) {
+      for (std::size_t k = 0; k < 3; ++k) --cells.lower[k];  // a leaf's box ends at the next leaf's first node
+      for_blocks_in(table, cells, [&](std::size_t b) {
+        Block& block = table.block[b];
+        const Cells base = block.base();
+        for (unsigned slot = 0; slot < 8; ++slot) {
+          const auto corner = corner_of(slot, kLeafNodes);
+          bool meets = true;
+          for (std::size_t k = 0; k < 3; ++k) {
+            const std::int64_t low = base[k] + corner[k];
+            meets = meets && cells.lower[k] < low + kLeafNodes && low <= cells.upper[k];
+          }
+          if (meets) block.changed = static_cast<std::uint8_t>(block.changed | 1u << slot);
+        }
+      });
+    }
+    return marked_blocks(table);
+  }
+
+  static std::vector<std::uint32_t> marked_blocks(const BlockTable& table) {
     std::vector<std::uint32_t> list;
-    for (std::size_t b = 0; b < reached.size(); ++b) {
-      if (reached[b] != 0) list.push_back(static_cast<std::uint32_t>(b));
+    for (std::size_t b = 0; b < table.block.size(); ++b) {
+      if (table.block[b].changed != 0) list.push_back(static_cast<std::uint32_t>(b));
     }
     return list;
   }
@@ -215,10 +253,28 @@ class BlobSampler final : public Sampler {
     return bounds.lower > iso_ ? Verdict::Inside : Verdict::Unknown;
   }
 
+  /// Samples the marked leaves; the others are kept.
   void sample_block(Block& block, Workspace& work) const {
+    work.old_leaf.swap(block.leaf);
+    work.old_values.swap(block.values);
+    const auto old_leaf_of = block.leaf_of;
+    block.leaf.clear();
+    block.values.clear();
     grid_.gather(block.base(), kBlockNodes, 0, work.block);
-    if (work.block.count == 0) return;
-    for (unsigned slot = 0; slot < 8; ++slot) sample_leaf(block, slot, work);
+    for (unsigned slot = 0; slot < 8; ++slot) {
+      if ((block.changed >> slot & 1u) != 0) {
+        block.leaf_of[slot] = kOutside;
+        if (work.block.count > 0) sample_leaf(block, slot, work);
+      } else if (old_leaf_of[slot] >= 0) {
+        Leaf leaf = work.old_leaf[static_cast<std::size_t>(old_leaf_of[slot])];
+        const auto from = work.old_values.begin() + static_cast<std::ptrdiff_t>(leaf.first_tile * kTileNodes);
+        leaf.first_tile = static_cast<std::uint32_t>(block.values.size() / kTileNodes);
+        block.values.insert(block.values.end(), from,
+                            from + static_cast<std::ptrdiff_t>(kTileNodes * static_cast<std::size_t>(std::popcount(leaf.active))));
+        block.leaf_of[slot] = static_cast<std::int8_t>(block.leaf.size());
+        block.leaf.push_back(leaf);
+      }
+    }
   }
 
   void sample_leaf(Block& block, unsigned slot, Workspace& work) const {
@@ -291,7 +347,10 @@ class ViewSampler final : public Sampler {
   }
 
   void sample(const Executor& executor, BlockTable& table) override {
-    for (Block& block : table.block) block.clear();
+    for (Block& block : table.block) {
+      block.clear();
+      block.changed = 0xff;
+    }
     // By block, so that a block is written by one task.
     struct Place {
       std::size_t block;
@@ -342,7 +401,7 @@ class ViewSampler final : public Sampler {
         roots.add(start, end, f0, f1, lattice::guess_root(kMissing, f0, f1, kMissing));
       });
       roots.solve(field_, {}, scale);
-      std::size_t i = 0, vertex = block.first_vertex + leaf.first_vertex;
+      std::size_t i = 0, vertex = leaf.first_vertex;
       for_edges([&](int x, int y, int z, int axis) {
         const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
         const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);
@@ -504,6 +563,8 @@ void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const La
     blocks *= static_cast<std::size_t>(count[k]);
   }
   if (first == table.lower && count == table.count) return;
+  BlockTable old;
+  std::swap(old, table);
   table.lower = first;
   table.count = count;
   table.block.assign(blocks, Block{});
@@ -511,7 +572,9 @@ void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const La
   for (std::int32_t z = 0; z < table.count[2]; ++z) {
     for (std::int32_t y = 0; y < table.count[1]; ++y) {
       for (std::int32_t x = 0; x < table.count[0]; ++x) {
-        table.block[b++].coord = {table.lower[0] + x, table.lower[1] + y, table.lower[2] + z};
+        const BlockCoord coord{table.lower[0] + x, table.lower[1] + y, table.lower[2] + z};
+        if (old.find(coord) != nullptr) table.block[b] = std::move(old.block[old.index(coord)]);
+        table.block[b++].coord = coord;
       }
     }
   }

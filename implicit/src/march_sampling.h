@@ -19,9 +19,10 @@ class Sampler {
   virtual ~Sampler() = default;
   /// Lays out the table: every block that the surface may enter. @throws Error{Limit} before taking memory
   virtual void prepare(const Executor& executor, BlockTable& table) = 0;
-  /// Fills blocks with leaves, signs and values.
+  /// Fills leaves with signs and values, those that are not as in the last call, and marks them as changed.
   virtual void sample(const Executor& executor, BlockTable& table) = 0;
-  /// Vertices of a block at their place in the mesh: positions, normals, and `along`, where they lie on their edges.
+  /// Vertices of the leaves marked `solve` at their place in the mesh: positions, normals, and `along`, where they lie
+  /// on their edges.
   virtual void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const = 0;
   /// Called on a thread before it projects points.
   virtual void begin_projection() const {}
@@ -42,7 +43,7 @@ class Sampler {
 /// F at a node of the block or of one beyond its upper faces, 0 where only the sign is known. @pre 0 <= x, y, z <= 16
 [[nodiscard]] float value_at(const BlockTable& table, const Block& block, int x, int y, int z);
 
-/// Lays out the table for the nodes [lower, upper].
+/// Lays out the table for the nodes [lower, upper]; blocks that stay are kept.
 void lay_out(BlockTable& table, const blobs::Cells& lower, const blobs::Cells& upper, const Lattice& lattice);
 
 /// The triangles of one tile, a range of the mesh.
@@ -66,9 +67,12 @@ struct MeshScratch {
   }
 };
 
-/// Counts, numbers, solves and joins everything.
+/// Counts, numbers, solves and joins everything; what did not change is taken from the last mesh.
 void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice, const Executor& executor,
               MeshScratch& scratch, Mesh& mesh);
+
+/// The tiles that hold triangles, in their order.
+void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles);
 
 /// Cuts every triangle into four at the middles of its edges, which are moved to the surface.
 /// @pre the mesh is closed and oriented

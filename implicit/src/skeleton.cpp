@@ -122,6 +122,10 @@ double distance_scale(const Primitive& primitive) noexcept {
 
 Support support_of(const Primitive& p, const Mat3& rotation) noexcept {
   const double R = p.kernel.radius;
+  if (p.shape == ShapeKind::Point && p.stretch == Vec3::Ones()) {  // a plain ball, by far the most common
+    const Vec3 ball = Vec3::Constant(R);
+    return {.core = {Vec3::Zero(), Vec3::Zero()}, .reach = R, .whole = {-ball, ball}, .rounding = ball};
+  }
   const auto turned = [&](const Vec3& half) -> Vec3 { return rotation.cwiseAbs() * half; };
   const auto spun = [&](const Vec3& semi_axes) -> Vec3 { return (rotation * semi_axes.asDiagonal()).rowwise().norm(); };
   if (p.shape == ShapeKind::Ellipsoid) {

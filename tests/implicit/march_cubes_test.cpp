@@ -318,6 +318,53 @@ TEST(MarchCubes, ForgetsWhatItKeptFromAnotherBody) {
   EXPECT_EQ(mesher.make(none.field, options, Executor(1)).vertex_count(), 0u);
 }
 
+// What moved primitives do not reach is kept: the mesh must be that of a fresh mesher, bit by bit.
+class MovedBody : public ::testing::TestWithParam<int> {};
+
+TEST_P(MovedBody, GivesTheMeshOfAFreshMesherAndSamplesOnlyWhatMoved) {
+  Body body = random_body({.seed = 21, .parts = 400, .half_width = 1.5, .least_radius = 0.2, .largest_radius = 0.35,
+                           .only_points = true});
+  Random random(5);
+  CubeMesher mesher;
+  const Executor executor(GetParam());
+  const MarchOptions options{.lattice = lattice_of(0.03)};
+  MarchCounts all;
+  (void)mesher.make(body.field, options, executor, &all);
+  const auto expect_same = [&](const std::string& what, MarchCounts& counts) {
+    body.place();
+    const Mesh& kept = mesher.make(body.field, options, executor, &counts);
+    EXPECT_EQ(hash_of(kept), hash_of(march_cubes(body.field, options, Executor(1)))) << what;
+    expect_closed(kept);
+  };
+  MarchCounts counts;
+  expect_same("nothing moved", counts);
+  EXPECT_EQ(counts.leaves_sampled, 0u);
+  for (int round = 0; round < 6; ++round) {
+    const std::uint32_t moved = random.below(400);
+    body.parts[moved].position += random.in_box(round < 3 ? 0.02 : 0.3);
+    expect_same("one moved", counts);
+    EXPECT_GT(counts.leaves_sampled, 0u);
+    EXPECT_LT(counts.leaves_sampled, all.leaves_sampled / 10);
+  }
+  for (int round = 0; round < 3; ++round) {  // beyond the box that holds all, and back
+    body.parts[7].position = round == 1 ? Vec3(0.1, 0.2, -0.1) : Vec3(-3.0 - round, 2.5, 4.0);
+    expect_same("one left", counts);
+  }
+  for (std::size_t i = 0; i < 40; ++i) body.parts[i].position += random.in_box(0.05);
+  expect_same("some moved", counts);
+  body.skeleton.primitive[3].kernel = Kernel::wyvill(0.25);
+  expect_same("one shrank", counts);
+  for (Pose& part : body.parts) part.position += random.in_box(0.01);
+  expect_same("all moved", counts);
+  body.skeleton.iso = 0.6;
+  expect_same("another iso value", counts);
+  body.parts.pop_back();
+  body.skeleton.primitive.pop_back();
+  body.skeleton.part_count = 399;
+  expect_same("one fewer", counts);
+}
+INSTANTIATE_TEST_SUITE_P(Threads, MovedBody, ::testing::Values(1, 3));
+
 void expect_message(const std::function<void()>& act, ErrorKind kind, const std::vector<std::string>& words) {
   try {
     act();

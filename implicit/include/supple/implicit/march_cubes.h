@@ -18,8 +18,8 @@ namespace supple::implicit {
 
 struct MarchCounts {
   std::uint64_t blocks = 0;         ///< blocks of 16^3 cells within reach of the body
-  std::uint64_t blocks_sampled = 0; ///< of these, looked into in this call
   std::uint64_t leaves = 0;         ///< leaves of 8^3 nodes that hold values
+  std::uint64_t leaves_sampled = 0; ///< places of leaves that were looked at in this call
   std::uint64_t nodes = 0;          ///< values held
   std::uint64_t bytes = 0;          ///< held besides the mesh
   bool single_precision = false;    ///< the body is nothing but Wyvill points
@@ -34,7 +34,8 @@ struct MarchOptions {
   int refinements = 0;  ///< times that every triangle is cut into four, new vertices moved to the surface; 0..4
 };
 
-/// Meshes one body again and again; memory is kept from call to call.
+/// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh of Wyvill points
+/// that no moved primitive reaches; the result is what a fresh mesher gives, bit by bit.
 class CubeMesher {
  public:
   CubeMesher();
@@ -48,6 +49,8 @@ class CubeMesher {
   /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes.
   const Mesh& make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                    MarchCounts* counts = nullptr);
+  /// The next call keeps nothing but memory.
+  void forget();
 
  private:
   struct Impl;
