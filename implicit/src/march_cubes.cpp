@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "field_index.h"
@@ -140,19 +141,44 @@ void count_leaf(const Neighbourhood& around, Leaf& leaf, std::vector<std::uint8_
   corners.resize(static_cast<std::size_t>(out - corners.data()));
 }
 
-/// Counts the leaves of a block and finds those whose vertices change; a whole block where any does.
-void count_block(const BlockTable& table, Block& block) {
-  bool any = block.changed != 0;
-  for (Leaf& leaf : block.leaf) {
-    leaf.solve = Neighbourhood(table, block, leaf.slot).changed();
-    any = any || leaf.solve;
+/// The seven blocks above a block, null where there is none.
+std::array<const Block*, 8> blocks_above(const BlockTable& table, const Block& block) {
+  std::array<const Block*, 8> above{&block};
+  for (unsigned step = 1; step < 8; ++step) {
+    above[step] = table.find({block.coord[0] + static_cast<std::int32_t>(step & 1u),
+                              block.coord[1] + static_cast<std::int32_t>(step >> 1 & 1u),
+                              block.coord[2] + static_cast<std::int32_t>(step >> 2)});
   }
-  if (!any) return;
+  return above;
+}
+
+/// Counts the leaves of a block and finds those whose vertices change.
+void count_block(const BlockTable& table, Block& block) {
+  const auto above = blocks_above(table, block);
+  block.touched = std::any_of(above.begin(), above.end(), [](const Block* b) { return b != nullptr && b->changed != 0; });
+  if (!block.touched) {
+    for (Leaf& leaf : block.leaf) leaf.solve = leaf.emit = false;
+    return;
+  }
   block.corners.clear();
   for (Leaf& leaf : block.leaf) {
+    const Neighbourhood around(table, block, leaf.slot);
+    leaf.solve = around.changed();
     leaf.first_cell = static_cast<std::uint32_t>(block.corners.size());
     leaf.vertices = leaf.triangles = 0;
-    count_leaf(Neighbourhood(table, block, leaf.slot), leaf, block.corners);
+    count_leaf(around, leaf, block.corners);
+  }
+}
+
+/// Triangles follow the vertices of a leaf and its upper neighbours.
+void mark_triangles(const BlockTable& table, Block& block) {
+  if (!block.touched) return;
+  for (Leaf& leaf : block.leaf) {
+    const Neighbourhood around(table, block, leaf.slot);
+    leaf.emit = around.changed();
+    for (unsigned step = 0; step < 8; ++step) {
+      leaf.emit = leaf.emit || (around.leaf(step) != nullptr && around.leaf(step)->solve);
+    }
   }
 }
 
@@ -324,7 +350,26 @@ void renumber(const Neighbourhood& around, const Leaf& leaf, std::array<std::uin
   }
 }
 
+/// The same for a block where all leaves stay and, with the blocks above, move alike. @return whether that was so
+bool renumber_alike(const BlockTable& table, const Block& block, Mesh& mesh) {
+  if (block.touched) return false;
+  const auto shift_of = [](const Leaf& l) { return static_cast<std::uint32_t>(l.first_vertex - l.old_vertex); };
+  const std::uint32_t shift = shift_of(block.leaf.front());
+  for (const Block* above : blocks_above(table, block)) {
+    if (above == nullptr || above->leaf.empty()) continue;
+    if (shift_of(above->leaf.front()) != shift || shift_of(above->leaf.back()) != shift) return false;
+  }
+  if (shift == 0) return true;
+  const Leaf& last = block.leaf.back();
+  auto* triangle = mesh.triangle.data();
+  for (std::size_t i = block.leaf.front().first_triangle; i < last.first_triangle + last.triangles; ++i) {
+    for (std::uint32_t& v : triangle[i]) v += shift;
+  }
+  return true;
+}
+
 void emit_triangles(const BlockTable& table, const Block& block, const std::vector<float>& along, Mesh& mesh) {
+  if (renumber_alike(table, block, mesh)) return;
   thread_local VertexTable vertices;
   thread_local std::array<std::array<std::uint32_t, 3>, (512 + 1) * kMostTriangles> found;
   for (const Leaf& leaf : block.leaf) {
@@ -358,24 +403,35 @@ void emit_triangles(const BlockTable& table, const Block& block, const std::vect
 
 namespace {
 
-/// Moves the numbers of kept leaves from where they were to where they are now, in place: those that move down in rising
-/// order, then those that move up in falling order, so that nothing is overwritten before it has moved.
-template <class Item, class First, class Last, class Count>
-void shift_kept(const std::vector<const Leaf*>& kept, std::vector<Item>& items, std::size_t count, const First& old_first,
-                const Last& new_first, const Count& count_of) {
-  if (items.size() < count) items.resize(count);
-  Item* data = items.data();
-  for (const Leaf* leaf : kept) {
-    if (new_first(*leaf) < old_first(*leaf)) {
-      std::copy(data + old_first(*leaf), data + old_first(*leaf) + count_of(*leaf), data + new_first(*leaf));
+/// A run of numbers that moves as a whole.
+struct Run {
+  std::size_t from, to, count;
+};
+
+void add_run(std::vector<Run>& runs, std::size_t from, std::size_t to, std::size_t count) {
+  if (!runs.empty()) {
+    Run& last = runs.back();
+    if (last.from + last.count == from && last.to + last.count == to) {
+      last.count += count;
+      return;
     }
   }
-  for (auto it = kept.rbegin(); it != kept.rend(); ++it) {
-    const Leaf& leaf = **it;
-    if (new_first(leaf) > old_first(leaf)) {
-      std::copy_backward(data + old_first(leaf), data + old_first(leaf) + count_of(leaf),
-                         data + new_first(leaf) + count_of(leaf));
-    }
+  runs.push_back({from, to, count});
+}
+
+/// Moves runs in place: those that move down in rising order, then those that move up in falling order, so that nothing
+/// is overwritten before it has moved.
+template <class Item>
+void move_runs(const std::vector<Run>& runs, std::size_t count, std::vector<Item>& items) {
+  if (items.size() < count) items.resize(count);
+  const auto move = [&](const Run& run) {
+    std::memmove(static_cast<void*>(items.data() + run.to), items.data() + run.from, run.count * sizeof(Item));
+  };
+  for (const Run& run : runs) {
+    if (run.to < run.from) move(run);
+  }
+  for (auto run = runs.rbegin(); run != runs.rend(); ++run) {
+    if (run->to > run->from) move(*run);
   }
   items.resize(count);
 }
@@ -394,39 +450,25 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
     });
   };
   for_each_block([&](Block& block) { count_block(table, block); });
-  // Triangles follow the vertices of a leaf and its upper neighbours.
-  for_each_block([&](Block& block) {
-    for (Leaf& leaf : block.leaf) {
-      const Neighbourhood around(table, block, leaf.slot);
-      leaf.emit = around.changed();
-      for (unsigned step = 0; step < 8; ++step) {
-        leaf.emit = leaf.emit || (around.leaf(step) != nullptr && around.leaf(step)->solve);
-      }
-    }
-  });
+  for_each_block([&](Block& block) { mark_triangles(table, block); });
   std::size_t vertices = 0, triangles = 0;
-  std::vector<const Leaf*> same_vertices, same_triangles;
+  std::vector<Run> same_vertices, same_triangles;
   for (const std::uint32_t b : blocks) {
     for (Leaf& leaf : table.block[b].leaf) {
       leaf.old_vertex = std::exchange(leaf.first_vertex, vertices);
       leaf.old_triangle = std::exchange(leaf.first_triangle, triangles);
       vertices += leaf.vertices;
       triangles += leaf.triangles;
-      if (!leaf.solve) same_vertices.push_back(&leaf);
-      if (!leaf.emit) same_triangles.push_back(&leaf);
+      if (!leaf.solve) add_run(same_vertices, leaf.old_vertex, leaf.first_vertex, leaf.vertices);
+      if (!leaf.emit) add_run(same_triangles, leaf.old_triangle, leaf.first_triangle, leaf.triangles);
     }
   }
   lattice::expect_indexable(vertices, lattice);
   mesh.columns.clear();
-  const auto shift_vertices = [&](auto& items) {
-    shift_kept(same_vertices, items, vertices, [](const Leaf& l) { return l.old_vertex; },
-               [](const Leaf& l) { return l.first_vertex; }, [](const Leaf& l) { return l.vertices; });
-  };
-  shift_vertices(mesh.position);
-  shift_vertices(mesh.normal);
-  shift_vertices(scratch.along);
-  shift_kept(same_triangles, mesh.triangle, triangles, [](const Leaf& l) { return l.old_triangle; },
-             [](const Leaf& l) { return l.first_triangle; }, [](const Leaf& l) { return l.triangles; });
+  move_runs(same_vertices, vertices, mesh.position);
+  move_runs(same_vertices, vertices, mesh.normal);
+  move_runs(same_vertices, vertices, scratch.along);
+  move_runs(same_triangles, triangles, mesh.triangle);
   for_each_block([&](Block& block) { sampler.solve(table, block, mesh, scratch.along); });
   for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.along, mesh); });
 }

@@ -81,6 +81,7 @@ struct Block {
   std::vector<float> values;  ///< F, tile by tile, x fastest
   std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, leaf by leaf tile by tile
   std::uint8_t changed = 0;  ///< bit by slot: sampled anew in this call
+  bool touched = false;      ///< it or an upper neighbour has changed leaves
 
   /// All outside, memory kept.
   void clear() {
