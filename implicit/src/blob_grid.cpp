@@ -13,7 +13,9 @@ namespace {
 constexpr std::int64_t kBinsPerBlob = 64;
 constexpr std::int64_t kFewBins = 1 << 16;
 
-std::int64_t floor_divide(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
+/// The bin of edge 2^shift that holds a coordinate or cell.
+std::int64_t bin_at(double x, int shift) { return static_cast<std::int64_t>(std::floor(x)) >> shift; }
+std::int64_t bin_at(std::int64_t cell, int shift) { return cell >> shift; }
 
 }  // namespace
 
@@ -21,7 +23,7 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
   const std::size_t n = primitives.size();
   const double per_cell = 1.0 / lattice.cell;
   const bool same_lattice = lattice.cell == lattice_.cell && lattice.origin == lattice_.origin;
-  const std::int64_t last_bin = bin_;
+  const int last_shift = shift_;
   lattice_ = lattice;
   cells_.swap(last_cells_);
   radius_.swap(last_radius_);
@@ -45,13 +47,13 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
   reach_ = n == 0 ? 0.0 : per_cell / std::sqrt(least_inverse);
   support_ = {};
   count_.fill(0);
-  bin_ = 8;
+  shift_ = 3;
   if (n > 0) {
-    while (static_cast<double>(2 * bin_) < reach_) bin_ *= 2;
-    for (;; bin_ *= 2) {
+    while (static_cast<double>(2 * bin()) < reach_) ++shift_;
+    for (;; ++shift_) {
       for (std::size_t k = 0; k < 3; ++k) {
-        first_[k] = floor_divide(static_cast<std::int64_t>(std::floor(low[k])), bin_);
-        count_[k] = floor_divide(static_cast<std::int64_t>(std::floor(high[k])), bin_) - first_[k] + 1;
+        first_[k] = bin_at(low[k], shift_);
+        count_[k] = bin_at(high[k], shift_) - first_[k] + 1;
       }
       const double bins = static_cast<double>(count_[0]) * static_cast<double>(count_[1]) * static_cast<double>(count_[2]);
       if (bins <= static_cast<double>(std::max(kFewBins, kBinsPerBlob * static_cast<std::int64_t>(n)))) break;
@@ -61,14 +63,14 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
       support_.upper[k] = static_cast<std::int64_t>(std::floor(high[k] + reach_)) + 1;
     }
   }
-  compare(same_lattice && last_bin == bin_ && last_radius_.size() == n);
+  compare(same_lattice && last_shift == shift_ && last_radius_.size() == n);
   const auto bins = static_cast<std::size_t>(count_[0] * count_[1] * count_[2]);
   start_.assign(bins + 1, 0);
   bin_of_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     std::array<std::int64_t, 3> at{};
     for (std::size_t k = 0; k < 3; ++k) {
-      at[k] = floor_divide(static_cast<std::int64_t>(std::floor(cells_[3 * i + k])), bin_) - first_[k];
+      at[k] = bin_at(cells_[3 * i + k], shift_) - first_[k];
     }
     bin_of_[i] = static_cast<std::uint32_t>((at[2] * count_[1] + at[1]) * count_[0] + at[0]);
     ++start_[bin_of_[i] + 1];
@@ -81,7 +83,7 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
     x_[to] = cells_[3 * i];
     y_[to] = cells_[3 * i + 1];
     z_[to] = cells_[3 * i + 2];
-    scale_[to] = static_cast<float>(lattice.cell * std::sqrt(primitives[i].inverse_r2));
+    scale_[to] = static_cast<float>(1.0 / radius_[i]);
   }
   for (std::size_t b = bins; b > 0; --b) start_[b] = start_[b - 1];
   start_[0] = 0;
@@ -120,8 +122,8 @@ void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin,
   const auto reach = static_cast<std::int64_t>(std::ceil(reach_)) + 1 + margin;
   Cells from{}, to{};
   for (std::size_t k = 0; k < 3; ++k) {
-    from[k] = std::max<std::int64_t>(floor_divide(base[k] - reach, bin_) - first_[k], 0);
-    to[k] = std::min<std::int64_t>(floor_divide(base[k] + size + reach, bin_) - first_[k], count_[k] - 1);
+    from[k] = std::max<std::int64_t>(bin_at(base[k] - reach, shift_) - first_[k], 0);
+    to[k] = std::min<std::int64_t>(bin_at(base[k] + size + reach, shift_) - first_[k], count_[k] - 1);
   }
   const BlobArrays all{x_.data(), y_.data(), z_.data(), scale_.data()};
   const std::array<double, 3> corner{static_cast<double>(base[0]), static_cast<double>(base[1]),

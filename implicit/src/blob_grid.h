@@ -51,7 +51,7 @@ class BlobGrid {
   /// Cells that the supports reach.
   [[nodiscard]] const CellBox& support() const noexcept { return support_; }
   /// Edge of a bin [cells].
-  [[nodiscard]] std::int64_t bin() const noexcept { return bin_; }
+  [[nodiscard]] std::int64_t bin() const noexcept { return std::int64_t{1} << shift_; }
 
   /// Blobs whose support may meet the cube of `size` cells above `base`, wider by `margin`; in the frame of `base`.
   void gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const;
@@ -63,15 +63,15 @@ class BlobGrid {
       for (std::int64_t y = 0; y < count_[1]; ++y) {
         for (std::int64_t x = 0; x < count_[0]; ++x, ++b) {
           if (start_[b] == start_[b + 1]) continue;
-          const Cells low{bin_ * (first_[0] + x), bin_ * (first_[1] + y), bin_ * (first_[2] + z)};
-          use(CellBox{low, {low[0] + bin_ - 1, low[1] + bin_ - 1, low[2] + bin_ - 1}});
+          const Cells low{bin() * (first_[0] + x), bin() * (first_[1] + y), bin() * (first_[2] + z)};
+          use(CellBox{low, {low[0] + bin() - 1, low[1] + bin() - 1, low[2] + bin() - 1}});
         }
       }
     }
   }
 
  private:
-  std::int64_t bin_ = 8;
+  int shift_ = 3;            ///< a bin has 2^shift cells along its edge
   Cells first_{}, count_{};  ///< lowest bin, bins along each axis
   double reach_ = 0.0;
   CellBox support_;

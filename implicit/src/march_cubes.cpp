@@ -329,21 +329,19 @@ void expect_owned(const Neighbourhood& around, const BlockCoord& block) {
   }
 }
 
+std::uint32_t shift_of(const Leaf& leaf) { return static_cast<std::uint32_t>(leaf.first_vertex - leaf.old_vertex); }
+
 /// Triangles that stay: only the numbers of their vertices move, each with its leaf.
 void renumber(const Neighbourhood& around, const Leaf& leaf, std::array<std::uint32_t, 3>* triangle) {
-  const auto shift_of = [](const Leaf& l) { return static_cast<std::uint32_t>(l.first_vertex - l.old_vertex); };
   const std::uint32_t own = shift_of(leaf);
-  bool alike = true;
-  for (unsigned step = 1; step < 8; ++step) {
-    alike = alike && (around.leaf(step) == nullptr || shift_of(*around.leaf(step)) == own);
-  }
-  if (alike && own == 0) return;
   for (std::size_t i = 0; i < leaf.triangles; ++i) {
     for (std::uint32_t& v : triangle[i]) {
       std::uint32_t shift = own;
-      for (unsigned step = 1; step < 8 && !alike; ++step) {
-        const Leaf* other = around.leaf(step);
-        if (other != nullptr && v - other->old_vertex < other->vertices) shift = shift_of(*other);
+      if (v - leaf.old_vertex >= leaf.vertices) {
+        for (unsigned step = 1; step < 8; ++step) {
+          const Leaf* other = around.leaf(step);
+          if (other != nullptr && v - other->old_vertex < other->vertices) shift = shift_of(*other);
+        }
       }
       v += shift;
     }
@@ -353,18 +351,19 @@ void renumber(const Neighbourhood& around, const Leaf& leaf, std::array<std::uin
 /// The same for a block where all leaves stay and, with the blocks above, move alike. @return whether that was so
 bool renumber_alike(const BlockTable& table, const Block& block, Mesh& mesh) {
   if (block.touched) return false;
-  const auto shift_of = [](const Leaf& l) { return static_cast<std::uint32_t>(l.first_vertex - l.old_vertex); };
   const std::uint32_t shift = shift_of(block.leaf.front());
   for (const Block* above : blocks_above(table, block)) {
-    if (above == nullptr || above->leaf.empty()) continue;
-    if (shift_of(above->leaf.front()) != shift || shift_of(above->leaf.back()) != shift) return false;
+    if (above == nullptr) continue;
+    for (const Leaf& leaf : above->leaf) {
+      if (shift_of(leaf) != shift) return false;
+    }
   }
   if (shift == 0) return true;
-  const Leaf& last = block.leaf.back();
-  auto* triangle = mesh.triangle.data();
-  for (std::size_t i = block.leaf.front().first_triangle; i < last.first_triangle + last.triangles; ++i) {
-    for (std::uint32_t& v : triangle[i]) v += shift;
-  }
+  const Leaf &first = block.leaf.front(), &last = block.leaf.back();
+  if (first.first_triangle == last.first_triangle + last.triangles) return true;
+  std::uint32_t* vertex = mesh.triangle[first.first_triangle].data();
+  std::uint32_t* end = vertex + 3 * (last.first_triangle + last.triangles - first.first_triangle);
+  for (; vertex != end; ++vertex) *vertex += shift;
   return true;
 }
 
