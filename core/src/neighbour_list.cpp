@@ -347,6 +347,7 @@ std::size_t NeighbourList::bytes() const {
   std::size_t total = size_of(l.reference, l.source, l.images, l.shift, l.position, l.normal, l.force, l.turn, l.cells,
                               l.cell, l.order, l.unsorted_shift, l.image_source, l.grid.start, l.grid.x, l.grid.y,
                               l.grid.z, l.grid.image, l.block, l.block_move2);
+  for (const std::vector<packed::Row>& rows : l.ellipsoid) total += size_of(rows);
   for (const packed::ListBlock& b : l.block) {
     total += size_of(b.owner, b.neighbour, b.near_x, b.near_y, b.near_z, b.near_index);
   }

@@ -87,6 +87,23 @@ struct SurfaceNumbers {
 void surface_loads(const SurfaceNumbers& law, const ListBlock& list, const Row* position, const Row* normal,
                    Row* force, Row* turn);
 
+/// Gay-Berne ellipsoids; powers are whole.
+struct GayBerneNumbers {
+  double range2 = 0.0;
+  double epsilon4 = 0.0;  ///< 4 eps
+  double slope = 0.0;     ///< 24 eps / sigma
+  double sigma = 0.0;
+  double shift = 0.0;     ///< gamma sigma
+  double volume2 = 0.0;   ///< 2 l^2
+  int upsilon = 0;
+  int mu = 0;
+};
+/// Diagonals (xx, yy, zz) and other elements (yz, zx, xy) of the matrices G_X, then of B_X, of all points.
+using EllipsoidRows = std::array<const Row*, 4>;
+/// Adds forces and torques to the rows of both particles of each pair.
+void gay_berne_loads(const GayBerneNumbers& law, const ListBlock& list, const Row* position,
+                     const EllipsoidRows& ellipsoid, Row* force, Row* torque);
+
 /// Largest squared distance of two sets of points, shape [points][3].
 double largest_move2(const double* now, const double* before, std::size_t points);
 

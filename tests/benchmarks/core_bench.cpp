@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/support.h"
+#include "supple/core/gay_berne.h"
 #include "supple/core/hash.h"
 #include "supple/core/integrate.h"
 #include "supple/core/neighbour_list.h"
@@ -82,6 +83,18 @@ std::uint64_t hash_of(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return hasher.value();
 }
 
+std::vector<double> read_doubles(const std::string& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) {
+    std::fprintf(stderr, "%s: cannot be read\n", path.c_str());
+    std::exit(2);
+  }
+  std::vector<double> values(static_cast<std::size_t>(in.tellg()) / sizeof(double));
+  in.seekg(0);
+  in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(double)));
+  return values;
+}
+
 /// Lennard-Jones atoms in reduced units: m = epsilon = sigma = 1, cut-off 2.5, skin 0.3, time step 0.005.
 struct Melt {
   PeriodicBox box;
@@ -112,14 +125,7 @@ struct Melt {
   }
   /// Box length, positions and velocities as doubles in a file.
   explicit Melt(const std::string& path) {
-    std::ifstream in(path, std::ios::binary | std::ios::ate);
-    if (!in) {
-      std::fprintf(stderr, "%s: cannot be read\n", path.c_str());
-      std::exit(2);
-    }
-    std::vector<double> values(static_cast<std::size_t>(in.tellg()) / sizeof(double));
-    in.seekg(0);
-    in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(double)));
+    const std::vector<double> values = read_doubles(path);
     box.length = Vec3(values[0], values[1], values[2]);
     const std::size_t n = (values.size() - 3) / 6;
     for (std::size_t i = 0; i < n; ++i) {
@@ -196,6 +202,105 @@ void bench_melt(Melt melt, int steps, int repeats) {
                  field("list_bytes_per_particle", static_cast<double>(melt.list.bytes()) / n) + ", " +
                  field("atom_steps_per_s", n / best) + ", " + thermo + ", " + melt.thermo("last"),
          .hash = hash_of(melt.x, melt.v)});
+}
+
+/// Gay-Berne ellipsoids in reduced units: axes 1, 1.5 and 2, wells 1, 0.5 and 0.2, cut-off 4, time step 0.002.
+struct Ellipsoids {
+  static constexpr double kRange = 4.0, kMass = 1.5;
+  const GayBerne law{.radii = Vec3(0.5, 0.75, 1.0), .well = Vec3(1.0, 0.5, 0.2), .upsilon = 3, .mu = 1};
+  PeriodicBox box;
+  ParticleSet set;
+  ParticleState state;
+
+  void add(const Vec3& x, const Vec3& v, const Quat& q) {
+    const Vec3 r2 = law.radii.cwiseAbs2();
+    set.mass.push_back(kMass);
+    set.inertia.push_back(kMass / 5.0 * Vec3(r2.y() + r2.z(), r2.z() + r2.x(), r2.x() + r2.y()));
+    set.normal.push_back(Vec3::UnitZ());
+    set.object.push_back(0);
+    set.pinned.push_back(0);
+    state.position.push_back(x);
+    state.velocity.push_back(v);
+    state.orientation.push_back(q);
+    state.angular_momentum.push_back(Vec3::Zero());
+  }
+  /// Density 0.22, side^3 ellipsoids.
+  explicit Ellipsoids(int side) {
+    test::Draw draw(982381);
+    const double edge = std::cbrt(1.0 / 0.22);
+    box.length = Vec3::Constant(side * edge);
+    for (int i = 0; i < side * side * side; ++i) {
+      add(edge * Vec3(i / side / side, i / side % side, i % side), draw.vector(1.5), draw.rotation());
+    }
+  }
+  /// Box length, positions, velocities, orientations (w, x, y, z) and angular momenta as doubles in a file.
+  explicit Ellipsoids(const std::string& path) {
+    const std::vector<double> values = read_doubles(path);
+    box.length = Vec3(values[0], values[1], values[2]);
+    const std::size_t n = (values.size() - 3) / 13;
+    const double* const x = values.data() + 3;
+    const double* const v = x + 3 * n;
+    const double* const q = v + 3 * n;
+    const double* const l = q + 4 * n;
+    for (std::size_t i = 0; i < n; ++i) {
+      add(Vec3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), Vec3(v[3 * i], v[3 * i + 1], v[3 * i + 2]),
+          Quat(q[4 * i], q[4 * i + 1], q[4 * i + 2], q[4 * i + 3]));
+      state.angular_momentum.back() = Vec3(l[3 * i], l[3 * i + 1], l[3 * i + 2]);
+    }
+  }
+  /// Energies per particle, by the law of one pair over the pairs of the list.
+  [[nodiscard]] std::string thermo(const NeighbourList& list, const std::string& prefix) const {
+    double potential = 0.0;
+    for (const IndexPair& pair : list.pairs()) {
+      const Vec3 r = box.nearest_image(state.position[pair.second] - state.position[pair.first]);
+      if (r.norm() >= kRange) continue;
+      potential += evaluate(law, PairPose{.r = r,
+                                          .orientation_a = state.orientation[pair.first],
+                                          .orientation_b = state.orientation[pair.second]})
+                       .energy;
+    }
+    const auto n = static_cast<double>(set.size());
+    return field((prefix + "_potential").c_str(), potential / n) + ", " +
+           field((prefix + "_energy").c_str(), (potential + measure_motion(set, state).kinetic_energy) / n);
+  }
+};
+
+void bench_ellipsoids(Ellipsoids all, int steps, int repeats) {
+  const Executor executor(1);
+  const ParticleState start = all.state;
+  double best = std::numeric_limits<double>::infinity();
+  std::string thermo;
+  std::size_t builds = 0;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    NeighbourList list(Ellipsoids::kRange, 0.5, all.box);
+    const ForceModel forces = [&](const ParticleState& state, double, ForceSample& out) {
+      builds += list.update(state.position, executor) ? 1 : 0;
+      out.internal.reset(state.size());
+      out.external.reset(state.size());
+      accumulate_geometric(list, all.law, state.orientation, executor, out.internal);
+    };
+    all.state = start;
+    KickState kick;
+    Ledger ledger;
+    list.update(all.state.position, executor);
+    if (repeat == 0) thermo = all.thermo(list, "first");
+    builds = 0;
+    const double begin = seconds(CLOCK_PROCESS_CPUTIME_ID);
+    for (int k = 0; k < steps; ++k) {
+      advance(all.set, {}, forces, 0.002 * k, 0.002, all.state, kick, ledger);
+    }
+    best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - begin) / steps);
+    if (repeat + 1 == repeats) {
+      list.update(all.state.position, executor);
+      thermo += ", " + all.thermo(list, "last");
+    }
+  }
+  print({.name = "gay_berne/steps=" + std::to_string(steps),
+         .particles = all.set.size(),
+         .time = best,
+         .rate = field("builds", static_cast<double>(builds)) + ", " +
+                 field("particle_steps_per_s", static_cast<double>(all.set.size()) / best) + ", " + thermo,
+         .hash = hash_of(all.state.position, all.state.angular_momentum)});
 }
 
 void bench_threads() {
@@ -324,11 +429,14 @@ void bench_spiral(int count, bool rubs) {
 
 }  // namespace
 
-/// @param argv  melt [FILE [STEPS]], threads, surface, lists, spiral; all when absent
+/// @param argv  melt [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, surface, lists, spiral; all when absent
 int main(int argc, char** argv) {
   const std::string_view what = argc > 1 ? argv[1] : "";
   const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };
   if (wanted("melt")) bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), argc > 3 ? std::atoi(argv[3]) : 100, 3);
+  if (wanted("ellipsoids")) {
+    bench_ellipsoids(argc > 2 ? Ellipsoids(argv[2]) : Ellipsoids(20), argc > 3 ? std::atoi(argv[3]) : 50, 3);
+  }
   if (wanted("surface")) {
     for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_surface_laws(count);
   }

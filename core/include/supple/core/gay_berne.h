@@ -1,0 +1,38 @@
+/// @file supple/core/gay_berne.h
+/// The Gay-Berne pair law of equal ellipsoids (Gay & Berne 1981, in the form for three unequal axes of Everaers &
+/// Ejtehadi 2003, and of LAMMPS' pair_style gayberne): a Lennard-Jones potential of the distance between surfaces,
+/// stronger or weaker by the directions of approach.
+#pragma once
+
+#include <span>
+
+#include "supple/core/neighbour_list.h"
+#include "supple/core/pair_laws.h"
+
+namespace supple::core {
+
+/// U = 4 epsilon (rho^12 - rho^6) eta chi with rho = sigma / (d - sigma_12 + gamma sigma), G = G_A + G_B, B = B_A + B_B,
+///   sigma_12 = (u^T G^-1 u / 2)^(-1/2), u = r/d    the distance at which the ellipsoids would touch,
+///   eta = (2 l^2 / det G)^(upsilon/2), l = (a b + c^2) sqrt(a b),
+///   chi = (2 u^T B^-1 u)^mu,
+/// where G_X = Q_X diag(a^2, b^2, c^2) Q_X^T and B_X = Q_X diag(well^(-1/mu)) Q_X^T. A sphere of radius sigma/2 with
+/// wells 1 and gamma 1 is a Lennard-Jones particle. @pre d - sigma_12 + gamma sigma > 0: deep overlap has no energy
+struct GayBerne {
+  double epsilon = 1.0;                   ///< [J]
+  double sigma = 1.0;                     ///< [m], > 0
+  double gamma = 1.0;                     ///< shift of the distance [sigma]
+  Vec3 radii = Vec3::Constant(0.5);       ///< half axes a, b, c along the body axes [m], > 0
+  Vec3 well = Vec3::Ones();               ///< depth of the well for approach along each body axis [epsilon], > 0
+  int upsilon = 1;                        ///< >= 0
+  int mu = 1;                             ///< >= 1
+};
+
+/// The law without a cut-off. @pre d > 0
+[[nodiscard]] PairLoad evaluate(const GayBerne& law, const PairPose& pose);
+
+/// Adds forces and torques between all particles of a list, cut off at its range without a shift.
+/// @param orientations  body to world, shape [particles]
+void accumulate_geometric(NeighbourList& list, const GayBerne& law, std::span<const Quat> orientations,
+                          const Executor& executor, Loads& loads);
+
+}  // namespace supple::core

