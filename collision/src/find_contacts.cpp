@@ -22,6 +22,8 @@ bool allowed(std::span<const ContactBody> bodies, const ContactRules& rules, std
   return !(bodies[a].fixed && bodies[b].fixed) && (!rules.allowed || rules.allowed(a, b));
 }
 
+}  // namespace
+
 std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules) {
   const auto pairs_of = [](std::uint64_t n) { return n == 0 ? 0 : n * (n - 1) / 2; };
   if (!rules.allowed) {
@@ -34,6 +36,8 @@ std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRu
   }
   return count;
 }
+
+namespace {
 
 /// Mean distance of the samples of a body [m]; 0 without samples.
 double sample_spacing(const ContactBody& body) {
@@ -81,33 +85,35 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
 
 }  // namespace
 
-std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
-                                  std::uint64_t* present) {
-  const auto count = static_cast<std::uint32_t>(bodies.size());
-  std::vector<Box> box(count);
-  for (std::uint32_t i = 0; i < count; ++i) box[i] = bodies[i].field.surface_box();
-  const int axis = longest_axis(box);
-
+std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes) {
+  const int axis = longest_axis(boxes);
   std::vector<std::uint32_t> order;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if (!box[i].empty()) order.push_back(i);
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
+    if (!boxes[i].empty()) order.push_back(i);
   }
   std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
-    return box[i].lower[axis] != box[j].lower[axis] ? box[i].lower[axis] < box[j].lower[axis] : i < j;
+    return boxes[i].lower[axis] != boxes[j].lower[axis] ? boxes[i].lower[axis] < boxes[j].lower[axis] : i < j;
   });
-
   std::vector<BodyPair> pairs;
   std::vector<std::uint32_t> open;  // boxes that reach the sweep position
   for (const std::uint32_t i : order) {
-    std::erase_if(open, [&](std::uint32_t j) { return box[j].upper[axis] < box[i].lower[axis]; });
+    std::erase_if(open, [&](std::uint32_t j) { return boxes[j].upper[axis] < boxes[i].lower[axis]; });
     for (const std::uint32_t j : open) {
-      if (!box[i].overlaps(box[j])) continue;
-      const BodyPair pair{std::min(i, j), std::max(i, j)};
-      if (allowed(bodies, rules, pair.a, pair.b)) pairs.push_back(pair);
+      if (boxes[i].overlaps(boxes[j])) pairs.push_back({std::min(i, j), std::max(i, j)});
     }
     open.push_back(i);
   }
   std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
+                                  std::uint64_t* present) {
+  std::vector<Box> box;
+  box.reserve(bodies.size());
+  for (const ContactBody& body : bodies) box.push_back(body.field ? body.field.surface_box() : Box{});
+  std::vector<BodyPair> pairs = overlapping_boxes(box);
+  std::erase_if(pairs, [&](const BodyPair& pair) { return !allowed(bodies, rules, pair.a, pair.b); });
   if (present != nullptr) *present = count_allowed(bodies, rules);
   return pairs;
 }

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "supple/core/error.h"
+#include "supple/core/hash.h"
 #include "supple/core/math.h"
 #include "supple/core/neighbours.h"
 
@@ -75,16 +76,36 @@ Arrangement arrange_ring(int count, double radius, NormalDirection normal) {
 
 Arrangement arrange_line(int count, double spacing) { return arrange_grid(count, 1, spacing); }
 
-Arrangement arrange_grid(int columns, int rows, double spacing) {
-  SUPPLE_EXPECTS(columns >= 1 && rows >= 1 && spacing > 0.0);
+Arrangement arrange_grid(int columns, int rows, double spacing, int layers) {
+  SUPPLE_EXPECTS(columns >= 1 && rows >= 1 && layers >= 1 && spacing > 0.0);
   Arrangement out;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      out.position.emplace_back(spacing * (column - 0.5 * (columns - 1)), spacing * (row - 0.5 * (rows - 1)), 0.0);
-      out.orientation.push_back(Quat::Identity());
+  const auto centred = [spacing](int index, int count) { return spacing * (index - 0.5 * (count - 1)); };
+  for (int layer = 0; layer < layers; ++layer) {
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        out.position.emplace_back(centred(column, columns), centred(row, rows), centred(layer, layers));
+        out.orientation.push_back(Quat::Identity());
+      }
     }
   }
   return out;
+}
+
+void disorder(Arrangement& arrangement, double distance) {
+  SUPPLE_EXPECTS(distance >= 0.0);
+  for (std::uint64_t i = 0; i < arrangement.size(); ++i) {
+    Vec3 way;
+    std::uint64_t draw = 0;
+    do {  // the first point of a cube that lies in the ball
+      for (int k = 0; k < 3; ++k) {
+        Hasher hasher;
+        hasher.add(i);
+        hasher.add(draw++);
+        way[k] = 2.0 * static_cast<double>(hasher.value() >> 11) * 0x1p-53 - 1.0;
+      }
+    } while (way.squaredNorm() > 1.0);
+    arrangement.position[i] += distance * way;
+  }
 }
 
 Arrangement arrange_geodesic(int frequency, double radius) {

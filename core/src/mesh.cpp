@@ -32,6 +32,17 @@ void Mesh::clear() {
   columns.clear();
 }
 
+void add_quadrangle(Mesh& mesh, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const auto first = static_cast<std::uint32_t>(mesh.position.size());
+  const Vec3 normal = (b - a).cross(d - a).normalized();
+  for (const Vec3& corner : {a, b, c, d}) {
+    mesh.position.push_back(corner);
+    mesh.normal.push_back(normal);
+  }
+  mesh.triangle.push_back({first, first + 1, first + 2});
+  mesh.triangle.push_back({first, first + 2, first + 3});
+}
+
 void append(Mesh& mesh, const Mesh& other) {
   const auto offset = static_cast<std::uint32_t>(mesh.vertex_count());
   mesh.position.insert(mesh.position.end(), other.position.begin(), other.position.end());

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "single_part.h"
 #include "supple/core/error.h"
 #include "supple/implicit/field.h"
 
@@ -19,13 +20,7 @@ void HalfSpace::evaluate(std::span<const Vec3> points, std::span<double> values,
 }
 
 void HalfSpace::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
-  const std::size_t n = points.size();
-  parts.offset.resize(n + 1);
-  for (std::size_t i = 0; i <= n; ++i) parts.offset[i] = static_cast<std::uint32_t>(i);
-  parts.part.assign(n, 0);
-  parts.value.resize(n);
-  parts.gradient.resize(n);
-  evaluate(points, parts.value, parts.gradient);
+  evaluate_single_part(*this, points, parts);
 }
 
 Interval HalfSpace::bound(const Box& box) const {

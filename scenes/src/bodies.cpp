@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <numeric>
 
 #include "supple/scenes/model.h"
 
@@ -36,8 +37,15 @@ void take_part(const ObjectModel& object, Body& body) {
 
 }  // namespace
 
+const std::string& body_name(const Model& model, const std::vector<Body>& bodies, std::size_t body) {
+  return body < bodies.size() ? bodies[body].name : model.fixed[body - bodies.size()].name;
+}
+
 std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) {
-  const std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, links);
+  std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, links);
+  for (const ObjectModel& object : model.objects) {
+    if (object.separate) std::iota(piece.begin() + object.first, piece.begin() + object.last, object.first);
+  }
   std::vector<std::size_t> body_of(piece.size());  // by the particle that names the piece, its smallest
   std::vector<Body> bodies;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
@@ -61,18 +69,22 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
 }
 
 collision::ContactRules make_body_rules(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
-  const auto ground = static_cast<std::uint32_t>(bodies.size());
-  std::vector<std::uint32_t> object(bodies.size() + 1), leader(bodies.size() + 1, kElsewhere);
+  const auto count = static_cast<std::uint32_t>(bodies.size() + model.fixed.size());
+  std::vector<std::uint32_t> object(count), leader(count, kElsewhere);
+  std::vector<std::uint8_t> separate(count, 0);
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     object[k] = bodies[k].object;
     leader[k] = bodies[k].particle.front();
+    separate[k] = model.objects[object[k]].separate ? 1 : 0;
   }
-  object[ground] = static_cast<std::uint32_t>(model.objects.size());
+  for (std::size_t k = bodies.size(); k < count; ++k) {
+    object[k] = static_cast<std::uint32_t>(model.objects.size() + k - bodies.size());
+  }
 
   collision::ContactRules rules;
   for (const auto& override : model.rules.overrides) {
-    for (std::uint32_t a = 0; a <= ground; ++a) {
-      for (std::uint32_t b = a + 1; b <= ground; ++b) {
+    for (std::uint32_t a = 0; a < count; ++a) {
+      for (std::uint32_t b = a + 1; b < count; ++b) {
         if (collision::BodyPair{object[a], object[b]} == override.pair) {
           rules.overrides.push_back({{a, b}, override.material});
         }
@@ -81,8 +93,9 @@ collision::ContactRules make_body_rules(const Model& model, const std::vector<Bo
   }
   std::sort(rules.overrides.begin(), rules.overrides.end(),
             [](const auto& x, const auto& y) { return x.pair < y.pair; });
-  rules.allowed = [&allowed = model.rules.allowed, object, leader, apart](std::uint32_t a, std::uint32_t b) {
+  rules.allowed = [&allowed = model.rules.allowed, object, leader, separate, apart](std::uint32_t a, std::uint32_t b) {
     if (object[a] != object[b]) return !allowed || allowed(object[a], object[b]);
+    if (separate[a] != 0) return true;
     return std::binary_search(apart.begin(), apart.end(),
                               collision::BodyPair{std::min(leader[a], leader[b]), std::max(leader[a], leader[b])});
   };

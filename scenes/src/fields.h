@@ -65,8 +65,10 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive.required("spacing", d.spacing, only(above(0.0, kLength), {Line, Grid}), "between neighbours");
   archive.required("columns", d.columns, only(between(1.0, 1e4, kNumber), {Grid}), "along x");
   archive.required("rows", d.rows, only(between(1.0, 1e4, kNumber), {Grid}), "along y");
+  archive("layers", d.layers, only(between(1.0, 1e4, kNumber), {Grid}), "along z");
   archive.required("file", d.file, only({}, {File}), "CSV of x, y, z [m], relative to the scene's folder");
   archive("normal", d.normal, only({}, {Ring, Spiral}), "where particle normals point: along the axis, or out of the curve");
+  archive("disorder", d.disorder, at_least(0.0, kLength), "each particle is moved at random by up to this, alike in every run");
   archive("at", d.at, any(kLength), "where the origin of the arrangement goes");
   archive("axis", d.axis, direction(), "where its z axis goes");
   archive("angle_deg", d.angle, degrees(-360.0, 360.0), "turn about its own axis, made first");
@@ -372,7 +374,7 @@ void fields(Archive& archive, LoadDesc& d) {
     case ArrangeKind::Line:
     case ArrangeKind::Ring:
     case ArrangeKind::Spiral: return d.count;
-    case ArrangeKind::Grid: return d.columns * d.rows;
+    case ArrangeKind::Grid: return d.columns * d.rows * d.layers;
     case ArrangeKind::Geodesic: return 10 * d.frequency * d.frequency + 2;
     case ArrangeKind::File: break;
   }
@@ -406,6 +408,7 @@ template <class Archive>
 void fields(Archive& archive, ObjectDesc& d) {
   archive.required("name", d.name, identifier(), "unique; objects are numbered in the order of their names");
   archive.required("particles", d.particles, {}, "who is there");
+  archive("separate", d.separate, {}, "each particle is a body of its own, which touches the others");
   archive("kinds", d.kinds, {}, "hinges and types; particles not named are standard, of type 0");
   archive("hinges_join", d.hinges_join, {}, "whether the interactions act between two hinges");
   archive("interactions", d.interactions, {}, "what holds them together");
@@ -421,6 +424,9 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("loads", d.loads, {}, "external forces and torques");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
+  archive.check(!d.separate || (d.interactions.empty() && d.kinds.empty()), "separate",
+                "expected no interactions or kinds in an object of separate bodies", "some",
+                "remove them, or 'separate'");
   archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
   const bool geometric = std::any_of(d.interactions.begin(), d.interactions.end(), [](const auto& i) { return i.geometric; });
@@ -448,7 +454,7 @@ void fields(Archive& archive, RestitutionDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, PairDesc& d) {
-  archive.required("objects", d.objects, identifier().items(2, 2), "two names; 'ground' is the ground");
+  archive.required("objects", d.objects, identifier().items(2, 2), "two names of objects or obstacles; 'ground' is the ground");
   archive("collide", d.collide, {}, "whether they can touch");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "instead of sqrt(mu_A mu_B)");
   archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "instead of the materials'");
@@ -517,21 +523,46 @@ void fields(Archive& archive, OutputDesc& d) {
   archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");
 }
 
-/// Object names are unique, none is "ground", and pairs name what is there.
+template <class Archive>
+void fields(Archive& archive, ObstacleDesc& d) {
+  using enum ObstacleName;
+  const auto only = [&d](const Rule& rule, ObstacleName shape) { return rule.only("shape", d.shape, {shape}); };
+  archive.required("name", d.name, identifier(), "unique, also among the objects");
+  archive("shape", d.shape, {}, "plane, box, or heights over x and y");
+  archive("at", d.at, any(kLength), "a point of the plane, the middle of the box, added to the heights");
+  archive("normal", d.normal, only(direction(), Plane), "out of the solid");
+  archive("extent", d.extent, only(above(0.0, kLength), Plane), "half the edge of the square that is drawn");
+  archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength), Box), "along its x, y, z");
+  archive("rounding", d.rounding, only(at_least(0.0, kLength), Box), "radius of its edges in contact");
+  archive("turn_axis", d.turn_axis, only(direction(), Box), "with turn_deg");
+  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), Box), "rotation");
+  archive.required("file", d.file, only({}, Heights), "CSV of x, y, z [m] on a regular grid, relative to the scene's folder");
+  archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
+  archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
+  archive("visible", d.visible, {}, "drawn");
+  archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is modulus times slope times depth");
+  archive("slope", d.slope, above(0.0, kSlope), "of its field");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
+  archive.check(d.shape != Box || d.rounding <= d.half_sizes.minCoeff(), "rounding", "expected at most the least half size",
+                number_text(d.rounding), "");
+}
+
+/// Names of objects and obstacles are unique, none is "ground", and pairs name what is there.
 template <class Archive>
 void check_names(Archive& archive, const Scene& d) {
-  std::map<std::string_view, std::size_t> index;
-  for (std::size_t i = 0; i < d.objects.size(); ++i) {
-    const std::string& name = d.objects[i].name;
-    const std::string key = "objects[" + std::to_string(i) + "].name";
+  std::map<std::string_view, std::string> index;
+  const auto check_unique = [&](const std::string& name, const std::string& place) {
+    const std::string key = place + ".name";
     archive.check(name != "ground", key, "expected a name other than 'ground'", "", "'ground' stands for the ground in pairs");
-    const auto [first, fresh] = index.try_emplace(name, i);
+    const auto [first, fresh] = index.try_emplace(name, place);
     archive.check(fresh || name.empty(), key, "expected a unique name", '\'' + shown(name) + '\'',
-                  "objects[" + std::to_string(first->second) + "] has it already");
-  }
+                  first->second + " has it already");
+  };
+  for (std::size_t i = 0; i < d.objects.size(); ++i) check_unique(d.objects[i].name, "objects[" + std::to_string(i) + ']');
+  for (std::size_t i = 0; i < d.obstacles.size(); ++i) check_unique(d.obstacles[i].name, "obstacles[" + std::to_string(i) + ']');
   if (index.contains("")) return;  // a name is missing, so nothing can be said about pairs
   std::vector<std::string_view> names;
-  for (const auto& [name, i] : index) names.push_back(name);
+  for (const auto& [name, place] : index) names.push_back(name);
   if (d.ground) names.emplace_back("ground");
   std::map<std::pair<std::string, std::string>, std::size_t> pairs;
   for (std::size_t k = 0; k < d.pairs.size(); ++k) {
@@ -562,6 +593,7 @@ void fields(Archive& archive, Scene& d) {
   archive("time_step", d.time_step, {}, "how finely time is cut");
   archive("integrator", d.integrator, {}, "how a step is made");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
+  archive("obstacles", d.obstacles, {}, "solids that stand still");
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
   archive("contact", d.contact, {}, "how contact is computed");
   archive("camera", d.camera, {}, "who looks on");

@@ -45,6 +45,9 @@ template <> struct EnumNames<ShapeName> {
                                                           "box",       "ellipsoid", "triangle", "polygon",  "ring",
                                                           "arc",       "curve",    "superquadric", "directed"};
 };
+template <> struct EnumNames<ObstacleName> {
+  static constexpr std::array<std::string_view, 3> names{"plane", "box", "heights"};
+};
 template <> struct EnumNames<KernelName> {
   static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",
                                                          "nishimura", "blinn",   "cauchy",      "blanc_schlick"};

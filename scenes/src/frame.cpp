@@ -46,7 +46,7 @@ void index(const StageContext& context, std::size_t i, Frame& frame) {
   frame.indexed[i] = 1;
 }
 
-/// The bodies of contact by index, then the ground. Bodies without contact keep an empty view.
+/// The bodies of contact by index, then the fixed ones. Bodies without contact keep an empty view.
 void view_bodies(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   const Model& model = context.model;
   static const Pose kStill{};
@@ -63,10 +63,10 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
     body.angular_velocity = frame.spin[i];
     body.samples = &frame.samples[i];
   }
-  if (model.has_ground) {
-    collision::ContactBody& body = frame.bodies.back();
-    body.field = model.ground;
-    body.material = model.ground_material;
+  for (std::size_t k = 0; k < model.fixed.size(); ++k) {
+    collision::ContactBody& body = frame.bodies[context.bodies.size() + k];
+    body.field = model.fixed[k].field();
+    body.material = model.fixed[k].material;
     body.pose = {&kStill, 1};
     body.velocity = {&kZero, 1};
     body.angular_velocity = {&kZero, 1};
@@ -74,33 +74,25 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
   }
 }
 
-Box body_reach(const StageContext& context, const Frame& frame, std::size_t body) {
-  return body < context.bodies.size() ? frame.reach[body] : context.model.ground.surface_box();
-}
-
-bool may_touch(const StageContext& context, std::size_t body) {
-  return body < context.bodies.size() ? collides(context, context.bodies[body]) : context.model.has_ground;
-}
-
 /// Flags the parts of each body whose supports reach another body: the only ones that are sampled. A rule on State
 /// alone, so it decides which kept distances move on.
 void flag_active_parts(const StageContext& context, Frame& frame) {
-  const std::size_t count = context.bodies.size() + (context.model.has_ground ? 1 : 0);
-  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
-    const Body& body = context.bodies[i];
-    frame.active[i].assign(body.particle.size(), 0);
-    if (!collides(context, body)) continue;
-    for (std::size_t j = 0; j < count; ++j) {
-      if (j == i || !may_touch(context, j)) continue;
-      const auto low = static_cast<std::uint32_t>(std::min(i, j));
-      const auto high = static_cast<std::uint32_t>(std::max(i, j));
-      if (!context.rules.allowed(low, high)) continue;
-      const Box other = body_reach(context, frame, j);
-      if (!frame.reach[i].overlaps(other)) continue;
-      for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
-        if (frame.placed[i].support[k].overlaps(other)) frame.active[i][body.skeleton.primitive[k].part] = 1;
-      }
+  const std::size_t moving = context.bodies.size();
+  std::vector<Box>& reach = frame.reach;
+  for (std::size_t i = 0; i < moving; ++i) {
+    frame.active[i].assign(context.bodies[i].particle.size(), 0);
+    if (!collides(context, context.bodies[i])) reach[i] = {};
+  }
+  const auto flag = [&](std::size_t i, const Box& other) {
+    if (i >= moving) return;
+    for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
+      if (frame.placed[i].support[k].overlaps(other)) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
     }
+  };
+  for (const collision::BodyPair& pair : collision::overlapping_boxes(reach)) {
+    if ((pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b)) continue;
+    flag(pair.a, reach[pair.b]);
+    flag(pair.b, reach[pair.a]);
   }
 }
 
@@ -115,14 +107,16 @@ Frame::Frame(const Model& model, std::size_t body_count)
       velocity(body_count),
       spin(body_count),
       placed(body_count),
-      reach(body_count),
+      reach(body_count + model.fixed.size()),
       field(body_count),
       indexed(body_count, 0),
       active(body_count),
       samples(body_count),
-      bodies(body_count + (model.has_ground ? 1 : 0)),
+      bodies(body_count + model.fixed.size()),
       loads(bodies.size()),
-      dissipative(bodies.size()) {}
+      dissipative(bodies.size()) {
+  for (std::size_t k = 0; k < model.fixed.size(); ++k) reach[body_count + k] = model.fixed[k].field().surface_box();
+}
 
 StageTimer::StageTimer(StageProfile& profile, bool every_call) : profile_(profile) {
   if (every_call) {
@@ -201,14 +195,20 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     StageTimer timer(profile(Stage::FindContacts), context.every_call);
     const auto allowed = [&](std::uint32_t a, std::uint32_t b) {
       const auto usable = [&](std::uint32_t i) {
-        return i == bodies.size() || (collides(context, bodies[i]) && frame.indexed[i] != 0);
+        return i >= bodies.size() || (collides(context, bodies[i]) && frame.indexed[i] != 0);
       };
       return usable(a) && usable(b) && context.rules.allowed(a, b);
     };
     const collision::ContactRules rules{.overrides = {}, .allowed = std::ref(allowed)};
-    std::uint64_t present = 0;
-    frame.pairs = collision::broad_phase(frame.bodies, rules, &present);
-    profile(Stage::FindContacts).present += present;
+    frame.pairs = collision::broad_phase(frame.bodies, rules);
+    if (!frame.pairs_present) {
+      const auto present = [&](std::uint32_t a, std::uint32_t b) {
+        const auto there = [&](std::uint32_t i) { return i >= bodies.size() || collides(context, bodies[i]); };
+        return there(a) && there(b) && context.rules.allowed(a, b);
+      };
+      frame.pairs_present = collision::count_allowed(frame.bodies, {.overrides = {}, .allowed = present});
+    }
+    profile(Stage::FindContacts).present += *frame.pairs_present;
     profile(Stage::FindContacts).visited += frame.pairs.size();
     if (context.skip && frame.pairs.empty()) return;
     collision::find_contacts(frame.bodies, frame.pairs, context.executor, frame.candidates);
@@ -246,9 +246,9 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
     }
     core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, particle, out.internal);
   }
-  if (model.has_ground) {
-    out.force_on_fixed += frame.loads.back().force[0];
-    out.moment_on_fixed += frame.loads.back().torque[0];
+  for (std::size_t i = context.bodies.size(); i < frame.loads.size(); ++i) {
+    out.force_on_fixed += frame.loads[i].force[0];
+    out.moment_on_fixed += frame.loads[i].torque[0];
   }
   profile.visited += frame.surface.point.size();
   profile.present += frame.surface.point.size();

@@ -2,6 +2,7 @@
 /// capacity is reused from step to step.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "supple/collision/find_contacts.h"
@@ -26,8 +27,9 @@ struct Frame {
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;
   // find_contacts, solve_contact_surface, react
-  std::vector<collision::ContactBody> bodies;         ///< and the ground, last
+  std::vector<collision::ContactBody> bodies;         ///< and the fixed ones after them
   std::vector<collision::BodyPair> pairs;
+  std::optional<std::uint64_t> pairs_present;         ///< that the rules allow, once counted
   collision::ContactCandidates candidates;
   collision::ContactSurface surface;
   std::vector<collision::PartLoads> loads;    ///< by body
@@ -72,7 +74,7 @@ void place_and_index_all(const StageContext& context, const core::ParticleState&
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
                           std::vector<implicit::SampleState>& samples, Frame& frame);
 
-/// Stage 7: loads of the contact surface on particles; the loads on the ground are added to the sample apart.
+/// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
 
 /// Stage 9 on the deformed fields, one mesh an object; of several pieces the meshes lie side by side in it.

@@ -45,7 +45,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
     case ArrangeKind::Single: out = core::arrange_single(); break;
     case ArrangeKind::Line: out = core::arrange_line(d.count, d.spacing); break;
     case ArrangeKind::Ring: out = core::arrange_ring(d.count, d.radius, direction_of(d.normal)); break;
-    case ArrangeKind::Grid: out = core::arrange_grid(d.columns, d.rows, d.spacing); break;
+    case ArrangeKind::Grid: out = core::arrange_grid(d.columns, d.rows, d.spacing, d.layers); break;
     case ArrangeKind::Spiral:
       out = core::arrange_spiral(d.count, d.inner_radius, d.outer_radius, d.turns, direction_of(d.normal));
       break;
@@ -55,6 +55,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
       out.orientation.assign(out.position.size(), Quat::Identity());
       break;
   }
+  if (d.disorder > 0.0) core::disorder(out, d.disorder);
   core::place(out, Pose{d.at, from_z_to(d.axis) * turned(Vec3::UnitZ(), d.angle)});
   return out;
 }
@@ -664,6 +665,7 @@ Model build_model(const Scene& scene) {
     }
     set_kinds(d, key, object, model, faults);
     object.hinges_join = d.hinges_join;
+    object.separate = d.separate;
     add_pins_and_loads(d, key, object, model, faults);
     model.objects.push_back(std::move(object));
   }

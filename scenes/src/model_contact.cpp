@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "supple/core/error.h"
+#include "supple/core/io/mesh_files.h"
 #include "supple/core/math.h"
 
 namespace supple::scenes {
@@ -26,11 +27,17 @@ double lag(double x) {
   return sum;
 }
 
-std::uint32_t body_of(const Scene& scene, const std::string& name) {
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    if (scene.objects[i].name == name) return static_cast<std::uint32_t>(i);
+constexpr std::uint32_t kNobody = 0xffffffff;
+
+/// Index of an object, or of a fixed body after them.
+std::uint32_t body_of(const Model& model, const std::string& name) {
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    if (model.objects[i].name == name) return i;
   }
-  return static_cast<std::uint32_t>(scene.objects.size()) + (name == "ground" ? 0 : 1);
+  for (std::uint32_t i = 0; i < model.fixed.size(); ++i) {
+    if (model.fixed[i].name == name) return static_cast<std::uint32_t>(model.objects.size()) + i;
+  }
+  return kNobody;
 }
 
 /// Upper estimate of the angular frequency of one object's contact, sqrt(P k A / m): its pressure rises by P k a metre
@@ -53,11 +60,57 @@ double contact_frequency(const ObjectModel& object, const core::ParticleSet& par
   return std::sqrt(largest);
 }
 
+/// Heights at the points of a regular grid, in any order.
+implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults) {
+  std::vector<Vec3> points = io::read_points_csv(scene.source.parent_path() / d.file);
+  std::sort(points.begin(), points.end(), [](const Vec3& a, const Vec3& b) {
+    return a.y() != b.y() ? a.y() < b.y() : a.x() < b.x();
+  });
+  std::size_t columns = 0;
+  while (columns < points.size() && points[columns].y() == points[0].y()) ++columns;
+  const std::size_t rows = columns > 0 ? points.size() / columns : 0;
+  bool regular = columns >= 2 && rows >= 2 && columns * rows == points.size();
+  const double spacing = regular ? points[1].x() - points[0].x() : 1.0;
+  regular = regular && spacing > 0.0;
+  std::vector<double> heights;
+  for (std::size_t i = 0; i < points.size() && regular; ++i) {
+    const double x = points[0].x() + spacing * static_cast<double>(i % columns);
+    const double y = points[0].y() + spacing * static_cast<double>(i / columns);
+    regular = std::hypot(points[i].x() - x, points[i].y() - y) <= 1e-6 * spacing;
+    heights.push_back(points[i].z());
+  }
+  if (!regular) {
+    faults.add(key + ".file", "expected points of a regular grid in x and y, at least 2 by 2, equally far apart both ways",
+               std::to_string(points.size()) + " points that are not one", "");
+    return {Vec3::Zero(), 1.0, 2, 2, std::vector<double>(4, 0.0), 1.0};
+  }
+  return {Vec3(points[0].x(), points[0].y(), 0.0) + d.at, spacing, columns, rows, heights, d.slope};
+}
+
+void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
+  if (scene.ground && scene.ground->collides) {
+    const GroundDesc& d = *scene.ground;
+    model.fixed.push_back({.name = "ground",
+                           .solid = implicit::HalfSpace{Vec3(0.0, 0.0, d.height), Vec3::UnitZ(), d.slope},
+                           .material = {d.modulus, d.friction, 0.0}});
+  }
+  for (const ObstacleDesc& d : scene.obstacles) {
+    FixedBody body{.name = d.name, .solid = implicit::HalfSpace{d.at, d.normal, d.slope}, .material = {d.modulus, d.friction, 0.0}};
+    if (d.shape == ObstacleName::Box) {
+      const Pose pose{d.at, Quat(Eigen::AngleAxisd(d.turn, d.turn_axis))};
+      body.solid = implicit::SolidBox(pose, d.half_sizes, d.rounding, d.slope);
+    } else if (d.shape == ObstacleName::Heights) {
+      body.solid = height_field(scene, d, "obstacles." + d.name, faults);
+    }
+    model.fixed.push_back(std::move(body));
+  }
+}
+
 void add_pairs(const Scene& scene, Model& model, ModelFaults& faults, std::vector<BodyPair>& forbidden) {
-  const auto ground = static_cast<std::uint32_t>(model.objects.size());
-  const auto collides = [&](std::uint32_t body) { return body == ground ? model.has_ground : model.objects[body].collides; };
+  const auto n = static_cast<std::uint32_t>(model.objects.size());
+  const auto collides = [&](std::uint32_t body) { return body >= n || model.objects[body].collides; };
   const auto material = [&](std::uint32_t body) -> const collision::ContactMaterial& {
-    return body == ground ? model.ground_material : model.objects[body].material;
+    return body >= n ? model.fixed[body - n].material : model.objects[body].material;
   };
   for (std::size_t k = 0; k < scene.pairs.size(); ++k) {
     const PairDesc& d = scene.pairs[k];
@@ -69,12 +122,13 @@ void add_pairs(const Scene& scene, Model& model, ModelFaults& faults, std::vecto
     std::array<std::uint32_t, 2> body{};
     bool known = true;
     for (std::size_t side = 0; side < 2; ++side) {
-      body[side] = body_of(scene, d.objects[side]);
-      if (body[side] > ground || (body[side] == ground && !scene.ground)) {
-        faults.add(key + ".objects[" + std::to_string(side) + ']', "expected the name of an object",
-                   '\'' + shown(d.objects[side]) + '\'', "");
-        known = false;
-      }
+      body[side] = body_of(model, d.objects[side]);
+      if (body[side] != kNobody) continue;
+      known = false;
+      if (d.collide && !*d.collide) continue;  // a ground that collides with nothing
+      faults.add(key + ".objects[" + std::to_string(side) + ']',
+                 d.objects[side] == "ground" ? "expected a ground that collides" : "expected the name of an object",
+                 '\'' + shown(d.objects[side]) + '\'', d.objects[side] == "ground" ? "set ground.collides: true" : "");
     }
     if (!known) continue;
     const BodyPair pair{std::min(body[0], body[1]), std::max(body[0], body[1])};
@@ -89,7 +143,7 @@ void add_pairs(const Scene& scene, Model& model, ModelFaults& faults, std::vecto
     if (!collides(pair.a) || !collides(pair.b)) {
       const std::string& name = d.objects[collides(body[0]) ? 1 : 0];
       faults.add(key, "expected two objects with contact", '\'' + shown(name) + "' without",
-                 name == "ground" ? "set ground.collides: true" : "add 'contact: {}' to it, or set 'collide: false' here");
+                 "add 'contact: {}' to it, or set 'collide: false' here");
       continue;
     }
     collision::PairMaterial combined = collision::combine(material(pair.a), material(pair.b));
@@ -171,11 +225,7 @@ double dissipation_for(double restitution, double speed) {
 }
 
 void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
-  if (scene.ground) {
-    model.has_ground = scene.ground->collides;
-    model.ground = {.point = Vec3(0.0, 0.0, scene.ground->height), .normal = Vec3::UnitZ(), .slope = scene.ground->slope};
-    model.ground_material = {scene.ground->modulus, scene.ground->friction, 0.0};
-  }
+  add_fixed_bodies(scene, model, faults);
   model.contact.error = scene.contact.error;
   model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy
                                                                   : collision::SplitRule::Contribution;
@@ -196,9 +246,9 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   for (std::uint32_t i = 0; i < count; ++i) {
     ObjectModel& object = model.objects[i];
     if (!object.collides) continue;
-    bool touches = object.breaks;
-    for (std::uint32_t j = 0; j <= count && !touches; ++j) {
-      const bool other = j == count ? model.has_ground : j != i && model.objects[j].collides;
+    bool touches = object.breaks || object.separate;
+    for (std::uint32_t j = 0; j < count + model.fixed.size() && !touches; ++j) {
+      const bool other = j >= count || (j != i && model.objects[j].collides);
       touches = other && (!model.rules.allowed || model.rules.allowed(i, j));
     }
     if (!touches) continue;

@@ -18,7 +18,8 @@ namespace supple::scenes {
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
 [[nodiscard]] std::unique_ptr<render::Renderer> make_scene_renderer(const Scene& scene, render::ContextKind context);
-[[nodiscard]] render::Image render_scene(render::Renderer& renderer, const Scene& scene, const std::vector<Mesh>& meshes);
+[[nodiscard]] render::Image render_scene(render::Renderer& renderer, const Scene& scene, const Model& model,
+                                         const std::vector<Mesh>& meshes);
 
 void write_mesh_files(const std::filesystem::path& folder, const std::string& name, int frame,
                       const Simulation& simulation, const std::vector<Mesh>& meshes);

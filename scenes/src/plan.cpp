@@ -40,19 +40,21 @@ std::string list(std::initializer_list<std::pair<bool, const char*>> items) {
   return text;
 }
 
-/// Bodies that may touch another one, the ground included.
+/// Objects and fixed bodies that may touch another one; two for an object that may touch itself.
 std::size_t contact_body_count(const Model& model) {
   const auto n = static_cast<std::uint32_t>(model.objects.size());
-  const auto collides = [&](std::uint32_t i) { return i == n ? model.has_ground : model.objects[i].collides; };
+  const auto count = static_cast<std::uint32_t>(n + model.fixed.size());
+  const auto collides = [&](std::uint32_t i) { return i >= n || model.objects[i].collides; };
   std::size_t bodies = 0;
-  for (std::uint32_t a = 0; a <= n; ++a) {
+  for (std::uint32_t a = 0; a < count; ++a) {
     if (!collides(a)) continue;
     bool partner = false;
-    for (std::uint32_t b = 0; b <= n && !partner; ++b) {
-      partner = b != a && collides(b) &&
+    for (std::uint32_t b = 0; b < count && !partner; ++b) {
+      partner = b != a && collides(b) && !(a >= n && b >= n) &&
                 (!model.rules.allowed || model.rules.allowed(std::min(a, b), std::max(a, b)));
     }
-    bodies += a != n && model.objects[a].breaks ? 2 : partner ? 1 : 0;  // an object that breaks touches its own pieces
+    const bool itself = a < n && (model.objects[a].breaks || (model.objects[a].separate && model.objects[a].last > model.objects[a].first + 1));
+    bodies += itself ? 2 : partner ? 1 : 0;
   }
   return bodies;
 }

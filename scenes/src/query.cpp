@@ -27,7 +27,7 @@ double thread_cpu_seconds() {
 }
 
 std::string body_name(const Simulation& simulation, std::uint32_t body) {
-  return body < simulation.bodies().size() ? simulation.bodies()[body].name : "ground";
+  return body_name(simulation.model(), simulation.bodies(), body);
 }
 
 std::string rule_name(collision::ContactRule rule) {

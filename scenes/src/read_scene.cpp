@@ -170,7 +170,9 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   }
   faults.raise();
   // Ids follow names, so the order of the file changes no bit.
-  std::sort(scene.objects.begin(), scene.objects.end(), [](const ObjectDesc& a, const ObjectDesc& b) { return a.name < b.name; });
+  const auto by_name = [](const auto& a, const auto& b) { return a.name < b.name; };
+  std::sort(scene.objects.begin(), scene.objects.end(), by_name);
+  std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
   scene.content_hash = content_hash(*root);
   return scene;

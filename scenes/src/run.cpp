@@ -114,7 +114,7 @@ class FrameWriter {
       render::Image image;
       {
         const StageClock clock(simulation.profile(Stage::Render));
-        image = render_scene(*renderer_, scene_, *meshes);
+        image = render_scene(*renderer_, scene_, simulation.model(), *meshes);
       }
       const StageClock clock(simulation.profile(Stage::Export));
       render::write_png(frame_path(options_.folder, name_, frame), image);

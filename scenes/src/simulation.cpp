@@ -115,6 +115,7 @@ struct Simulation::Impl {
     }
     state.samples = std::move(samples);
     rules = make_body_rules(model, bodies, state.apart);
+    frame.pairs_present.reset();
   }
 
   /// Two pieces are apart when those that they broke from were.
@@ -128,6 +129,7 @@ struct Simulation::Impl {
     const ApartPairs old_pairs = std::move(state.apart);
     state.apart.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (model.objects[bodies[i].object].separate) continue;
       for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
         const auto [a, b] = std::minmax({origin(bodies[i]), origin(bodies[j])});
         if (std::binary_search(old_pairs.begin(), old_pairs.end(), collision::BodyPair{a, b})) {
@@ -148,7 +150,8 @@ struct Simulation::Impl {
       return pulled.field[i].surface_box();
     };
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (!model.objects[bodies[i].object].collides || bodies[i].skeleton.primitive.empty()) continue;
+      const ObjectModel& object = model.objects[bodies[i].object];
+      if (!object.collides || object.separate || bodies[i].skeleton.primitive.empty()) continue;
       for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
         const collision::BodyPair pair{bodies[i].particle.front(), bodies[j].particle.front()};
         if (bodies[j].skeleton.primitive.empty() || std::binary_search(state.apart.begin(), state.apart.end(), pair)) continue;
@@ -159,6 +162,7 @@ struct Simulation::Impl {
     state.apart.insert(state.apart.end(), fresh.begin(), fresh.end());
     std::sort(state.apart.begin(), state.apart.end());
     rules = make_body_rules(model, bodies, state.apart);
+    frame.pairs_present.reset();
   }
 
   [[nodiscard]] double frame_time() const { return 1.0 / scene.frame_rate; }

@@ -238,12 +238,12 @@ TEST(Pairs, ThatDoNotCollideRepelWhenBothCan) {
 TEST(Ground, IsTheLastBody) {
   const Model model = model_of(std::string(kHead) + kBall +
                                "ground: {height: -0.5, friction: 0.4}\npairs: [{objects: [ground, ball], friction: 0.1}]\n");
-  EXPECT_TRUE(model.has_ground);
-  EXPECT_EQ(model.ground.point.z(), -0.5);
+  ASSERT_EQ(model.fixed.size(), 1u);
+  EXPECT_EQ(std::get<implicit::HalfSpace>(model.fixed[0].solid).point.z(), -0.5);
   ASSERT_EQ(model.rules.overrides.size(), 1u);
   EXPECT_EQ(model.rules.overrides[0].pair, (collision::BodyPair{0, 1}));
   EXPECT_GT(model.objects[0].samples.size(), 0u);
-  EXPECT_FALSE(model_of(std::string(kHead) + kBall + "ground: {collides: false}\n").has_ground);
+  EXPECT_TRUE(model_of(std::string(kHead) + kBall + "ground: {collides: false}\n").fixed.empty());
 }
 
 TEST(Skeletons, GoToTheParticlesNamed) {

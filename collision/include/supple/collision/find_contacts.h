@@ -17,7 +17,13 @@ struct ContactCandidates {
   std::uint64_t pairs_present = 0;     ///< pairs that the rules allow, as `broad_phase` counts them
 };
 
-/// Pairs whose surface boxes overlap, by sweep and prune along the longest axis; sorted.
+/// Pairs of boxes that overlap, by sweep and prune along the longest axis; sorted. Empty boxes overlap nothing.
+[[nodiscard]] std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes);
+
+/// Pairs that the rules allow, touching or not; asks for each of them.
+[[nodiscard]] std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules);
+
+/// Pairs whose surface boxes overlap and that may touch, sorted.
 [[nodiscard]] std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
                                                 std::uint64_t* present = nullptr);
 

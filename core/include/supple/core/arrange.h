@@ -31,8 +31,10 @@ enum class NormalDirection : std::uint8_t {
 [[nodiscard]] Arrangement arrange_ring(int count, double radius, NormalDirection normal);
 /// `count` particles `spacing` apart along x, centred; normals +z.
 [[nodiscard]] Arrangement arrange_line(int count, double spacing);
-/// Rectangular grid, `columns` along x and `rows` along y, centred; normals +z.
-[[nodiscard]] Arrangement arrange_grid(int columns, int rows, double spacing);
+/// Grid, `columns` along x, `rows` along y and `layers` along z, centred; normals +z.
+[[nodiscard]] Arrangement arrange_grid(int columns, int rows, double spacing, int layers = 1);
+/// Moves every particle by a vector of a ball of radius `distance`, by its index alone: the same in every run.
+void disorder(Arrangement& arrangement, double distance);
 /// A closed shell: the icosahedron, each edge cut in `frequency` and its faces in triangles, projected to the sphere about
 /// the origin; 10 frequency^2 + 2 particles, normals outward, the first and the twelfth opposite. @pre frequency <= 31
 [[nodiscard]] Arrangement arrange_geodesic(int frequency, double radius);

@@ -31,6 +31,9 @@ struct Mesh {
 /// Puts `other` beside `mesh`. A column that only one of them has is 0 for the vertices of the other.
 void append(Mesh& mesh, const Mesh& other);
 
+/// Adds a flat face with four vertices of its own, counter-clockwise from outside.
+void add_quadrangle(Mesh& mesh, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+
 /// What a closed surface must satisfy, measured.
 struct MeshReport {
   bool closed = false;              ///< every edge has exactly two triangles

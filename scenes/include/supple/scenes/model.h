@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "supple/collision/deformed_field.h"
@@ -11,6 +12,7 @@
 #include "supple/core/interactions.h"
 #include "supple/core/links.h"
 #include "supple/implicit/field.h"
+#include "supple/implicit/solids.h"
 #include "supple/implicit/surface_samples.h"
 #include "supple/scenes/scene.h"
 
@@ -27,8 +29,19 @@ struct ObjectModel {
   bool collides = false;                  ///< has `contact` and a surface
   bool hinges_join = false;               ///< the laws act between two hinges
   bool breaks = false;                    ///< has `breaking`, so it may fall into pieces
+  bool separate = false;                  ///< each particle is a body of its own
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
+};
+
+/// A solid that stands still and touches every object that has contact.
+struct FixedBody {
+  std::string name;
+  std::variant<implicit::HalfSpace, implicit::SolidBox, implicit::HeightField> solid;
+  collision::ContactMaterial material;
+  [[nodiscard]] implicit::FieldView field() const {
+    return std::visit([](const auto& s) { return implicit::FieldView(s); }, solid);
+  }
 };
 
 struct Model {
@@ -38,10 +51,8 @@ struct Model {
   core::Interactions interactions;        ///< of the unbroken scene
   core::Links links;                      ///< what can break or yield
   std::vector<ObjectModel> objects;       ///< in the order of the scene (by name)
-  bool has_ground = false;                ///< the ground collides: it is the last contact body
-  implicit::HalfSpace ground;
-  collision::ContactMaterial ground_material;
-  collision::ContactRules rules;          ///< body index = object index; the ground is objects.size()
+  std::vector<FixedBody> fixed;           ///< the ground, if it collides, then the obstacles by name
+  collision::ContactRules rules;          ///< body index = object index; fixed bodies follow the objects
   collision::ContactSettings contact;
   collision::ReactionSettings reaction;
   collision::BulgeSettings bulge;
@@ -68,9 +79,11 @@ struct Body {
 /// touch each other: a fresh crack must first open. Part of State.
 using ApartPairs = std::vector<collision::BodyPair>;
 
+/// Name of a contact body: of a body, or of a fixed one.
+[[nodiscard]] const std::string& body_name(const Model& model, const std::vector<Body>& bodies, std::size_t body);
 /// The bodies at a state, in the order of objects and of smallest particles.
 [[nodiscard]] std::vector<Body> make_bodies(const Model& model, const core::LinkState& links);
-/// Model::rules for these bodies; the ground is bodies.size().
+/// Model::rules for these bodies, which the fixed ones follow.
 [[nodiscard]] collision::ContactRules make_body_rules(const Model& model, const std::vector<Body>& bodies,
                                                       const ApartPairs& apart);
 

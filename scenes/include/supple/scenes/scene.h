@@ -44,8 +44,10 @@ struct ParticlesDesc {
   double outer_radius = 0.0;          ///< spiral [m]
   double turns = 1.0;                 ///< spiral
   double spacing = 0.0;               ///< line, grid [m]
+  double disorder = 0.0;              ///< each particle is moved at random by up to this [m]
   int columns = 1;                    ///< grid
   int rows = 1;                       ///< grid
+  int layers = 1;                     ///< grid, along z
   std::string file;                   ///< CSV of x, y, z beside the scene
   NormalKind normal = NormalKind::Axis;
   Vec3 at = Vec3::Zero();             ///< where the arrangement's origin goes [m]
@@ -203,6 +205,7 @@ struct LoadDesc {
 struct ObjectDesc {
   std::string name;
   ParticlesDesc particles;
+  bool separate = false;                    ///< each particle is a body of its own
   std::vector<KindDesc> kinds;              ///< particles not named are standard, of type 0
   bool hinges_join = false;                 ///< two hinges have all laws between them
   std::vector<InteractionDesc> interactions;
@@ -227,7 +230,7 @@ struct RestitutionDesc {
 
 /// pairs[]: what two objects do that differs from their materials
 struct PairDesc {
-  std::vector<std::string> objects;   ///< two names; "ground" is the ground
+  std::vector<std::string> objects;   ///< two names of objects, obstacles or "ground"
   std::optional<bool> collide;
   std::optional<double> friction;
   std::optional<double> dissipation;
@@ -268,6 +271,28 @@ struct GroundDesc {
   double friction = 0.5;
 };
 
+enum class ObstacleName : std::uint8_t { Plane, Box, Heights };
+
+/// obstacles[]: solids that stand still and touch every object that has contact
+struct ObstacleDesc {
+  std::string name;
+  ObstacleName shape = ObstacleName::Box;
+  Vec3 at = Vec3::Zero();             ///< a point of the plane; the middle of the box; added to the heights [m]
+  Vec3 normal = Vec3::UnitZ();        ///< plane: outward
+  double extent = 2.0;                ///< plane: half the edge of the square that is drawn [m]
+  Vec3 half_sizes = Vec3::Zero();     ///< box [m]
+  double rounding = 0.0;              ///< box: radius of its edges [m]
+  Vec3 turn_axis = Vec3::UnitZ();     ///< box, with turn
+  double turn = 0.0;                  ///< box [rad] (key turn_deg)
+  std::string file;                   ///< heights: CSV of x, y, z on a regular grid, beside the scene
+  Vec3 colour = Vec3(0.72, 0.74, 0.78);  ///< sRGB
+  double roughness = 0.6;
+  bool visible = true;
+  double modulus = 1e6;               ///< P [Pa]
+  double slope = 1.0;                 ///< |grad F| [1/m]
+  double friction = 0.5;
+};
+
 struct ImagesDesc {
   std::vector<int> size = {1280, 720};
   int samples = 4;
@@ -297,6 +322,7 @@ struct Scene {
   TimeStepDesc time_step;
   IntegratorDesc integrator;
   std::vector<ObjectDesc> objects;    ///< sorted by name
+  std::vector<ObstacleDesc> obstacles;  ///< sorted by name
   std::vector<PairDesc> pairs;
   ContactDesc contact;
   CameraDesc camera;
