@@ -8,6 +8,7 @@
 #include "field_index.h"
 #include "field_lanes.h"
 #include "supple/core/error.h"
+#include "supple/core/math.h"
 
 namespace supple::implicit {
 namespace {
@@ -173,16 +174,23 @@ Field& Field::operator=(Field&&) noexcept = default;
 
 void Field::evaluate(std::span<const Vec3> points, std::span<double> values) const {
   SUPPLE_EXPECTS(points.size() == values.size());
+  if (index_->blend.active()) {
+    evaluate_blended(*index_, points, values.data(), nullptr);
+    return;
+  }
   evaluate_batch(*index_, points, values.data(), nullptr);
 }
 
 void Field::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
   SUPPLE_EXPECTS(points.size() == values.size() && points.size() == gradients.size());
+  if (index_->blend.active()) {
+    evaluate_blended(*index_, points, values.data(), gradients.data());
+    return;
+  }
   evaluate_batch(*index_, points, values.data(), gradients.data());
 }
 
-void Field::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
-  const Index& index = *index_;
+void part_rows(const Field::Index& index, std::span<const Vec3> points, FieldParts& parts) {
   const lanes::Primitives in{index.primitive.data(), index.shape.data(), 0.0, index.uniform};
   Scratch& scratch = Scratch::of_thread(index.size());
   parts.offset.assign(1, 0);
@@ -217,17 +225,34 @@ void Field::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) cons
     for (; begin < end; begin += kPack) {
       const std::size_t stop = std::min(begin + kPack, end);
       const lanes::Bounds box = lanes::bounds_of(points.data() + begin, stop - begin);
-      const bool scan = index.cull && index.size() <= Index::kScanLimit;
+      const bool scan = index.cull && index.size() <= Field::Index::kScanLimit;
       const std::size_t candidates = scan
                                          ? lanes::filter(index.leaf.data(), index.leaf.size(), box, scratch.ids.data())
                                          : query(index, box, scratch);
       add_rows(begin, stop, candidates);
     }
   };
-  if (index.size() <= Index::kScanLimit) {
+  if (index.size() <= Field::Index::kScanLimit) {
     add_points(0, points.size());
   } else {
     for_groups(index, points, [&](const Group& group) { add_points(group.begin, group.end); });
+  }
+}
+
+std::span<const std::uint32_t> candidates_of(const Field::Index& index, const Box& box) {
+  Scratch& scratch = Scratch::of_thread(index.size());
+  const lanes::Bounds bounds{{box.lower[0], box.lower[1], box.lower[2]}, {box.upper[0], box.upper[1], box.upper[2]}};
+  const bool scan = index.cull && index.size() <= Field::Index::kScanLimit;
+  const std::size_t count = scan ? lanes::filter(index.leaf.data(), index.leaf.size(), bounds, scratch.ids.data())
+                                 : query(index, bounds, scratch);
+  return {scratch.ids.data(), count};
+}
+
+void Field::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
+  if (index_->blend.active()) {
+    blended_part_rows(*index_, points, parts);
+  } else {
+    part_rows(*index_, points, parts);
   }
 }
 
@@ -243,34 +268,132 @@ FieldCounts Field::count(std::span<const Vec3> points) const {
           .primitives_present = points.size() * index_->size()};
 }
 
-Mat3 Field::hessian(const Vec3& point) const {
+namespace {
+
+Mat3 primitive_hessian(const Field::Index& index, std::size_t i, const Vec3& point) {
+  if (!index.support[i].contains(point)) return Mat3::Zero();
+  const PackedPrimitive& p = index.primitive[i];
+  const PackedShape& shape = index.shape[i];
+  const Mat3 A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
+  if (shape.foot == PackedFoot::Convolved) {
+    const double h = 1e-5 * shape.kernel.radius / shape.distance_scale;
+    Mat3 hessian;
+    for (int k = 0; k < 3; ++k) {
+      const auto slope_at = [&](double step) -> Vec3 {
+        const Vec3 x = point + step * Vec3::Unit(k) - Vec3(p.position[0], p.position[1], p.position[2]);
+        return A.transpose() * convolve(shape.view, shape.kernel, A * x).gradient;
+      };
+      hessian.col(k) = (slope_at(h) - slope_at(-h)) / (2.0 * h);
+    }
+    return 0.5 * (hessian + hessian.transpose());
+  }
+  Mat3 second;  // of q in the local frame
+  const FootSample sample = foot(shape.view, A * (point - Vec3(p.position[0], p.position[1], p.position[2])), &second);
+  const Vec3 g = 2.0 * A.transpose() * sample.half_gradient;
+  return second_slope(shape.kernel, sample.q) * g * g.transpose() +
+         supple::implicit::evaluate(shape.kernel, sample.q).slope * A.transpose() * second * A;
+}
+
+}  // namespace
+
+Mat3 part_hessian(const Field::Index& index, std::uint32_t part, const Vec3& point) {
+  const auto first = std::partition_point(index.primitive.begin(), index.primitive.end(),
+                                          [part](const PackedPrimitive& p) { return p.part < part; });
   Mat3 sum = Mat3::Zero();
-  for (std::size_t i = 0; i < index_->size(); ++i) {
-    if (!index_->support[i].contains(point)) continue;
-    const PackedPrimitive& p = index_->primitive[i];
-    const PackedShape& shape = index_->shape[i];
-    const Mat3 A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
-    Mat3 second;  // of q in the local frame
-    const FootSample sample = foot(shape.view, A * (point - Vec3(p.position[0], p.position[1], p.position[2])), &second);
-    const Vec3 g = 2.0 * A.transpose() * sample.half_gradient;
-    sum += second_slope(shape.kernel, sample.q) * g * g.transpose() +
-           supple::implicit::evaluate(shape.kernel, sample.q).slope * A.transpose() * second * A;
+  for (auto p = first; p != index.primitive.end() && p->part == part; ++p) {
+    sum += primitive_hessian(index, static_cast<std::size_t>(p - index.primitive.begin()), point);
   }
   return sum;
 }
 
+Mat3 Field::hessian(const Vec3& point) const {
+  Mat3 sum = Mat3::Zero();
+  if (index_->blend.active()) {
+    const double h = 1e-5 * index_->feature_size;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 points[2] = {point + h * Vec3::Unit(k), point - h * Vec3::Unit(k)};
+      double values[2];
+      Vec3 gradients[2];
+      evaluate_blended(*index_, points, values, gradients);
+      sum.col(k) = (gradients[0] - gradients[1]) / (2.0 * h);
+    }
+    return 0.5 * (sum + sum.transpose());
+  }
+  for (std::size_t i = 0; i < index_->size(); ++i) sum += primitive_hessian(*index_, i, point);
+  return sum;
+}
+
+namespace {
+
+/// The parts' sums by the rule, written out; parts without contribution are left out.
+double combined_reference(const Blend& blend, std::vector<NodeSample> nodes) {
+  std::erase_if(nodes, [](const NodeSample& k) { return k.value == 0.0; });
+  double result = 0.0;
+  for (const NodeSample& k : nodes) result = std::max(result, k.value);
+  switch (blend.rule) {
+    case BlendRule::Sum:
+      result = 0.0;
+      for (const NodeSample& k : nodes) result += k.value;
+      break;
+    case BlendRule::Graph:
+      for (const NodeSample& k : nodes) {
+        double sum = k.value;
+        for (const BlendEdge& e : blend.edge) {
+          if (e.a != k.node && e.b != k.node) continue;
+          for (const NodeSample& j : nodes) {
+            if (j.node != k.node && (j.node == e.a || j.node == e.b)) sum += e.weight * std::min(j.value, k.value);
+          }
+        }
+        result = std::max(result, sum);
+      }
+      break;
+    case BlendRule::Ricci: {
+      double sum = 0.0;
+      for (const NodeSample& k : nodes) sum += math::pow(k.value, blend.exponent);
+      if (sum > 0.0) result = math::pow(sum, 1.0 / blend.exponent);
+      break;
+    }
+    case BlendRule::Gradient:
+      for (const NodeSample& a : nodes) {
+        for (const NodeSample& b : nodes) {
+          const double scale = a.gradient.norm() * b.gradient.norm();
+          if (a.node == b.node || scale == 0.0) continue;
+          const Opening opening = opening_of(blend.opening, std::clamp(a.gradient.dot(b.gradient) / scale, -1.0, 1.0));
+          result = std::max(result, arc_blend(a.value, b.value, opening.t).value);
+        }
+      }
+      break;
+  }
+  return result;
+}
+
+}  // namespace
+
 double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed, const Vec3& point, Vec3* gradient) {
+  std::vector<NodeSample> nodes(skeleton.part_count);
+  for (std::uint32_t i = 0; i < skeleton.part_count; ++i) nodes[i].node = i;
   double sum = 0.0;
   Vec3 slope = Vec3::Zero();
   for (std::size_t k = 0; k < skeleton.primitive.size(); ++k) {
     const Primitive& p = skeleton.primitive[k];
     const Vec3 y = placed.rotation[k].transpose() * (point - placed.position[k]);
-    const ShapeSample shape = evaluate(p, y);
-    const KernelSample kernel = evaluate(p.kernel, shape.q);
-    sum += kernel.value;
-    slope += kernel.slope * (placed.rotation[k] * shape.gradient);
+    const Potential f = potential(p, y);
+    const Vec3 own = placed.rotation[k] * f.gradient;
+    sum += f.value;
+    slope += own;
+    NodeSample& node = nodes[skeleton.blend.node.empty() ? p.part : skeleton.blend.node[p.part]];
+    node.value += f.value;
+    node.gradient += own;
   }
-  if (gradient != nullptr) *gradient = slope;
+  if (skeleton.blend.rule != BlendRule::Sum) sum = combined_reference(skeleton.blend, std::move(nodes));
+  if (gradient != nullptr && skeleton.blend.rule == BlendRule::Sum) *gradient = slope;
+  if (gradient != nullptr && skeleton.blend.rule != BlendRule::Sum) {
+    const double h = 1e-6;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 step = h * Vec3::Unit(k);
+      (*gradient)[k] = (evaluate_reference(skeleton, placed, point + step) - evaluate_reference(skeleton, placed, point - step)) / (2.0 * h);
+    }
+  }
   return sum - skeleton.iso;
 }
 

@@ -76,13 +76,11 @@ DistanceRange clipped_range(const Field::Index& index, std::uint32_t i, const Bo
 
 /// Adds the range of primitive i to the sums.
 void add_single(const Field::Index& index, std::uint32_t i, const Box& box, bool with_slope, lanes::BoundSums& sums) {
-  const DistanceRange range = clipped_range(index, i, box);
+  const PrimitiveBound bound = bound_primitive(index, i, box, with_slope);
   const PackedShape& shape = index.shape[i];
-  sums.upper += evaluate(shape.kernel, range.near2).value;
-  sums.lower += evaluate(shape.kernel, range.far2).value;
-  if (with_slope) {
-    sums.slope += shape.distance_scale * lipschitz(shape.kernel, std::sqrt(range.near2), std::sqrt(range.far2));
-  }
+  sums.upper += bound.value.upper;
+  sums.lower += bound.value.lower;
+  sums.slope += bound.slope;
   sums.scale += shape.peak;
   sums.slope_scale += shape.lipschitz;
   sums.terms += 1.0;
@@ -166,7 +164,7 @@ Box find_surface_box(const Field::Index& index, const Field& field) {
   for (std::size_t i = 0; i < index.size(); ++i) {
     const PackedShape& shape = index.shape[i];
     box = box.united(index.support[i]);
-    if (!(shape.peak > index.iso)) continue;
+    if (!(shape.peak > index.iso) || shape.foot == PackedFoot::Convolved) continue;
     const Kernel& k = shape.kernel;
     if (last_kernel == nullptr || *last_kernel != k) {
       last_reach = index.iso > 0.0 ? iso_distance(k, index.iso) : k.radius;
@@ -204,11 +202,36 @@ Box find_surface_box(const Field::Index& index, const Field& field) {
   return box;
 }
 
+/// By the value at the centre and the largest slope anywhere.
+PrimitiveBound bound_convolution(const Field::Index& index, std::uint32_t id, const Box& box) {
+  const PackedPrimitive& p = index.primitive[id];
+  const PackedShape& shape = index.shape[id];
+  const Box part = box.intersection(index.support[id]);
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const Eigen::Map<const RowMajor> A(shape.to_local.data());
+  const double f = convolve(shape.view, shape.kernel, A * (part.centre() - Vec3(p.position[0], p.position[1], p.position[2]))).value;
+  const double change = 0.5 * part.extent().norm() * shape.lipschitz * (1.0 + 1e-12);
+  const bool clipped = part.lower != box.lower || part.upper != box.upper;  // the box reaches where f is 0
+  return {.value = {clipped ? 0.0 : std::max(f - change, 0.0), std::min(f + change, shape.peak)}, .slope = shape.lipschitz};
+}
+
 }  // namespace
+
+PrimitiveBound bound_primitive(const Field::Index& index, std::uint32_t id, const Box& box, bool with_slope) {
+  const PackedShape& shape = index.shape[id];
+  if (shape.foot == PackedFoot::Convolved) return bound_convolution(index, id, box);
+  const DistanceRange range = clipped_range(index, id, box);
+  PrimitiveBound bound{{evaluate(shape.kernel, range.far2).value, evaluate(shape.kernel, range.near2).value}};
+  if (with_slope) {
+    bound.slope = shape.distance_scale * lipschitz(shape.kernel, std::sqrt(range.near2), std::sqrt(range.far2));
+  }
+  return bound;
+}
 
 Interval Field::bound(const Box& box) const {
   const Index& index = *index_;
   if (box.empty()) return {-index.iso, -index.iso};
+  if (index.blend.active()) return blended_bound(index, box);
   const lanes::BoundSums sums = touching_sums(index, box, false);
   if (sums.terms == 0.0) return {-index.iso, -index.iso};
   const double round_off = (16.0 + sums.terms) * kEps * (sums.scale + index.iso);
@@ -218,6 +241,7 @@ Interval Field::bound(const Box& box) const {
 double Field::gradient_bound(const Box& box) const {
   const Index& index = *index_;
   if (box.empty()) return 0.0;
+  if (index.blend.active()) return blended_gradient_bound(index, box);
   const lanes::BoundSums sums = touching_sums(index, box, true);
   return sums.slope + (32.0 + sums.terms) * kEps * sums.slope_scale;
 }

@@ -14,6 +14,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSlack = 1e-12;
 
 PackedFoot foot_of(const Primitive& p) noexcept {
+  if (p.convolved) return PackedFoot::Convolved;
   switch (p.shape) {
     case ShapeKind::Segment: return p.taper == 1.0 ? PackedFoot::Slab : PackedFoot::Scalar;
     case ShapeKind::Point:
@@ -28,7 +29,9 @@ PackedFoot foot_of(const Primitive& p) noexcept {
 PackedKind kind_of(const Primitive& p) noexcept {
   const bool wyvill = p.kernel.kind == KernelKind::Wyvill;
   const PackedFoot foot = foot_of(p);
-  if ((!wyvill && p.kernel.kind != KernelKind::Gascuel) || foot == PackedFoot::Scalar) return PackedKind::General;
+  if ((!wyvill && p.kernel.kind != KernelKind::Gascuel) || foot == PackedFoot::Scalar || foot == PackedFoot::Convolved) {
+    return PackedKind::General;
+  }
   if (foot == PackedFoot::Disc) return wyvill ? PackedKind::DiscWyvill : PackedKind::DiscGascuel;
   if (p.shape == ShapeKind::Point && p.stretch == Vec3::Ones()) return wyvill ? PackedKind::PointWyvill : PackedKind::PointGascuel;
   return wyvill ? PackedKind::SlabWyvill : PackedKind::SlabGascuel;
@@ -82,6 +85,11 @@ void pack(const Primitive& p, const Vec3* control, const Vec3& position, const M
     shape.outer_cubic = (2.0 * p.kernel.iso / w - p.kernel.slope) / (w * w);
   }
   shape.lipschitz = shape.distance_scale * lipschitz(p.kernel);
+  if (p.convolved) {
+    const ConvolutionLimits limits = convolution_limits(shape.view, p.kernel);
+    shape.peak = limits.peak;
+    shape.lipschitz = shape.distance_scale * limits.slope;
+  }
 }
 
 double feature_of(const Primitive& p) noexcept {
@@ -208,12 +216,14 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   if (!field.index_) field.index_ = std::make_unique<Field::Index>();
   Field::Index& index = *field.index_;
   index.iso = skeleton.iso;
+  index.blend.assign(skeleton.blend, skeleton.part_count);
   index.primitive.resize(n);
   index.shape.resize(n);
   index.rounded.resize(n);
   index.support.assign(placed.support.begin(), placed.support.end());
   index.feature_size = kInfinity;
   index.uniform = true;
+  index.convolved = false;
   index.surface_box.reset();
   double extent = 0.0;
   index.control.clear();
@@ -225,6 +235,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
     control += skeleton.primitive[i].control.size();
     index.feature_size = std::min(index.feature_size, feature_of(skeleton.primitive[i]));
     index.uniform = index.uniform && index.primitive[i].kind == index.primitive[0].kind;
+    index.convolved = index.convolved || skeleton.primitive[i].convolved;
     extent += placed.support[i].extent().sum();
   }
   index.typical_extent = n > 0 ? extent / (3.0 * static_cast<double>(n)) : 0.0;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "blend.h"
 #include "shapes.h"
 #include "supple/implicit/field.h"
 
@@ -21,7 +22,7 @@ enum class PackedKind : std::uint32_t {
   General,  ///< any foot with any kernel
 };
 /// How the foot point of a general primitive is found.
-enum class PackedFoot : std::uint8_t { Slab, Disc, Scalar };
+enum class PackedFoot : std::uint8_t { Slab, Disc, Scalar, Convolved };
 
 /// What the hot loop reads of a primitive; one cache line.
 struct alignas(64) PackedPrimitive {
@@ -82,6 +83,8 @@ struct Field::Index {
   double typical_extent = 0.0;  ///< mean edge of the supports' boxes [m]
   bool cull = true;
   bool uniform = true;          ///< all primitives are of one kind
+  bool convolved = false;       ///< some primitive is a convolution
+  BlendIndex blend;
   std::vector<PackedPrimitive> primitive;  ///< by id
   std::vector<PackedShape> shape;          ///< by id
   std::vector<RoundedBox> rounded;         ///< by id
@@ -104,6 +107,26 @@ struct Field::Index {
   void build_leaves();
   void build_levels();
 };
+
+/// Rows of the parts' sums, whatever the blend.
+void part_rows(const Field::Index& index, std::span<const Vec3> points, FieldParts& parts);
+/// Ids of the primitives whose supports may meet a box, in rising order; valid until the thread evaluates again.
+[[nodiscard]] std::span<const std::uint32_t> candidates_of(const Field::Index& index, const Box& box);
+/// Hessian of one part's sum.
+[[nodiscard]] Mat3 part_hessian(const Field::Index& index, std::uint32_t part, const Vec3& point);
+
+/// Of one primitive on a box.
+struct PrimitiveBound {
+  Interval value{};
+  double slope = 0.0;  ///< of |grad f|, where asked for
+};
+[[nodiscard]] PrimitiveBound bound_primitive(const Field::Index& index, std::uint32_t id, const Box& box, bool with_slope);
+
+// Fields with another rule than Sum: see field_blend.cpp.
+void evaluate_blended(const Field::Index& index, std::span<const Vec3> points, double* values, Vec3* gradients);
+void blended_part_rows(const Field::Index& index, std::span<const Vec3> points, FieldParts& parts);
+[[nodiscard]] Interval blended_bound(const Field::Index& index, const Box& box);
+[[nodiscard]] double blended_gradient_bound(const Field::Index& index, const Box& box);
 
 /// One rounded box as slot of a pack.
 inline void set_slot(LeafPack& pack, std::size_t slot, const RoundedBox& box, std::uint32_t id) noexcept {

@@ -189,6 +189,25 @@ HWY_INLINE V scalar_foot(D d, const ShapeView& view, V& x, V& y, V& z) {
   return hn::Load(d, q);
 }
 
+/// f of a convolved shape and its gradient in place of y.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V scalar_convolution(D d, const PackedShape& shape, V& x, V& y, V& z) {
+  constexpr std::size_t kLanes = hn::MaxLanes(D());
+  alignas(64) double at[3][kLanes], f[kLanes];
+  hn::Store(x, d, at[0]);
+  hn::Store(y, d, at[1]);
+  hn::Store(z, d, at[2]);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Potential sample = convolve(shape.view, shape.kernel, Vec3(at[0][lane], at[1][lane], at[2][lane]));
+    f[lane] = sample.value;
+    for (std::size_t k = 0; k < 3; ++k) at[k][lane] = sample.gradient[static_cast<Eigen::Index>(k)];
+  }
+  x = hn::Load(d, at[0]);
+  y = hn::Load(d, at[1]);
+  z = hn::Load(d, at[2]);
+  return hn::Load(d, f);
+}
+
 /// Adds the primitives ids[0..n), all of one kind, to the sums.
 template <PackedKind kKind, bool kGradient, class D, std::size_t K>
 HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_RESTRICT ids, std::size_t n,
@@ -217,7 +236,7 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
                             hn::MulAdd(hn::Set(d, a[1]), vy, hn::Mul(hn::Set(d, a[0]), vx)));
         };
         const V y0 = local(0), y1 = local(1), y2 = local(2);
-        if (kGeneral && shape.foot == PackedFoot::Scalar) {
+        if (kGeneral && shape.foot >= PackedFoot::Scalar) {
           vx = y0;
           vy = y1;
           vz = y2;
@@ -248,7 +267,12 @@ HWY_INLINE void add_run(D d, const Primitives& in, const std::uint32_t* HWY_REST
       if constexpr (kWyvill) {
         kernel = wyvill<kGradient>(d, p, q);
       } else if constexpr (kGeneral) {
-        kernel = any_kernel<kGradient>(d, p, shape, q);
+        if (shape.foot == PackedFoot::Convolved) {
+          const V one = hn::Set(d, 1.0);
+          kernel = {scalar_convolution(d, shape, vx, vy, vz), one, one};
+        } else {
+          kernel = any_kernel<kGradient>(d, p, shape, q);
+        }
       } else {
         kernel = gascuel<kGradient>(d, shape, q);
       }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "field_index.h"
+#include "field_ray.h"
 #include "supple/core/error.h"
 
 namespace supple::implicit {
@@ -87,6 +89,10 @@ Vec3 root_on_segment(const FieldView& field, const Vec3& a, const Vec3& b) {
 std::optional<double> intersect(const FieldView& field, const Vec3& origin, const Vec3& direction, double t_max) {
   SUPPLE_EXPECTS(t_max >= 0.0 && std::isfinite(t_max));
   SUPPLE_EXPECTS(std::abs(direction.squaredNorm() - 1.0) < 1e-6);
+  if (const Field* primitives = field.as_field()) {
+    const Field::Index& index = primitives->index();
+    if (!index.blend.active() && !index.convolved) return intersect_primitives(*primitives, origin, direction, t_max);
+  }
   const double feature = field.feature_size();
   const auto at = [&](double t) -> Vec3 { return origin + t * direction; };
   Vec3 gradient;

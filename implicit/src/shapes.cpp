@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "supple/core/math.h"
+#include "supple/implicit/convolution.h"
 
 namespace supple::implicit {
 namespace {
@@ -323,7 +325,38 @@ ShapeView view_of(const Primitive& primitive) noexcept {
     const auto [sin, cos] = math::sin_cos(primitive.size.y());
     view.pair = {cos, sin};
   }
+  if (primitive.convolved) {
+    const double distance = iso_distance(primitive.kernel, 0.5);
+    const bool flat = primitive.shape == ShapeKind::Triangle || primitive.shape == ShapeKind::Polygon;
+    view.gain = 0.5 / (flat ? convolve_plane(primitive.kernel, distance) : convolve_line(primitive.kernel, distance));
+  }
   return view;
+}
+
+Potential convolve(const ShapeView& shape, const Kernel& kernel, const Vec3& y) noexcept {
+  // Exactly zero out of reach, whatever rounding makes of sums over edges.
+  if (foot(shape, y).q >= kernel.radius * kernel.radius) return {};
+  Convolution sum;
+  if (shape.kind == ShapeKind::Segment) {
+    sum = convolve_segment(kernel, shape.size.x(), y);
+  } else if (shape.kind == ShapeKind::Triangle || shape.kind == ShapeKind::Polygon) {
+    sum = convolve_polygon(kernel, shape.control, y);
+  } else {
+    sum = convolve_arc(kernel, shape.size.x(), shape.kind == ShapeKind::Ring ? std::numbers::pi : shape.size.y(), y);
+  }
+  return {std::max(shape.gain * sum.value, 0.0), shape.gain * sum.gradient};
+}
+
+ConvolutionLimits convolution_limits(const ShapeView& shape, const Kernel& kernel) noexcept {
+  const double R = kernel.radius;
+  double measure = 0.0;  // of the shape within one support, at most
+  switch (shape.kind) {
+    case ShapeKind::Segment: measure = 2.0 * std::min(shape.size.x(), R); break;
+    case ShapeKind::Ring: measure = 2.0 * std::numbers::pi * shape.size.x(); break;
+    case ShapeKind::Arc: measure = 2.0 * shape.size.y() * shape.size.x(); break;
+    default: measure = std::numbers::pi * R * R; break;
+  }
+  return {shape.gain * measure, shape.gain * measure * lipschitz(kernel)};
 }
 
 FootSample foot(const ShapeView& shape, const Vec3& y, Mat3* second) noexcept {

@@ -18,6 +18,7 @@ struct ShapeView {
   double taper = 1.0;
   std::array<double, 2> pair{};      ///< Superquadric: exponents; Arc: cosine and sine of its half angle
   std::span<const Vec3> control;
+  double gain = 0.0;                 ///< of a convolution; 0: the kernel of the nearest point
 };
 
 [[nodiscard]] ShapeView view_of(const Primitive& primitive) noexcept;
@@ -28,6 +29,14 @@ struct FootSample {
   Vec3 half_gradient = Vec3::Zero();
 };
 [[nodiscard]] FootSample foot(const ShapeView& shape, const Vec3& y, Mat3* second = nullptr) noexcept;
+
+/// f and its gradient of a convolved shape. @pre shape.gain > 0
+[[nodiscard]] Potential convolve(const ShapeView& shape, const Kernel& kernel, const Vec3& y) noexcept;
+/// Bounds of a convolved shape's f and |grad f|, everywhere [1, 1/m].
+struct ConvolutionLimits {
+  double peak = 0.0, slope = 0.0;
+};
+[[nodiscard]] ConvolutionLimits convolution_limits(const ShapeView& shape, const Kernel& kernel) noexcept;
 
 /// A point of a Bezier curve of two to four control points, with its first two derivatives by t in [0, 1].
 struct BezierPoint {

@@ -5,6 +5,7 @@
 
 #include "shapes.h"
 #include "supple/core/error.h"
+#include "supple/implicit/convolution.h"
 
 namespace supple::implicit {
 namespace {
@@ -97,6 +98,16 @@ Mat3 second_derivative(const Primitive& primitive, const Vec3& y) noexcept {
   static_cast<void>(foot(view_of(primitive), y.cwiseQuotient(primitive.stretch), &second));
   const Vec3 inverse = primitive.stretch.cwiseInverse();
   return inverse.asDiagonal() * second * inverse.asDiagonal();
+}
+
+Potential potential(const Primitive& primitive, const Vec3& y) noexcept {
+  if (primitive.convolved) {
+    const Potential own = convolve(view_of(primitive), primitive.kernel, y.cwiseQuotient(primitive.stretch));
+    return {own.value, own.gradient.cwiseQuotient(primitive.stretch)};
+  }
+  const ShapeSample shape = evaluate(primitive, y);
+  const KernelSample kernel = evaluate(primitive.kernel, shape.q);
+  return {kernel.value, kernel.slope * shape.gradient};
 }
 
 double distance_scale(const Primitive& primitive) noexcept {
@@ -211,6 +222,11 @@ void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, Place
 bool well_formed(const Primitive& p) noexcept {
   const auto positive = [](const Vec3& v) { return (v.array() > 0.0).all() && v.allFinite(); };
   if (!(p.kernel.radius > 0.0) || !positive(p.stretch) || !(p.taper > 0.0)) return false;
+  if (p.convolved) {
+    const bool can = p.shape == ShapeKind::Segment || p.shape == ShapeKind::Triangle || p.shape == ShapeKind::Polygon ||
+                     p.shape == ShapeKind::Ring || p.shape == ShapeKind::Arc;
+    if (!can || p.taper != 1.0 || !convolves(p.kernel.kind)) return false;
+  }
   switch (p.shape) {
     case ShapeKind::Ellipsoid: return positive(p.size);
     case ShapeKind::Superquadric: {

@@ -261,8 +261,7 @@ class BlockProjector {
   [[nodiscard]] double contribution(std::size_t primitive, const Vec3& x) const {
     const Primitive& p = task_.skeleton.primitive[primitive];
     const Vec3 y = p.offset.to_body(task_.parts[p.part].to_body(x));
-    return supple::implicit::evaluate(p.kernel, supple::implicit::evaluate(p, y).q)
-        .value;
+    return potential(p, y).value;
   }
 
   void finish(const Seed& seed) {

@@ -134,6 +134,121 @@ TEST(Intersect, FindsTheSphereOfOnePoint) {
   EXPECT_FALSE(intersect(body.field, Vec3(-3, 0, 0), Vec3::UnitX(), 1.0).has_value());
 }
 
+/// Closed forms for rays from far away: t of the first meeting, or nothing.
+std::optional<double> sphere_hit(const Vec3& origin, const Vec3& direction, double radius) {
+  const double b = origin.dot(direction);
+  const double disc = b * b - (origin.squaredNorm() - radius * radius);
+  if (disc < 0.0) return std::nullopt;
+  return -b - std::sqrt(disc);
+}
+
+TEST(Intersect, GrazedSpheresAreMetAndMissedToRoundOff) {
+  const double radius = iso_distance(Kernel::wyvill(1.0), 0.5);
+  const Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});
+  Random random(71);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vec3 direction = random.direction();
+    const Vec3 side = direction.cross(random.direction()).normalized();
+    for (const double share : {1e-3, 1e-6, 1e-9, 1e-12}) {
+      const Vec3 inside = (1.0 - share) * radius * side - 2.0 * direction;
+      const std::optional<double> hit = intersect(body.field, inside, direction, 10.0);
+      ASSERT_TRUE(hit.has_value()) << share;
+      // A grazing ray magnifies the rounding of the radius (1e-15) by 1 / sqrt(2 share).
+      EXPECT_NEAR(*hit, 2.0 - radius * std::sqrt(share * (2.0 - share)), 1e-15 + 4e-15 / std::sqrt(2.0 * share)) << share;
+      const Vec3 outside = (1.0 + share) * radius * side - 2.0 * direction;
+      EXPECT_FALSE(intersect(body.field, outside, direction, 10.0).has_value()) << share;
+    }
+  }
+}
+
+TEST(Intersect, MeetsConesRoundedPlatesAndRingsWhereTheirFormulasSay) {
+  const double rho = iso_distance(Kernel::wyvill(0.5), 0.5);
+  Random random(72);
+  Primitive ring = wyvill_point(0.5);
+  ring.shape = ShapeKind::Ring;
+  ring.size = {1.0, 0.0, 0.0};
+  const Body torus = body_of({{ring, Vec3::Zero()}});
+  Primitive plate = wyvill_point(0.5);
+  plate.shape = ShapeKind::Rectangle;
+  plate.size = {1.0, 1.0, 0.0};
+  const Body slab = body_of({{plate, Vec3::Zero()}});
+  Primitive egg = wyvill_point(1.0);
+  egg.stretch = {0.4, 0.9, 1.3};
+  const Body ellipsoid = body_of({{egg, Vec3::Zero()}});
+  for (int trial = 0; trial < 300; ++trial) {
+    // Down on the ring's tube: height sqrt(rho^2 - (r - 1)^2).
+    const double r = 1.0 + random.uniform(-0.999, 0.999) * rho, angle = random.uniform(0.0, 6.28);
+    const Vec3 above(r * std::cos(angle), r * std::sin(angle), 3.0);
+    const std::optional<double> down = intersect(torus.field, above, -Vec3::UnitZ(), 10.0);
+    ASSERT_TRUE(down.has_value());
+    EXPECT_NEAR(*down, 3.0 - std::sqrt(rho * rho - (r - 1.0) * (r - 1.0)), 1e-12);
+    EXPECT_FALSE(intersect(torus.field, Vec3(0.0, 0.0, 3.0), -Vec3::UnitZ(), 10.0).has_value());  // through the hole
+    // The flat part of the plate.
+    const Vec3 target(random.uniform(-0.7, 0.7), random.uniform(-0.7, 0.7), rho);
+    const Vec3 direction = Vec3(random.uniform(-1, 1), random.uniform(-1, 1), -1.0).normalized();
+    const Vec3 origin = target - 0.1 * direction / -direction.z();
+    const std::optional<double> flat = intersect(slab.field, origin, direction, 10.0);
+    ASSERT_TRUE(flat.has_value());
+    EXPECT_NEAR(*flat, (target - origin).norm(), 1e-13);
+    // An ellipsoid is a sphere in stretched coordinates.
+    const Vec3 from = 3.0 * random.direction();
+    const Vec3 towards = (random.in_box(0.5) - from).normalized();
+    const Vec3 y = from.cwiseQuotient(egg.stretch), u = towards.cwiseQuotient(egg.stretch);
+    const std::optional<double> expected = sphere_hit(y, u.normalized(), 2.0 * rho);
+    const std::optional<double> found = intersect(ellipsoid.field, from, towards, 10.0);
+    ASSERT_EQ(found.has_value(), expected.has_value());
+    if (found) {
+      EXPECT_NEAR(*found, *expected / u.norm(), 1e-9);  // grazing rays magnify 1e-16 by up to 1e5 here
+    }
+  }
+}
+
+TEST(Intersect, SeesFilmsThinnerThanAnyStep) {
+  // Two balls overlap in a lens whose field exceeds the iso value by 1e-12 only: a ray across it must stop there.
+  const double merge = 2.0 * std::sqrt(1.0 - std::cbrt(0.25));  // the saddle touches zero at this distance
+  const auto through = [&](double D) {
+    const Body body = body_of({{wyvill_point(1.0), Vec3(-D / 2, 0, 0)}, {wyvill_point(1.0), Vec3(D / 2, 0, 0)}});
+    return intersect(body.field, Vec3(0, -2, 0), Vec3::UnitY(), 10.0);
+  };
+  EXPECT_TRUE(through(merge - 1e-12).has_value());
+  EXPECT_NEAR(*through(merge - 1e-12), 2.0, 2e-6);
+  EXPECT_FALSE(through(merge + 1e-12).has_value());
+}
+
+TEST(Intersect, MissesNoSurfaceOfAnyShape) {
+  // Against 20,000 samples along each ray: the hit is no later than the first sample of another sign.
+  int hits = 0;
+  for (const std::uint64_t seed : {81u, 82u, 83u}) {
+    const Body body = random_body({.seed = seed, .parts = 15, .half_width = 1.3, .every_shape = true});
+    Random random(seed + 100);
+    constexpr std::size_t kSamples = 20000;
+    std::vector<Vec3> points(kSamples);
+    std::vector<double> values(kSamples);
+    for (int ray = 0; ray < 60; ++ray) {
+      const bool inside = ray % 3 == 0;
+      const Vec3 origin = inside ? random.in_box(1.0) : Vec3(3.0 * random.direction());
+      const Vec3 direction = (random.in_box(1.2) - origin).normalized();
+      const double t_max = 6.0;
+      for (std::size_t i = 0; i < kSamples; ++i) {
+        points[i] = origin + t_max * static_cast<double>(i) / (kSamples - 1.0) * direction;
+      }
+      body.field.evaluate(points, values);
+      std::size_t first = 0;
+      while (first < kSamples && (values[first] > 0.0) == (values[0] > 0.0)) ++first;
+      const std::optional<double> t = intersect(body.field, origin, direction, t_max);
+      if (first < kSamples) {
+        ASSERT_TRUE(t.has_value()) << seed << ' ' << ray;
+        EXPECT_LE(*t, t_max * static_cast<double>(first) / (kSamples - 1.0) + 1e-12);
+      }
+      if (t) {
+        ++hits;
+        EXPECT_LT(std::abs(FieldView(body.field).value(origin + *t * direction)), 1e-12);
+      }
+    }
+  }
+  EXPECT_GT(hits, 80);
+}
+
 TEST(Intersect, MeetsAHalfSpace) {
   const HalfSpace ground{};
   const std::optional<double> t = intersect(ground, Vec3(0, 0, 2), Vec3(0.6, 0, -0.8), 100.0);

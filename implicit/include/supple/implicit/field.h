@@ -1,5 +1,5 @@
 /// @file supple/implicit/field.h
-/// The field of one body: F(p) = sum_k f_k(p) - c over its primitives, with a bounding volume hierarchy over their
+/// The field of one body: F(p) = sum_k f_k(p) - c over its primitives, or by another rule of blend.h, with a bounding volume hierarchy over their
 /// supports and packed, batched evaluation. Sums run in primitive order, so culling cannot change a bit.
 #pragma once
 
@@ -57,7 +57,8 @@ class Field {
 /// Stage 3. Rebuilds `field` for the placed primitives; capacity is reused.
 void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& field);
 
-/// The clear reference: sums every primitive through `evaluate(Kernel)` and `evaluate(Primitive)`, no index, no batch.
+/// The clear reference: sums `potential` of every primitive, no index, no batch;
+/// of other rules than the sum the gradient is a central difference over 1e-6 m.
 [[nodiscard]] double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed, const Vec3& point,
                                         Vec3* gradient = nullptr);
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "supple/core/types.h"
+#include "supple/implicit/blend.h"
 #include "supple/implicit/kernel.h"
 
 namespace supple::implicit {
@@ -47,6 +48,10 @@ struct Primitive {
   /// The field is stretched by these factors along the own axes, shape and support alike: f(y / stretch). An anisotropic
   /// metric for any shape.
   Vec3 stretch = Vec3::Ones();
+  /// Segment, Triangle, Polygon, Ring, Arc with a kernel that convolves() and without taper: the kernel is integrated over the
+  /// shape instead of taken at its nearest point, scaled so that a long straight line (a wide plane) is 1/2 at the distance
+  /// where the kernel itself is. Shapes that share ends or edges join without a bulge.
+  bool convolved = false;
 };
 
 /// Distance of a primitive's shape in the frame of the primitive.
@@ -57,6 +62,13 @@ struct ShapeSample {
 [[nodiscard]] ShapeSample evaluate(const Primitive& primitive, const Vec3& y) noexcept;
 /// Second derivatives of q [1] where they exist; they jump where the foot point goes to another piece of the shape.
 [[nodiscard]] Mat3 second_derivative(const Primitive& primitive, const Vec3& y) noexcept;
+
+/// f of a primitive alone in its own frame.
+struct Potential {
+  double value = 0.0;            ///< [1]
+  Vec3 gradient = Vec3::Zero();  ///< [1/m]
+};
+[[nodiscard]] Potential potential(const Primitive& primitive, const Vec3& y) noexcept;
 
 /// Largest |grad sqrt(q)|: 1 for plain shapes; more where stretch, taper or radii less than R bring level sets together.
 [[nodiscard]] double distance_scale(const Primitive& primitive) noexcept;
@@ -74,6 +86,7 @@ struct Skeleton {
   std::vector<Primitive> primitive;
   std::uint32_t part_count = 0;
   double iso = 0.5;  ///< c: the body is {sum f >= c}
+  Blend blend;       ///< how the parts combine, if not as a sum
 };
 
 /// Primitives in world axes; Frame data.

@@ -1,0 +1,63 @@
+/// @file blend.h
+/// A Blend prepared for evaluation.
+#pragma once
+
+#include <cstddef>
+
+#include "supple/implicit/blend.h"
+
+namespace supple::implicit {
+
+/// Sums of one node at a point.
+struct NodeSample {
+  std::uint32_t node = 0;
+  double value = 0.0;             ///< > 0
+  Vec3 gradient = Vec3::Zero();
+};
+
+/// The potential and what it takes of each node.
+struct Combined {
+  double value = 0.0;
+  // Gradient: the pair that is the largest, and dF/dx by the cosine x of its angle; by_cosine is 0 otherwise.
+  std::size_t first = 0, second = 0;
+  double cosine = 0.0;
+  double by_cosine = 0.0;
+};
+
+class BlendIndex {
+ public:
+  /// @param part_count  parts of the body
+  void assign(const Blend& blend, std::size_t part_count);
+  [[nodiscard]] bool active() const noexcept { return rule_ != BlendRule::Sum; }
+  [[nodiscard]] BlendRule rule() const noexcept { return rule_; }
+  [[nodiscard]] std::uint32_t node_of(std::uint32_t part) const noexcept { return node_.empty() ? part : node_[part]; }
+
+  /// @param nodes  at one point, in rising order   @param share  receives dF/df_k, shape of nodes
+  [[nodiscard]] Combined combine(std::span<const NodeSample> nodes, std::span<double> share) const noexcept;
+
+  /// As combine, of bounds: the rules rise with every f_k.
+  struct NodeBound {
+    std::uint32_t node = 0;
+    Interval value{};
+    double slope = 0.0;  ///< of |grad f_k|
+  };
+  [[nodiscard]] Interval bound(std::span<const NodeBound> nodes) const;
+  /// Of |grad F|; infinite for Gradient where two nodes are met, for the angle turns without a limit where gradients vanish.
+  [[nodiscard]] double slope_bound(std::span<const NodeBound> nodes) const;
+
+ private:
+  /// Calls use(j, weight) for the positions j in `nodes` of the neighbours of nodes[k].
+  template <class Nodes, class Use>
+  void for_neighbours(const Nodes& nodes, std::size_t k, const Use& use) const;
+
+  BlendRule rule_ = BlendRule::Sum;
+  double exponent_ = 4.0;
+  double opening_ = 0.3;
+  std::vector<std::uint32_t> node_;
+  std::vector<std::uint32_t> offset_;     ///< neighbours of node k are [offset[k], offset[k + 1])
+  std::vector<std::uint32_t> neighbour_;  ///< rising
+  std::vector<double> weight_;
+  std::vector<std::uint32_t> next_;       ///< scratch of assign
+};
+
+}  // namespace supple::implicit
