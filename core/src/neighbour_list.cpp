@@ -1,6 +1,7 @@
 #include "supple/core/neighbour_list.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
 
@@ -246,6 +247,43 @@ void NeighbourList::Impl::stage(std::span<const Vec3> positions, const Executor&
   executor.for_blocks(source.size(), kPointBlock, std::cref(body));
 }
 
+packed::Fixed NeighbourList::Impl::stage_fixed(const Executor& executor) {
+  // Neighbours are at most twice the reach apart, a quarter of what 32 bits hold.
+  constexpr double kQuanta = 0x1p29;
+  const double turns = kQuanta / (range + skin) * 0x1p-32;
+  fixed.resize(position.size());
+  const auto quanta = [turns](double x) {
+    // A sum with 3 2^51 rounds to a whole number and leaves its low bits at the end.
+    constexpr double kWhole = 0x1.8p52;
+    const double t = x * turns;
+    const double q = (t - ((t + kWhole) - kWhole)) * 0x1p32 + kWhole;
+    return std::bit_cast<float>(static_cast<std::uint32_t>(std::bit_cast<std::uint64_t>(q)));
+  };
+  const auto body = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const packed::Row& x = position[e];
+      fixed[e] = {quanta(x.x), quanta(x.y), quanta(x.z), 0.0F};
+    }
+  };
+  executor.for_blocks(position.size(), kPointBlock, std::cref(body));
+  return {.rows = &fixed.data()->x,
+          .quantum = static_cast<float>((range + skin) / kQuanta),
+          .outside = static_cast<float>(4.0 * range)};
+}
+
+void NeighbourList::Impl::stage_single_normals(std::span<const Vec3> normals, const Executor& executor) {
+  single_normal.resize(position.size());
+  std::fill(single_normal.begin() + static_cast<std::ptrdiff_t>(source.size()), single_normal.end(),
+            packed::SingleRow{});
+  const auto body = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const Eigen::Vector3f n = normals[source[e]].cast<float>();
+      single_normal[e] = {n.x(), n.y(), n.z(), 0.0F};
+    }
+  };
+  executor.for_blocks(source.size(), kPointBlock, std::cref(body));
+}
+
 void NeighbourList::Impl::clear(std::vector<packed::Row>& rows, const Executor& executor) const {
   rows.resize(position.size());
   const auto body = [&](std::size_t begin, std::size_t end) {
@@ -266,7 +304,8 @@ void NeighbourList::Impl::stage_normals(std::span<const Vec3> normals, const Exe
   executor.for_blocks(source.size(), kPointBlock, std::cref(body));
 }
 
-void accumulate_geometric(NeighbourList& list, const TwelveSix& law, const Executor& executor, Loads& loads) {
+void accumulate_geometric(NeighbourList& list, const TwelveSix& law, const Executor& executor, Loads& loads,
+                          Precision precision) {
   NeighbourList::Impl& impl = list.impl();
   SUPPLE_EXPECTS(loads.force.size() == impl.reference.size());
   const double s2 = law.sigma * law.sigma;
@@ -275,9 +314,16 @@ void accumulate_geometric(NeighbourList& list, const TwelveSix& law, const Execu
                                          .twelve = 48.0 * law.epsilon * s6 * s6,
                                          .six = 24.0 * law.epsilon * s6};
   impl.clear(impl.force, executor);
-  impl.for_lists(executor, [&](const packed::ListBlock& block) {
-    packed::twelve_six_forces(numbers, block, impl.position.data(), impl.force.data());
-  });
+  if (precision == Precision::SingleForces) {
+    const packed::Fixed fixed = impl.stage_fixed(executor);
+    impl.for_lists(executor, [&](const packed::ListBlock& block) {
+      packed::twelve_six_forces(numbers, block, fixed, impl.force.data());
+    });
+  } else {
+    impl.for_lists(executor, [&](const packed::ListBlock& block) {
+      packed::twelve_six_forces(numbers, block, impl.position.data(), impl.force.data());
+    });
+  }
   impl.for_points(executor, [&](std::size_t i, std::size_t point) {
     const packed::Row& f = impl.force[point];
     loads.force[i] += Vec3(f.x, f.y, f.z);
@@ -285,11 +331,10 @@ void accumulate_geometric(NeighbourList& list, const TwelveSix& law, const Execu
 }
 
 void accumulate_geometric(NeighbourList& list, const SurfaceLaws& law, std::span<const Vec3> normals,
-                          const Executor& executor, Loads& loads) {
+                          const Executor& executor, Loads& loads, Precision precision) {
   NeighbourList::Impl& impl = list.impl();
   const std::size_t n = impl.reference.size();
   SUPPLE_EXPECTS(normals.size() == n && loads.force.size() == n && loads.torque.size() == n);
-  impl.stage_normals(normals, executor);
   const double h2 = impl.range * impl.range;
   const packed::SurfaceNumbers numbers{.range = impl.range,
                                        .inverse_h2 = 1.0 / h2,
@@ -307,10 +352,19 @@ void accumulate_geometric(NeighbourList& list, const SurfaceLaws& law, std::span
                                        .cocircularity2 = 2.0 * law.cocircularity};
   impl.clear(impl.force, executor);
   impl.clear(impl.turn, executor);
-  impl.for_lists(executor, [&](const packed::ListBlock& block) {
-    packed::surface_loads(numbers, block, impl.position.data(), impl.normal.data(), impl.force.data(),
-                          impl.turn.data());
-  });
+  if (precision == Precision::SingleForces) {
+    const packed::Fixed fixed = impl.stage_fixed(executor);
+    impl.stage_single_normals(normals, executor);
+    impl.for_lists(executor, [&](const packed::ListBlock& block) {
+      packed::surface_loads(numbers, block, fixed, &impl.single_normal.data()->x, impl.force.data(), impl.turn.data());
+    });
+  } else {
+    impl.stage_normals(normals, executor);
+    impl.for_lists(executor, [&](const packed::ListBlock& block) {
+      packed::surface_loads(numbers, block, impl.position.data(), impl.normal.data(), impl.force.data(),
+                            impl.turn.data());
+    });
+  }
   impl.for_points(executor, [&](std::size_t i, std::size_t point) {
     const packed::Row& f = impl.force[point];
     const packed::Row& t = impl.turn[point];
@@ -344,7 +398,8 @@ std::size_t NeighbourList::entries() const {
 std::size_t NeighbourList::bytes() const {
   const auto size_of = [](const auto&... v) { return ((v.capacity() * sizeof(v[0])) + ...); };
   const Impl& l = *impl_;
-  std::size_t total = size_of(l.reference, l.source, l.images, l.shift, l.position, l.normal, l.force, l.turn, l.cells,
+  std::size_t total = size_of(l.reference, l.source, l.images, l.shift, l.position, l.normal, l.force, l.turn, l.fixed,
+                              l.single_normal, l.cells,
                               l.cell, l.order, l.unsorted_shift, l.image_source, l.grid.start, l.grid.x, l.grid.y,
                               l.grid.z, l.grid.image, l.block, l.block_move2);
   for (const std::vector<packed::Row>& rows : l.ellipsoid) total += size_of(rows);

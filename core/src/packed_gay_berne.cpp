@@ -179,7 +179,7 @@ void GayBerneLoads(const GayBerneNumbers& given, const ListBlock& list, const Ro
         const Vector k = times(c, r);
         store(r, p, near[b].r);
         store(k, p, near[b].k);
-        store(dot({g.d.x, g.o.z, g.o.y}, {c.d.x, c.o.z, c.o.y}), p, near[b].det_g);
+        store(dot(Vector{g.d.x, g.o.z, g.o.y}, Vector{c.d.x, c.o.z, c.o.y}), p, near[b].det_g);
         store(cross(times(own, k), k), p, near[b].k_turn);
         store(twist(own, c), p, near[b].det_turn);
       }
@@ -192,7 +192,7 @@ void GayBerneLoads(const GayBerneNumbers& given, const ListBlock& list, const Ro
         const Symmetric c = adjugate(g);
         const Vector i = times(c, load(near[b].r, p));
         store(i, p, near[b].i);
-        store(dot({g.d.x, g.o.z, g.o.y}, {c.d.x, c.o.z, c.o.y}), p, near[b].det_b);
+        store(dot(Vector{g.d.x, g.o.z, g.o.y}, Vector{c.d.x, c.o.z, c.o.y}), p, near[b].det_b);
         store(cross(times(own, i), i), p, near[b].i_turn);
       }
     }

@@ -17,6 +17,7 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "packed_laws-inl.h"
 #include "packed_rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -44,9 +45,9 @@ HWY_INLINE Divided divide(std::uint32_t owner, const std::uint32_t* HWY_RESTRICT
   return out;
 }
 
-void TwelveSixForces(const TwelveSixNumbers& law, const ListBlock& list, const Row* HWY_RESTRICT position,
+void TwelveSixForces(const TwelveSixNumbers& given, const ListBlock& list, const Row* HWY_RESTRICT position,
                      Row* HWY_RESTRICT force) {
-  const V range2 = set(law.range2), twelve = set(law.twelve), six = set(law.six);
+  const TwelveSixNumbers law = given;
   const double* HWY_RESTRICT rows = &position->x;
   double* HWY_RESTRICT forces = &force->x;
   const std::uint32_t* HWY_RESTRICT owner = list.owner.data();
@@ -54,10 +55,7 @@ void TwelveSixForces(const TwelveSixNumbers& law, const ListBlock& list, const R
   const auto add_forces = [&](const Divided& near) HWY_ATTR {
     Vector push[kParts];
     for (std::size_t p = 0; p < kParts; ++p) {
-      const V inverse = near.inverse[p];
-      const V i6 = hn::Mul(hn::Mul(inverse, inverse), inverse);
-      const V g = hn::Mul(hn::Mul(i6, inverse), hn::MulSub(twelve, i6, six));
-      push[p] = scaled(hn::IfThenElseZero(hn::Lt(near.d2[p], range2), g), near.r[p]);
+      push[p] = scaled(twelve_six_slope(law, near.d2[p], near.inverse[p]), near.r[p]);
     }
     const Rows out = rows_of(push);
     subtract_total(out, forces + *owner);
@@ -165,35 +163,16 @@ HWY_INLINE void evaluate_cohesion(const SurfaceNumbers& law, Near* HWY_RESTRICT 
   });
 }
 
-/// With a = n_i . r, b = n_j . r, c = n_i . n_j the energy of a pair is U_c(d) + psi E,
-/// E = k_f (kappa^2 + 2 w / d^2) + a q_a + b q_b + 2 k_n (1 - c), w = kappa (a - b) + 1 - c,
-/// q_a = k_p a + k_c (a + b), q_b = k_p b + k_c (a + b),
-/// so that dU/dr = G r + U_a n_i + U_b n_j, dU/dn_i = U_a r + U_c n_j and dU/dn_j = U_b r + U_c n_i.
 HWY_INLINE void evaluate_gains(const SurfaceNumbers& law, std::size_t k, const Vector& n, const Vector& m, Near& near) {
   const D d;
-  const Vector r = near.r(k);
-  const V d2 = squared(r);
-  const V inverse = hn::Div(set(1.0), d2);
-  const V rest = hn::Max(hn::NegMulAdd(d2, set(law.inverse_h2), set(1.0)), hn::Zero(d));
-  const V a = dot(n, r), b = dot(m, r);
-  const V unlike = hn::NegMulAdd(n.x, m.x, hn::NegMulAdd(n.y, m.y, hn::NegMulAdd(n.z, m.z, set(1.0))));
-  const V rest2 = hn::Mul(rest, rest);
-  const V psi = hn::Mul(rest2, rest);
-  const V form = hn::Mul(set(law.form4), inverse);
-  const V bend = hn::Mul(set(law.half_curvature), form);
-  const V q_a = hn::MulAdd(set(law.flatness2), a, hn::Mul(set(law.cocircularity2), b));
-  const V q_b = hn::MulAdd(set(law.flatness2), b, hn::Mul(set(law.cocircularity2), a));
-  const V bent = hn::Mul(form, hn::MulAdd(set(law.curvature), hn::Sub(a, b), unlike));
-  const V e2 = hn::Add(hn::MulAdd(set(law.conormality4), unlike, hn::Add(bent, set(law.form_offset2))),
-                       hn::MulAdd(a, q_a, hn::Mul(b, q_b)));
-  const V radial = hn::Mul(inverse, hn::NegMulAdd(psi, bent, hn::Load(d, near.pull + k)));
+  const SurfaceGains<V> gains = surface_gains(law, near.r(k), n, m, hn::Load(d, near.pull + k));
   hn::Store(m.x, d, near.mx + k);
   hn::Store(m.y, d, near.my + k);
   hn::Store(m.z, d, near.mz + k);
-  hn::Store(hn::MulAdd(hn::Mul(rest2, set(law.slope)), e2, radial), d, near.g + k);
-  hn::Store(hn::Mul(psi, hn::Add(q_a, bend)), d, near.u_a + k);
-  hn::Store(hn::Mul(psi, hn::Sub(q_b, bend)), d, near.u_b + k);
-  hn::Store(hn::Mul(psi, hn::NegMulAdd(set(0.5), form, set(-law.conormality2))), d, near.u_c + k);
+  hn::Store(gains.g, d, near.g + k);
+  hn::Store(gains.u_a, d, near.u_a + k);
+  hn::Store(gains.u_b, d, near.u_b + k);
+  hn::Store(gains.u_c, d, near.u_c + k);
 }
 
 HWY_INLINE void add_surface_loads(std::uint32_t i, const std::uint32_t* HWY_RESTRICT j, const Near& near,
@@ -378,7 +357,7 @@ double LargestMove2(const double* HWY_RESTRICT now, const double* HWY_RESTRICT b
     V x, y, z, x0, y0, z0;
     hn::LoadInterleaved3(d, now + 3 * k, x, y, z);
     hn::LoadInterleaved3(d, before + 3 * k, x0, y0, z0);
-    largest = hn::Max(largest, squared({hn::Sub(x, x0), hn::Sub(y, y0), hn::Sub(z, z0)}));
+    largest = hn::Max(largest, squared(Vector{hn::Sub(x, x0), hn::Sub(y, y0), hn::Sub(z, z0)}));
   }
   double move2 = hn::GetLane(hn::MaxOfLanes(d, largest));
   for (; k < points; ++k) {

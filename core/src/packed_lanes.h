@@ -87,6 +87,22 @@ struct SurfaceNumbers {
 void surface_loads(const SurfaceNumbers& law, const ListBlock& list, const Row* position, const Row* normal,
                    Row* force, Row* turn);
 
+/// Positions for pairs in single precision: whole numbers of quanta, modulo 2^32, as the bits of floats. Neighbours are
+/// so near each other that the difference modulo 2^32 is the true one: precision is relative to the range, not to the
+/// extent of all particles.
+struct alignas(16) SingleRow {
+  float x = 0.0F, y = 0.0F, z = 0.0F, w = 0.0F;
+};
+struct Fixed {
+  const float* rows = nullptr;  ///< of SingleRow
+  float quantum = 0.0F;         ///< [m]
+  float outside = 0.0F;         ///< a coordinate of r out of range [m]
+};
+/// The same laws in single precision; each pair acts on both particles with the same number, and sums are of doubles.
+void twelve_six_forces(const TwelveSixNumbers& law, const ListBlock& list, const Fixed& fixed, Row* force);
+void surface_loads(const SurfaceNumbers& law, const ListBlock& list, const Fixed& fixed, const float* normals,
+                   Row* force, Row* turn);
+
 /// Gay-Berne ellipsoids; powers are whole.
 struct GayBerneNumbers {
   double range2 = 0.0;

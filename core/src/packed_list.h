@@ -31,6 +31,8 @@ struct NeighbourList::Impl {
   std::vector<packed::Row> position;       ///< of the points, and far away those that fill the batches of each block
   std::vector<packed::Row> normal;
   std::array<std::vector<packed::Row>, 4> ellipsoid;
+  std::vector<packed::SingleRow> fixed;    ///< positions in quanta of `kQuanta` a reach
+  std::vector<packed::SingleRow> single_normal;
   std::vector<packed::Row> force;          ///< sums of the points
   std::vector<packed::Row> turn;
 
@@ -47,6 +49,8 @@ struct NeighbourList::Impl {
   void stage(std::span<const Vec3> positions, const Executor& executor);
   void clear(std::vector<packed::Row>& rows, const Executor& executor) const;
   void stage_normals(std::span<const Vec3> normals, const Executor& executor);
+  packed::Fixed stage_fixed(const Executor& executor);
+  void stage_single_normals(std::span<const Vec3> normals, const Executor& executor);
   void stage_ellipsoids(const Vec3& radii2, const Vec3& softness, std::span<const Quat> orientations,
                         const Executor& executor);
   /// Calls use(block) for all lists, those of one colour in any order.

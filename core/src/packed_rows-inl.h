@@ -20,9 +20,12 @@ using V = hn::Vec<D>;
 constexpr std::size_t kLanes = hn::MaxLanes(D());
 constexpr std::size_t kParts = kBatch / kLanes;  ///< vectors of a batch
 
-struct Vector {
-  V x, y, z;
+/// The same for each lane: W is a vector of doubles or of floats.
+template <class W>
+struct VectorOf {
+  W x, y, z;
 };
+using Vector = VectorOf<V>;
 
 HWY_INLINE V set(double value) { return hn::Set(D(), value); }
 
@@ -136,18 +139,25 @@ HWY_INLINE void subtract_total(const Rows& r, double* row) {
   _mm256_store_pd(row, _mm256_sub_pd(_mm256_load_pd(row), total(r)));
 }
 
-HWY_INLINE V dot(const Vector& a, const Vector& b) {
+template <class W>
+HWY_INLINE W dot(const VectorOf<W>& a, const VectorOf<W>& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
-HWY_INLINE V squared(const Vector& r) { return dot(r, r); }
-
-HWY_INLINE Vector scaled(V s, const Vector& v) { return {hn::Mul(s, v.x), hn::Mul(s, v.y), hn::Mul(s, v.z)}; }
+template <class W>
+HWY_INLINE W squared(const VectorOf<W>& r) {
+  return dot(r, r);
+}
+template <class W>
+HWY_INLINE VectorOf<W> scaled(W s, const VectorOf<W>& v) {
+  return {hn::Mul(s, v.x), hn::Mul(s, v.y), hn::Mul(s, v.z)};
+}
 /// s v + w.
-HWY_INLINE Vector scaled_sum(V s, const Vector& v, const Vector& w) {
+template <class W>
+HWY_INLINE VectorOf<W> scaled_sum(W s, const VectorOf<W>& v, const VectorOf<W>& w) {
   return {hn::MulAdd(s, v.x, w.x), hn::MulAdd(s, v.y, w.y), hn::MulAdd(s, v.z, w.z)};
 }
-
-HWY_INLINE Vector minus(const Vector& a, const Vector& b) {
+template <class W>
+HWY_INLINE VectorOf<W> minus(const VectorOf<W>& a, const VectorOf<W>& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 

@@ -101,6 +101,7 @@ struct Melt {
   std::vector<Vec3> x, v;
   Loads loads;
   NeighbourList list{2.5, 0.3};
+  Precision precision = Precision::Double;
   std::size_t builds = 0;
 
   /// fcc of density 0.8442 with cells^3 unit cells, at temperature 3.
@@ -142,7 +143,7 @@ struct Melt {
   void forces(const Executor& executor) {
     builds += list.update(x, executor) ? 1 : 0;
     loads.force.assign(x.size(), Vec3::Zero());
-    accumulate_geometric(list, TwelveSix{}, executor, loads);
+    accumulate_geometric(list, TwelveSix{}, executor, loads, precision);
   }
   /// Velocity Verlet.
   void step(const Executor& executor) {
@@ -180,8 +181,11 @@ struct Melt {
   }
 };
 
-void bench_melt(Melt melt, int steps, int repeats) {
+const char* name_of(Precision precision) { return precision == Precision::Double ? "" : "/single"; }
+
+void bench_melt(Melt melt, Precision precision, int steps, int repeats) {
   const Executor executor(1);
+  melt.precision = precision;
   const std::vector<Vec3> x = melt.x, v = melt.v;
   double best = std::numeric_limits<double>::infinity();
   std::string thermo;
@@ -195,7 +199,7 @@ void bench_melt(Melt melt, int steps, int repeats) {
     best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - start) / steps);
   }
   const double n = static_cast<double>(x.size());
-  print({.name = "melt/steps=" + std::to_string(steps),
+  print({.name = "melt" + std::string(name_of(precision)) + "/steps=" + std::to_string(steps),
          .particles = x.size(),
          .time = best,
          .rate = field("steps_per_build", static_cast<double>(steps) / static_cast<double>(melt.builds)) + ", " +
@@ -336,7 +340,7 @@ struct Crowd {
   }
 };
 
-void bench_surface_laws(std::size_t count) {
+void bench_surface_laws(std::size_t count, Precision precision) {
   const Crowd crowd(count);
   const Executor executor(1);
   constexpr double kRange = 2.5;
@@ -355,10 +359,10 @@ void bench_surface_laws(std::size_t count) {
   Loads loads;
   const double time = least_time(10, CLOCK_PROCESS_CPUTIME_ID, [&] {
     loads.reset(count);
-    accumulate_geometric(list, laws, crowd.normal, executor, loads);
+    accumulate_geometric(list, laws, crowd.normal, executor, loads, precision);
   });
   const auto n = static_cast<double>(count);
-  print({.name = "surface_laws",
+  print({.name = "surface_laws" + std::string(name_of(precision)),
          .particles = count,
          .time = time,
          .rate = field("pairs_per_s", static_cast<double>(pairs) / time) + ", " +
@@ -429,16 +433,25 @@ void bench_spiral(int count, bool rubs) {
 
 }  // namespace
 
-/// @param argv  melt [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, surface, lists, spiral; all when absent
+/// @param argv  melt [FILE [STEPS]], melt_single, ellipsoids [FILE [STEPS]], threads, surface, lists, spiral; all when absent
 int main(int argc, char** argv) {
   const std::string_view what = argc > 1 ? argv[1] : "";
   const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };
-  if (wanted("melt")) bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), argc > 3 ? std::atoi(argv[3]) : 100, 3);
+  for (const Precision precision : {Precision::Double, Precision::SingleForces}) {
+    const bool single = precision == Precision::SingleForces;
+    if (what.empty() || what == (single ? "melt_single" : "melt")) {
+      bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), precision, argc > 3 ? std::atoi(argv[3]) : 100, 3);
+    }
+  }
   if (wanted("ellipsoids")) {
     bench_ellipsoids(argc > 2 ? Ellipsoids(argv[2]) : Ellipsoids(20), argc > 3 ? std::atoi(argv[3]) : 50, 3);
   }
   if (wanted("surface")) {
-    for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_surface_laws(count);
+    for (const Precision precision : {Precision::Double, Precision::SingleForces}) {
+      for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) {
+        bench_surface_laws(count, precision);
+      }
+    }
   }
   if (wanted("lists")) {
     for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_lists(count);

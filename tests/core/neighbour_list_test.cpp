@@ -100,19 +100,21 @@ void for_surface_loads(const Crowd& crowd, const SurfaceLaws& law, const Use& us
   }
 }
 
-Loads surface_loads(const Crowd& crowd, const Executor& executor = Executor(1)) {
+Loads surface_loads(const Crowd& crowd, const Executor& executor = Executor(1),
+                    Precision precision = Precision::Double) {
   NeighbourList list = make_list(crowd, executor);
   Loads loads;
   loads.reset(crowd.position.size());
-  accumulate_geometric(list, kSurface, crowd.normal, executor, loads);
+  accumulate_geometric(list, kSurface, crowd.normal, executor, loads, precision);
   return loads;
 }
 
-Loads twelve_six_loads(const Crowd& crowd, const Executor& executor = Executor(1)) {
+Loads twelve_six_loads(const Crowd& crowd, const Executor& executor = Executor(1),
+                       Precision precision = Precision::Double) {
   NeighbourList list = make_list(crowd, executor);
   Loads loads;
   loads.reset(crowd.position.size());
-  accumulate_geometric(list, TwelveSix{.epsilon = 0.3, .sigma = 0.5}, executor, loads);
+  accumulate_geometric(list, TwelveSix{.epsilon = 0.3, .sigma = 0.5}, executor, loads, precision);
   return loads;
 }
 
@@ -288,6 +290,99 @@ TEST(GeometricLoads, HaveTheSameBitsForEveryVectorWidth) {
     hwy::GetChosenTarget().Update(target);
     EXPECT_EQ(hash_of(surface_loads(crowd)), surface) << hwy::TargetName(target);
     EXPECT_EQ(hash_of(twelve_six_loads(crowd)), radial) << hwy::TargetName(target);
+    hwy::SetSupportedTargetsForTest(0);
+  }
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+/// The crowd moved far away: in coordinates of single precision separations would be known to 2^-8 only.
+Crowd far_away(Crowd crowd) {
+  for (Vec3& x : crowd.position) x += Vec3(65536.0, -65536.0, 65536.0);
+  return crowd;
+}
+
+TEST(SingleForces, AgreeWithDoubleToSinglePrecisionHoweverFarFromTheOrigin) {
+  // Separations are rounded to u = 2^-24 of themselves and to 2^-29 of 1.2 in each coordinate, 1.2e-9; of r = 0.1 or more
+  // that is 2 u in all. Power 13 and some ten roundings: 40 u of each pair's force.
+  constexpr double kUnit = 0x1p-24;
+  for (const bool periodic : {false, true}) {
+    for (const std::size_t count : {2U, 9U, 64U, 700U}) {
+      Crowd crowd = make_crowd(count, 90 + count, periodic);
+      if (!periodic) crowd = far_away(crowd);
+      const Loads loads = twelve_six_loads(crowd, Executor(1), Precision::SingleForces);
+      const Loads exact = twelve_six_loads(crowd);
+      std::vector<double> scale(count, 0.0);
+      for (const IndexPair& pair : near_pairs(crowd, 1.0)) {
+        const double d = between(crowd, pair.first, pair.second).norm(), s6 = std::pow(0.5 / d, 6.0);
+        const double size = 4.0 * 0.3 * (12.0 * s6 * s6 + 6.0 * s6) / d * std::max(1.0, 0.1 / d);
+        scale[pair.first] += size;
+        scale[pair.second] += size;
+      }
+      bool rounded = count < 64;
+      for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_LE((loads.force[i] - exact.force[i]).norm(), 40.0 * kUnit * scale[i]) << count << ' ' << i << periodic;
+        rounded = rounded || (loads.force[i] - exact.force[i]).norm() > 0.01 * kUnit * scale[i];
+      }
+      EXPECT_TRUE(rounded);
+    }
+  }
+}
+
+TEST(SingleForces, OfTheFiveLawsAgreeWithDoubleToSinglePrecision) {
+  // As above; n_i . r and n_j . r cancel, so a pair's error is that of the sum of its terms. A term of form grows as
+  // 1/d^3, so near pairs are given more: the bound is 40 u of the size of all five terms with their factors.
+  constexpr double kUnit = 0x1p-24;
+  for (const bool periodic : {false, true}) {
+    const std::size_t count = 700;
+    Crowd crowd = make_crowd(count, 94, periodic);
+    if (!periodic) crowd = far_away(crowd);
+    const Loads loads = surface_loads(crowd, Executor(1), Precision::SingleForces), exact = surface_loads(crowd);
+    std::vector<double> scale(count, 0.0);
+    for (const IndexPair& pair : near_pairs(crowd, 1.0)) {
+      const double d = between(crowd, pair.first, pair.second).norm();
+      const double cohesion = kSurface.cohesion.f0 * kSurface.cohesion.r0 / d * std::pow(1.0 + d / 0.4, 3.0);
+      const double form = kSurface.form / (d * d) * (2.0 + kSurface.curvature * d) * (2.0 / d + kSurface.curvature);
+      const double others = kSurface.coplanarity * d + 4.0 * kSurface.conormality + 4.0 * kSurface.cocircularity * d;
+      for (const std::uint32_t i : {pair.first, pair.second}) {
+        scale[i] += (cohesion + 8.0 * (form + others)) * std::max(1.0, 0.1 / d);
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_LE((loads.force[i] - exact.force[i]).norm(), 40.0 * kUnit * scale[i]) << i << periodic;
+      EXPECT_LE((loads.torque[i] - exact.torque[i]).norm(), 40.0 * kUnit * scale[i]) << i << periodic;
+    }
+  }
+}
+
+TEST(SingleForces, KeepMomentumAsDoublesDo) {
+  const Crowd crowd = make_crowd(2000, 95, false);
+  for (const bool surface : {false, true}) {
+    const Loads loads = surface ? surface_loads(crowd, Executor(1), Precision::SingleForces)
+                                : twelve_six_loads(crowd, Executor(1), Precision::SingleForces);
+    Vec3 force = Vec3::Zero();
+    double scale = 0.0;
+    for (const Vec3& f : loads.force) {
+      force += f;
+      scale += f.norm();
+    }
+    EXPECT_LE(force.norm(), 1e-14 * scale) << surface;
+  }
+}
+
+TEST(SingleForces, HaveTheSameBitsForEveryNumberOfThreadsAndEveryVectorWidth) {
+  const Crowd crowd = make_crowd(20000, 96, true);
+  const auto hash = [&](int threads) {
+    const Executor executor(threads);
+    return hash_of(surface_loads(crowd, executor, Precision::SingleForces)) ^
+           (3 * hash_of(twelve_six_loads(crowd, executor, Precision::SingleForces)));
+  };
+  const std::uint64_t one = hash(1);
+  for (const int threads : {2, 3, 8}) EXPECT_EQ(hash(threads), one) << threads;
+  for (const auto target : {HWY_AVX2, HWY_AVX3}) {
+    if ((hwy::SupportedTargets() & target) == 0) continue;
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(target);
+    EXPECT_EQ(hash(1), one) << hwy::TargetName(target);
     hwy::SetSupportedTargetsForTest(0);
   }
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
