@@ -28,56 +28,48 @@ using U = hn::RebindToUnsigned<F>;
 
 constexpr float kNowhere = 1e30F;  ///< a coordinate farther away than any range
 
-/// Distances of a batch that is on its way through the divider.
-struct Divided {
-  Vector r[kParts];
-  V d2[kParts], inverse[kParts];
-};
-
-HWY_INLINE Divided divide(std::uint32_t owner, const std::uint32_t* HWY_RESTRICT j, const double* HWY_RESTRICT rows) {
-  const Vector x = broadcast(rows + owner);
-  Divided out;
-  for (std::size_t p = 0; p < kParts; ++p) {
-    out.r[p] = minus(load_rows(rows, j + p * kLanes), x);
-    out.d2[p] = squared(out.r[p]);
-    out.inverse[p] = hn::Div(set(1.0), out.d2[p]);
-  }
-  return out;
-}
-
 void TwelveSixForces(const TwelveSixNumbers& given, const ListBlock& list, const Row* HWY_RESTRICT position,
                      Row* HWY_RESTRICT force) {
+  struct Push {
+    alignas(64) double x[kBatch], y[kBatch], z[kBatch];
+  };
+  constexpr std::size_t kNearBatches = 32;
+  const D d;
   const TwelveSixNumbers law = given;
   const double* HWY_RESTRICT rows = &position->x;
   double* HWY_RESTRICT forces = &force->x;
-  const std::uint32_t* HWY_RESTRICT owner = list.owner.data();
-  const std::uint32_t* HWY_RESTRICT j = list.neighbour.data();
-  const auto add_forces = [&](const Divided& near) HWY_ATTR {
-    Vector push[kParts];
-    for (std::size_t p = 0; p < kParts; ++p) {
-      push[p] = scaled(twelve_six_slope(law, near.d2[p], near.inverse[p]), near.r[p]);
+  Push push[kNearBatches];
+  for (std::size_t begin = 0; begin < list.batches; begin += kNearBatches) {
+    const std::uint32_t* HWY_RESTRICT owner = list.owner.data() + begin;
+    const std::uint32_t* HWY_RESTRICT neighbour = list.neighbour.data() + kBatch * begin;
+    const std::size_t count = std::min(list.batches - begin, kNearBatches);
+    for (std::size_t b = 0; b < count; ++b) {
+      const Vector x = broadcast(rows + owner[b]);
+      for (std::size_t k = 0; k < kBatch; k += kLanes) {
+        const Vector r = minus(load_rows(rows, neighbour + kBatch * b + k), x);
+        const V d2 = squared(r);
+        const Vector f = scaled(twelve_six_slope(law, d2, hn::Div(set(1.0), d2)), r);
+        hn::Store(f.x, d, push[b].x + k);
+        hn::Store(f.y, d, push[b].y + k);
+        hn::Store(f.z, d, push[b].z + k);
+      }
     }
-    const Rows out = rows_of(push);
-    subtract_total(out, forces + *owner);
-    add_rows(out, j, forces);
-    ++owner;
-    j += kBatch;
-  };
-  // While one batch is added the next two are divided.
-  Divided even = divide(owner[0], j, rows), odd = divide(owner[1], j + kBatch, rows);
-  std::size_t b = 1;
-  for (; b < list.batches; b += 2) {
-    add_forces(even);
-    even = divide(owner[1], j + kBatch, rows);
-    add_forces(odd);
-    odd = divide(owner[1], j + kBatch, rows);
+    for (std::size_t b = 0; b < count; ++b) {
+      Vector f[kParts];
+      for (std::size_t p = 0; p < kParts; ++p) {
+        const std::size_t k = p * kLanes;
+        f[p] = {hn::Load(d, push[b].x + k), hn::Load(d, push[b].y + k), hn::Load(d, push[b].z + k)};
+      }
+      const Rows out = rows_of(f);
+      subtract_total(out, forces + owner[b]);
+      add_rows(out, neighbour + kBatch * b, forces);
+    }
   }
-  if (b == list.batches) add_forces(even);
 }
 
 /// Vectors that are worked on in step: the results of one arrive while the others are begun.
 constexpr std::size_t kChains = 4;
-static_assert(kChains / kParts <= kSpareBatches + 1 && kSpareBatches >= 2);
+static_assert(kChains / kParts <= kSpareBatches + 1);
 template <class Step>
 HWY_INLINE void in_step(const Step& step) {
   for (std::size_t c = 0; c < kChains; ++c) step(c);
