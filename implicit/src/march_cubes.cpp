@@ -566,8 +566,14 @@ struct CubeMesher::Impl {
   march::BlockTable table;
   march::MeshScratch scratch;
   Mesh mesh, refined;
+  std::unique_ptr<march::Sampler> sampler;  ///< of the last mesh
+  Lattice cell_lattice;
   double iso = 0.0;
   bool kept = false;  ///< table and mesh are those of the grid's last build
+
+  const Mesh& march(const FieldView& field, const Lattice& lattice, const Executor& executor, MarchCounts& counts);
+  /// The last mesh, refined.
+  const Mesh& refine(int refinements, const Executor& executor, MarchCounts& counts);
 };
 
 CubeMesher::CubeMesher() : impl_(std::make_unique<Impl>()) {}
@@ -575,42 +581,99 @@ CubeMesher::~CubeMesher() = default;
 CubeMesher::CubeMesher(CubeMesher&&) noexcept = default;
 CubeMesher& CubeMesher::operator=(CubeMesher&&) noexcept = default;
 
+namespace {
+
+/// Largest distance of the centroids to the surface.
+double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& executor) {
+  constexpr std::size_t kBatch = 512;
+  std::vector<double> largest((mesh.triangle_count() + kBatch - 1) / kBatch, 0.0);
+  executor.for_blocks(mesh.triangle_count(), kBatch, [&](std::size_t begin, std::size_t end) {
+    std::array<Vec3, kBatch> points, gradients;
+    std::array<double, kBatch> values;
+    const std::size_t n = end - begin;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto& t = mesh.triangle[begin + i];
+      points[i] = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
+    }
+    field.evaluate(std::span(points).first(n), std::span(values).first(n), std::span(gradients).first(n));
+    for (std::size_t i = 0; i < n; ++i) {
+      const double slope = gradients[i].norm();
+      if (slope > 0.0) largest[begin / kBatch] = std::max(largest[begin / kBatch], std::abs(values[i]) / slope);
+    }
+  });
+  return largest.empty() ? 0.0 : *std::max_element(largest.begin(), largest.end());
+}
+
+}  // namespace
+
 const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                              MarchCounts* counts) {
-  SUPPLE_EXPECTS(options.refinements >= 0 && options.refinements <= kMostRefinements);
-  Impl& kept = *impl_;
-  const Field* points = field.as_field();
-  const double iso = points != nullptr ? points->index().iso : 0.0;
-  if (!kept.kept || iso != kept.iso) {
-    kept.grid.forget();
+  SUPPLE_EXPECTS(options.refinements >= 0 && options.refinements <= kMostRefinements && options.error >= 0.0);
+  MarchCounts local;
+  MarchCounts& count = counts != nullptr ? *counts : local;
+  if (options.error == 0.0) {
+    const Mesh& mesh = impl_->march(field, options.lattice, executor, count);
+    return options.refinements == 0 ? mesh : impl_->refine(options.refinements, executor, count);
   }
-  kept.kept = false;
-  kept.iso = iso;
-  const std::unique_ptr<march::Sampler> sampler = march::make_sampler(field, options.lattice, kept.grid);
-  sampler->prepare(executor, kept.table);
-  sampler->sample(executor, kept.table);
-  march::assemble(kept.table, *sampler, options.lattice, executor, kept.scratch, kept.mesh);
-  kept.kept = sampler->single_precision();
-  if (counts != nullptr) {
-    *counts = {};
-    counts->blocks = kept.table.block.size();
-    counts->single_precision = sampler->single_precision();
-    for (const march::Block& block : kept.table.block) {
-      counts->leaves += block.leaf.size();
-      counts->leaves_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
-      counts->nodes += block.values.size();
-      counts->bytes += sizeof(march::Block) + block.leaf.capacity() * sizeof(march::Leaf) +
-                       block.values.capacity() * sizeof(float) + block.corners.capacity();
+  constexpr int kRefinements = 2, kHalvings = 6;  // cells of 1/2 to 1/64 of the feature size
+  Lattice lattice = options.lattice;
+  lattice.cell = 0.5 * field.feature_size();
+  double found = 0.0;
+  for (int halving = 0; halving < kHalvings; ++halving, lattice.cell *= 0.5) {
+    const Mesh& mesh = impl_->march(field, lattice, executor, count);
+    count.error = found = centroid_error(field, mesh, executor);
+    if (found <= options.error) return mesh;
+    if (found > std::pow(4.0, kRefinements) * options.error) continue;  // a refinement divides errors by four
+    for (int level = 1; level <= kRefinements; ++level) {
+      const Mesh& refined = impl_->refine(level, executor, count);
+      count.error = found = centroid_error(field, refined, executor);
+      if (found <= options.error) return refined;
     }
-    counts->bytes += kept.scratch.bytes() + kept.grid.bytes();
   }
-  if (options.refinements == 0) return kept.mesh;
-  kept.refined = kept.mesh;
-  march::list_tiles(kept.table, kept.scratch.tiles);
-  for (int level = 0; level < options.refinements; ++level) {
-    march::refine(*sampler, options.lattice, executor, kept.scratch, kept.refined);
+  throw Error(ErrorKind::Limit, {.place = "",
+                                 .key = "mesh.error",
+                                 .expected = "expected an error of at most " + lattice::three_digits(options.error) + " m",
+                                 .found = lattice::three_digits(found) + " m with cells of " +
+                                          lattice::three_digits(2.0 * lattice.cell) + " m",
+                                 .hint = "allow at least " + lattice::three_digits(1.05 * found) + " m"});
+}
+
+const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& lattice, const Executor& executor,
+                                    MarchCounts& counts) {
+  const Field* points = field.as_field();
+  const double level = points != nullptr ? points->index().iso : 0.0;
+  if (!kept || level != iso) grid.forget();
+  kept = false;
+  iso = level;
+  sampler = march::make_sampler(field, lattice, grid);
+  sampler->prepare(executor, table);
+  sampler->sample(executor, table);
+  march::assemble(table, *sampler, lattice, executor, scratch, mesh);
+  kept = sampler->single_precision();
+  cell_lattice = lattice;
+  counts = {};
+  counts.blocks = table.block.size();
+  counts.single_precision = sampler->single_precision();
+  counts.cell = lattice.cell;
+  for (const march::Block& block : table.block) {
+    counts.leaves += block.leaf.size();
+    counts.leaves_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
+    counts.nodes += block.values.size();
+    counts.bytes += sizeof(march::Block) + block.leaf.capacity() * sizeof(march::Leaf) +
+                    block.values.capacity() * sizeof(float) + block.corners.capacity();
   }
-  return kept.refined;
+  counts.bytes += scratch.bytes() + grid.bytes();
+  return mesh;
+}
+
+const Mesh& CubeMesher::Impl::refine(int refinements, const Executor& executor, MarchCounts& counts) {
+  refined = mesh;
+  march::list_tiles(table, scratch.tiles);
+  for (int level = 0; level < refinements; ++level) {
+    march::refine(*sampler, cell_lattice, executor, scratch, refined);
+  }
+  counts.refinements = refinements;
+  return refined;
 }
 
 void CubeMesher::forget() { impl_->kept = false; }

@@ -318,6 +318,44 @@ TEST(MarchCubes, ForgetsWhatItKeptFromAnotherBody) {
   EXPECT_EQ(mesher.make(none.field, options, Executor(1)).vertex_count(), 0u);
 }
 
+// The error asked for holds at the centroids, is not overdone, and smaller errors need more triangles.
+TEST(MarchCubes, ReachesTheErrorThatIsAskedFor) {
+  const Body body = body_of({{wyvill_point(1.0), Vec3(-0.4, 0, 0)}, {wyvill_point(1.0), Vec3(0.4, 0, 0)},
+                             {wyvill_point(0.5), Vec3(2.5, 0.1, 0)}});
+  std::size_t last = 0;
+  for (const double error : {1e-2, 1e-3, 1e-4}) {
+    MarchCounts counts;
+    const Mesh mesh = march_cubes(body.field, {.lattice = {.origin = kOffset, .cell = 0.0}, .error = error}, Executor(2), &counts);
+    EXPECT_EQ(expect_closed(mesh).components, 2u);
+    EXPECT_LE(counts.error, error);
+    EXPECT_GT(counts.error, error / 64.0);
+    double largest = 0.0;
+    for (const auto& t : mesh.triangle) {
+      const Vec3 c = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
+      Vec3 gradient;
+      const double f = FieldView(body.field).value(c, gradient);
+      largest = std::max(largest, std::abs(f) / gradient.norm());
+    }
+    EXPECT_NEAR(largest, counts.error, 1e-12);
+    EXPECT_GT(mesh.triangle_count(), 2 * last);
+    last = mesh.triangle_count();
+  }
+}
+
+// Only sums are taken in single precision: other rules of blending see the view.
+TEST(MarchCubes, HeedsTheRuleOfBlending) {
+  Body body = body_of({{wyvill_point(1.0), Vec3(-0.5, 0, 0)}, {wyvill_point(1.0), Vec3(0.5, 0, 0)}});
+  const MarchOptions options{.lattice = lattice_of(0.05)};
+  const double sum = inspect(march_cubes(body.field, options, Executor(1))).volume;
+  body.skeleton.blend.rule = BlendRule::Graph;  // without edges: a union
+  body.place();
+  MarchCounts counts;
+  const Mesh apart = march_cubes(body.field, options, Executor(1), &counts);
+  EXPECT_FALSE(counts.single_precision);
+  EXPECT_NEAR(inspect(apart).volume, 2 * 0.392496505, 0.01);  // of two Wyvill spheres, which just do not overlap
+  EXPECT_GT(sum, 1.1 * inspect(apart).volume);
+}
+
 // What moved primitives do not reach is kept: the mesh must be that of a fresh mesher, bit by bit.
 class MovedBody : public ::testing::TestWithParam<int> {};
 
@@ -383,6 +421,8 @@ TEST(MarchCubes, RefusesABillionNodesBeforeTakingMemory) {
                  {"lattice.cell", "1000000000 lattice nodes", "1.38e+09", "0.0018 m", "use cells of at least 0.00"});
   expect_message([&] { (void)march_cubes(body.field, {.lattice = lattice_of(1e-12)}, Executor(1)); }, ErrorKind::Limit,
                  {"lattice.cell", "node numbers", "use cells of at least"});
+  expect_message([&] { (void)march_cubes(body.field, {.lattice = lattice_of(0.1), .error = 1e-12}, Executor(1)); },
+                 ErrorKind::Limit, {"mesh.error", "1e-12 m", "with cells of 0.0156 m", "allow at least"});
   EXPECT_THROW((void)march_cubes(body.field, {.lattice = lattice_of(0.0)}, Executor(1)), ContractViolation);
   EXPECT_THROW((void)march_cubes(body.field, {.lattice = lattice_of(0.1), .refinements = 5}, Executor(1)),
                ContractViolation);

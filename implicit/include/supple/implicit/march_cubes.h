@@ -23,6 +23,9 @@ struct MarchCounts {
   std::uint64_t nodes = 0;          ///< values held
   std::uint64_t bytes = 0;          ///< held besides the mesh
   bool single_precision = false;    ///< the body is nothing but Wyvill points
+  double cell = 0.0;                ///< edge of a cell that was used [m]
+  int refinements = 0;
+  double error = 0.0;               ///< when one was asked for: the largest found [m]
 };
 
 /// Lattice nodes in the box of a body that may be asked for.
@@ -32,6 +35,9 @@ inline constexpr int kMostRefinements = 4;
 struct MarchOptions {
   Lattice lattice;
   int refinements = 0;  ///< times that every triangle is cut into four, new vertices moved to the surface; 0..4
+  /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
+  /// chosen: cells of half the field's feature size, halved until at most two refinements do, see `make`.
+  double error = 0.0;
 };
 
 /// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh of Wyvill points
@@ -46,7 +52,10 @@ class CubeMesher {
   /// The closed surface F = 0, outward oriented, with the normals of the field; valid until the next call.
   /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges: where
   /// the surface turns by more than a right angle within a cell, as at a neck about to close, refined triangles can fold.
-  /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes.
+  /// With options.error, distances are |F| / |grad F|, and a body of separate balls is found whole: half a support is a
+  /// cell that no ball of its surface passes through.
+  /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes, or when cells of
+  /// a 64th of the feature size do not reach options.error.
   const Mesh& make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                    MarchCounts* counts = nullptr);
   /// The next call keeps nothing but memory.

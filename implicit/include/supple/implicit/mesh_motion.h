@@ -1,0 +1,28 @@
+/// @file supple/implicit/mesh_motion.h
+/// How the surface of a body moves and whose it is, as columns of its mesh.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "supple/core/executor.h"
+#include "supple/core/mesh.h"
+#include "supple/implicit/field_view.h"
+
+namespace supple::implicit {
+
+/// A part (particle) of a body as a rigid motion.
+struct PartMotion {
+  Vec3 centre = Vec3::Zero();            ///< [m]
+  Vec3 velocity = Vec3::Zero();          ///< of the centre [m/s]
+  Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
+  std::uint32_t id = 0;                  ///< what "owner" says
+};
+
+/// Adds the columns "velocity_x", "velocity_y", "velocity_z" [m/s] and "owner" (id of the part with the largest share of
+/// the field) to a mesh. Along the normal the velocity is that of the moving surface, dF/dt / |grad F| with every part's
+/// field carried rigidly (Witkin & Heckbert 1994, sec. 3); across it, the parts' velocities weighted by their fields.
+/// @param parts  by the field's part index
+void add_motion(const FieldView& field, std::span<const PartMotion> parts, const Executor& executor, Mesh& mesh);
+
+}  // namespace supple::implicit

@@ -1,0 +1,81 @@
+#include "supple/implicit/mesh_motion.h"
+
+#include <gtest/gtest.h>
+
+#include "implicit/bodies.h"
+#include "supple/implicit/march_cubes.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+struct Moving {
+  Body body = random_body({.seed = 8, .parts = 20});
+  std::vector<PartMotion> motion;
+  Mesh mesh;
+
+  void make() {
+    mesh = march_cubes(body.field, {.lattice = {.origin = Vec3(0.01, 0.02, 0.03), .cell = 0.08}}, Executor(1));
+    for (std::uint32_t i = 0; i < motion.size(); ++i) {
+      motion[i].centre = body.parts[i].position;
+      motion[i].id = 100 + i;
+    }
+    add_motion(body.field, motion, Executor(2), mesh);
+  }
+  [[nodiscard]] Vec3 velocity(std::size_t v) const {
+    return {mesh.columns[0].values[v], mesh.columns[1].values[v], mesh.columns[2].values[v]};
+  }
+};
+
+TEST(MeshMotion, IsTheMotionOfARigidBody) {
+  Moving moving;
+  const Vec3 v(0.3, -1.0, 0.5), w(0.2, 0.7, -1.1);
+  for (const Pose& part : moving.body.parts) {
+    moving.motion.push_back({.velocity = v + w.cross(part.position), .angular_velocity = w});
+  }
+  moving.make();
+  ASSERT_GT(moving.mesh.vertex_count(), 100u);
+  for (std::size_t i = 0; i < moving.mesh.vertex_count(); ++i) {
+    EXPECT_LT((moving.velocity(i) - v - w.cross(moving.mesh.position[i])).norm(), 1e-12);
+  }
+}
+
+// A vertex carried for a time dt stays on the surface up to dt^2 times second derivatives of F and of the motion: halving
+// dt divides |F| by four.
+TEST(MeshMotion, KeepsVerticesOnTheMovingSurfaceToSecondOrder) {
+  Moving moving;
+  moving.body = random_body({.seed = 9, .parts = 20, .only_points = true});
+  Random random(3);
+  for (std::size_t i = 0; i < 20; ++i) moving.motion.push_back({.velocity = random.in_box(1.0)});
+  moving.make();
+  std::array<double, 2> largest{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double dt = k == 0 ? 2e-3 : 1e-3;
+    Body later = random_body({.seed = 9, .parts = 20, .only_points = true});
+    for (std::size_t i = 0; i < 20; ++i) later.parts[i].position += dt * moving.motion[i].velocity;
+    later.place();
+    for (std::size_t i = 0; i < moving.mesh.vertex_count(); ++i) {
+      const Vec3& x = moving.mesh.position[i];
+      const double before = FieldView(moving.body.field).value(x);  // what the vertex is off by at first
+      const double f = FieldView(later.field).value(x + dt * moving.velocity(i)) - before;
+      largest[k] = std::max(largest[k], std::abs(f));
+    }
+  }
+  EXPECT_NEAR(largest[0] / largest[1], 4.0, 0.2);
+}
+
+TEST(MeshMotion, NamesThePartWithTheLargestShare) {
+  Moving moving;
+  moving.body = body_of({{wyvill_point(1.0), Vec3(-0.5, 0, 0)}, {wyvill_point(1.0), Vec3(0.5, 0, 0)}});
+  moving.motion.resize(2);
+  moving.make();
+  ASSERT_EQ(moving.mesh.columns[3].name, "owner");
+  for (std::size_t i = 0; i < moving.mesh.vertex_count(); ++i) {
+    if (std::abs(moving.mesh.position[i].x()) < 1e-9) continue;
+    EXPECT_EQ(moving.mesh.columns[3].values[i], moving.mesh.position[i].x() < 0.0 ? 100.0 : 101.0);
+  }
+}
+
+}  // namespace
+}  // namespace supple::implicit
