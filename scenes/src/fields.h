@@ -512,6 +512,15 @@ void fields(Archive& archive, ImagesDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, MeshingDesc& d) {
+  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra); auto: cubes, the faster one");
+  archive("error", d.error, above(0.0, kLength).or_auto(), "largest distance of a triangle's centroid to the surface, for cubes; auto: by the cell");
+  archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
+  archive.check(!d.error || d.method != MeshingName::Tetrahedra, "error", "expected method auto or cubes with an error", "tetrahedra",
+                "leave out 'method'");
+}
+
+template <class Archive>
 void fields(Archive& archive, OutputDesc& d) {
   archive("images", d.images, {}, "a PNG a frame");
   archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
@@ -519,6 +528,7 @@ void fields(Archive& archive, OutputDesc& d) {
   archive("particles", d.particles, {}, "table of particles a frame");
   archive("mesh", d.mesh, {}, "surfaces a frame");
   archive("grid", d.grid, {}, "fields a frame");
+  archive("meshing", d.meshing, {}, "how surfaces become meshes");
   archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids; auto: 8 cells across the smallest thickness, 64 along each object");
   archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");
 }

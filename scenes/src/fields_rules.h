@@ -61,6 +61,9 @@ template <> struct EnumNames<TableName> {
 template <> struct EnumNames<MeshName> {
   static constexpr std::array<std::string_view, 2> names{"none", "ply"};
 };
+template <> struct EnumNames<MeshingName> {
+  static constexpr std::array<std::string_view, 3> names{"auto", "cubes", "tetrahedra"};
+};
 template <> struct EnumNames<GridName> {
   static constexpr std::array<std::string_view, 2> names{"none", "vdb"};
 };

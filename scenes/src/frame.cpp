@@ -7,6 +7,7 @@
 
 #include "supple/collision/deformed_field.h"
 #include "supple/core/parts.h"
+#include "supple/implicit/mesh_motion.h"
 #include "supple/implicit/polygonise.h"
 
 namespace supple::scenes {
@@ -110,6 +111,7 @@ Frame::Frame(const Model& model, std::size_t body_count)
       reach(body_count + model.fixed.size()),
       field(body_count),
       indexed(body_count, 0),
+      mesher(body_count),
       active(body_count),
       samples(body_count),
       bodies(body_count + model.fixed.size()),
@@ -254,7 +256,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   profile.present += frame.surface.point.size();
 }
 
-std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) {
+std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles, Frame& frame) try {
   const Model& model = context.model;
   const std::vector<Body>& bodies = context.bodies;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
@@ -299,8 +301,26 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) 
   }
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (!has_surface(bodies[i]) || std::binary_search(touching.begin(), touching.end(), i)) continue;
-    surfaces[i] = implicit::polygonise(frame.field[i], lattice, context.executor, &counts);
-    add_counts();
+    if (model.meshing.method == MeshingName::Tetrahedra) {
+      surfaces[i] = implicit::polygonise(frame.field[i], lattice, context.executor, &counts);
+      add_counts();
+      continue;
+    }
+    implicit::MarchCounts marched;
+    surfaces[i] = frame.mesher[i].make(frame.field[i], {.lattice = lattice, .error = model.meshing.error.value_or(0.0)},
+                                       context.executor, &marched);
+    profile.visited += marched.leaves;
+    profile.present += 8 * marched.blocks;
+  }
+  for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {
+    if (surfaces[i].position.empty()) continue;
+    core::gather_motion(model.particles, particles, bodies[i].particle, frame.velocity[i], frame.spin[i]);
+    std::vector<implicit::PartMotion> parts(bodies[i].particle.size());
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      parts[k] = {.centre = frame.pose[i][k].position, .velocity = frame.velocity[i][k],
+                  .angular_velocity = frame.spin[i][k], .id = bodies[i].particle[k]};
+    }
+    implicit::add_motion(frame.field[i], parts, context.executor, surfaces[i]);
   }
   std::vector<Mesh> meshes(model.objects.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -312,6 +332,14 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame) 
     }
   }
   return meshes;
+} catch (const Error& error) {
+  // The names of the mesher's arguments become those of the scene's keys.
+  std::vector<Fault> faults = error.faults();
+  for (Fault& fault : faults) {
+    if (fault.key == "lattice.cell") fault.key = "output.cell";
+    if (fault.key == "mesh.error") fault.key = "output.meshing.error";
+  }
+  throw Error(error.kind(), std::move(faults));
 }
 
 }  // namespace supple::scenes

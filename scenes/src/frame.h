@@ -9,6 +9,7 @@
 #include "supple/collision/react.h"
 #include "supple/core/executor.h"
 #include "supple/implicit/field.h"
+#include "supple/implicit/march_cubes.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/simulation.h"
 
@@ -23,6 +24,7 @@ struct Frame {
   std::vector<Box> reach;                     ///< box of all supports; holds the surface box
   std::vector<implicit::Field> field;
   std::vector<std::uint8_t> indexed;          ///< 1: `field` belongs to this frame
+  std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;
@@ -78,6 +80,6 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
 
 /// Stage 9 on the deformed fields, one mesh an object; of several pieces the meshes lie side by side in it.
-[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, Frame& frame);
+[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 
 }  // namespace supple::scenes

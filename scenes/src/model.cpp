@@ -714,6 +714,7 @@ Model build_model(const Scene& scene) {
     if (!object.skeleton.primitive.empty()) cell = std::min(cell, own.extent().maxCoeff() / kCellsAlong);
     everything = everything.united(own);
   }
+  model.meshing = scene.output.meshing;
   if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
   model.scene_length = everything.extent().norm();
   if (!(model.scene_length > 0.0)) model.scene_length = model.smallest_length;

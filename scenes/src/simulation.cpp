@@ -351,7 +351,7 @@ struct Simulation::Impl {
   const std::vector<Mesh>& pull_meshes() {
     if (pulled_meshes) return meshes;
     pull_fields();
-    meshes = polygonise_objects(context(), pulled);
+    meshes = polygonise_objects(context(), state.particles, pulled);
     pulled_meshes = true;
     return meshes;
   }

@@ -420,6 +420,41 @@ TEST(Meshes, OfTouchingObjectsCoincideOnTheContactAndAreClosed) {
   EXPECT_EQ(shared[0], shared[1]);
 }
 
+TEST(Meshes, AreMadeAsTheSceneAsks) {
+  const auto meshes_of = [](const std::string& output) {
+    Simulation simulation = make(two_balls("output: {" + output + "}"));
+    return simulation.meshes();
+  };
+  const Mesh cubes = meshes_of("cell: 0.03").front();
+  const Mesh tetrahedra = meshes_of("cell: 0.03, meshing: {method: tetrahedra}").front();
+  EXPECT_EQ(cubes.triangle_count(), meshes_of("cell: 0.03, meshing: {method: cubes}").front().triangle_count());
+  EXPECT_GT(tetrahedra.triangle_count(), 2 * cubes.triangle_count());
+  EXPECT_NEAR(inspect(cubes).volume, inspect(tetrahedra).volume, 0.02 * inspect(cubes).volume);
+  const Mesh coarse = meshes_of("meshing: {error: 5 mm}").front(), fine = meshes_of("meshing: {error: 0.05 mm}").front();
+  EXPECT_GT(fine.triangle_count(), 20 * coarse.triangle_count());
+  EXPECT_TRUE(cubes.columns.empty());
+  const Mesh moving = meshes_of("cell: 0.03, meshing: {motion: true}").front();
+  ASSERT_EQ(moving.columns.size(), 4u);
+  EXPECT_EQ(moving.columns[0].name, "velocity_x");
+  for (std::size_t v = 0; v < moving.vertex_count(); ++v) {
+    const Vec3 expected = Vec3(2, 0, 0) + Vec3(0, 1, 2).cross(moving.position[v] - Vec3(-0.6, 0.05, 0));
+    EXPECT_NEAR(moving.columns[0].values[v], expected.x(), 1e-12);
+    EXPECT_EQ(moving.columns[3].values[v], 0.0);
+  }
+}
+
+TEST(Meshes, RefuseABillionNodesAndNameTheKey) {
+  Simulation simulation = make(two_balls("output: {cell: 1e-5}"));
+  try {
+    (void)simulation.meshes();
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Limit);
+    EXPECT_NE(std::string(error.what()).find("output.cell: expected at most 1000000000 lattice nodes"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Meshes, BulgeAroundTheContactWhenAskedTo) {
   const auto volume = [](const std::string& extra) {
     Simulation simulation = make(two_balls(extra));

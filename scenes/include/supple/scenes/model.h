@@ -56,6 +56,7 @@ struct Model {
   collision::ContactSettings contact;
   collision::ReactionSettings reaction;
   collision::BulgeSettings bulge;
+  MeshingDesc meshing;                    ///< how surfaces become meshes
   double cell = 0.0;                      ///< lattice cell for meshes and grids [m]; 0 when nothing has a surface
   double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
   double smallest_length = 0.0;           ///< what a step must resolve: nearest rest distance or iso radius [m]

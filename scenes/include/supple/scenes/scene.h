@@ -301,6 +301,13 @@ struct ImagesDesc {
 enum class TableName : std::uint8_t { None, Csv };
 enum class MeshName : std::uint8_t { None, Ply };
 enum class GridName : std::uint8_t { None, Vdb };
+enum class MeshingName : std::uint8_t { Auto, Cubes, Tetrahedra };
+
+struct MeshingDesc {
+  MeshingName method = MeshingName::Auto;  ///< of bodies that touch no other
+  std::optional<double> error;             ///< largest distance of a triangle's centroid to the surface [m]; absent: by the cell
+  bool motion = false;                     ///< columns of velocity and owner
+};
 
 struct OutputDesc {
   std::optional<ImagesDesc> images;
@@ -309,6 +316,7 @@ struct OutputDesc {
   TableName particles = TableName::None;
   MeshName mesh = MeshName::None;
   GridName grid = GridName::None;
+  MeshingDesc meshing;
   std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
 };
 
