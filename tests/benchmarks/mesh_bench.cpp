@@ -3,7 +3,7 @@
 /// memory, a hash, and the distances of vertices and of triangle centroids to the exact surface in cells (RMS; Newton's
 /// method along the analytic gradient, in double precision).
 ///
-///   mesh_bench [PREFIX]                        e.g. w3/128 or w3/128/cubes; all when absent
+///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
 ///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
 #include <algorithm>
@@ -19,6 +19,7 @@
 #include "blob_grid.h"
 #include "field_index.h"
 #include "march_sampling.h"
+#include "support/mesh_distance.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/polygonise.h"
@@ -78,6 +79,27 @@ double rms_distance(const Field& field, std::span<const Vec3> points) {
     for (std::size_t i = 0; i < n; ++i) sum += (at[i] - start[begin + i]).squaredNorm();
   }
   return start.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(start.size()));
+}
+
+/// RMS and largest distance of points of the exact surface to a mesh: vertices, in double precision, of tetrahedra on a
+/// lattice that shares no nodes.
+struct Back {
+  double rms = 0.0, largest = 0.0;
+};
+Back distance_back(const Field& field, const Lattice& lattice, const Mesh& mesh) {
+  const Mesh exact = polygonise(
+      field, {.origin = lattice.origin + Vec3::Constant(0.37 * lattice.cell), .cell = lattice.cell}, Executor(2));
+  const supple::testing::MeshDistance distance(mesh, lattice.cell);
+  const std::size_t stride = 1 + exact.vertex_count() / 100'000;
+  Back back;
+  double n = 0.0;
+  for (std::size_t i = 0; i < exact.vertex_count(); i += stride, ++n) {
+    const double d = distance(exact.position[i]);
+    back.rms += d * d;
+    back.largest = std::max(back.largest, d);
+  }
+  back.rms = n > 0.0 ? std::sqrt(back.rms / n) : 0.0;
+  return back;
 }
 
 std::vector<Vec3> centroids(const Mesh& mesh) {
@@ -155,7 +177,7 @@ std::uint64_t bytes_of(const Mesh& mesh) {
          mesh.triangle.capacity() * sizeof(mesh.triangle[0]);
 }
 
-void measure(const std::string& name, Body& body, const Lattice& lattice, const Method& method) {
+void measure(const std::string& name, Body& body, const Lattice& lattice, const Method& method, bool two_sided) {
   const Executor executor(1);
   double index = 1e300, best = 1e300, total = 0.0;
   Mesh mesh;
@@ -165,6 +187,7 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
   Lattice coarse = lattice;
   coarse.cell *= std::ldexp(1.0, std::max(method.refinements, 0));
   for (int repeat = 0; repeat < 200 && (repeat < 3 || total < 0.6); ++repeat) {
+    mesher.forget();  // memory stays at hand, as in an animation where all moves
     const double begin = cpu_seconds();
     body.place();
     const double indexed = cpu_seconds();
@@ -182,11 +205,13 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
   if (made != &mesh) mesh = *made;
   const double vertex_error = rms_distance(body.field, mesh.position) / lattice.cell;
   const double centroid_error = rms_distance(body.field, centroids(mesh)) / lattice.cell;
+  const Back back = two_sided ? distance_back(body.field, lattice, mesh) : Back{};
   std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"index_cpu_ms\": %.4g, "
               "\"items\": %zu, \"items_per_s\": %.4g, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", "
-              "\"rms_vertex_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"hash\": \"%s\"}\n",
+              "\"rms_vertex_over_h\": %.3g, \"rms_back_over_h\": %.3g, \"largest_back_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"hash\": \"%s\"}\n",
               name.c_str(), 1e3 * best, 1e3 * index, mesh.triangle_count(),
               static_cast<double>(mesh.triangle_count()) / best, centroid_error, vertex_error,
+              back.rms / lattice.cell, back.largest / lattice.cell,
               1e-6 * static_cast<double>(bytes_of(mesh)), 1e-6 * static_cast<double>(bytes), hash_of(mesh).c_str());
   std::fflush(stdout);
 }
@@ -205,9 +230,12 @@ int report_errors(Body& body, const Lattice& lattice, const char* path) {
     std::fprintf(stderr, "%s: too short\n", path);
     return 1;
   }
-  std::printf("{\"items\": %zu, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", \"rms_vertex_over_h\": %.3g}\n",
+  const Back back = distance_back(body.field, lattice, mesh);
+  std::printf("{\"items\": %zu, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", \"rms_vertex_over_h\": %.3g, "
+              "\"rms_back_over_h\": %.3g, \"largest_back_over_h\": %.3g}\n",
               mesh.triangle_count(), rms_distance(body.field, centroids(mesh)) / lattice.cell,
-              rms_distance(body.field, mesh.position) / lattice.cell);
+              rms_distance(body.field, mesh.position) / lattice.cell, back.rms / lattice.cell,
+              back.largest / lattice.cell);
   return 0;
 }
 
@@ -292,6 +320,7 @@ int main(int argc, char** argv) {
     return write_grid(body, frame_of(body).lattice(cells), cells, argv[4]);
   }
   const std::string_view filter = argc > 1 ? argv[1] : "";
+  const bool two_sided = argc > 2 && std::string_view(argv[2]) == "--both";
   for (const std::string body_name : {"w1", "w2", "w3", "w4"}) {
     if (!starts_alike(filter, body_name)) continue;
     Body body = make_body(body_name);
@@ -300,7 +329,7 @@ int main(int argc, char** argv) {
       for (const Method& method : kMethods) {
         const std::string name = body_name + '/' + std::to_string(cells) + '/' + std::string(method.name);
         if (name.compare(0, filter.size(), filter) != 0) continue;
-        measure(name, body, frame.lattice(cells), method);
+        measure(name, body, frame.lattice(cells), method, two_sided);
       }
       const std::string name = body_name + '/' + std::to_string(cells) + "/moved";
       if (body_name != "w1" && name.compare(0, filter.size(), filter) == 0) {

@@ -11,6 +11,7 @@
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "march_cases.h"
+#include "support/mesh_distance.h"
 #include "supple/core/error.h"
 
 namespace supple::implicit {
@@ -340,6 +341,36 @@ TEST(MarchCubes, ReachesTheErrorThatIsAskedFor) {
     EXPECT_GT(mesh.triangle_count(), 2 * last);
     last = mesh.triangle_count();
   }
+}
+
+// Both ways: from the mesh to the exact surface, and from points of the exact surface (vertices of the double-precision
+// tetrahedra on a finer lattice) to the mesh. A triangle of a cell with its vertices on the surface has a circumradius below
+// sqrt(3)/2 cell, and its distance to a surface of curvature k is below k/2 times its square.
+TEST(MarchCubes, LiesOnTheExactSurfaceBothWaysAndAMissedPartShows) {
+  constexpr double kCell = 0.04;
+  const Body body = body_of({{wyvill_point(1.0), Vec3(-0.4, 0, 0)}, {wyvill_point(1.0), Vec3(0.4, 0, 0)},
+                             {wyvill_point(0.5), Vec3(2.5, 0.1, 0)}});
+  const Mesh exact = polygonise(body.field, lattice_of(0.31 * kCell), Executor(2));
+  const double curvature = 1.0 / (0.454202019 * 0.5);  // of the smallest ball, the largest there is
+  const double bound = 0.5 * 0.75 * kCell * kCell * curvature;
+  for (const int refinements : {0, 1}) {
+    const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(kCell), .refinements = refinements}, Executor(1));
+    const supple::testing::MeshDistance to_mesh(mesh, kCell), to_exact(exact, kCell);
+    double there = 0.0, back = 0.0;
+    for (const auto& t : mesh.triangle) {
+      there = std::max(there, to_exact((mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0));
+    }
+    for (const Vec3& p : exact.position) back = std::max(back, to_mesh(p));
+    EXPECT_LT(there, bound);
+    EXPECT_LT(back, bound);
+    EXPECT_GT(back, bound / 256.0);
+  }
+  const Body without = body_of({{wyvill_point(1.0), Vec3(-0.4, 0, 0)}, {wyvill_point(1.0), Vec3(0.4, 0, 0)}});
+  const Mesh less = march_cubes(without.field, {.lattice = lattice_of(kCell)}, Executor(1));
+  const supple::testing::MeshDistance to_less(less, kCell);
+  double back = 0.0;
+  for (const Vec3& p : exact.position) back = std::max(back, to_less(p));
+  EXPECT_GT(back, 1.0);
 }
 
 // Only sums are taken in single precision: other rules of blending see the view.
