@@ -1,6 +1,7 @@
 #include "supple/collision/contact_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -68,6 +69,7 @@ class PairSolver {
   std::vector<const ContactBody*> third_bodies_;
   std::vector<double> value_;
   PressureBatch batch_;
+  std::array<bool, 2> columns_{};  // whether the squeezed region of A, of B is wanted
   Vec3 first_ = Vec3::Zero();  // integral of x p dA
   double load_ = 0.0;
 };
@@ -92,7 +94,7 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
     const std::optional<PeakFrame> frame = finder_.climb(pressure, hill, extent);
     if (!frame || covered(frame->origin, 0.0)) continue;
     const double largest_before = out.summary.largest_pressure;
-    if (!polar_.solve(pressure, *frame, settings.error, settings.max_refinement, 2.0 * extent, out.points)) {
+    if (!polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, out.points)) {
       return false;
     }
     add_sums(polar_.sums(), frame->origin, out.summary);
@@ -216,6 +218,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   const BodyPair pair = candidates.pair[k];
   const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
   PairPressure pressure(a, b);
+  columns_ = {settings.energy || a.pose.size() > 1, settings.energy || b.pose.size() > 1};
   out.summary = {};
   out.summary.bodies = pair;
   out.points.clear();
@@ -227,10 +230,11 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   const std::span<const Vec3> seeds =
       std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
   const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
+  const bool convex = candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
   const double diagonal = overlap.extent().norm();
   double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
   // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
-  extent = std::max(extent, 2.0 * spacing);
+  extent = std::max(extent, convex ? pressure.feature_size() : 2.0 * spacing);
   if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
   if (!std::isfinite(extent)) return;  // two half-spaces
 
@@ -240,7 +244,14 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   std::set_union(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(third_));
   std::erase_if(third_, [&](std::uint32_t c) { return c == pair.a || c == pair.b; });
 
-  if (seeds.empty()) {
+  if (convex) {
+    starts_.hill.assign(seeds.begin(), seeds.end());
+    starts_.inside.clear();
+    batch_.resize(1);
+    batch_.point[0] = seeds.front();
+    pressure.evaluate_values(batch_);
+    if (std::min(batch_.a[0], batch_.b[0]) > 0.0) starts_.inside.push_back(seeds.front());
+  } else if (seeds.empty()) {
     finder_.start_from_scan(pressure, overlap, starts_);
   } else {
     finder_.start_from_seeds(pressure, seeds, spacing, starts_);

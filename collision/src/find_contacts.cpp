@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace supple::collision {
 namespace {
@@ -83,6 +84,28 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
   }
 }
 
+/// A point in the middle of the overlap of two convex bodies, or of the gap between them: on the line between the nearest
+/// points of their cores, which are found by going from one core to the other. None when the cores meet.
+std::optional<Vec3> between_cores(const ContactBody& a, const ContactBody& b, const Vec3& start) {
+  constexpr int kSteps = 32;
+  constexpr double kEnough = 1e-3;  // of the distance: the overlap is sought from here, not measured
+  std::optional<implicit::CorePoint> on_a = a.field.core_point(start);
+  if (!on_a) return std::nullopt;
+  std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
+  if (!on_b) return std::nullopt;
+  for (int i = 0; i < kSteps; ++i) {
+    const Vec3 before = on_a->point;
+    on_a = a.field.core_point(on_b->point);
+    if ((on_a->point - before).norm() <= kEnough * (on_a->point - on_b->point).norm()) break;
+    on_b = b.field.core_point(on_a->point);
+  }
+  const Vec3 across = on_b->point - on_a->point;
+  const double distance = across.norm();
+  if (!(distance > kEnough * (on_a->radius + on_b->radius))) return std::nullopt;
+  const double middle = 0.5 * (std::min(on_a->radius, distance) + std::max(distance - on_b->radius, 0.0));
+  return Vec3(on_a->point + (middle / distance) * across);
+}
+
 }  // namespace
 
 std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes) {
@@ -124,6 +147,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
   struct Slot {
     Box overlap;
     double spacing = 0.0;
+    bool convex = false;
     std::vector<Vec3> seed;
   };
   thread_local std::vector<Slot> slots;
@@ -148,8 +172,16 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
       const ContactBody& b = job.bodies[job.pairs[k].b];
       Slot& slot = job.slots[k];
       slot.overlap = a.field.surface_box().intersection(b.field.surface_box());
-      slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
       slot.seed.clear();
+      const Vec3 start = (a.fixed ? b : a).pose.empty() ? Vec3::Zero().eval() : (a.fixed ? b : a).pose.front().position;
+      const std::optional<Vec3> between = between_cores(a, b, start);
+      slot.convex = between.has_value();
+      slot.spacing = 0.0;
+      if (slot.convex) {
+        slot.seed.push_back(*between);
+        continue;
+      }
+      slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
       const Box near = slot.overlap.inflated(slot.spacing);
       collect(a, b, near, job.spacing[job.pairs[k].a], scratch, slot.seed);
       collect(b, a, near, job.spacing[job.pairs[k].b], scratch, slot.seed);
@@ -159,6 +191,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
   out.pair.clear();
   out.overlap.clear();
   out.spacing.clear();
+  out.convex.clear();
   out.seed.clear();
   out.offset.assign(1, 0);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -167,6 +200,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
     out.pair.push_back(pairs[k]);
     out.overlap.push_back(slot.overlap);
     out.spacing.push_back(slot.spacing);
+    out.convex.push_back(slot.convex ? 1 : 0);
     out.seed.insert(out.seed.end(), slot.seed.begin(), slot.seed.end());
     out.offset.push_back(static_cast<std::uint32_t>(out.seed.size()));
   }

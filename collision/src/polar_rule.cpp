@@ -211,31 +211,28 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   return false;
 }
 
-bool PolarRuleSolver::add_columns(PairPressure& pressure, const PolarRule& rule, double error, PatchPoints& points) {
-  const double tolerance = std::min(1e-3, 0.1 * std::sqrt(error));
+bool PolarRuleSolver::add_columns(PairPressure& pressure, const PolarRule& rule, int side, double error,
+                                  PatchPoints& points) {
+  if (!column_ends(pressure, side, std::min(1e-3, 0.1 * std::sqrt(error)))) return false;
   const GaussRule& gauss = gauss_rule(rule.column);
   const std::size_t n = node_.size();
-  thickness_ = 0.0;
-  for (const int side : {0, 1}) {
-    if (!column_ends(pressure, side, tolerance)) return false;
-    thickness_ += end_[side][n];
-    const double sign = side == 0 ? 1.0 : -1.0;
-    const std::size_t begin = points.volume_point.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      const double length = end_[side][i];
-      points.displaced[side] += weight_[i] * length;
-      for (std::size_t j = 0; j < gauss.node.size(); ++j) {
-        points.volume_point.push_back(node_.point[i] + (sign * length * gauss.node[j]) * frame_.axis);
-        points.volume_weight.push_back(weight_[i] * length * gauss.weight[j]);
-        points.volume_side.push_back(static_cast<std::uint8_t>(side));
-      }
+  thickness_ += end_[side][n];
+  const double sign = side == 0 ? 1.0 : -1.0;
+  const std::size_t begin = points.volume_point.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double length = end_[side][i];
+    points.displaced[side] += weight_[i] * length;
+    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+      points.volume_point.push_back(node_.point[i] + (sign * length * gauss.node[j]) * frame_.axis);
+      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j]);
+      points.volume_side.push_back(static_cast<std::uint8_t>(side));
     }
-    const std::size_t count = points.volume_point.size() - begin;
-    line_value_.resize(count);
-    pressure.evaluate(side, std::span(points.volume_point).subspan(begin), line_value_);
-    for (std::size_t i = 0; i < count; ++i) {
-      points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
-    }
+  }
+  const std::size_t count = points.volume_point.size() - begin;
+  line_value_.resize(count);
+  pressure.evaluate(side, std::span(points.volume_point).subspan(begin), line_value_);
+  for (std::size_t i = 0; i < count; ++i) {
+    points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
   }
   return true;
 }
@@ -247,15 +244,16 @@ double PolarRuleSolver::algebraic_error() const {
   return 2.0 * rim_error_ + lift_ / std::sqrt(fine_.area) + rounding;
 }
 
-bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, double error, int refinements,
-                            double extent, PatchPoints& points) {
+bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                            const std::array<bool, 2>& columns, double extent, PatchPoints& points) {
+  const double error = settings.error;
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   extent_ = extent;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   estimate_ = 1.0;
   const std::span<const PolarRule> rules = polar_rules();
-  const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(refinements, 1)));
+  const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
   const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 2 : error < 1e-5 ? 1 : 0, last - 1);
   for (std::size_t r = first; r <= last; ++r) {
@@ -267,7 +265,14 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, doub
     const double difference = kSafety * relative_difference(fine_, coarse_) + (r == 1 ? kUnseen : 0.0);
     if (difference > error && r < last) continue;
     estimate_ = difference + algebraic_error();
-    if (!add_columns(pressure, rules[r], error, points)) return false;
+    thickness_ = 0.0;
+    for (const int side : {0, 1}) {
+      if (!columns[static_cast<std::size_t>(side)]) {
+        thickness_ += 0.5 * frame_.thickness;
+      } else if (!add_columns(pressure, rules[r], side, error, points)) {
+        return false;
+      }
+    }
     for (std::size_t i = 0; i < node_.size(); ++i) {
       points.point.push_back(node_.point[i]);
       points.normal.push_back(normal_[i]);

@@ -4,23 +4,26 @@
 /// vanishes at the rim. Columns along the axis carry the integrals over the squeezed regions.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "find_peak.h"
 #include "pair_pressure.h"
 #include "patch_points.h"
 #include "quadrature.h"
+#include "supple/collision/contact_surface.h"
 
 namespace supple::collision {
 
 class PolarRuleSolver {
  public:
-  /// Refines until two consecutive rules agree to `error`, at most `refinements` times.
+  /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
+  /// @param columns  whether the squeezed region of A, of B is wanted
   /// @param extent  rims farther away are not believed [m]
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
-  [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, double error, int refinements,
-                           double extent, PatchPoints& points);
+  [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                           const std::array<bool, 2>& columns, double extent, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about the frame's origin
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
@@ -30,7 +33,7 @@ class PolarRuleSolver {
   bool solve_rim(PairPressure& pressure, const PolarRule& rule, double error);
   bool solve_heights(PairPressure& pressure, const PolarRule& rule, double error);
   bool integrate(const PolarRule& rule);
-  bool add_columns(PairPressure& pressure, const PolarRule& rule, double error, PatchPoints& points);
+  bool add_columns(PairPressure& pressure, const PolarRule& rule, int side, double error, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double algebraic_error() const;

@@ -39,11 +39,17 @@ class Side {
     if (parts > 1) {
       body.field.evaluate_parts(points, rows_);
       for (std::size_t i = 0; i < points.size(); ++i) normalise_row(i);
+      return;
     }
+    velocity_ = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[0];
+    spin_ = body.velocity.empty() || body.angular_velocity.empty() ? Vec3::Zero().eval() : body.angular_velocity[0];
+    velocity_ -= spin_.cross(body.pose[0].position);
   }
+  [[nodiscard]] bool single() const { return body_->pose.size() == 1; }
 
   /// Contribution-weighted velocity sum lambda_k (v_k + omega_k x (x - x_k)).
   [[nodiscard]] Vec3 velocity(std::size_t i, const Vec3& x) const {
+    if (single()) return velocity_ + spin_.cross(x);
     if (body_->velocity.empty()) return Vec3::Zero();
     Vec3 sum = Vec3::Zero();
     for_parts(i, [&](std::size_t k, double lambda) {
@@ -52,6 +58,12 @@ class Side {
       sum += lambda * v;
     });
     return sum;
+  }
+
+  /// A force and its moment about `centre`, to the only part.
+  void add_whole(const Vec3& f, const Vec3& moment, const Vec3& centre) {
+    force_[0] += f;
+    torque_[0] += moment + (centre - body_->pose[0].position).cross(f);
   }
 
   void add_by_contribution(std::size_t i, const Vec3& x, const Vec3& f) {
@@ -66,6 +78,7 @@ class Side {
   void add_by_energy(std::span<const Vec3> volume_points, std::span<const double> volume_weights,
                      std::span<const std::uint8_t> volume_sides, std::uint8_t side, std::span<const double> load,
                      const Vec3& centre, const Vec3& total, const Vec3& moment) {
+    if (single()) return add_whole(total, moment, centre);
     const std::size_t parts = body_->pose.size();
     elastic_force_.assign(parts, Vec3::Zero());
     elastic_torque_.assign(parts, Vec3::Zero());
@@ -77,22 +90,20 @@ class Side {
     if (!(all > 0.0)) return;
     for (double& s : share_) s /= all;
 
-    if (parts > 1) {
-      own_point_.clear();
-      own_weight_.clear();
-      for (std::size_t i = 0; i < volume_points.size(); ++i) {
-        if (volume_sides[i] != side) continue;
-        own_point_.push_back(volume_points[i]);
-        own_weight_.push_back(volume_weights[i] * body_->material.modulus);
-      }
-      body_->field.evaluate_parts(own_point_, volume_rows_);
-      for (std::size_t i = 0; i < own_point_.size(); ++i) {
-        for (std::uint32_t e = volume_rows_.offset[i]; e < volume_rows_.offset[i + 1]; ++e) {
-          const std::size_t k = volume_rows_.part[e];
-          const Vec3 f = own_weight_[i] * volume_rows_.gradient[e];
-          elastic_force_[k] += f;
-          elastic_torque_[k] += (own_point_[i] - body_->pose[k].position).cross(f);
-        }
+    own_point_.clear();
+    own_weight_.clear();
+    for (std::size_t i = 0; i < volume_points.size(); ++i) {
+      if (volume_sides[i] != side) continue;
+      own_point_.push_back(volume_points[i]);
+      own_weight_.push_back(volume_weights[i] * body_->material.modulus);
+    }
+    body_->field.evaluate_parts(own_point_, volume_rows_);
+    for (std::size_t i = 0; i < own_point_.size(); ++i) {
+      for (std::uint32_t e = volume_rows_.offset[i]; e < volume_rows_.offset[i + 1]; ++e) {
+        const std::size_t k = volume_rows_.part[e];
+        const Vec3 f = own_weight_[i] * volume_rows_.gradient[e];
+        elastic_force_[k] += f;
+        elastic_torque_[k] += (own_point_[i] - body_->pose[k].position).cross(f);
       }
     }
     Vec3 force_left = total, moment_left = moment;
@@ -134,15 +145,13 @@ class Side {
 
   template <class Use>
   void for_parts(std::size_t i, const Use& use) const {
-    if (body_->pose.size() == 1) {
-      use(std::size_t{0}, 1.0);
-      return;
-    }
     for (std::uint32_t e = rows_.offset[i]; e < rows_.offset[i + 1]; ++e) use(rows_.part[e], rows_.value[e]);
   }
 
   const ContactBody* body_ = nullptr;
   double sign_ = 0.0;
+  Vec3 velocity_ = Vec3::Zero();  // of the only part, at the world origin
+  Vec3 spin_ = Vec3::Zero();
   implicit::FieldParts rows_, volume_rows_;
   std::vector<Vec3> own_point_;
   std::vector<double> own_weight_;
@@ -202,13 +211,17 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
                            side.sign() < 0.0 ? std::uint8_t{0} : std::uint8_t{1}, load, centre, side.sign() * push,
                            side.sign() * twist);
       } else {
+        if (side.single()) {
+          side.add_whole(side.sign() * push, side.sign() * twist, centre);
+          continue;
+        }
         for (std::size_t i = 0; i < n; ++i) side.add_by_contribution(i, x[i], side.sign() * load[i] * normal[i]);
       }
     }
 
     for (const int s : {0, 1}) sides[s].move_to(loads[body_of[s]]);
     const PairMaterial material = material_of(bodies, rules, pair);
-    Vec3 dissipative = Vec3::Zero();
+    Vec3 dissipative = Vec3::Zero(), dissipative_twist = Vec3::Zero();
     if (material.friction > 0.0 || material.dissipation > 0.0) {
       for (std::size_t i = 0; i < n; ++i) {
         const Vec3 v = sides[0].velocity(i, x[i]) - sides[1].velocity(i, x[i]);
@@ -221,12 +234,15 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
           const double grip = friction_mollifier(speed, settings.friction_speed) / speed;
           f -= (material.friction * load[i] * factor * grip) * slide;
         }
-        sides[0].add_by_contribution(i, x[i], f);
-        sides[1].add_by_contribution(i, x[i], -f);
+        if (!sides[0].single()) sides[0].add_by_contribution(i, x[i], f);
+        if (!sides[1].single()) sides[1].add_by_contribution(i, x[i], -f);
         report.dissipated_power -= f.dot(v);
         dissipative += f;
+        dissipative_twist += (x[i] - centre).cross(f);
       }
       for (const int s : {0, 1}) {
+        const double sign = -sides[s].sign();
+        if (sides[s].single()) sides[s].add_whole(sign * dissipative, sign * dissipative_twist, centre);
         if (!dissipative_loads.empty()) sides[s].add_to(dissipative_loads[body_of[s]]);
         sides[s].move_to(loads[body_of[s]]);
       }

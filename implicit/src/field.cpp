@@ -268,6 +268,16 @@ FieldCounts Field::count(std::span<const Vec3> points) const {
           .primitives_present = points.size() * index_->size()};
 }
 
+std::optional<CorePoint> Field::core_point(const Vec3& place) const {
+  if (!index_->core_radius) return std::nullopt;
+  const PackedPrimitive& p = index_->primitive.front();
+  const PackedShape& shape = index_->shape.front();
+  // Not stretched, so A is a rotation and half the gradient of q leads to the foot.
+  const Mat3 A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
+  const FootSample sample = foot(shape.view, A * (place - Vec3(p.position[0], p.position[1], p.position[2])));
+  return CorePoint{place - A.transpose() * sample.half_gradient, *index_->core_radius};
+}
+
 namespace {
 
 Mat3 primitive_hessian(const Field::Index& index, std::size_t i, const Vec3& point) {

@@ -238,6 +238,10 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
     index.convolved = index.convolved || skeleton.primitive[i].convolved;
     extent += placed.support[i].extent().sum();
   }
+  index.core_radius.reset();
+  if (has_convex_core(skeleton) && evaluate(skeleton.primitive[0].kernel, 0.0).value > skeleton.iso) {
+    index.core_radius = iso_distance(skeleton.primitive[0].kernel, skeleton.iso);
+  }
   index.typical_extent = n > 0 ? extent / (3.0 * static_cast<double>(n)) : 0.0;
   index.build_leaves();
   index.build_levels();

@@ -85,6 +85,7 @@ struct Field::Index {
   bool uniform = true;          ///< all primitives are of one kind
   bool convolved = false;       ///< some primitive is a convolution
   BlendIndex blend;
+  std::optional<double> core_radius;  ///< of a convex body: from its core to the surface [m]
   std::vector<PackedPrimitive> primitive;  ///< by id
   std::vector<PackedShape> shape;          ///< by id
   std::vector<RoundedBox> rounded;         ///< by id

@@ -54,6 +54,10 @@ Box HalfSpace::surface_box() const {
   return box;
 }
 
+std::optional<CorePoint> HalfSpace::core_point(const Vec3& place) const {
+  return CorePoint{place - std::max(0.0, (place - point).dot(normal)) * normal, 0.0};
+}
+
 double HalfSpace::feature_size() const { return std::numeric_limits<double>::infinity(); }
 
 }  // namespace supple::implicit

@@ -196,6 +196,30 @@ Support support_of(const Primitive& p, const Mat3& rotation) noexcept {
           .rounding = whole_axes};
 }
 
+bool has_convex_core(const Skeleton& skeleton) noexcept {
+  if (skeleton.primitive.size() != 1) return false;
+  const Primitive& p = skeleton.primitive.front();
+  if (p.taper != 1.0 || p.convolved || p.stretch != Vec3::Ones()) return false;
+  switch (p.shape) {
+    case ShapeKind::Point:
+    case ShapeKind::Segment:
+    case ShapeKind::Rectangle:
+    case ShapeKind::Disc:
+    case ShapeKind::Box:
+    case ShapeKind::Triangle:
+    case ShapeKind::Polygon:
+      return true;
+    case ShapeKind::Ellipsoid:
+    case ShapeKind::Ring:
+    case ShapeKind::Arc:
+    case ShapeKind::Curve:
+    case ShapeKind::Superquadric:
+    case ShapeKind::Directed:
+      break;
+  }
+  return false;
+}
+
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out) {
   SUPPLE_EXPECTS(parts.size() == skeleton.part_count);
   const std::size_t n = skeleton.primitive.size();

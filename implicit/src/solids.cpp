@@ -109,6 +109,12 @@ Box SolidBox::surface_box() const {
   return {centre_ - reach, centre_ + reach};
 }
 
+std::optional<CorePoint> SolidBox::core_point(const Vec3& place) const {
+  const Vec3 y = rotation_.transpose() * (place - centre_);
+  const Vec3 reach = half_ - Vec3::Constant(rounding_);
+  return CorePoint{centre_ + rotation_ * y.cwiseMax(-reach).cwiseMin(reach), rounding_};
+}
+
 double SolidBox::feature_size() const { return 2.0 * half_.minCoeff(); }
 
 Mesh SolidBox::mesh() const {

@@ -23,13 +23,14 @@ struct Group {
   std::string_view measures;
 };
 
-constexpr std::array<Group, 6> kGroups{{
+constexpr std::array<Group, 7> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)"},
     {"core/integrators", "integrator_bench", "time against error of every integrator; a file name after it: plot (SVG)"},
     {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
     {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)"},
     {"implicit/mesh", "mesh_bench", "surface meshes beside their error (w1/64 to w4/512)"},
     {"collision", "contact_bench", "one contact query: time, points and error"},
+    {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; after it: poses, case"},
 }};
 
 fs::path program_path(const Group& group) { return fs::read_symlink("/proc/self/exe").parent_path() / group.program; }

@@ -75,25 +75,30 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
   }
 }
 
-/// Flags the parts of each body whose supports reach another body: the only ones that are sampled. A rule on State
-/// alone, so it decides which kept distances move on.
+/// Flags the bodies whose supports reach another body, and the parts that do: the only ones that are sampled, unless
+/// both bodies are convex, which need no samples to find each other. A rule on State alone, so it decides which kept
+/// distances move on.
 void flag_active_parts(const StageContext& context, Frame& frame) {
   const std::size_t moving = context.bodies.size();
   std::vector<Box>& reach = frame.reach;
   for (std::size_t i = 0; i < moving; ++i) {
+    frame.near[i] = 0;
     frame.active[i].assign(context.bodies[i].particle.size(), 0);
     if (!collides(context, context.bodies[i])) reach[i] = {};
   }
-  const auto flag = [&](std::size_t i, const Box& other) {
+  const auto flag = [&](std::size_t i, const Box& other, bool sampled) {
     if (i >= moving) return;
     for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
-      if (frame.placed[i].support[k].overlaps(other)) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
+      if (!frame.placed[i].support[k].overlaps(other)) continue;
+      frame.near[i] = 1;
+      if (sampled) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
     }
   };
   for (const collision::BodyPair& pair : collision::overlapping_boxes(reach)) {
     if ((pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b)) continue;
-    flag(pair.a, reach[pair.b]);
-    flag(pair.b, reach[pair.a]);
+    const bool sampled = frame.convex[pair.a] == 0 || frame.convex[pair.b] == 0;
+    flag(pair.a, reach[pair.b], sampled);
+    flag(pair.b, reach[pair.a], sampled);
   }
 }
 
@@ -103,21 +108,28 @@ bool any_active(const std::vector<std::uint8_t>& flags) {
 
 }  // namespace
 
-Frame::Frame(const Model& model, std::size_t body_count)
-    : pose(body_count),
-      velocity(body_count),
-      spin(body_count),
-      placed(body_count),
-      reach(body_count + model.fixed.size()),
-      field(body_count),
-      indexed(body_count, 0),
-      mesher(body_count),
-      active(body_count),
-      samples(body_count),
-      bodies(body_count + model.fixed.size()),
-      loads(bodies.size()),
-      dissipative(bodies.size()) {
-  for (std::size_t k = 0; k < model.fixed.size(); ++k) reach[body_count + k] = model.fixed[k].field().surface_box();
+Frame::Frame(const Model& model, const std::vector<Body>& all)
+    : pose(all.size()),
+      velocity(all.size()),
+      spin(all.size()),
+      placed(all.size()),
+      reach(all.size() + model.fixed.size()),
+      field(all.size()),
+      indexed(all.size(), 0),
+      mesher(all.size()),
+      convex(reach.size(), 0),
+      near(all.size(), 0),
+      active(all.size()),
+      samples(all.size()),
+      bodies(reach.size()),
+      loads(reach.size()),
+      dissipative(reach.size()) {
+  for (std::size_t i = 0; i < all.size(); ++i) convex[i] = implicit::has_convex_core(all[i].skeleton) ? 1 : 0;
+  for (std::size_t k = 0; k < model.fixed.size(); ++k) {
+    const implicit::FieldView solid = model.fixed[k].field();
+    reach[all.size() + k] = solid.surface_box();
+    convex[all.size() + k] = solid.core_point(Vec3::Zero()) ? 1 : 0;
+  }
 }
 
 StageTimer::StageTimer(StageProfile& profile, bool every_call) : profile_(profile) {
@@ -146,7 +158,7 @@ void place_and_index_all(const StageContext& context, const core::ParticleState&
 }
 
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
-                          std::vector<implicit::SampleState>& samples, Frame& frame) {
+                          std::vector<implicit::SampleState>& samples, Frame& frame, bool energy) {
   const Model& model = context.model;
   const std::vector<Body>& bodies = context.bodies;
   const auto profile = [&](Stage stage) -> StageProfile& {
@@ -170,11 +182,11 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (!collides(context, bodies[i])) continue;
       ++profile(Stage::IndexField).present;
-      if (context.skip && !any_active(frame.active[i])) continue;
+      if (context.skip && frame.near[i] == 0) continue;
       index(context, i, frame);
       ++profile(Stage::IndexField).visited;
     }
-    for (std::size_t i = 0; i < bodies.size(); ++i) near |= any_active(frame.active[i]);
+    near = any_active(frame.near);
   }
   view_bodies(context, particles, frame);
   if (context.skip && !near) return;
@@ -218,7 +230,9 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   if (context.skip && frame.candidates.pair.empty()) return;
   {
     StageTimer timer(profile(Stage::SolveContactSurface), context.every_call);
-    collision::solve_contact_surface(frame.bodies, frame.candidates, model.contact, context.executor, frame.surface);
+    collision::ContactSettings settings = model.contact;
+    settings.energy = energy;
+    collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
     profile(Stage::SolveContactSurface).present += frame.candidates.pair.size();
     profile(Stage::SolveContactSurface).visited += frame.surface.summary.size();
   }

@@ -25,6 +25,8 @@ struct Frame {
   std::vector<implicit::Field> field;
   std::vector<std::uint8_t> indexed;          ///< 1: `field` belongs to this frame
   std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
+  std::vector<std::uint8_t> convex;           ///< 1: a contact body that is convex; shape [bodies + fixed ones]
+  std::vector<std::uint8_t> near;             ///< 1: its supports reach another body
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;
@@ -39,7 +41,7 @@ struct Frame {
   collision::ReactionReport reaction;
   std::vector<Vec3> traction_force;           ///< by pair of `surface`
 
-  Frame(const Model& model, std::size_t body_count);
+  Frame(const Model& model, const std::vector<Body>& all);
 };
 
 /// Measures one call of a stage; every 64th call is timed and counted 64-fold, or every call when profiling.
@@ -72,9 +74,9 @@ void place_and_index(const StageContext& context, const core::ParticleState& par
 /// The same for every body with a surface.
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 
-/// Stages 2 to 6: from particles to the contact surface. Warm starts are read from and written to `samples`.
+/// Stages 2 to 6: from particles to the contact surface, with its energy if asked for. Warm starts are read from and written to `samples`.
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
-                          std::vector<implicit::SampleState>& samples, Frame& frame);
+                          std::vector<implicit::SampleState>& samples, Frame& frame, bool energy);
 
 /// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);

@@ -58,10 +58,10 @@ struct Simulation::Impl {
         executor(o.threads),
         plan(plan_step(scene, model, requested_outputs(scene))),
         laws(model.interactions),
-        frame(model, 0),
+        frame(model, bodies),
         workspace(model.particles, laws),
         integrator(plan_integrator(scene, model)),
-        pulled(model, 0) {
+        pulled(model, bodies) {
     state.particles = model.initial;
     state.links = core::unbroken(model.links);
     form_bodies();
@@ -76,8 +76,8 @@ struct Simulation::Impl {
   void form_bodies() {
     bodies = make_bodies(model, state.links);
     rules = make_body_rules(model, bodies, state.apart);
-    frame = Frame(model, bodies.size());
-    pulled = Frame(model, bodies.size());
+    frame = Frame(model, bodies);
+    pulled = Frame(model, bodies);
   }
 
   /// The laws that are left, and what is made from them.
@@ -235,7 +235,7 @@ struct Simulation::Impl {
       p.present += counts.pairs_present;
     }
     if (contact_on()) {
-      find_contact_surface(context(), particles, state.samples, frame);
+      find_contact_surface(context(), particles, state.samples, frame, false);
       apply_reactions(context(), frame, out);
     }
   }
@@ -332,7 +332,7 @@ struct Simulation::Impl {
       std::vector<implicit::SampleState> trial = state.samples;
       Profile unused{};
       const StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
-      find_contact_surface(quiet, state.particles, trial, pulled);
+      find_contact_surface(quiet, state.particles, trial, pulled, true);
       pulled_sample.internal.reset(model.particles.size());
       apply_reactions(quiet, pulled, pulled_sample);
     }

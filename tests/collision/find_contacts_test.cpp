@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
 
 #include "bodies.h"
@@ -91,6 +92,72 @@ TEST(FindContacts, GivesTheSameForceForAnyNumberOfSamples) {
       EXPECT_NEAR(s.summary[0].force.norm(), force, 1e-9 * force);
     }
     force = s.summary[0].force.norm();
+  }
+}
+
+/// A body of one primitive in a pose.
+struct Shaped {
+  implicit::Field field;
+  Shaped(implicit::ShapeKind shape, const Vec3& size, const Pose& pose) {
+    implicit::Skeleton skeleton;
+    implicit::Primitive p;
+    p.shape = shape;
+    p.size = size;
+    p.kernel = implicit::Kernel::gascuel(0.2, 0.5, 2.5);
+    skeleton.primitive.push_back(p);
+    skeleton.part_count = 1;
+    implicit::PlacedSkeleton placed;
+    implicit::place_skeleton(skeleton, {&pose, 1}, placed);
+    implicit::index_field(skeleton, placed, field);
+  }
+};
+
+TEST(ConvexBodies, MeetWithoutSamplesWithTheForceThatAScanFinds) {
+  using implicit::ShapeKind;
+  std::mt19937_64 engine(11);
+  const auto vector = [&](double r) {
+    return Vec3(uniform(engine, -r, r), uniform(engine, -r, r), uniform(engine, -r, r));
+  };
+  const std::array<ShapeKind, 5> shapes{ShapeKind::Point, ShapeKind::Segment, ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Box};
+  int touching = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto draw = [&](const Vec3& place) {
+      const Pose pose{place, Quat(Eigen::AngleAxisd(uniform(engine, 0, 3), vector(1).normalized()))};
+      return Shaped(shapes[engine() % shapes.size()], Vec3(0.3, 0.2, 0.15), pose);
+    };
+    const Shaped a = draw(Vec3::Zero()), b = draw(vector(0.5));
+    Stage stage;
+    for (const Shaped* body : {&a, &b}) stage.add(body->field);
+    const ContactSurface found = stage.solve({.error = 1e-2, .max_refinement = 3});
+    if (stage.candidates.pair.empty() || stage.candidates.convex[0] == 0) continue;  // apart, or the cores meet
+    ASSERT_EQ(stage.candidates.seed.size(), 1u);
+    ContactCandidates scanned = stage.candidates;
+    scanned.convex[0] = 0;
+    scanned.seed.clear();
+    scanned.offset = {0, 0};
+    ContactSurface expected;
+    solve_contact_surface(stage.bodies(), scanned, {.error = 1e-2, .max_refinement = 3}, Executor(1), expected);
+    if (expected.summary.empty()) continue;  // a scan may miss what is thinner than its mesh
+    ASSERT_EQ(found.summary.size(), 1u) << trial;
+    ++touching;
+    const auto &x = found.summary[0], &y = expected.summary[0];
+    const double error = 1.5 * (x.error_estimate + y.error_estimate);
+    EXPECT_LE((x.force - y.force).norm(), error * y.force.norm()) << trial;
+  }
+  EXPECT_GT(touching, 50);
+}
+
+TEST(ConvexBodies, AreFoundAtAnyDepth) {
+  // A ball over the middle of a plate: the overlap is a lens of depth 1e-9 to .1.
+  for (const double depth : {1e-9, 1e-6, 1e-3, 0.1}) {
+    const Shaped plate(implicit::ShapeKind::Rectangle, Vec3(0.3, 0.3, 0), {});
+    const Shaped ball(implicit::ShapeKind::Point, Vec3::Zero(), {Vec3(0.05, -0.07, 0.4 - depth), Quat::Identity()});
+    Stage stage;
+    stage.add(plate.field);
+    stage.add(ball.field);
+    const ContactSurface& s = stage.solve();
+    ASSERT_EQ(s.summary.size(), 1u) << depth;
+    EXPECT_NEAR(s.summary[0].largest_overlap, depth, 1e-5 * depth + 1e-15);
   }
 }
 

@@ -108,6 +108,48 @@ TEST(SolidBox, RefusesARoundingThicknessDoesNotHold) {
   EXPECT_THROW((SolidBox{kPose, kHalf, 0.3, 1.0}), ContractViolation);
 }
 
+TEST(Cores, AreAtOneDistanceFromTheSurface) {
+  // On the way out of the nearest core point the surface comes after `radius`.
+  const auto expect_core = [](const FieldView& field, double reach) {
+    for (const Vec3& place : testing::random_points(8, 100, reach)) {
+      const std::optional<CorePoint> core = field.core_point(place);
+      ASSERT_TRUE(core);
+      const Vec3 way = place - core->point;
+      if (way.norm() < 1e-6) continue;
+      EXPECT_NEAR(field.value(core->point + core->radius * way.normalized()), 0.0, 1e-12) << place.transpose();
+    }
+  };
+  const SolidBox box = make_box(0.1);
+  const HalfSpace plane{Vec3(0, 0, 0.2), Vec3(0.6, 0, 0.8), 2.0};
+  expect_core(box, 2.0);
+  expect_core(plane, 2.0);
+  for (const ShapeKind shape : {ShapeKind::Point, ShapeKind::Segment, ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Box,
+                                ShapeKind::Triangle}) {
+    Primitive p;
+    p.shape = shape;
+    p.size = Vec3(0.3, 0.2, 0.1);
+    p.kernel = Kernel::wyvill(0.5);
+    if (shape == ShapeKind::Triangle) p.control = {Vec3(0.3, 0, 0), Vec3(0, 0.4, 0), Vec3(-0.2, -0.1, 0.1)};
+    Skeleton skeleton{{p}, 1, 0.5};
+    EXPECT_TRUE(has_convex_core(skeleton));
+    PlacedSkeleton placed;
+    Field field;
+    place_skeleton(skeleton, {&kPose, 1}, placed);
+    index_field(skeleton, placed, field);
+    expect_core(field, 1.5);
+  }
+}
+
+TEST(Cores, AreThoseOfConvexBodiesOnly) {
+  EXPECT_FALSE(FieldView(make_terrain()).core_point(Vec3::Zero()));
+  Skeleton two{{Primitive{}, Primitive{}}, 1, 0.5};
+  EXPECT_FALSE(has_convex_core(two));
+  two.primitive.resize(1);
+  EXPECT_TRUE(has_convex_core(two));
+  two.primitive[0].stretch = Vec3(1, 2, 1);
+  EXPECT_FALSE(has_convex_core(two));
+}
+
 TEST(HeightField, PassesThroughItsHeightsAndConvergesAtFourthOrder) {
   // Away from the borders, where the slope is held at 0.
   const auto error = [](std::size_t n) {

@@ -21,6 +21,7 @@ enum class ContactRule : std::uint8_t {
 
 struct ContactSettings {
   double error = 1e-4;   ///< relative error of force, area and centre of pressure asked for, in [1e-10, 0.1]
+  bool energy = true;    ///< false: energy, displaced volumes and squeezed regions only where the parts of a body need them
   int max_refinement = 6;  ///< refinements before the estimate is accepted as it is
   ContactRule only = ContactRule::None;  ///< None: the cheapest rule that fits; otherwise this rule alone
 };
@@ -49,7 +50,7 @@ struct ContactSurface {
     Vec3 centre_of_pressure = Vec3::Zero();  ///< integral x p dA / integral p dA [m]
     double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]
     double largest_pressure = 0.0;         ///< [Pa]
-    double largest_overlap = 0.0;          ///< thickness of {p_A > 0, p_B > 0} through the point of largest pressure [m]
+    double largest_overlap = 0.0;          ///< to first order without `ContactSettings::energy`: thickness of {p_A > 0, p_B > 0} through the point of largest pressure [m]
     double displaced_a = 0.0;              ///< volume of V_A [m^3]: what A loses to B
     double displaced_b = 0.0;              ///< volume of V_B [m^3]
     double residual = 0.0;                 ///< largest |p_A - p_B| / max(P_A, P_B) at the points [1]

@@ -14,6 +14,8 @@ struct ContactCandidates {
   std::vector<std::uint32_t> offset;   ///< seeds of pair k are [offset[k], offset[k+1]), shape [pairs + 1]
   std::vector<Vec3> seed;              ///< world points [m]
   std::vector<double> spacing;         ///< of the coarser samples of the two bodies [m], 0: none; shape [pairs]
+  /// 1: both bodies are convex, so that their overlap is one piece with one peak; its only seed lies between their cores.
+  std::vector<std::uint8_t> convex;    ///< shape [pairs]
   std::uint64_t pairs_present = 0;     ///< pairs that the rules allow, as `broad_phase` counts them
 };
 
@@ -27,7 +29,7 @@ struct ContactCandidates {
 [[nodiscard]] std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
                                                 std::uint64_t* present = nullptr);
 
-/// Stage 5. Needs the samples of stage 4 for the bodies of the broad phase. A sample is a seed when the other surface is,
+/// Stage 5. Needs the samples of stage 4 for the bodies of the broad phase, but not of pairs of convex bodies. A sample is a seed when the other surface is,
 /// to first order, at most one sample spacing away. Pairs that have samples but no seed are left out; pairs without any
 /// samples are kept and searched by stage 6. `pairs_present` is left as it is.
 void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair> pairs, const Executor& executor,

@@ -34,6 +34,8 @@ class Field {
   [[nodiscard]] double gradient_bound(const Box& box) const;
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
+  /// For bodies with `has_convex_core`.
+  [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
 
   /// Hessian of F [1/m^2] at one point (mean curvature, tests); the mean curvature is > 0 for a sphere:
   /// kappa = (g^T H g - |g|^2 tr H) / (2 |g|^3).
@@ -74,6 +76,7 @@ struct HalfSpace {
   [[nodiscard]] double gradient_bound(const Box& box) const;
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
+  [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
 };
 
 }  // namespace supple::implicit

@@ -5,6 +5,7 @@
 
 #include <concepts>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,18 @@ struct FieldParts {
   std::vector<std::uint32_t> part;    ///< index of the part within its body
   std::vector<double> value;          ///< f_k [1]
   std::vector<Vec3> gradient;         ///< grad f_k [1/m]
+};
+
+/// A convex body as seen from a place: its core is a convex set, around which all its level sets lie at equal distances.
+struct CorePoint {
+  Vec3 point = Vec3::Zero();  ///< of the core, nearest to the place [m]
+  double radius = 0.0;        ///< from the core to the surface [m]
+};
+
+/// A field of a convex body may say so; what it says is exact.
+template <class T>
+concept HasCore = requires(const T& field, const Vec3& place) {
+  { field.core_point(place) } -> std::same_as<std::optional<CorePoint>>;
 };
 
 /// What a type must offer to be seen through a FieldView.
@@ -64,6 +77,9 @@ class FieldView {
   /// A length [m] below which F has no features: iterations limit their steps to half of it.
   [[nodiscard]] double feature_size() const { return table_->feature_size(self_); }
 
+  /// The nearest point of the core of a convex body; none where the field does not know its body to be convex.
+  [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const { return table_->core_point(self_, place); }
+
   [[nodiscard]] double value(const Vec3& p) const {
     double v;
     evaluate({&p, 1}, {&v, 1});
@@ -87,6 +103,7 @@ class FieldView {
     double (*gradient_bound)(const void*, const Box&);
     Box (*surface_box)(const void*);
     double (*feature_size)(const void*);
+    std::optional<CorePoint> (*core_point)(const void*, const Vec3&);
     const Field* (*as_field)(const void*);
   };
   template <class T>
@@ -100,6 +117,13 @@ class FieldView {
       [](const void* f, const Box& b) { return static_cast<double>(static_cast<const T*>(f)->gradient_bound(b)); },
       [](const void* f) { return static_cast<const T*>(f)->surface_box(); },
       [](const void* f) { return static_cast<double>(static_cast<const T*>(f)->feature_size()); },
+      []([[maybe_unused]] const void* f, [[maybe_unused]] const Vec3& place) -> std::optional<CorePoint> {
+        if constexpr (HasCore<T>) {
+          return static_cast<const T*>(f)->core_point(place);
+        } else {
+          return std::nullopt;
+        }
+      },
       []([[maybe_unused]] const void* f) -> const Field* {
         if constexpr (std::same_as<T, Field>) {
           return static_cast<const Field*>(f);

@@ -89,6 +89,9 @@ struct Skeleton {
   Blend blend;       ///< how the parts combine, if not as a sum
 };
 
+/// Whether the body is convex by construction: one primitive, offsets of a convex shape.
+[[nodiscard]] bool has_convex_core(const Skeleton& skeleton) noexcept;
+
 /// Primitives in world axes; Frame data.
 struct PlacedSkeleton {
   std::vector<Vec3> position;  ///< origin of the primitive [m], shape [primitives]

@@ -26,6 +26,7 @@ class SolidBox {
   [[nodiscard]] double gradient_bound(const Box& box) const;
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
+  [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
   /// Its surface with sharp edges, one quadrangle a face.
   [[nodiscard]] Mesh mesh() const;
 
