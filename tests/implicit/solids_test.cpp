@@ -130,7 +130,7 @@ TEST(Cores, AreAtOneDistanceFromTheSurface) {
     p.size = Vec3(0.3, 0.2, 0.1);
     p.kernel = Kernel::wyvill(0.5);
     if (shape == ShapeKind::Triangle) p.control = {Vec3(0.3, 0, 0), Vec3(0, 0.4, 0), Vec3(-0.2, -0.1, 0.1)};
-    Skeleton skeleton{{p}, 1, 0.5};
+    Skeleton skeleton{.primitive = {p}, .part_count = 1, .iso = 0.5, .blend = {}};
     EXPECT_TRUE(has_convex_core(skeleton));
     PlacedSkeleton placed;
     Field field;
@@ -142,7 +142,7 @@ TEST(Cores, AreAtOneDistanceFromTheSurface) {
 
 TEST(Cores, AreThoseOfConvexBodiesOnly) {
   EXPECT_FALSE(FieldView(make_terrain()).core_point(Vec3::Zero()));
-  Skeleton two{{Primitive{}, Primitive{}}, 1, 0.5};
+  Skeleton two{.primitive = {Primitive{}, Primitive{}}, .part_count = 1, .iso = 0.5, .blend = {}};
   EXPECT_FALSE(has_convex_core(two));
   two.primitive.resize(1);
   EXPECT_TRUE(has_convex_core(two));
