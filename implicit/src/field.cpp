@@ -172,22 +172,35 @@ Field::~Field() = default;
 Field::Field(Field&&) noexcept = default;
 Field& Field::operator=(Field&&) noexcept = default;
 
+const Field::Index& Field::index() const {
+  Index& index = *index_;
+  if (!index.built.load(std::memory_order_acquire)) {
+    const std::lock_guard lock(index.build_mutex);
+    if (!index.built.load(std::memory_order_relaxed)) {
+      index.build_leaves();
+      index.build_levels();
+      index.built.store(true, std::memory_order_release);
+    }
+  }
+  return index;
+}
+
 void Field::evaluate(std::span<const Vec3> points, std::span<double> values) const {
   SUPPLE_EXPECTS(points.size() == values.size());
   if (index_->blend.active()) {
-    evaluate_blended(*index_, points, values.data(), nullptr);
+    evaluate_blended(index(), points, values.data(), nullptr);
     return;
   }
-  evaluate_batch(*index_, points, values.data(), nullptr);
+  evaluate_batch(index(), points, values.data(), nullptr);
 }
 
 void Field::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
   SUPPLE_EXPECTS(points.size() == values.size() && points.size() == gradients.size());
   if (index_->blend.active()) {
-    evaluate_blended(*index_, points, values.data(), gradients.data());
+    evaluate_blended(index(), points, values.data(), gradients.data());
     return;
   }
-  evaluate_batch(*index_, points, values.data(), gradients.data());
+  evaluate_batch(index(), points, values.data(), gradients.data());
 }
 
 void part_rows(const Field::Index& index, std::span<const Vec3> points, FieldParts& parts) {
@@ -250,9 +263,9 @@ std::span<const std::uint32_t> candidates_of(const Field::Index& index, const Bo
 
 void Field::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
   if (index_->blend.active()) {
-    blended_part_rows(*index_, points, parts);
+    blended_part_rows(index(), points, parts);
   } else {
-    part_rows(*index_, points, parts);
+    part_rows(index(), points, parts);
   }
 }
 
@@ -262,7 +275,7 @@ void Field::set_culling(bool on) { index_->cull = on; }
 
 FieldCounts Field::count(std::span<const Vec3> points) const {
   std::vector<double> values(points.size());
-  const std::uint64_t visited = evaluate_batch(*index_, points, values.data(), nullptr);
+  const std::uint64_t visited = evaluate_batch(index(), points, values.data(), nullptr);
   return {.points = points.size(),
           .primitives_visited = visited,
           .primitives_present = points.size() * index_->size()};
@@ -324,7 +337,7 @@ Mat3 Field::hessian(const Vec3& point) const {
       const Vec3 points[2] = {point + h * Vec3::Unit(k), point - h * Vec3::Unit(k)};
       double values[2];
       Vec3 gradients[2];
-      evaluate_blended(*index_, points, values, gradients);
+      evaluate_blended(index(), points, values, gradients);
       sum.col(k) = (gradients[0] - gradients[1]) / (2.0 * h);
     }
     return 0.5 * (sum + sum.transpose());

@@ -229,7 +229,7 @@ PrimitiveBound bound_primitive(const Field::Index& index, std::uint32_t id, cons
 }
 
 Interval Field::bound(const Box& box) const {
-  const Index& index = *index_;
+  const Index& index = this->index();
   if (box.empty()) return {-index.iso, -index.iso};
   if (index.blend.active()) return blended_bound(index, box);
   const lanes::BoundSums sums = touching_sums(index, box, false);
@@ -239,7 +239,7 @@ Interval Field::bound(const Box& box) const {
 }
 
 double Field::gradient_bound(const Box& box) const {
-  const Index& index = *index_;
+  const Index& index = this->index();
   if (box.empty()) return 0.0;
   if (index.blend.active()) return blended_gradient_bound(index, box);
   const lanes::BoundSums sums = touching_sums(index, box, true);
@@ -248,7 +248,7 @@ double Field::gradient_bound(const Box& box) const {
 
 Box Field::surface_box() const {
   const std::lock_guard lock(index_->surface_box_mutex);
-  if (!index_->surface_box) index_->surface_box = find_surface_box(*index_, *this);
+  if (!index_->surface_box) index_->surface_box = find_surface_box(index(), *this);
   return *index_->surface_box;
 }
 

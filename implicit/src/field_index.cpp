@@ -243,8 +243,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
     index.core_radius = iso_distance(skeleton.primitive[0].kernel, skeleton.iso);
   }
   index.typical_extent = n > 0 ? extent / (3.0 * static_cast<double>(n)) : 0.0;
-  index.build_leaves();
-  index.build_levels();
+  index.built.store(false, std::memory_order_release);
 }
 
 }  // namespace supple::implicit

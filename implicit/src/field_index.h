@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -105,6 +106,10 @@ struct Field::Index {
   std::vector<Box> leaf_box, box_swap;
 
   [[nodiscard]] std::size_t size() const noexcept { return primitive.size(); }
+  // The hierarchy, built when it is first asked for: what only meshes Wyvill points never does.
+  std::atomic<bool> built{false};
+  std::mutex build_mutex;
+
   void build_leaves();
   void build_levels();
 };

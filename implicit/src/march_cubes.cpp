@@ -641,7 +641,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
 const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& lattice, const Executor& executor,
                                     MarchCounts& counts) {
   const Field* points = field.as_field();
-  const double level = points != nullptr ? points->index().iso : 0.0;
+  const double level = points != nullptr ? points->packed().iso : 0.0;
   if (!kept || level != iso) grid.forget();
   kept = false;
   iso = level;

@@ -504,7 +504,7 @@ class ViewSampler final : public Sampler {
 std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, blobs::BlobGrid& grid) {
   SUPPLE_EXPECTS(std::isfinite(lattice.cell) && lattice.cell > 0.0 && lattice.origin.allFinite());
   if (const Field* points = field.as_field()) {
-    const Field::Index& index = points->index();
+    const Field::Index& index = points->packed();
     if (index.size() > 0 && index.uniform && index.primitive[0].kind == PackedKind::PointWyvill && !index.blend.active()) {
       return std::make_unique<BlobSampler>(index, lattice, grid);
     }

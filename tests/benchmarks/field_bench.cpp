@@ -90,6 +90,7 @@ void measure_body(std::string_view filter, const std::string& name, Body& body, 
 
   measure(filter, name + "/index", [&](Hasher& hasher) {
     body.place();
+    (void)field.index();
     hasher.add(field.feature_size());
     return body.skeleton.primitive.size();
   });

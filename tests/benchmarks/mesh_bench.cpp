@@ -246,7 +246,7 @@ int write_grid(Body& body, const Lattice& lattice, int cells, const char* path) 
   const auto n = static_cast<std::int64_t>(cells) + 1;
   const auto iso = static_cast<float>(body.skeleton.iso);
   std::vector<float> values(static_cast<std::size_t>(n * n * n), -iso);
-  const std::span<const PackedPrimitive> primitives = body.field.index().primitive;
+  const std::span<const PackedPrimitive> primitives = body.field.packed().primitive;
   double touched = 1e300, surface = 1e300;
   for (int repeat = 0; repeat < 3; ++repeat) {
     double begin = cpu_seconds();

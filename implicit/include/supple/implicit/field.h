@@ -48,8 +48,10 @@ class Field {
   void set_culling(bool on);
 
   struct Index;
-  /// What the loops of this module read; private to it.
-  [[nodiscard]] const Index& index() const noexcept { return *index_; }
+  /// What the loops of this module read, the hierarchy included; private to it.
+  [[nodiscard]] const Index& index() const;
+  /// The same without the hierarchy, which is built when it is first asked for.
+  [[nodiscard]] const Index& packed() const noexcept { return *index_; }
 
  private:
   friend void index_field(const Skeleton&, const PlacedSkeleton&, Field&);
