@@ -2,33 +2,49 @@
 #include <array>
 #include <cmath>
 
+#include "lanes.h"
+#include "step.h"
 #include "supple/core/integrate.h"
 #include "supple/core/math.h"
 
 namespace supple::core {
 namespace {
 
+template <class T>
 struct HalfAngle {
-  double sinc;  ///< sin(x) / x
-  double cos;
+  T sinc;  ///< sin(x) / x
+  T cos;
 };
 
-/// sin(x)/x and cos(x) from x^2: by series below 1/16, where eight terms are exact to the last place.
-HalfAngle half_angle(double x2) {
-  if (x2 < 0.0625) {
-    constexpr std::array<double, 7> kSinc{1.0,        -1.0 / 6.0,          1.0 / 120.0,         -1.0 / 5040.0,
-                                          1.0 / 362880.0, -1.0 / 39916800.0, 1.0 / 6227020800.0};
-    constexpr std::array<double, 8> kCos{1.0,           -1.0 / 2.0,         1.0 / 24.0,          -1.0 / 720.0,
-                                         1.0 / 40320.0, -1.0 / 3628800.0, 1.0 / 479001600.0, -1.0 / 87178291200.0};
-    double sinc = kSinc.back();
-    for (std::size_t k = kSinc.size() - 1; k-- > 0;) sinc = std::fma(sinc, x2, kSinc[k]);
-    double cos = kCos.back();
-    for (std::size_t k = kCos.size() - 1; k-- > 0;) cos = std::fma(cos, x2, kCos[k]);
-    return {sinc, cos};
-  }
+constexpr double kSeriesLimit = 0.0625;
+
+/// sin(x)/x and cos(x) by series of x^2, where eight terms are exact to the last place.
+template <class T>
+HalfAngle<T> half_angle_series(T x2) {
+  constexpr std::array<double, 7> kSinc{1.0,        -1.0 / 6.0,          1.0 / 120.0,         -1.0 / 5040.0,
+                                        1.0 / 362880.0, -1.0 / 39916800.0, 1.0 / 6227020800.0};
+  constexpr std::array<double, 8> kCos{1.0,           -1.0 / 2.0,         1.0 / 24.0,          -1.0 / 720.0,
+                                       1.0 / 40320.0, -1.0 / 3628800.0, 1.0 / 479001600.0, -1.0 / 87178291200.0};
+  T sinc(kSinc.back());
+  for (std::size_t k = kSinc.size() - 1; k-- > 0;) sinc = fma(sinc, x2, T(kSinc[k]));
+  T cos(kCos.back());
+  for (std::size_t k = kCos.size() - 1; k-- > 0;) cos = fma(cos, x2, T(kCos[k]));
+  return {sinc, cos};
+}
+
+HalfAngle<double> half_angle(double x2) {
+  if (x2 < kSeriesLimit) return half_angle_series(x2);
   const double x = std::sqrt(x2);
   const math::SinCos value = math::sin_cos(x);
   return {value.sin / x, value.cos};
+}
+
+/// q turned by twice the rotation vector `half`, of unit length.
+template <class T>
+Rotation<T> turned(const HalfAngle<T>& value, const Vector<T>& half, const Rotation<T>& q) {
+  const Rotation<T> p = product({value.sinc * half, value.cos}, q);
+  const T scale = fma(T(-0.5), fma(p.w, p.w, dot(p.u, p.u)), T(1.5));
+  return {scale * p.u, scale * p.w};
 }
 
 /// One Newton step to unit length; a product of unit quaternions is a rounding error away from it.
@@ -37,7 +53,7 @@ void renormalise(Quat& q) { q.coeffs() *= 1.5 - 0.5 * q.squaredNorm(); }
 /// R_k(h): the exact flow of L_k^2 / (2 I_k) over h on the orientation and the body angular momentum.
 void rotate_about_axis(int k, double h, const Vec3& inertia, Quat& q, Vec3& body_momentum) {
   const double half = 0.5 * h * body_momentum[k] / inertia[k];
-  const HalfAngle value = half_angle(half * half);
+  const HalfAngle<double> value = half_angle(half * half);
   const double s = value.sinc * half;
   const double c = value.cos;
   const int i = (k + 1) % 3;
@@ -56,7 +72,7 @@ void rotate_about_axis(int k, double h, const Vec3& inertia, Quat& q, Vec3& body
 }  // namespace
 
 Quat rotation_exp(const Vec3& rotation) {
-  const HalfAngle value = half_angle(0.25 * rotation.squaredNorm());
+  const HalfAngle<double> value = half_angle(0.25 * rotation.squaredNorm());
   const Vec3 u = 0.5 * value.sinc * rotation;
   return Quat(value.cos, u.x(), u.y(), u.z());
 }
@@ -73,7 +89,11 @@ Vec3 rotation_log(const Quat& q) {
 
 void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt) {
   if (inertia.x() == inertia.y() && inertia.y() == inertia.z()) {
-    orientation = rotation_exp(dt / inertia.x() * angular_momentum) * orientation;
+    const double scale = 0.5 * dt / inertia.x();
+    const Vector<double> half{scale * angular_momentum.x(), scale * angular_momentum.y(), scale * angular_momentum.z()};
+    const Rotation<double> q{{orientation.x(), orientation.y(), orientation.z()}, orientation.w()};
+    const Rotation<double> next = turned(half_angle(dot(half, half)), half, q);
+    orientation = Quat(next.w, next.u.x, next.u.y, next.u.z);
   } else {
     Vec3 body = orientation.conjugate() * angular_momentum;
     rotate_about_axis(2, 0.5 * dt, inertia, orientation, body);
@@ -81,8 +101,25 @@ void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& in
     rotate_about_axis(0, dt, inertia, orientation, body);
     rotate_about_axis(1, 0.5 * dt, inertia, orientation, body);
     rotate_about_axis(2, 0.5 * dt, inertia, orientation, body);
+    renormalise(orientation);
   }
-  renormalise(orientation);
+}
+
+bool rotate_four(const Vec3* angular_momentum, const Vec3* inertia, double dt, Quat* orientation) {
+  const auto column = [](const Vec3* v, int k) { return Lanes(_mm256_set_pd(v[3][k], v[2][k], v[1][k], v[0][k])); };
+  const Lanes scale = Lanes(0.5 * dt) / column(inertia, 0);
+  const Vector<Lanes> half{scale * column(angular_momentum, 0), scale * column(angular_momentum, 1),
+                           scale * column(angular_momentum, 2)};
+  const Lanes x2 = dot(half, half);
+  if (_mm256_movemask_pd(_mm256_cmp_pd(x2.v, _mm256_set1_pd(kSeriesLimit), _CMP_LT_OQ)) != 0xf) return false;
+  std::array<Lanes, 4> q;
+  for (std::size_t k = 0; k < 4; ++k) q[k] = _mm256_loadu_pd(orientation[k].coeffs().data());
+  transpose(q[0], q[1], q[2], q[3]);
+  const Rotation<Lanes> next = turned(half_angle_series(x2), half, {{q[0], q[1], q[2]}, q[3]});
+  q = {next.u.x, next.u.y, next.u.z, next.w};
+  transpose(q[0], q[1], q[2], q[3]);
+  for (std::size_t k = 0; k < 4; ++k) _mm256_storeu_pd(orientation[k].coeffs().data(), q[k].v);
+  return true;
 }
 
 void rotate_free_exponential(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt) {

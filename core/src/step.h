@@ -11,6 +11,10 @@ inline bool holds_orientation(const ParticleSet& set, std::size_t i) { return (s
 /// Takes the velocity and the angular momentum that a pin holds.
 void stop_pinned(const ParticleSet& set, ParticleState& state);
 
+/// `rotate_free` of four particles in a row with equal principal moments each, to the same bits. @return false, having
+/// done nothing, where one turns so far that the series of the others does not hold.
+[[nodiscard]] bool rotate_four(const Vec3* angular_momentum, const Vec3* inertia, double dt, Quat* orientation);
+
 /// Clears `sample` and asks for the loads.
 void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample);
 

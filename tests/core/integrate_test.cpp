@@ -415,6 +415,37 @@ TEST(Planar, KeepsHeightToTheBitAndTurnsAboutTheVerticalOnly) {
   EXPECT_NEAR(s.energy(), energy + ledger.external_work - ledger.dissipated, 1e-2 * s.energy());
 }
 
+TEST(FreeDrift, GivesEachParticleTheBitsThatItHasAlone) {
+  // Particles drift by fours where all four turn evenly and slowly: rows with fast, resting, pinned and uneven ones too.
+  Draw draw(401);
+  System all;
+  for (int i = 0; i < 23; ++i) {
+    all.p.add(draw.vector(1.0), draw.uniform(0.5, 2.0), draw.uniform(0.5, 2.0));
+    all.p.state.velocity.back() = draw.vector(1.0);
+    all.p.state.orientation.back() = draw.rotation();
+    all.p.state.angular_momentum.back() = draw.vector(i == 9 ? 40.0 : 1.0);
+  }
+  all.p.state.angular_momentum[13].setZero();
+  all.p.set.pinned[16] = kPinPosition;
+  all.p.set.inertia[20].x() *= 1.5;
+  std::vector<System> alone(23);
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    Particles& one = alone[i].p;
+    one.add(all.p.state.position[i], all.p.set.mass[i]);
+    one.set.inertia[0] = all.p.set.inertia[i];
+    one.set.pinned[0] = all.p.set.pinned[i];
+    one.state.velocity[0] = all.p.state.velocity[i];
+    one.state.orientation[0] = all.p.state.orientation[i];
+    one.state.angular_momentum[0] = all.p.state.angular_momentum[i];
+    alone[i].run(0.1, 20);
+  }
+  all.run(0.1, 20);
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(all.p.state.position[i], alone[i].p.state.position[0]) << i;
+    EXPECT_EQ(all.p.state.orientation[i].coeffs(), alone[i].p.state.orientation[0].coeffs()) << i;
+  }
+}
+
 TEST(StableStep, IsTheSmallestOfItsLimits) {
   EXPECT_EQ(stable_step({}), std::numeric_limits<double>::infinity());
   EXPECT_DOUBLE_EQ(stable_step({.frequency = 100.0}), 0.003);
