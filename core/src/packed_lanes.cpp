@@ -107,8 +107,8 @@ HWY_INLINE void exp_negative(V (&x)[kChains]) {
   });
 }
 
-/// What is known of a batch. Short passes over some batches fill it: a processor works on several of them at once, where
-/// one long pass would wait for its own results.
+/// What is known of a batch. Short passes over some batches fill it: a processor works on several of them at once,
+/// where one long pass would wait for its own results.
 struct Near {
   alignas(64) double x[kBatch], y[kBatch], z[kBatch];  ///< r
   double d[kBatch];                                    ///< its length

@@ -1,5 +1,5 @@
-// The loops of neighbour lists on the widest vectors that the processor has. A batch is eight neighbours of one particle
-// on every width; what they do to the particle is added in one order and then to its row: the width changes no bit.
+// The loops of neighbour lists on the widest vectors that the processor has. A batch is eight neighbours of one
+// particle on every width; what they do to it is added in one order and then to its row: the width changes no bit.
 #pragma once
 
 #include <array>

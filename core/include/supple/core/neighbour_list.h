@@ -83,10 +83,10 @@ struct SurfaceLaws {
   double cocircularity = 0.0;  ///< [N/m]
 };
 
-/// With SingleForces the force and the derivatives by normals of each pair are computed in single precision and added up
-/// in double. Separations are exact to 2^-29 of range + skin before they are rounded to single precision. Both particles
-/// of a pair get the same force, so momentum is conserved as in double; the moment of a pair, and with it angular
-/// momentum, is only as exact as single precision, about 1e-7 of the forces times their distances.
+/// With SingleForces the force and the derivatives by normals of each pair are computed in single precision and added
+/// up in double. Separations are exact to 2^-29 of range + skin before they are rounded to single precision. Both
+/// particles of a pair get the same force, so momentum is conserved as in double; the moment of a pair, and with it
+/// angular momentum, is only as exact as single precision, about 1e-7 of the forces times their distances.
 enum class Precision : std::uint8_t { Double, SingleForces };
 
 /// Adds what a law does between all particles of a list, at the positions of its last update.
