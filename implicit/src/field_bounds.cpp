@@ -238,6 +238,54 @@ Interval Field::bound(const Box& box) const {
   return {std::max(sums.lower - index.iso - round_off, -index.iso), sums.upper - index.iso + round_off};
 }
 
+Interval Field::tight_bound(const Box& box) const {
+  const Index& index = this->index();
+  const Interval plain = bound(box);
+  if (box.empty() || index.blend.active() || !box.lower.allFinite() || !box.upper.allFinite()) return plain;
+  const Vec3 centre = box.centre();
+  const Vec3 half = 0.5 * box.extent();
+  const double reach2 = half.squaredNorm();
+  double value = -index.iso;             // of what is expanded about the centre
+  Vec3 gradient = Vec3::Zero();
+  double least = 0.0, largest = 0.0;     // second derivatives
+  Interval rest{0.0, 0.0};               // of what is not
+  double scale = index.iso, terms = 0.0;
+  for (const std::uint32_t id : candidates_of(index, box)) {
+    if (!index.support[id].overlaps(box)) continue;
+    const PackedPrimitive& p = index.primitive[id];
+    const PackedShape& shape = index.shape[id];
+    scale += shape.peak + shape.lipschitz * half.norm();
+    terms += 1.0;
+    const DistanceRange range = clipped_range(index, id, box);
+    const bool clipped = !(index.support[id].contains(box.lower) && index.support[id].contains(box.upper));
+    const double far = clipped ? shape.kernel.radius : std::sqrt(range.far2);
+    const CurvatureRange curvature = curvature_range(shape.kernel, std::sqrt(range.near2), far);
+    // Squared distances of convex shapes have second derivatives between 0 and 2, those of plane curves do not.
+    const bool convex = shape.foot == PackedFoot::Slab || shape.foot == PackedFoot::Disc || shape.view.kind == ShapeKind::Triangle ||
+                        shape.view.kind == ShapeKind::Polygon;
+    if (!convex || shape.foot == PackedFoot::Convolved || !std::isfinite(curvature.upper)) {
+      const PrimitiveBound one = bound_primitive(index, id, box, false);
+      rest.lower += one.value.lower;
+      rest.upper += one.value.upper;
+      continue;
+    }
+    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    const Eigen::Map<const RowMajor> A(shape.to_local.data());
+    const FootSample sample = foot(shape.view, A * (centre - Vec3(p.position[0], p.position[1], p.position[2])));
+    const KernelSample kernel = supple::implicit::evaluate(shape.kernel, sample.q);
+    value += kernel.value;
+    gradient += 2.0 * kernel.slope * (A.transpose() * sample.half_gradient);
+    const double stretch = shape.distance_scale * shape.distance_scale;
+    least += stretch * curvature.lower;
+    largest += stretch * curvature.upper;
+  }
+  if (terms == 0.0) return plain;
+  const double first = gradient.cwiseAbs().dot(half);
+  const double round_off = (64.0 + 2.0 * terms) * kEps * scale;
+  return {std::max(plain.lower, value + rest.lower - first + 0.5 * least * reach2 - round_off),
+          std::min(plain.upper, value + rest.upper + first + 0.5 * largest * reach2 + round_off)};
+}
+
 double Field::gradient_bound(const Box& box) const {
   const Index& index = this->index();
   if (box.empty()) return 0.0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <string>
 
 #include "supple/core/error.h"
@@ -244,6 +245,40 @@ double lipschitz(const Kernel& kernel, double near, double far) noexcept {
     if (vertex > from && vertex < far) largest = std::max(largest, steepness(vertex));
   }
   return largest;
+}
+
+CurvatureRange curvature_range(const Kernel& kernel, double near, double far) noexcept {
+  const double R2 = kernel.radius * kernel.radius;
+  const double from = near * near / R2;
+  const double to = std::min(far * far / R2, 1.0);
+  if (from >= 1.0) return {};
+  // In u, over R^2: d2f/dd2 is e = 2 f' + 4 u f'', (df/dd)/d is 2 f', which rises with u; e has one extremum at most.
+  double extremum = 2.0;
+  const double a = kernel.shape * kernel.shape;
+  switch (kernel.kind) {
+    case KernelKind::Wyvill: extremum = 0.6; break;
+    case KernelKind::SoftObject: extremum = 0.85; break;
+    case KernelKind::Murakami: break;
+    case KernelKind::Blinn: extremum = 1.5 / a; break;
+    case KernelKind::Cauchy: extremum = 0.6 / a; break;
+    case KernelKind::Nishimura: return {from < 1.0 / 9.0 ? -6.0 / R2 : 2.0 * in_square(kernel, from).first / R2, to > 1.0 / 9.0 ? 3.0 / R2 : 0.0};
+    case KernelKind::Gascuel:
+    case KernelKind::BlancSchlick: {
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      return {-kInfinity, kInfinity};
+    }
+  }
+  const auto radial = [&](double u) {
+    const InSquare g = in_square(kernel, u);
+    return 2.0 * g.first + 4.0 * u * g.second;
+  };
+  double least = std::min({radial(from), radial(to), 2.0 * in_square(kernel, from).first, 0.0});
+  double largest = std::max({radial(from), radial(to), 0.0});
+  if (extremum > from && extremum < to) {
+    least = std::min(least, radial(extremum));
+    largest = std::max(largest, radial(extremum));
+  }
+  return {least / R2, largest / R2};
 }
 
 double iso_distance(const Kernel& kernel, double iso) {

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <numeric>
+#include <span>
+#include <utility>
 
 #include "supple/scenes/model.h"
 
@@ -8,6 +10,32 @@ namespace {
 
 constexpr std::uint32_t kElsewhere = 0xffffffff;
 
+/// The blend among the particles of a piece. @param part  of the piece by particle of the object, or kElsewhere
+implicit::Blend take_blend(const implicit::Blend& all, const std::vector<std::uint32_t>& part, std::uint32_t part_count) {
+  implicit::Blend blend = all;
+  if (all.rule == implicit::BlendRule::Sum) return blend;
+  blend.node.assign(part_count, 0);
+  std::vector<std::uint32_t> present;  // nodes that the piece has particles of, rising
+  for (std::size_t k = 0; k < part.size(); ++k) {
+    if (part[k] == kElsewhere) continue;
+    blend.node[part[k]] = all.node[k];
+    present.push_back(all.node[k]);
+  }
+  std::sort(present.begin(), present.end());
+  present.erase(std::unique(present.begin(), present.end()), present.end());
+  const auto renumbered = [&](std::uint32_t node) {
+    const auto place = std::lower_bound(present.begin(), present.end(), node);
+    return place != present.end() && *place == node ? static_cast<std::uint32_t>(place - present.begin()) : kElsewhere;
+  };
+  for (std::uint32_t& node : blend.node) node = renumbered(node);
+  blend.edge.clear();
+  for (const implicit::BlendEdge& e : all.edge) {
+    const std::uint32_t a = renumbered(e.a), b = renumbered(e.b);
+    if (a != kElsewhere && b != kElsewhere) blend.edge.push_back({a, b, e.weight});
+  }
+  return blend;
+}
+
 /// The primitives and seeds that the particles of a piece carry.
 void take_part(const ObjectModel& object, Body& body) {
   std::vector<std::uint32_t> part(object.last - object.first, kElsewhere);
@@ -15,6 +43,7 @@ void take_part(const ObjectModel& object, Body& body) {
 
   body.skeleton.part_count = static_cast<std::uint32_t>(body.particle.size());
   body.skeleton.iso = object.skeleton.iso;
+  body.skeleton.blend = take_blend(object.skeleton.blend, part, body.skeleton.part_count);
   std::vector<std::uint32_t> primitive(object.skeleton.primitive.size(), kElsewhere);
   for (std::size_t k = 0; k < object.skeleton.primitive.size(); ++k) {
     implicit::Primitive copy = object.skeleton.primitive[k];
@@ -39,6 +68,64 @@ void take_part(const ObjectModel& object, Body& body) {
 
 const std::string& body_name(const Model& model, const std::vector<Body>& bodies, std::size_t body) {
   return body < bodies.size() ? bodies[body].name : model.fixed[body - bodies.size()].name;
+}
+
+core::LinkState parted_links(const Model& model, const core::LinkState& links, std::span<const double> broken_for) {
+  core::LinkState parted = links;
+  for (std::size_t k = 0; k < broken_for.size(); ++k) {
+    const double fade = model.objects[model.particles.object[model.links.first[k]]].fade;
+    if (broken_for[k] < fade) parted.broken[k] = 0;
+  }
+  return parted;
+}
+
+void fade_blends(const Model& model, const core::LinkState& links, std::span<const double> broken_for, std::vector<Body>& bodies) {
+  for (Body& body : bodies) {
+    const ObjectModel& object = model.objects[body.object];
+    if (!(object.fade > 0.0)) continue;
+    // Weights of the bonds between the particles of the object, in both directions, sorted.
+    struct Bond {
+      std::uint32_t from, to;
+      double weight;
+    };
+    std::vector<Bond> bonds;
+    for (std::size_t k = 0; k < model.links.size(); ++k) {
+      const std::uint32_t a = model.links.first[k], b = model.links.second[k];
+      if (a < object.first || a >= object.last) continue;
+      const double weight = links.broken[k] != 0 ? implicit::fading(broken_for[k], object.fade) : 1.0;
+      bonds.push_back({a, b, weight});
+      bonds.push_back({b, a, weight});
+    }
+    std::sort(bonds.begin(), bonds.end(), [](const Bond& x, const Bond& y) { return std::pair(x.from, x.to) < std::pair(y.from, y.to); });
+    const auto of = [&](std::uint32_t particle) {
+      const auto first = std::lower_bound(bonds.begin(), bonds.end(), particle, [](const Bond& x, std::uint32_t p) { return x.from < p; });
+      const auto last = std::find_if(first, bonds.end(), [&](const Bond& x) { return x.from != particle; });
+      return std::span<const Bond>(first, last);
+    };
+    const auto between = [&](std::uint32_t a, std::uint32_t b) {
+      double best = 0.0;
+      bool any = false;
+      for (const Bond& x : of(a)) {
+        if (x.to == b) return x.weight;
+        for (const Bond& y : of(x.to)) {
+          if (y.to != b) continue;
+          any = true;
+          best = std::max(best, std::min(x.weight, y.weight));
+        }
+      }
+      return any ? best : 1.0;
+    };
+    implicit::Blend& blend = body.skeleton.blend;
+    for (implicit::BlendEdge& e : blend.edge) {
+      e.weight = 0.0;
+      for (std::uint32_t i = 0; i < blend.node.size(); ++i) {
+        if (blend.node[i] != e.a) continue;
+        for (std::uint32_t j = 0; j < blend.node.size(); ++j) {
+          if (blend.node[j] == e.b) e.weight = std::max(e.weight, between(body.particle[i], body.particle[j]));
+        }
+      }
+    }
+  }
 }
 
 std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) {

@@ -285,6 +285,8 @@ void fields(Archive& archive, SkeletonDesc& d) {
   archive("radii_behind", d.radii_behind, only(above(0.0, kLength), {Directed}), "along -x, -y, -z; absent: as radii");
   archive("end_radius", d.end_radius, only(above(0.0, kLength), {Segment, Curve}),
           "support radius at the end, kernel.radius being that at the beginning; absent: the same");
+  archive("convolve", d.convolve, only({}, {Segment, Triangle, Polygon, Ring, Arc}),
+          "integrate the kernel over the shape, so that shapes that share ends join without a bulge; kernels wyvill, murakami, cauchy");
   archive("stretch", d.stretch, between(1e-3, 1e3, kNumber), "of shape and support along the primitive's axes");
   archive("at", d.at, any(kLength), "offset in the particle's frame");
   archive("turn_axis", d.turn_axis, direction(), "in the particle's frame, with turn_deg");
@@ -294,8 +296,43 @@ void fields(Archive& archive, SkeletonDesc& d) {
   archive.required("kernel", d.kernel, {}, "how the field falls off");
   const bool own_scale = d.shape == Ellipsoid || d.shape == Superquadric || d.shape == Directed;
   check_points(archive, d);
+  archive.check(!d.convolve || d.end_radius == 0.0, "convolve", "expected no end_radius with convolve", "one", "");
+  const bool closed_form = d.kernel.type == KernelName::Wyvill || d.kernel.type == KernelName::Murakami || d.kernel.type == KernelName::Cauchy;
+  archive.check(!d.convolve || closed_form, "kernel.type", "expected one of wyvill, murakami, cauchy with convolve",
+                '\'' + std::string(name_of(d.kernel.type)) + '\'', "");
   archive.check(d.kernel.radius > 0.0 || own_scale, "kernel.radius", "expected a length > 0 [m]", "nothing",
                 "this key is required");
+}
+
+template <class Archive>
+void fields(Archive& archive, BlendGroupDesc& d) {
+  archive.required("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
+                   "from 0, negative from the end");
+}
+
+template <class Archive>
+void fields(Archive& archive, BlendDesc& d) {
+  using enum BlendName;
+  const auto only = [&d](const Rule& rule, std::initializer_list<BlendName> rules) { return rule.only("rule", d.rule, rules); };
+  archive("rule", d.rule, {},
+          "sum: everything blends; graph: what neighbours or within name blends, the rest meets in a crease; ricci: the n-norm; "
+          "gradient: surfaces blend where they run into each other and not where they are parallel or face each other");
+  archive("groups", d.groups, {}, "particles of one group sum; particles in none are groups of their own");
+  archive("neighbours", d.neighbours, only(between(1.0, 1000.0, kNumber), {Graph}),
+          "groups blend that hold particles up to this many apart in their order");
+  archive("within", d.within, only(above(0.0, kLength), {Graph}), "or particles nearer than this at rest");
+  archive("exponent", d.exponent, only(between(1.0, 100.0, kNumber), {Ricci}), "n: 1 is the sum, a large one nearly the union");
+  archive("opening", d.opening, only(between(0.05, 0.95, kNumber), {Gradient}),
+          "where surfaces cross at right angles: small blends widely, 1 would be the union");
+  archive("fade", d.fade, only(at_least(0.0, kTime), {Graph}),
+          "how long particles still blend, less and less, after the bond between them broke; pieces part when it has faded");
+}
+
+template <class Archive>
+void fields(Archive& archive, VolumeDesc& d) {
+  archive("target", d.target, above(0.0, kVolume).or_auto(), "V0; auto: the volume at the start");
+  archive("rate", d.rate, up_to(1000.0, kRate), "alpha: kernels grow by alpha (V0 - V) / V0");
+  archive("damping", d.damping, between(0.0, 0.15, kNumber), "beta: against change of the volume");
 }
 
 template <class Archive>
@@ -397,6 +434,11 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
       check("kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.kinds[k].particles[j]);
     }
   }
+  for (std::size_t k = 0; d.blend && k < d.blend->groups.size(); ++k) {
+    for (std::size_t j = 0; j < d.blend->groups[k].particles.size(); ++j) {
+      check("blend.groups[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.blend->groups[k].particles[j]);
+    }
+  }
   for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
     for (std::size_t j = 0; j < d.skeleton[k].particles.size(); ++j) {
       check("skeleton[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.skeleton[k].particles[j]);
@@ -414,6 +456,8 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("interactions", d.interactions, {}, "what holds them together");
   archive("skeleton", d.skeleton, {}, "what they look like; without it the object has no surface");
   archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");
+  archive("blend", d.blend, {}, "how the surfaces of its particles join; absent: as the sum");
+  archive("volume", d.volume, {}, "held by growing and shrinking the kernels (Desbrun & Gascuel 1995); absent: not held");
   archive("contact", d.contact, {}, "what the surface does on contact; absent or false: it touches nothing");
   archive("repulsion", d.repulsion, {}, "exponential repulsion from other objects that have it, where contact is off");
   archive("medium", d.medium, {}, "drag of a surrounding medium; absent: none");
@@ -427,6 +471,10 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive.check(!d.separate || (d.interactions.empty() && d.kinds.empty()), "separate",
                 "expected no interactions or kinds in an object of separate bodies", "some",
                 "remove them, or 'separate'");
+  archive.check(!d.volume || !d.skeleton.empty(), "volume", "expected a skeleton, whose volume it is", "none", "");
+  archive.check(!d.volume || (!d.breaking && !d.separate), "volume", "expected an object that stays one body",
+                d.breaking ? "'breaking'" : "'separate'", "");
+  archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking, "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
   archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
   const bool geometric = std::any_of(d.interactions.begin(), d.interactions.end(), [](const auto& i) { return i.geometric; });

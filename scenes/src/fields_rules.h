@@ -52,6 +52,9 @@ template <> struct EnumNames<KernelName> {
   static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",
                                                          "nishimura", "blinn",   "cauchy",      "blanc_schlick"};
 };
+template <> struct EnumNames<BlendName> {
+  static constexpr std::array<std::string_view, 4> names{"sum", "graph", "ricci", "gradient"};
+};
 template <> struct EnumNames<SplitName> {
   static constexpr std::array<std::string_view, 2> names{"energy", "contribution"};
 };

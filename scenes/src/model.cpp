@@ -22,6 +22,8 @@ namespace {
 constexpr double kCellsAcross = 8.0;   // lattice cells across the smallest surface thickness
 constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
 
+constexpr double kVolumeCell = 0.125;   // of the iso radius: cells that measure a held volume
+
 core::NormalDirection direction_of(NormalKind normal) {
   return normal == NormalKind::Radial ? core::NormalDirection::Radial : core::NormalDirection::Axis;
 }
@@ -199,6 +201,7 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
     if (s.shape == ShapeName::Directed) primitive.control = {s.radii_behind.isZero() ? s.radii : s.radii_behind};
     primitive.exponent = {s.exponents.x(), s.exponents.y()};
     primitive.stretch = s.stretch;
+    primitive.convolved = s.convolve;
     if (s.end_radius > 0.0) primitive.taper = s.end_radius / radius;
     primitive.offset = {s.at, turned(s.turn_axis.normalized(), s.turn)};
     try {
@@ -234,6 +237,52 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
   std::stable_sort(skeleton.primitive.begin(), skeleton.primitive.end(),
                    [](const implicit::Primitive& a, const implicit::Primitive& b) { return a.part < b.part; });
   return skeleton;
+}
+
+/// How the particles of an object blend. @param rest  their places
+implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<const Vec3> rest, ModelFaults& faults) {
+  constexpr std::array kRules{implicit::BlendRule::Sum, implicit::BlendRule::Graph, implicit::BlendRule::Ricci,
+                              implicit::BlendRule::Gradient};
+  implicit::Blend blend;
+  blend.rule = kRules[static_cast<std::size_t>(d.rule)];
+  blend.exponent = d.exponent;
+  blend.opening = d.opening;
+  const auto n = static_cast<std::uint32_t>(rest.size());
+  constexpr std::uint32_t kNone = 0xffffffff;
+  blend.node.assign(n, kNone);
+  std::uint32_t nodes = 0;
+  for (std::size_t k = 0; k < d.groups.size(); ++k, ++nodes) {
+    for (std::size_t j = 0; j < d.groups[k].particles.size(); ++j) {
+      const std::string place = key + ".groups[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']';
+      const auto index = particle_index(d.groups[k].particles[j], n);
+      if (!index) {
+        fail_index(faults, place, d.groups[k].particles[j], n);
+      } else if (blend.node[*index] != kNone) {
+        faults.add(place, "expected a particle of no other group", std::to_string(d.groups[k].particles[j]), "");
+      } else {
+        blend.node[*index] = nodes;
+      }
+    }
+  }
+  for (std::uint32_t& node : blend.node) {
+    if (node == kNone) node = nodes++;
+  }
+  if (blend.rule != implicit::BlendRule::Graph) return blend;
+  const auto join = [&](const core::Bonds& bonds) {
+    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
+      const auto [low, high] = std::minmax(blend.node[bonds.first[b]], blend.node[bonds.second[b]]);
+      if (low != high) blend.edge.push_back({low, high, 1.0});
+    }
+  };
+  if (d.neighbours) join(core::bonds_along(0, n, *d.neighbours));
+  if (d.within) join(core::bonds_within(rest, 0, n, *d.within));
+  const auto before = [](const implicit::BlendEdge& a, const implicit::BlendEdge& b) {
+    return std::pair(a.a, a.b) < std::pair(b.a, b.b);
+  };
+  const auto same = [](const implicit::BlendEdge& a, const implicit::BlendEdge& b) { return a.a == b.a && a.b == b.b; };
+  std::sort(blend.edge.begin(), blend.edge.end(), before);
+  blend.edge.erase(std::unique(blend.edge.begin(), blend.edge.end(), same), blend.edge.end());
+  return blend;
 }
 
 /// Which particles are hinges, and the types of the others.
@@ -552,9 +601,19 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     return;
   }
   object.skeleton = build_skeleton(d, key, n, faults);
+  if (d.blend) {
+    object.skeleton.blend = blend_of(*d.blend, key + ".blend", arrangement.position, faults);
+    object.fade = d.blend->fade;
+  }
   for (const implicit::Primitive& primitive : object.skeleton.primitive) {
     const double iso = iso_radius(primitive, d.iso);
     object.iso_radius = object.iso_radius == 0.0 ? iso : std::min(object.iso_radius, iso);
+  }
+
+  if (d.volume && !object.skeleton.primitive.empty()) {
+    object.holds_volume = true;
+    object.volume = {d.volume->target.value_or(0.0), d.volume->rate, d.volume->damping};
+    object.volume_cell = kVolumeCell * object.iso_radius;
   }
 
   const std::vector<double> nearest = nearest_distances(arrangement.position);

@@ -64,7 +64,10 @@ struct Simulation::Impl {
         pulled(model, bodies) {
     state.particles = model.initial;
     state.links = core::unbroken(model.links);
+    state.broken_for.assign(model.links.size(), 0.0);
+    state.volumes.resize(model.objects.size());
     form_bodies();
+    measure_volumes();
     for (const Body& body : bodies) state.samples.push_back({.distance = std::vector<double>(body.samples.size(), -1.0)});
     choose_step();
     book_audits();
@@ -74,7 +77,9 @@ struct Simulation::Impl {
 
   /// Bodies, rules and frames for the present pieces.
   void form_bodies() {
-    bodies = make_bodies(model, state.links);
+    bodies = make_bodies(model, parted_links(model, state.links, state.broken_for));
+    fade_blends(model, state.links, state.broken_for, bodies);
+    scale_kernels();
     rules = make_body_rules(model, bodies, state.apart);
     frame = Frame(model, bodies);
     pulled = Frame(model, bodies);
@@ -96,12 +101,12 @@ struct Simulation::Impl {
   /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces.
   void update_links() {
     if (model.links.size() == 0) return;
+    const bool fades = age_broken_links();
     const core::LinkChange change = core::update_links(model.particles, state.particles, laws, model.links, dt(),
                                                        state.links, state.ledger);
-    if (!change.any()) return;
-    form_laws();
-    state.kick.valid = false;
-    if (change.broke == 0) return;
+    if (change.any()) form_laws();
+    if (change.any() || fades) state.kick.valid = false;
+    if (change.broke == 0 && !fades) return;
     const std::vector<Body> before = std::move(bodies);
     form_bodies();
     if (bodies.size() == before.size()) return;
@@ -116,6 +121,58 @@ struct Simulation::Impl {
     state.samples = std::move(samples);
     rules = make_body_rules(model, bodies, state.apart);
     frame.pairs_present.reset();
+  }
+
+  /// Links that broke grow older, up to the time in which their blend fades. @return whether any did
+  bool age_broken_links() {
+    bool any = false;
+    for (std::size_t k = 0; k < state.broken_for.size(); ++k) {
+      if (state.links.broken[k] == 0) continue;
+      const double fade = model.objects[model.particles.object[model.links.first[k]]].fade;
+      if (!(state.broken_for[k] < fade)) continue;
+      state.broken_for[k] = std::min(state.broken_for[k] + dt(), fade);
+      any = true;
+    }
+    return any;
+  }
+
+  /// Kernels of the bodies as the controllers of volume have them now.
+  void scale_kernels() {
+    for (Body& body : bodies) {
+      const ObjectModel& object = model.objects[body.object];
+      if (!object.holds_volume) continue;
+      const double scale = state.volumes[body.object].scale;
+      for (std::size_t k = 0; k < body.skeleton.primitive.size(); ++k) {
+        body.skeleton.primitive[k] = implicit::scaled(object.skeleton.primitive[k], scale);
+      }
+      for (std::size_t k = 0; k < body.samples.size(); ++k) body.samples.reach[k] = scale * object.samples.reach[k];
+    }
+  }
+
+  /// Volume of a body that its object holds [m^3].
+  double volume_of(std::size_t body) {
+    place_and_index(context(), state.particles, body, pulled);
+    return implicit::enclosed_volume(pulled.field[body], model.objects[bodies[body].object].volume_cell);
+  }
+
+  /// Targets that the scene leaves to the start.
+  void measure_volumes() {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      ObjectModel& object = model.objects[bodies[i].object];
+      if (object.holds_volume && !(object.volume.target > 0.0)) object.volume.target = volume_of(i);
+    }
+  }
+
+  /// Between two steps: kernels grow or shrink towards the volume their object holds.
+  void control_volumes() {
+    bool any = false;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const ObjectModel& object = model.objects[bodies[i].object];
+      if (!object.holds_volume || !(object.volume.target > 0.0)) continue;
+      implicit::control_volume(object.volume, volume_of(i), dt(), state.volumes[bodies[i].object]);
+      any = true;
+    }
+    if (any) scale_kernels();
   }
 
   /// Two pieces are apart when those that they broke from were.
@@ -275,6 +332,7 @@ struct Simulation::Impl {
       throw_diverged(divergence, step, at);
     }
     update_links();
+    control_volumes();
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
       ++state.frame;
@@ -434,6 +492,8 @@ void Simulation::step_frame() {
 void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());
   SUPPLE_EXPECTS(state.links.broken.size() == impl_->model.links.size());
+  SUPPLE_EXPECTS(state.broken_for.size() == impl_->model.links.size());
+  SUPPLE_EXPECTS(state.volumes.size() == impl_->model.objects.size());
   impl_->drop_results();
   impl_->take(std::move(state));
 }

@@ -9,7 +9,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 2;
+constexpr std::uint64_t kVersion = 3;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -81,6 +81,8 @@ std::uint64_t State::hash() const {
   kick.hash(hasher);
   ledger.hash(hasher);
   links.hash(hasher);
+  hasher.add(std::span<const double>(broken_for));
+  for (const auto& v : volumes) v.hash(hasher);
   for (const auto& pair : apart) {
     hasher.add(std::uint64_t{pair.a});
     hasher.add(std::uint64_t{pair.b});
@@ -102,6 +104,9 @@ void save_state(const std::filesystem::path& path, const State& state, std::uint
   state.kick.save(out);
   state.ledger.save(out);
   state.links.save(out);
+  out.write(std::span<const double>(state.broken_for));
+  out.write(std::uint64_t{state.volumes.size()});
+  for (const auto& v : state.volumes) v.save(out);
   out.write(std::uint64_t{state.apart.size()});
   for (const auto& pair : state.apart) {
     out.write(std::uint64_t{pair.a});
@@ -148,7 +153,10 @@ State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
   state.kick.load(in);
   state.ledger.load(in);
   state.links.load(in);
+  in.read(state.broken_for);
   std::uint64_t n = 0;
+  in.read(n);
+  for (std::uint64_t i = 0; i < n; ++i) state.volumes.emplace_back().load(in);
   in.read(n);
   for (std::uint64_t i = 0; i < n; ++i) {
     std::uint64_t a = 0, b = 0;

@@ -142,7 +142,8 @@ UnitText read_unit(std::string_view text) {
 
 std::string_view noun_of(const Dimension& dimension) {
   for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce, kTorque,
-                            kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed}) {
+                            kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed,
+                            kVolume}) {
     if (q.dimension == dimension) return q.noun;
   }
   return "";

@@ -48,6 +48,34 @@ TEST_P(BoundedBody, TrueRangeLiesInsideTheInterval) {
   EXPECT_GT(decided, 10000);  // bounds are of use
 }
 
+TEST_P(BoundedBody, TightIntervalHoldsTheRangeAndIsNeverWider) {
+  Random random(87);
+  std::vector<Vec3> points(24);
+  std::vector<double> values(24);
+  int violations = 0, decided = 0, plainly = 0;
+  for (int trial = 0; trial < 8000; ++trial) {
+    const double size = 0.4 * std::pow(10.0, -2.0 * random.uniform(0, 1));
+    const Vec3 centre = random.in_box(1.5);
+    const Vec3 half = 0.5 * size * (Vec3::Ones() + 0.9 * random.in_box(1.0));
+    const Box box{centre - half, centre + half};
+    for (std::size_t i = 0; i < 24; ++i) {
+      const auto bit = [i](std::size_t k) { return static_cast<double>(i >> k & 1); };
+      const Vec3 t = i < 8 ? Vec3(bit(0), bit(1), bit(2)) : Vec3(0.5 * (Vec3::Ones() + random.in_box(1.0)));
+      points[i] = (box.lower + t.cwiseProduct(box.extent())).cwiseMax(box.lower).cwiseMin(box.upper);
+    }
+    body_.field.evaluate(points, values);
+    const Interval plain = body_.field.bound(box);
+    const Interval tight = body_.field.tight_bound(box);
+    for (const double value : values) violations += !tight.contains(value);
+    EXPECT_GE(tight.lower, plain.lower);
+    EXPECT_LE(tight.upper, plain.upper);
+    decided += tight.upper < 0.0 || tight.lower > 0.0;
+    plainly += plain.upper < 0.0 || plain.lower > 0.0;
+  }
+  EXPECT_EQ(violations, 0);
+  EXPECT_GE(decided, plainly);
+}
+
 TEST_P(BoundedBody, IntervalShrinksToTheValueOnAPoint) {
   Random random(78);
   for (int trial = 0; trial < 300; ++trial) {
@@ -129,6 +157,33 @@ TEST(FieldBounds, ABodyTooThinForItsIsoValueHasNoSurface) {
   body.parts.resize(1);
   body.place();
   EXPECT_TRUE(body.field.surface_box().empty());
+}
+
+TEST(FieldBounds, TightIntervalsOfOverlappingBlobsErrByTheSquareOfTheBox) {
+  // Some sixty supports overlap. Summed intervals are off by the sum of all slopes times the box, the tight ones by second
+  // derivatives times its square: halving the box quarters what they exceed the true range by.
+  const Body body = random_body({.seed = 9, .parts = 600, .half_width = 0.8, .least_radius = 0.3, .largest_radius = 0.4, .only_points = true});
+  Random random(88);
+  double excess[2] = {0.0, 0.0}, plain_excess[2] = {0.0, 0.0};
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vec3 centre = random.in_box(0.6);
+    for (const int k : {0, 1}) {
+      const double h = k == 0 ? 0.02 : 0.01;
+      const Box box = Box{centre, centre}.inflated(h);
+      Interval range{1e9, -1e9};
+      for (int i = 0; i < 125; ++i) {
+        const Vec3 x = centre + 0.5 * h * Vec3(i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2);
+        const double f = FieldView(body.field).value(x);
+        range = {std::min(range.lower, f), std::max(range.upper, f)};
+      }
+      const Interval tight = body.field.tight_bound(box), plain = body.field.bound(box);
+      excess[k] += (tight.upper - tight.lower) - (range.upper - range.lower);
+      plain_excess[k] += (plain.upper - plain.lower) - (range.upper - range.lower);
+    }
+  }
+  EXPECT_LT(excess[1], 0.27 * excess[0]);
+  EXPECT_GT(plain_excess[1], 0.45 * plain_excess[0]);
+  EXPECT_LT(excess[1], 0.15 * plain_excess[1]);
 }
 
 TEST(FieldBounds, UnboundedBoxesAreBounded) {

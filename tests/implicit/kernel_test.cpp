@@ -204,6 +204,22 @@ TEST_P(AnyKernel, SlopesMatchCentralDifferences) {
   }
 }
 
+TEST_P(AnyKernel, CurvatureRangeHoldsBothSecondDerivatives) {
+  const Kernel kernel = GetParam();
+  const int n = 40;
+  for (int a = 0; a <= n; a += 3) {
+    for (int b = a; b <= n; b += 3) {
+      const CurvatureRange range = curvature_range(kernel, static_cast<double>(a) / n, static_cast<double>(b) / n);
+      for (int i = 5 * a; i <= 5 * b; ++i) {
+        const double d = i / (5.0 * n), q = d * d;
+        const double across = 2.0 * evaluate(kernel, q).slope, along = across + 4.0 * q * second_slope(kernel, q);
+        EXPECT_LE(range.lower, std::min({across, along, 0.0}) + 1e-12) << d;
+        EXPECT_GE(range.upper, std::max({across, along, 0.0}) - 1e-12) << d;
+      }
+    }
+  }
+}
+
 TEST_P(AnyKernel, FallsToZeroAtItsSupport) {
   const Kernel kernel = GetParam();
   double last = at(kernel, 0.0);

@@ -267,6 +267,46 @@ TEST(Skeletons, GoToTheParticlesNamed) {
   EXPECT_EQ(model.objects[0].samples.size(), 0u);
 }
 
+TEST(Skeletons, TakeShapesKernelsAndStretchFromTheirKeys) {
+  const Model model = model_of(std::string(kHead) + R"(
+  - name: a
+    particles: {}
+    skeleton:
+      - {shape: curve, points: [[0, 0, 0], [1, 0, 0], [1, 1, 0]], end_radius: 0.1, kernel: {type: blinn, radius: 0.4, sharpness: 3}}
+      - {shape: arc, radius: 0.5, half_angle_deg: 90, convolve: true, stretch: [1, 2, 1], kernel: {type: cauchy, radius: 0.4}}
+      - {shape: superquadric, semi_axes: [0.5, 0.4, 0.3], exponents: [0.2, 1], kernel: {type: blanc_schlick, hardness: 2}}
+      - {shape: directed, radii: [0.5, 0.4, 0.3], radii_behind: [0.2, 0.4, 0.3], kernel: {}}
+)");
+  const auto& p = model.objects[0].skeleton.primitive;
+  ASSERT_EQ(p.size(), 4u);
+  EXPECT_EQ(p[0].control.size(), 3u);
+  EXPECT_DOUBLE_EQ(p[0].taper, 0.25);
+  EXPECT_EQ(p[0].kernel.shape, 3.0);
+  EXPECT_TRUE(p[1].convolved);
+  EXPECT_NEAR(p[1].size.y(), std::numbers::pi / 2, 1e-15);
+  EXPECT_EQ(p[1].stretch, Vec3(1, 2, 1));
+  EXPECT_EQ(p[2].exponent, (std::array<double, 2>{0.2, 1.0}));
+  EXPECT_EQ(p[2].kernel.radius, 0.3);
+  EXPECT_EQ(p[3].control.at(0), Vec3(0.2, 0.4, 0.3));
+  EXPECT_EQ(p[3].kernel.radius, 0.2);
+}
+
+TEST(Blends, JoinGroupsAndNeighbours) {
+  const Model model = model_of(std::string(kHead) + R"(
+  - name: a
+    particles: {arrange: line, count: 5, spacing: 1}
+    skeleton: [{shape: point, kernel: {radius: 1}}]
+    blend: {rule: graph, groups: [{particles: [0, 1]}, {particles: [-1]}], within: 1.5}
+)");
+  const implicit::Blend& blend = model.objects[0].skeleton.blend;
+  EXPECT_EQ(blend.rule, implicit::BlendRule::Graph);
+  EXPECT_EQ(blend.node, (std::vector<std::uint32_t>{0, 0, 2, 3, 1}));
+  ASSERT_EQ(blend.edge.size(), 3u);  // particles 1-2, 2-3, 3-4
+  EXPECT_EQ(std::pair(blend.edge[0].a, blend.edge[0].b), std::pair(0u, 2u));
+  EXPECT_EQ(std::pair(blend.edge[1].a, blend.edge[1].b), std::pair(1u, 3u));
+  EXPECT_EQ(std::pair(blend.edge[2].a, blend.edge[2].b), std::pair(2u, 3u));
+}
+
 TEST(FormRadius, RefusesFlatBonds) {
   try {
     (void)model_of(std::string(kHead) + R"(

@@ -37,6 +37,11 @@ class Field {
   /// For bodies with `has_convex_core`.
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
 
+  /// Bounds of F on a box, never wider than `bound` and on small boxes with overlapping primitives far narrower: value and
+  /// gradient at the centre and bounds of the second derivatives leave an error of second order in the box. Costs about
+  /// twice as much. Of fields with another rule than Sum: `bound`.
+  [[nodiscard]] Interval tight_bound(const Box& box) const;
+
   /// Hessian of F [1/m^2] at one point (mean curvature, tests); the mean curvature is > 0 for a sphere:
   /// kappa = (g^T H g - |g|^2 tr H) / (2 |g|^3).
   [[nodiscard]] Mat3 hessian(const Vec3& point) const;

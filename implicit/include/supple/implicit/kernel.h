@@ -71,6 +71,12 @@ struct Kernel {
 [[nodiscard]] double lipschitz(const Kernel& kernel) noexcept;
 /// max of |df/dd| for d in [near, far] [1/m].
 [[nodiscard]] double lipschitz(const Kernel& kernel, double near, double far) noexcept;
+/// Bounds of the second derivatives of f of a point by place, for distances in [near, far]: they lie between the least and
+/// largest of d2f/dd2 and (df/dd)/d, and 0 [1/m^2]. Infinite for Gascuel's and Blanc & Schlick's kernels.
+struct CurvatureRange {
+  double lower = 0.0, upper = 0.0;
+};
+[[nodiscard]] CurvatureRange curvature_range(const Kernel& kernel, double near, double far) noexcept;
 /// Distance at which f = iso [m]. @pre 0 < iso < f(0)
 [[nodiscard]] double iso_distance(const Kernel& kernel, double iso);
 /// -df/dd at that distance [1/m]: the stiffness k of contact.

@@ -14,6 +14,7 @@
 #include "supple/implicit/field.h"
 #include "supple/implicit/solids.h"
 #include "supple/implicit/surface_samples.h"
+#include "supple/implicit/volume.h"
 #include "supple/scenes/scene.h"
 
 namespace supple::scenes {
@@ -30,6 +31,10 @@ struct ObjectModel {
   bool hinges_join = false;               ///< the laws act between two hinges
   bool breaks = false;                    ///< has `breaking`, so it may fall into pieces
   bool separate = false;                  ///< each particle is a body of its own
+  double fade = 0.0;                      ///< how long a broken bond's blend fades [s]
+  bool holds_volume = false;              ///< kernels are scaled by State::volumes
+  implicit::VolumeControl volume;         ///< target 0: what the first step measures
+  double volume_cell = 0.0;               ///< of the cells that measure it [m]
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
 };
@@ -82,6 +87,13 @@ using ApartPairs = std::vector<collision::BodyPair>;
 
 /// Name of a contact body: of a body, or of a fixed one.
 [[nodiscard]] const std::string& body_name(const Model& model, const std::vector<Body>& bodies, std::size_t body);
+/// Links as bodies see them: those that broke less than their object's `fade` ago still join.
+/// @param broken_for  time since each link broke [s], shape of the links
+[[nodiscard]] core::LinkState parted_links(const Model& model, const core::LinkState& links, std::span<const double> broken_for);
+/// Sets the weights of the blend's edges of objects that fade, by the ages of their links: a pair with a bond has the bond's
+/// weight, one without the best of the paths over one common neighbour, or 1 where there never was such a path.
+void fade_blends(const Model& model, const core::LinkState& links, std::span<const double> broken_for, std::vector<Body>& bodies);
+
 /// The bodies at a state, in the order of objects and of smallest particles.
 [[nodiscard]] std::vector<Body> make_bodies(const Model& model, const core::LinkState& links);
 /// Model::rules for these bodies, which the fixed ones follow.

@@ -133,6 +133,7 @@ struct SkeletonDesc {
   Vec3 at = Vec3::Zero();             ///< offset in the particle's frame [m]
   Vec3 turn_axis = Vec3::UnitZ();     ///< with turn: rotation in the particle's frame
   double turn = 0.0;                  ///< [rad] (key turn_deg)
+  bool convolve = false;              ///< segment, triangle, polygon, ring, arc: integrate the kernel over the shape
   std::vector<int> particles;         ///< which particles carry it; empty: all
   KernelDesc kernel;
 };
@@ -202,6 +203,31 @@ struct LoadDesc {
   double ramp = 0.0;                  ///< [s]
 };
 
+enum class BlendName : std::uint8_t { Sum, Graph, Ricci, Gradient };
+
+/// objects[].blend.groups[]
+struct BlendGroupDesc {
+  std::vector<int> particles;         ///< negative counts from the end
+};
+
+/// objects[].blend: how the surfaces of particles join
+struct BlendDesc {
+  BlendName rule = BlendName::Graph;
+  std::vector<BlendGroupDesc> groups;   ///< particles of one group sum; the others are groups of their own
+  std::optional<int> neighbours;        ///< graph: groups blend whose particles are at most so far apart in their order
+  std::optional<double> within;         ///< graph: or nearer than this at rest [m]
+  double exponent = 4.0;                ///< ricci
+  double opening = 0.3;                 ///< gradient
+  double fade = 0.0;                    ///< graph: how long the blend of a broken bond fades [s]
+};
+
+/// objects[].volume: kernels grow and shrink so that the object keeps its volume
+struct VolumeDesc {
+  std::optional<double> target;       ///< [m^3]; absent: that of the start
+  double rate = 2.0;                  ///< alpha [1/s]
+  double damping = 0.05;              ///< beta
+};
+
 struct ObjectDesc {
   std::string name;
   ParticlesDesc particles;
@@ -211,6 +237,8 @@ struct ObjectDesc {
   std::vector<InteractionDesc> interactions;
   std::vector<SkeletonDesc> skeleton;
   double iso = 0.5;
+  std::optional<BlendDesc> blend;           ///< absent: everything sums
+  std::optional<VolumeDesc> volume;         ///< absent: not held
   std::optional<MaterialDesc> contact;      ///< absent: the object touches nothing
   std::optional<RepulsionDesc> repulsion;
   std::optional<MediumDesc> medium;

@@ -45,6 +45,8 @@ struct State {
   core::KickState kick;
   core::Ledger ledger;
   core::LinkState links;               ///< what broke and yielded
+  std::vector<double> broken_for;      ///< since when each link is broken, up to its object's `fade` [s], shape [links]
+  std::vector<implicit::VolumeState> volumes;  ///< by object
   ApartPairs apart;                    ///< pieces of one object that touch each other by now
   std::vector<implicit::SampleState> samples;  ///< by body
   RunRecord record;

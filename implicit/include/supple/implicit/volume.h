@@ -1,0 +1,40 @@
+/// @file supple/implicit/volume.h
+/// A body's volume held near a target by growing and shrinking its kernels (Desbrun & Gascuel 1995): a proportional-derivative
+/// controller on the measured volume. The paper shifts a kernel, f(d - epsilon); here its lengths are
+/// multiplied by a scale, which keeps it smooth at the skeleton and compact.
+#pragma once
+
+#include "supple/core/hash.h"
+#include "supple/implicit/field_view.h"
+#include "supple/implicit/skeleton.h"
+
+namespace supple::implicit {
+
+/// Volume of {F >= 0} by cubic cells [m^3]: whole ones where bounds show it, the others by the part of them on the inner side
+/// of the tangent plane. Errs by the square of the cell over the radii of curvature; changes smoothly while the surface moves.
+/// @param cell  [m], > 0   @pre the surface box is bounded
+[[nodiscard]] double enclosed_volume(const FieldView& field, double cell);
+
+/// The primitive with all lengths of its kernel (of its support, for shapes that give that) multiplied by `scale` > 0; values
+/// on the kernel's range stay, slopes are divided by it. The shape's own size stays.
+[[nodiscard]] Primitive scaled(const Primitive& primitive, double scale);
+
+struct VolumeControl {
+  double target = 0.0;   ///< V0 [m^3], > 0
+  double rate = 2.0;     ///< alpha [1/s]
+  double damping = 0.05; ///< beta [1], < 1/6
+};
+
+/// Part of State, by body.
+struct VolumeState {
+  double scale = 1.0;    ///< of the kernels
+  double volume = 0.0;   ///< at the last step [m^3]; 0: not measured yet
+  void save(StateWriter& out) const;
+  void load(StateReader& in);
+  void hash(Hasher& hasher) const;
+};
+
+/// One step: d(scale)/scale = (alpha (V0 - V) dt - beta (V - V_last)) / V0, at most 2 % a step, the scale kept in [1/4, 4].
+void control_volume(const VolumeControl& control, double volume, double dt, VolumeState& state) noexcept;
+
+}  // namespace supple::implicit
