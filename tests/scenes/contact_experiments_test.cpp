@@ -1,0 +1,143 @@
+// Experiments on contact against closed forms: bounces, sliding, a row of balls, and what must not happen.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+Simulation make(const std::string& text) { return Simulation(parse_scene(text, "test.yaml", ".")); }
+
+Simulation library(const std::string& name) {
+  return Simulation(read_scene(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"), {}));
+}
+
+/// A ball of linear pressure (half its modulus at its centre) dropped by 0.2 m, in equal steps of a millisecond or less.
+std::string dropped(const std::string& rest = "", int substeps = 1, const std::string& modulus = "2e4") {
+  return R"(
+schema: 1
+duration: 3 s
+frame_rate: 1000
+time_step: {substeps: )" + std::to_string(substeps) + R"(}
+contact: {error: 1e-6}
+gravity: [0, 0, -9.81]
+obstacles: [{name: floor, shape: plane, modulus: 1e9}]
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0, 0, 0.3], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: )" + modulus + R"(}
+)" + rest;
+}
+
+/// Speeds up over speeds down before it, bounce by bounce.
+std::vector<double> restitutions(Simulation simulation, int bounces) {
+  std::vector<double> found;
+  double down = 0.0;
+  bool below = false;
+  while (static_cast<int>(found.size()) < bounces && simulation.time() < 2.9) {
+    simulation.step();
+    const double z = simulation.state().particles.position[0].z(), v = simulation.state().particles.velocity[0].z();
+    // Speeds are taken at contact's beginning and end, at the height where both meet: z = r.
+    const double speed = std::sqrt(std::max(0.0, v * v + 2.0 * 9.81 * (z - 0.1)));
+    if (z > 0.1 && v < 0.0) down = speed;
+    if (z <= 0.1) below = true;
+    if (z > 0.1 && v > 0.0 && below) {
+      found.push_back(speed / down);
+      below = false;
+    }
+  }
+  return found;
+}
+
+TEST(Bounce, LosesNothingOverFourBouncesAtAMillisecond) {
+  const std::vector<double> e = restitutions(make(dropped()), 4);
+  ASSERT_EQ(e.size(), 4u);
+  for (const double value : e) EXPECT_NEAR(value, 1.0, 1e-3);
+}
+
+TEST(Bounce, ReboundsAsAsked) {
+  // A stiff ball, whose weight does nothing during the bounce.
+  for (const double asked : {0.9, 0.5}) {
+    const double approach = std::sqrt(2.0 * 9.81 * 0.2);
+    const std::vector<double> e =
+        restitutions(make(dropped("pairs: [{objects: [ball, floor], restitution: {value: " + std::to_string(asked) +
+                                  ", at_speed: " + std::to_string(approach) + "}}]\n", 16, "2e7")),
+                     1);
+    ASSERT_EQ(e.size(), 1u);
+    EXPECT_NEAR(e[0], asked, 0.01);
+  }
+}
+
+TEST(Bounce, RestsAtTheDepthThatCarriesTheWeight) {
+  // F = pi E d^2 (1 - 2 d / 3 R) for a ball of linear pressure on a rigid plane.
+  Simulation simulation = make(dropped("    medium: {linear: 8, angular: 8}\n"));
+  while (simulation.time() < 2.9) simulation.step();
+  const double d = 0.1 - simulation.state().particles.position[0].z();
+  const double force = std::numbers::pi * 1e4 * d * d * (1.0 - 2.0 * d / 0.3);
+  EXPECT_NEAR(force, 0.2 * 9.81, 2e-3 * 0.2 * 9.81);  // .1 % in d
+}
+
+TEST(Incline, SlidesByGravityLessFrictionAndStaysBelowTheFrictionAngle) {
+  Simulation simulation = library("contacts/slide_on_incline");
+  const Vec3 down(0.939692621, 0.0, -0.342020143);
+  const std::vector<Vec3> start = simulation.state().particles.position;
+  const auto way = [&](std::size_t i) { return (simulation.state().particles.position[i] - start[i]).dot(down); };
+  // Averaged over the second half, after the blocks have settled on the slope.
+  double early = 0.0;
+  while (simulation.frame() < 25) {
+    simulation.step_frame();
+    if (simulation.frame() == 13) early = simulation.state().particles.velocity[0].dot(down);
+  }
+  const double acceleration = (simulation.state().particles.velocity[0].dot(down) - early) / 0.5;
+  EXPECT_NEAR(acceleration, 9.81 * (0.342020143 - 0.2 * 0.939692621), 0.01);
+  EXPECT_GT(way(0), 0.7);
+  EXPECT_LT(std::abs(way(1)), 0.01);
+}
+
+TEST(Cradle, PassesTheSpeedOfTheFirstBallToTheLast) {
+  Simulation simulation = library("contacts/newtons_cradle");
+  while (simulation.frame() < 61) simulation.step_frame();
+  const auto& v = simulation.state().particles.velocity;
+  EXPECT_GT(v[4].x(), 0.98);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_LT(std::abs(v[i].x()), 0.1);
+  EXPECT_LT(simulation.audits().momentum_error, 1e-13);
+  EXPECT_LT(simulation.audits().energy_error, 1e-3);
+}
+
+TEST(Tunnelling, HappensAtNoSpeedAndPhaseOfAutomaticSteps) {
+  // A small ball shot at a thin plate that is held: it must not be found on the other side.
+  for (const double speed : {10.0, 100.0, 600.0}) {
+    for (int phase = 0; phase < 5; ++phase) {
+      Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+frame_rate: 1000
+time_step: {max_substeps: 65536}
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0.013, 0.007, )" + std::to_string(0.2 + 0.2 * speed * 1e-3 * phase) +
+                                   R"(], velocity: [0, 0, )" + std::to_string(-speed) + R"(], mass: 0.001}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]
+    contact: {modulus: 1e8}
+  - name: plate
+    particles: {arrange: single, mass: 1}
+    skeleton: [{shape: square, half_size: 0.3, kernel: {type: wyvill, radius: 0.06}}]
+    contact: {modulus: 1e9}
+    pins: [{particle: 0}]
+)");
+      while (simulation.frame() < 5) simulation.step_frame();
+      EXPECT_GT(simulation.state().particles.position[0].z(), 0.0) << speed << ' ' << phase;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace supple::scenes
