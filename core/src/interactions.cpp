@@ -225,10 +225,7 @@ void accumulate_geometric(PackedGeometric<Law>& law, const ParticleState& state,
   const double range2 = law.range * law.range;
   for (const IndexPair& pair : law.near) {
     if (!law.same_object && law.side[pair.first] == law.side[pair.second]) continue;
-    if (!law.kind.empty() && interact_completely(law.kind[pair.first], law.kind[pair.second],
-                                                 law.kinds == PairKinds::IncompleteButHinges)) {
-      continue;
-    }
+    if (!law.kind.empty() && !takes_kinds(law.kinds, law.kind[pair.first], law.kind[pair.second])) continue;
     const Vec3 r = law.position[pair.first] - law.position[pair.second];
     if (dot(r, r) < range2) law.pairs.add(law.particle[pair.first], law.particle[pair.second]);
   }
@@ -283,7 +280,7 @@ PackedGeometric<Law> pack_geometric(const GeometricLaw<Law>& law, const Particle
     if (set.object[i] != law.object_a && set.object[i] != law.object_b) continue;
     out.particle.push_back(i);
     out.side.push_back(set.object[i] == law.object_b ? 1 : 0);
-    if (law.kinds != PairKinds::Any && !set.kind.empty()) out.kind.push_back(set.kind[i]);
+    if (law.kinds != PairKinds::Any) out.kind.push_back(set.kind.empty() ? 0 : set.kind[i]);
   }
   return out;
 }

@@ -477,9 +477,6 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking, "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
   archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
-  const bool geometric = std::any_of(d.interactions.begin(), d.interactions.end(), [](const auto& i) { return i.geometric; });
-  archive.check(!(geometric && !d.kinds.empty()), "kinds", "expected no geometric law beside kinds", "one",
-                "a geometric law takes all particles of the object: put those of another kind into an object of their own");
   archive.check(!(d.breaking && literal_laws(d)), "breaking", "expected no law with paper_literal, which has no energy", "one", "");
   archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",
                 "add 'skeleton' or remove 'contact'");

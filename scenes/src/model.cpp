@@ -417,11 +417,17 @@ class LawBuilder {
     }
   }
 
-  /// Between all particles of the object within the range of the law.
+  /// Between all particles of the object within the range of the law, as their kinds allow.
   void add_geometric(const InteractionDesc& d, const std::string& key) {
     const std::uint32_t object = model_.particles.object[object_.first];
+    const auto begin = model_.particles.kind.begin();
+    const bool kinds = std::any_of(begin + object_.first, begin + object_.last, [](std::uint32_t k) { return k != 0; });
+    const core::PairKinds taken = !kinds                ? core::PairKinds::Any
+                                  : object_.hinges_join ? core::PairKinds::CompleteWithHinges
+                                                        : core::PairKinds::Complete;
     const auto add_list = [&](auto& lists, double range, const auto& law) {
-      lists.push_back({.name = name(d), .object_a = object, .object_b = object, .range = range, .law = law});
+      lists.push_back(
+          {.name = name(d), .object_a = object, .object_b = object, .range = range, .law = law, .kinds = taken});
     };
     core::Interactions& laws = model_.interactions;
     const double r0 = d.rest_distance.value_or(0.0);

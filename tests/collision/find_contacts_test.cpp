@@ -120,7 +120,7 @@ TEST(ConvexBodies, MeetWithoutSamplesWithTheForceThatAScanFinds) {
   };
   const std::array<ShapeKind, 5> shapes{ShapeKind::Point, ShapeKind::Segment, ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Box};
   int touching = 0;
-  for (int trial = 0; trial < 200; ++trial) {
+  for (int trial = 0; trial < 100; ++trial) {
     const auto draw = [&](const Vec3& place) {
       const Pose pose{place, Quat(Eigen::AngleAxisd(uniform(engine, 0, 3), vector(1).normalized()))};
       return Shaped(shapes[engine() % shapes.size()], Vec3(0.3, 0.2, 0.15), pose);
@@ -128,7 +128,7 @@ TEST(ConvexBodies, MeetWithoutSamplesWithTheForceThatAScanFinds) {
     const Shaped a = draw(Vec3::Zero()), b = draw(vector(0.5));
     Stage stage;
     for (const Shaped* body : {&a, &b}) stage.add(body->field);
-    const ContactSurface found = stage.solve({.error = 1e-2, .max_refinement = 3});
+    const ContactSurface found = stage.solve({.error = 3e-2, .max_refinement = 2});
     if (stage.candidates.pair.empty() || stage.candidates.convex[0] == 0) continue;  // apart, or the cores meet
     ASSERT_EQ(stage.candidates.seed.size(), 1u);
     ContactCandidates scanned = stage.candidates;
@@ -136,7 +136,7 @@ TEST(ConvexBodies, MeetWithoutSamplesWithTheForceThatAScanFinds) {
     scanned.seed.clear();
     scanned.offset = {0, 0};
     ContactSurface expected;
-    solve_contact_surface(stage.bodies(), scanned, {.error = 1e-2, .max_refinement = 3}, Executor(1), expected);
+    solve_contact_surface(stage.bodies(), scanned, {.error = 3e-2, .max_refinement = 2}, Executor(1), expected);
     if (expected.summary.empty()) continue;  // a scan may miss what is thinner than its mesh
     ASSERT_EQ(found.summary.size(), 1u) << trial;
     ++touching;
@@ -144,7 +144,7 @@ TEST(ConvexBodies, MeetWithoutSamplesWithTheForceThatAScanFinds) {
     const double error = 1.5 * (x.error_estimate + y.error_estimate);
     EXPECT_LE((x.force - y.force).norm(), error * y.force.norm()) << trial;
   }
-  EXPECT_GT(touching, 50);
+  EXPECT_GT(touching, 25);
 }
 
 TEST(ConvexBodies, AreFoundAtAnyDepth) {

