@@ -65,6 +65,37 @@ TEST(React, GivesEveryPartMinusTheDerivativeOfTheEnergy) {
   }
 }
 
+TEST(React, GivesABodyOfOnePartTheForceAndTorqueOfSigma) {
+  // Parts away from the middles of their spheres, in motion, with friction and damping.
+  const LinearSphere left{Vec3(-0.4, 0, 0), Linear{0.6, 1.0}}, right{Vec3(0.5, 0.2, 0.1), Linear{0.5, 2.0}};
+  const Vec3 centre[2] = {Vec3(-0.6, 0.3, 0.2), Vec3(0.7, -0.1, 0.4)};
+  Stage stage;
+  stage.add(left, {centre[0]});
+  stage.add(right, {centre[1]});
+  for (ContactBody& body : stage.bodies()) body.material = {.modulus = 1.0, .friction = 0.5, .dissipation = 0.4};
+  stage.velocity(0)[0] = Vec3(0.3, 0.2, -0.1);
+  stage.spin(1)[0] = Vec3(0.5, -1.0, 0.7);
+  const ContactSurface& s = stage.solve({.error = 1e-6});
+  ASSERT_EQ(s.summary.size(), 1u);
+  const PairMaterial material = combine(stage.bodies()[0].material, stage.bodies()[1].material);
+  const double slow = 1e-3;
+  const std::vector<PartLoads> loads = stage.react({.friction_speed = slow});
+  Vec3 force = Vec3::Zero(), torque[2] = {Vec3::Zero(), Vec3::Zero()};
+  for (std::size_t i = 0; i < s.point.size(); ++i) {
+    const Vec3 v = stage.velocity(0)[0] - stage.spin(1)[0].cross(s.point[i] - centre[1]);
+    const double approach = v.dot(s.normal[i]), load = s.area[i] * s.pressure[i];
+    const Vec3 slide = v - approach * s.normal[i];
+    const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
+    const Vec3 f = -load * factor * (s.normal[i] + material.friction * friction_mollifier(slide.norm(), slow) * slide.normalized());
+    force += f;
+    torque[0] += (s.point[i] - centre[0]).cross(f);
+    torque[1] -= (s.point[i] - centre[1]).cross(f);
+  }
+  EXPECT_LE((loads[0].force[0] - force).norm(), 1e-13 * force.norm());
+  EXPECT_LE((loads[1].force[0] + force).norm(), 1e-13 * force.norm());
+  for (const std::size_t i : {0u, 1u}) EXPECT_LE((loads[i].torque[0] - torque[i]).norm(), 1e-13 * torque[i].norm()) << i;
+}
+
 /// Two bodies of several parts in motion, with friction and damping.
 struct MovingBlobs {
   Blobs left{{Vec3(-0.3, 0, 0), Vec3(0.05, 0.1, 0), Vec3(-0.2, 0.3, 0.1)}, 1.0};
