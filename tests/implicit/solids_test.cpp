@@ -173,7 +173,10 @@ TEST(HeightField, BoundsHold) { expect_bounds(make_terrain(), 1.5); }
 TEST(HeightField, IsConstantBeyondItsBorders) {
   const HeightField terrain = make_terrain();
   EXPECT_EQ(terrain.height(1.7, 0.2).x(), terrain.height(1.0, 0.2).x());
-  EXPECT_NEAR(terrain.height(1.0, 0.2).y(), 0.0, 1e-14);
+  for (const double border : {-1.0, 1.0}) {
+    EXPECT_NEAR(terrain.height(border, 0.2).y(), 0.0, 1e-13);
+    EXPECT_NEAR(terrain.height(0.2, border).z(), 0.0, 1e-13);
+  }
   EXPECT_EQ(terrain.height(-4.0, -3.0).x(), terrain.height(-1.0, -1.0).x());
 }
 
