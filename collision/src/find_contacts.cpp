@@ -86,9 +86,11 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
 
 /// A point in the middle of the overlap of two convex bodies, or of the gap between them: on the line between the nearest
 /// points of their cores, which are found by going from one core to the other. None when the cores meet.
-std::optional<Vec3> between_cores(const ContactBody& a, const ContactBody& b, const Vec3& start) {
+std::optional<Vec3> between_cores(const ContactBody& a, const ContactBody& b) {
   constexpr int kSteps = 32;
   constexpr double kEnough = 1e-3;  // of the distance: the overlap is sought from here, not measured
+  const std::span<const Pose> moving = a.fixed ? b.pose : a.pose;  // a place to begin at, near one of them
+  const Vec3 start = moving.empty() ? Vec3::Zero().eval() : moving.front().position;
   std::optional<implicit::CorePoint> on_a = a.field.core_point(start);
   if (!on_a) return std::nullopt;
   std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
@@ -173,8 +175,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
       Slot& slot = job.slots[k];
       slot.overlap = a.field.surface_box().intersection(b.field.surface_box());
       slot.seed.clear();
-      const Vec3 start = (a.fixed ? b : a).pose.empty() ? Vec3::Zero().eval() : (a.fixed ? b : a).pose.front().position;
-      const std::optional<Vec3> between = between_cores(a, b, start);
+      const std::optional<Vec3> between = between_cores(a, b);
       slot.convex = between.has_value();
       slot.spacing = 0.0;
       if (slot.convex) {

@@ -170,42 +170,35 @@ HWY_INLINE KernelLanes<V> any_kernel(D d, const PackedPrimitive& p, const Packed
   return out;
 }
 
-/// Squared distance and half its gradient of shapes that are measured point by point.
-template <class D, class V = hn::Vec<D>>
-HWY_INLINE V scalar_foot(D d, const ShapeView& view, V& x, V& y, V& z) {
+/// What `measure` says of each point: a value, returned, and a vector, in place of the point.
+template <class D, class Measure, class V = hn::Vec<D>>
+HWY_INLINE V point_by_point(D d, const Measure& measure, V& x, V& y, V& z) {
   constexpr std::size_t kLanes = hn::MaxLanes(D());
-  alignas(64) double at[3][kLanes], q[kLanes];
+  alignas(64) double at[3][kLanes], value[kLanes];
   hn::Store(x, d, at[0]);
   hn::Store(y, d, at[1]);
   hn::Store(z, d, at[2]);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const FootSample sample = foot(view, Vec3(at[0][lane], at[1][lane], at[2][lane]));
-    q[lane] = sample.q;
-    for (std::size_t k = 0; k < 3; ++k) at[k][lane] = sample.half_gradient[static_cast<Eigen::Index>(k)];
+    const auto [number, vector] = measure(Vec3(at[0][lane], at[1][lane], at[2][lane]));
+    value[lane] = number;
+    for (std::size_t k = 0; k < 3; ++k) at[k][lane] = vector[static_cast<Eigen::Index>(k)];
   }
   x = hn::Load(d, at[0]);
   y = hn::Load(d, at[1]);
   z = hn::Load(d, at[2]);
-  return hn::Load(d, q);
+  return hn::Load(d, value);
+}
+
+/// Squared distance and half its gradient of shapes that are measured point by point.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V scalar_foot(D d, const ShapeView& view, V& x, V& y, V& z) {
+  return point_by_point(d, [&view](const Vec3& p) { return foot(view, p); }, x, y, z);
 }
 
 /// f of a convolved shape and its gradient in place of y.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V scalar_convolution(D d, const PackedShape& shape, V& x, V& y, V& z) {
-  constexpr std::size_t kLanes = hn::MaxLanes(D());
-  alignas(64) double at[3][kLanes], f[kLanes];
-  hn::Store(x, d, at[0]);
-  hn::Store(y, d, at[1]);
-  hn::Store(z, d, at[2]);
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Potential sample = convolve(shape.view, shape.kernel, Vec3(at[0][lane], at[1][lane], at[2][lane]));
-    f[lane] = sample.value;
-    for (std::size_t k = 0; k < 3; ++k) at[k][lane] = sample.gradient[static_cast<Eigen::Index>(k)];
-  }
-  x = hn::Load(d, at[0]);
-  y = hn::Load(d, at[1]);
-  z = hn::Load(d, at[2]);
-  return hn::Load(d, f);
+  return point_by_point(d, [&shape](const Vec3& p) { return convolve(shape.view, shape.kernel, p); }, x, y, z);
 }
 
 /// Adds the primitives ids[0..n), all of one kind, to the sums.

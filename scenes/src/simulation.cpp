@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame.h"
+#include "read_scene_faults.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 
@@ -268,7 +269,7 @@ struct Simulation::Impl {
                         .key = "time_step.max_substeps",
                         .expected = "expected a stable step with at most " + std::to_string(desc.max_substeps) +
                                     " substeps a frame",
-                        .found = "one of " + std::to_string(step) + " s (" + std::to_string(1LL << k) + " substeps) at frame " +
+                        .found = "one of " + number_text(step) + " s (" + std::to_string(1LL << k) + " substeps) at frame " +
                                  std::to_string(state.frame),
                         .hint = "soften the stiffest interaction or contact, make the lightest particle heavier, or "
                                 "raise time_step.max_substeps"});

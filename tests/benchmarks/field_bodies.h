@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "implicit/bodies.h"
 #include "supple/core/math.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/skeleton.h"
@@ -15,16 +16,7 @@ namespace supple::benchmarks {
 
 using namespace supple::implicit;
 
-struct Body {
-  Skeleton skeleton;
-  std::vector<Pose> parts;
-  PlacedSkeleton placed;
-  Field field;
-  void place() {
-    place_skeleton(skeleton, parts, placed);
-    index_field(skeleton, placed, field);
-  }
-};
+using implicit::testing::Body;
 
 /// Ten plates along a spiral.
 inline Body plate_spiral() {

@@ -126,13 +126,6 @@ Loads loads_of(const Ellipsoids& all, const Executor& executor = Executor(1)) {
   return loads;
 }
 
-std::uint64_t hash_of(const Loads& loads) {
-  Hasher hasher;
-  hasher.add(loads.force);
-  hasher.add(loads.torque);
-  return hasher.value();
-}
-
 TEST(GayBerneLoads, AreThoseOfEveryPairInRange) {
   for (const bool periodic : {false, true}) {
     const Ellipsoids all(5, 305, periodic);
@@ -182,13 +175,13 @@ TEST(GayBerneLoads, GiveNoForceAndNoMomentToTheWhole) {
 
 TEST(GayBerneLoads, HaveTheSameBitsForEveryNumberOfThreadsAndEveryVectorWidth) {
   const Ellipsoids all(12, 307, true);
-  const std::uint64_t one = hash_of(loads_of(all));
-  for (const int threads : {2, 3, 8}) EXPECT_EQ(hash_of(loads_of(all, Executor(threads))), one) << threads;
+  const std::uint64_t one = test::hash_of(loads_of(all));
+  for (const int threads : {2, 3, 8}) EXPECT_EQ(test::hash_of(loads_of(all, Executor(threads))), one) << threads;
   for (const auto target : {HWY_AVX2, HWY_AVX3}) {
     if ((hwy::SupportedTargets() & target) == 0) continue;
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(target);
-    EXPECT_EQ(hash_of(loads_of(all)), one) << hwy::TargetName(target);
+    EXPECT_EQ(test::hash_of(loads_of(all)), one) << hwy::TargetName(target);
     hwy::SetSupportedTargetsForTest(0);
   }
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());

@@ -118,13 +118,6 @@ Loads twelve_six_loads(const Crowd& crowd, const Executor& executor = Executor(1
   return loads;
 }
 
-std::uint64_t hash_of(const Loads& loads) {
-  Hasher hasher;
-  hasher.add(loads.force);
-  hasher.add(loads.torque);
-  return hasher.value();
-}
-
 TEST(NeighbourLists, HoldThePairsInReachAndNoOthers) {
   for (const bool periodic : {false, true}) {
     for (const std::size_t count : {0U, 1U, 2U, 9U, 65U, 700U}) {
@@ -187,7 +180,7 @@ TEST(NeighbourLists, GoOnWithTheSameBitsFromTheirReferencePositions) {
     Loads loads;
     loads.reset(crowd.position.size());
     accumulate_geometric(from, kSurface, crowd.normal, executor, loads);
-    return hash_of(loads);
+    return test::hash_of(loads);
   };
   EXPECT_EQ(loads_of(list), loads_of(other));
 }
@@ -273,23 +266,23 @@ TEST(SurfaceLoads, GiveNoForceAndNoMomentToTheWhole) {
 TEST(GeometricLoads, HaveTheSameBitsForEveryNumberOfThreads) {
   for (const bool periodic : {false, true}) {
     const Crowd crowd = make_crowd(20000, 56, periodic);
-    const std::uint64_t surface = hash_of(surface_loads(crowd)), radial = hash_of(twelve_six_loads(crowd));
+    const std::uint64_t surface = test::hash_of(surface_loads(crowd)), radial = test::hash_of(twelve_six_loads(crowd));
     for (const int threads : {2, 3, 8}) {
-      EXPECT_EQ(hash_of(surface_loads(crowd, Executor(threads))), surface) << threads;
-      EXPECT_EQ(hash_of(twelve_six_loads(crowd, Executor(threads))), radial) << threads;
+      EXPECT_EQ(test::hash_of(surface_loads(crowd, Executor(threads))), surface) << threads;
+      EXPECT_EQ(test::hash_of(twelve_six_loads(crowd, Executor(threads))), radial) << threads;
     }
   }
 }
 
 TEST(GeometricLoads, HaveTheSameBitsForEveryVectorWidth) {
   const Crowd crowd = make_crowd(3000, 57, true);
-  const std::uint64_t surface = hash_of(surface_loads(crowd)), radial = hash_of(twelve_six_loads(crowd));
+  const std::uint64_t surface = test::hash_of(surface_loads(crowd)), radial = test::hash_of(twelve_six_loads(crowd));
   for (const auto target : {HWY_AVX2, HWY_AVX3}) {
     if ((hwy::SupportedTargets() & target) == 0) continue;
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(target);
-    EXPECT_EQ(hash_of(surface_loads(crowd)), surface) << hwy::TargetName(target);
-    EXPECT_EQ(hash_of(twelve_six_loads(crowd)), radial) << hwy::TargetName(target);
+    EXPECT_EQ(test::hash_of(surface_loads(crowd)), surface) << hwy::TargetName(target);
+    EXPECT_EQ(test::hash_of(twelve_six_loads(crowd)), radial) << hwy::TargetName(target);
     hwy::SetSupportedTargetsForTest(0);
   }
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
@@ -373,8 +366,8 @@ TEST(SingleForces, HaveTheSameBitsForEveryNumberOfThreadsAndEveryVectorWidth) {
   const Crowd crowd = make_crowd(20000, 96, true);
   const auto hash = [&](int threads) {
     const Executor executor(threads);
-    return hash_of(surface_loads(crowd, executor, Precision::SingleForces)) ^
-           (3 * hash_of(twelve_six_loads(crowd, executor, Precision::SingleForces)));
+    return test::hash_of(surface_loads(crowd, executor, Precision::SingleForces)) ^
+           (3 * test::hash_of(twelve_six_loads(crowd, executor, Precision::SingleForces)));
   };
   const std::uint64_t one = hash(1);
   for (const int threads : {2, 3, 8}) EXPECT_EQ(hash(threads), one) << threads;

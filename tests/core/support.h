@@ -86,6 +86,13 @@ inline PairPose pair_pose(const Particles& p, std::uint32_t a, std::uint32_t b) 
   return core::pair_pose(p.set, p.state, a, b);
 }
 
+inline std::uint64_t hash_of(const Loads& loads) {
+  Hasher hasher;
+  hasher.add(loads.force);
+  hasher.add(loads.torque);
+  return hasher.value();
+}
+
 /// Hands what a checkpoint holds of `from` to `to`; whether all of it was taken.
 template <class System>
 [[nodiscard]] bool restart(const System& from, System& to) {

@@ -19,19 +19,6 @@ namespace {
 
 using namespace testing;
 
-const Vec3 kOffset(0.0137, -0.0071, 0.0229);  // puts no node on a surface
-
-Lattice lattice_of(double cell) { return {.origin = kOffset, .cell = cell}; }
-
-MeshReport expect_closed(const Mesh& mesh) {
-  const MeshReport report = inspect(mesh);
-  EXPECT_GT(mesh.triangle_count(), 0u);
-  EXPECT_TRUE(report.closed);
-  EXPECT_TRUE(report.oriented);
-  EXPECT_EQ(mesh.normal.size(), mesh.vertex_count());
-  return report;
-}
-
 /// A Field that the mesher cannot recognise: it then takes the path in double precision.
 struct Seen {
   const Field& field;

@@ -2,6 +2,8 @@
 /// What tests ask of meshes.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -11,8 +13,22 @@
 
 #include "supple/core/hash.h"
 #include "supple/core/mesh.h"
+#include "supple/implicit/polygonise.h"
 
 namespace supple::implicit::testing {
+
+inline const Vec3 kOffset(0.0137, -0.0071, 0.0229);  // puts no node on a surface
+
+inline Lattice lattice_of(double cell) { return {.origin = kOffset, .cell = cell}; }
+
+inline MeshReport expect_closed(const Mesh& mesh) {
+  const MeshReport report = inspect(mesh);
+  EXPECT_GT(mesh.triangle_count(), 0u);
+  EXPECT_TRUE(report.closed);
+  EXPECT_TRUE(report.oriented);
+  EXPECT_EQ(mesh.normal.size(), mesh.vertex_count());
+  return report;
+}
 
 inline std::uint64_t hash_of(const Mesh& mesh) {
   Hasher hasher;

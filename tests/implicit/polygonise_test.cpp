@@ -14,19 +14,6 @@ namespace {
 
 using namespace testing;
 
-const Vec3 kOffset(0.0137, -0.0071, 0.0229);  // puts no node on a surface
-
-Lattice lattice_of(double cell) { return {.origin = kOffset, .cell = cell}; }
-
-MeshReport expect_closed(const Mesh& mesh) {
-  const MeshReport report = inspect(mesh);
-  EXPECT_GT(mesh.triangle_count(), 0u);
-  EXPECT_TRUE(report.closed);
-  EXPECT_TRUE(report.oriented);
-  EXPECT_EQ(mesh.normal.size(), mesh.vertex_count());
-  return report;
-}
-
 // Wyvill 1986: a point with R = 1 and iso 1/2 has its surface at 0.454202019 (checks on a closed mesh).
 TEST(Polygonise, MeetsAreaAndVolumeOfTheWyvillSphereWithOrderTwo) {
   constexpr double kRadius = 0.454202019, kArea = 2.592435660, kVolume = 0.392496505;

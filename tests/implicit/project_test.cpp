@@ -215,6 +215,32 @@ TEST(Intersect, SeesFilmsThinnerThanAnyStep) {
   EXPECT_FALSE(through(merge + 1e-12).has_value());
 }
 
+TEST(Intersect, MissesNoTubeOfARingWhoseMiddleIsInItsSupport) {
+  // Across a ring q falls, rises and falls again before it rises: slopes of one sign at two ends say nothing of between.
+  Primitive ring = wyvill_point(1.2);
+  ring.shape = ShapeKind::Ring;
+  ring.size = {0.5, 0.0, 0.0};
+  Body body = body_of({{ring, Vec3::Zero()}});
+  body.skeleton.iso = 0.9;
+  body.place();
+  Random random(91);
+  constexpr int kSamples = 3000;
+  constexpr double kMost = 4.0;
+  int hits = 0;
+  for (int ray = 0; ray < 400; ++ray) {
+    const Vec3 origin = 2.0 * random.direction();
+    const Vec3 direction = (random.in_box(0.6) - origin).normalized();
+    int first = 0;
+    while (first < kSamples && FieldView(body.field).value(origin + kMost * first / kSamples * direction) < 0.0) ++first;
+    if (first == kSamples) continue;
+    const std::optional<double> t = intersect(body.field, origin, direction, kMost);
+    ASSERT_TRUE(t.has_value()) << ray;
+    EXPECT_LE(*t, kMost * first / kSamples) << ray;
+    ++hits;
+  }
+  EXPECT_GT(hits, 100);
+}
+
 TEST(Intersect, MissesNoSurfaceOfAnyShape) {
   // Against 20,000 samples along each ray: the hit is no later than the first sample of another sign.
   int hits = 0;

@@ -122,6 +122,36 @@ double brute_force(const std::vector<std::pair<Vec3, double>>& points, const Vec
   return least;
 }
 
+TEST(Shapes, ArcsAgreeWithBruteForce) {
+  Random random(9);
+  constexpr int n = 20000;
+  for (const double half_angle : {0.4, 1.3, 2.2, 3.0}) {
+    std::vector<std::pair<Vec3, double>> points;
+    for (int i = 0; i <= n; ++i) {
+      const double angle = half_angle * (2.0 * i / n - 1.0);
+      points.emplace_back(0.8 * Vec3(std::cos(angle), std::sin(angle), 0.0), 1.0);
+    }
+    for (int trial = 0; trial < 100; ++trial) {
+      const Vec3 y = random.in_box(1.5);
+      // Between two points the arc is half a step of theirs away at most.
+      EXPECT_NEAR(distance(ShapeKind::Arc, {0.8, half_angle, 0}, y), brute_force(points, y), 0.8 * half_angle / n);
+    }
+  }
+}
+
+TEST(Shapes, SupportOfRadiiByDirectionReachesAsFarAsItsBoxWhereOneRadiusIsSmall) {
+  // Along x the support bulges beyond its radius 0.2 there: the largest n_x r(n) is 0.43.
+  Primitive p = shape_of(ShapeKind::Directed, {0.2, 1.0, 1.0}, {{0.2, 1.0, 1.0}});
+  p.kernel = Kernel::wyvill(1.0);
+  double reach = 0.0;
+  for (int i = 0; i <= 10000; ++i) {
+    const double n = i / 10000.0;
+    reach = std::max(reach, n * (0.2 * n * n + 1.0 - n * n));
+  }
+  EXPECT_NEAR(support_box(p).upper.x(), reach, 1e-6);
+  EXPECT_NEAR(support_box(p).lower.x(), -reach, 1e-6);
+}
+
 TEST(Shapes, CurvesOfVaryingRadiusAgreeWithBruteForce) {
   Random random(7);
   const int n = 20000;
