@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "lighting.h"
 #include "supple/core/error.h"
 
 namespace supple::render {
@@ -38,22 +39,60 @@ void append(const Mesh& mesh, const Vec3& origin, DrawList& list) {
   SUPPLE_EXPECTS(largest < mesh.vertex_count());
 }
 
+const std::vector<double>* column(const Mesh& mesh, std::string_view name) {
+  for (const Mesh::Column& c : mesh.columns)
+    if (c.name == name) return &c.values;
+  return nullptr;
+}
+
+/// What decides the colour at the vertices of an item.
+void append_paint(const Item& item, std::vector<float>& out) {
+  const Mesh& mesh = *item.mesh;
+  const bool values = item.paint.kind == PaintKind::Values;
+  std::array<const std::vector<double>*, 3> from = {column(mesh, values ? item.paint.column : "rest_x"), nullptr, nullptr};
+  if (!values) from = {from[0], column(mesh, "rest_y"), column(mesh, "rest_z")};
+  const bool rest = from[0] != nullptr && from[1] != nullptr && from[2] != nullptr;
+  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
+    Vec3 at = Vec3::Zero();
+    if (values)
+      at.x() = from[0] == nullptr ? item.paint.lower : (*from[0])[i];
+    else
+      at = rest ? Vec3((*from[0])[i], (*from[1])[i], (*from[2])[i]) : mesh.position[i];
+    for (int k = 0; k < 3; ++k) out.push_back(static_cast<float>(at[k]));
+  }
+}
+
 /// The next length of a ladder of four rungs an octave.
 double rung(double length) { return std::exp2(std::ceil(4.0 * std::log2(std::max(length, 1e-6))) / 4.0); }
 
 }  // namespace
+
+bool is_painted(const Item& item) {
+  return item.paint.kind != PaintKind::Plain || item.wireframe || !item.surface;
+}
+
+RectangleEdges rectangle_edges(const AreaLight& light) {
+  const Vec3 facing = light.facing.normalized();
+  Vec3 across = Vec3::UnitZ().cross(facing);
+  if (!(across.norm() > 1e-9)) across = Vec3::UnitX();
+  across.normalize();
+  return {.u = light.half_sizes.x() * across, .v = light.half_sizes.y() * facing.cross(across)};
+}
 
 void pack(std::span<const Item> items, const Vec3& origin, DrawList& list) {
   list.vertices.clear();
   list.indices.clear();
   list.ranges.clear();
   list.bounds = Box();
+  list.paint.clear();
+  const bool painted = std::any_of(items.begin(), items.end(), is_painted);
   for (std::size_t i = 0; i < items.size(); ++i) {
     SUPPLE_EXPECTS(items[i].mesh != nullptr);
     const Mesh& mesh = *items[i].mesh;
     if (mesh.triangle.empty()) continue;
     const std::size_t first = list.indices.size();
     append(mesh, origin, list);
+    if (painted) append_paint(items[i], list.paint);
     list.ranges.push_back({.first = first, .count = list.indices.size() - first, .item = i});
   }
 }

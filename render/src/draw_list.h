@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "supple/render/renderer.h"
+#include "supple/render/view.h"
 
 namespace supple::render {
 
@@ -20,6 +20,7 @@ struct DrawRange {
 /// All items in one vertex and one index array.
 struct DrawList {
   std::vector<float> vertices;         ///< position and normal, shape [vertices][6]
+  std::vector<float> paint;            ///< object coordinates or (value, 0, 0), shape [vertices][3]; empty without painted items
   std::vector<std::uint32_t> indices;  ///< shape [triangles][3]
   std::vector<DrawRange> ranges;       ///< items that have triangles, in their order
   Box bounds;                          ///< of all vertices, relative to the origin [m]
@@ -53,7 +54,14 @@ struct MapFit {
 /// whole texels, so that the map of a slowly changing box stands still and shadows do not swim from frame to frame.
 [[nodiscard]] MapFit fit_map(const Box& bounds, const Vec3& direction, int size);
 
-/// Linear light of an sRGB colour in [0, 1] (IEC 61966-2-1).
-[[nodiscard]] Eigen::Vector3f linear_colour(const Vec3& srgb);
+/// Whether the item's colour is not the same all over (or it is not all there), so that pixels must carry it.
+[[nodiscard]] bool is_painted(const Item& item);
+
+/// Halves of the edges of an area light: u horizontal, u x v where it shines [m].
+struct RectangleEdges {
+  Vec3 u;
+  Vec3 v;
+};
+[[nodiscard]] RectangleEdges rectangle_edges(const AreaLight& light);
 
 }  // namespace supple::render

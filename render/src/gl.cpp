@@ -1,6 +1,7 @@
 #include "gl.h"
 
 #include <algorithm>
+#include <array>
 
 #include "supple/core/error.h"
 
@@ -47,6 +48,17 @@ GLuint make_texture(const Gl& gl, int width, int height, GLenum internal, const 
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   return texture;
+}
+
+void check_complete(const Gl& gl, int width, int height, int samples) {
+  if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE || gl.GetError() != GL_NO_ERROR)
+    throw Error(ErrorKind::Limit, Fault{.place = "render",
+                                        .key = {},
+                                        .expected = "the driver cannot hold a picture of " + std::to_string(width) +
+                                                    " x " + std::to_string(height) + " pixels with " +
+                                                    std::to_string(std::max(1, samples)) + " samples",
+                                        .found = {},
+                                        .hint = "use a smaller picture or fewer samples"});
 }
 
 }  // namespace
@@ -113,14 +125,22 @@ Target make_target(const Gl& gl, int width, int height, const TargetFormat& form
     target.depth = make_texture(gl, width, height, GL_DEPTH_COMPONENT32F, format, true);
     gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, texture_kind, target.depth, 0);
   }
-  if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE || gl.GetError() != GL_NO_ERROR)
-    throw Error(ErrorKind::Limit, Fault{.place = "render",
-                                        .key = {},
-                                        .expected = "the driver cannot hold a picture of " + std::to_string(width) +
-                                                    " x " + std::to_string(height) + " pixels with " +
-                                                    std::to_string(std::max(1, format.samples)) + " samples",
-                                        .found = {},
-                                        .hint = "use a smaller picture or fewer samples"});
+  check_complete(gl, width, height, format.samples);
+  return target;
+}
+
+Target add_colour(const Gl& gl, const Target& first, const TargetFormat& format) {
+  Target target = {.framebuffer = 0, .colour = 0, .depth = first.depth, .width = first.width, .height = first.height};
+  const GLenum kind = format.samples > 1 ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D;
+  gl.GenFramebuffers(1, &target.framebuffer);
+  gl.BindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
+  target.colour = make_texture(gl, first.width, first.height, format.colour, format, false);
+  gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, kind, first.colour, 0);
+  gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, kind, target.colour, 0);
+  gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, kind, first.depth, 0);
+  constexpr std::array<GLenum, 2> both = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+  gl.DrawBuffers(2, both.data());
+  check_complete(gl, first.width, first.height, format.samples);
   return target;
 }
 

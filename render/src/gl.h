@@ -5,6 +5,7 @@
 
 #include <GL/glcorearb.h>
 
+#include <span>
 #include <string>
 
 #include "gl_context.h"
@@ -13,26 +14,28 @@
 namespace supple::render {
 
 // X(type suffix in capitals, name): one line a function; the list is the whole of our use of OpenGL.
-#define SUPPLE_GL_FUNCTIONS(X)                                                                              \
-  X(ACTIVETEXTURE, ActiveTexture) X(ATTACHSHADER, AttachShader) X(BINDBUFFER, BindBuffer)                   \
-  X(BINDFRAMEBUFFER, BindFramebuffer) X(BINDSAMPLER, BindSampler) X(BINDTEXTURE, BindTexture)               \
-  X(BINDVERTEXARRAY, BindVertexArray) X(BLENDEQUATION, BlendEquation)                           \
-  X(BUFFERDATA, BufferData) X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus)                               \
-  X(CLEAR, Clear) X(CLEARBUFFERUIV, ClearBufferuiv) X(CLEARCOLOR, ClearColor)                               \
-  X(COMPILESHADER, CompileShader)                                                                           \
-  X(CREATEPROGRAM, CreateProgram) X(CREATESHADER, CreateShader) X(CULLFACE, CullFace)                       \
-  X(DELETESHADER, DeleteShader) X(DEPTHFUNC, DepthFunc) X(DEPTHMASK, DepthMask) X(DISABLE, Disable) X(DRAWARRAYS, DrawArrays)       \
-  X(DRAWBUFFER, DrawBuffer) X(DRAWELEMENTS, DrawElements) X(ENABLE, Enable)                                 \
-  X(ENABLEVERTEXATTRIBARRAY, EnableVertexAttribArray) X(FRAMEBUFFERTEXTURE2D, FramebufferTexture2D)         \
-  X(GENBUFFERS, GenBuffers) X(GENFRAMEBUFFERS, GenFramebuffers) X(GENSAMPLERS, GenSamplers)                 \
-  X(GENTEXTURES, GenTextures) X(GENVERTEXARRAYS, GenVertexArrays) X(GETERROR, GetError)                     \
-  X(GETINTEGERV, GetIntegerv) X(GETPROGRAMINFOLOG, GetProgramInfoLog) X(GETPROGRAMIV, GetProgramiv)         \
-  X(GETSHADERINFOLOG, GetShaderInfoLog) X(GETSHADERIV, GetShaderiv) X(GETSTRING, GetString)                 \
-  X(GETUNIFORMLOCATION, GetUniformLocation) X(LINKPROGRAM, LinkProgram) X(PIXELSTOREI, PixelStorei)         \
-  X(READBUFFER, ReadBuffer) X(READPIXELS, ReadPixels) X(SAMPLERPARAMETERI, SamplerParameteri)               \
-  X(SHADERSOURCE, ShaderSource) X(TEXIMAGE2D, TexImage2D) X(TEXIMAGE2DMULTISAMPLE, TexImage2DMultisample)   \
-  X(TEXPARAMETERI, TexParameteri) X(UNIFORM1F, Uniform1f) X(UNIFORM1I, Uniform1i) X(UNIFORM2F, Uniform2f)   \
-  X(UNIFORM3F, Uniform3f) X(UNIFORMMATRIX4FV, UniformMatrix4fv) X(USEPROGRAM, UseProgram)                   \
+#define SUPPLE_GL_FUNCTIONS(X)                                                                                \
+  X(ACTIVETEXTURE, ActiveTexture) X(ATTACHSHADER, AttachShader) X(BINDBUFFER, BindBuffer)                     \
+  X(BINDFRAMEBUFFER, BindFramebuffer) X(BINDSAMPLER, BindSampler) X(BINDTEXTURE, BindTexture)                 \
+  X(BINDVERTEXARRAY, BindVertexArray) X(BLENDEQUATION, BlendEquation) X(BUFFERDATA, BufferData)               \
+  X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus) X(CLEAR, Clear) X(CLEARBUFFERUIV, ClearBufferuiv)         \
+  X(CLEARCOLOR, ClearColor) X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram)                   \
+  X(CREATESHADER, CreateShader) X(CULLFACE, CullFace) X(DELETEBUFFERS, DeleteBuffers)                         \
+  X(DELETESHADER, DeleteShader) X(DELETETEXTURES, DeleteTextures) X(DEPTHFUNC, DepthFunc)                     \
+  X(DEPTHMASK, DepthMask) X(DISABLE, Disable) X(DRAWARRAYS, DrawArrays) X(DRAWBUFFER, DrawBuffer)             \
+  X(DRAWBUFFERS, DrawBuffers) X(DRAWELEMENTS, DrawElements) X(ENABLE, Enable)                                 \
+  X(ENABLEVERTEXATTRIBARRAY, EnableVertexAttribArray) X(FINISH, Finish)                                       \
+  X(FRAMEBUFFERTEXTURE2D, FramebufferTexture2D) X(GENBUFFERS, GenBuffers) X(GENFRAMEBUFFERS, GenFramebuffers) \
+  X(GENSAMPLERS, GenSamplers) X(GENTEXTURES, GenTextures) X(GENVERTEXARRAYS, GenVertexArrays)                 \
+  X(GENERATEMIPMAP, GenerateMipmap) X(GETERROR, GetError) X(GETINTEGERV, GetIntegerv)                         \
+  X(GETPROGRAMINFOLOG, GetProgramInfoLog) X(GETPROGRAMIV, GetProgramiv) X(GETSHADERINFOLOG, GetShaderInfoLog) \
+  X(GETSHADERIV, GetShaderiv) X(GETSTRING, GetString) X(GETUNIFORMLOCATION, GetUniformLocation)               \
+  X(LINKPROGRAM, LinkProgram) X(PIXELSTOREI, PixelStorei) X(POLYGONMODE, PolygonMode)                         \
+  X(POLYGONOFFSET, PolygonOffset) X(READBUFFER, ReadBuffer) X(READPIXELS, ReadPixels)                         \
+  X(SAMPLEMASKI, SampleMaski) X(SAMPLERPARAMETERI, SamplerParameteri) X(SHADERSOURCE, ShaderSource)           \
+  X(TEXIMAGE2D, TexImage2D) X(TEXIMAGE2DMULTISAMPLE, TexImage2DMultisample) X(TEXPARAMETERI, TexParameteri)   \
+  X(UNIFORM1F, Uniform1f) X(UNIFORM1I, Uniform1i) X(UNIFORM2F, Uniform2f) X(UNIFORM3F, Uniform3f)             \
+  X(UNIFORM3FV, Uniform3fv) X(UNIFORMMATRIX4FV, UniformMatrix4fv) X(USEPROGRAM, UseProgram)                   \
   X(VERTEXATTRIBPOINTER, VertexAttribPointer) X(VIEWPORT, Viewport)
 
 /// One member per function, without the gl prefix. @pre the context is current whenever a member is called.
@@ -59,6 +62,9 @@ class Program {
   void set(const char* name, float value) const { gl_->Uniform1f(location(name), value); }
   void set(const char* name, const Eigen::Vector2f& v) const { gl_->Uniform2f(location(name), v.x(), v.y()); }
   void set(const char* name, const Eigen::Vector3f& v) const { gl_->Uniform3f(location(name), v.x(), v.y(), v.z()); }
+  void set(const char* name, std::span<const Eigen::Vector3f> vectors) const {
+    gl_->Uniform3fv(location(name), static_cast<GLsizei>(vectors.size()), vectors.data()->data());
+  }
   void set(const char* name, const Eigen::Matrix4f& m) const {
     gl_->UniformMatrix4fv(location(name), 1, GL_FALSE, m.data());
   }
@@ -85,6 +91,8 @@ struct TargetFormat {
   GLenum filter = GL_NEAREST;
 };
 
+/// A framebuffer of two targets of equal size: depth and first colour of `first`, and a texture of its own.
+[[nodiscard]] Target add_colour(const Gl& gl, const Target& first, const TargetFormat& format);
 /// @throws Error{Limit} when the driver cannot hold it.
 [[nodiscard]] Target make_target(const Gl& gl, int width, int height, const TargetFormat& format);
 

@@ -6,13 +6,10 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
-#include "supple/core/mesh.h"
-#include "supple/core/types.h"
-#include "supple/render/image.h"
+#include "supple/render/view.h"
 
 namespace supple::render {
 
@@ -27,36 +24,13 @@ struct RenderSettings {
   ContextKind context = ContextKind::Auto;  ///< Auto: OSMesa
 };
 
-struct Camera {
-  Vec3 from = Vec3(0, -4, 2);     ///< [m]
-  Vec3 look_at = Vec3::Zero();    ///< [m]
-  Vec3 up = Vec3::UnitZ();        ///< looking along it, y is up in the picture
-  double field_of_view = 0.61;    ///< vertical [rad], in (0, pi)
-};
-
-struct Light {
-  Vec3 direction = Vec3(-0.45, 0.35, -1.0);  ///< the way the light travels
-  double intensity = 3.0;                    ///< relative to the sky
-};
-
-struct Ground {
-  double height = 0.0;                       ///< z [m]
-  Vec3 colour = Vec3(0.80, 0.80, 0.78);      ///< sRGB, fades to the background with distance
-};
-
-struct Item {
-  const Mesh* mesh = nullptr;                ///< may be empty
-  Vec3 colour = Vec3(0.8, 0.8, 0.8);         ///< sRGB in [0, 1]
-  double roughness = 0.45;                   ///< (0, 1]
-  bool two_sided = false;                    ///< draws back faces, too: for surfaces that are not closed
-};
-
-struct View {
-  Camera camera;
-  Light light;
-  std::optional<Ground> ground;
-  Vec3 background_top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
-  Vec3 background_bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
+/// CPU seconds of the process, threads of the driver included, since the renderer was made.
+struct RenderTimes {
+  double context = 0.0;    ///< making the OpenGL context
+  double shaders = 0.0;    ///< building programs; a software driver compiles them with the first pixels, so those too
+  double upload = 0.0;     ///< packing and handing over vertices, hierarchies of boxes
+  double draw = 0.0;
+  double read_back = 0.0;
 };
 
 class Renderer {
@@ -69,6 +43,7 @@ class Renderer {
   [[nodiscard]] virtual Image render(const View& view, std::span<const Item> items) = 0;
   /// e.g. "OSMesa, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   [[nodiscard]] virtual std::string description() const = 0;
+  [[nodiscard]] virtual RenderTimes times() const = 0;
 };
 
 /// @throws Error{Usage} for sizes out of range, Error{Io} when the context cannot be made (naming the library looked for).

@@ -1,17 +1,8 @@
+#include "shader_parts.h"
 #include "shaders.h"
 
 namespace supple::render::shaders {
 namespace {
-
-const char* const kVersion = "#version 330 core\n";
-
-/// Points of Vogel's disc (Vogel 1979), turned by an angle of the pixel (interleaved gradient noise, Jimenez 2014).
-const char* const kDisc = R"(
-float pixel_turn() {
-  return 6.2831853 * fract(52.9829189 * fract(dot(floor(gl_FragCoord.xy), vec2(0.06711056, 0.00583715))));
-}
-const mat2 kGoldenTurn = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
-)";
 
 /// Share of the sun's disc a point sees: percentage-closer soft shadows (Fernando 2005) in an orthographic map.
 /// Every tap is compared with the tangent plane of the receiver, so that a slanted surface does not shadow itself.
@@ -82,51 +73,70 @@ vec3 filmic(vec3 radiance) {
 }
 )";
 
-/// The geometry buffer (octahedral normal, id; depth) and what of a pixel follows from the camera alone.
-const char* const kGeometry = R"(
-uniform vec2 half_extent;
-uniform vec2 picture_size;
-uniform vec2 depth_range;     // near and far plane [m]
-uniform mat4 view;
-uniform float eye_height;     // above the ground; below 0: no ground to be seen [m]
-const float kNowhere = 1e4;   // depth of nothing, in depths of the far plane
+/// Rectangles without shadows. Diffuse by the contour integral of Lambert (Baum, Rushmeier & Winget 1989, clipped to the
+/// horizon by its closed-form fit, Hill & Heitz 2016); glossy by the point of the rectangle nearest to the mirrored view
+/// (Karis 2013).
+const char* const kAreaLight = R"(
+uniform int area_lights;
+uniform vec3 area_centre[4];
+uniform vec3 area_u[4];        // half the edge along either side [m]
+uniform vec3 area_v[4];
+uniform vec3 area_radiance[4];
 
-vec3 eye_ray(vec2 pixel) { return vec3((pixel / picture_size * 2.0 - 1.0) * half_extent, -1.0); }
-
-float eye_depth(float stored) {
-  return stored < 1.0 ? depth_range.x * depth_range.y / (depth_range.y - stored * (depth_range.y - depth_range.x))
-                      : kNowhere * depth_range.y;
+vec3 edge_integral(vec3 a, vec3 b) {
+  float x = clamp(dot(a, b), -0.9999, 0.9999);
+  return cross(a, b) * (acos(x) * inversesqrt(1.0 - x * x));
 }
 
-float ground_depth(vec3 ray) {
-  float fall = -dot(view[2].xyz, ray);
-  return eye_height > 0.0 && fall > 1e-6 ? eye_height / fall : kNowhere * depth_range.y;
+// Irradiance over pi of a unit radiance; what lies below the horizon is clipped as of a sphere of the same solid angle.
+float rectangle_share(vec3 p, vec3 n, vec3 c, vec3 u, vec3 v) {
+  vec3 a = normalize(c - u - v - p);
+  vec3 b = normalize(c + u - v - p);
+  vec3 d = normalize(c + u + v - p);
+  vec3 e = normalize(c - u + v - p);
+  // From the lit side the corners run clockwise.
+  vec3 f = (edge_integral(a, b) + edge_integral(b, d) + edge_integral(d, e) + edge_integral(e, a)) * -0.15915494;
+  float size = length(f);
+  return max((size * size + dot(f, n)) / (size + 1.0), 0.0);
 }
 
-vec3 unpack_normal(uint bits) {
-  vec2 f = vec2(float(bits & 65535u), float(bits >> 16u)) / 65535.0 * 2.0 - 1.0;
-  vec3 n = vec3(f, 1.0 - abs(f.x) - abs(f.y));
-  float t = max(-n.z, 0.0);
-  n.xy += vec2(n.x >= 0.0 ? -t : t, n.y >= 0.0 ? -t : t);
-  return normalize(n);
-}
-)";
-
-/// What a pixel shows where there is nothing, and how it is stored: sRGB (IEC 61966-2-1).
-const char* const kPixel = R"(
-uniform vec3 background_top;
-uniform vec3 background_bottom;
-out vec4 colour;
-
-vec3 background_colour() {
-  float t = clamp(gl_FragCoord.y / picture_size.y, 0.0, 1.0);
-  return mix(background_bottom, background_top, t * t * (3.0 - 2.0 * t));
+vec3 area_diffuse(vec3 p, vec3 n) {
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < area_lights; ++i) {
+    float lit = dot(p - area_centre[i], cross(area_u[i], area_v[i])) > 0.0 ? 1.0 : 0.0;
+    sum += area_radiance[i] * (lit * rectangle_share(p, n, area_centre[i], area_u[i], area_v[i]));
+  }
+  return sum;
 }
 
-vec4 encoded(vec3 light) {
-  vec3 linear = clamp(light, 0.0, 1.0);
-  vec3 high = 1.055 * pow(max(linear, 1e-6), vec3(1.0 / 2.4)) - 0.055;
-  return vec4(mix(linear * 12.92, high, vec3(greaterThan(linear, vec3(0.0031308)))), 1.0);
+vec3 area_light(vec3 p, vec3 n, vec3 v, vec3 albedo, vec3 normal_reflectance, float a2) {
+  vec3 sum = albedo * area_diffuse(p, n);
+  vec3 mirrored = reflect(-v, n);
+  for (int i = 0; i < area_lights; ++i) {
+    vec3 c = area_centre[i];
+    vec3 front = normalize(cross(area_u[i], area_v[i]));
+    float lit = dot(p - c, front) > 0.0 ? 1.0 : 0.0;
+    float t = dot(c - p, front) / min(dot(mirrored, front), -1e-3);
+    vec3 hit = p + mirrored * max(t, 0.0) - c;
+    float u = clamp(dot(hit, area_u[i]) / dot(area_u[i], area_u[i]), -1.0, 1.0);
+    float w = clamp(dot(hit, area_v[i]) / dot(area_v[i], area_v[i]), -1.0, 1.0);
+    vec3 to = c + u * area_u[i] + w * area_v[i] - p;
+    float d2 = dot(to, to);
+    vec3 l = to * inversesqrt(d2);
+    vec3 h = normalize(l + v);
+    float nh = max(dot(n, h), 0.0);
+    float nl = max(dot(n, l), 0.0);
+    float nv = max(dot(n, v), 0.08);
+    float area = 4.0 * length(area_u[i]) * length(area_v[i]);
+    // The lobe is widened by the light's angular size and keeps its energy.
+    float wide = min(sqrt(a2) + 0.5 * sqrt(area / d2), 1.0);
+    float spread = nh * nh * (a2 - 1.0) + 1.0;
+    float lobe = a2 / (spread * spread) * (a2 / (wide * wide)) * 0.25 / (nl * nv + 0.05);
+    vec3 fresnel = normal_reflectance + (1.0 - normal_reflectance) * pow(1.0 - max(dot(v, h), 0.0), 5.0);
+    float seen_share = min(nl * max(-dot(l, front), 0.0) * area / (d2 * 3.14159265), 1.0);
+    sum += area_radiance[i] * fresnel * (lit * lobe * seen_share);
+  }
+  return sum;
 }
 )";
 
@@ -140,7 +150,7 @@ uniform float ground_occluded;    // 0: nothing stands above the ground
 vec3 ground_light(vec3 p, vec3 behind, float visible) {
   vec2 at = (ground_to_unit * vec4(p, 1.0)).xy;
   float ao = mix(1.0, textureLod(ground_visibility, clamp(at, 0.0, 1.0), 0.0).r, ground_occluded);
-  vec3 radiance = ground_albedo * (sun * (max(to_light.z, 0.0) * visible) + sky * ao);
+  vec3 radiance = ground_albedo * (sun * (max(to_light.z, 0.0) * visible) + sky * ao + area_diffuse(p, vec3(0.0, 0.0, 1.0)));
   // Into the background with distance and towards the horizon, so that there is no edge.
   float away = length(p.xy) / camera_distance;
   float down = (eye.z - p.z) / length(eye - p);
@@ -150,7 +160,7 @@ vec3 ground_light(vec3 p, vec3 behind, float visible) {
 )";
 
 const char* const kItemLight = R"(
-uniform sampler2D materials;      // albedo and roughness of each item
+uniform sampler2D materials;      // albedo and roughness of each item; in the next row, metallic and painted
 uniform sampler2D occlusion;
 uniform float occlusion_radius;   // [m]
 uniform int contact_taps;         // 0: no other item to touch
@@ -189,10 +199,14 @@ float contact_line(uint id, float depth) {
   return 1.0 - 0.6 * min(touching * 0.5, 1.0);
 }
 
-vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible) {
+vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_albedo) {
   int number = int(id) - 1;
-  vec4 material = texelFetch(materials, ivec2(number & 4095, number >> 12), 0);
-  vec3 albedo = material.rgb;
+  ivec2 row = ivec2(number & 4095, (number >> 12) * 2);
+  vec4 material = texelFetch(materials, row, 0);
+  vec2 more = texelFetch(materials, row + ivec2(0, 1), 0).rg;
+  vec3 base = more.y > 0.5 ? own_albedo : material.rgb;
+  vec3 albedo = base * (1.0 - more.x);
+  vec3 normal_reflectance = mix(vec3(0.04), base, more.x);
   float roughness = material.a;
   vec3 v = normalize(eye - p);
   vec3 h = normalize(v + to_light);
@@ -207,7 +221,7 @@ vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible) {
   float spread = nh * nh * (a2 - 1.0) + 1.0;
   float d = a2 / (spread * spread);
   float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
-  float fresnel = 0.04 + 0.96 * pow(1.0 - vh, 5.0);
+  vec3 fresnel = normal_reflectance + (1.0 - normal_reflectance) * pow(1.0 - vh, 5.0);
   vec3 radiance = sun * (nl * visible) * (albedo * (1.0 - fresnel) + d * smith * fresnel);
 
   // Occlusion with the light that an occluder of the same colour sends back (Jimenez et al. 2016).
@@ -225,8 +239,9 @@ vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible) {
   seen += sky * 1.6 * smoothstep(0.80 - 0.4 * roughness, 0.90 + 0.1 * roughness, dot(mirrored, box));
   vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
   float split = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
-  float gloss = 0.04 * (-1.04 * split + r.z) + (1.04 * split + r.w);
+  vec3 gloss = normal_reflectance * (-1.04 * split + r.z) + (1.04 * split + r.w);
   radiance += seen * gloss * ao;
+  radiance += area_light(p, n, v, albedo, normal_reflectance, a2);
 
   // A rim of light from behind parts the item from a ground of the same brightness.
   float edge = pow(1.0 - nv, 4.0);
@@ -235,174 +250,13 @@ vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible) {
 }
 )";
 
-/// Version, number of samples and access to the geometry buffer, which is a multisampled texture above one sample.
-std::string header(int samples) {
-  const std::string kind = samples > 1 ? "MS" : "";
-  const std::string sample = samples > 1 ? "s" : "0";
-  return std::string(kVersion) + "#define SAMPLES " + std::to_string(samples) + "\nuniform usampler2D" + kind +
-         " geometry;\nuniform sampler2D" + kind + " depths;\n#define GEOMETRY(at, s) texelFetch(geometry, at, " + sample +
-         ")\n#define DEPTH(at, s) texelFetch(depths, at, " + sample + ")\n";
+std::string painted_access(int samples) {
+  return std::string("uniform sampler2D") + (samples > 1 ? "MS" : "") + " paints;\n" +
+         "vec3 squared(vec3 v) { return v * v; }\n#define ALBEDO(at, s) squared(texelFetch(paints, at, " +
+         (samples > 1 ? "s" : "0") + ").rgb)\n";
 }
 
 }  // namespace
-
-std::string position_only() {
-  return std::string(kVersion) + R"(
-layout(location = 0) in vec3 position;
-uniform mat4 to_clip;
-out vec3 world;
-void main() {
-  world = position;
-  gl_Position = to_clip * vec4(position, 1.0);
-})";
-}
-
-std::string surface() {
-  return std::string(kVersion) + R"(
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 normal;
-uniform mat4 to_clip;
-centroid out vec3 world_normal;
-void main() {
-  world_normal = normal;
-  gl_Position = to_clip * vec4(position, 1.0);
-})";
-}
-
-std::string whole_picture() {
-  return std::string(kVersion) + R"(
-uniform float plane;
-void main() {
-  gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, plane, 1.0);
-})";
-}
-
-std::string nothing() { return std::string(kVersion) + "void main() {}\n"; }
-
-std::string height_range() {
-  return std::string(kVersion) + R"(
-in vec3 world;
-uniform float ground_height;
-out vec4 range;
-void main() {
-  float height = max(world.z - ground_height, 0.0);
-  range = vec4(-height, height, 0.0, 0.0);
-})";
-}
-
-// Along each azimuth the columns of the height range hide elevations from atan(low / d) to atan(high / d); with the
-// cosine weight of a diffuse receiver the hidden share is the difference of sin^2 of the elevations.
-std::string ground_occlusion() {
-  return std::string(kVersion) + R"(
-uniform sampler2D heights;
-uniform float map_size;      // edge of the map [m]
-uniform float target_size;   // edge of this target [texel]
-out vec4 visibility;
-const int kAzimuths = 20;
-const int kSteps = 12;
-void main() {
-  vec2 here = gl_FragCoord.xy / target_size;
-  float hidden = 0.0;
-  for (int a = 0; a < kAzimuths; ++a) {
-    float angle = 6.2831853 * (float(a) + 0.5) / float(kAzimuths);
-    vec2 along = vec2(cos(angle), sin(angle));
-    float lowest = 1.0;
-    float highest = 0.0;
-    for (int k = 0; k < kSteps; ++k) {
-      float s = (float(k) + 0.5) / float(kSteps);
-      float distance = 0.6 * s * s + 0.002;
-      vec2 range = textureLod(heights, here + along * distance, 0.0).rg;
-      float d2 = distance * distance * map_size * map_size;
-      float low = max(-range.x, 0.0);
-      float high = range.y;
-      if (high >= 0.0) {
-        lowest = min(lowest, low * low / (low * low + d2));
-        highest = max(highest, high * high / (high * high + d2));
-      }
-    }
-    hidden += max(highest - lowest, 0.0);
-  }
-  vec2 rim = smoothstep(vec2(0.0), vec2(0.12), min(here, 1.0 - here));
-  visibility = vec4(1.0 - hidden / float(kAzimuths) * rim.x * rim.y);
-})";
-}
-
-// The normal by its octahedral map (Meyer et al. 2010), 16 bits a coordinate.
-std::string geometry() {
-  return std::string(kVersion) + R"(
-centroid in vec3 world_normal;
-uniform int id;
-out uvec2 data;
-void main() {
-  vec3 n = gl_FrontFacing ? world_normal : -world_normal;
-  n /= max(abs(n.x) + abs(n.y) + abs(n.z), 1e-20);
-  vec2 sign_of = vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
-  vec2 octahedral = n.z >= 0.0 ? n.xy : (1.0 - abs(n.yx)) * sign_of;
-  uvec2 bits = uvec2(round(clamp(octahedral * 0.5 + 0.5, 0.0, 1.0) * 65535.0));
-  data = uvec2(bits.x | (bits.y << 16u), uint(id));
-})";
-}
-
-// Scalable ambient obscurance (McGuire, Mara, Luebke 2012), without its mip chain: the disc is a few dozen pixels.
-std::string screen_occlusion(int samples) {
-  return header(samples) + kDisc + kGeometry + R"(
-uniform float radius;        // [m]
-out vec4 data;
-const int kTaps = 14;
-void main() {
-  ivec2 last = ivec2(picture_size) - 1;
-  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * 2, last);
-  uvec2 item = GEOMETRY(pixel, 0).rg;
-  vec3 ray = eye_ray(vec2(pixel) + 0.5);
-  float depth = eye_depth(DEPTH(pixel, 0).r);
-  vec3 n = mat3(view) * unpack_normal(item.x);
-  vec3 p = ray * depth;
-  // Four by four turns, which the blur averages exactly.
-  ivec2 cell = ivec2(gl_FragCoord.xy) & 3;
-  float turn = 6.2831853 * float((cell.x * 4 + cell.y * 5 + (cell.y & 1) * 2) & 15) / 16.0;
-  vec2 turned = vec2(cos(turn), sin(turn));
-  float pixels = clamp(radius / (depth * half_extent.y) * 0.5 * picture_size.y, 3.0, 0.15 * picture_size.y);
-  int taps = item.y > 0u ? kTaps : 0;
-  float r2 = radius * radius;
-  float sum = 0.0;
-  for (int i = 0; i < taps; ++i) {
-    vec2 offset = turned * (pixels * sqrt((float(i) + 0.5) / float(kTaps)));
-    ivec2 other = clamp(pixel + ivec2(round(offset)), ivec2(0), last);
-    vec3 other_ray = eye_ray(vec2(other) + 0.5);
-    vec3 v = other_ray * min(eye_depth(DEPTH(other, 0).r), ground_depth(other_ray)) - p;
-    float d2 = dot(v, v);
-    float closeness = max(1.0 - d2 / r2, 0.0);
-    sum += closeness * closeness * max(dot(v, n) - 0.02 * radius, 0.0) * inversesqrt(d2 + 1e-4 * r2);
-    turned = kGoldenTurn * turned;
-  }
-  data = vec4(max(1.0 - 2.6 * sum / float(kTaps), 0.0), depth, 0.0, 0.0);
-})";
-}
-
-std::string occlusion_blur() {
-  return std::string(kVersion) + R"(
-uniform sampler2D occlusion;
-uniform float radius;
-uniform float nowhere;   // depths beyond are of no item [m]
-out vec4 data;
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  ivec2 last = textureSize(occlusion, 0) - 1;
-  vec2 here = texelFetch(occlusion, pixel, 0).rg;
-  // A whole patch of lanes without items has nothing to blur.
-  int rows = here.g < nowhere ? 2 : -2;
-  float sum = 1e-4 * here.r;
-  float weight_sum = 1e-4;
-  for (int y = -2; y < rows; ++y)
-    for (int x = -2; x < 2; ++x) {
-      vec2 there = texelFetch(occlusion, clamp(pixel + ivec2(x, y), ivec2(0), last), 0).rg;
-      float weight = max(1.0 - abs(there.g - here.g) / radius, 0.0);
-      sum += weight * there.r;
-      weight_sum += weight;
-    }
-  data = vec4(sum / weight_sum, here.g, 0.0, 0.0);
-})";
-}
 
 // Sorts the pixels for the passes that follow: a software rasteriser takes both sides of every branch, but leaves out
 // whole patches that fail the depth test. The background is drawn on the way.
@@ -419,7 +273,7 @@ void main() {
 }
 
 std::string lit_ground() {
-  return std::string(kVersion) + kDisc + kGeometry + kPixel + kShadow + kLight + kGroundLight + R"(
+  return std::string(kVersion) + kDisc + kGeometry + kPixel + kShadow + kLight + kAreaLight + kGroundLight + R"(
 void main() {
   vec3 ray = eye_ray(gl_FragCoord.xy);
   vec3 p = eye + (transpose(mat3(view)) * ray) * ground_depth(ray);
@@ -429,8 +283,9 @@ void main() {
 
 // Each surface of a pixel is lit once, whatever number of its samples it covers. Surfaces: one for each item (two for
 // an item that folds over itself within the pixel), the ground, and the background.
-std::string lit_items(int samples) {
-  return header(samples) + kDisc + kGeometry + kPixel + kShadow + kLight + kGroundLight + kItemLight + R"(
+std::string lit_items(int samples, bool painted) {
+  return header(samples) + (painted ? painted_access(samples) : std::string("#define ALBEDO(at, s) vec3(0.0)\n")) + kDisc +
+         kGeometry + kPixel + kShadow + kLight + kAreaLight + kGroundLight + kItemLight + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 ray = eye_ray(gl_FragCoord.xy);
@@ -462,6 +317,7 @@ void main() {
     float slack = 0.0;
     float surface_depth = 0.0;
     vec3 n = vec3(0.0);
+    vec3 own_albedo = vec3(0.0);
     int count = 0;
     for (int s = 0; s < SAMPLES; ++s) {
       if (open[s] && !found) {
@@ -476,17 +332,19 @@ void main() {
       open[s] = open[s] && !same;
       surface_depth += same ? depth[s] : 0.0;
       n += same ? normal[s] : vec3(0.0);
+      own_albedo += same ? ALBEDO(pixel, s) : vec3(0.0);
       count += same ? 1 : 0;
     }
     left -= count;
     surface_depth /= float(max(count, 1));
+    own_albedo /= float(max(count, 1));
     n = normalize(n);
     bool is_item = surface_id > 0u;
     bool is_floor = !is_item && surface_depth < depth_range.y * 0.5 * kNowhere;
     vec3 p = eye + along * surface_depth;
     float visible = sun_visibility(p, n, is_item || is_floor);
     vec3 lit = behind;
-    if (is_item) lit = item_light(p, n, surface_depth, surface_id, visible);
+    if (is_item) lit = item_light(p, n, surface_depth, surface_id, visible, own_albedo);
     if (is_floor) lit = ground_light(p, behind, visible);
     sum += lit * float(count);
   }

@@ -1,0 +1,90 @@
+/// @file supple/render/view.h
+/// What a picture shows, whoever draws it: camera, lights, ground, and items with their materials. Colours are sRGB in
+/// [0, 1] and become linear light (IEC 61966-2-1) before anything is computed with them.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "supple/core/mesh.h"
+#include "supple/core/types.h"
+#include "supple/render/colour_map.h"
+#include "supple/render/image.h"
+
+namespace supple::render {
+
+struct Camera {
+  Vec3 from = Vec3(0, -4, 2);     ///< [m]
+  Vec3 look_at = Vec3::Zero();    ///< [m]
+  Vec3 up = Vec3::UnitZ();        ///< looking along it, y is up in the picture
+  double field_of_view = 0.61;    ///< vertical [rad], in (0, pi)
+  double aperture = 0.0;          ///< radius of a thin lens [m]; 0: everything is sharp (path tracer)
+  double focus = 0.0;             ///< distance of what is sharp, along the line of sight [m]; 0: that of look_at
+};
+
+struct Light {
+  Vec3 direction = Vec3(-0.45, 0.35, -1.0);  ///< the way the light travels
+  double intensity = 3.0;                    ///< irradiance over pi, relative to the radiance of the sky
+};
+
+/// A rectangle that shines on the side it faces.
+struct AreaLight {
+  Vec3 at = Vec3::Zero();                    ///< its middle [m]
+  Vec3 facing = -Vec3::UnitZ();              ///< where it shines
+  Eigen::Vector2d half_sizes = {0.5, 0.5};   ///< [m]; the first is horizontal
+  Vec3 colour = Vec3::Ones();                ///< sRGB
+  double radiance = 5.0;                     ///< relative to that of the sky
+};
+
+struct Ground {
+  double height = 0.0;                       ///< z [m]
+  Vec3 colour = Vec3(0.80, 0.80, 0.78);      ///< sRGB, fades to the background with distance
+};
+
+/// Where the colour of an item comes from. Patterns live in object coordinates: the columns "rest_x", "rest_y", "rest_z"
+/// of the mesh [m], or world positions where it has none. They so stick to a body that moves and deforms.
+enum class PaintKind : std::uint8_t {
+  Plain,    ///< Item::colour
+  Checker,  ///< cubes of Item::colour and Paint::colour in turn
+  Stripes,  ///< the same in slices across Paint::axis
+  Picture,  ///< an image, projected along the three axes and mixed by the slope of the surface there
+  Values,   ///< a column of the mesh through a colour map
+  Normals,  ///< (n + 1) / 2
+};
+
+struct Paint {
+  PaintKind kind = PaintKind::Plain;
+  Vec3 colour = Vec3(0.95, 0.95, 0.93);           ///< the second one of Checker and Stripes
+  double size = 0.1;                              ///< edge of a cube, thickness of a slice, width of the image [m]
+  Vec3 axis = Vec3::UnitX();                      ///< Stripes
+  std::shared_ptr<const Image> picture = nullptr; ///< Picture
+  std::string column = {};                        ///< Values; a mesh without it shows the lower end
+  ColourMap map = ColourMap::Viridis;             ///< Values
+  double lower = 0.0;                             ///< Values: what the ends of the map stand for
+  double upper = 1.0;
+};
+
+struct Item {
+  const Mesh* mesh = nullptr;                ///< may be empty
+  Vec3 colour = Vec3(0.8, 0.8, 0.8);         ///< sRGB in [0, 1]; of a metal, that of its reflection
+  double roughness = 0.45;                   ///< (0, 1]
+  bool two_sided = false;                    ///< draws back faces, too: for surfaces that are not closed
+  double metallic = 0.0;                     ///< 0: dielectric of index 1.5, 1: metal
+  double opacity = 1.0;                      ///< (0, 1]; OpenGL: in steps of 1 / samples
+  Paint paint = {};
+  bool surface = true;                       ///< false: only what `wireframe` asks for
+  bool wireframe = false;                    ///< edges of the triangles, dark on a surface, in the item's colour without
+};
+
+struct View {
+  Camera camera;
+  Light light;
+  std::optional<Ground> ground;
+  Vec3 background_top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
+  Vec3 background_bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
+  std::vector<AreaLight> area_lights = {};          ///< OpenGL takes the first four and casts no shadows of theirs
+};
+
+}  // namespace supple::render

@@ -1,0 +1,299 @@
+#include "gl_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "process_time.h"
+#include "supple/core/error.h"
+
+namespace supple::render {
+namespace {
+
+// Shares of the distance between camera and point looked at, so that a still camera gives still looks.
+constexpr double kOcclusionRadius = 0.07;
+constexpr double kRegion = 3.0;
+
+}  // namespace
+
+void GlRenderer::draw_range(const DrawRange& range) const {
+  gl_.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(range.count), GL_UNSIGNED_INT,
+                   reinterpret_cast<const void*>(range.first * sizeof(std::uint32_t)));
+}
+
+void GlRenderer::draw_all_items() const {
+  gl_.BindVertexArray(item_array_);
+  draw_range({.first = 0, .count = list_.indices.size(), .item = 0});
+}
+
+void GlRenderer::draw_cover() const {
+  gl_.BindVertexArray(empty_array_);
+  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void GlRenderer::begin(const Target& target, bool depth) const {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
+  gl_.Viewport(0, 0, priming_ ? 1 : target.width, priming_ ? 1 : target.height);
+  if (depth)
+    gl_.Enable(GL_DEPTH_TEST);
+  else
+    gl_.Disable(GL_DEPTH_TEST);
+}
+
+void GlRenderer::draw_shadow_map(const MapFit& fit) const {
+  begin(shadow_, true);
+  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+  programs_->depth.use();
+  programs_->depth.set("to_clip", fit.to_clip);
+  draw_all_items();
+}
+
+void GlRenderer::draw_ground_occlusion(const MapFit& fit, float ground_height) const {
+  begin(heights_, false);
+  gl_.ClearColor(-1e30F, -1e30F, 0.0F, 0.0F);
+  gl_.Clear(GL_COLOR_BUFFER_BIT);
+  gl_.Enable(GL_BLEND);
+  gl_.BlendEquation(GL_MAX);
+  programs_->height.use();
+  programs_->height.set("to_clip", fit.to_clip);
+  programs_->height.set("ground_height", ground_height);
+  draw_all_items();
+  gl_.Disable(GL_BLEND);
+
+  begin(ground_occlusion_, false);
+  programs_->ground_occlusion.use();
+  programs_->ground_occlusion.set("heights", kHeights);
+  programs_->ground_occlusion.set("map_size", fit.extent.x());
+  programs_->ground_occlusion.set("target_size", static_cast<float>(kGroundOcclusionSize));
+  draw_cover();
+}
+
+void GlRenderer::draw_geometry(const CameraMatrices& camera, std::span<const Item> items) const {
+  if (painted_) {
+    draw_painted_geometry(camera, items);
+    return;
+  }
+  begin(geometry_, true);
+  constexpr std::array<GLuint, 4> no_item{};
+  gl_.ClearBufferuiv(GL_COLOR, 0, no_item.data());
+  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+  programs_->geometry.use();
+  programs_->geometry.set("to_clip", camera.view_projection);
+  gl_.BindVertexArray(item_array_);
+  for (const DrawRange& range : list_.ranges) {
+    set_cover(items[range.item], range.item);
+    programs_->geometry.set("id", static_cast<int>(range.item + 1));
+    draw_range(range);
+  }
+  gl_.Enable(GL_CULL_FACE);
+  gl_.Disable(GL_SAMPLE_MASK);
+}
+
+void GlRenderer::set_geometry(const Program& program, const CameraMatrices& camera, const View& view) const {
+  program.set("geometry", kGeometry);
+  program.set("depths", kDepths);
+  program.set("half_extent", camera.half_extent);
+  program.set("picture_size",
+              Eigen::Vector2f(static_cast<float>(settings_.width), static_cast<float>(settings_.height)));
+  program.set("depth_range", camera.depth_range);
+  program.set("view", camera.view);
+  program.set("eye_height", view.ground ? static_cast<float>(view.camera.from.z() - view.ground->height) : -1.0F);
+}
+
+void GlRenderer::draw_screen_occlusion(const CameraMatrices& camera, const View& view, float radius) const {
+  begin(occlusion_, false);
+  programs_->occlusion.use();
+  set_geometry(programs_->occlusion, camera, view);
+  programs_->occlusion.set("radius", radius);
+  draw_cover();
+
+  begin(blurred_, false);
+  programs_->blur.use();
+  programs_->blur.set("occlusion", kOcclusion);
+  programs_->blur.set("radius", radius);
+  programs_->blur.set("nowhere", 2.0F * camera.depth_range.y());
+  draw_cover();
+}
+
+void GlRenderer::set_background(const Program& program, const View& view) const {
+  program.set("background_top", linear_colour(view.background_top));
+  program.set("background_bottom", linear_colour(view.background_bottom));
+}
+
+void GlRenderer::set_light(const Program& program, const CameraMatrices& camera, const View& view,
+                           const MapFit* shadow, const MapFit* heights) const {
+  const Eigen::Vector3f to_light = -view.light.direction.normalized().cast<float>();
+  const Eigen::Vector3f sun = sun_colour(view.light);
+  const Eigen::Vector3f sky = sky_colour();
+  // The ground sends back what falls on it, less the shade that items cast over it; without one, half a sky.
+  Eigen::Vector3f bounce = 0.5F * sky;
+  if (view.ground)
+    bounce = 0.45F * linear_colour(view.ground->colour).cwiseProduct(sky + std::max(to_light.z(), 0.0F) * sun);
+  program.set("to_light", to_light);
+  program.set("sun", sun);
+  program.set("sky", sky);
+  program.set("bounce", bounce);
+  program.set("exposure", kExposure);
+  program.set("light_tangent", static_cast<float>(std::tan(settings_.shadow_softness)));
+  program.set("shadow_depth", kShadowDepth);
+  program.set("shadow_compare", kShadowCompare);
+  program.set("shadow_texels", shadow == nullptr ? 0.0F : static_cast<float>(settings_.shadow_size));
+  if (shadow != nullptr) {
+    program.set("shadow_to_unit", shadow->to_unit);
+    program.set("shadow_axes", shadow->axes);
+    program.set("shadow_extent", shadow->extent);
+  }
+  program.set("eye", camera.eye);
+  program.set("ground_albedo", linear_colour(view.ground ? view.ground->colour : Vec3(Vec3::Zero())));
+  program.set("camera_distance", static_cast<float>(camera.distance));
+  program.set("ground_visibility", kGroundOcclusion);
+  program.set("ground_occluded", heights == nullptr ? 0.0F : 1.0F);
+  if (heights != nullptr) program.set("ground_to_unit", heights->to_unit);
+
+  const std::size_t count = std::min(view.area_lights.size(), kAreaLights);
+  program.set("area_lights", static_cast<int>(count));
+  if (count == 0) return;
+  std::array<std::array<Eigen::Vector3f, kAreaLights>, 4> area;
+  for (std::size_t i = 0; i < count; ++i) {
+    const RectangleEdges edges = rectangle_edges(view.area_lights[i]);
+    area[0][i] = (view.area_lights[i].at - view.camera.look_at).cast<float>();
+    area[1][i] = edges.u.cast<float>();
+    area[2][i] = edges.v.cast<float>();
+    area[3][i] = static_cast<float>(view.area_lights[i].radiance) * linear_colour(view.area_lights[i].colour);
+  }
+  constexpr std::array<const char*, 4> kNames = {"area_centre", "area_u", "area_v", "area_radiance"};
+  for (std::size_t k = 0; k < 4; ++k) program.set(kNames[k], std::span<const Eigen::Vector3f>(area[k]).first(count));
+}
+
+void GlRenderer::draw_picture(const CameraMatrices& camera, const View& view, const MapFit* shadow,
+                              const MapFit* heights, float radius) const {
+  begin(output_, true);
+  gl_.DepthFunc(GL_ALWAYS);
+  programs_->classify.use();
+  set_geometry(programs_->classify, camera, view);
+  set_background(programs_->classify, view);
+  draw_cover();
+  gl_.DepthMask(GL_FALSE);
+
+  // Between the depths that `classify` writes: .3 is behind the ground's .1 alone, .7 before the items' .9 alone.
+  if (view.ground) {
+    gl_.DepthFunc(GL_GREATER);
+    programs_->ground.use();
+    programs_->ground.set("plane", 2.0F * 0.3F - 1.0F);
+    set_geometry(programs_->ground, camera, view);
+    set_background(programs_->ground, view);
+    set_light(programs_->ground, camera, view, shadow, heights);
+    draw_cover();
+  }
+  if (!list_.ranges.empty()) {
+    gl_.DepthFunc(GL_LESS);
+    const Program& program = painted_ ? painting_->lit_items : programs_->items;
+    program.use();
+    program.set("plane", 2.0F * 0.7F - 1.0F);
+    set_geometry(program, camera, view);
+    set_background(program, view);
+    set_light(program, camera, view, shadow, heights);
+    program.set("materials", kMaterials);
+    program.set("paints", kPaints);
+    program.set("occlusion", kBlurred);
+    program.set("occlusion_radius", radius);
+    program.set("contact_taps", list_.ranges.size() > 1 ? 8 : 0);
+    draw_cover();
+  }
+  gl_.DepthMask(GL_TRUE);
+  gl_.DepthFunc(GL_LEQUAL);
+}
+
+Image GlRenderer::read_back() {
+  const auto width = static_cast<std::size_t>(settings_.width);
+  const auto height = static_cast<std::size_t>(settings_.height);
+  rgba_.resize(4 * width * height);
+  gl_.PixelStorei(GL_PACK_ALIGNMENT, 4);
+  gl_.ReadPixels(0, 0, settings_.width, settings_.height, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
+  if (const GLenum code = gl_.GetError(); code != GL_NO_ERROR) {
+    const bool memory = code == GL_OUT_OF_MEMORY;
+    throw Error(memory ? ErrorKind::Limit : ErrorKind::Internal,
+                Fault{.place = "render",
+                      .key = {},
+                      .expected = memory ? "the driver has no memory for the picture"
+                                         : "OpenGL reports error " + std::to_string(code),
+                      .found = {},
+                      .hint = {}});
+  }
+  Image image{.width = settings_.width, .height = settings_.height, .pixels = {}};
+  image.pixels.resize(3 * width * height);
+  std::uint8_t* out = image.pixels.data();
+  for (std::size_t y = 0; y < height; ++y) {
+    const std::uint8_t* row = &rgba_[4 * width * (height - 1 - y)];
+    for (std::size_t x = 0; x < width; ++x, out += 3) std::memcpy(out, row + 4 * x, 3);
+  }
+  return image;
+}
+
+void GlRenderer::draw(const View& view, std::span<const Item> items) {
+  const Vec3& origin = view.camera.look_at;
+  {
+    const CpuClock clock(times_.upload);
+    pack(items, origin, list_);
+  }
+  painted_ = !list_.paint.empty();
+  if (painted_) make_painting();
+  const CameraMatrices camera =
+      camera_matrices(view.camera, static_cast<double>(settings_.width) / settings_.height, list_.bounds);
+
+  gl_.Disable(GL_BLEND);
+  gl_.Disable(GL_DITHER);
+  gl_.DepthFunc(GL_LEQUAL);
+  gl_.Enable(GL_CULL_FACE);
+  gl_.CullFace(GL_BACK);
+
+  // Maps cover what is near the picture; something that flew away does not coarsen them.
+  const Vec3 reach = Vec3::Constant(kRegion * camera.distance);
+  const Box region = list_.bounds.intersection({-reach, reach});
+  const bool has_items = !list_.indices.empty();
+  const bool has_region = has_items && !region.empty();
+  if (has_items) {
+    const CpuClock clock(times_.upload);
+    upload(items);
+  }
+  const CpuClock clock(times_.draw);
+
+  std::optional<MapFit> shadow;
+  if (has_region && settings_.shadow_size > 0 && view.light.intensity > 0.0) {
+    // The side of a closed surface that faces the light is all of its shadow.
+    if (std::any_of(items.begin(), items.end(), [](const Item& item) { return item.two_sided; }))
+      gl_.Disable(GL_CULL_FACE);
+    shadow = fit_map(region, view.light.direction, settings_.shadow_size);
+    draw_shadow_map(*shadow);
+  }
+  std::optional<MapFit> heights;
+  gl_.Disable(GL_CULL_FACE);  // lowest and highest points are on different sides
+  if (has_region && view.ground) {
+    const double ground = view.ground->height - origin.z();
+    const double above = region.upper.z() - ground;
+    if (above > 0.0) {
+      const double margin = std::min(1.5 * above, 0.5 * kRegion * camera.distance);
+      const double half = 0.5 * std::max(region.extent().x(), region.extent().y()) + margin;
+      const Vec3 spread(half, half, 0.5 * region.extent().z());
+      heights = fit_map({region.centre() - spread, region.centre() + spread}, Vec3(0, 0, -1), kHeightMapSize);
+      draw_ground_occlusion(*heights, static_cast<float>(ground));
+    }
+  }
+  gl_.Enable(GL_CULL_FACE);
+
+  const auto radius = static_cast<float>(kOcclusionRadius * camera.distance);
+  draw_geometry(camera, items);
+  if (has_items) draw_screen_occlusion(camera, view, radius);
+  draw_picture(camera, view, shadow ? &*shadow : nullptr, heights ? &*heights : nullptr, radius);
+  gl_.Finish();
+}
+
+Image GlRenderer::render(const View& view, std::span<const Item> items) {
+  SUPPLE_EXPECTS(view.light.direction.norm() > 0.0);
+  const CurrentContext current(*context_);
+  draw(view, items);
+  const CpuClock clock(times_.read_back);
+  return read_back();
+}
+
+}  // namespace supple::render
