@@ -61,6 +61,7 @@ void print_profile(const fs::path& folder) {
 }
 
 int report(const scenes::RunResult& result, const Arguments& arguments) {
+  for (const std::string& warning : result.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (result.outcome != "done") {
     std::fprintf(stderr, "%s\n", result.reason.c_str());
     std::fprintf(stderr, "stopped: %s, last good frame %d, %s\n", result.outcome.c_str(), result.frames,

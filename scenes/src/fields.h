@@ -514,6 +514,7 @@ template <class Archive>
 void fields(Archive& archive, ContactDesc& d) {
   archive("error", d.error, between(1e-10, 0.1, kNumber), "relative error of force, area and centre of pressure");
   archive("split", d.split, {}, "how forces reach the particles: gradient of the contact energy, or by contribution");
+  archive("core", d.core, {}, "soft: bodies pressed too hard pass one another, which is reported; barrier: deep cores turn back what approaches");
   archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out");
   archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
   archive("bulge_width", d.bulge_width, up_to(1.0, kNumber), "share of the other body's feature size");

@@ -58,6 +58,9 @@ template <> struct EnumNames<BlendName> {
 template <> struct EnumNames<SplitName> {
   static constexpr std::array<std::string_view, 2> names{"energy", "contribution"};
 };
+template <> struct EnumNames<CoreName> {
+  static constexpr std::array<std::string_view, 2> names{"soft", "barrier"};
+};
 template <> struct EnumNames<TableName> {
   static constexpr std::array<std::string_view, 2> names{"none", "csv"};
 };

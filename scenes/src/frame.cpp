@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "supple/collision/deformed_field.h"
 #include "supple/core/parts.h"
@@ -63,6 +64,10 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
     body.velocity = frame.velocity[i];
     body.angular_velocity = frame.spin[i];
     body.samples = &frame.samples[i];
+    body.core_value = std::numeric_limits<double>::infinity();
+    for (const implicit::Primitive& primitive : own.skeleton.primitive) {
+      body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);
+    }
   }
   for (std::size_t k = 0; k < model.fixed.size(); ++k) {
     collision::ContactBody& body = frame.bodies[context.bodies.size() + k];
@@ -72,6 +77,8 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
     body.velocity = {&kZero, 1};
     body.angular_velocity = {&kZero, 1};
     body.fixed = true;
+    const Box box = body.field.surface_box();
+    if (box.lower.allFinite() && box.upper.allFinite()) body.core_value = body.field.value(box.centre());
   }
 }
 

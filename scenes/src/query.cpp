@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "supple/collision/approach.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -75,6 +76,9 @@ std::string query_contact(Simulation& simulation, bool samples) {
   const double begin = thread_cpu_seconds();
   const collision::ContactSurface& surface = simulation.contacts();
   const double cpu_us = 1e6 * (thread_cpu_seconds() - begin);
+  const auto capacity = [bodies = simulation.contact_bodies()](const collision::ContactSurface::Summary& s) {
+    return collision::contact_capacity(bodies[s.bodies.a], bodies[s.bodies.b], -s.force.normalized());
+  };
   ordered_json json;
   json["time_s"] = simulation.time();
   json["cpu_us"] = cpu_us;
@@ -89,6 +93,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"area_m2", s.area},
                          {"centre_of_pressure_m", vector(s.centre_of_pressure)},
                          {"energy_j", s.energy},
+                         {"capacity_j", capacity(s)},
                          {"largest_pressure_pa", s.largest_pressure},
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},

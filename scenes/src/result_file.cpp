@@ -63,6 +63,11 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
                       {"external_impulse_ns", vector(state.ledger.external_impulse)},
                       {"pin_impulse_ns", vector(state.ledger.pin_impulse)},
                       {"pin_angular_impulse_nms", vector(state.ledger.pin_angular_impulse)}};
+    json["overloads"] = ordered_json::array();
+    for (const auto& o : state.record.overloads) {
+      json["overloads"].push_back({{"a", o.a}, {"b", o.b}, {"time_s", o.time}, {"energy_j", o.energy}, {"capacity_j", o.capacity}});
+    }
+    json["core_impulses"] = state.record.core_impulses;
     const Model& model = simulation->model();
     ordered_json objects = ordered_json::object();
     for (std::size_t i = 0; i < model.objects.size(); ++i) {

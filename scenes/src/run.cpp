@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <optional>
@@ -182,6 +183,13 @@ std::string outcome_of(ErrorKind kind) {
 
 constexpr int kSignalExit = 128;
 
+std::string overload_text(const RunRecord::Overload& o) {
+  std::array<char, 160> numbers{};
+  std::snprintf(numbers.data(), numbers.size(), " overloaded from t = %.6g s: energy of approach and contact %.4g J, capacity %.4g J",
+                o.time, o.energy, o.capacity);
+  return o.a + " and " + o.b + numbers.data();
+}
+
 /// Runs `body`, which fills `result`; whatever happens result.json is left behind.
 template <class Body>
 RunResult guarded(const Scene& scene, const RunOptions& options, std::optional<Simulation>& simulation,
@@ -204,6 +212,7 @@ RunResult guarded(const Scene& scene, const RunOptions& options, std::optional<S
   if (simulation) {
     result.frames = simulation->frame();
     result.state_hash = simulation->state_hash();
+    for (const auto& o : simulation->state().record.overloads) result.warnings.push_back(overload_text(o));
   }
   write_result_file(scene, result, simulation ? &*simulation : nullptr, seconds_since(begin));
   return result;

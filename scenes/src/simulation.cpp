@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame.h"
+#include "overload.h"
 #include "read_scene_faults.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
@@ -39,6 +40,7 @@ struct Simulation::Impl {
   std::vector<Body> bodies;
   collision::ContactRules rules;
   Frame frame;
+  OverloadWatch watch;
   core::InteractionWorkspace workspace;
   IntegratorPlan integrator;
   core::IntegratorWorkspace integrator_workspace;
@@ -81,6 +83,7 @@ struct Simulation::Impl {
     bodies = make_bodies(model, parted_links(model, state.links, state.broken_for));
     fade_blends(model, state.links, state.broken_for, bodies);
     scale_kernels();
+    watch.forget();
     rules = make_body_rules(model, bodies, state.apart);
     frame = Frame(model, bodies);
     pulled = Frame(model, bodies);
@@ -332,12 +335,26 @@ struct Simulation::Impl {
       if (last_frame.record.valid) take(last_frame);
       throw_diverged(divergence, step, at);
     }
+    watch_pressing();
     update_links();
     control_volumes();
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
       ++state.frame;
     }
+  }
+
+  /// At the end of a step: pairs that press harder than they can hold are noted, and turned back by hard cores.
+  void watch_pressing() {
+    if (!contact_on()) return;
+    const bool barrier = scene.contact.core == CoreName::Barrier;
+    if (barrier && integrator.settings.method != core::Integrator::Symplectic) {
+      // The last trial of other methods need not be the state they end with.
+      std::vector<implicit::SampleState> trial = state.samples;
+      find_contact_surface(context(), state.particles, trial, frame, false);
+    }
+    watch.look(context(), state.particles, frame, time(), state.record);
+    if (barrier && hold_cores(context(), frame, state.particles, state.ledger, state.record)) state.kick.valid = false;
   }
 
   void book_work(const core::StepReport& report) {
@@ -504,6 +521,11 @@ const std::vector<Mesh>& Simulation::meshes() { return impl_->pull_meshes(); }
 const collision::ContactSurface& Simulation::contacts() {
   impl_->pull_contacts();
   return impl_->pulled.surface;
+}
+
+std::span<const collision::ContactBody> Simulation::contact_bodies() {
+  impl_->pull_contacts();
+  return impl_->pulled.bodies;
 }
 
 const std::vector<Vec3>& Simulation::contact_forces() {

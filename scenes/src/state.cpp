@@ -9,7 +9,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 3;
+constexpr std::uint64_t kVersion = 4;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -36,6 +36,13 @@ void save_record(StateWriter& out, const RunRecord& r) {
     out.write(o.largest_deformation);
     out.write(o.final_shape_error);
   }
+  out.write(r.core_impulses);
+  out.write(std::uint64_t{r.overloads.size()});
+  for (const auto& o : r.overloads) {
+    out.write(std::string_view(o.a));
+    out.write(std::string_view(o.b));
+    for (const double value : {o.time, o.energy, o.capacity}) out.write(value);
+  }
 }
 
 void load_record(StateReader& in, RunRecord& r) {
@@ -58,6 +65,16 @@ void load_record(StateReader& in, RunRecord& r) {
     in.read(o.largest_deformation);
     in.read(o.final_shape_error);
     r.objects.push_back(o);
+  }
+  in.read(r.core_impulses);
+  in.read(n);
+  r.overloads.clear();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    RunRecord::Overload o;
+    in.read(o.a);
+    in.read(o.b);
+    for (double* value : {&o.time, &o.energy, &o.capacity}) in.read(*value);
+    r.overloads.push_back(std::move(o));
   }
 }
 

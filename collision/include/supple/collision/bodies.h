@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct ContactBody {
   std::span<const Vec3> angular_velocity;    ///< of the parts, world axes [rad/s], shape [parts]
   const implicit::SurfaceSamples* samples = nullptr;  ///< null: the body offers no seeds (a half-space)
   bool fixed = false;                        ///< takes forces without moving; two fixed bodies do not touch
+  double core_value = std::numeric_limits<double>::infinity();  ///< F where the body is deepest [1], or less; for hard cores
 };
 
 /// A pair of bodies, a < b.

@@ -266,11 +266,13 @@ struct PairDesc {
 };
 
 enum class SplitName : std::uint8_t { Energy, Contribution };
+enum class CoreName : std::uint8_t { Soft, Barrier };
 
 /// contact: of the scene
 struct ContactDesc {
   double error = 1e-4;
   SplitName split = SplitName::Energy;
+  CoreName core = CoreName::Soft;
   double friction_speed = 1e-3;       ///< [m/s]
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
   double bulge_width = 0.15;          ///< share of the other body's feature size

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -89,6 +90,8 @@ class Simulation {
   [[nodiscard]] const std::vector<Mesh>& meshes();
   /// Contacts of the current state between `bodies()`, the ground being the last. Kept until the next step.
   [[nodiscard]] const collision::ContactSurface& contacts();
+  /// Bodies as contact sees them, the fixed ones last; valid until the next step.
+  [[nodiscard]] std::span<const collision::ContactBody> contact_bodies();
   /// Total force on body A of each contact, damping and friction included [N], shape [contacts().summary].
   [[nodiscard]] const std::vector<Vec3>& contact_forces();
   /// Loads of contact on all particles at the current state.

@@ -33,6 +33,15 @@ struct RunRecord {
   double largest_overlap = 0.0;        ///< thickness of the overlap of undeformed fields [m]
   double largest_overlap_share = 0.0;  ///< the same over twice the smaller iso radius [1]
   std::vector<ObjectRecord> objects;
+  /// A pair that pressed harder than half of what it holds: when first, and how hard at worst.
+  struct Overload {
+    std::string a, b;                  ///< names of the bodies
+    double time = 0.0;                 ///< [s]
+    double energy = 0.0;               ///< of approach and contact [J]
+    double capacity = 0.0;             ///< largest contact energy of the pair [J]
+  };
+  std::vector<Overload> overloads;
+  std::uint64_t core_impulses = 0;     ///< pairs that hard cores turned back
   bool valid = false;
 };
 

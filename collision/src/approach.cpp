@@ -1,0 +1,232 @@
+#include "supple/collision/approach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "supple/core/error.h"
+
+namespace supple::collision {
+namespace {
+
+/// Contributions of a body's parts to its field at one point.
+void contributions_at(const ContactBody& body, const Vec3& x, implicit::FieldParts& row) {
+  if (body.pose.size() == 1) {
+    row.offset.assign({0, 1});
+    row.part.assign(1, 0);
+    row.value.assign(1, 1.0);
+    return;
+  }
+  body.field.evaluate_parts({&x, 1}, row);
+  double sum = 0.0;
+  for (const double v : row.value) sum += v;
+  for (double& v : row.value) v /= sum;
+}
+
+/// One body at a point where it is pushed along a normal.
+struct Handle {
+  const ContactBody* body = nullptr;
+  const PartMobility* mobility = nullptr;
+  implicit::FieldParts row;
+  Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
+
+  void take(const ContactBody& b, const PartMobility& m, const Vec3& x, const Vec3& n) {
+    body = &b;
+    mobility = &m;
+    point = x;
+    normal = n;
+    contributions_at(b, x, row);
+  }
+  /// Speed of the point along the normal, by contributions, with what impulses have added so far.
+  [[nodiscard]] double speed(const PartLoads* added) const {
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t e = 0; e < row.part.size(); ++e) {
+      const std::size_t k = row.part[e];
+      const Vec3 arm = point - body->pose[k].position;
+      if (!body->velocity.empty()) sum += row.value[e] * body->velocity[k];
+      if (!body->angular_velocity.empty()) sum += row.value[e] * body->angular_velocity[k].cross(arm);
+      if (added == nullptr || mobility->inverse_mass.empty()) continue;
+      sum += row.value[e] * mobility->inverse_mass[k].cwiseProduct(added->force[k]);
+      sum += row.value[e] * (mobility->inverse_inertia[k] * added->torque[k]).cross(arm);
+    }
+    return sum.dot(normal);
+  }
+  /// Change of that speed by a unit impulse along the normal that is shared out by contributions.
+  [[nodiscard]] double inverse_mass() const {
+    if (mobility->inverse_mass.empty()) return 0.0;
+    double sum = 0.0;
+    for (std::size_t e = 0; e < row.part.size(); ++e) {
+      const std::size_t k = row.part[e];
+      const Vec3 lever = (point - body->pose[k].position).cross(normal);
+      sum += row.value[e] * row.value[e] *
+             (normal.dot(mobility->inverse_mass[k].cwiseProduct(normal)) + lever.dot(mobility->inverse_inertia[k] * lever));
+    }
+    return sum;
+  }
+  void push(double impulse, PartLoads& loads) const {
+    for (std::size_t e = 0; e < row.part.size(); ++e) {
+      const std::size_t k = row.part[e];
+      const Vec3 j = (impulse * row.value[e]) * normal;
+      loads.force[k] += j;
+      loads.torque[k] += (point - body->pose[k].position).cross(j);
+    }
+  }
+};
+
+/// The box in which both bodies, A moved by `shift`, may have pressure.
+Box overlap_of(const ContactBody& a, const ContactBody& b, const Vec3& shift) {
+  const Box box = a.field.surface_box();
+  return Box{box.lower + shift, box.upper + shift}.intersection(b.field.surface_box());
+}
+
+}  // namespace
+
+Approach measure_approach(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
+                          const ContactSurface::Summary& summary) {
+  SUPPLE_EXPECTS(mobility.size() == bodies.size());
+  Approach approach;
+  approach.point = summary.centre_of_pressure;
+  approach.normal = -summary.force.normalized();
+  Handle a, b;
+  a.take(bodies[summary.bodies.a], mobility[summary.bodies.a], approach.point, approach.normal);
+  b.take(bodies[summary.bodies.b], mobility[summary.bodies.b], approach.point, approach.normal);
+  approach.speed = a.speed(nullptr) - b.speed(nullptr);
+  approach.inverse_mass = a.inverse_mass() + b.inverse_mass();
+  return approach;
+}
+
+double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, int cells) {
+  SUPPLE_EXPECTS(cells > 0);
+  const Box box = overlap_of(a, b, shift);
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return 0.0;
+  const Vec3 cell = box.extent() / cells;
+  thread_local std::vector<Vec3> point, moved;
+  thread_local std::vector<double> of_a, of_b;
+  const auto n = static_cast<std::size_t>(cells) * static_cast<std::size_t>(cells);
+  point.resize(n);
+  moved.resize(n);
+  of_a.resize(n);
+  of_b.resize(n);
+  double sum = 0.0;
+  for (int k = 0; k < cells; ++k) {
+    for (int j = 0; j < cells; ++j) {
+      for (int i = 0; i < cells; ++i) {
+        const auto at = static_cast<std::size_t>(j * cells + i);
+        point[at] = box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
+        moved[at] = point[at] - shift;
+      }
+    }
+    a.field.evaluate(moved, of_a);
+    b.field.evaluate(point, of_b);
+    for (std::size_t at = 0; at < n; ++at) {
+      sum += std::max(0.0, std::min(a.material.modulus * of_a[at], b.material.modulus * of_b[at]));
+    }
+  }
+  return sum * cell.prod();
+}
+
+double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells) {
+  if (!a.field.surface_box().lower.allFinite() || !a.field.surface_box().upper.allFinite()) {
+    SUPPLE_EXPECTS(b.field.surface_box().extent().allFinite());
+    return contact_capacity(b, a, -direction, cells);
+  }
+  // Extents along the direction, by the support of the boxes.
+  const auto reach = [](const Box& box, const Vec3& d) {
+    double sum = 0.0;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if (d[k] != 0.0) sum += d[k] > 0.0 ? d[k] * box.upper[k] : d[k] * box.lower[k];
+    }
+    return sum;
+  };
+  const Box of_a = a.field.surface_box(), of_b = b.field.surface_box();
+  const double front = reach(of_a, direction), back = -reach(of_a, -direction);
+  const double near = -reach(of_b, -direction), far = reach(of_b, direction);
+  // From where A's front meets the near side of B to where its back has left it, or where A is wholly inside.
+  double first = near - front, last = far - back;
+  if (!std::isfinite(first)) first = 0.0;
+  if (!std::isfinite(last)) {
+    // A point of A's box that is deep enough below an unbounded B takes no part of its pressure away.
+    last = std::isfinite(near) ? near - back : 2.0 * (front - back);
+  }
+  constexpr int kScan = 12;
+  const int coarse = std::max(8, cells / 2);
+  const double step = (last - first) / kScan;
+  double best = 0.0, at = first;
+  for (int i = 0; i <= kScan; ++i) {
+    const double energy = shifted_energy(a, b, (first + i * step) * direction, coarse);
+    if (energy > best) {
+      best = energy;
+      at = first + i * step;
+    }
+  }
+  double low = std::max(first, at - step), high = std::min(last, at + step);
+  constexpr double kGolden = 0.3819660112501051;
+  double left = low + kGolden * (high - low), right = high - kGolden * (high - low);
+  double at_left = shifted_energy(a, b, left * direction, coarse), at_right = shifted_energy(a, b, right * direction, coarse);
+  constexpr int kNarrowings = 10;
+  for (int i = 0; i < kNarrowings; ++i) {
+    if (at_left > at_right) {
+      high = right;
+      right = left;
+      at_right = at_left;
+      left = low + kGolden * (high - low);
+      at_left = shifted_energy(a, b, left * direction, coarse);
+    } else {
+      low = left;
+      left = right;
+      at_left = at_right;
+      right = high - kGolden * (high - low);
+      at_right = shifted_energy(a, b, right * direction, coarse);
+    }
+  }
+  const double middle = at_left > at_right ? left : right;
+  return std::max(shifted_energy(a, b, middle * direction, cells), shifted_energy(a, b, at * direction, cells));
+}
+
+double core_pressure(const ContactBody& a, const ContactBody& b) {
+  return kCoreShare * std::min(a.material.modulus * a.core_value, b.material.modulus * b.core_value);
+}
+
+CoreImpulses hold_cores(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
+                        const ContactSurface& surface, std::span<PartLoads> impulses) {
+  SUPPLE_EXPECTS(mobility.size() == bodies.size() && impulses.size() == bodies.size());
+  struct Pair {
+    BodyPair bodies;
+    Handle a, b;
+    double inverse_mass;
+    bool pushed = false;
+  };
+  CoreImpulses report;
+  std::vector<Pair> pairs;
+  for (const ContactSurface::Summary& s : surface.summary) {
+    const ContactBody &a = bodies[s.bodies.a], &b = bodies[s.bodies.b];
+    if (!(s.largest_pressure > core_pressure(a, b)) || !(s.force.norm() > 0.0)) continue;
+    const Vec3 normal = -s.force.normalized();
+    Pair pair{.bodies = s.bodies, .a = {}, .b = {}, .inverse_mass = 0.0};
+    pair.a.take(a, mobility[s.bodies.a], s.centre_of_pressure, normal);
+    pair.b.take(b, mobility[s.bodies.b], s.centre_of_pressure, normal);
+    pair.inverse_mass = pair.a.inverse_mass() + pair.b.inverse_mass();
+    if (pair.inverse_mass > 0.0) pairs.push_back(std::move(pair));
+  }
+  constexpr int kElasticSweeps = 100, kSweeps = 200;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    bool any = false;
+    for (Pair& p : pairs) {
+      PartLoads &on_a = impulses[p.bodies.a], &on_b = impulses[p.bodies.b];
+      const double speed = p.a.speed(&on_a) - p.b.speed(&on_b);
+      // What an inelastic sweep leaves is round-off of the speeds.
+      if (!(speed > 1e-12 * (std::abs(p.a.speed(&on_a)) + std::abs(p.b.speed(&on_b))))) continue;
+      any = true;
+      p.pushed = true;
+      const double impulse = (sweep < kElasticSweeps ? 2.0 : 1.0) * speed / p.inverse_mass;
+      p.a.push(-impulse, on_a);
+      p.b.push(impulse, on_b);
+    }
+    if (!any) break;
+    report.settled = sweep + 1 < kSweeps;
+  }
+  for (const Pair& p : pairs) report.turned += p.pushed ? 1 : 0;
+  return report;
+}
+
+}  // namespace supple::collision

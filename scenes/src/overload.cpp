@@ -1,0 +1,150 @@
+#include "overload.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "supple/core/parts.h"
+
+namespace supple::scenes {
+namespace {
+
+/// Mass of a whole body [kg]; infinite when a pin holds it.
+double mass_of(const StageContext& context, std::uint32_t body) {
+  if (body >= context.bodies.size()) return std::numeric_limits<double>::infinity();
+  double mass = 0.0;
+  for (const std::uint32_t i : context.bodies[body].particle) {
+    if ((context.model.particles.pinned[i] & core::kPinPosition) != 0) return std::numeric_limits<double>::infinity();
+    mass += context.model.particles.mass[i];
+  }
+  return mass;
+}
+
+/// Bodies that are alike hold alike: particles of one object that are bodies of their own count as one kind.
+std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
+  constexpr std::uint32_t kAlike = 0x80000000;
+  if (body >= context.bodies.size() || !context.model.objects[context.bodies[body].object].separate) return body;
+  return kAlike | context.bodies[body].object;
+}
+
+}  // namespace
+
+void find_mobility(const StageContext& context, const core::ParticleState& particles,
+                   std::vector<collision::PartMobility>& mobility) {
+  const core::ParticleSet& set = context.model.particles;
+  mobility.resize(context.bodies.size() + context.model.fixed.size());
+  for (std::size_t b = 0; b < context.bodies.size(); ++b) {
+    const std::vector<std::uint32_t>& particle = context.bodies[b].particle;
+    mobility[b].inverse_mass.resize(particle.size());
+    mobility[b].inverse_inertia.resize(particle.size());
+    for (std::size_t k = 0; k < particle.size(); ++k) {
+      const std::uint32_t i = particle[k];
+      mobility[b].inverse_mass[k] = core::free_translation(set.pinned[i], Vec3::Constant(1.0 / set.mass[i]));
+      const Mat3 turn = particles.orientation[i].toRotationMatrix();
+      const Vec3 free = core::free_rotation(set.pinned[i], Vec3::Ones());
+      mobility[b].inverse_inertia[k] =
+          free.asDiagonal() * turn * set.inertia[i].cwiseInverse().asDiagonal() * turn.transpose() * free.asDiagonal();
+    }
+  }
+}
+
+void OverloadWatch::forget() {
+  capacity_.clear();
+  worst_.clear();
+}
+
+double OverloadWatch::capacity_of(const StageContext& context, const Frame& frame, const collision::Approach& approach,
+                                  const collision::BodyPair& pair) {
+  const std::uint32_t a = kind_of(context, pair.a), b = kind_of(context, pair.b);
+  const auto [place, fresh] = capacity_.try_emplace(collision::BodyPair{std::min(a, b), std::max(a, b)}, 0.0);
+  constexpr int kCoarseCells = 12;
+  if (fresh) {
+    place->second = collision::contact_capacity(frame.bodies[pair.a], frame.bodies[pair.b], approach.normal, kCoarseCells);
+  }
+  return place->second;
+}
+
+void OverloadWatch::look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
+                         RunRecord& record) {
+  if (frame.surface.summary.empty()) return;
+  find_mobility(context, particles, mobility_);
+  for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
+    const double force = s.force.norm();
+    if (!(force > 0.0)) continue;
+    const collision::Approach approach = collision::measure_approach(frame.bodies, mobility_, s);
+    const double speed = std::max(approach.speed, 0.0);
+    const double inverse = 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b);
+    const double kinetic = inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
+    // The force of a contact rises with its depth up to the largest load, so force times depth is more than its energy.
+    const double estimate = kinetic + force * s.largest_overlap;
+    constexpr double kSafety = 0.4;  // of a coarse capacity, where half is the bound
+    if (!(estimate > kSafety * capacity_of(context, frame, approach, s.bodies))) continue;
+    double& worst = worst_[s.bodies];
+    constexpr double kWorthMeasuring = 1.1;
+    if (!(estimate > kWorthMeasuring * worst)) continue;
+    worst = estimate;
+
+    const collision::ContactBody &a = frame.bodies[s.bodies.a], &b = frame.bodies[s.bodies.b];
+    constexpr int kCells = 24;
+    const double energy = kinetic + collision::shifted_energy(a, b, Vec3::Zero(), kCells);
+    const double capacity = collision::contact_capacity(a, b, approach.normal, kCells);
+    if (!(energy > 0.5 * capacity)) continue;
+    RunRecord::Overload found{.a = body_name(context.model, context.bodies, s.bodies.a),
+                              .b = body_name(context.model, context.bodies, s.bodies.b),
+                              .time = time,
+                              .energy = energy,
+                              .capacity = capacity};
+    const auto known = std::find_if(record.overloads.begin(), record.overloads.end(),
+                                    [&](const RunRecord::Overload& o) { return o.a == found.a && o.b == found.b; });
+    if (known == record.overloads.end()) {
+      record.overloads.push_back(std::move(found));
+    } else if (energy * known->capacity > known->energy * capacity) {
+      known->energy = energy;
+      known->capacity = capacity;
+    }
+  }
+}
+
+bool hold_cores(const StageContext& context, Frame& frame, core::ParticleState& particles, core::Ledger& ledger,
+                RunRecord& record) {
+  const auto deep = [&](const collision::ContactSurface::Summary& s) {
+    return s.largest_pressure > collision::core_pressure(frame.bodies[s.bodies.a], frame.bodies[s.bodies.b]);
+  };
+  if (std::none_of(frame.surface.summary.begin(), frame.surface.summary.end(), deep)) return false;
+  const core::ParticleSet& set = context.model.particles;
+  std::vector<collision::PartMobility> mobility;
+  find_mobility(context, particles, mobility);
+  std::vector<collision::PartLoads> impulses(frame.bodies.size());
+  for (std::size_t b = 0; b < frame.bodies.size(); ++b) {
+    impulses[b].force.assign(frame.bodies[b].pose.size(), Vec3::Zero());
+    impulses[b].torque.assign(frame.bodies[b].pose.size(), Vec3::Zero());
+    if (b < context.bodies.size() && !frame.bodies[b].pose.empty()) {
+      core::gather_motion(set, particles, context.bodies[b].particle, frame.velocity[b], frame.spin[b]);
+    }
+  }
+  const collision::CoreImpulses done = collision::hold_cores(frame.bodies, mobility, frame.surface, impulses);
+  if (done.turned == 0) return false;
+  record.core_impulses += done.turned;
+
+  const double before = core::measure_motion(set, particles).kinetic_energy;
+  for (std::size_t b = 0; b < frame.bodies.size(); ++b) {
+    for (std::size_t k = 0; k < impulses[b].force.size(); ++k) {
+      const Vec3 &j = impulses[b].force[k], &turn = impulses[b].torque[k];
+      if (b >= context.bodies.size()) {  // the moving ones take the opposite
+        ledger.external_impulse -= j;
+        ledger.external_angular_impulse -= frame.bodies[b].pose[k].position.cross(j) + turn;
+        continue;
+      }
+      const std::uint32_t i = context.bodies[b].particle[k];
+      const Vec3 free_j = core::free_translation(set.pinned[i], j), free_turn = core::free_rotation(set.pinned[i], turn);
+      particles.velocity[i] += free_j / set.mass[i];
+      particles.angular_momentum[i] += free_turn;
+      const Vec3 held = free_j - j;
+      ledger.pin_impulse += held;
+      ledger.pin_angular_impulse += particles.position[i].cross(held) + free_turn - turn;
+    }
+  }
+  ledger.dissipated += before - core::measure_motion(set, particles).kinetic_energy;
+  return true;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,40 @@
+/// What presses harder than a pair can hold: noticed while stepping, and turned back where the scene asks for hard cores.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "frame.h"
+#include "supple/collision/approach.h"
+#include "supple/scenes/state.h"
+
+namespace supple::scenes {
+
+/// What moves the parts of the bodies, by contact body; fixed ones stay empty.
+void find_mobility(const StageContext& context, const core::ParticleState& particles,
+                   std::vector<collision::PartMobility>& mobility);
+
+/// Looks at every pair that touches. A pair is overloaded when the kinetic energy of its approach (with the masses of the
+/// whole bodies) and its contact energy are more than half of what it can hold (`collision::contact_capacity`).
+class OverloadWatch {
+ public:
+  void look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
+            RunRecord& record);
+  /// Bodies have other indices from now on.
+  void forget();
+
+ private:
+  double capacity_of(const StageContext& context, const Frame& frame, const collision::Approach& approach,
+                     const collision::BodyPair& pair);
+
+  std::vector<collision::PartMobility> mobility_;
+  std::map<collision::BodyPair, double> capacity_;  ///< when the pair, or one like it, was first seen [J]
+  std::map<collision::BodyPair, double> worst_;     ///< estimate of the energy that was last measured [J]
+};
+
+/// Turns back what approaches beyond its core (`collision::hold_cores`); books what pins and fixed bodies take, and what
+/// sweeps that only stopped an approach took away. @return whether any velocity changed
+bool hold_cores(const StageContext& context, Frame& frame, core::ParticleState& particles, core::Ledger& ledger,
+                RunRecord& record);
+
+}  // namespace supple::scenes

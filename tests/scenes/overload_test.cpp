@@ -1,0 +1,121 @@
+// Pairs that press harder than they can hold: what is reported, what hard cores do, and that nothing passes below.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "supple/scenes/query.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+namespace {
+
+/// Two balls of linear pressure, E = 1e4 Pa and R = 0.1 m, of 0.2 kg each, that meet head-on or nearly.
+std::string balls(double speed, const std::string& rest = "") {
+  const auto ball = [](const std::string& name, double x, double y, double v) {
+    return "  - name: " + name + "\n    particles: {arrange: single, at: [" + std::to_string(x) + ", " + std::to_string(y) +
+           ", 0], velocity: [" + std::to_string(v) + ", 0, 0], mass: 0.2}\n" +
+           "    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]\n" +
+           "    contact: {modulus: 2e4}\n";
+  };
+  return "schema: 1\nduration: 10 s\nframe_rate: 1000\ntime_step: {max_substeps: 65536}\n" + rest + "objects:\n" +
+         ball("left", -0.11, 0.0, 0.5 * speed) + ball("right", 0.11, 0.01, -0.5 * speed);
+}
+
+Simulation run(const std::string& text, int frames) {
+  Simulation simulation(parse_scene(text, "test.yaml", "."));
+  while (simulation.frame() < frames) simulation.step_frame();
+  return simulation;
+}
+
+constexpr double kCapacity = std::numbers::pi * 1e4 * 1e-3 / 3.0;  // of two such balls [J]
+
+TEST(Overload, IsReportedAboveHalfOfTheCapacityOnly) {
+  const double safe = std::sqrt(2.0 * 0.45 * kCapacity / 0.1);  // of 45 % with half the mass of a ball
+  EXPECT_TRUE(run(balls(safe), 60).state().record.overloads.empty());
+
+  const double harder = std::sqrt(2.0 * 0.6 * kCapacity / 0.1);
+  const Simulation simulation = run(balls(harder), 60);
+  ASSERT_EQ(simulation.state().record.overloads.size(), 1u);
+  const RunRecord::Overload& found = simulation.state().record.overloads[0];
+  EXPECT_EQ(found.a, "left");
+  EXPECT_EQ(found.b, "right");
+  // Verlet's kinetic energy and that of the contact, each of which swings by (omega dt)^2 = 9 % at most, make the largest sum.
+  EXPECT_NEAR(found.energy, 0.6 * kCapacity, 0.09 * 0.6 * kCapacity);
+  EXPECT_NEAR(found.capacity, kCapacity, 0.01 * kCapacity);
+  EXPECT_NEAR(found.time, 0.02 / harder, 2e-3);
+}
+
+TEST(Overload, OfASteadyLoadBeginsWhereTheBallCarriesNoMore) {
+  // A linear ball on a rigid plane carries at most pi E R^2 / 3 = 104.7 N, at the depth R, where half of its capacity is spent.
+  const auto pressed = [](double force, bool until_reported = false) {
+    Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 10 s
+frame_rate: 100
+contact: {error: 0.01}
+obstacles: [{name: floor, shape: plane, modulus: 1e9}]
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0, 0, 0.1], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 2e4}
+    medium: {linear: 40, angular: 40}
+    loads: [{particle: 0, force: [0, 0, -)" + std::to_string(force) + R"(], ramp: 0.2}]
+)",
+                                      "test.yaml", "."));
+    while (simulation.frame() < 60 && !(until_reported && !simulation.state().record.overloads.empty())) simulation.step_frame();
+    return simulation;
+  };
+  const Simulation carried = pressed(80.0);
+  EXPECT_TRUE(carried.state().record.overloads.empty());
+  EXPECT_GT(carried.state().particles.position[0].z(), 0.0);
+  const Simulation crushed = pressed(150.0, true);
+  ASSERT_EQ(crushed.state().record.overloads.size(), 1u);
+  EXPECT_NEAR(crushed.state().record.overloads[0].capacity, kCapacity, 0.01 * kCapacity);
+  EXPECT_TRUE(crushed.state().particles.position[0].allFinite());
+}
+
+TEST(Overload, IsKeptWithTheState) {
+  const Simulation simulation = run(balls(15.0), 8);
+  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "overload.state";
+  save_state(file, simulation.state(), 1);
+  const State loaded = load_state(file, 1);
+  ASSERT_EQ(loaded.record.overloads.size(), 1u);
+  EXPECT_EQ(loaded.record.overloads[0].b, "right");
+  EXPECT_EQ(loaded.record.overloads[0].energy, simulation.state().record.overloads[0].energy);
+}
+
+TEST(Overload, CapacityStandsInTheAnswerToAQuery) {
+  Simulation simulation = run(balls(1.0), 40);
+  const auto answer = nlohmann::json::parse(query_contact(simulation, false));
+  EXPECT_NEAR(answer["pairs"][0]["capacity_j"].get<double>(), kCapacity, 0.01 * kCapacity);
+}
+
+TEST(Tunnelling, HappensAtNoSpeedWithHardCores) {
+  for (const double speed : {20.0, 150.0, 600.0}) {
+    const int frames = 20 + static_cast<int>(100.0 / speed);
+    const Simulation soft = run(balls(speed, "contact: {error: 0.1}\n"), frames);
+    const Simulation hard = run(balls(speed, "contact: {core: barrier}\n"), frames);
+    const auto gap = [](const Simulation& s) { return s.state().particles.position[1].x() - s.state().particles.position[0].x(); };
+    EXPECT_LT(gap(soft), 0.0) << speed;
+    EXPECT_GT(gap(hard), 0.1) << speed;
+    EXPECT_GT(hard.state().record.core_impulses, 0u);
+    EXPECT_EQ(hard.state().record.overloads.size(), 1u);
+    EXPECT_LT(hard.audits().momentum_error, 1e-13);
+    EXPECT_LT(hard.audits().angular_momentum_error, 1e-12);
+    // Verlet's energy swings by (omega dt)^2 at most; the cores add nothing.
+    EXPECT_LT(hard.audits().energy_error, 0.01);
+  }
+}
+
+TEST(HardCores, DoNothingBelowThem) {
+  const Simulation soft = run(balls(5.0), 60), hard = run(balls(5.0, "contact: {core: barrier}\n"), 60);
+  EXPECT_EQ(hard.state().record.core_impulses, 0u);
+  EXPECT_EQ(soft.state_hash(), hard.state_hash());
+}
+
+}  // namespace
+}  // namespace supple::scenes
