@@ -9,11 +9,11 @@ declare -A supple_packages=(
            libdeflate-dev libosmesa6-dev libgl-dev libegl-dev
            libyaml-cpp-dev nlohmann-json3-dev libcli11-dev"
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
-  [test]="libgtest-dev"
+  [test]="libgtest-dev libcgal-dev"
   [check]="clang"
 )
 declare -A supple_purpose=(
-  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests" [check]="for the second compiler"
+  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, and Delaunay meshes" [check]="for the second compiler"
 )
 
 # missing_packages NAME...: prints those that dpkg does not list as installed.

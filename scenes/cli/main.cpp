@@ -18,6 +18,9 @@
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#ifdef SUPPLE_HAS_CGAL
+#include "supple/cgal/surface_meshes.h"
+#endif
 
 namespace {
 
@@ -77,6 +80,16 @@ int report(const scenes::RunResult& result, const Arguments& arguments) {
   return 0;
 }
 
+/// What optional components of this program offer.
+scenes::SimulationOptions simulation_options(int threads) {
+  scenes::SimulationOptions options;
+  options.threads = threads;
+#ifdef SUPPLE_HAS_CGAL
+  options.delaunay = cgal::delaunay_mesh;
+#endif
+  return options;
+}
+
 scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folder, tool::ProgressBar& bar) {
   scenes::RunOptions options;
   options.folder = folder;
@@ -87,6 +100,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.simulate_only = arguments.simulate_only;
   options.profile = arguments.profile;
   options.context = arguments.context;
+  options.delaunay = simulation_options(0).delaunay;
   options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
   options.interrupt = &interrupted;
   return options;
@@ -126,7 +140,7 @@ int render(const Arguments& arguments) {
 
 int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
-  const scenes::Simulation simulation(scene);
+  const scenes::Simulation simulation(scene, simulation_options(1));
   if (!arguments.quiet) {
     std::printf("%s: no fault found (%zu objects, %zu particles, %d frames)\n", arguments.scene.c_str(),
                 scene.objects.size(), simulation.model().particles.size(), scene.frame_count());
@@ -137,7 +151,7 @@ int check(const Arguments& arguments) {
 int explain(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.simulate_only) scene.output = {};
-  std::fputs(scenes::explain(scenes::Simulation(std::move(scene))).c_str(), stdout);
+  std::fputs(scenes::explain(scenes::Simulation(std::move(scene), simulation_options(1))).c_str(), stdout);
   return 0;
 }
 
@@ -145,7 +159,7 @@ int query(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.error > 0.0) scene.contact.error = arguments.error;
   const std::uint64_t fingerprint = scene.content_hash;
-  scenes::Simulation simulation(std::move(scene), {.threads = arguments.threads});
+  scenes::Simulation simulation(std::move(scene), simulation_options(arguments.threads));
   if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, fingerprint));
   std::string answer;
   if (arguments.query == "forces") {

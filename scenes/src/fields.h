@@ -559,11 +559,16 @@ void fields(Archive& archive, ImagesDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, MeshingDesc& d) {
-  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra); auto: cubes, the faster one");
+  using enum MeshingName;
+  const auto only = [&d](const Rule& rule) { return rule.only("method", d.method, {Delaunay}); };
+  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra); auto: cubes, the faster one; delaunay: triangles of guaranteed quality, needs the component supple_cgal");
   archive("error", d.error, above(0.0, kLength).or_auto(), "largest distance of a triangle's centroid to the surface, for cubes; auto: by the cell");
+  archive("angle_deg", d.angle, only(degrees(1.0, 30.0)), "least angle of a triangle");
+  archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
+  archive("distance", d.distance, only(above(0.0, kLength).or_auto()), "from a triangle's circumcentre to that point; auto: a tenth of the size");
   archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
-  archive.check(!d.error || d.method != MeshingName::Tetrahedra, "error", "expected method auto or cubes with an error", "tetrahedra",
-                "leave out 'method'");
+  archive.check(!d.error || d.method == Auto || d.method == Cubes, "error", "expected method auto or cubes with an error",
+                std::string(name_of(d.method)), "leave out 'method'");
 }
 
 template <class Archive>

@@ -68,7 +68,7 @@ template <> struct EnumNames<MeshName> {
   static constexpr std::array<std::string_view, 2> names{"none", "ply"};
 };
 template <> struct EnumNames<MeshingName> {
-  static constexpr std::array<std::string_view, 3> names{"auto", "cubes", "tetrahedra"};
+  static constexpr std::array<std::string_view, 4> names{"auto", "cubes", "tetrahedra", "delaunay"};
 };
 template <> struct EnumNames<GridName> {
   static constexpr std::array<std::string_view, 2> names{"none", "vdb"};

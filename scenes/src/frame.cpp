@@ -327,6 +327,16 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
       add_counts();
       continue;
     }
+    if (model.meshing.method == MeshingName::Delaunay) {
+      const double size = model.meshing.size.value_or(2.0 * model.cell);
+      const double distance = model.meshing.distance.value_or(0.1 * size);
+      implicit::DelaunayReport report;
+      surfaces[i] = (*context.delaunay)(frame.field[i], {.angle = model.meshing.angle, .size = size, .distance = distance,
+                                                         .cell = model.cell}, &report);
+      profile.visited += report.seeds + report.inserted;
+      profile.present += report.seeds + report.inserted;
+      continue;
+    }
     implicit::MarchCounts marched;
     surfaces[i] = frame.mesher[i].make(frame.field[i], {.lattice = lattice, .error = model.meshing.error.value_or(0.0)},
                                        context.executor, &marched);
@@ -359,6 +369,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   for (Fault& fault : faults) {
     if (fault.key == "lattice.cell") fault.key = "output.cell";
     if (fault.key == "mesh.error") fault.key = "output.meshing.error";
+    if (fault.key == "mesh.size") fault.key = "output.meshing.size";
   }
   throw Error(error.kind(), std::move(faults));
 }

@@ -8,6 +8,7 @@
 #include "supple/collision/find_contacts.h"
 #include "supple/collision/react.h"
 #include "supple/core/executor.h"
+#include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/scenes/model.h"
@@ -66,6 +67,7 @@ struct StageContext {
   Profile& profile;
   bool skip = true;
   bool every_call = false;
+  const implicit::DelaunayMesher* delaunay = nullptr;
 };
 
 /// Stages 2 and 3 for one body.

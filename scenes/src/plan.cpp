@@ -63,6 +63,7 @@ std::size_t contact_body_count(const Model& model) {
 std::string meshing_of(const Scene& scene) {
   const MeshingDesc& d = scene.output.meshing;
   if (d.method == MeshingName::Tetrahedra) return "tetrahedra";
+  if (d.method == MeshingName::Delaunay) return "Delaunay refinement by CGAL, tetrahedra where objects touch";
   return std::string(d.error ? "marching cubes to the error asked for" : "marching cubes") +
          (d.method == MeshingName::Auto ? " (auto: the faster one)" : "") + ", tetrahedra where objects touch";
 }

@@ -288,7 +288,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
   std::optional<Simulation> simulation;
   return guarded(scene, options, simulation, [&](RunResult& result) {
         if (!options.resume) remove_outputs(options.folder, name);
-        simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile});
+        simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
         const int frame_count = scene.frame_count();
         FrameWriter writer(scene, options, outputs);
         Reporter report(options, frame_count);
@@ -339,7 +339,7 @@ RunResult render_run(const Scene& scene, const RunOptions& options) {
                                            .found = "none",
                                            .hint = "run the scene first: supple run SCENE --out FOLDER"});
         }
-        simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile});
+        simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
         FrameWriter writer(scene, options, outputs);
         Reporter report(options, *last);
         for (int frame = 1; frame <= *last; ++frame) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame.h"
+#include "model_faults.h"
 #include "overload.h"
 #include "read_scene_faults.h"
 #include "supple/core/error.h"
@@ -57,14 +58,20 @@ struct Simulation::Impl {
   Impl(Scene s, SimulationOptions o)
       : scene(std::move(s)),
         model(build_model(scene)),
-        options(o),
-        executor(o.threads),
+        options(std::move(o)),
+        executor(options.threads),
         plan(plan_step(scene, model, requested_outputs(scene))),
         laws(model.interactions),
         frame(model, bodies),
         workspace(model.particles, laws),
         integrator(plan_integrator(scene, model)),
         pulled(model, bodies) {
+    if (scene.output.meshing.method == MeshingName::Delaunay && !options.delaunay) {
+      ModelFaults faults(scene);
+      faults.add("output.meshing.method", "expected a program with the component supple_cgal for delaunay", "one without it",
+                 "install libcgal-dev and build again, or use method: cubes");
+      faults.raise();
+    }
     state.particles = model.initial;
     state.links = core::unbroken(model.links);
     state.broken_for.assign(model.links.size(), 0.0);
@@ -76,7 +83,7 @@ struct Simulation::Impl {
     book_audits();
   }
 
-  StageContext context() { return {model, bodies, rules, executor, profile, options.skip, options.profile}; }
+  StageContext context() { return {model, bodies, rules, executor, profile, options.skip, options.profile, &options.delaunay}; }
 
   /// Bodies, rules and frames for the present pieces.
   void form_bodies() {

@@ -52,6 +52,18 @@ std::uint64_t hash_after(const Scene& scene, int frames, SimulationOptions optio
   return simulation.state_hash();
 }
 
+TEST(Meshes, ByAComponentThatIsAbsentAreRefusedByItsName) {
+  try {
+    (void)make(two_balls("output: {mesh: ply, meshing: {method: delaunay}}"));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Scene);
+    EXPECT_EQ(std::string(error.what()),
+              "./test.yaml: output.meshing.method: expected a program with the component supple_cgal for delaunay, found one "
+              "without it; install libcgal-dev and build again, or use method: cubes");
+  }
+}
+
 TEST(FreeCollision, KeepsMomentumAndAngularMomentumToRoundOffAtEveryStep) {
   for (const std::string& scene : {std::string("contacts/spiral_free"), std::string("contacts/two_balls")}) {
     Simulation simulation(library_scene(scene));

@@ -41,7 +41,8 @@ class SolidBox {
 };
 
 /// Ground of varying height, {z <= h(x, y)}: F = slope (h(x, y) - z). h is the bicubic spline through heights on a regular
-/// grid, constant beyond its borders; C^2 inside.
+/// grid as a sum of cubic B-splines (de Boor 1978, "A Practical Guide to Splines", ch. IX-XIII), constant beyond its
+/// borders; C^2 inside.
 class HeightField {
  public:
   /// @param heights  h at corner + spacing (i, j), row j after row, shape [rows][columns] [m]

@@ -35,6 +35,7 @@ struct RunOptions {
   bool simulate_only = false;                   ///< no images, meshes, grids or film
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
+  implicit::DelaunayMesher delaunay{};          ///< see SimulationOptions::delaunay
   std::string context = "auto";                 ///< auto, osmesa or egl
   std::function<void(const Progress&)> progress{}; ///< called from the running thread; may be empty
   const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current frame (the signal's number)

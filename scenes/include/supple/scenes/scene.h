@@ -331,11 +331,14 @@ struct ImagesDesc {
 enum class TableName : std::uint8_t { None, Csv };
 enum class MeshName : std::uint8_t { None, Ply };
 enum class GridName : std::uint8_t { None, Vdb };
-enum class MeshingName : std::uint8_t { Auto, Cubes, Tetrahedra };
+enum class MeshingName : std::uint8_t { Auto, Cubes, Tetrahedra, Delaunay };
 
 struct MeshingDesc {
   MeshingName method = MeshingName::Auto;  ///< of bodies that touch no other
   std::optional<double> error;             ///< largest distance of a triangle's centroid to the surface [m]; absent: by the cell
+  double angle = 0.5235987755982988;       ///< Delaunay: least angle of a triangle [rad]
+  std::optional<double> size;              ///< Delaunay: largest radius of a surface ball [m]; absent: two cells
+  std::optional<double> distance;          ///< Delaunay: from circumcentre to surface [m]; absent: a tenth of the size
   bool motion = false;                     ///< columns of velocity and owner
 };
 

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "supple/core/mesh.h"
+#include "supple/implicit/delaunay.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/plan.h"
 #include "supple/scenes/state.h"
@@ -26,6 +27,7 @@ struct SimulationOptions {
   int threads = 1;             ///< 0: all the machine has; the result does not depend on it
   bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
   bool profile = false;        ///< time every step, not every 64th
+  implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
 };
 
 /// Work of one stage so far.

@@ -1,0 +1,276 @@
+#include <CGAL/Complex_2_in_triangulation_3.h>
+#include <CGAL/Delaunay_triangulation_3.h>
+#include <CGAL/Delaunay_triangulation_cell_base_with_circumcenter_3.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Robust_circumcenter_traits_3.h>
+#include <CGAL/Surface_mesh_cell_base_3.h>
+#include <CGAL/Surface_mesh_default_criteria_3.h>
+#include <CGAL/Surface_mesh_vertex_base_3.h>
+#include <CGAL/make_surface_mesh.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <tuple>
+#include <unordered_map>
+#include <vector>
+
+#include "supple/cgal/surface_meshes.h"
+#include "supple/core/error.h"
+#include "supple/implicit/march_cubes.h"
+#include "supple/implicit/project.h"
+
+namespace supple::cgal {
+namespace {
+
+/// A vertex or cell that knows when it was made. CGAL then sorts by that and not by address, and repeats.
+template <class Base>
+class Stamped : public Base {
+ public:
+  template <class Structure>
+  struct Rebind_TDS {
+    using Other = Stamped<typename Base::template Rebind_TDS<Structure>::Other>;
+  };
+  using Has_timestamp = CGAL::Tag_true;
+  using Base::Base;
+  [[nodiscard]] std::size_t time_stamp() const { return stamp_; }
+  void set_time_stamp(const std::size_t& stamp) { stamp_ = stamp; }
+
+ private:
+  std::size_t stamp_ = std::numeric_limits<std::size_t>::max();
+};
+
+using Traits = CGAL::Robust_circumcenter_traits_3<CGAL::Exact_predicates_inexact_constructions_kernel>;
+using VertexBase = Stamped<CGAL::Surface_mesh_vertex_base_3<Traits>>;
+using CellBase =
+    Stamped<CGAL::Delaunay_triangulation_cell_base_with_circumcenter_3<Traits, CGAL::Surface_mesh_cell_base_3<Traits>>>;
+using Triangulation =
+    CGAL::Delaunay_triangulation_3<Traits, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+using Complex = CGAL::Complex_2_in_triangulation_3<Triangulation>;
+using Point = Traits::Point_3;
+using Facet = Triangulation::Facet;
+
+Vec3 vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
+Point point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+/// The surface as the mesher meets it: where dual edges of the triangulation cross it.
+struct Surface {
+  implicit::FieldView field;
+  Vec3 centre;  ///< of a ball that holds the surface
+  double radius;
+  std::vector<Point> seeds;
+};
+
+class Oracle {
+ public:
+  using Surface_3 = Surface;
+  using Point_3 = Point;
+  using Intersection_point = Point;
+  using Segment_3 = Traits::Segment_3;
+  using Ray_3 = Traits::Ray_3;
+  using Line_3 = Traits::Line_3;
+
+  class Intersect_3 {
+   public:
+    CGAL::Object operator()(const Surface& surface, const Segment_3& s) const {
+      return between(surface, vec(s.source()), vec(s.target()));
+    }
+    CGAL::Object operator()(const Surface& surface, const Ray_3& r) const {
+      const Vec3 from = vec(r.source());
+      return between(surface, from, beyond(surface, from, vec(r.point(1)) - from));
+    }
+    CGAL::Object operator()(const Surface& surface, const Line_3& l) const {
+      const Vec3 at = vec(l.point(0)), along = vec(l.point(1)) - at;
+      return between(surface, beyond(surface, at, -along), beyond(surface, at, along));
+    }
+
+   private:
+    static Vec3 beyond(const Surface& surface, const Vec3& from, const Vec3& along) {
+      return from + ((from - surface.centre).norm() + 1.01 * surface.radius) * along.normalized();
+    }
+    // A dual edge counts when its ends lie on different sides; the triangles then bound the cells whose circumcentre lies
+    // inside, and that is a closed surface.
+    static CGAL::Object between(const Surface& surface, const Vec3& a, const Vec3& b) {
+      if ((surface.field.value(a) > 0.0) == (surface.field.value(b) > 0.0)) return {};
+      // An edge comes from either end; rounding must not tell which.
+      const bool forward = std::tie(a.x(), a.y(), a.z()) < std::tie(b.x(), b.y(), b.z());
+      return CGAL::make_object(point(implicit::root_on_segment(surface.field, forward ? a : b, forward ? b : a)));
+    }
+  };
+
+  class Construct_initial_points {
+   public:
+    template <class Out>
+    Out operator()(const Surface& surface, Out out, int /*count*/ = 0) const {
+      return std::copy(surface.seeds.begin(), surface.seeds.end(), out);
+    }
+  };
+
+  [[nodiscard]] Intersect_3 intersect_3_object() const { return {}; }
+  [[nodiscard]] Construct_initial_points construct_initial_points_object() const { return {}; }
+};
+
+[[noreturn]] void refuse(std::uint64_t most, const std::string& found) {
+  throw Error(ErrorKind::Limit,
+              {.place = "", .key = "mesh.size",
+               .expected = "expected bounds of triangles that " + std::to_string(most) + " vertices reach",
+               .found = found,
+               .hint = "ask for a larger size or distance, or a smaller angle: edges of the surface hold no angle"});
+}
+
+/// The bounds, and a limit: the mesher looks at every new triangle here.
+class Criteria : public CGAL::Surface_mesh_default_criteria_3<Triangulation> {
+ public:
+  Criteria(const implicit::DelaunayOptions& options, const Triangulation& triangulation)
+      : Surface_mesh_default_criteria_3(options.angle * 180.0 / std::numbers::pi, options.size, options.distance),
+        triangulation_(triangulation),
+        most_(options.most_vertices) {}
+  bool is_bad(const Facet& facet, Quality& quality) const {
+    if (triangulation_.number_of_vertices() > most_) refuse(most_, "more");
+    return Surface_mesh_default_criteria_3::is_bad(facet, quality);
+  }
+
+ private:
+  const Triangulation& triangulation_;
+  std::uint64_t most_;
+};
+
+/// Connected part of each vertex, numbered by its first vertex.
+std::vector<std::uint32_t> parts_of(const Mesh& mesh) {
+  std::vector<std::uint32_t> parent(mesh.vertex_count());
+  for (std::uint32_t v = 0; v < parent.size(); ++v) parent[v] = v;
+  const auto root = [&](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (const auto& t : mesh.triangle) {
+    for (const std::uint32_t v : t) {
+      const std::uint32_t a = root(t[0]), b = root(v);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  for (std::uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
+  return parent;
+}
+
+/// Vertices of the mesh, in their order, that keep a distance from those taken before: `spacing`, and a sixth of the extent of
+/// their own part where that is less.
+std::vector<Point> spread(const implicit::FieldView& field, const Mesh& mesh, double spacing) {
+  const std::vector<std::uint32_t> part = parts_of(mesh);
+  std::vector<Box> extent(mesh.vertex_count());
+  for (std::size_t v = 0; v < part.size(); ++v) extent[part[v]].include(mesh.position[v]);
+  struct Place {
+    std::int64_t x, y, z;
+    std::uint32_t part;
+    bool operator==(const Place&) const = default;
+  };
+  const auto hash = [](const Place& p) {
+    return static_cast<std::size_t>((static_cast<std::uint64_t>(p.x) * 73856093u) ^ (static_cast<std::uint64_t>(p.y) * 19349663u) ^
+                                    (static_cast<std::uint64_t>(p.z) * 83492791u) ^ (std::uint64_t{p.part} * 2654435761u));
+  };
+  std::unordered_map<Place, std::vector<std::uint32_t>, decltype(hash)> taken(64, hash);
+  std::vector<Point> seeds;
+  for (std::uint32_t v = 0; v < part.size(); ++v) {
+    const double apart = std::min(spacing, extent[part[v]].extent().norm() / 6.0);
+    const Vec3& p = mesh.position[v];
+    const Eigen::Matrix<std::int64_t, 3, 1> at = (p / apart).array().floor().cast<std::int64_t>();
+    bool free = true;
+    for (int n = 0; n < 27 && free; ++n) {
+      const auto found = taken.find({at.x() + n % 3 - 1, at.y() + n / 3 % 3 - 1, at.z() + n / 9 - 1, part[v]});
+      if (found == taken.end()) continue;
+      free = std::none_of(found->second.begin(), found->second.end(),
+                          [&](std::uint32_t u) { return (mesh.position[u] - p).squaredNorm() < apart * apart; });
+    }
+    if (!free) continue;
+    taken[{at.x(), at.y(), at.z(), part[v]}].push_back(v);
+    seeds.push_back(point(implicit::project_to_surface(field, p).point));
+  }
+  return seeds;
+}
+
+void measure(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& surface_centre, implicit::DelaunayReport& report) {
+  const double ab = (b - a).norm(), bc = (c - b).norm(), ca = (a - c).norm();
+  const Vec3 normal = (b - a).cross(c - a);
+  const double twice_area = normal.norm();
+  const double radius = ab * bc * ca / (2.0 * twice_area);
+  report.least_angle = std::min(report.least_angle, std::asin(std::min(1.0, std::min({ab, bc, ca}) / (2.0 * radius))));
+  report.largest_radius = std::max(report.largest_radius, radius);
+  const Vec3 u = b - a, w = c - a;
+  const Vec3 circumcentre =
+      a + (u.squaredNorm() * w.cross(normal) + w.squaredNorm() * normal.cross(u)) / (2.0 * normal.squaredNorm());
+  report.largest_distance = std::max(report.largest_distance, (surface_centre - circumcentre).norm());
+}
+
+/// Triangles of the complex, counter-clockwise from outside: the cell whose circumcentre lies inside is behind each.
+Mesh extract(const implicit::FieldView& field, Complex& complex, implicit::DelaunayReport& report) {
+  const Triangulation& triangulation = complex.triangulation();
+  Mesh mesh;
+  std::unordered_map<Triangulation::Vertex_handle, std::uint32_t> number;
+  for (auto v = triangulation.finite_vertices_begin(); v != triangulation.finite_vertices_end(); ++v) {
+    if (!complex.is_in_complex(v)) continue;
+    number.emplace(v, static_cast<std::uint32_t>(mesh.position.size()));
+    mesh.position.push_back(vec(v->point()));
+  }
+  std::vector<double> values(mesh.vertex_count());
+  mesh.normal.resize(mesh.vertex_count());
+  field.evaluate(mesh.position, values, mesh.normal);
+  for (Vec3& n : mesh.normal) n = n.squaredNorm() > 0.0 ? Vec3(-n.normalized()) : Vec3::UnitZ();
+
+  report.least_angle = std::numbers::pi;
+  for (auto facet = complex.facets_begin(); facet != complex.facets_end(); ++facet) {
+    auto [cell, side] = *facet;
+    const Vec3 centre = vec(cell->get_facet_surface_center(side));
+    if (!triangulation.is_infinite(cell) && (field.value(vec(triangulation.dual(cell))) > 0.0)) {
+      std::tie(cell, side) = triangulation.mirror_facet(*facet);
+    }
+    std::array<std::uint32_t, 3> t{};
+    for (int k = 0; k < 3; ++k) {
+      t[static_cast<std::size_t>(k)] = number.at(cell->vertex(Triangulation::vertex_triple_index(side, k)));
+    }
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    mesh.triangle.push_back(t);
+    measure(mesh.position[t[0]], mesh.position[t[1]], mesh.position[t[2]], centre, report);
+  }
+  std::sort(mesh.triangle.begin(), mesh.triangle.end());
+  if (mesh.triangle.empty()) report.least_angle = 0.0;
+  return mesh;
+}
+
+}  // namespace
+
+Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOptions& options,
+                   implicit::DelaunayReport* report) {
+  SUPPLE_EXPECTS(options.angle > 0.0 && options.angle <= 0.5236 && options.size > 0.0 && options.distance > 0.0 &&
+                 options.cell > 0.0);
+  implicit::DelaunayReport found;
+  implicit::MarchOptions march;
+  march.lattice.cell = options.cell;
+  const Mesh coarse = implicit::march_cubes(field, march, Executor(1));
+  // Surface balls cover the surface, and there are two triangles to a vertex.
+  const double least = inspect(coarse).area / (2.0 * std::numbers::pi * options.size * options.size);
+  if (least > static_cast<double>(options.most_vertices)) {
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "at least %.3g by the area of the surface", least);
+    refuse(options.most_vertices, text.data());
+  }
+  const Box box = field.surface_box();
+  const Surface surface{field, box.centre(), 0.5 * box.extent().norm(),
+                        spread(field, coarse, options.size)};
+  found.seeds = surface.seeds.size();
+  Mesh mesh;
+  if (!surface.seeds.empty()) {
+    Triangulation triangulation;
+    Complex complex(triangulation);
+    CGAL::make_surface_mesh(complex, surface, Oracle(), Criteria(options, triangulation), CGAL::Manifold_tag());
+    found.inserted = triangulation.number_of_vertices() - found.seeds;
+    mesh = extract(field, complex, found);
+  }
+  if (report != nullptr) *report = found;
+  return mesh;
+}
+
+}  // namespace supple::cgal
