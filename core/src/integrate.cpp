@@ -1,10 +1,12 @@
 #include "supple/core/integrate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "damping.h"
+#include "lanes.h"
 #include "step.h"
 #include "supple/core/error.h"
 
@@ -32,9 +34,50 @@ double dissipated_by(const ParticleSet& set, const ForceSample& sample, double d
   return -work;
 }
 
+bool are_free(const ParticleSet& set, std::size_t i, std::size_t count) {
+  std::uint8_t pinned = 0;
+  for (std::size_t k = i; k < i + count; ++k) pinned |= set.pinned[k];
+  return pinned == 0;
+}
+
+/// Whether no load acts on four particles in a row.
+bool are_unloaded(const Loads& loads, std::size_t i) {
+  const double* const force = loads.force[i].data();
+  const double* const torque = loads.torque[i].data();
+  __m256d any = _mm256_setzero_pd();
+  for (int k = 0; k < 12; k += 4) {
+    any = _mm256_or_pd(any, _mm256_or_pd(_mm256_loadu_pd(force + k), _mm256_loadu_pd(torque + k)));
+  }
+  const __m256d is_zero = _mm256_cmp_pd(any, _mm256_setzero_pd(), _CMP_EQ_OQ);
+  return _mm256_movemask_pd(is_zero) == 0xf;
+}
+
+/// Four free particles in a row at once where no external load acts; their bits are those of one by one.
+bool kick_four(const ParticleSet& set, const ForceSample& sample, std::size_t i, double dt, ParticleState& state) {
+  if (i + 4 > set.size() || !are_free(set, i, 4) || !are_unloaded(sample.external, i)) return false;
+  const __m256d inverse_mass = _mm256_div_pd(_mm256_set1_pd(1.0), _mm256_loadu_pd(&set.mass[i]));
+  const std::array<Lanes, 3> mass_of{_mm256_permute4x64_pd(inverse_mass, 0b01000000),
+                                     _mm256_permute4x64_pd(inverse_mass, 0b10100101),
+                                     _mm256_permute4x64_pd(inverse_mass, 0b11111110)};
+  const double* const force = sample.internal.force[i].data();
+  const double* const torque = sample.internal.torque[i].data();
+  double* const velocity = state.velocity[i].data();
+  double* const momentum = state.angular_momentum[i].data();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t at = 4 * k;
+    (Lanes::load_any(velocity + at) + mass_of[k] * (Lanes(dt) * Lanes::load_any(force + at))).store_any(velocity + at);
+    (Lanes::load_any(momentum + at) + Lanes(dt) * Lanes::load_any(torque + at)).store_any(momentum + at);
+  }
+  return true;
+}
+
 void kick(const ParticleSet& set, const ForceSample& sample, double dt, ParticleState& state, Ledger& ledger) {
   ledger.dissipated += dissipated_by(set, sample, dt, state);
   for (std::size_t i = 0; i < set.size(); ++i) {
+    if (kick_four(set, sample, i, dt, state)) {
+      i += 3;
+      continue;
+    }
     const Vec3& x = state.position[i];
     const Vec3& external_force = sample.external.force[i];
     const Vec3& external_torque = sample.external.torque[i];
@@ -59,21 +102,15 @@ void turn_free(RotationUpdate rotation, Quat& orientation, const Vec3& angular_m
   }
 }
 
-/// Whether a particle is free and turns about one axis while its angular momentum lasts.
-bool turns_evenly(const ParticleSet& set, const ParticleState& state, std::size_t i) {
-  const Vec3& inertia = set.inertia[i];
-  return set.pinned[i] == 0 && inertia.x() == inertia.y() && inertia.y() == inertia.z() &&
-         state.angular_momentum[i] != Vec3::Zero();
-}
-
-/// Four particles in a row at once where that is possible; their bits are those of `rotate_free`.
+/// Four free particles in a row at once where that is possible; their bits are those of `rotate_free`.
 bool drift_four(const ParticleSet& set, std::size_t i, double dt, ParticleState& state) {
-  if (i + 4 > set.size()) return false;
-  for (std::size_t k = i; k < i + 4; ++k) {
-    if (!turns_evenly(set, state, k)) return false;
-  }
+  if (i + 4 > set.size() || !are_free(set, i, 4)) return false;
   if (!rotate_four(&state.angular_momentum[i], &set.inertia[i], dt, &state.orientation[i])) return false;
-  for (std::size_t k = i; k < i + 4; ++k) state.position[k] += dt * state.velocity[k];
+  double* const position = state.position[i].data();
+  const double* const velocity = state.velocity[i].data();
+  for (std::size_t k = 0; k < 12; k += 4) {
+    (Lanes::load_any(position + k) + Lanes(dt) * Lanes::load_any(velocity + k)).store_any(position + k);
+  }
   return true;
 }
 
@@ -103,6 +140,10 @@ double half_work(const ParticleSet& set, RotationUpdate rotation, const Loads& e
                  double dt) {
   double work = 0.0;
   for (std::size_t i = 0; i < set.size(); ++i) {
+    if (i + 4 <= set.size() && are_unloaded(external, i)) {
+      i += 3;
+      continue;
+    }
     if (!holds_position(set, i)) work += 0.5 * dt * external.force[i].dot(state.velocity[i]);
     if (!holds_orientation(set, i) && external.torque[i] != Vec3::Zero()) {
       work += 0.5 * external.torque[i].dot(drifted_rotation(set, rotation, state, i, dt));

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "bond_runs.h"
 #include "neighbour_grid.h"
 #include "pair_kernels.h"
 #include "supple/core/interactions.h"
@@ -85,14 +86,21 @@ struct InteractionWorkspace::Impl {
              std::vector<PackedGeometric<Repulsion>>>
       geometric;
 
+  runs::Runs runs;  ///< the bonded laws that are not in `bonded`
+
+  bool has_lists = false;          ///< laws in `bonded` or `geometric`, which the following three serve
   bool needs_orientation = false;
   bool needs_normal = false;
-  std::size_t bond_count = 0;
+  std::size_t listed_bonds = 0;    ///< in `bonded`
+  std::size_t bond_count = 0;      ///< those and the ones of `runs`, which come after
+  std::size_t law_bonds = 0;       ///< each counted once for every law on it
 
   NeighbourGrid grid;
   std::vector<StagedPose> pose;
   std::vector<StagedLoads> sum;
-  std::vector<StagedPairLoads> pair_loads;  ///< of all bonds, or of one geometric law
+  std::vector<StagedPairLoads> pair_loads;  ///< of all bonds in `bonded`, or of one geometric law
+  std::vector<runs::BondLoads> run_loads;
+  std::vector<std::vector<std::size_t>> batch_bonds;  ///< of each group the first bond of each batch
 
   /// For each particle its bonds in ascending order: 2 bond, +1 where it is the second of the pair.
   std::vector<std::uint32_t> gather_start;

@@ -125,11 +125,22 @@ void evaluate_pairs(const PackedPairs& pairs, const LaneRow* numbers, std::size_
   executor.for_blocks(pairs.batches(), kBatchBlock, std::ref(body));
 }
 
+/// Work on [0, particles), by the calling thread where waking others would take longer.
+template <class Body>
+void for_particles(std::size_t particles, const Executor& executor, const Body& body) {
+  if (particles < kSerialPairs) {
+    body(std::size_t{0}, particles);
+  } else {
+    executor.for_blocks(particles, kParticleBlock, std::cref(body));
+  }
+}
+
+/// Poses for the laws that are no runs; sums are set to 0.
 void stage_poses(const ParticleSet& set, const ParticleState& state, const Executor& executor,
                  InteractionWorkspace::Impl& work) {
   work.pose.resize(set.size());
   work.sum.resize(set.size());
-  const auto body = [&](std::size_t begin, std::size_t end) {
+  for_particles(set.size(), executor, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       StagedPose& pose = work.pose[i];
       const Vec3& x = state.position[i];
@@ -142,22 +153,41 @@ void stage_poses(const ParticleSet& set, const ParticleState& state, const Execu
       }
       work.sum[i] = StagedLoads{};
     }
-  };
-  if (set.size() < kSerialPairs) {
-    body(0, set.size());
-  } else {
-    executor.for_blocks(set.size(), kParticleBlock, std::ref(body));
-  }
+  });
 }
 
+void unstage_loads(const Executor& executor, InteractionWorkspace::Impl& work, Loads& loads) {
+  const runs::Work rows = work.runs.work();
+  for_particles(loads.force.size(), executor, [&](std::size_t begin, std::size_t end) {
+    if (work.has_lists) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const StagedLoads& sum = work.sum[i];
+        loads.force[i] += Vec3(sum.force[0], sum.force[1], sum.force[2]);
+        loads.torque[i] += Vec3(sum.torque[0], sum.torque[1], sum.torque[2]);
+      }
+    }
+    if (!work.runs.empty()) runs::add_sums(rows, begin, end, loads);
+  });
+}
+
+/// Bonds of runs come last; their sums are associated as in `runs::accumulate`.
 void gather(const Executor& executor, InteractionWorkspace::Impl& work) {
   const auto body = [&work](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      StagedLoads sum = work.sum[i];
+      StagedLoads sum{}, first{}, second{};
+      if (work.has_lists) sum = work.sum[i];
       for (std::uint32_t k = work.gather_start[i]; k < work.gather_start[i + 1]; ++k) {
-        const std::uint32_t entry = work.gather_entry[k];
-        const StagedPairLoads& loads = work.pair_loads[entry / 2];
-        if (entry % 2 == 0) {
+        const std::uint32_t bond = work.gather_entry[k] / 2;
+        const bool is_first = work.gather_entry[k] % 2 == 0;
+        if (bond >= work.listed_bonds) {
+          const runs::BondLoads& loads = work.run_loads[bond - work.listed_bonds];
+          StagedLoads& side = is_first ? first : second;
+          add_row(side.force, loads.force_b);
+          add_row(side.torque, is_first ? loads.torque_a : loads.torque_b);
+          continue;
+        }
+        const StagedPairLoads& loads = work.pair_loads[bond];
+        if (is_first) {
           subtract_row(sum.force, loads.force);
           add_row(sum.torque, loads.torque_a);
         } else {
@@ -165,7 +195,15 @@ void gather(const Executor& executor, InteractionWorkspace::Impl& work) {
           add_row(sum.torque, loads.torque_b);
         }
       }
-      work.sum[i] = sum;
+      if (work.has_lists) work.sum[i] = sum;
+      if (work.runs.empty()) continue;
+      const runs::Work rows = work.runs.work();
+      for (std::size_t k = 0; k < 3; ++k) {
+        rows.row(runs::kFirst + runs::kForce + k)[i] = first.force[k];
+        rows.row(runs::kFirst + runs::kTorque + k)[i] = first.torque[k];
+        rows.row(runs::kSecond + runs::kForce + k)[i] = second.force[k];
+        rows.row(runs::kSecond + runs::kTorque + k)[i] = second.torque[k];
+      }
     }
   };
   executor.for_blocks(work.sum.size(), kParticleBlock, std::ref(body));
@@ -181,9 +219,10 @@ void accumulate_bonds(const Executor& executor, InteractionWorkspace::Impl& work
            ...);
         },
         work.bonded);
+    for (const runs::Group& group : work.runs.groups) runs::accumulate(group, work.runs.work());
     return;
   }
-  work.pair_loads.resize(work.bond_count);
+  work.pair_loads.resize(work.listed_bonds);
   std::size_t offset = 0;
   const auto evaluate_law = [&](const auto& bonds) {
     using Law = typename std::decay_t<decltype(bonds)>::LawType;
@@ -192,6 +231,17 @@ void accumulate_bonds(const Executor& executor, InteractionWorkspace::Impl& work
     offset += bonds.pairs.count;
   };
   std::apply([&](const auto&... bonds) { (evaluate_law(bonds), ...); }, work.bonded);
+  work.run_loads.resize(work.bond_count - work.listed_bonds);
+  const runs::Work rows = work.runs.work();
+  for (std::size_t g = 0; g < work.runs.groups.size(); ++g) {
+    const runs::Group& group = work.runs.groups[g];
+    const auto body = [&](std::size_t begin, std::size_t end) {
+      for (std::size_t batch = begin; batch < end; ++batch) {
+        runs::evaluate(group, batch, rows, work.run_loads.data() + work.batch_bonds[g][batch]);
+      }
+    };
+    executor.for_blocks(group.batch.size(), kBatchBlock, std::cref(body));
+  }
   gather(executor, work);
 }
 
@@ -244,13 +294,14 @@ void accumulate_geometric(PackedGeometric<Law>& law, const ParticleState& state,
   }
 }
 
+/// The lists that are no runs. @param taken  by runs, list by list
 template <class Law>
-void pack_bonds(const std::vector<BondedLaw<Law>>& laws, std::size_t particles, PackedBonds<Law>& out) {
+void pack_bonds(const std::vector<BondedLaw<Law>>& laws, std::vector<bool>::const_iterator& taken,
+                PackedBonds<Law>& out) {
   using Kernel = PairKernel<Law>;
   for (const BondedLaw<Law>& law : laws) {
-    SUPPLE_EXPECTS(law.first.size() == law.law.size() && law.second.size() == law.law.size());
+    if (*taken++) continue;
     for (std::size_t k = 0; k < law.law.size(); ++k) {
-      SUPPLE_EXPECTS(law.first[k] < particles && law.second[k] < particles && law.first[k] != law.second[k]);
       const std::size_t lane = out.pairs.count % kLanes;
       if (lane == 0) out.numbers.resize(out.numbers.size() + Kernel::kNumbers);
       std::array<double, Kernel::kNumbers> numbers;
@@ -293,12 +344,28 @@ void build_gather_lists(std::size_t particles, InteractionWorkspace::Impl& work)
       for (std::size_t k = 0; k < pairs.count; ++k) visit(bond++, pairs.first[k], pairs.second[k]);
     };
     std::apply([&](const auto&... bonds) { (walk(bonds.pairs), ...); }, work.bonded);
+    work.listed_bonds = bond;
+    for (const runs::Group& group : work.runs.groups) {
+      for (const runs::Batch& batch : group.batch) {
+        for (std::uint32_t k = 0; k < batch.count; ++k) visit(bond++, batch.first + k, batch.second + k);
+      }
+    }
     return static_cast<std::size_t>(bond);
   };
   work.bond_count = for_each_pair([&work](std::uint32_t, std::uint32_t a, std::uint32_t b) {
     ++work.gather_start[a + 1];
     ++work.gather_start[b + 1];
   });
+  std::size_t run_bonds = 0;
+  work.law_bonds = work.listed_bonds;
+  for (const runs::Group& group : work.runs.groups) {
+    work.law_bonds += group.laws.size() * group.count;
+    std::vector<std::size_t>& begin = work.batch_bonds.emplace_back();
+    for (const runs::Batch& batch : group.batch) {
+      begin.push_back(run_bonds);
+      run_bonds += batch.count;
+    }
+  }
   SUPPLE_EXPECTS(work.bond_count < (std::size_t{1} << 31));
   for (std::size_t i = 0; i < particles; ++i) work.gather_start[i + 1] += work.gather_start[i];
   work.gather_entry.resize(2 * work.bond_count);
@@ -339,20 +406,24 @@ double ExternalLoad::factor(double time) const {
 InteractionWorkspace::InteractionWorkspace(const ParticleSet& set, const Interactions& interactions)
     : impl_(std::make_unique<Impl>()) {
   const std::size_t n = set.size();
+  const std::vector<bool> taken = runs::pack(n, interactions, impl_->runs);
+  auto next = taken.begin();
   for_each_bonded(interactions, [&]<class Law>(const std::vector<BondedLaw<Law>>& lists) {
-    pack_bonds(lists, n, std::get<PackedBonds<Law>>(impl_->bonded));
+    pack_bonds(lists, next, std::get<PackedBonds<Law>>(impl_->bonded));
   });
   for_each_geometric(interactions, [&]<class Law>(const std::vector<GeometricLaw<Law>>& lists) {
     for (const auto& law : lists) {
       std::get<std::vector<PackedGeometric<Law>>>(impl_->geometric).push_back(pack_geometric(law, set));
       impl_->needs_orientation = impl_->needs_orientation || PairKernel<Law>::kOrientation;
       impl_->needs_normal = impl_->needs_normal || PairKernel<Law>::kNormal;
+      impl_->has_lists = true;
     }
   });
   std::apply(
       [this](const auto&... bonds) {
         const auto note = [this]<class Law>(const PackedBonds<Law>& packed) {
           if (packed.pairs.count == 0) return;
+          impl_->has_lists = true;
           impl_->needs_orientation = impl_->needs_orientation || PairKernel<Law>::kOrientation;
           impl_->needs_normal = impl_->needs_normal || PairKernel<Law>::kNormal;
         };
@@ -373,9 +444,14 @@ InteractionCounts accumulate_interactions(const ParticleSet& set, const Particle
   SUPPLE_EXPECTS(state.size() == n && internal.force.size() == n && external.force.size() == n);
   InteractionWorkspace::Impl& work = workspace.impl();
   SUPPLE_EXPECTS(work.gather_start.size() == n + 1);
-  InteractionCounts counts{.pairs_visited = work.bond_count, .pairs_present = work.bond_count};
+  InteractionCounts counts{.pairs_visited = work.law_bonds, .pairs_present = work.law_bonds};
 
-  stage_poses(set, state, executor, work);
+  if (work.has_lists) stage_poses(set, state, executor, work);
+  if (!work.runs.empty()) {
+    for_particles(n, executor, [&](std::size_t begin, std::size_t end) {
+      runs::stage(set, state, begin, end, work.runs);
+    });
+  }
   accumulate_bonds(executor, work);
   const auto accumulate_lists = [&](auto& lists) {
     for (auto& law : lists) accumulate_geometric(law, state, executor, work, counts);
@@ -386,11 +462,7 @@ InteractionCounts accumulate_interactions(const ParticleSet& set, const Particle
     counts.pairs_visited += list.law.size();
     counts.pairs_present += list.law.size();
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    const StagedLoads& sum = work.sum[i];
-    internal.force[i] += Vec3(sum.force[0], sum.force[1], sum.force[2]);
-    internal.torque[i] += Vec3(sum.torque[0], sum.torque[1], sum.torque[2]);
-  }
+  unstage_loads(executor, work, internal);
 
   if (interactions.gravity != Vec3::Zero()) {
     for (std::size_t i = 0; i < n; ++i) external.force[i] += set.mass[i] * interactions.gravity;

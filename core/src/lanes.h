@@ -17,13 +17,16 @@ namespace supple::core {
 inline constexpr std::size_t kLanes = 4;
 
 struct Lanes {
+  static constexpr std::size_t kCount = kLanes;
   __m256d v;
 
   Lanes() = default;
   Lanes(__m256d value) : v(value) {}
   Lanes(double value) : v(_mm256_set1_pd(value)) {}
   static Lanes load(const double* aligned) { return _mm256_load_pd(aligned); }
+  static Lanes load_any(const double* at) { return _mm256_loadu_pd(at); }
   void store(double* aligned) const { _mm256_store_pd(aligned, v); }
+  void store_any(double* at) const { _mm256_storeu_pd(at, v); }
 
   friend Lanes operator+(Lanes a, Lanes b) { return _mm256_add_pd(a.v, b.v); }
   friend Lanes operator-(Lanes a, Lanes b) { return _mm256_sub_pd(a.v, b.v); }
@@ -41,6 +44,12 @@ inline Lanes least(Lanes a, Lanes b) { return _mm256_min_pd(a.v, b.v); }
 /// value where a < b, else 0.
 inline Lanes where_less(Lanes a, Lanes b, Lanes value) {
   return _mm256_and_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LT_OQ), value.v);
+}
+/// The first `count` lanes, the others 0.
+inline Lanes first_lanes(Lanes a, std::size_t count) {
+  const __m256i lane = _mm256_set_epi64x(3, 2, 1, 0);
+  const __m256i keep = _mm256_cmpgt_epi64(_mm256_set1_epi64x(static_cast<std::int64_t>(count)), lane);
+  return _mm256_and_pd(a.v, _mm256_castsi256_pd(keep));
 }
 /// `set` where the highest bit is 1, else `clear`.
 inline Lanes by_highest_bit(Lanes bits, Lanes set, Lanes clear) { return _mm256_blendv_pd(clear.v, set.v, bits.v); }
@@ -152,6 +161,25 @@ inline void transpose(Lanes& a, Lanes& b, Lanes& c, Lanes& d) {
   b = _mm256_permute2f128_pd(ab_high, cd_high, 0x20);
   c = _mm256_permute2f128_pd(ab_low, cd_low, 0x31);
   d = _mm256_permute2f128_pd(ab_high, cd_high, 0x31);
+}
+
+/// Four vectors in a row, x y z x y z ..., and lanes of each coordinate.
+inline Vector<Lanes> load_vectors(const double* at) {
+  const __m256d a = _mm256_loadu_pd(at), b = _mm256_loadu_pd(at + 4), c = _mm256_loadu_pd(at + 8);
+  const __m256d x = _mm256_blend_pd(_mm256_blend_pd(a, b, 0b0100), c, 0b0010);
+  const __m256d y = _mm256_blend_pd(_mm256_blend_pd(a, b, 0b1001), c, 0b0100);
+  const __m256d z = _mm256_blend_pd(_mm256_blend_pd(a, b, 0b0010), c, 0b1001);
+  return {_mm256_permute4x64_pd(x, 0b01101100), _mm256_permute4x64_pd(y, 0b10110001),
+          _mm256_permute4x64_pd(z, 0b11000110)};
+}
+
+inline void store_vectors(const Vector<Lanes>& v, double* at) {
+  const __m256d x = _mm256_permute4x64_pd(v.x.v, 0b01101100);
+  const __m256d y = _mm256_permute4x64_pd(v.y.v, 0b10110001);
+  const __m256d z = _mm256_permute4x64_pd(v.z.v, 0b11000110);
+  _mm256_storeu_pd(at, _mm256_blend_pd(_mm256_blend_pd(x, y, 0b0010), z, 0b0100));
+  _mm256_storeu_pd(at + 4, _mm256_blend_pd(_mm256_blend_pd(y, z, 0b0010), x, 0b0100));
+  _mm256_storeu_pd(at + 8, _mm256_blend_pd(_mm256_blend_pd(z, x, 0b0010), y, 0b0100));
 }
 
 }  // namespace supple::core

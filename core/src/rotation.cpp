@@ -106,19 +106,23 @@ void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& in
 }
 
 bool rotate_four(const Vec3* angular_momentum, const Vec3* inertia, double dt, Quat* orientation) {
-  const auto column = [](const Vec3* v, int k) { return Lanes(_mm256_set_pd(v[3][k], v[2][k], v[1][k], v[0][k])); };
-  const Lanes scale = Lanes(0.5 * dt) / column(inertia, 0);
-  const Vector<Lanes> half{scale * column(angular_momentum, 0), scale * column(angular_momentum, 1),
-                           scale * column(angular_momentum, 2)};
+  const auto all = [](__m256d is_true) { return _mm256_movemask_pd(is_true) == 0xf; };
+  const Vector<Lanes> moment = load_vectors(inertia->data());
+  const __m256d isotropic = _mm256_and_pd(_mm256_cmp_pd(moment.x.v, moment.y.v, _CMP_EQ_OQ),
+                                          _mm256_cmp_pd(moment.y.v, moment.z.v, _CMP_EQ_OQ));
+  const Lanes scale = Lanes(0.5 * dt) / moment.x;
+  const Vector<Lanes> half = scale * load_vectors(angular_momentum->data());
   const Lanes x2 = dot(half, half);
-  if (_mm256_movemask_pd(_mm256_cmp_pd(x2.v, _mm256_set1_pd(kSeriesLimit), _CMP_LT_OQ)) != 0xf) return false;
+  if (!all(_mm256_and_pd(isotropic, _mm256_cmp_pd(x2.v, _mm256_set1_pd(kSeriesLimit), _CMP_LT_OQ)))) return false;
   std::array<Lanes, 4> q;
-  for (std::size_t k = 0; k < 4; ++k) q[k] = _mm256_loadu_pd(orientation[k].coeffs().data());
+  for (std::size_t k = 0; k < 4; ++k) q[k] = Lanes::load_any(orientation[k].coeffs().data());
   transpose(q[0], q[1], q[2], q[3]);
   const Rotation<Lanes> next = turned(half_angle_series(x2), half, {{q[0], q[1], q[2]}, q[3]});
   q = {next.u.x, next.u.y, next.u.z, next.w};
   transpose(q[0], q[1], q[2], q[3]);
-  for (std::size_t k = 0; k < 4; ++k) _mm256_storeu_pd(orientation[k].coeffs().data(), q[k].v);
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (angular_momentum[k] != Vec3::Zero()) q[k].store_any(orientation[k].coeffs().data());
+  }
   return true;
 }
 

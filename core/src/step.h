@@ -11,8 +11,8 @@ inline bool holds_orientation(const ParticleSet& set, std::size_t i) { return (s
 /// Takes the velocity and the angular momentum that a pin holds.
 void stop_pinned(const ParticleSet& set, ParticleState& state);
 
-/// `rotate_free` of four particles in a row with equal principal moments each, to the same bits. @return false, having
-/// done nothing, where one turns so far that the series of the others does not hold.
+/// `rotate_free` of four particles in a row, to the same bits; those without angular momentum are left alone. @return
+/// false, having done nothing, where one has unequal moments or turns so far that the series of the others does not hold.
 [[nodiscard]] bool rotate_four(const Vec3* angular_momentum, const Vec3* inertia, double dt, Quat* orientation);
 
 /// Clears `sample` and asks for the loads.

@@ -10,12 +10,14 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/support.h"
+#include "spiral_kernel.h"
 #include "supple/core/gay_berne.h"
 #include "supple/core/hash.h"
 #include "supple/core/integrate.h"
@@ -38,11 +40,11 @@ double peak_megabytes() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-/// Least time of `work` over at least `repeats` runs and 0.3 s [s].
-double least_time(int repeats, clockid_t clock, const std::function<void()>& work) {
+/// Least time of `work` over at least `repeats` runs and a span [s].
+double least_time(int repeats, clockid_t clock, const std::function<void()>& work, double span = 0.3) {
   double best = std::numeric_limits<double>::infinity();
   double total = 0.0;
-  for (int k = 0; k < 10000 && (k < repeats || total < 0.3); ++k) {
+  for (int k = 0; k < 10000 && (k < repeats || total < span); ++k) {
     const double start = seconds(clock);
     work();
     const double time = seconds(clock) - start;
@@ -393,42 +395,116 @@ void bench_lists(std::size_t count) {
          .hash = hasher.value()});
 }
 
+struct SpiralNumbers {
+  double stretch = 400.0, rotation = 1.5, coplanarity = 2.0;
+  double friction = 0.0, angular_friction = 0.0;
+  double load = 0.1;  ///< on the first particle, along x
+};
+constexpr int kSpiralSteps = 1000;
+constexpr double kSpiralStep = 1e-4;
+
 /// A spiral with bond frames and co-planarity to second neighbours, with or without friction, stepped by `advance`.
-void bench_spiral(int count, bool rubs) {
-  const test::Particles spiral = test::make_spiral(count);
-  Interactions all;
-  all.bond_frame.push_back(test::bond_frames(spiral, 400.0, 1.5));
-  all.coplanarity.push_back(test::coplanarities(spiral, 2.0));
-  if (rubs) {
-    all.friction.push_back({.name = "friction",
-                            .first = all.bond_frame[0].first,
-                            .second = all.bond_frame[0].second,
-                            .linear = 0.2,
-                            .angular = 1e-3});
+class Spiral {
+ public:
+  Spiral(const test::Particles& rest, const SpiralNumbers& numbers) : rest_(rest) {
+    all_.bond_frame.push_back(test::bond_frames(rest, numbers.stretch, numbers.rotation));
+    all_.coplanarity.push_back(test::coplanarities(rest, numbers.coplanarity));
+    if (numbers.friction > 0.0) {
+      all_.friction.push_back({.name = "friction",
+                               .first = all_.bond_frame[0].first,
+                               .second = all_.bond_frame[0].second,
+                               .linear = numbers.friction,
+                               .angular = numbers.angular_friction});
+    }
+    all_.external.push_back({.particle = 0, .force = Vec3(numbers.load, 0.0, 0.0), .begin = 0.0, .end = 1e9});
+    workspace_.emplace(rest.set, all_);
   }
-  all.external.push_back({.particle = 0, .force = Vec3(0.1, 0.0, 0.0), .begin = 0.0, .end = 1e9});
-  const Executor executor(1);
-  InteractionWorkspace workspace(spiral.set, all);
-  const ForceModel forces = [&](const ParticleState& state, double time, ForceSample& out) {
-    accumulate_interactions(spiral.set, state, all, time, executor, workspace, out.internal, out.external);
-  };
-  ParticleState state = spiral.state;
-  KickState kick;
-  Ledger ledger;
-  constexpr int kSteps = 1000;
-  constexpr double kStep = 1e-4;
-  const auto run = [&] {
-    state = spiral.state;
-    kick.valid = false;
-    ledger = {};
-    for (int k = 0; k < kSteps; ++k) advance(spiral.set, all, forces, kStep * k, kStep, state, kick, ledger);
-  };
-  const double time = least_time(20, CLOCK_PROCESS_CPUTIME_ID, run) / kSteps;
+  void run() {
+    const ForceModel forces = [&](const ParticleState& at, double time, ForceSample& out) {
+      accumulate_interactions(rest_.set, at, all_, time, executor_, *workspace_, out.internal, out.external);
+    };
+    state = rest_.state;
+    kick_.valid = false;
+    ledger_ = {};
+    for (int k = 0; k < kSpiralSteps; ++k) {
+      advance(rest_.set, all_, forces, kSpiralStep * k, kSpiralStep, state, kick_, ledger_);
+    }
+  }
+  [[nodiscard]] std::size_t bonds() const { return all_.bond_frame[0].first.size(); }
+  ParticleState state;
+
+ private:
+  const test::Particles& rest_;
+  Interactions all_;
+  const Executor executor_{1};
+  std::optional<InteractionWorkspace> workspace_;
+  KickState kick_;
+  Ledger ledger_;
+};
+
+/// The same by the kernel of its own.
+class HandSpiral {
+ public:
+  HandSpiral(const test::Particles& rest, const SpiralNumbers& numbers)
+      : rest_{flat(rest.state.position), {}, flat(rest.state.velocity), flat(rest.state.angular_momentum)},
+        chain_({.inverse_mass = 1.0 / rest.set.mass[0],
+                .inverse_inertia = 1.0 / rest.set.inertia[0].x(),
+                .stretch = numbers.stretch,
+                .rotation = numbers.rotation,
+                .coplanarity = numbers.coplanarity,
+                .friction = numbers.friction,
+                .angular_friction = numbers.angular_friction,
+                .load = {numbers.load, 0.0, 0.0}},
+               with_orientation(rest)) {}
+  void run() {
+    chain_.state = rest_;
+    chain_.start();
+    for (int k = 0; k < kSpiralSteps; ++k) chain_.step(kSpiralStep);
+  }
+  /// Largest difference of a coordinate.
+  [[nodiscard]] double difference(const std::vector<Vec3>& position) const {
+    double largest = 0.0;
+    for (std::size_t k = 0; k < 3 * position.size(); ++k) {
+      largest = std::max(largest, std::abs(chain_.state.position[k] - position[k / 3][static_cast<int>(k % 3)]));
+    }
+    return largest;
+  }
+
+ private:
+  static std::vector<double> flat(const std::vector<Vec3>& rows) {
+    std::vector<double> out;
+    for (const Vec3& row : rows) out.insert(out.end(), row.data(), row.data() + 3);
+    return out;
+  }
+  const benchmarks::ChainState& with_orientation(const test::Particles& rest) {
+    for (const Quat& q : rest.state.orientation) {
+      rest_.orientation.insert(rest_.orientation.end(), q.coeffs().data(), q.coeffs().data() + 4);
+    }
+    return rest_;
+  }
+  benchmarks::ChainState rest_;
+  benchmarks::Chain chain_;
+};
+
+/// Both take turns, so that what else the machine does meets both.
+void bench_spiral(int count, bool rubs) {
+  const test::Particles rest = test::make_spiral(count);
+  const SpiralNumbers numbers{.friction = rubs ? 0.2 : 0.0, .angular_friction = rubs ? 1e-3 : 0.0};
+  Spiral spiral(rest, numbers);
+  HandSpiral hand(rest, numbers);
+  double time = std::numeric_limits<double>::infinity(), hand_time = time;
+  for (int turn = 0; turn < 20; ++turn) {
+    time = std::min(time, least_time(3, CLOCK_PROCESS_CPUTIME_ID, [&] { spiral.run(); }, 0.02));
+    hand_time = std::min(hand_time, least_time(3, CLOCK_PROCESS_CPUTIME_ID, [&] { hand.run(); }, 0.02));
+  }
   print({.name = rubs ? "spiral_step/friction" : "spiral_step",
          .particles = static_cast<std::size_t>(count),
-         .time = time,
-         .rate = field("bonds", static_cast<double>(all.bond_frame[0].first.size())),
-         .hash = hash_of(state.position, state.velocity)});
+         .time = time / kSpiralSteps,
+         .rate = field("bonds", static_cast<double>(spiral.bonds())) + ", " +
+                 field("hand_kernel_us", 1e6 * hand_time / kSpiralSteps) + ", " +
+                 field("times_hand_kernel", time / hand_time) + ", " +
+                 field("difference_m", hand.difference(spiral.state.position)),
+         .hash = hash_of(spiral.state.position, spiral.state.velocity)});
 }
 
 }  // namespace

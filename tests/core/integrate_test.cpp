@@ -446,6 +446,51 @@ TEST(FreeDrift, GivesEachParticleTheBitsThatItHasAlone) {
   }
 }
 
+TEST(Kicks, GiveEachParticleTheBitsThatItHasAlone) {
+  // Particles are kicked by fours where no load from outside acts: fours with a pinned, a loaded and no odd particle.
+  Draw draw(402);
+  System all;
+  std::vector<double> stiffness;
+  std::vector<Vec3> outside(14, Vec3::Zero());
+  for (int i = 0; i < 14; ++i) {
+    all.p.add(draw.vector(1.0), draw.uniform(0.5, 2.0), draw.uniform(0.5, 2.0));
+    all.p.state.velocity.back() = draw.vector(1.0);
+    all.p.state.angular_momentum.back() = draw.vector(1.0);
+    stiffness.push_back(draw.uniform(0.5, 2.0));
+  }
+  all.p.set.pinned[2] = kPinPosition;
+  outside[9] = Vec3(0.3, -0.2, 0.1);
+  const auto forces = [&](std::size_t first) {
+    return [&, first](const ParticleState& state, double, ForceSample& out) {
+      for (std::size_t i = 0; i < state.size(); ++i) {
+        out.internal.force[i] = -stiffness[first + i] * state.position[i];
+        out.internal.torque[i] = stiffness[first + i] * Vec3(0.1, 0.2, -0.3).cross(state.position[i]);
+        out.external.force[i] = outside[first + i];
+        out.external.torque[i] = -outside[first + i];
+      }
+    };
+  };
+  std::vector<System> alone(14);
+  double external_work = 0.0;
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    Particles& one = alone[i].p;
+    one.add(all.p.state.position[i], all.p.set.mass[i]);
+    one.set.inertia[0] = all.p.set.inertia[i];
+    one.set.pinned[0] = all.p.set.pinned[i];
+    one.state.velocity[0] = all.p.state.velocity[i];
+    one.state.angular_momentum[0] = all.p.state.angular_momentum[i];
+    alone[i].run(forces(i), 0.05, 40);
+    external_work += alone[i].ledger.external_work;
+  }
+  all.run(forces(0), 0.05, 40);
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(all.p.state.velocity[i], alone[i].p.state.velocity[0]) << i;
+    EXPECT_EQ(all.p.state.angular_momentum[i], alone[i].p.state.angular_momentum[0]) << i;
+  }
+  EXPECT_EQ(all.ledger.external_impulse, alone[9].ledger.external_impulse);
+  EXPECT_EQ(all.ledger.external_work, external_work);
+}
+
 TEST(StableStep, IsTheSmallestOfItsLimits) {
   EXPECT_EQ(stable_step({}), std::numeric_limits<double>::infinity());
   EXPECT_DOUBLE_EQ(stable_step({.frequency = 100.0}), 0.003);

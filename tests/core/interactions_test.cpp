@@ -137,26 +137,58 @@ std::uint64_t hash_of(const Evaluated& loads) {
   return hasher.value();
 }
 
+/// Within a few hundred roundings of terms up to the largest.
+void expect_reference_laws(const Particles& p, const Interactions& interactions) {
+  const Evaluated fast = evaluate_loads(p, interactions, Executor(1));
+  Loads reference;
+  reference.reset(p.set.size());
+  double scale = 0.0;
+  for (const LawReport& report : report_laws(p.set, p.state, interactions, 0.5)) {
+    for (std::size_t i = 0; i < p.set.size(); ++i) {
+      reference.force[i] += report.loads.force[i];
+      reference.torque[i] += report.loads.torque[i];
+      scale = std::max({scale, report.loads.force[i].norm(), report.loads.torque[i].norm()});
+    }
+  }
+  for (std::size_t i = 0; i < p.set.size(); ++i) {
+    EXPECT_LE((fast.internal.force[i] + fast.external.force[i] - reference.force[i]).norm(), 1e-12 * scale) << i;
+    EXPECT_LE((fast.internal.torque[i] + fast.external.torque[i] - reference.torque[i]).norm(), 1e-12 * scale) << i;
+  }
+}
+
 TEST(Interactions, AddUpToTheReferenceLaws) {
   for (const std::size_t count : {2U, 3U, 7U, 61U}) {
     const Crowd crowd = make_crowd(std::max<std::size_t>(count, 4), 31 + count);
-    const Evaluated fast = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
-    Loads reference;
-    reference.reset(crowd.p.set.size());
-    double scale = 0.0;
-    for (const LawReport& report : report_laws(crowd.p.set, crowd.p.state, crowd.interactions, 0.5)) {
-      for (std::size_t i = 0; i < crowd.p.set.size(); ++i) {
-        reference.force[i] += report.loads.force[i];
-        reference.torque[i] += report.loads.torque[i];
-        scale = std::max({scale, report.loads.force[i].norm(), report.loads.torque[i].norm()});
-      }
-    }
-    // A few hundred roundings of terms up to the scale.
-    for (std::size_t i = 0; i < crowd.p.set.size(); ++i) {
-      EXPECT_LE((fast.internal.force[i] + fast.external.force[i] - reference.force[i]).norm(), 1e-12 * scale) << i;
-      EXPECT_LE((fast.internal.torque[i] + fast.external.torque[i] - reference.torque[i]).norm(), 1e-12 * scale) << i;
-    }
+    expect_reference_laws(crowd.p, crowd.interactions);
   }
+}
+
+TEST(BondsInARow, AddUpToTheReferenceLawsHoweverListsAndPairsAreOrdered) {
+  // Rows are batches of bonds whose particles follow each other; lists with the same bonds share their batches.
+  const Particles p = make_crowd(40, 77).p;
+  Draw draw(78);
+  Interactions all;
+  const auto add = [&](std::uint32_t apart, std::uint32_t first, std::uint32_t count, std::uint32_t stride) {
+    BondedLaw<Coplanarity> list;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const std::uint32_t a = first + (count - 1 - k) * stride;
+      list.first.push_back(a);
+      list.second.push_back(a + apart);
+      list.law.push_back({.strength = draw.uniform(0.5, 2.0), .weight = {}});
+    }
+    all.coplanarity.push_back(std::move(list));
+  };
+  add(1, 0, 20, 1);
+  add(2, 0, 20, 1);  // as many from the same on, yet others
+  add(1, 0, 20, 1);  // the same
+  add(3, 5, 9, 3);   // none follows another
+  add(5, 34, 1, 1);
+  add(1, 30, 9, 1);
+  all.cohesion.push_back({.name = "",
+                          .first = all.coplanarity[1].first,
+                          .second = all.coplanarity[1].second,
+                          .law = std::vector<Cohesion>(20, {.r0 = 0.5, .f0 = 1.0})});
+  expect_reference_laws(p, all);
 }
 
 TEST(Kinds, FollowTheRuleTable) {
