@@ -28,6 +28,7 @@ class BlendIndex {
  public:
   /// @param part_count  parts of the body
   void assign(const Blend& blend, std::size_t part_count);
+  bool operator==(const BlendIndex&) const = default;
   [[nodiscard]] bool active() const noexcept { return rule_ != BlendRule::Sum; }
   [[nodiscard]] BlendRule rule() const noexcept { return rule_; }
   [[nodiscard]] std::uint32_t node_of(std::uint32_t part) const noexcept { return node_.empty() ? part : node_[part]; }

@@ -3,9 +3,13 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
+#include <unordered_map>
 
+#include "field_index.h"
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -113,13 +117,6 @@ class MemoryArchive : public openvdb::io::Archive {
 
 struct SurfaceGrid::Impl {
   FloatGrid::Ptr grid;
-  std::uint64_t active = 0;
-  std::uint64_t memory = 0;
-
-  explicit Impl(FloatGrid::Ptr made) : grid(std::move(made)) {
-    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) active += leaf->onVoxelCount();
-    memory = grid->memUsage();
-  }
 };
 
 SurfaceGrid::SurfaceGrid() = default;
@@ -129,12 +126,12 @@ SurfaceGrid& SurfaceGrid::operator=(SurfaceGrid&&) noexcept = default;
 
 std::uint64_t SurfaceGrid::active_voxels() const {
   SUPPLE_EXPECTS(impl_ != nullptr);
-  return impl_->active;
+  return impl_->grid->activeVoxelCount();
 }
 
 std::uint64_t SurfaceGrid::memory_bytes() const {
   SUPPLE_EXPECTS(impl_ != nullptr);
-  return impl_->memory;
+  return impl_->grid->memUsage();
 }
 
 std::uint64_t SurfaceGrid::hash() const {
@@ -166,81 +163,348 @@ double SurfaceGrid::interpolate(const Vec3& world) const {
   return sum;
 }
 
-SurfaceGrid make_surface_grid(const FieldView& field, const GridOptions& options, const Executor& executor) {
+namespace {
+
+/// Whether the nodes of a box may be in the band.
+Verdict look(const FieldView& field, double width, const Box& box) {
+  const Interval value = field.bound(box);
+  const double band = width * field.gradient_bound(box);
+  if (value.lower > band) return Verdict::Inside;
+  if (value.upper < -band) return Verdict::Outside;
+  return Verdict::Keep;
+}
+
+double band_of(const GridOptions& options) { return options.half_width * options.lattice.cell; }
+
+BlockRange range_of(const FieldView& field, const GridOptions& options) {
+  return block_range(field.surface_box(), options.lattice,
+                     static_cast<int>(std::min(std::ceil(options.half_width), 1e6)));
+}
+
+/// What stands for voxels beyond the band: its width, or the largest |F| in it, with the sign of the side.
+float inside_value(const GridOptions& options, float largest) {
+  const auto width = static_cast<float>(band_of(options));
+  if (options.content == GridContent::SignedDistance) return -width;
+  return largest > 0.0F ? largest : width;
+}
+
+void set_beyond(Leaf& leaf, float inside) {
+  for (auto voxel = leaf.beginValueOff(); voxel; ++voxel) voxel.setValue(*voxel > 0.0F ? inside : -inside);
+}
+
+void fill(FloatTree& tree, const BlockBox& box, float value) {
+  tree.fill({first_voxel(box.lower), first_voxel(box.upper).offsetBy(kCells - 1)}, value, false);
+}
+
+/// Puts a sampled leaf, or the tile that stands for it, into the tree.
+void place(FloatTree& tree, const BlockCoord& block, SampledLeaf& sampled, float inside) {
+  if (sampled.leaf) {
+    tree.addLeaf(sampled.leaf.release());
+  } else {
+    fill(tree, {block, block}, sampled.inside ? inside : -inside);
+  }
+}
+
+/// A whole grid and what its making found.
+struct MadeGrid {
+  FloatGrid::Ptr grid;
+  float inside = 0.0F;
+  std::vector<std::pair<BlockCoord, float>> largest;  ///< |value| by leaf
+  std::uint64_t looked_at = 0;
+};
+
+MadeGrid make_whole(const FieldView& field, const GridOptions& options, const Executor& executor) {
   SUPPLE_EXPECTS(options.half_width >= 1.0 && std::isfinite(options.half_width));
   openvdb::initialize();
   const Lattice& lattice = options.lattice;
-  const double width = options.half_width * lattice.cell;
+  const double width = band_of(options);
   const RefineOptions refine{.limit = std::max<std::uint64_t>(1, options.max_voxels / kLeafVoxels),
                              .look_factor = 8,  // up to eight for each that is kept
                              .last_node = kCells - 1,
                              .keep_inside = true,
                              .counted = "voxels",
                              .per_block = kLeafVoxels};
-  const BlockRange range =
-      block_range(field.surface_box(), lattice, static_cast<int>(std::min(std::ceil(options.half_width), 1e6)));
-  const BlockList list = refine_blocks(
-      range, lattice, 0, executor, refine,
-      [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) {
-        const Interval value = field.bound(box);
-        const double band = width * field.gradient_bound(box);
-        if (value.lower > band) return Verdict::Inside;
-        if (value.upper < -band) return Verdict::Outside;
-        return Verdict::Keep;
-      });
-
+  const BlockList list =
+      refine_blocks(range_of(field, options), lattice, 0, executor, refine,
+                    [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) {
+                      return look(field, width, box);
+                    });
   std::vector<SampledLeaf> leaves(list.block.size());
   executor.for_blocks(leaves.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) leaves[i] = sample_leaf(field, options, list.block[i]);
   });
-  // Beyond the band: the width of the band, or the largest |F| in it, with the sign of the side.
-  const bool is_distance = options.content == GridContent::SignedDistance;
+  MadeGrid made;
+  made.looked_at = leaves.size();
   float largest = 0.0F;
-  for (const SampledLeaf& sampled : leaves) largest = std::max(largest, sampled.largest);
-  const float beyond = !is_distance && largest > 0.0F ? largest : static_cast<float>(width);
-  const float inside = is_distance ? -beyond : beyond;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    largest = std::max(largest, leaves[i].largest);
+    if (leaves[i].leaf) made.largest.emplace_back(list.block[i], leaves[i].largest);
+  }
+  made.inside = inside_value(options, largest);
   executor.for_blocks(leaves.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (!leaves[i].leaf) continue;
-      for (auto voxel = leaves[i].leaf->beginValueOff(); voxel; ++voxel) {
-        voxel.setValue(*voxel > 0.0F ? inside : -inside);
-      }
+      if (leaves[i].leaf) set_beyond(*leaves[i].leaf, made.inside);
     }
   });
-
-  SurfaceGrid result;
   executor.run([&] {
-    FloatGrid::Ptr grid = FloatGrid::create(-inside);
-    for (const BlockBox& box : list.inside) {
-      grid->tree().fill({first_voxel(box.lower), first_voxel(box.upper).offsetBy(kCells - 1)}, inside, false);
-    }
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-      if (leaves[i].leaf) {
-        grid->tree().addLeaf(leaves[i].leaf.release());
-      } else if (leaves[i].inside) {
-        const Coord low = first_voxel(list.block[i]);
-        grid->tree().fill({low, low.offsetBy(kCells - 1)}, inside, false);
-      }
-    }
-    grid->setName(options.name);
-    grid->setGridClass(is_distance ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
+    made.grid = FloatGrid::create(-made.inside);
+    for (const BlockBox& box : list.inside) fill(made.grid->tree(), box, made.inside);
+    for (std::size_t i = 0; i < leaves.size(); ++i) place(made.grid->tree(), list.block[i], leaves[i], made.inside);
+    // One tree for one content: boxes are tiles as large as they can be, whatever the order in which they came.
+    made.grid->tree().prune();
+    made.grid->setName(options.name);
+    made.grid->setGridClass(options.content == GridContent::SignedDistance ? openvdb::GRID_LEVEL_SET
+                                                                           : openvdb::GRID_UNKNOWN);
     openvdb::math::Transform::Ptr transform = openvdb::math::Transform::createLinearTransform(lattice.cell);
     transform->postTranslate({lattice.origin.x(), lattice.origin.y(), lattice.origin.z()});
-    grid->setTransform(transform);
-    grid->insertMeta("units", openvdb::StringMetadata("m"));
-    grid->insertMeta("up_axis", openvdb::StringMetadata("z"));
-    grid->insertMeta(kHashKey, openvdb::StringMetadata(to_hex(hash_of(*grid))));
-    result.impl_ = std::make_unique<SurfaceGrid::Impl>(std::move(grid));
+    made.grid->setTransform(transform);
+    made.grid->insertMeta("units", openvdb::StringMetadata("m"));
+    made.grid->insertMeta("up_axis", openvdb::StringMetadata("z"));
   });
+  return made;
+}
+
+/// All that the values near a primitive depend on, by a hash for what is more than a point.
+struct PrimitiveKey {
+  std::array<double, 3> position{};
+  double inverse_r2 = 0.0;
+  std::uint64_t rest = 0;
+  bool operator==(const PrimitiveKey&) const = default;
+};
+
+PrimitiveKey key_of(const Field::Index& index, std::size_t id) {
+  const PackedPrimitive& p = index.primitive[id];
+  PrimitiveKey key{p.position, p.inverse_r2, p.part};
+  if (p.kind == PackedKind::PointWyvill) return key;
+  const PackedShape& shape = index.shape[id];
+  Hasher hasher;
+  hasher.add(std::uint64_t{p.part});
+  hasher.add(std::span<const double>(shape.to_local));
+  hasher.add(std::span<const double>(shape.half));
+  const Kernel& k = shape.kernel;
+  hasher.add(static_cast<std::uint64_t>(k.kind));
+  for (const double x : {k.radius, k.thickness, k.slope, k.iso, k.shape}) hasher.add(x);
+  const ShapeView& v = shape.view;
+  hasher.add(static_cast<std::uint64_t>(v.kind));
+  hasher.add(std::span<const Vec3>(&v.size, 1));
+  for (const double x : {v.radius, v.taper, v.pair[0], v.pair[1], v.gain}) hasher.add(x);
+  hasher.add(v.control);
+  key.rest = hasher.value();
+  return key;
+}
+
+struct BlockHash {
+  std::size_t operator()(const BlockCoord& b) const {
+    return static_cast<std::size_t>(hash_bytes(std::as_bytes(std::span<const std::int32_t>(b))));
+  }
+};
+
+bool same(const GridOptions& a, const GridOptions& b) {
+  return a.lattice.origin == b.lattice.origin && a.lattice.cell == b.lattice.cell && a.content == b.content &&
+         a.half_width == b.half_width && a.max_voxels == b.max_voxels && a.name == b.name;
+}
+
+bool same(const BlockRange& a, const BlockRange& b) { return a.lower == b.lower && a.upper == b.upper; }
+
+}  // namespace
+
+SurfaceGrid make_surface_grid(const FieldView& field, const GridOptions& options, const Executor& executor) {
+  SurfaceGrid result;
+  result.impl_ = std::make_unique<SurfaceGrid::Impl>(make_whole(field, options, executor).grid);
   return result;
 }
 
+struct GridUpdater::Impl {
+  SurfaceGrid result;
+  bool usable = false;
+  GridOptions options;
+  BlockRange range;
+  double iso = 0.0;
+  BlendIndex blend;
+  std::vector<PrimitiveKey> key, next_key;
+  std::vector<Box> support;
+  float inside = 0.0F;
+  std::unordered_map<BlockCoord, float, BlockHash> largest;  ///< |value| by leaf, for GridContent::Field
+  std::vector<BlockCoord> touched;
+  std::vector<SampledLeaf> sampled;
+
+  /// Blocks of the range that a box reaches.
+  void touch(const Box& box) {
+    const BlockRange reached = block_range(box, options.lattice, 1);
+    for (std::int32_t z = std::max(reached.lower[2], range.lower[2]); z <= std::min(reached.upper[2], range.upper[2]); ++z) {
+      for (std::int32_t y = std::max(reached.lower[1], range.lower[1]); y <= std::min(reached.upper[1], range.upper[1]); ++y) {
+        for (std::int32_t x = std::max(reached.lower[0], range.lower[0]); x <= std::min(reached.upper[0], range.upper[0]); ++x) {
+          touched.push_back({x, y, z});
+        }
+      }
+    }
+  }
+
+  /// Lists the blocks that may be different. @return false where everything may be
+  bool list_touched(const Field::Index& index, const std::vector<Box>& boxes) {
+    touched.clear();
+    if (key.size() != next_key.size()) return false;
+    for (std::size_t i = 0; i < key.size(); ++i) {
+      if (key[i] == next_key[i]) continue;
+      touch(support[i]);
+      touch(boxes[i]);
+      if (touched.size() > 64 * (index.size() + 4096)) drop_repeats();
+    }
+    drop_repeats();
+    return 2 * touched.size() < std::max<std::size_t>(result.impl_->grid->tree().leafCount(), 64);
+  }
+  void drop_repeats() {
+    std::sort(touched.begin(), touched.end(), before);
+    touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  }
+
+  /// @return false when the largest value is another one
+  bool update(const FieldView& field, const Executor& executor, GridCounts& counts) {
+    const double width = band_of(options);
+    sampled.clear();
+    sampled.resize(touched.size());
+    std::vector<Verdict> verdict(touched.size());
+    executor.for_blocks(touched.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const BlockCoord& b = touched[i];
+        const Box box{node_position(options.lattice, kCells * b[0], kCells * b[1], kCells * b[2]),
+                      node_position(options.lattice, kCells * b[0] + kCells - 1, kCells * b[1] + kCells - 1,
+                                    kCells * b[2] + kCells - 1)};
+        verdict[i] = look(field, width, box);
+        if (verdict[i] == Verdict::Keep) {
+          sampled[i] = sample_leaf(field, options, b);
+        } else {
+          sampled[i].inside = verdict[i] == Verdict::Inside;
+        }
+      }
+    });
+    counts.leaves_looked_at = touched.size();
+    counts.leaves_sampled = static_cast<std::uint64_t>(std::count(verdict.begin(), verdict.end(), Verdict::Keep));
+    if (options.content == GridContent::Field) {
+      for (std::size_t i = 0; i < touched.size(); ++i) {
+        if (sampled[i].leaf) {
+          largest[touched[i]] = sampled[i].largest;
+        } else {
+          largest.erase(touched[i]);
+        }
+      }
+      float most = 0.0F;
+      for (const auto& [block, value] : largest) most = std::max(most, value);
+      if (inside_value(options, most) != inside) return false;
+    }
+    FloatTree& tree = result.impl_->grid->tree();
+    for (std::size_t i = 0; i < touched.size(); ++i) {
+      if (sampled[i].leaf) set_beyond(*sampled[i].leaf, inside);
+      place(tree, touched[i], sampled[i], inside);
+    }
+    tree.prune();
+    return true;
+  }
+};
+
+GridUpdater::GridUpdater() : impl_(std::make_unique<Impl>()) {}
+GridUpdater::~GridUpdater() = default;
+GridUpdater::GridUpdater(GridUpdater&&) noexcept = default;
+GridUpdater& GridUpdater::operator=(GridUpdater&&) noexcept = default;
+
+const SurfaceGrid& GridUpdater::make(const Field& field, const GridOptions& options, const Executor& executor,
+                                     GridCounts* counts) {
+  Impl& self = *impl_;
+  const Field::Index& index = field.index();
+  GridCounts count;
+  self.next_key.resize(index.size());
+  for (std::size_t i = 0; i < index.size(); ++i) self.next_key[i] = key_of(index, i);
+  const BlockRange range = range_of(field, options);
+  const bool comparable = self.usable && same(options, self.options) && index.iso == self.iso &&
+                          index.blend == self.blend && same(range, self.range);
+  self.usable = false;
+  bool done = false;
+  if (comparable && self.list_touched(index, index.support)) {
+    executor.run([&] { done = self.update(field, executor, count); });
+  }
+  if (!done) {
+    MadeGrid made = make_whole(field, options, executor);
+    count = {.leaves_looked_at = made.looked_at, .leaves_sampled = made.looked_at, .whole = true};
+    self.result.impl_ = std::make_unique<SurfaceGrid::Impl>(std::move(made.grid));
+    self.inside = made.inside;
+    self.largest.clear();
+    if (options.content == GridContent::Field) self.largest.insert(made.largest.begin(), made.largest.end());
+    self.options = options;
+    self.range = range;
+    self.iso = index.iso;
+    self.blend = index.blend;
+  }
+  self.key.swap(self.next_key);
+  self.support = index.support;
+  self.usable = true;
+  if (counts != nullptr) *counts = count;
+  return self.result;
+}
+
+void UnitedField::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+  std::vector<Vec3> gradients(points.size());
+  evaluate(points, values, gradients);
+}
+
+void UnitedField::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+  std::vector<double> value(points.size());
+  std::vector<Vec3> gradient(points.size());
+  for (std::size_t k = 0; k < fields_.size(); ++k) {
+    fields_[k].evaluate(points, value, gradient);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (k > 0 && !(value[i] > values[i])) continue;
+      values[i] = value[i];
+      gradients[i] = gradient[i];
+    }
+  }
+}
+
+void UnitedField::evaluate_parts(std::span<const Vec3>, FieldParts&) const { SUPPLE_EXPECTS(!"parts of one body"); }
+
+Interval UnitedField::bound(const Box& box) const {
+  Interval result = fields_.front().bound(box);
+  for (const FieldView& field : std::span(fields_).subspan(1)) {
+    const Interval other = field.bound(box);
+    result.lower = std::max(result.lower, other.lower);
+    result.upper = std::max(result.upper, other.upper);
+  }
+  return result;
+}
+
+double UnitedField::gradient_bound(const Box& box) const {
+  double largest = 0.0;
+  for (const FieldView& field : fields_) largest = std::max(largest, field.gradient_bound(box));
+  return largest;
+}
+
+Box UnitedField::surface_box() const {
+  Box box;
+  for (const FieldView& field : fields_) {
+    if (const Box other = field.surface_box(); !other.empty()) box = box.united(other);
+  }
+  return box;
+}
+
+double UnitedField::feature_size() const {
+  double least = std::numeric_limits<double>::infinity();
+  for (const FieldView& field : fields_) least = std::min(least, field.feature_size());
+  return least;
+}
+
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid> grids) {
+  std::vector<const SurfaceGrid*> pointers;
+  for (const SurfaceGrid& grid : grids) pointers.push_back(&grid);
+  write_grids(path, pointers);
+}
+
+void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid* const> grids) {
   openvdb::initialize();
   openvdb::GridCPtrVec pointers;
-  for (const SurfaceGrid& grid : grids) {
-    SUPPLE_EXPECTS(grid.impl_ != nullptr);
-    pointers.push_back(grid.impl_->grid);
+  for (const SurfaceGrid* grid : grids) {
+    SUPPLE_EXPECTS(grid != nullptr && grid->impl_ != nullptr);
+    const FloatGrid::Ptr marked = grid->impl_->grid->copy();  // shares the tree
+    marked->insertMeta(kHashKey, openvdb::StringMetadata(to_hex(hash_of(*marked))));
+    pointers.push_back(marked);
   }
   std::string bytes;
   Executor(1).run([&] { bytes = MemoryArchive().bytes(pointers); });

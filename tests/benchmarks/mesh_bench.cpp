@@ -3,7 +3,8 @@
 /// memory, a hash, and the distances of vertices and of triangle centroids to the exact surface in cells (RMS; Newton's
 /// method along the analytic gradient, in double precision).
 ///
-///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways
+///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
+///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the blobs moved
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
 ///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
 #include <algorithm>
@@ -23,6 +24,7 @@
 #include "supple/core/hash.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/polygonise.h"
+#include "supple/implicit/surface_grid.h"
 
 namespace {
 
@@ -128,11 +130,8 @@ struct Method {
 /// "refined" starts from a lattice of twice the cell, "refined_twice" of four times.
 constexpr std::array<Method, 4> kMethods{{{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}}};
 
-/// 1 % of the blobs, those nearest to one on the surface, moved to and fro by a tenth of their radius.
-void measure_moved(const std::string& name, Body& body, const Lattice& lattice) {
-  const Executor executor(1);
-  CubeMesher mesher, fresh;
-  MarchCounts counts;
+/// 1 % of the blobs, those nearest to one on the surface.
+std::vector<std::uint32_t> blobs_at_the_side(const Body& body) {
   std::vector<std::uint32_t> order(body.parts.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::size_t top = 0;
@@ -144,14 +143,61 @@ void measure_moved(const std::string& name, Body& body, const Lattice& lattice) 
     return (body.parts[a].position - centre).squaredNorm() < (body.parts[b].position - centre).squaredNorm();
   });
   order.resize(std::max<std::size_t>(order.size() / 100, 1));
+  return order;
+}
+
+/// Moves them by a tenth of their radius, to and fro.
+void move(Body& body, std::span<const std::uint32_t> some, int repeat) {
+  for (const std::uint32_t i : some) {
+    body.parts[i].position.z() += (repeat % 2 == 0 ? 0.1 : -0.1) * body.skeleton.primitive[i].kernel.radius;
+  }
+  body.place();
+}
+
+/// A signed distance on the leaves around the surface as a grid for OpenVDB, and its update when 1 % of the blobs moved.
+void measure_grid(const std::string& name, Body& body, const Lattice& lattice) {
+  const Executor executor(1);
+  const std::vector<std::uint32_t> some = blobs_at_the_side(body);
+  const GridOptions options{.lattice = lattice};
+  GridUpdater updater;
+  GridCounts counts;
+  double whole = 1e300, moved = 1e300, total = 0.0;
+  std::uint64_t leaves = 0, sampled = 0;
+  for (int repeat = 0; repeat < 40 && (repeat < 4 || total < 1.5); ++repeat) {
+    move(body, some, repeat);
+    (void)body.field.index();
+    double begin = cpu_seconds();
+    const SurfaceGrid& kept = updater.make(body.field, options, executor, &counts);
+    const double once = cpu_seconds() - begin;
+    if (repeat > 0) {
+      moved = std::min(moved, once);
+      sampled = counts.leaves_sampled;
+    } else {
+      leaves = counts.leaves_sampled;
+    }
+    begin = cpu_seconds();
+    const SurfaceGrid made = make_surface_grid(body.field, options, executor);
+    const double all = cpu_seconds() - begin;
+    whole = std::min(whole, all);
+    total += all;
+    if (repeat < 3 && made.hash() != kept.hash()) std::printf("%s: differs from a whole grid\n", name.c_str());
+  }
+  std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"whole_cpu_ms\": %.5g, "
+              "\"share\": %.3g, \"leaves\": %llu, \"leaves_sampled\": %llu}\n",
+              name.c_str(), 1e3 * moved, 1e3 * whole, moved / whole, static_cast<unsigned long long>(leaves),
+              static_cast<unsigned long long>(sampled));
+  std::fflush(stdout);
+}
+
+void measure_moved(const std::string& name, Body& body, const Lattice& lattice) {
+  const Executor executor(1);
+  CubeMesher mesher, fresh;
+  MarchCounts counts;
+  const std::vector<std::uint32_t> some = blobs_at_the_side(body);
   double whole = 1e300, moved = 1e300, total = 0.0;
   Mesh mesh;
   for (int repeat = 0; repeat < 100 && (repeat < 4 || total < 1.5); ++repeat) {
-    for (const std::uint32_t i : order) {
-      const double R = body.skeleton.primitive[i].kernel.radius;
-      body.parts[i].position.z() += (repeat % 2 == 0 ? 0.1 : -0.1) * R;
-    }
-    body.place();
+    move(body, some, repeat);
     double begin = cpu_seconds();
     const Mesh& kept = mesher.make(body.field, {.lattice = lattice}, executor, &counts);
     const double once = cpu_seconds() - begin;
@@ -334,6 +380,10 @@ int main(int argc, char** argv) {
       const std::string name = body_name + '/' + std::to_string(cells) + "/moved";
       if (body_name != "w1" && name.compare(0, filter.size(), filter) == 0) {
         measure_moved(name, body, frame.lattice(cells));
+      }
+      const std::string grid = body_name + '/' + std::to_string(cells) + "/grid";
+      if (body_name != "w1" && grid.compare(0, filter.size(), filter) == 0) {
+        measure_grid(grid, body, frame.lattice(cells));
       }
     }
   }

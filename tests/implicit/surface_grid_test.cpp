@@ -4,12 +4,14 @@
 #include <openvdb/openvdb.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
+#include "supple/core/hash.h"
 
 // OpenVDB loses one node when the topology of a file ends early: RootNode::readTopology holds it by a plain pointer.
 extern "C" const char* __lsan_default_suppressions();
@@ -177,6 +179,120 @@ TEST(SurfaceGrid, DoesNotDependOnThreads) {
   };
   const std::uint64_t expected = hash(1);
   for (const int threads : {2, 3, 8}) EXPECT_EQ(hash(threads), expected);
+}
+
+std::string bytes_of(const Folder& folder, const SurfaceGrid& grid) {
+  const SurfaceGrid* const one[] = {&grid};
+  write_grids(folder / "bytes.vdb", one);
+  std::ifstream file(folder / "bytes.vdb", std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// Hash of a file without the random number that OpenVDB puts into its head, after four numbers and a flag.
+std::uint64_t content_of(std::string bytes) {
+  constexpr std::size_t kBegin = 21, kLength = 36;
+  bytes.erase(kBegin, kLength);
+  return hash_bytes(std::as_bytes(std::span<const char>(bytes)));
+}
+
+TEST(GridUpdater, HasTheTreeOfAWholeGridWhateverMoved) {
+  const Folder folder;
+  for (const GridContent content : {GridContent::SignedDistance, GridContent::Field}) {
+    Body body = random_body({.seed = 8, .parts = 60, .half_width = 2.0, .every_shape = true});
+    const GridOptions options = options_of(content);
+    GridUpdater updater;
+    Random random(9);
+    int kept = 0;
+    for (int step = 0; step < 8; ++step) {
+      if (step % 4 != 3) {  // one part moves, or a kernel grows, or nothing happens
+        body.parts[random.below(60)].position += random.in_box(0.2);
+      } else if (step == 7) {
+        body.skeleton.primitive[3].kernel = Kernel::wyvill(0.9 * body.skeleton.primitive[3].kernel.radius);
+      }
+      body.place();
+      GridCounts counts;
+      const SurfaceGrid& grid = updater.make(body.field, options, Executor(2), &counts);
+      const SurfaceGrid whole = make_surface_grid(body.field, options, Executor(1));
+      ASSERT_EQ(grid.hash(), whole.hash()) << step;
+      ASSERT_EQ(content_of(bytes_of(folder, grid)), content_of(bytes_of(folder, whole))) << step;
+      kept += counts.whole ? 0 : 1;
+    }
+    EXPECT_GE(kept, 5);
+  }
+}
+
+TEST(GridUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
+  Body body = random_body({.seed = 8, .parts = 200, .half_width = 3.0, .only_points = true});
+  GridUpdater updater;
+  GridCounts counts;
+  const GridOptions options = options_of(GridContent::SignedDistance);
+  (void)updater.make(body.field, options, Executor(1), &counts);
+  EXPECT_TRUE(counts.whole);
+  const std::uint64_t all = counts.leaves_sampled;
+  (void)updater.make(body.field, options, Executor(1), &counts);
+  EXPECT_EQ(counts.leaves_looked_at, 0u);
+  body.parts[7].position.x() += 0.01;
+  body.place();
+  (void)updater.make(body.field, options, Executor(1), &counts);
+  EXPECT_FALSE(counts.whole);
+  EXPECT_GT(counts.leaves_sampled, 0u);
+  // A support of at most 0.6 m spans at most 5 leaves of 0.4 m along an axis.
+  EXPECT_LE(counts.leaves_looked_at, 125u);
+  EXPECT_LT(10 * counts.leaves_sampled, all);
+}
+
+TEST(GridUpdater, MakesEverythingAnewForOtherOptionsIsoOrPrimitives) {
+  Body body = random_body({.seed = 8, .parts = 60, .half_width = 2.0, .only_points = true});
+  GridUpdater updater;
+  GridOptions options = options_of(GridContent::SignedDistance);
+  const auto whole = [&] {
+    body.place();
+    GridCounts counts;
+    const std::uint64_t hash = updater.make(body.field, options, Executor(1), &counts).hash();
+    EXPECT_EQ(hash, make_surface_grid(body.field, options, Executor(1)).hash());
+    return counts.whole;
+  };
+  EXPECT_TRUE(whole());
+  EXPECT_FALSE(whole());
+  options.half_width = 2.0;
+  EXPECT_TRUE(whole());
+  body.skeleton.iso = 0.4;
+  EXPECT_TRUE(whole());
+  body.skeleton.blend.rule = BlendRule::Ricci;
+  EXPECT_TRUE(whole());
+  body.skeleton.primitive.pop_back();
+  EXPECT_TRUE(whole());
+  EXPECT_FALSE(whole());
+}
+
+TEST(SurfaceGrid, OfUnitedBodiesHasTheDistanceToTheNearest) {
+  const FunctionField left = sphere(kOrigin, 0.4), right = sphere(kOrigin + Vec3(1.5, 0, 0), 0.3);
+  const UnitedField both({left, right});
+  const SurfaceGrid grid = make_surface_grid(both, options_of(GridContent::SignedDistance), Executor(1));
+  for (int k = -12; k < 12; ++k) {
+    for (int j = -12; j < 12; ++j) {
+      for (int i = -12; i < 40; ++i) {
+        const double distance = -std::max(FieldView(left).value(node(i, j, k)), FieldView(right).value(node(i, j, k)));
+        ASSERT_NEAR(grid.value(i, j, k), std::clamp(distance, -3.0 * kCell, 3.0 * kCell), kFloatEps);
+      }
+    }
+  }
+}
+
+TEST(SurfaceGrid, IsReadByTheToolsOfOpenVdb) {
+  if (std::system("command -v vdb_print >/dev/null 2>&1") != 0) GTEST_SKIP() << "no vdb_print (libopenvdb-tools)";
+  const Folder folder;
+  std::vector<SurfaceGrid> grids;
+  grids.push_back(make_surface_grid(sphere(kOrigin, 0.6), options_of(GridContent::SignedDistance), Executor(1)));
+  const auto path = folder / "ball.vdb";
+  write_grids(path, grids);
+  const auto report = folder / "report.txt";
+  ASSERT_EQ(std::system(("vdb_print -l " + path.string() + " >" + report.string() + " 2>&1").c_str()), 0);
+  std::ifstream file(report);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  for (const std::string word : {"Name: ball", "class: level set", "units: m", "voxel size: 0.05"}) {
+    EXPECT_NE(text.find(word), std::string::npos) << word << " in\n" << text;
+  }
 }
 
 TEST(SurfaceGrid, HoldsTheSideOfEveryVoxelOfARandomBody) {

@@ -7,9 +7,11 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "supple/core/executor.h"
-#include "supple/implicit/field_view.h"
+#include "supple/implicit/field.h"
 #include "supple/implicit/polygonise.h"
 
 namespace supple::implicit {
@@ -42,8 +44,9 @@ class SurfaceGrid {
   [[nodiscard]] double interpolate(const Vec3& world) const;                          ///< trilinear
 
  private:
+  friend class GridUpdater;
   friend SurfaceGrid make_surface_grid(const FieldView&, const GridOptions&, const Executor&);
-  friend void write_grids(const std::filesystem::path&, std::span<const SurfaceGrid>);
+  friend void write_grids(const std::filesystem::path&, std::span<const SurfaceGrid* const>);
   friend SurfaceGrid read_grid(const std::filesystem::path&, const std::string&);
   struct Impl;
   std::unique_ptr<Impl> impl_;
@@ -54,8 +57,54 @@ class SurfaceGrid {
 [[nodiscard]] SurfaceGrid make_surface_grid(const FieldView& field, const GridOptions& options,
                                             const Executor& executor);
 
+struct GridCounts {
+  std::uint64_t leaves_looked_at = 0;  ///< leaves of 8^3 voxels that bounds or values were asked for in this call
+  std::uint64_t leaves_sampled = 0;    ///< of these, evaluated
+  bool whole = false;                  ///< everything was made anew
+};
+
+/// Makes the grid of one body again and again: only leaves are touched that the support of a primitive that moved, or was
+/// where it is no longer, reaches. The grid is that of `make_surface_grid`, in values, in its tree and so in its file.
+class GridUpdater {
+ public:
+  GridUpdater();
+  ~GridUpdater();
+  GridUpdater(GridUpdater&&) noexcept;
+  GridUpdater& operator=(GridUpdater&&) noexcept;
+
+  /// Valid until the next call. Everything is made anew where options, iso value, blend or the number of primitives are not
+  /// those of the last call, where more than half of the leaves would change, and with GridContent::Field where the largest
+  /// value does: it stands for all beyond the band.
+  /// @throws as make_surface_grid; the next call then makes everything anew
+  const SurfaceGrid& make(const Field& field, const GridOptions& options, const Executor& executor,
+                          GridCounts* counts = nullptr);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Several bodies as one: the largest of their fields, so a signed distance is that to the nearest of them.
+class UnitedField {
+ public:
+  /// @param fields  must outlive this
+  explicit UnitedField(std::vector<FieldView> fields) : fields_(std::move(fields)) {}
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  /// @throws ContractViolation: parts of several bodies have no common numbers
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const;
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& box) const;
+  [[nodiscard]] Box surface_box() const;
+  [[nodiscard]] double feature_size() const;
+
+ private:
+  std::vector<FieldView> fields_;
+};
+
 /// Writes one .vdb with all grids, by temporary file and rename. @throws Error{Io}
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid> grids);
+void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid* const> grids);
 /// @throws Error{Io} when absent, Error{Corrupt} when not a grid of that name.
 [[nodiscard]] SurfaceGrid read_grid(const std::filesystem::path& path, const std::string& name);
 
