@@ -102,7 +102,7 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 at;
 uniform mat4 to_clip;
 centroid out vec3 world_normal;
-centroid out vec3 painted_at;
+out vec3 painted_at;   // at the middle of the pixel, for derivatives
 void main() {
   world_normal = normal;
   painted_at = at;
@@ -141,7 +141,7 @@ void main() { data = packed_geometry(world_normal); })";
 std::string painted_geometry() {
   return std::string(kVersion) + kPacking + kPaint + R"(
 centroid in vec3 world_normal;
-centroid in vec3 painted_at;
+in vec3 painted_at;
 layout(location = 0) out uvec2 data;
 layout(location = 1) out vec4 colour;   // square roots, which spend 8 bits as the eye does
 void main() {

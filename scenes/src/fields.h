@@ -16,6 +16,7 @@
 #include <string>
 #include <utility>
 
+#include "fields_looks.h"
 #include "fields_rules.h"
 #include "read_scene_faults.h"
 #include "supple/core/lennard_jones.h"
@@ -468,6 +469,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("loads", d.loads, {}, "external forces and torques");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
+  archive("look", d.look, {}, "what else its pictures show");
   archive.check(!d.separate || (d.interactions.empty() && d.kinds.empty()), "separate",
                 "expected no interactions or kinds in an object of separate bodies", "some",
                 "remove them, or 'separate'");
@@ -519,24 +521,6 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
   archive("bulge_width", d.bulge_width, up_to(1.0, kNumber), "share of the other body's feature size");
   archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "of the surface samples; auto: a sixth of the smallest feature");
-}
-
-template <class Archive>
-void fields(Archive& archive, CameraDesc& d) {
-  archive("from", d.from, any(kLength), "where it stands");
-  archive("look_at", d.look_at, any(kLength), "what is in the middle");
-  archive("up", d.up, direction(), "what is up in the picture");
-  archive("field_of_view_deg", d.field_of_view, degrees(1.0, 150.0), "vertical");
-  const Vec3 sight = d.look_at - d.from;
-  archive.check(sight.norm() > 0.0, "look_at", "expected a point apart from 'from'", "the same point", "");
-  archive.check(sight.norm() == 0.0 || sight.cross(d.up).norm() > 1e-6 * sight.norm() * d.up.norm(), "up", "expected a direction across the line of sight",
-                "one along it", "");
-}
-
-template <class Archive>
-void fields(Archive& archive, LightDesc& d) {
-  archive("direction", d.direction, direction(), "the way the light travels");
-  archive("softness_deg", d.softness, degrees(0.0, 20.0), "angular radius; 0: sharp shadows");
 }
 
 template <class Archive>
@@ -644,6 +628,20 @@ void check_names(Archive& archive, const Scene& d) {
 }
 
 template <class Archive>
+void check_cameras(Archive& archive, const Scene& d) {
+  archive.check(d.cameras.empty() || !archive.given("camera"), "cameras", "expected either camera or cameras", "both", "");
+  archive.check(d.camera.name.empty(), "camera.name", "expected no name for the only camera", '\'' + shown(d.camera.name) + '\'',
+                "use 'cameras' for several");
+  for (std::size_t i = 0; i < d.cameras.size(); ++i) {
+    const std::string key = "cameras[" + std::to_string(i) + "].name";
+    archive.check(!d.cameras[i].name.empty(), key, "expected a name", "nothing", "this key is required");
+    for (std::size_t k = 0; k < i; ++k)
+      archive.check(d.cameras[k].name != d.cameras[i].name, key, "expected a unique name", '\'' + shown(d.cameras[i].name) + '\'',
+                    "cameras[" + std::to_string(k) + "] has it already");
+  }
+}
+
+template <class Archive>
 void fields(Archive& archive, Scene& d) {
   archive.required("schema", d.schema, between(1.0, 1.0, kNumber), "version of this format");
   archive("title", d.title, {}, "for people");
@@ -658,7 +656,10 @@ void fields(Archive& archive, Scene& d) {
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
   archive("contact", d.contact, {}, "how contact is computed");
   archive("camera", d.camera, {}, "who looks on");
+  archive("cameras", d.cameras, {}, "several onlookers, instead of 'camera': images NAME.CAMERA.0001.png and a film each");
   archive("light", d.light, {}, "the sun");
+  archive("lights", d.lights, {}, "rectangles that shine; OpenGL takes the first four, without shadows");
+  archive("background", d.background, {}, "behind everything, from top to bottom");
   archive("ground", d.ground, {}, "a horizontal plane; absent: none");
   archive("output", d.output, {}, "what is written");
   archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",
@@ -675,6 +676,7 @@ void fields(Archive& archive, Scene& d) {
                 "expected an explicit method beside a law with paper_literal, which has no energy",
                 std::string(name_of(d.integrator.method)), "use 'symplectic' or 'rk4'");
   check_names(archive, d);
+  check_cameras(archive, d);
 }
 
 }  // namespace supple::scenes

@@ -61,6 +61,15 @@ template <> struct EnumNames<SplitName> {
 template <> struct EnumNames<CoreName> {
   static constexpr std::array<std::string_view, 2> names{"soft", "barrier"};
 };
+template <> struct EnumNames<PatternName> {
+  static constexpr std::array<std::string_view, 3> names{"checker", "stripes", "picture"};
+};
+template <> struct EnumNames<ColourByName> {
+  static constexpr std::array<std::string_view, 5> names{"colour", "pressure", "stretch", "speed", "normals"};
+};
+template <> struct EnumNames<MapName> {
+  static constexpr std::array<std::string_view, 5> names{"viridis", "magma", "coolwarm", "turbo", "grey"};
+};
 template <> struct EnumNames<TableName> {
   static constexpr std::array<std::string_view, 2> names{"none", "csv"};
 };

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "look_columns.h"
 #include "supple/collision/deformed_field.h"
 #include "supple/core/parts.h"
 #include "supple/implicit/mesh_motion.h"
@@ -277,7 +278,8 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   profile.present += frame.surface.point.size();
 }
 
-std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles, Frame& frame) try {
+std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
+                                     const core::Interactions& laws, Frame& frame) try {
   const Model& model = context.model;
   const std::vector<Body>& bodies = context.bodies;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
@@ -352,6 +354,10 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
                   .angular_velocity = frame.spin[i][k], .id = bodies[i].particle[k]};
     }
     implicit::add_motion(frame.field[i], parts, context.executor, surfaces[i]);
+  }
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (!surfaces[i].position.empty())
+      add_look_columns(model, bodies[i], particles, laws, frame.field[i], frame.pose[i], context.executor, surfaces[i]);
   }
   std::vector<Mesh> meshes(model.objects.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {

@@ -83,7 +83,9 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
 /// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
 
-/// Stage 9 on the deformed fields, one mesh an object; of several pieces the meshes lie side by side in it.
-[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles, Frame& frame);
+/// Stage 9 on the deformed fields, one mesh an object, with the columns its look needs; of several pieces the meshes lie
+/// side by side in it. @param laws  those that nothing has broken
+[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
+                                                   const core::Interactions& laws, Frame& frame);
 
 }  // namespace supple::scenes

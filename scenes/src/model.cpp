@@ -780,6 +780,7 @@ Model build_model(const Scene& scene) {
     everything = everything.united(own);
   }
   model.meshing = scene.output.meshing;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) model.objects[i].look = scene.objects[i].look;
   if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
   model.scene_length = everything.extent().norm();
   if (!(model.scene_length > 0.0)) model.scene_length = model.smallest_length;

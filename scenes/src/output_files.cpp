@@ -32,17 +32,6 @@ double process_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// What is drawn of an obstacle.
-Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
-  constexpr int kFiner = 4;  // facets along a cell of the heights
-  if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) return box->mesh();
-  if (const auto* heights = std::get_if<implicit::HeightField>(&body.solid)) return heights->mesh(kFiner);
-  const Vec3 u = d.extent * d.normal.unitOrthogonal(), v = d.normal.cross(u);
-  Mesh mesh;
-  add_quadrangle(mesh, d.at - u - v, d.at + u - v, d.at + u + v, d.at - u + v);
-  return mesh;
-}
-
 }  // namespace
 
 StageClock::StageClock(StageProfile& profile) : profile_(profile), begin_(process_cpu_seconds()) { ++profile.calls; }
@@ -64,41 +53,12 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
       if (entry.path().filename().string().starts_with(name + ".")) fs::remove(entry.path(), ignored);
     }
   }
-  for (const char* suffix : {".mp4", "_sheet.png"}) fs::remove(folder / (name + suffix), ignored);
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string file = entry.path().filename().string();
+    const bool ours = file.starts_with(name + '.') || file == name + "_sheet.png";
+    if (ours && (file.ends_with(".mp4") || file.ends_with("_sheet.png"))) fs::remove(entry.path(), ignored);
+  }
   fs::remove(folder / "result.json", ignored);
-}
-
-std::unique_ptr<render::Renderer> make_scene_renderer(const Scene& scene, render::ContextKind context) {
-  render::RenderSettings settings;
-  if (scene.output.images) {
-    settings.width = scene.output.images->size.at(0);
-    settings.height = scene.output.images->size.at(1);
-    settings.samples = scene.output.images->samples;
-  }
-  settings.shadow_softness = scene.light.softness;
-  settings.context = context;
-  return render::make_renderer(settings);
-}
-
-render::Image render_scene(render::Renderer& renderer, const Scene& scene, const Model& model,
-                           const std::vector<Mesh>& meshes) {
-  render::View view;
-  view.camera = {scene.camera.from, scene.camera.look_at, scene.camera.up, scene.camera.field_of_view};
-  view.light.direction = scene.light.direction;
-  if (scene.ground && scene.ground->visible) view.ground = render::Ground{scene.ground->height, scene.ground->colour};
-  std::vector<render::Item> items;
-  for (std::size_t i = 0; i < meshes.size(); ++i) {
-    items.push_back({&meshes[i], scene.objects[i].colour, scene.objects[i].roughness});
-  }
-  std::vector<Mesh> obstacles;
-  obstacles.reserve(scene.obstacles.size());
-  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
-    const ObstacleDesc& d = scene.obstacles[i];
-    if (!d.visible) continue;
-    obstacles.push_back(obstacle_mesh(d, model.fixed[model.fixed.size() - scene.obstacles.size() + i]));
-    items.push_back({&obstacles.back(), d.colour, d.roughness, d.shape != ObstacleName::Box});
-  }
-  return renderer.render(view, items);
 }
 
 void write_mesh_files(const fs::path& folder, const std::string& name, int frame, const Simulation& simulation,

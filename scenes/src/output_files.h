@@ -1,12 +1,11 @@
-/// Stages 10 and 11: pictures and files of one frame, each complete when it has its name.
+/// Stage 11: files of one frame, each complete when it has its name.
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "supple/render/renderer.h"
+#include "supple/render/image.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
@@ -16,10 +15,6 @@ namespace supple::scenes {
 
 /// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result).
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
-
-[[nodiscard]] std::unique_ptr<render::Renderer> make_scene_renderer(const Scene& scene, render::ContextKind context);
-[[nodiscard]] render::Image render_scene(render::Renderer& renderer, const Scene& scene, const Model& model,
-                                         const std::vector<Mesh>& meshes);
 
 void write_mesh_files(const std::filesystem::path& folder, const std::string& name, int frame,
                       const Simulation& simulation, const std::vector<Mesh>& meshes);

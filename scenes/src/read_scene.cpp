@@ -105,8 +105,8 @@ class Override {
 };
 
 /// Keys that change a picture but not the motion: a run with other values continues, or is drawn again.
-constexpr std::array<std::string_view, 8> kLooks = {"title", "camera",    "light",  "output",
-                                                    "colour", "roughness", "visible", "duration"};
+constexpr std::array<std::string_view, 12> kLooks = {"title",  "camera", "cameras",   "light",   "lights",  "background",
+                                                     "output", "colour", "roughness", "look",    "visible", "duration"};
 
 void add_content(const Node& node, Hasher& hasher) {
   hasher.add(static_cast<std::uint64_t>(node.kind));

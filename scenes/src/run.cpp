@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "output_files.h"
+#include "picture.h"
 #include "result_file.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
@@ -99,7 +100,9 @@ class FrameWriter {
  public:
   FrameWriter(const Scene& scene, const RunOptions& options, OutputRequest outputs)
       : scene_(scene), options_(options), outputs_(outputs), name_(scene_name(scene)) {
-    if (outputs_.images) renderer_ = make_scene_renderer(scene, context_kind(options.context));
+    context_ = context_kind(options.context);
+    for (const CameraDesc& camera : cameras_of(scene))
+      image_names_.push_back(camera.name.empty() ? name_ : name_ + '.' + camera.name);
   }
 
   void write(Simulation& simulation, Reporter& report, double done) {
@@ -112,14 +115,17 @@ class FrameWriter {
     }
     if (outputs_.images) {
       report("render", frame, done);
-      render::Image image;
-      {
-        const StageClock clock(simulation.profile(Stage::Render));
-        image = render_scene(*renderer_, scene_, simulation.model(), *meshes);
+      if (!pictures_) pictures_ = std::make_unique<ScenePictures>(scene_, simulation.model(), context_);
+      for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
+        render::Image image;
+        {
+          const StageClock clock(simulation.profile(Stage::Render));
+          image = pictures_->draw(simulation, camera);
+        }
+        const StageClock clock(simulation.profile(Stage::Export));
+        render::write_png(frame_path(options_.folder, image_names_[camera], frame), image);
+        ++images_;
       }
-      const StageClock clock(simulation.profile(Stage::Export));
-      render::write_png(frame_path(options_.folder, name_, frame), image);
-      ++images_;
     }
     const StageClock clock(simulation.profile(Stage::Export));
     if (outputs_.meshes) write_mesh_files(options_.folder, name_, frame, simulation, *meshes);
@@ -128,19 +134,23 @@ class FrameWriter {
     if (outputs_.particles) write_particle_table(options_.folder, name_, frame, simulation);
   }
 
-  /// Film and contact sheet of all frames 1 .. last that are there.
+  /// Film and contact sheet of each camera, of all frames 1 .. last that are there; returns the first film.
   fs::path finish(Simulation& simulation, Reporter& report, int last) {
     if (!outputs_.images) return {};
     const StageClock clock(simulation.profile(Stage::Export));
     report("film", last, 0.99);
-    write_contact_sheet(options_.folder, name_, last);
-    if (!outputs_.film) return {};
-    for (int frame = 1; frame <= last; ++frame) {
-      if (!fs::exists(frame_path(options_.folder, name_, frame))) return {};
+    fs::path first_film;
+    for (const std::string& name : image_names_) {
+      write_contact_sheet(options_.folder, name, last);
+      if (!outputs_.film) continue;
+      bool all = true;
+      for (int frame = 1; frame <= last && all; ++frame) all = fs::exists(frame_path(options_.folder, name, frame));
+      if (!all) continue;
+      const fs::path film = options_.folder / (name + ".mp4");
+      render::encode_film(options_.folder / "frames", name, 1, last, scene_.frame_rate, film);
+      if (first_film.empty()) first_film = film;
     }
-    const fs::path film = options_.folder / (name_ + ".mp4");
-    render::encode_film(options_.folder / "frames", name_, 1, last, scene_.frame_rate, film);
-    return film;
+    return first_film;
   }
 
  private:
@@ -148,7 +158,9 @@ class FrameWriter {
   const RunOptions& options_;
   OutputRequest outputs_;
   std::string name_;
-  std::unique_ptr<render::Renderer> renderer_;
+  std::vector<std::string> image_names_;  ///< one a camera
+  render::ContextKind context_ = render::ContextKind::Auto;
+  std::unique_ptr<ScenePictures> pictures_;
   int images_ = 0;
 };
 

@@ -434,7 +434,7 @@ struct Simulation::Impl {
   const std::vector<Mesh>& pull_meshes() {
     if (pulled_meshes) return meshes;
     pull_fields();
-    meshes = polygonise_objects(context(), state.particles, pulled);
+    meshes = polygonise_objects(context(), state.particles, laws, pulled);
     pulled_meshes = true;
     return meshes;
   }

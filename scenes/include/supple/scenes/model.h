@@ -37,6 +37,7 @@ struct ObjectModel {
   double volume_cell = 0.0;               ///< of the cells that measure it [m]
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
+  LookDesc look;                          ///< decides which columns its meshes carry
 };
 
 /// A solid that stands still and touches every object that has contact.

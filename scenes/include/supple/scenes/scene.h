@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "supple/core/types.h"
+#include "supple/scenes/looks.h"
 
 namespace supple::scenes {
 
@@ -249,6 +250,7 @@ struct ObjectDesc {
   std::vector<LoadDesc> loads;
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
   double roughness = 0.45;
+  LookDesc look;
 };
 
 struct RestitutionDesc {
@@ -277,18 +279,6 @@ struct ContactDesc {
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
   double bulge_width = 0.15;          ///< share of the other body's feature size
   std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
-};
-
-struct CameraDesc {
-  Vec3 from = Vec3(0.4, -2.6, 1.4);
-  Vec3 look_at = Vec3::Zero();
-  Vec3 up = Vec3::UnitZ();
-  double field_of_view = 0.61;        ///< vertical [rad] (key field_of_view_deg)
-};
-
-struct LightDesc {
-  Vec3 direction = Vec3(-0.45, 0.35, -1.0);
-  double softness = 0.03;             ///< angular radius [rad] (key softness_deg)
 };
 
 struct GroundDesc {
@@ -367,7 +357,10 @@ struct Scene {
   std::vector<PairDesc> pairs;
   ContactDesc contact;
   CameraDesc camera;
+  std::vector<CameraDesc> cameras;    ///< instead of camera: an image sequence and a film each
   LightDesc light;
+  std::vector<AreaLightDesc> lights;
+  BackgroundDesc background;
   std::optional<GroundDesc> ground;
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key

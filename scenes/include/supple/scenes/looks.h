@@ -1,0 +1,81 @@
+/// @file supple/scenes/looks.h
+/// What of a scene decides pictures alone: materials, cameras, lights. A run with other values of these continues.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "supple/core/types.h"
+
+namespace supple::scenes {
+
+enum class PatternName : std::uint8_t { Checker, Stripes, Picture };
+
+/// objects[].look.texture
+struct TextureDesc {
+  PatternName pattern = PatternName::Checker;
+  Vec3 colour = Vec3(0.95, 0.95, 0.93);  ///< checker, stripes: the second one, sRGB
+  double size = 0.1;                  ///< [m]
+  Vec3 axis = Vec3::UnitX();          ///< stripes: across them
+  std::string file;                   ///< picture: PNG beside the scene
+};
+
+enum class ColourByName : std::uint8_t { Colour, Pressure, Stretch, Speed, Normals };
+enum class MapName : std::uint8_t { Viridis, Magma, Coolwarm, Turbo, Grey };
+
+/// objects[].look
+struct LookDesc {
+  double metallic = 0.0;
+  double opacity = 1.0;
+  std::optional<TextureDesc> texture;
+  ColourByName colour_by = ColourByName::Colour;
+  MapName map = MapName::Viridis;
+  Vec3 range = Vec3(0, 1, 0);         ///< of values: the two ends of the map, in the value's SI unit
+  bool scale_bar = true;
+  bool surface = true;
+  bool wireframe = false;
+  double frames = 0.0;                ///< length of the arrows at each particle [m]; 0: none
+  double bonds = 0.0;                 ///< radius of the rods between bonded particles [m]; 0: none
+};
+
+/// cameras[].keys[]
+struct CameraKeyDesc {
+  double time = 0.0;                  ///< [s]
+  Vec3 from = Vec3(0.4, -2.6, 1.4);
+  Vec3 look_at = Vec3::Zero();
+  double field_of_view = 0.61;        ///< [rad] (key field_of_view_deg)
+};
+
+/// camera, cameras[]
+struct CameraDesc {
+  std::string name;                   ///< empty: the only one
+  Vec3 from = Vec3(0.4, -2.6, 1.4);
+  Vec3 look_at = Vec3::Zero();
+  Vec3 up = Vec3::UnitZ();
+  double field_of_view = 0.61;        ///< vertical [rad] (key field_of_view_deg)
+  double turntable = 0.0;             ///< about the vertical through look_at, during the scene [rad] (key turntable_deg)
+  std::vector<CameraKeyDesc> keys;    ///< by time; instead of from, look_at and field_of_view
+};
+
+struct LightDesc {
+  Vec3 direction = Vec3(-0.45, 0.35, -1.0);
+  double intensity = 3.0;             ///< irradiance over pi, relative to the radiance of the sky
+  double softness = 0.03;             ///< angular radius [rad] (key softness_deg)
+};
+
+/// lights[]: rectangles that shine on the side they face
+struct AreaLightDesc {
+  Vec3 at = Vec3::Zero();             ///< [m]
+  Vec3 facing = Vec3(0, 0, -1);
+  Vec3 half_sizes = Vec3(0.5, 0.5, 0);  ///< across and along [m]
+  Vec3 colour = Vec3::Ones();         ///< sRGB
+  double intensity = 5.0;             ///< radiance, relative to that of the sky
+};
+
+struct BackgroundDesc {
+  Vec3 top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
+  Vec3 bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
+};
+
+}  // namespace supple::scenes

@@ -1,0 +1,59 @@
+#include "look_columns.h"
+
+#include "supple/core/parts.h"
+#include "supple/implicit/mesh_columns.h"
+
+namespace supple::scenes {
+namespace {
+
+/// d / d0 - 1 of the bonds of each particle of a body, in the mean; a pair counts once for each law that joins it.
+std::vector<double> mean_stretch(const Model& model, const Body& body, const core::ParticleState& particles,
+                                 const core::Interactions& laws) {
+  std::vector<double> sum(particles.size(), 0.0), count(particles.size(), 0.0);
+  const ObjectModel& object = model.objects[body.object];
+  for_each_bond(laws, [&](std::uint32_t a, std::uint32_t b) {
+    if (a < object.first || a >= object.last) return;
+    const double rest = (model.rest.position[a] - model.rest.position[b]).norm();
+    if (!(rest > 0.0)) return;
+    const double stretch = (particles.position[a] - particles.position[b]).norm() / rest - 1.0;
+    for (const std::uint32_t i : {a, b}) {
+      sum[i] += stretch;
+      count[i] += 1.0;
+    }
+  });
+  std::vector<double> out;
+  for (const std::uint32_t i : body.particle) out.push_back(count[i] > 0.0 ? sum[i] / count[i] : 0.0);
+  return out;
+}
+
+}  // namespace
+
+void add_look_columns(const Model& model, const Body& body, const core::ParticleState& particles,
+                      const core::Interactions& laws, const implicit::FieldView& field, std::span<const Pose> poses,
+                      const Executor& executor, Mesh& mesh) {
+  const LookDesc& look = model.objects[body.object].look;
+  std::vector<Vec3> places;
+  for (const Pose& pose : poses) places.push_back(pose.position);
+  if (look.texture) {
+    const ObjectModel& object = model.objects[body.object];
+    Vec3 origin = Vec3::Zero();
+    for (std::uint32_t i = object.first; i < object.last; ++i) origin += model.rest.position[i] / (object.last - object.first);
+    std::vector<Pose> rest;
+    core::gather_poses(model.rest, body.particle, rest);
+    std::vector<implicit::PartPlace> parts;
+    for (std::size_t k = 0; k < poses.size(); ++k) parts.push_back({.now = poses[k], .rest = rest[k]});
+    implicit::add_rest_coordinates(field, parts, origin, executor, mesh);
+  }
+  if (look.colour_by == ColourByName::Stretch)
+    implicit::add_part_values(field, places, mean_stretch(model, body, particles, laws), "stretch", executor, mesh);
+  if (look.colour_by == ColourByName::Speed) {
+    std::vector<Vec3> velocity, spin;
+    core::gather_motion(model.particles, particles, body.particle, velocity, spin);
+    std::vector<implicit::PartMotion> parts;
+    for (std::size_t k = 0; k < places.size(); ++k)
+      parts.push_back({.centre = places[k], .velocity = velocity[k], .angular_velocity = spin[k], .id = body.particle[k]});
+    implicit::add_speed(field, parts, executor, mesh);
+  }
+}
+
+}  // namespace supple::scenes

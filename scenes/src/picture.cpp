@@ -1,0 +1,169 @@
+#include "picture.h"
+
+#include <algorithm>
+
+#include "look_columns.h"
+#include "supple/render/glyphs.h"
+
+namespace supple::scenes {
+namespace {
+
+/// What is drawn of an obstacle.
+Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
+  constexpr int kFiner = 4;  // facets along a cell of the heights
+  if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) return box->mesh();
+  if (const auto* heights = std::get_if<implicit::HeightField>(&body.solid)) return heights->mesh(kFiner);
+  const Vec3 u = d.extent * d.normal.unitOrthogonal(), v = d.normal.cross(u);
+  Mesh mesh;
+  add_quadrangle(mesh, d.at - u - v, d.at + u - v, d.at + u + v, d.at - u + v);
+  return mesh;
+}
+
+render::RenderSettings settings_of(const Scene& scene, render::ContextKind context) {
+  render::RenderSettings settings;
+  if (scene.output.images) {
+    settings.width = scene.output.images->size.at(0);
+    settings.height = scene.output.images->size.at(1);
+    settings.samples = scene.output.images->samples;
+  }
+  settings.shadow_softness = scene.light.softness;
+  settings.context = context;
+  return settings;
+}
+
+render::View view_of(const Scene& scene) {
+  render::View view;
+  view.light = {.direction = scene.light.direction, .intensity = scene.light.intensity};
+  if (scene.ground && scene.ground->visible) view.ground = render::Ground{scene.ground->height, scene.ground->colour};
+  view.background_top = scene.background.top;
+  view.background_bottom = scene.background.bottom;
+  for (const AreaLightDesc& d : scene.lights) {
+    view.area_lights.push_back({.at = d.at, .facing = d.facing, .half_sizes = d.half_sizes.head<2>(), .colour = d.colour,
+                                .radiance = d.intensity});
+  }
+  return view;
+}
+
+struct Quantity {
+  const char* column;
+  const char* title;
+};
+
+/// The column behind `colour_by`, and what its scale bar says.
+Quantity quantity_of(ColourByName by) {
+  switch (by) {
+    case ColourByName::Pressure: return {"pressure", "pressure [Pa]"};
+    case ColourByName::Stretch: return {"stretch", "stretch"};
+    case ColourByName::Speed: return {"speed", "speed [m/s]"};
+    case ColourByName::Colour:
+    case ColourByName::Normals: break;
+  }
+  return {"", ""};
+}
+
+render::Paint paint_of(const LookDesc& look, const std::shared_ptr<const render::Image>& texture) {
+  render::Paint paint;
+  if (look.texture) {
+    constexpr std::array kKinds = {render::PaintKind::Checker, render::PaintKind::Stripes, render::PaintKind::Picture};
+    paint.kind = kKinds[static_cast<std::size_t>(look.texture->pattern)];
+    paint.colour = look.texture->colour;
+    paint.size = look.texture->size;
+    paint.axis = look.texture->axis;
+    paint.picture = texture;
+  }
+  if (look.colour_by == ColourByName::Normals) paint.kind = render::PaintKind::Normals;
+  const Quantity quantity = quantity_of(look.colour_by);
+  if (*quantity.column != '\0') {
+    paint.kind = render::PaintKind::Values;
+    paint.column = quantity.column;
+    paint.map = static_cast<render::ColourMap>(look.map);
+    paint.lower = look.range.x();
+    paint.upper = look.range.y();
+  }
+  return paint;
+}
+
+/// One bar for each quantity, map and range that is shown.
+std::vector<render::ScaleBar> bars_of(const Scene& scene) {
+  std::vector<render::ScaleBar> bars;
+  for (const ObjectDesc& object : scene.objects) {
+    const Quantity quantity = quantity_of(object.look.colour_by);
+    if (*quantity.column == '\0' || !object.look.scale_bar) continue;
+    const render::ScaleBar bar{.map = static_cast<render::ColourMap>(object.look.map), .lower = object.look.range.x(),
+                               .upper = object.look.range.y(), .title = quantity.title};
+    if (std::find(bars.begin(), bars.end(), bar) == bars.end()) bars.push_back(bar);
+  }
+  return bars;
+}
+
+}  // namespace
+
+ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::ContextKind context)
+    : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)) {
+  for (const ObjectDesc& object : scene.objects) {
+    const bool reads = object.look.texture && object.look.texture->pattern == PatternName::Picture;
+    textures_.push_back(reads ? std::make_shared<const render::Image>(
+                                    render::read_png(scene.source.parent_path() / object.look.texture->file))
+                              : nullptr);
+  }
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
+    const FixedBody& body = model.fixed[model.fixed.size() - scene.obstacles.size() + i];
+    obstacles_.push_back(scene.obstacles[i].visible ? obstacle_mesh(scene.obstacles[i], body) : Mesh());
+  }
+  renderer_ = render::make_renderer(settings_of(scene, context));
+}
+
+void ScenePictures::add_objects(const std::vector<Mesh>& meshes) {
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    const ObjectDesc& d = scene_.objects[i];
+    if (!d.look.surface && !d.look.wireframe) continue;
+    items_.push_back({.mesh = &meshes[i], .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
+                      .opacity = d.look.opacity, .paint = paint_of(d.look, textures_[i]), .surface = d.look.surface,
+                      .wireframe = d.look.wireframe});
+  }
+  for (std::size_t i = 0; i < obstacles_.size(); ++i) {
+    const ObstacleDesc& d = scene_.obstacles[i];
+    if (d.visible) items_.push_back({&obstacles_[i], d.colour, d.roughness, d.shape != ObstacleName::Box});
+  }
+}
+
+void ScenePictures::add_glyphs(const Simulation& simulation) {
+  glyphs_.clear();
+  const core::ParticleState& state = simulation.state().particles;
+  for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+    const LookDesc& look = scene_.objects[i].look;
+    const ObjectModel& object = simulation.model().objects[i];
+    if (look.frames > 0.0) {
+      std::vector<Pose> poses;
+      for (std::uint32_t p = object.first; p < object.last; ++p) poses.push_back({state.position[p], state.orientation[p]});
+      const std::array<Vec3, 3> colours = {Vec3(0.85, 0.16, 0.12), Vec3(0.15, 0.62, 0.20), Vec3(0.13, 0.32, 0.85)};
+      std::array<Mesh, 3> axes = render::frame_glyphs(poses, look.frames);
+      for (std::size_t k = 0; k < 3; ++k)
+        items_.push_back({.mesh = &glyphs_.emplace_back(std::move(axes[k])), .colour = colours[k]});
+    }
+    if (look.bonds > 0.0) {
+      std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+      for_each_bond(simulation.laws(), [&](std::uint32_t a, std::uint32_t b) {
+        if (a >= object.first && a < object.last) pairs.emplace_back(a, b);
+      });
+      std::sort(pairs.begin(), pairs.end());
+      pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+      Mesh& mesh = glyphs_.emplace_back();
+      for (const auto& [a, b] : pairs) render::add_rod(mesh, state.position[a], state.position[b], look.bonds);
+      for (std::uint32_t p = object.first; p < object.last; ++p) render::add_ball(mesh, state.position[p], 1.8 * look.bonds);
+      items_.push_back({.mesh = &mesh, .colour = Vec3(0.30, 0.30, 0.33), .roughness = 0.35});
+    }
+  }
+}
+
+render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera) {
+  view_.camera = camera_at(cameras_of(scene_)[camera], simulation.time(), scene_.duration);
+  items_.clear();
+  add_objects(simulation.meshes());
+  add_glyphs(simulation);
+  render::Image image = renderer_->render(view_, items_);
+  render::draw_scale_bars(image, bars_);
+  return image;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,39 @@
+/// Stage 10: what a scene's pictures show, drawn by a renderer.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "camera.h"
+#include "supple/render/overlay.h"
+#include "supple/render/renderer.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+class ScenePictures {
+ public:
+  /// @throws Error{Io} when a texture cannot be read or no context can be made
+  ScenePictures(const Scene& scene, const Model& model, render::ContextKind context);
+
+  /// The simulation's current state as the camera of this number sees it.
+  [[nodiscard]] render::Image draw(Simulation& simulation, std::size_t camera);
+  [[nodiscard]] render::RenderTimes times() const { return renderer_->times(); }
+
+ private:
+  void add_objects(const std::vector<Mesh>& meshes);
+  void add_glyphs(const Simulation& simulation);
+
+  const Scene& scene_;
+  render::View view_;
+  std::vector<std::shared_ptr<const render::Image>> textures_;  ///< of each object, may be null
+  std::vector<Mesh> obstacles_;
+  std::vector<render::ScaleBar> bars_;
+  std::unique_ptr<render::Renderer> renderer_;
+  std::vector<render::Item> items_;
+  std::deque<Mesh> glyphs_;  ///< of this picture
+};
+
+}  // namespace supple::scenes

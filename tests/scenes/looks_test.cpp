@@ -1,0 +1,134 @@
+// What scenes say about pictures: cameras that move, columns for colours, files of several cameras.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "camera.h"
+#include "supple/core/error.h"
+#include "supple/render/image.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/run.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+Scene scene_with(const std::string& look, const std::string& rest) {
+  return parse_scene(R"(
+schema: 1
+duration: 0.5 s
+frame_rate: 4
+objects:
+  - name: chain
+    particles: {arrange: line, count: 3, spacing: 0.2, velocity: [1, 0, 0], mass: 0.5}
+    interactions: [{law: bond_frame, stretch: 50, rotation: 0.1}]
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.4}}]
+    colour: [0.8, 0.2, 0.1]
+    look: {)" + look + "}\n" + rest, "looks.yaml", ".");
+}
+
+constexpr const char* kOneCamera = "camera: {from: [0, -3, 1], look_at: [0, 0, 0]}\n"
+                                   "output: {images: {size: [160, 120], samples: 4}}\n";
+
+class Looks : public testing::Test {
+ protected:
+  Looks() : folder_(fs::path(testing::TempDir()) / ("looks_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+    fs::remove_all(folder_);
+  }
+  ~Looks() override { fs::remove_all(folder_); }
+
+  render::Image first_picture(const Scene& scene, const std::string& name = "looks") {
+    const RunResult done = run_scene(scene, {.folder = folder_, .frames = {1}, .threads = 1, .overwrite = true});
+    EXPECT_EQ(done.outcome, "done") << done.reason;
+    return render::read_png(folder_ / "frames" / (name + ".0001.png"));
+  }
+  fs::path folder_;
+};
+
+TEST(Camera, TurnsAboutWhatItLooksAt) {
+  CameraDesc desc;
+  desc.from = Vec3(0, -3, 1);
+  desc.look_at = Vec3(0, 0, 0.5);
+  desc.turntable = 2.0 * M_PI;
+  EXPECT_LT((camera_at(desc, 0.25, 1.0).from - Vec3(3, 0, 1)).norm(), 1e-12);
+  EXPECT_LT((camera_at(desc, 1.0, 1.0).from - desc.from).norm(), 1e-12);
+}
+
+TEST(Camera, PassesItsKeysAndRestsAtBothEnds) {
+  CameraDesc desc;
+  desc.keys = {{.time = 1.0, .from = Vec3(0, -3, 0)}, {.time = 2.0, .from = Vec3(3, 0, 0)}, {.time = 4.0, .from = Vec3(0, 3, 1), .field_of_view = 1.0}};
+  for (const CameraKeyDesc& key : desc.keys) EXPECT_LT((camera_at(desc, key.time, 5.0).from - key.from).norm(), 1e-12);
+  EXPECT_EQ(camera_at(desc, 0.0, 5.0).from, desc.keys[0].from);
+  EXPECT_EQ(camera_at(desc, 9.0, 5.0).field_of_view, 1.0);
+  // Without corners: the slopes on both sides of a key agree.
+  const double h = 1e-6;
+  const Vec3 before = (camera_at(desc, 2.0, 5.0).from - camera_at(desc, 2.0 - h, 5.0).from) / h;
+  const Vec3 after = (camera_at(desc, 2.0 + h, 5.0).from - camera_at(desc, 2.0, 5.0).from) / h;
+  EXPECT_LT((before - after).norm(), 1e-4);
+  EXPECT_LT((camera_at(desc, 1.0 + h, 5.0).from - desc.keys[0].from).norm() / h, 1e-4);
+}
+
+TEST_F(Looks, ChangeNoBitOfTheMotion) {
+  const Scene plain = scene_with("", kOneCamera);
+  const Scene coloured = scene_with("colour_by: stretch, range: [-0.1, 0.1], frames: 0.1", kOneCamera);
+  EXPECT_EQ(plain.content_hash, coloured.content_hash);
+  const RunResult a = run_scene(plain, {.folder = folder_ / "a", .threads = 1});
+  const RunResult b = run_scene(coloured, {.folder = folder_ / "b", .threads = 1});
+  EXPECT_EQ(a.state_hash, b.state_hash);
+}
+
+TEST_F(Looks, ShowWhatEachKeyAsksFor) {
+  const render::Image plain = first_picture(scene_with("", kOneCamera));
+  for (const char* look : {"metallic: 1", "opacity: 0.5", "texture: {pattern: checker, size: 0.07}", "texture: {pattern: stripes}",
+                           "colour_by: pressure, range: [0, 100]", "colour_by: stretch, range: [-1, 1]",
+                           "colour_by: speed, range: [0, 2]", "colour_by: normals", "wireframe: true", "surface: false",
+                           "frames: 0.4", "surface: false, bonds: 0.02"}) {
+    EXPECT_NE(first_picture(scene_with(look, kOneCamera)).pixels, plain.pixels) << look;
+  }
+  const auto with = [&](const std::string& more) { return first_picture(scene_with("", more + kOneCamera)); };
+  EXPECT_NE(with("background: {top: [0, 0, 0]}\n").pixels, plain.pixels);
+  EXPECT_NE(with("lights: [{at: [0, -1, 1], facing: [0, 1, -1]}]\n").pixels, plain.pixels);
+  EXPECT_NE(with("light: {intensity: 1}\n").pixels, plain.pixels);
+  EXPECT_NE(first_picture(scene_with("colour_by: speed, range: [0, 2], scale_bar: false", kOneCamera)).pixels,
+            first_picture(scene_with("colour_by: speed, range: [0, 2]", kOneCamera)).pixels);
+}
+
+TEST_F(Looks, SpeedShowsTheColourOfItsValue) {
+  // All move at 1 m/s, the middle of the map's range; the same scene in that colour looks the same.
+  const std::string more = kOneCamera;
+  const render::Image by_speed = first_picture(scene_with("colour_by: speed, map: grey, range: [0, 2], scale_bar: false", more));
+  Scene same = scene_with("", more);
+  same.objects[0].colour = Vec3::Constant(0.5);
+  const render::Image plain = first_picture(same);
+  ASSERT_EQ(plain.pixels.size(), by_speed.pixels.size());
+  for (std::size_t i = 0; i < plain.pixels.size(); ++i) EXPECT_NEAR(plain.pixels[i], by_speed.pixels[i], 3);
+}
+
+TEST_F(Looks, SeveralCamerasLeaveImagesFilmsAndSheetsEach) {
+  const Scene scene = scene_with("", R"(
+cameras:
+  - {name: front, from: [0, -3, 1], look_at: [0, 0, 0]}
+  - {name: above, from: [0, -0.1, 4], look_at: [0, 0, 0], turntable_deg: 90}
+output: {images: {size: [96, 64], samples: 1}, film: true}
+)");
+  ASSERT_EQ(run_scene(scene, {.folder = folder_, .threads = 1}).outcome, "done");
+  for (const char* file : {"frames/looks.front.0001.png", "frames/looks.above.0003.png", "looks.front.mp4", "looks.above.mp4",
+                           "looks.front_sheet.png", "looks.above_sheet.png"})
+    EXPECT_TRUE(fs::exists(folder_ / file)) << file;
+  EXPECT_FALSE(fs::exists(folder_ / "frames/looks.0001.png"));
+  EXPECT_NE(render::read_png(folder_ / "frames/looks.front.0001.png").pixels,
+            render::read_png(folder_ / "frames/looks.above.0001.png").pixels);
+  ASSERT_EQ(run_scene(scene_with("", kOneCamera), {.folder = folder_, .threads = 1, .overwrite = true}).outcome, "done");
+  EXPECT_FALSE(fs::exists(folder_ / "looks.front.mp4"));
+}
+
+TEST_F(Looks, AnAbsentTextureIsNamed) {
+  const RunResult result = run_scene(scene_with("texture: {pattern: picture, file: absent.png}", kOneCamera),
+                                     {.folder = folder_, .threads = 1});
+  EXPECT_EQ(result.outcome, "io");
+  EXPECT_NE(result.reason.find("absent.png"), std::string::npos) << result.reason;
+}
+
+}  // namespace
+}  // namespace supple::scenes
