@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "bonded_lists.h"
 #include "law_lists.h"
 #include "pair_hessians.h"
 #include "supple/core/error.h"
@@ -168,6 +169,18 @@ void for_each_hessian(const ParticleSet& set, const ParticleState& state, const 
       visit(a, b, hessian(law, pair_pose(set, state, a, b), kind));
     });
   });
+}
+
+std::vector<std::array<std::uint32_t, 2>> bonded_pairs(const Interactions& interactions) {
+  std::vector<std::array<std::uint32_t, 2>> pairs;
+  const auto add = [&pairs](std::uint32_t a, std::uint32_t b) { pairs.push_back({std::min(a, b), std::max(a, b)}); };
+  for_each_bond(interactions, [&add](const auto&, std::uint32_t a, std::uint32_t b) { add(a, b); });
+  for (const BondedLaw<LiteralForm>& list : interactions.literal_form) {
+    for (std::size_t k = 0; k < list.first.size(); ++k) add(list.first[k], list.second[k]);
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
 }
 
 }  // namespace supple::core

@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
 
+#include "srgb.h"
 #include "supple/core/error.h"
 
 namespace supple::render {
 namespace {
 
-/// Linear light of each 8-bit sRGB value (IEC 61966-2-1).
-const std::array<double, 256>& linear_of_srgb() {
+const std::array<double, 256>& linear_table() {
   static const std::array<double, 256> table = [] {
     std::array<double, 256> values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -57,6 +59,8 @@ bool well_formed(const Image& image) {
 
 }  // namespace
 
+double linear_of_srgb(std::uint8_t value) { return linear_table()[value]; }
+
 Image downscale(const Image& image, int width) {
   SUPPLE_EXPECTS(well_formed(image));
   SUPPLE_EXPECTS(width >= 1 && width <= image.width);
@@ -66,7 +70,7 @@ Image downscale(const Image& image, int width) {
 
   const std::vector<Span> columns = coverage(image.width, out.width);
   const std::vector<Span> rows = coverage(image.height, out.height);
-  const std::array<double, 256>& linear = linear_of_srgb();
+  const std::array<double, 256>& linear = linear_table();
   for (int y = 0; y < out.height; ++y) {
     const Span& row = rows[static_cast<std::size_t>(y)];
     for (int x = 0; x < out.width; ++x) {
@@ -104,6 +108,22 @@ Image contact_sheet(std::span<const Image> images, int columns, int gap) {
                   &sheet.pixels[index(sheet, left, top + y)]);
   }
   return sheet;
+}
+
+ImageDifference compare(const Image& a, const Image& b, double gain) {
+  SUPPLE_EXPECTS(well_formed(a) && a.width == b.width && a.height == b.height && b.pixels.size() == a.pixels.size());
+  SUPPLE_EXPECTS(gain > 0.0);
+  ImageDifference out{.picture = a};
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    const int difference = std::abs(a.pixels[i] - b.pixels[i]);
+    out.largest = std::max(out.largest, difference);
+    squares += difference * difference;
+    out.picture.pixels[i] = static_cast<std::uint8_t>(std::min(255L, std::lround(gain * difference)));
+  }
+  const double mean = squares / static_cast<double>(a.pixels.size());
+  out.psnr = mean > 0.0 ? 10.0 * std::log10(255.0 * 255.0 / mean) : std::numeric_limits<double>::infinity();
+  return out;
 }
 
 }  // namespace supple::render

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <string_view>
 
@@ -19,6 +20,7 @@ using Bytes = std::vector<std::byte>;
 constexpr std::array<unsigned char, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 // Smooth pictures: higher levels cost several times the time for a few per cent of the size.
 constexpr int kLevel = 6;
+constexpr std::string_view kFingerprint("Fingerprint\0", 12);  // the keyword of a text chunk ends with a zero
 constexpr int kLargestEdge = 65536;
 constexpr std::size_t kLargestFile = std::size_t{1} << 30;
 
@@ -154,7 +156,7 @@ Image decode(const std::filesystem::path& path, const Header& header, const Byte
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, const Image& image) {
+void write_png(const std::filesystem::path& path, const Image& image, std::string_view fingerprint) {
   SUPPLE_EXPECTS(image.width > 0 && image.height > 0);
   SUPPLE_EXPECTS(image.pixels.size() ==
                  3 * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
@@ -170,9 +172,31 @@ void write_png(const std::filesystem::path& path, const Image& image) {
   add_chunk(file, "sRGB", std::array<std::byte, 1>{});  // perceptual intent
   constexpr std::string_view text("Software\0supple", 15);
   add_chunk(file, "tEXt", std::as_bytes(std::span(text)));
+  if (!fingerprint.empty()) {
+    const std::string entry = std::string(kFingerprint) + std::string(fingerprint);
+    add_chunk(file, "tEXt", std::as_bytes(std::span<const char>(entry)));
+  }
   add_pixels(file, image);
   add_chunk(file, "IEND", {});
   io::write_atomically(path, file);
+}
+
+std::string png_fingerprint(const std::filesystem::path& path) {
+  constexpr std::size_t kHead = 1024;  // our chunks before the pixels are far shorter
+  std::array<char, kHead> head{};
+  std::ifstream in(path, std::ios::binary);
+  in.read(head.data(), kHead);
+  const std::string_view text(head.data(), static_cast<std::size_t>(in.gcount()));
+  if (text.size() < kSignature.size() || std::memcmp(text.data(), kSignature.data(), kSignature.size()) != 0) return {};
+  for (std::size_t at = kSignature.size(); at + 8 <= text.size();) {
+    const std::size_t length = get_u32(reinterpret_cast<const std::byte*>(text.data() + at));
+    const std::string_view type = text.substr(at + 4, 4);
+    if (type == "IDAT" || length > text.size() - at - 8) return {};
+    const std::string_view data = text.substr(at + 8, length);
+    if (type == "tEXt" && data.starts_with(kFingerprint)) return std::string(data.substr(kFingerprint.size()));
+    at += 12 + length;
+  }
+  return {};
 }
 
 Image read_png(const std::filesystem::path& path) {

@@ -15,6 +15,7 @@
 #include "progress_bar.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/scenes/inspect.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
@@ -45,37 +46,45 @@ struct Arguments {
   std::string state;
   std::string query;
   std::string group;
+  std::string other;
+  std::string meshes;
+  std::string grids;
+  std::string particles;
+  std::string contacts;
   std::vector<std::string> words;
   int threads = 0;
   int cells = 0;
   double error = 0.0;
+  double gain = 8.0;
   bool overwrite = false;
   bool resume = false;
   bool simulate_only = false;
+  bool render_only = false;
   bool profile = false;
   bool quiet = false;
   bool samples = false;
   bool json = false;
   bool list = false;
+  bool sheet = false;
+  bool no_film = false;
 };
 
-void print_profile(const fs::path& folder) {
-  std::printf("stages: see \"stages\" in %s\n", (folder / "result.json").c_str());
-}
+void print_profile(const fs::path& report) { std::printf("stages: see \"stages\" in %s\n", report.c_str()); }
 
 int report(const scenes::RunResult& result, const Arguments& arguments) {
   for (const std::string& warning : result.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (result.outcome != "done") {
     std::fprintf(stderr, "%s\n", result.reason.c_str());
     std::fprintf(stderr, "stopped: %s, last good frame %d, %s\n", result.outcome.c_str(), result.frames,
-                 (result.folder / "result.json").c_str());
+                 result.report.c_str());
     return result.exit_code;
   }
   if (!arguments.quiet) {
-    std::printf("frames: %s\n", (result.folder / "frames").c_str());
+    std::printf("folder: %s\n", result.folder.c_str());
+    if (result.pictures_kept > 0) std::printf("frames: %d drawn, %d kept\n", result.pictures_drawn, result.pictures_kept);
     if (!result.film.empty()) std::printf("film:   %s\n", result.film.c_str());
-    std::printf("result: %s (state %s)\n", (result.folder / "result.json").c_str(), to_hex(result.state_hash).c_str());
-    if (arguments.profile) print_profile(result.folder);
+    std::printf("result: %s (state %s)\n", result.report.c_str(), to_hex(result.state_hash).c_str());
+    if (arguments.profile) print_profile(result.report);
   }
   return 0;
 }
@@ -106,6 +115,10 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   return options;
 }
 
+fs::path folder_of(const scenes::Scene& scene, const Arguments& arguments) {
+  return arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
+}
+
 tool::ProgressBar make_bar(const Arguments& arguments) {
   return tool::ProgressBar(arguments.quiet ? tool::ProgressStyle::None : tool::progress_style(arguments.progress));
 }
@@ -123,19 +136,49 @@ scenes::Scene read_for_run(const Arguments& arguments) {
 int run(const Arguments& arguments) {
   const scenes::Scene scene = read_for_run(arguments);
   tool::ProgressBar bar = make_bar(arguments);
-  const fs::path folder = arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
-  const scenes::RunResult result = scenes::run_scene(scene, run_options(arguments, folder, bar));
+  const scenes::RunResult result = scenes::run_scene(scene, run_options(arguments, folder_of(scene, arguments), bar));
   bar.finish();
   return report(result, arguments);
 }
 
 int render(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  if (arguments.sheet) {
+    std::printf("sheet:  %s\n", scenes::make_sheet(scene, folder_of(scene, arguments)).c_str());
+    return 0;
+  }
   tool::ProgressBar bar = make_bar(arguments);
-  const fs::path folder = arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
-  const scenes::RunResult result = scenes::render_run(scene, run_options(arguments, folder, bar));
+  const scenes::RunResult result = scenes::render_run(scene, run_options(arguments, folder_of(scene, arguments), bar));
   bar.finish();
   return report(result, arguments);
+}
+
+int export_files(Arguments arguments) {
+  for (const auto& [key, formats] : {std::pair{"mesh", &arguments.meshes}, {"grid", &arguments.grids},
+                                     {"particles", &arguments.particles}, {"contacts", &arguments.contacts}}) {
+    if (!formats->empty()) arguments.set.push_back("output." + std::string(key) + "=[" + *formats + ']');
+  }
+  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  tool::ProgressBar bar = make_bar(arguments);
+  const scenes::RunResult result = scenes::export_run(scene, run_options(arguments, folder_of(scene, arguments), bar));
+  bar.finish();
+  return report(result, arguments);
+}
+
+int compare(const Arguments& arguments) {
+  const scenes::Comparison result = scenes::compare_runs({.first = arguments.scene,
+                                                          .second = arguments.other,
+                                                          .folder = arguments.out.empty() ? "out/compare" : arguments.out,
+                                                          .gain = arguments.gain,
+                                                          .film = !arguments.no_film});
+  const auto worst = std::min_element(result.frames.begin(), result.frames.end(),
+                                      [](const auto& a, const auto& b) { return a.psnr < b.psnr; });
+  const auto equal = std::count_if(result.frames.begin(), result.frames.end(), [](const auto& f) { return f.largest == 0; });
+  std::printf("frames: %zu in both, %td equal, %d and %d in one only\n", result.frames.size(), equal, result.only_first,
+              result.only_second);
+  std::printf("worst:  frame %d, PSNR %.2f dB, largest difference %d of 255\n", worst->frame, worst->psnr, worst->largest);
+  if (!result.film.empty()) std::printf("film:   %s\n", result.film.c_str());
+  return 0;
 }
 
 int check(const Arguments& arguments) {
@@ -218,11 +261,34 @@ int parse_and_call(int argc, char** argv) {
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder");
   run_verb->add_flag("--resume", a.resume, "continue from the last saved state in the folder");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
+  run_verb->add_flag("--render-only", a.render_only, "pictures and film from the saved states of an earlier run, as `supple render`");
   run_verb->footer("Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
 
   CLI::App* render_verb = app.add_subcommand("render", "draw the frames of a run again from its saved states");
   run_flags(render_verb, a);
+  render_verb->add_flag("--overwrite", a.overwrite, "draw pictures that are there and up to date again, too");
+  render_verb->add_flag("--sheet", a.sheet, "only the contact sheet, of the frames that are there");
   render_verb->footer("Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
+
+  CLI::App* export_verb = app.add_subcommand("export", "files for other tools from the saved states of a run");
+  run_flags(export_verb, a);
+  export_verb->add_option("--mesh", a.meshes, "surfaces: ply, obj, usd, separated by commas");
+  export_verb->add_option("--grid", a.grids, "fields: vdb");
+  export_verb->add_option("--particles", a.particles, "particles and bonds: csv, vtk");
+  export_verb->add_option("--contacts", a.contacts, "points of the contact surfaces: csv, vtk");
+  export_verb->footer("Example: supple export scenes/library/contacts/two_balls.yaml --out out/two_balls --mesh usd --particles vtk");
+
+  CLI::App* info_verb = app.add_subcommand("info", "what a run folder holds: outcome, audits, times, files");
+  info_verb->add_option("run", a.scene, "run folder")->required();
+  info_verb->footer("Example: supple info out/two_balls");
+
+  CLI::App* compare_verb = app.add_subcommand("compare", "frames of two runs side by side, with their difference");
+  compare_verb->add_option("first", a.scene, "run folder")->required();
+  compare_verb->add_option("second", a.other, "run folder")->required();
+  compare_verb->add_option("--out", a.out, "output folder (default: out/compare)");
+  compare_verb->add_option("--gain", a.gain, "of the difference pictures")->check(CLI::Range(1.0, 255.0));
+  compare_verb->add_flag("--no-film", a.no_film, "frames and table only");
+  compare_verb->footer("Example: supple compare out/literal out/consistent --out out/compare");
 
   CLI::App* check_verb = app.add_subcommand("check", "read a scene and report every fault in it");
   scene_option(check_verb, a);
@@ -268,8 +334,14 @@ int parse_and_call(int argc, char** argv) {
     app.exit(error);
     return kUsage;
   }
-  if (run_verb->parsed()) return run(a);
+  if (run_verb->parsed()) return a.render_only ? render(a) : run(a);
   if (render_verb->parsed()) return render(a);
+  if (export_verb->parsed()) return export_files(a);
+  if (info_verb->parsed()) {
+    std::fputs(scenes::describe_run(a.scene).c_str(), stdout);
+    return 0;
+  }
+  if (compare_verb->parsed()) return compare(a);
   if (check_verb->parsed()) return check(a);
   if (explain_verb->parsed()) return explain(a);
   if (bench_verb->parsed()) return bench(a);

@@ -538,6 +538,8 @@ template <class Archive>
 void fields(Archive& archive, ImagesDesc& d) {
   archive("size", d.size, between(16.0, 16384.0, kNumber).items(2, 2), "width, height [pixel]");
   archive("samples", d.samples, between(1.0, 8.0, kNumber), "a pixel: 1, 2, 4 or 8");
+  archive("formats", d.formats, {}, "exr: half floats in linear light with depth, normals, velocities and numbers of objects");
+  archive.check(!d.formats.empty(), "formats", "expected a format of images", "none", "write 'images: false' for no images");
   archive.check((d.samples & (d.samples - 1)) == 0, "samples", "expected 1, 2, 4 or 8", std::to_string(d.samples), "");
 }
 
@@ -559,12 +561,14 @@ template <class Archive>
 void fields(Archive& archive, OutputDesc& d) {
   archive("images", d.images, {}, "a PNG a frame");
   archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
-  archive("contacts", d.contacts, {}, "table of contacts");
-  archive("particles", d.particles, {}, "table of particles a frame");
-  archive("mesh", d.mesh, {}, "surfaces a frame");
+  archive("contacts", d.contacts, {}, "points of the contact surfaces a frame; vtk: .vtp files and a .pvd");
+  archive("particles", d.particles, {}, "particles and bonds a frame; vtk: .vtp files and a .pvd");
+  archive("mesh", d.mesh, {}, "surfaces; ply, obj: a file an object and frame; usd: one file with all frames");
   archive("grid", d.grid, {}, "fields a frame");
   archive("meshing", d.meshing, {}, "how surfaces become meshes");
   archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids; auto: 8 cells across the smallest thickness, 64 along each object");
+  archive.check(!d.film || !d.images || std::count(d.images->formats.begin(), d.images->formats.end(), ImageName::Png) > 0, "film",
+                "expected images as png for a film", "none", "add png to output.images.formats");
   archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");
 }
 

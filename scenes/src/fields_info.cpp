@@ -49,6 +49,7 @@ std::string expectation(FieldType type, std::span<const std::string_view> choice
     case FieldType::Boolean: return "true or false";
     case FieldType::Text: return rule.name ? "a name" : "text";
     case FieldType::Choice: return "one of " + joined(choices);
+    case FieldType::Choices: return "one of " + joined(choices) + ", a list of them, or none";
     case FieldType::Vector:
       return rule.direction ? "a direction: a list of 3 numbers"
                             : "a list of " + count_text(rule, 3, 3) + ", each " + rule_text(rule, false);

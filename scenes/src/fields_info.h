@@ -13,7 +13,7 @@
 
 namespace supple::scenes {
 
-enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Vector, Vectors, Wholes, Texts, Mapping, Mappings };
+enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Choices, Vector, Vectors, Wholes, Texts, Mapping, Mappings };
 
 struct FieldInfo {
   std::string_view key;
@@ -23,7 +23,7 @@ struct FieldInfo {
   bool may_be_absent = false;                ///< std::optional, so false or auto (by the rule) stand for none
   std::string default_text;                  ///< "" without default
   Rule rule;
-  std::span<const std::string_view> choices; ///< Choice
+  std::span<const std::string_view> choices; ///< Choice, Choices
   std::vector<FieldInfo> children;           ///< Mapping, Mappings
 };
 
@@ -53,6 +53,11 @@ class InfoArchive {
   static std::string default_of(const std::string& value, const Rule& /*rule*/) { return '"' + value + '"'; }
   static std::string default_of(const Vec3& value, const Rule& rule);
   static std::string default_of(const std::vector<int>& value, const Rule& rule);
+  template <class E>
+    requires std::is_enum_v<E>
+  static std::string default_of(const std::vector<E>& value, const Rule& /*rule*/) {
+    return value.empty() ? "none" : std::string(name_of(value.front()));
+  }
   template <class T>
   static std::string default_of(const std::optional<T>& /*value*/, const Rule& rule) {
     return rule.automatic ? "auto" : "";
@@ -81,6 +86,9 @@ template <> struct FieldKind<std::vector<std::string>> { static constexpr FieldT
 template <class E>
   requires std::is_enum_v<E>
 struct FieldKind<E> { static constexpr FieldType type = FieldType::Choice; };
+template <class E>
+  requires std::is_enum_v<E>
+struct FieldKind<std::vector<E>> { static constexpr FieldType type = FieldType::Choices; };
 template <Described D> struct FieldKind<D> { static constexpr FieldType type = FieldType::Mapping; };
 template <Described D> struct FieldKind<std::vector<D>> { static constexpr FieldType type = FieldType::Mappings; };
 template <class T> struct FieldKind<std::optional<T>> { static constexpr FieldType type = FieldKind<T>::type; };
@@ -89,6 +97,9 @@ template <class T>
 struct FieldValue { using type = T; };
 template <class T> struct FieldValue<std::optional<T>> { using type = T; };
 template <Described D> struct FieldValue<std::vector<D>> { using type = D; };
+template <class E>
+  requires std::is_enum_v<E>
+struct FieldValue<std::vector<E>> { using type = E; };
 
 template <class T>
 FieldInfo& InfoArchive::add(std::string_view key, T& /*value*/, const Rule& rule, std::string_view meaning) {
@@ -97,7 +108,7 @@ FieldInfo& InfoArchive::add(std::string_view key, T& /*value*/, const Rule& rule
   info.key = key;
   info.meaning = meaning;
   info.type = FieldKind<T>::type;
-  info.may_be_absent = !std::is_same_v<T, Value> && info.type != FieldType::Mappings;
+  info.may_be_absent = !std::is_same_v<T, Value> && info.type != FieldType::Mappings && info.type != FieldType::Choices;
   info.rule = rule;
   if constexpr (std::is_enum_v<Value>) info.choices = EnumNames<Value>::names;
   if constexpr (Described<Value>) {
@@ -117,7 +128,8 @@ FieldInfo& InfoArchive::add(std::string_view key, T& /*value*/, const Rule& rule
 template <class T>
 [[nodiscard]] std::string expectation(const T& /*value*/, const Rule& rule) {
   std::span<const std::string_view> choices;
-  if constexpr (std::is_enum_v<T>) choices = EnumNames<T>::names;
+  using Value = typename FieldValue<T>::type;
+  if constexpr (std::is_enum_v<Value>) choices = EnumNames<Value>::names;
   return expectation(FieldKind<T>::type, choices, rule);
 }
 

@@ -67,6 +67,10 @@ Json value_schema(const FieldInfo& info) {
     case FieldType::Text:
       return info.rule.name ? Json{{"type", "string"}, {"pattern", "^[A-Za-z_][A-Za-z0-9_.-]*$"}} : Json{{"type", "string"}};
     case FieldType::Choice: return {{"enum", info.choices}};
+    case FieldType::Choices: {
+      const Json one{{"enum", info.choices}};
+      return {{"anyOf", Json::array({one, list_schema(one, {}, 0, kAny), {{"const", "none"}}})}};
+    }
     case FieldType::Vector: return list_schema(number_schema(info.rule, false), info.rule, 3, 3);
     case FieldType::Vectors: {
       const Json point = list_schema(number_schema(info.rule, false), {}, 3, 3);

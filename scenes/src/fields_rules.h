@@ -70,17 +70,20 @@ template <> struct EnumNames<ColourByName> {
 template <> struct EnumNames<MapName> {
   static constexpr std::array<std::string_view, 5> names{"viridis", "magma", "coolwarm", "turbo", "grey"};
 };
+template <> struct EnumNames<ImageName> {
+  static constexpr std::array<std::string_view, 2> names{"png", "exr"};
+};
 template <> struct EnumNames<TableName> {
-  static constexpr std::array<std::string_view, 2> names{"none", "csv"};
+  static constexpr std::array<std::string_view, 2> names{"csv", "vtk"};
 };
 template <> struct EnumNames<MeshName> {
-  static constexpr std::array<std::string_view, 2> names{"none", "ply"};
+  static constexpr std::array<std::string_view, 3> names{"ply", "obj", "usd"};
 };
 template <> struct EnumNames<MeshingName> {
   static constexpr std::array<std::string_view, 4> names{"auto", "cubes", "tetrahedra", "delaunay"};
 };
 template <> struct EnumNames<GridName> {
-  static constexpr std::array<std::string_view, 2> names{"none", "vdb"};
+  static constexpr std::array<std::string_view, 1> names{"vdb"};
 };
 
 template <class E>

@@ -6,21 +6,21 @@
 namespace supple::scenes {
 namespace {
 
-/// d / d0 - 1 of the bonds of each particle of a body, in the mean; a pair counts once for each law that joins it.
+/// d / d0 - 1 of the bonded pairs of each particle of a body, in the mean.
 std::vector<double> mean_stretch(const Model& model, const Body& body, const core::ParticleState& particles,
                                  const core::Interactions& laws) {
   std::vector<double> sum(particles.size(), 0.0), count(particles.size(), 0.0);
   const ObjectModel& object = model.objects[body.object];
-  for_each_bond(laws, [&](std::uint32_t a, std::uint32_t b) {
-    if (a < object.first || a >= object.last) return;
+  for (const auto& [a, b] : core::bonded_pairs(laws)) {
+    if (a < object.first || a >= object.last) continue;
     const double rest = (model.rest.position[a] - model.rest.position[b]).norm();
-    if (!(rest > 0.0)) return;
+    if (!(rest > 0.0)) continue;
     const double stretch = (particles.position[a] - particles.position[b]).norm() / rest - 1.0;
     for (const std::uint32_t i : {a, b}) {
       sum[i] += stretch;
       count[i] += 1.0;
     }
-  });
+  }
   std::vector<double> out;
   for (const std::uint32_t i : body.particle) out.push_back(count[i] > 0.0 ? sum[i] / count[i] : 0.0);
   return out;

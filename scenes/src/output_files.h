@@ -10,21 +10,17 @@
 
 namespace supple::scenes {
 
+/// "name.0012.ext"
+[[nodiscard]] std::string numbered(const std::string& name, int frame, const std::string& extension);
 [[nodiscard]] std::filesystem::path state_path(const std::filesystem::path& folder, const std::string& name, int frame);
 [[nodiscard]] std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame);
 
 /// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result).
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
-void write_mesh_files(const std::filesystem::path& folder, const std::string& name, int frame,
-                      const Simulation& simulation, const std::vector<Mesh>& meshes);
 void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation);
-void write_contact_table(const std::filesystem::path& folder, const std::string& name, int frame,
-                         Simulation& simulation);
-void write_particle_table(const std::filesystem::path& folder, const std::string& name, int frame,
-                          const Simulation& simulation);
-/// NAME_sheet.png: twelve frames spread over 1 .. last that exist, 3 rows of 4.
-void write_contact_sheet(const std::filesystem::path& folder, const std::string& name, int last);
+/// NAME_sheet.png: twelve frames spread over 1 .. last that exist, 3 rows of 4. Empty when none does.
+std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, int last);
 
 /// Books process CPU time of a scope on a stage.
 class StageClock {

@@ -98,32 +98,44 @@ std::vector<render::ScaleBar> bars_of(const Scene& scene) {
 
 }  // namespace
 
+std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model) {
+  std::vector<Mesh> meshes;
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
+    const FixedBody& body = model.fixed[model.fixed.size() - scene.obstacles.size() + i];
+    meshes.push_back(scene.obstacles[i].visible ? obstacle_mesh(scene.obstacles[i], body) : Mesh());
+  }
+  return meshes;
+}
+
 ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::ContextKind context)
-    : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)) {
+    : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)), settings_(settings_of(scene, context)) {
   for (const ObjectDesc& object : scene.objects) {
     const bool reads = object.look.texture && object.look.texture->pattern == PatternName::Picture;
     textures_.push_back(reads ? std::make_shared<const render::Image>(
                                     render::read_png(scene.source.parent_path() / object.look.texture->file))
                               : nullptr);
   }
-  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
-    const FixedBody& body = model.fixed[model.fixed.size() - scene.obstacles.size() + i];
-    obstacles_.push_back(scene.obstacles[i].visible ? obstacle_mesh(scene.obstacles[i], body) : Mesh());
-  }
-  renderer_ = render::make_renderer(settings_of(scene, context));
+  obstacles_ = obstacle_meshes(scene, model);
+  renderer_ = render::make_renderer(settings_);
+}
+
+void ScenePictures::add(render::Item item, std::string name) {
+  items_.push_back(std::move(item));
+  item_names_.push_back(std::move(name));
 }
 
 void ScenePictures::add_objects(const std::vector<Mesh>& meshes) {
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const ObjectDesc& d = scene_.objects[i];
     if (!d.look.surface && !d.look.wireframe) continue;
-    items_.push_back({.mesh = &meshes[i], .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
-                      .opacity = d.look.opacity, .paint = paint_of(d.look, textures_[i]), .surface = d.look.surface,
-                      .wireframe = d.look.wireframe});
+    add({.mesh = &meshes[i], .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
+         .opacity = d.look.opacity, .paint = paint_of(d.look, textures_[i]), .surface = d.look.surface,
+         .wireframe = d.look.wireframe},
+        d.name);
   }
   for (std::size_t i = 0; i < obstacles_.size(); ++i) {
     const ObstacleDesc& d = scene_.obstacles[i];
-    if (d.visible) items_.push_back({&obstacles_[i], d.colour, d.roughness, d.shape != ObstacleName::Box});
+    if (d.visible) add({&obstacles_[i], d.colour, d.roughness, d.shape != ObstacleName::Box}, d.name);
   }
 }
 
@@ -138,20 +150,17 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
       for (std::uint32_t p = object.first; p < object.last; ++p) poses.push_back({state.position[p], state.orientation[p]});
       const std::array<Vec3, 3> colours = {Vec3(0.85, 0.16, 0.12), Vec3(0.15, 0.62, 0.20), Vec3(0.13, 0.32, 0.85)};
       std::array<Mesh, 3> axes = render::frame_glyphs(poses, look.frames);
-      for (std::size_t k = 0; k < 3; ++k)
-        items_.push_back({.mesh = &glyphs_.emplace_back(std::move(axes[k])), .colour = colours[k]});
+      for (std::size_t k = 0; k < 3; ++k) {
+        add({.mesh = &glyphs_.emplace_back(std::move(axes[k])), .colour = colours[k]}, object.name + ".frames");
+      }
     }
     if (look.bonds > 0.0) {
-      std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-      for_each_bond(simulation.laws(), [&](std::uint32_t a, std::uint32_t b) {
-        if (a >= object.first && a < object.last) pairs.emplace_back(a, b);
-      });
-      std::sort(pairs.begin(), pairs.end());
-      pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
       Mesh& mesh = glyphs_.emplace_back();
-      for (const auto& [a, b] : pairs) render::add_rod(mesh, state.position[a], state.position[b], look.bonds);
+      for (const auto& [a, b] : core::bonded_pairs(simulation.laws())) {
+        if (a >= object.first && a < object.last) render::add_rod(mesh, state.position[a], state.position[b], look.bonds);
+      }
       for (std::uint32_t p = object.first; p < object.last; ++p) render::add_ball(mesh, state.position[p], 1.8 * look.bonds);
-      items_.push_back({.mesh = &mesh, .colour = Vec3(0.30, 0.30, 0.33), .roughness = 0.35});
+      add({.mesh = &mesh, .colour = Vec3(0.30, 0.30, 0.33), .roughness = 0.35}, object.name + ".bonds");
     }
   }
 }
@@ -159,11 +168,18 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
 render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera) {
   view_.camera = camera_at(cameras_of(scene_)[camera], simulation.time(), scene_.duration);
   items_.clear();
+  item_names_.clear();
   add_objects(simulation.meshes());
   add_glyphs(simulation);
   render::Image image = renderer_->render(view_, items_);
   render::draw_scale_bars(image, bars_);
+  if (view_.ground) item_names_.emplace_back("ground");
   return image;
+}
+
+render::Layers ScenePictures::layers() {
+  if (!layer_renderer_) layer_renderer_ = render::make_layer_renderer(settings_);
+  return layer_renderer_->render(view_, items_);
 }
 
 }  // namespace supple::scenes

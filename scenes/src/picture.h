@@ -7,11 +7,15 @@
 #include <vector>
 
 #include "camera.h"
+#include "supple/render/layers.h"
 #include "supple/render/overlay.h"
 #include "supple/render/renderer.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
+
+/// What is drawn of each obstacle; empty where it is not visible.
+[[nodiscard]] std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model);
 
 class ScenePictures {
  public:
@@ -20,11 +24,15 @@ class ScenePictures {
 
   /// The simulation's current state as the camera of this number sees it.
   [[nodiscard]] render::Image draw(Simulation& simulation, std::size_t camera);
+  /// Depth, normals, velocities and numbers behind the picture that was drawn last, and what its items are called.
+  [[nodiscard]] render::Layers layers();
+  [[nodiscard]] const std::vector<std::string>& item_names() const { return item_names_; }
   [[nodiscard]] render::RenderTimes times() const { return renderer_->times(); }
 
  private:
   void add_objects(const std::vector<Mesh>& meshes);
   void add_glyphs(const Simulation& simulation);
+  void add(render::Item item, std::string name);
 
   const Scene& scene_;
   render::View view_;
@@ -32,7 +40,10 @@ class ScenePictures {
   std::vector<Mesh> obstacles_;
   std::vector<render::ScaleBar> bars_;
   std::unique_ptr<render::Renderer> renderer_;
+  render::RenderSettings settings_;
+  std::unique_ptr<render::LayerRenderer> layer_renderer_;  ///< made when layers are first asked for
   std::vector<render::Item> items_;
+  std::vector<std::string> item_names_;
   std::deque<Mesh> glyphs_;  ///< of this picture
 };
 

@@ -78,10 +78,10 @@ OutputRequest requested_outputs(const Scene& scene) {
   const OutputDesc& o = scene.output;
   return {.images = o.images.has_value(),
           .film = o.film,
-          .meshes = o.mesh != MeshName::None,
-          .grids = o.grid != GridName::None,
-          .contacts = o.contacts != TableName::None,
-          .particles = o.particles != TableName::None};
+          .meshes = !o.mesh.empty(),
+          .grids = !o.grid.empty(),
+          .contacts = !o.contacts.empty(),
+          .particles = !o.particles.empty()};
 }
 
 bool StepPlan::on(Stage stage) const { return stages[static_cast<std::size_t>(stage)].on; }

@@ -108,25 +108,55 @@ class Override {
 constexpr std::array<std::string_view, 12> kLooks = {"title",  "camera", "cameras",   "light",   "lights",  "background",
                                                      "output", "colour", "roughness", "look",    "visible", "duration"};
 
-void add_content(const Node& node, Hasher& hasher) {
+/// Keys of a scene that change no picture, and those of its output that do.
+constexpr std::array<std::string_view, 2> kUnseen = {"title", "duration"};
+constexpr std::array<std::string_view, 3> kSeenOutput = {"images", "meshing", "cell"};
+
+template <std::size_t N>
+bool among(const std::array<std::string_view, N>& keys, std::string_view key) {
+  return std::find(keys.begin(), keys.end(), key) != keys.end();
+}
+
+/// @param taken  whether a key counts, on every level
+void add_content(const Node& node, const auto& taken, Hasher& hasher) {
   hasher.add(static_cast<std::uint64_t>(node.kind));
   hasher.add(node.text);
-  for (const Node* item : node.items) add_content(*item, hasher);
+  for (const Node* item : node.items) add_content(*item, taken, hasher);
   std::vector<const Node::Entry*> entries;
   for (const Node::Entry& entry : node.entries) {
-    if (std::find(kLooks.begin(), kLooks.end(), entry.key) == kLooks.end()) entries.push_back(&entry);
+    if (taken(entry.key)) entries.push_back(&entry);
   }
   std::sort(entries.begin(), entries.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
   for (const Node::Entry* entry : entries) {
     hasher.add(entry->key);
-    add_content(*entry->value, hasher);
+    add_content(*entry->value, taken, hasher);
   }
 }
 
 /// Of everything that decides the motion, whatever the order of the keys.
 std::uint64_t content_hash(const Node& root) {
   Hasher hasher;
-  add_content(root, hasher);
+  add_content(root, [](std::string_view key) { return !among(kLooks, key); }, hasher);
+  return hasher.value();
+}
+
+/// Of everything that decides a picture of a given state.
+std::uint64_t picture_hash(const Node& root) {
+  const auto all = [](std::string_view /*key*/) { return true; };
+  Hasher hasher;
+  std::vector<const Node::Entry*> seen;
+  for (const Node::Entry& entry : root.entries) {
+    if (entry.key != "output" && !among(kUnseen, entry.key)) seen.push_back(&entry);
+    if (entry.key != "output") continue;
+    for (const Node::Entry& inner : entry.value->entries) {
+      if (among(kSeenOutput, inner.key)) seen.push_back(&inner);
+    }
+  }
+  std::sort(seen.begin(), seen.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
+  for (const Node::Entry* entry : seen) {
+    hasher.add(entry->key);
+    add_content(*entry->value, all, hasher);
+  }
   return hasher.value();
 }
 
@@ -175,6 +205,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
   scene.content_hash = content_hash(*root);
+  scene.picture_hash = picture_hash(*root);
   return scene;
 }
 

@@ -2,6 +2,7 @@
 /// The archive that reads: one per mapping of the file.
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <optional>
 #include <string>
@@ -78,6 +79,24 @@ class ReadArchive {
     requires std::is_enum_v<E>
   void read(const Node& node, const std::string& path, E& value, const Rule& /*rule*/) {
     if (const auto index = read_choice(node, path, EnumNames<E>::names)) value = static_cast<E>(*index);
+  }
+
+  template <class E>
+    requires std::is_enum_v<E>
+  void read(const Node& node, const std::string& path, std::vector<E>& value, const Rule& rule) {
+    value.clear();
+    if (node.kind != Node::Kind::List) {
+      if (node.kind == Node::Kind::Scalar && node.text == "none") return;
+      E one{};
+      read(node, path, one, rule);
+      value = {one};
+      return;
+    }
+    for (std::size_t i = 0; i < node.items.size(); ++i) {
+      E one{};
+      read(*node.items[i], path + '[' + std::to_string(i) + ']', one, rule);
+      if (std::find(value.begin(), value.end(), one) == value.end()) value.push_back(one);
+    }
   }
 
   template <class T>

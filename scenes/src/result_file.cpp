@@ -33,6 +33,8 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["frames"] = result.frames;
   json["last_good_frame"] = result.frames;
   json["frame_count"] = scene.frame_count();
+  json["frame_rate"] = scene.frame_rate;
+  json["pictures"] = {{"drawn", result.pictures_drawn}, {"kept", result.pictures_kept}};
   json["state_hash"] = to_hex(result.state_hash);
   json["warnings"] = result.warnings;
   json["units"] = {{"length", "m"}, {"up_axis", "z"}};
@@ -94,7 +96,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["film"] = result.film.empty() ? ordered_json(nullptr) : ordered_json(result.film.filename().string());
   json["peak_memory_mb"] = peak_memory_mb();
   json["wall_s"] = wall_s;
-  io::write_atomically(result.folder / "result.json", std::string_view(json.dump(2) + "\n"));
+  io::write_atomically(result.report, std::string_view(json.dump(2) + "\n"));
 }
 
 }  // namespace supple::scenes

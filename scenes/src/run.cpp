@@ -11,12 +11,11 @@
 #include <cstdio>
 #include <optional>
 
+#include "frame_writer.h"
 #include "output_files.h"
-#include "picture.h"
 #include "result_file.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
-#include "supple/render/renderer.h"
 
 namespace supple::scenes {
 namespace {
@@ -59,24 +58,6 @@ void remove_temporaries(const fs::path& folder) {
   }
 }
 
-class Reporter {
- public:
-  Reporter(const RunOptions& options, int frame_count) : options_(options), frame_count_(frame_count) {}
-
-  void operator()(const std::string& stage, int frame, double done) {
-    if (!options_.progress) return;
-    const double elapsed = seconds_since(begin_);
-    const double left = done > 0.02 ? elapsed * (1.0 - done) / done : -1.0;
-    options_.progress({stage, frame, frame_count_, elapsed, left});
-  }
-  [[nodiscard]] double elapsed() const { return seconds_since(begin_); }
-
- private:
-  const RunOptions& options_;
-  int frame_count_;
-  Clock::time_point begin_ = Clock::now();
-};
-
 std::optional<int> last_saved_frame(const fs::path& folder, const std::string& name, int frame_count) {
   for (int frame = frame_count; frame >= 1; --frame) {
     if (fs::exists(state_path(folder, name, frame))) return frame;
@@ -84,100 +65,10 @@ std::optional<int> last_saved_frame(const fs::path& folder, const std::string& n
   return std::nullopt;
 }
 
-render::ContextKind context_kind(const std::string& name) {
-  if (name == "auto") return render::ContextKind::Auto;
-  if (name == "osmesa") return render::ContextKind::OSMesa;
-  if (name == "egl") return render::ContextKind::Egl;
-  throw Error(ErrorKind::Usage, Fault{.place = "--context",
-                                      .key = {},
-                                      .expected = "expected auto, osmesa or egl",
-                                      .found = name,
-                                      .hint = {}});
-}
-
-/// What a run writes, frame by frame.
-class FrameWriter {
- public:
-  FrameWriter(const Scene& scene, const RunOptions& options, OutputRequest outputs)
-      : scene_(scene), options_(options), outputs_(outputs), name_(scene_name(scene)) {
-    context_ = context_kind(options.context);
-    for (const CameraDesc& camera : cameras_of(scene))
-      image_names_.push_back(camera.name.empty() ? name_ : name_ + '.' + camera.name);
-  }
-
-  void write(Simulation& simulation, Reporter& report, double done) {
-    const int frame = simulation.frame();
-    if (!options_.frames.empty() && !options_.frames.contains(frame)) return;
-    const std::vector<Mesh>* meshes = nullptr;
-    if (outputs_.images || outputs_.meshes) {
-      report("surface", frame, done);
-      meshes = &simulation.meshes();
-    }
-    if (outputs_.images) {
-      report("render", frame, done);
-      if (!pictures_) pictures_ = std::make_unique<ScenePictures>(scene_, simulation.model(), context_);
-      for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
-        render::Image image;
-        {
-          const StageClock clock(simulation.profile(Stage::Render));
-          image = pictures_->draw(simulation, camera);
-        }
-        const StageClock clock(simulation.profile(Stage::Export));
-        render::write_png(frame_path(options_.folder, image_names_[camera], frame), image);
-        ++images_;
-      }
-    }
-    const StageClock clock(simulation.profile(Stage::Export));
-    if (outputs_.meshes) write_mesh_files(options_.folder, name_, frame, simulation, *meshes);
-    if (outputs_.grids) write_grid_file(options_.folder, name_, frame, simulation);
-    if (outputs_.contacts) write_contact_table(options_.folder, name_, frame, simulation);
-    if (outputs_.particles) write_particle_table(options_.folder, name_, frame, simulation);
-  }
-
-  /// Film and contact sheet of each camera, of all frames 1 .. last that are there; returns the first film.
-  fs::path finish(Simulation& simulation, Reporter& report, int last) {
-    if (!outputs_.images) return {};
-    const StageClock clock(simulation.profile(Stage::Export));
-    report("film", last, 0.99);
-    fs::path first_film;
-    for (const std::string& name : image_names_) {
-      write_contact_sheet(options_.folder, name, last);
-      if (!outputs_.film) continue;
-      bool all = true;
-      for (int frame = 1; frame <= last && all; ++frame) all = fs::exists(frame_path(options_.folder, name, frame));
-      if (!all) continue;
-      const fs::path film = options_.folder / (name + ".mp4");
-      render::encode_film(options_.folder / "frames", name, 1, last, scene_.frame_rate, film);
-      if (first_film.empty()) first_film = film;
-    }
-    return first_film;
-  }
-
- private:
-  const Scene& scene_;
-  const RunOptions& options_;
-  OutputRequest outputs_;
-  std::string name_;
-  std::vector<std::string> image_names_;  ///< one a camera
-  render::ContextKind context_ = render::ContextKind::Auto;
-  std::unique_ptr<ScenePictures> pictures_;
-  int images_ = 0;
-};
-
 OutputRequest outputs_of(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = requested_outputs(scene);
   if (options.simulate_only) outputs.images = outputs.film = outputs.meshes = outputs.grids = false;
   return outputs;
-}
-
-void make_folders(const fs::path& folder, const OutputRequest& outputs) {
-  io::make_writable_folder(folder);
-  io::make_writable_folder(folder / "states");
-  if (outputs.images) io::make_writable_folder(folder / "frames");
-  if (outputs.meshes) io::make_writable_folder(folder / "meshes");
-  if (outputs.grids) io::make_writable_folder(folder / "grids");
-  if (outputs.contacts) io::make_writable_folder(folder / "contacts");
-  if (outputs.particles) io::make_writable_folder(folder / "particles");
 }
 
 std::string outcome_of(ErrorKind kind) {
@@ -194,6 +85,7 @@ std::string outcome_of(ErrorKind kind) {
 }
 
 constexpr int kSignalExit = 128;
+constexpr const char* kResultFile = "result.json";
 
 std::string overload_text(const RunRecord::Overload& o) {
   std::array<char, 160> numbers{};
@@ -202,12 +94,20 @@ std::string overload_text(const RunRecord::Overload& o) {
   return o.a + " and " + o.b + numbers.data();
 }
 
-/// Runs `body`, which fills `result`; whatever happens result.json is left behind.
+bool was_interrupted(const RunOptions& options, RunResult& result) {
+  if (options.interrupt == nullptr || options.interrupt->load() == 0) return false;
+  result.reason = "interrupted by signal " + std::to_string(options.interrupt->load());
+  result.exit_code = kSignalExit + options.interrupt->load();
+  return true;
+}
+
+/// Runs `body`, which fills `result`; whatever happens a report of this name is left behind.
 template <class Body>
-RunResult guarded(const Scene& scene, const RunOptions& options, std::optional<Simulation>& simulation,
-                  const Body& body) {
+RunResult guarded(const Scene& scene, const RunOptions& options, const char* report_name,
+                  std::optional<Simulation>& simulation, const Body& body) {
   RunResult result;
   result.folder = options.folder;
+  result.report = options.folder / report_name;
   const auto begin = Clock::now();
   try {
     body(result);
@@ -230,16 +130,57 @@ RunResult guarded(const Scene& scene, const RunOptions& options, std::optional<S
   return result;
 }
 
+/// Outputs again of the saved states.
+RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, const char* report_name) {
+  const bool pictures_only = outputs.images;
+  const std::string name = scene_name(scene);
+  io::make_writable_folder(options.folder);
+  const FolderLock lock(options.folder);
+  remove_temporaries(options.folder);
+
+  std::optional<Simulation> simulation;
+  return guarded(scene, options, report_name, simulation, [&](RunResult& result) {
+    const auto last = last_saved_frame(options.folder, name, scene.frame_count());
+    if (!last) {
+      throw Error(ErrorKind::Io, Fault{.place = (options.folder / "states").string(),
+                                       .key = {},
+                                       .expected = "expected saved states of a run",
+                                       .found = "none",
+                                       .hint = "run the scene first: supple run SCENE --out FOLDER"});
+    }
+    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
+    FrameWriter writer(scene, simulation->model(), options, outputs);
+    Reporter report(options, *last);
+    for (int frame = 1; frame <= *last; ++frame) {
+      if (was_interrupted(options, result)) return;
+      if (!options.frames.empty() && !options.frames.contains(frame)) continue;
+      State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
+      if (pictures_only && !options.overwrite && !writer.renews(frame, state.hash())) {
+        ++result.pictures_kept;
+        continue;
+      }
+      simulation->restore(std::move(state));
+      writer.write(*simulation, report, static_cast<double>(frame) / *last);
+    }
+    if (simulation->frame() != *last) {  // the report is of the run as a whole
+      simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
+    }
+    result.pictures_drawn = writer.pictures_drawn();
+    result.film = writer.finish(*simulation, report, *last);
+  });
+}
+
 }  // namespace
 
 void leave_failure(const fs::path& folder, const std::string& name, const Error& error) {
   try {
-    if (fs::exists(folder / "result.json")) return;
+    if (fs::exists(folder / kResultFile)) return;
     io::make_writable_folder(folder);
     Scene scene;
     scene.source = name + ".yaml";
     RunResult result;
     result.folder = folder;
+    result.report = folder / kResultFile;
     result.outcome = outcome_of(error.kind());
     result.reason = error.what();
     result.exit_code = static_cast<int>(error.kind());
@@ -286,10 +227,10 @@ std::set<int> parse_frames(const std::string& text) {
 RunResult run_scene(const Scene& scene, const RunOptions& options) {
   const OutputRequest outputs = outputs_of(scene, options);
   const std::string name = scene_name(scene);
-  make_folders(options.folder, outputs);
+  io::make_writable_folder(options.folder / "states");
   const FolderLock lock(options.folder);
   remove_temporaries(options.folder);
-  if (!options.overwrite && !options.resume && fs::exists(options.folder / "result.json")) {
+  if (!options.overwrite && !options.resume && fs::exists(options.folder / kResultFile)) {
     throw Error(ErrorKind::Io, Fault{.place = options.folder.string(),
                                      .key = {},
                                      .expected = "expected an output folder without an earlier result",
@@ -298,15 +239,21 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
   }
 
   std::optional<Simulation> simulation;
-  return guarded(scene, options, simulation, [&](RunResult& result) {
+  return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {
         if (!options.resume) remove_outputs(options.folder, name);
         simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
         const int frame_count = scene.frame_count();
-        FrameWriter writer(scene, options, outputs);
+        FrameWriter writer(scene, simulation->model(), options, outputs);
         Reporter report(options, frame_count);
         bool fresh = true;
         if (options.resume) {
           if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
+            for (int frame = 1; frame <= *last; ++frame) {
+              State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
+              if (!writer.renews(frame, state.hash())) continue;
+              simulation->restore(std::move(state));
+              writer.renew(*simulation, report, static_cast<double>(frame) / frame_count);
+            }
             simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
             fresh = false;
           }
@@ -318,15 +265,12 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         };
         if (fresh) finish_frame();
         while (simulation->frame() < frame_count) {
-          if (options.interrupt != nullptr && options.interrupt->load() != 0) {
-            result.reason = "interrupted by signal " + std::to_string(options.interrupt->load());
-            result.exit_code = kSignalExit + options.interrupt->load();
-            return;
-          }
+          if (was_interrupted(options, result)) return;
           report("simulate", simulation->frame() + 1, static_cast<double>(simulation->frame()) / frame_count);
           simulation->step_frame();
           finish_frame();
         }
+        result.pictures_drawn = writer.pictures_drawn();
         result.film = writer.finish(*simulation, report, frame_count);
       });
 }
@@ -335,37 +279,34 @@ RunResult render_run(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = outputs_of(scene, options);
   outputs.images = true;
   outputs.contacts = outputs.particles = outputs.meshes = outputs.grids = false;
-  const std::string name = scene_name(scene);
-  make_folders(options.folder, outputs);
-  const FolderLock lock(options.folder);
-  remove_temporaries(options.folder);
+  return replay(scene, options, outputs, "render.json");
+}
 
-  std::optional<Simulation> simulation;
-  return guarded(scene, options, simulation, [&](RunResult& result) {
-        const int frame_count = scene.frame_count();
-        const auto last = last_saved_frame(options.folder, name, frame_count);
-        if (!last) {
-          throw Error(ErrorKind::Io, Fault{.place = (options.folder / "states").string(),
-                                           .key = {},
-                                           .expected = "expected saved states of a run",
-                                           .found = "none",
-                                           .hint = "run the scene first: supple run SCENE --out FOLDER"});
-        }
-        simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
-        FrameWriter writer(scene, options, outputs);
-        Reporter report(options, *last);
-        for (int frame = 1; frame <= *last; ++frame) {
-          if (options.interrupt != nullptr && options.interrupt->load() != 0) {
-            result.reason = "interrupted by signal " + std::to_string(options.interrupt->load());
-            result.exit_code = kSignalExit + options.interrupt->load();
-            return;
-          }
-          if (!options.frames.empty() && !options.frames.contains(frame)) continue;
-          simulation->restore(load_state(state_path(options.folder, name, frame), scene.content_hash));
-          writer.write(*simulation, report, static_cast<double>(frame) / *last);
-        }
-        result.film = writer.finish(*simulation, report, *last);
-      });
+fs::path make_sheet(const Scene& scene, const fs::path& folder) {
+  const std::string name = scene_name(scene);
+  const auto last = last_saved_frame(folder, name, scene.frame_count());
+  const fs::path sheet = last ? write_contact_sheet(folder, name, *last) : fs::path();
+  if (sheet.empty()) {
+    throw Error(ErrorKind::Io, Fault{.place = (folder / "frames").string(),
+                                     .key = {},
+                                     .expected = "expected frames of a run",
+                                     .found = "none",
+                                     .hint = "draw them first: supple render SCENE --out FOLDER"});
+  }
+  return sheet;
+}
+
+RunResult export_run(const Scene& scene, const RunOptions& options) {
+  OutputRequest outputs = outputs_of(scene, options);
+  outputs.images = outputs.film = false;
+  if (!outputs.contacts && !outputs.particles && !outputs.meshes && !outputs.grids) {
+    throw Error(ErrorKind::Usage, Fault{.place = scene.source.string(),
+                                        .key = "output",
+                                        .expected = "expected a mesh, grid, particles or contacts to export",
+                                        .found = "none",
+                                        .hint = "name them: supple export SCENE --mesh usd --particles vtk"});
+  }
+  return replay(scene, options, outputs, "export.json");
 }
 
 }  // namespace supple::scenes

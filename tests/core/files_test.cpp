@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -10,6 +11,8 @@
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"
+#include "supple/core/io/usd_file.h"
+#include "supple/core/io/vtk_files.h"
 
 namespace {
 
@@ -148,6 +151,128 @@ TEST_F(Files, OfPointsNameEveryLineThatIsNotThreeNumbers) {
     EXPECT_EQ(error.faults()[5].place, path("p.csv").string() + ":7");
   }
   expect_error(ErrorKind::Io, "none.csv", [&] { static_cast<void>(io::read_points_csv(path("none.csv"))); });
+}
+
+TEST_F(Files, ThatAreNotCommittedLeaveNothing) {
+  {
+    io::AtomicFile file(path("a.txt"));
+    file.append(std::string(200000, 'x'));
+    EXPECT_EQ(file_count(), 1U);  // under another name
+    EXPECT_FALSE(fs::exists(path("a.txt")));
+  }
+  EXPECT_EQ(file_count(), 0U);
+  io::AtomicFile file(path("a.txt"));
+  std::string expected;
+  for (const std::size_t length : {3U, 70000U, 1U, 65536U, 0U, 9U}) {
+    expected += std::string(length, static_cast<char>('a' + length % 26));
+    file.append(std::string(length, static_cast<char>('a' + length % 26)));
+  }
+  file.commit();
+  EXPECT_EQ(text_of(path("a.txt")), expected);
+  EXPECT_EQ(file_count(), 1U);
+}
+
+Mesh tetrahedron(double size) {
+  Mesh mesh;
+  mesh.position = {Vec3::Zero(), size * Vec3::UnitX(), size * Vec3::UnitY(), size * Vec3::UnitZ()};
+  mesh.triangle = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  mesh.normal.assign(4, Vec3::UnitX());
+  return mesh;
+}
+
+TEST_F(Files, OfMeshesAsObjCountVerticesFromOne) {
+  io::write_obj(path("m.obj"), tetrahedron(0.1));
+  EXPECT_EQ(text_of(path("m.obj")),
+            "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nvn 1 0 0\nvn 1 0 0\nvn 1 0 0\nvn 1 0 0\n"
+            "f 1//1 3//3 2//2\nf 1//1 2//2 4//4\nf 1//1 4//4 3//3\nf 2//2 3//3 4//4\n");
+}
+
+io::PointSet three_points() {
+  io::PointSet points;
+  points.position = {Vec3(1, 2, 3), Vec3(0.1, -0.2, 1e-300), Vec3(4, 5, 6)};
+  points.line = {{0, 2}};
+  points.add("mass_kg") = {1.0, 2.0, 1.0 / 3.0};
+  points.add("spin <1/s>", {"a", "b"}) = {1, 2, 3, 4, 5, 6};
+  return points;
+}
+
+TEST_F(Files, OfPointsAsVtpKeepEveryBitAtTheOffsetsTheyState) {
+  const io::PointSet points = three_points();
+  io::write_vtp(path("p.vtp"), points);
+  const std::string text = text_of(path("p.vtp"));
+  const std::size_t raw = text.find("encoding=\"raw\">\n_") + 17;
+  const auto array = [&](const std::string& name) {
+    const std::size_t tag = text.find("Name=\"" + name + '"');
+    const std::size_t offset = std::stoul(text.substr(text.find("offset=\"", tag) + 8));
+    std::uint64_t bytes = 0;
+    std::memcpy(&bytes, text.data() + raw + offset, sizeof bytes);
+    return text.substr(raw + offset + sizeof bytes, bytes);
+  };
+  const auto bits = [](const auto& values) {
+    return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+  };
+  EXPECT_EQ(array("mass_kg"), bits(points.data[0].values));
+  EXPECT_EQ(array("spin &lt;1/s>"), bits(points.data[1].values));
+  EXPECT_EQ(array("position_m"), bits(points.position));
+  EXPECT_NE(text.find("NumberOfPoints=\"3\" NumberOfVerts=\"3\" NumberOfLines=\"1\""), std::string::npos);
+  const std::size_t lines = text.find("<Lines>");
+  const std::size_t offset = std::stoul(text.substr(text.find("offset=\"", lines) + 8));
+  EXPECT_EQ(text.substr(raw + offset + 8, 16), bits(std::vector<std::int64_t>{0, 2}));
+  EXPECT_TRUE(text.ends_with("\n  </AppendedData>\n</VTKFile>\n"));
+}
+
+TEST_F(Files, OfPointsAsTablesNameEveryComponent) {
+  io::write_points_csv(path("p.csv"), three_points());
+  EXPECT_EQ(text_of(path("p.csv")), "x_m,y_m,z_m,mass_kg,a,b\n1,2,3,1,1,2\n0.1,-0.2,1e-300,2,3,4\n"
+                                    "4,5,6,0.3333333333333333,5,6\n");
+  io::write_vtp(path("none.vtp"), {});
+  io::write_points_csv(path("none.csv"), {});
+  EXPECT_EQ(text_of(path("none.csv")), "x_m,y_m,z_m\n");
+}
+
+TEST_F(Files, OfSequencesNameTimesAndFiles) {
+  const std::vector<io::TimedFile> files{{0.0, "particles/a.0001.vtp"}, {0.125, "particles/a & b.vtp"}};
+  io::write_pvd(path("a.pvd"), files);
+  const std::string text = text_of(path("a.pvd"));
+  EXPECT_NE(text.find("<DataSet timestep=\"0\" part=\"0\" file=\"particles/a.0001.vtp\"/>"), std::string::npos);
+  EXPECT_NE(text.find("<DataSet timestep=\"0.125\" part=\"0\" file=\"particles/a &amp; b.vtp\"/>"), std::string::npos);
+}
+
+TEST_F(Files, OfAnimationsKeepWhatStaysByItsFirstAndLastFrame) {
+  const std::vector<io::UsdObject> objects{{.name = "a.b"}, {.name = "a-b"}};
+  {
+    io::UsdAnimation animation(path("a.usda"), 24.0, objects);
+    const Mesh still = tetrahedron(1.0), none;
+    Mesh moving = tetrahedron(1.0);
+    for (int frame = 1; frame <= 4; ++frame) {
+      if (frame == 3) moving.columns.push_back({.name = "contact", .values = {0.0, 1.0, 0.0, 0.5}});
+      if (frame == 4) moving = tetrahedron(2.0);
+      animation.add_frame(frame, std::array<const Mesh*, 2>{&moving, frame == 2 ? &none : &still});
+    }
+    EXPECT_EQ(file_count(), 0U);  // until it is whole
+    animation.finish();
+  }
+  EXPECT_EQ(file_count(), 1U);
+  const std::string text = text_of(path("a.usda"));
+  const std::size_t first = text.find("def Mesh \"a_b\""), second = text.find("def Mesh \"a_b_\"");
+  ASSERT_NE(first, std::string::npos);
+  ASSERT_NE(second, std::string::npos);
+  const auto samples = [&](std::size_t from, const std::string& attribute) {
+    const std::size_t begin = text.find(attribute + ".timeSamples = {\n", from);
+    std::string block = text.substr(begin, text.find('}', begin) - begin);
+    std::vector<int> frames;
+    for (std::size_t at = block.find("\n            "); at != std::string::npos; at = block.find("\n            ", at + 1)) {
+      frames.push_back(std::stoi(block.substr(at)));
+    }
+    return frames;
+  };
+  EXPECT_EQ(samples(first, "points"), (std::vector<int>{1, 3, 4}));
+  EXPECT_EQ(samples(first, "faceVertexIndices"), (std::vector<int>{1}));
+  EXPECT_EQ(samples(first, "primvars:contact"), (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_EQ(samples(second, "points"), (std::vector<int>{1, 2, 3}));
+  EXPECT_EQ(samples(second, "visibility"), (std::vector<int>{1, 2, 3}));
+  EXPECT_NE(text.find("startTimeCode = 1"), std::string::npos);
+  EXPECT_NE(text.find("endTimeCode = 4"), std::string::npos);
 }
 
 }  // namespace

@@ -165,5 +165,27 @@ TEST(ContactSheet, PlacesImagesRowByRow) {
   EXPECT_THROW(static_cast<void>(contact_sheet({}, 2, 1)), ContractViolation);
 }
 
+TEST(Png, CarriesAFingerprintThatItsHeadShows) {
+  const Folder folder;
+  write_png(folder / "a.png", noise(40, 30), "0123abcd");
+  EXPECT_EQ(png_fingerprint(folder / "a.png"), "0123abcd");
+  EXPECT_EQ(read_png(folder / "a.png").pixels, noise(40, 30).pixels);
+  write_png(folder / "b.png", noise(40, 30));
+  EXPECT_EQ(png_fingerprint(folder / "b.png"), "");
+  EXPECT_EQ(png_fingerprint(folder / "none.png"), "");
+}
+
+TEST(Compare, GoesByTheValuesOfTheChannels) {
+  Image a{.width = 2, .height = 1, .pixels = {10, 20, 30, 40, 50, 60}}, b = a;
+  EXPECT_EQ(compare(a, b, 8.0).largest, 0);
+  EXPECT_TRUE(std::isinf(compare(a, b, 8.0).psnr));
+  b.pixels[1] = 23;
+  b.pixels[5] = 20;
+  const ImageDifference difference = compare(a, b, 8.0);
+  EXPECT_EQ(difference.largest, 40);
+  EXPECT_NEAR(difference.psnr, 10.0 * std::log10(255.0 * 255.0 * 6.0 / (9.0 + 1600.0)), 1e-12);
+  EXPECT_EQ(difference.picture.pixels, (std::vector<std::uint8_t>{0, 24, 0, 0, 0, 255}));
+}
+
 }  // namespace
 }  // namespace supple::render::test

@@ -95,7 +95,7 @@ TEST(SceneReader, ReadsASceneLikeASentence) {
   EXPECT_EQ(scene.ground->height, -0.6);
   ASSERT_TRUE(scene.output.images);
   EXPECT_TRUE(scene.output.film);
-  EXPECT_EQ(scene.output.contacts, TableName::Csv);
+  EXPECT_EQ(scene.output.contacts, std::vector{TableName::Csv});
 }
 
 TEST(SceneReader, ReadsJsonToo) {

@@ -8,7 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
 #include "supple/render/image.h"
+#include "supple/render/layers.h"
+#include "supple/scenes/inspect.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 
@@ -144,6 +147,124 @@ TEST_F(Run, DrawsFramesAgainFromSavedStates) {
   again.frames = {4};
   EXPECT_EQ(render_run(scene_, again).outcome, "done");
   EXPECT_EQ(render::read_png(folder_ / "frames/drops.0004.png").pixels, first.pixels);
+}
+
+std::vector<std::byte> bytes_of(const fs::path& path) { return io::read_file(path, std::size_t{1} << 24); }
+
+TEST_F(Run, ExportsFromSavedStatesWhatTheRunWouldHaveWritten) {
+  scene_.output.mesh = {MeshName::Usd, MeshName::Obj, MeshName::Ply};
+  scene_.output.particles = scene_.output.contacts = {TableName::Csv, TableName::Vtk};
+  scene_.output.images.reset();
+  scene_.output.film = false;
+  ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
+  Scene quiet = scene_;
+  quiet.output = {};
+  RunOptions other = options();
+  other.folder = folder_ / "other";
+  ASSERT_EQ(run_scene(quiet, other).outcome, "done");
+  const auto before = bytes_of(other.folder / "result.json");
+  EXPECT_EQ(export_run(scene_, other).outcome, "done");
+  for (const char* file : {"drops.usda", "drops_particles.pvd", "drops_contacts.pvd", "meshes/drops.left.0003.obj",
+                           "meshes/drops.right.0003.ply", "particles/drops.0003.vtp", "contacts/drops.0003.vtp",
+                           "contacts/drops.0003.csv"}) {
+    EXPECT_EQ(bytes_of(folder_ / file), bytes_of(other.folder / file)) << file;
+  }
+  EXPECT_TRUE(fs::exists(other.folder / "export.json"));
+  EXPECT_EQ(bytes_of(other.folder / "result.json"), before);  // of the run, not of what came after
+  EXPECT_THROW((void)export_run(quiet, other), Error);
+}
+
+TEST_F(Run, KeepsPicturesThatShowTheSameSceneAndState) {
+  scene_.output.film = false;
+  ASSERT_EQ(run_scene(scene_, options()).pictures_drawn, 5);
+  EXPECT_EQ(render_run(scene_, options()).pictures_kept, 5);
+  fs::remove(folder_ / "frames/drops.0002.png");
+  RunResult result = render_run(scene_, options());
+  EXPECT_EQ(result.pictures_kept, 4);
+  EXPECT_EQ(result.pictures_drawn, 1);
+  RunOptions all = options();
+  all.overwrite = true;
+  EXPECT_EQ(render_run(scene_, all).pictures_drawn, 5);
+
+  const std::vector<std::string> title{"title=Other"}, colour{"objects.left.colour=[1, 0, 0]"};
+  EXPECT_EQ(render_run(parse_scene(kTiny, "drops.yaml", ".", title), options()).pictures_kept, 5);
+  Scene red = parse_scene(kTiny, "drops.yaml", ".", colour);
+  const auto before = bytes_of(folder_ / "frames/drops.0003.png");
+  result = render_run(red, options());
+  EXPECT_EQ(result.pictures_drawn, 5);
+  EXPECT_NE(bytes_of(folder_ / "frames/drops.0003.png"), before);
+}
+
+TEST_F(Run, DrawsMissingPicturesOnResuming) {
+  scene_.output.film = false;
+  ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
+  const auto second = bytes_of(folder_ / "frames/drops.0002.png");
+  fs::remove(folder_ / "frames/drops.0002.png");
+  RunOptions o = options();
+  o.resume = true;
+  ASSERT_EQ(run_scene(scene_, o).outcome, "done");
+  EXPECT_EQ(bytes_of(folder_ / "frames/drops.0002.png"), second);
+}
+
+TEST_F(Run, IsDescribedAndCompared) {
+  ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
+  const std::string text = describe_run(folder_);
+  for (const char* part : {"Two drops", "outcome     done", "frames      5 of 5", "momentum_error", "left ", "solve_contact_surface",
+                           "frames/*.png", "states/*.state", "drops.mp4"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  }
+  EXPECT_THROW((void)describe_run(folder_ / "frames"), Error);
+
+  const std::vector<std::string> colour{"objects.left.colour=[1, 0, 0]", "duration=0.375 s"};
+  RunOptions other = options();
+  other.folder = folder_ / "red";
+  ASSERT_EQ(run_scene(parse_scene(kTiny, "drops.yaml", ".", colour), other).outcome, "done");
+  const Comparison same = compare_runs({.first = folder_, .second = folder_, .folder = folder_ / "same"});
+  ASSERT_EQ(same.frames.size(), 5u);
+  for (const FrameComparison& f : same.frames) EXPECT_EQ(f.largest, 0);
+  const Comparison differ = compare_runs({.first = folder_, .second = other.folder, .folder = folder_ / "differ"});
+  EXPECT_EQ(differ.frames.size(), 4u);
+  EXPECT_EQ(differ.only_first, 1);
+  EXPECT_EQ(differ.only_second, 0);
+  for (const FrameComparison& f : differ.frames) {
+    EXPECT_GT(f.largest, 10);
+    EXPECT_LT(f.psnr, 45.0);
+  }
+  EXPECT_EQ(render::read_png(folder_ / "differ/frames/compare.0001.png").width, 3 * 96 + 4 * 2);
+  EXPECT_TRUE(fs::exists(folder_ / "differ/compare.mp4"));
+  EXPECT_TRUE(fs::exists(folder_ / "differ/compare.csv"));
+}
+
+TEST_F(Run, WritesPicturesForCompositing) {
+  const std::vector<std::string> exr{"output={images: {size: [96, 64], samples: 1, formats: [png, exr]}}"};
+  scene_ = parse_scene(kTiny, "drops.yaml", ".", exr);
+  RunOptions o = options();
+  o.frames = {1, 3};
+  ASSERT_EQ(run_scene(scene_, o).outcome, "done");
+  EXPECT_TRUE(fs::exists(folder_ / "frames/drops.0003.png"));
+  EXPECT_EQ(render::exr_fingerprint(folder_ / "frames/drops.0003.exr"), render::png_fingerprint(folder_ / "frames/drops.0003.png"));
+  EXPECT_EQ(render_run(scene_, o).pictures_kept, 2);
+  fs::remove(folder_ / "frames/drops.0003.exr");
+  EXPECT_EQ(render_run(scene_, o).pictures_drawn, 1);
+}
+
+TEST_F(Run, GathersTheFramesBeforeARestartToo) {
+  scene_.output = {};
+  scene_.output.mesh = {MeshName::Usd};
+  RunOptions o = options();
+  o.folder = folder_ / "whole";
+  ASSERT_EQ(run_scene(scene_, o).outcome, "done");
+  std::atomic<int> signal{0};
+  RunOptions stopped = options();
+  stopped.interrupt = &signal;
+  stopped.progress = [&](const Progress& p) { signal = p.frame >= 3 ? 15 : 0; };
+  ASSERT_EQ(run_scene(scene_, stopped).outcome, "interrupted");
+  EXPECT_FALSE(fs::exists(folder_ / "drops.usda"));
+  stopped.interrupt = nullptr;
+  stopped.progress = nullptr;
+  stopped.resume = true;
+  ASSERT_EQ(run_scene(scene_, stopped).outcome, "done");
+  EXPECT_EQ(bytes_of(folder_ / "drops.usda"), bytes_of(o.folder / "drops.usda"));
 }
 
 TEST_F(Run, SaysWhenAFolderCannotBeMade) {

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "supple/core/error.h"
 
@@ -32,11 +33,6 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   [[nodiscard]] int get() const { return value_; }
-  [[nodiscard]] bool close_now() {
-    const int value = value_;
-    value_ = -1;
-    return ::close(value) == 0;
-  }
 
  private:
   int value_;
@@ -69,19 +65,55 @@ void sync_folder(const std::filesystem::path& folder) {
 
 }  // namespace
 
-void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const std::filesystem::path temporary = temporary_name(path);
-  Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (descriptor.get() < 0) fail(path, "cannot be written", errno);
-  int code = write_all(descriptor.get(), bytes);
-  if (code == 0 && ::fsync(descriptor.get()) != 0) code = errno;
-  if (!descriptor.close_now() && code == 0) code = errno;
-  if (code == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) code = errno;
-  if (code != 0) {
-    ::unlink(temporary.c_str());
-    fail(path, "cannot be written", code);
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), temporary_(temporary_name(path_)) {
+  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) fail(path_, "cannot be written", errno);
+}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  if (const int code = write_all(descriptor_, bytes)) fail(path_, "cannot be written", code);
+}
+
+void AtomicFile::append(std::span<const std::byte> bytes) {
+  constexpr std::size_t kBuffer = std::size_t{1} << 16;
+  if (buffer_.size() + bytes.size() > kBuffer) {
+    write(buffer_);
+    buffer_.clear();
   }
-  sync_folder(path.parent_path());
+  if (bytes.size() > kBuffer) {
+    write(bytes);
+  } else {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
+}
+
+void AtomicFile::append(std::string_view text) { append(std::as_bytes(std::span<const char>(text))); }
+
+void AtomicFile::commit() {
+  SUPPLE_EXPECTS(descriptor_ >= 0);
+  write(buffer_);
+  buffer_.clear();
+  int code = ::fsync(descriptor_) != 0 ? errno : 0;
+  if (::close(descriptor_) != 0 && code == 0) code = errno;
+  descriptor_ = -1;
+  if (code == 0 && ::rename(temporary_.c_str(), path_.c_str()) != 0) code = errno;
+  if (code != 0) {
+    ::unlink(temporary_.c_str());
+    fail(path_, "cannot be written", code);
+  }
+  sync_folder(path_.parent_path());
+}
+
+void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  AtomicFile file(path);
+  file.append(bytes);
+  file.commit();
 }
 
 void write_atomically(const std::filesystem::path& path, std::string_view text) {

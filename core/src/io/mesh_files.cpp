@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 
@@ -23,13 +24,6 @@ void append(std::string& bytes, T value) {
   bytes.append(raw.data(), raw.size());
 }
 
-void append_number(std::string& text, double value) {
-  std::array<char, 32> buffer;
-  const auto result =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, 17);
-  text.append(buffer.data(), result.ptr);
-}
-
 /// PLY property names are single words.
 std::string word(std::string name) {
   for (char& c : name) {
@@ -39,7 +33,6 @@ std::string word(std::string name) {
 }
 
 bool is_separator(char c) { return c == ',' || c == ';' || c == ' ' || c == '\t' || c == '\r'; }
-
 
 bool parse_number(std::string_view text, double& value) {
   if (text.size() > 1 && text.front() == '+' && text[1] != '-') text.remove_prefix(1);
@@ -94,6 +87,30 @@ void write_ply(const std::filesystem::path& path, const Mesh& mesh) {
     for (const std::uint32_t v : t) append(bytes, static_cast<std::int32_t>(v));
   }
   write_atomically(path, bytes);
+}
+
+void write_obj(const std::filesystem::path& path, const Mesh& mesh) {
+  SUPPLE_EXPECTS(mesh.normal.size() == mesh.vertex_count());
+  std::string text;
+  text.reserve(80 * mesh.vertex_count() + 40 * mesh.triangle_count());
+  const auto add = [&text](std::string_view head, const std::vector<Vec3>& vectors) {
+    for (const Vec3& v : vectors) {
+      text += head;
+      append_vector(text, v, " ");
+      text += '\n';
+    }
+  };
+  add("v ", mesh.position);
+  add("vn ", mesh.normal);
+  for (const auto& t : mesh.triangle) {
+    text += 'f';
+    for (const std::uint32_t v : t) {
+      const std::string number = std::to_string(v + 1);  // counted from 1
+      text.append(" ").append(number).append("//").append(number);
+    }
+    text += '\n';
+  }
+  write_atomically(path, text);
 }
 
 void write_csv(const std::filesystem::path& path, std::span<const TableColumn> columns) {

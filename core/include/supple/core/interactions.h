@@ -130,6 +130,9 @@ struct Interactions {
   [[nodiscard]] std::size_t law_count() const;
 };
 
+/// Every two particles that a bonded law ties, once: A < B, ascending. What a picture of the bonds shows.
+[[nodiscard]] std::vector<std::array<std::uint32_t, 2>> bonded_pairs(const Interactions& interactions);
+
 /// Energy [J], forces and torques of one law, for `query forces` and for audits.
 struct LawReport {
   std::string name;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace supple::render {
@@ -18,8 +19,11 @@ struct Image {
   std::vector<std::uint8_t> pixels;  ///< shape [height][width][3]
 };
 
-/// Writes a PNG (sRGB chunk, text chunks for `software`) by temporary file and rename. @throws Error{Io}
-void write_png(const std::filesystem::path& path, const Image& image);
+/// Writes a PNG (sRGB chunk, text chunks for `software` and, unless empty, `fingerprint`) by temporary file and rename.
+/// @throws Error{Io}
+void write_png(const std::filesystem::path& path, const Image& image, std::string_view fingerprint = {});
+/// The fingerprint that a PNG of ours carries; empty for any other file, or none. Reads its head only.
+[[nodiscard]] std::string png_fingerprint(const std::filesystem::path& path);
 /// Reads an 8-bit RGB or RGBA PNG (alpha dropped). @throws Error{Io}, Error{Corrupt}
 [[nodiscard]] Image read_png(const std::filesystem::path& path);
 
@@ -28,6 +32,15 @@ void write_png(const std::filesystem::path& path, const Image& image);
 /// A grid of equally sized images, `columns` a row, with `gap` pixels of white between and around.
 /// @pre !images.empty(), columns >= 1, gap >= 0
 [[nodiscard]] Image contact_sheet(std::span<const Image> images, int columns, int gap);
+
+/// How far two pictures are apart, by their 8-bit sRGB values.
+struct ImageDifference {
+  double psnr = 0.0;   ///< 10 log10(255^2 / mean squared difference) [dB]; infinite for equal pictures
+  int largest = 0;     ///< of a channel, 0 .. 255
+  Image picture;       ///< absolute difference of each channel, times a gain
+};
+/// @pre pictures of one size, gain > 0
+[[nodiscard]] ImageDifference compare(const Image& a, const Image& b, double gain);
 
 /// Encodes frames folder/stem.0001.png ... (first .. last) to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg
 /// program, into a temporary file that is renamed when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names

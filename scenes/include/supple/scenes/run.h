@@ -1,5 +1,5 @@
 /// @file supple/scenes/run.h
-/// A whole run, from scene to files: what `supple run` and `supple render` do.
+/// A whole run, from scene to files: what `supple run`, `supple render` and `supple export` do.
 #pragma once
 
 #include <atomic>
@@ -48,18 +48,29 @@ struct RunResult {
   int frames = 0;           ///< the last frame reached
   std::uint64_t state_hash = 0;
   std::filesystem::path folder;
+  int pictures_drawn = 0;
+  int pictures_kept = 0;    ///< those of `render_run` that were there already and show this scene and state
+  std::filesystem::path report; ///< result.json, render.json or export.json
   std::filesystem::path film;   ///< empty: none
   std::vector<std::string> warnings;
 };
 
 /// Simulates, surfaces, renders and films a scene into options.folder:
-/// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, grids/, contacts/, particles/ as
-/// asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
+/// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, NAME.usda, grids/, contacts/,
+/// particles/, NAME_contacts.pvd, NAME_particles.pvd as asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
 /// @throws Error{Io} when not even the folder can be made or is in use, Error{Usage}
 [[nodiscard]] RunResult run_scene(const Scene& scene, const RunOptions& options);
 
 /// Draws the frames of a finished or interrupted run again from its saved states, with the scene's camera and looks.
+/// Pictures that are there and show the same scene and state are kept, unless options.overwrite. Leaves render.json.
 [[nodiscard]] RunResult render_run(const Scene& scene, const RunOptions& options);
+
+/// NAME_sheet.png of the frames that a run has: twelve spread over all, 4 a row. @throws Error{Io} when there is none
+std::filesystem::path make_sheet(const Scene& scene, const std::filesystem::path& folder);
+
+/// Writes the files that the scene's `output` asks for, images and film left out, from the saved states of a run. Leaves
+/// export.json as its report. @throws Error{Usage} when no file is asked for
+[[nodiscard]] RunResult export_run(const Scene& scene, const RunOptions& options);
 
 /// Leaves a result.json that says why a run could not begin (a faulty scene, say). Does nothing where the folder cannot
 /// be made or holds an earlier result.

@@ -313,14 +313,17 @@ struct ObstacleDesc {
   double friction = 0.5;
 };
 
+enum class ImageName : std::uint8_t { Png, Exr };
+
 struct ImagesDesc {
   std::vector<int> size = {1280, 720};
   int samples = 4;
+  std::vector<ImageName> formats = {ImageName::Png};
 };
 
-enum class TableName : std::uint8_t { None, Csv };
-enum class MeshName : std::uint8_t { None, Ply };
-enum class GridName : std::uint8_t { None, Vdb };
+enum class TableName : std::uint8_t { Csv, Vtk };
+enum class MeshName : std::uint8_t { Ply, Obj, Usd };
+enum class GridName : std::uint8_t { Vdb };
 enum class MeshingName : std::uint8_t { Auto, Cubes, Tetrahedra, Delaunay };
 
 struct MeshingDesc {
@@ -335,10 +338,10 @@ struct MeshingDesc {
 struct OutputDesc {
   std::optional<ImagesDesc> images;
   bool film = false;                  ///< needs images
-  TableName contacts = TableName::None;
-  TableName particles = TableName::None;
-  MeshName mesh = MeshName::None;
-  GridName grid = GridName::None;
+  std::vector<TableName> contacts;    ///< formats; empty: none
+  std::vector<TableName> particles;
+  std::vector<MeshName> mesh;
+  std::vector<GridName> grid;
   MeshingDesc meshing;
   std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
 };
@@ -365,6 +368,7 @@ struct Scene {
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key
   std::uint64_t content_hash = 0;     ///< of all keys but those of looks, output and duration; not a key
+  std::uint64_t picture_hash = 0;     ///< of all keys that decide a picture of a state; not a key
 
   /// Frame n shows t = (n - 1) / frame_rate; frame 1 is the initial state.
   [[nodiscard]] int frame_count() const;

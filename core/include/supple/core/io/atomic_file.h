@@ -15,6 +15,28 @@ namespace supple::io {
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_atomically(const std::filesystem::path& path, std::string_view text);
 
+/// A file that grows piece by piece and gets its name when it is whole. What was not committed leaves nothing behind.
+class AtomicFile {
+ public:
+  /// @throws Error{Io}
+  explicit AtomicFile(std::filesystem::path path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  void append(std::span<const std::byte> bytes);  ///< @throws Error{Io}
+  void append(std::string_view text);
+  /// Fsync and rename. @throws Error{Io}; nothing is left under either name then. @pre not called before
+  void commit();
+
+ private:
+  void write(std::span<const std::byte> bytes);
+
+  std::filesystem::path path_, temporary_;
+  std::vector<std::byte> buffer_;
+  int descriptor_ = -1;
+};
+
 /// The whole file. @throws Error{Io} when it cannot be read, Error{Limit} when it is larger than `limit` bytes.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit);
 

@@ -14,13 +14,16 @@ namespace supple::io {
 /// Binary little-endian PLY with normals and every column as a float property. @throws Error{Io}
 void write_ply(const std::filesystem::path& path, const Mesh& mesh);
 
+/// Wavefront OBJ (ASCII) with normals; columns have no place in it. Numbers in single precision. @throws Error{Io}
+void write_obj(const std::filesystem::path& path, const Mesh& mesh);
+
 /// One named column of a table; all columns of a table have the same length.
 struct TableColumn {
   std::string name;               ///< with its unit, e.g. "pressure_pa"
   std::span<const double> values;
 };
 
-/// CSV with a header line; numbers print with 17 significant digits, so reading them back gives the same bits.
+/// CSV with a header line; numbers print as short as reads back as the same bits.
 /// @throws Error{Io}
 void write_csv(const std::filesystem::path& path, std::span<const TableColumn> columns);
 

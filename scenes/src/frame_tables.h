@@ -1,0 +1,15 @@
+/// Particles and contacts of one frame as points with data.
+#pragma once
+
+#include "supple/core/io/vtk_files.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+/// Every particle with object, mass, pose, motion and the loads of contact on it; a line a bond.
+[[nodiscard]] io::PointSet particle_points(Simulation& simulation);
+
+/// Every quadrature point of the contact surfaces with bodies, normal, area, pressure and the elastic force on body A.
+[[nodiscard]] io::PointSet contact_points(Simulation& simulation);
+
+}  // namespace supple::scenes

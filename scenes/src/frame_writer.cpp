@@ -1,0 +1,221 @@
+#include "frame_writer.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "frame_tables.h"
+#include "output_files.h"
+#include "program_identity.h"
+#include "supple/core/error.h"
+#include "supple/core/hash.h"
+#include "supple/core/io/atomic_file.h"
+#include "supple/core/io/mesh_files.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+template <class Format>
+bool has(const std::vector<Format>& formats, Format format) {
+  return std::find(formats.begin(), formats.end(), format) != formats.end();
+}
+
+render::ContextKind context_kind(const std::string& name) {
+  if (name == "auto") return render::ContextKind::Auto;
+  if (name == "osmesa") return render::ContextKind::OSMesa;
+  if (name == "egl") return render::ContextKind::Egl;
+  throw Error(ErrorKind::Usage, Fault{.place = "--context",
+                                      .key = {},
+                                      .expected = "expected auto, osmesa or egl",
+                                      .found = name,
+                                      .hint = {}});
+}
+
+void write_points(const fs::path& folder, const std::string& name, int frame, const std::vector<TableName>& formats,
+                  const io::PointSet& points) {
+  if (has(formats, TableName::Csv)) io::write_points_csv(folder / numbered(name, frame, ".csv"), points);
+  if (has(formats, TableName::Vtk)) io::write_vtp(folder / numbered(name, frame, ".vtp"), points);
+}
+
+}  // namespace
+
+Reporter::Reporter(const RunOptions& options, int frame_count) : options_(options), frame_count_(frame_count) {}
+
+void Reporter::operator()(const std::string& stage, int frame, double done) {
+  if (!options_.progress) return;
+  const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+  const double left = done > 0.02 ? elapsed * (1.0 - done) / done : -1.0;
+  options_.progress({stage, frame, frame_count_, elapsed, left});
+}
+
+FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOptions& options, OutputRequest outputs)
+    : scene_(scene), options_(options), outputs_(outputs), name_(scene_name(scene)) {
+  for (const auto& [wanted, part] : {std::pair{outputs.images, "frames"}, {outputs.meshes, "meshes"}, {outputs.grids, "grids"},
+                                     {outputs.contacts, "contacts"}, {outputs.particles, "particles"}}) {
+    if (wanted) io::make_writable_folder(options.folder / part);
+  }
+  for (const CameraDesc& camera : cameras_of(scene)) {
+    image_names_.push_back(camera.name.empty() ? name_ : name_ + '.' + camera.name);
+  }
+  if (outputs_.images) {
+    image_formats_ = scene.output.images ? scene.output.images->formats : ImagesDesc{}.formats;
+    pictures_ = std::make_unique<ScenePictures>(scene, model, context_kind(options.context));
+  }
+  if (!outputs_.meshes || !has(scene.output.mesh, MeshName::Usd)) return;
+  std::vector<io::UsdObject> objects;
+  for (const ObjectDesc& o : scene.objects) objects.push_back({o.name, o.colour, o.roughness});
+  for (const ObstacleDesc& o : scene.obstacles) objects.push_back({o.name, o.colour, o.roughness});
+  animation_ = std::make_unique<io::UsdAnimation>(options.folder / (name_ + ".usda"), scene.frame_rate, objects);
+  obstacles_ = obstacle_meshes(scene, model);
+}
+
+void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
+  const int frame = simulation.frame();
+  if (!wanted(frame)) return;
+  const std::vector<Mesh>* meshes = nullptr;
+  if (outputs_.images || outputs_.meshes) {
+    report("surface", frame, done);
+    meshes = &simulation.meshes();
+  }
+  if (outputs_.images) draw(simulation, report, done);
+  const StageClock clock(simulation.profile(Stage::Export));
+  if (outputs_.meshes) write_meshes(simulation, *meshes);
+  if (animation_) add_to_animation(simulation, *meshes);
+  if (outputs_.grids) write_grid_file(options_.folder, name_, frame, simulation);
+  write_tables(simulation);
+}
+
+std::string FrameWriter::fingerprint(std::uint64_t state_hash) const {
+  Hasher hasher;
+  hasher.add(std::string_view(program_identity()));
+  hasher.add(scene_.picture_hash);
+  hasher.add(state_hash);
+  hasher.add(std::string_view(options_.context));
+  return to_hex(hasher.value());
+}
+
+fs::path FrameWriter::picture_path(std::size_t camera, int frame, ImageName format) const {
+  return frame_path(options_.folder, image_names_[camera], frame).replace_extension(format == ImageName::Png ? ".png" : ".exr");
+}
+
+bool FrameWriter::pictures_are_current(int frame, std::uint64_t state_hash) const {
+  const std::string wanted = fingerprint(state_hash);
+  for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
+    for (const ImageName format : image_formats_) {
+      const fs::path path = picture_path(camera, frame, format);
+      if (wanted != (format == ImageName::Png ? render::png_fingerprint(path) : render::exr_fingerprint(path))) return false;
+    }
+  }
+  return true;
+}
+
+bool FrameWriter::renews(int frame, std::uint64_t state_hash) const {
+  return wanted(frame) && (animation_ || (outputs_.images && !pictures_are_current(frame, state_hash)));
+}
+
+void FrameWriter::renew(Simulation& simulation, Reporter& report, double done) {
+  const int frame = simulation.frame();
+  report("surface", frame, done);
+  const std::vector<Mesh>& meshes = simulation.meshes();
+  if (outputs_.images && !pictures_are_current(frame, simulation.state_hash())) draw(simulation, report, done);
+  const StageClock clock(simulation.profile(Stage::Export));
+  if (animation_) add_to_animation(simulation, meshes);
+}
+
+void FrameWriter::draw(Simulation& simulation, Reporter& report, double done) {
+  const int frame = simulation.frame();
+  const std::string mark = fingerprint(simulation.state_hash());
+  report("render", frame, done);
+  for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
+    render::Image image;
+    render::Layers layers;
+    {
+      const StageClock clock(simulation.profile(Stage::Render));
+      image = pictures_->draw(simulation, camera);
+      if (has(image_formats_, ImageName::Exr)) layers = pictures_->layers();
+    }
+    const StageClock clock(simulation.profile(Stage::Export));
+    if (has(image_formats_, ImageName::Png)) render::write_png(picture_path(camera, frame, ImageName::Png), image, mark);
+    if (has(image_formats_, ImageName::Exr)) {
+      render::write_exr(picture_path(camera, frame, ImageName::Exr), image, layers, pictures_->item_names(), mark);
+    }
+  }
+  ++pictures_drawn_;
+}
+
+void FrameWriter::write_meshes(const Simulation& simulation, const std::vector<Mesh>& meshes) {
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    if (meshes[i].position.empty()) continue;
+    const std::string stem = name_ + "." + simulation.model().objects[i].name;
+    const auto path = [&](const char* extension) {
+      return options_.folder / "meshes" / numbered(stem, simulation.frame(), extension);
+    };
+    if (has(scene_.output.mesh, MeshName::Ply)) io::write_ply(path(".ply"), meshes[i]);
+    if (has(scene_.output.mesh, MeshName::Obj)) io::write_obj(path(".obj"), meshes[i]);
+  }
+}
+
+void FrameWriter::add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes) {
+  std::vector<const Mesh*> all;
+  for (const Mesh& mesh : meshes) all.push_back(&mesh);
+  for (const Mesh& mesh : obstacles_) all.push_back(&mesh);
+  const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
+  std::vector<io::UsdCamera> cameras;
+  for (const CameraDesc& desc : cameras_of(scene_)) {
+    const render::Camera at = camera_at(desc, simulation.time(), scene_.duration);
+    cameras.push_back({desc.name.empty() ? "camera" : desc.name, at.from, at.look_at, at.up, at.field_of_view,
+                       static_cast<double>(size.at(0)) / size.at(1)});
+  }
+  animation_->add_frame(simulation.frame(), all, cameras);
+}
+
+void FrameWriter::write_tables(Simulation& simulation) {
+  const int frame = simulation.frame();
+  const OutputDesc& output = scene_.output;
+  if (outputs_.contacts) write_points(options_.folder / "contacts", name_, frame, output.contacts, contact_points(simulation));
+  if (outputs_.particles) {
+    write_points(options_.folder / "particles", name_, frame, output.particles, particle_points(simulation));
+  }
+}
+
+void FrameWriter::write_time_list(const char* part, int last) {
+  std::vector<io::TimedFile> files;
+  for (int frame = 1; frame <= last; ++frame) {
+    const fs::path file = fs::path(part) / numbered(name_, frame, ".vtp");
+    if (fs::exists(options_.folder / file)) files.push_back({(frame - 1) / scene_.frame_rate, file});
+  }
+  io::write_pvd(options_.folder / (name_ + '_' + part + ".pvd"), files);
+}
+
+fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last) {
+  const StageClock clock(simulation.profile(Stage::Export));
+  if (animation_) {
+    report("usd", last, 0.99);
+    animation_->finish();
+  }
+  if (outputs_.particles && has(scene_.output.particles, TableName::Vtk)) write_time_list("particles", last);
+  if (outputs_.contacts && has(scene_.output.contacts, TableName::Vtk)) write_time_list("contacts", last);
+  if (!outputs_.images) return {};
+  report("film", last, 0.99);
+  fs::path first_film;
+  for (const std::string& name : image_names_) {
+    write_contact_sheet(options_.folder, name, last);
+    const fs::path film = outputs_.film ? make_film(name, last) : fs::path();
+    if (first_film.empty()) first_film = film;
+  }
+  return first_film;
+}
+
+/// Of one camera, if all its frames are there.
+fs::path FrameWriter::make_film(const std::string& name, int last) const {
+  for (int frame = 1; frame <= last; ++frame) {
+    if (!fs::exists(frame_path(options_.folder, name, frame))) return {};
+  }
+  const fs::path film = options_.folder / (name + ".mp4");
+  render::encode_film(options_.folder / "frames", name, 1, last, scene_.frame_rate, film);
+  return film;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,69 @@
+/// What a run leaves behind, frame by frame.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "picture.h"
+#include "supple/core/io/usd_file.h"
+#include "supple/scenes/run.h"
+
+namespace supple::scenes {
+
+/// Tells RunOptions::progress where a run is.
+class Reporter {
+ public:
+  Reporter(const RunOptions& options, int frame_count);
+  void operator()(const std::string& stage, int frame, double done);
+
+ private:
+  const RunOptions& options_;
+  int frame_count_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+class FrameWriter {
+ public:
+  /// Makes the folders. @throws Error{Io}
+  FrameWriter(const Scene& scene, const Model& model, const RunOptions& options, OutputRequest outputs);
+
+  /// Everything asked for of the present frame.
+  void write(Simulation& simulation, Reporter& report, double done);
+  /// Films, contact sheets and lists over all frames 1 .. last that are there. Returns the film, if there is one.
+  std::filesystem::path finish(Simulation& simulation, Reporter& report, int last);
+
+  /// Whether a frame that was written before must be seen again: for a file over all frames, or because its picture is
+  /// absent or one of another scene or state.
+  [[nodiscard]] bool renews(int frame, std::uint64_t state_hash) const;
+  /// Writes again what `renews` found.
+  void renew(Simulation& simulation, Reporter& report, double done);
+  [[nodiscard]] int pictures_drawn() const { return pictures_drawn_; }
+
+ private:
+  [[nodiscard]] bool wanted(int frame) const { return options_.frames.empty() || options_.frames.contains(frame); }
+  [[nodiscard]] std::filesystem::path picture_path(std::size_t camera, int frame, ImageName format) const;
+  [[nodiscard]] std::string fingerprint(std::uint64_t state_hash) const;
+  [[nodiscard]] bool pictures_are_current(int frame, std::uint64_t state_hash) const;
+  void draw(Simulation& simulation, Reporter& report, double done);
+  void write_meshes(const Simulation& simulation, const std::vector<Mesh>& meshes);
+  void write_tables(Simulation& simulation);
+  void add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes);
+  std::filesystem::path make_film(const std::string& name, int last) const;
+  void write_time_list(const char* part, int last);
+
+  const Scene& scene_;
+  const RunOptions& options_;
+  OutputRequest outputs_;
+  std::string name_;
+  std::vector<std::string> image_names_;  // one a camera
+  std::vector<ImageName> image_formats_;
+  std::unique_ptr<ScenePictures> pictures_;
+  std::unique_ptr<io::UsdAnimation> animation_;
+  std::vector<Mesh> obstacles_;  // of the animation
+  int pictures_drawn_ = 0;
+};
+
+}  // namespace supple::scenes

@@ -1,0 +1,11 @@
+/// Which build of the program runs: files of another build may differ in a bit.
+#pragma once
+
+#include <string>
+
+namespace supple::scenes {
+
+/// The build id that the linker put into the program; its version where there is none.
+[[nodiscard]] std::string program_identity();
+
+}  // namespace supple::scenes
