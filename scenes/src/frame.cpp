@@ -1,13 +1,12 @@
 #include "frame.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <functional>
 #include <limits>
 
 #include "look_columns.h"
 #include "supple/collision/deformed_field.h"
+#include "supple/core/cpu_time.h"
 #include "supple/core/parts.h"
 #include "supple/implicit/mesh_motion.h"
 #include "supple/implicit/polygonise.h"
@@ -16,12 +15,6 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kTimedEvery = 64;
-
-double process_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 Box box_of(const implicit::PlacedSkeleton& placed) {
   Box box;

@@ -1,11 +1,10 @@
 #include "output_files.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "supple/core/cpu_time.h"
 #include "supple/implicit/surface_grid.h"
 
 namespace supple::scenes {
@@ -17,12 +16,6 @@ constexpr int kSheetColumns = 4;
 constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
 constexpr int kSheetGap = 4;
-
-double process_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 }  // namespace
 

@@ -1,12 +1,11 @@
 #include "supple/scenes/query.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "supple/collision/approach.h"
+#include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -20,12 +19,6 @@ using nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-
-double thread_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 std::string body_name(const Simulation& simulation, std::uint32_t body) {
   return body_name(simulation.model(), simulation.bodies(), body);
@@ -73,9 +66,9 @@ std::string query_forces(Simulation& simulation) {
 }
 
 std::string query_contact(Simulation& simulation, bool samples) {
-  const double begin = thread_cpu_seconds();
+  const double begin = process_cpu_seconds();
   const collision::ContactSurface& surface = simulation.contacts();
-  const double cpu_us = 1e6 * (thread_cpu_seconds() - begin);
+  const double cpu_us = 1e6 * (process_cpu_seconds() - begin);
   const auto capacity = [bodies = simulation.contact_bodies()](const collision::ContactSurface::Summary& s) {
     return collision::contact_capacity(bodies[s.bodies.a], bodies[s.bodies.b], -s.force.normalized());
   };
@@ -144,9 +137,9 @@ std::string query_field(Simulation& simulation, const fs::path& points) {
 std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   if (query.cells > 0) simulation.set_cells(query.cells);
   const Model& model = simulation.model();
-  const double begin = thread_cpu_seconds();
+  const double begin = process_cpu_seconds();
   const std::vector<Mesh>& meshes = simulation.meshes();
-  const double cpu_ms = 1e3 * (thread_cpu_seconds() - begin);
+  const double cpu_ms = 1e3 * (process_cpu_seconds() - begin);
   ordered_json json;
   json["cell_m"] = simulation.cell();
   json["cpu_ms"] = cpu_ms;
