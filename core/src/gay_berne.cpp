@@ -4,25 +4,13 @@
 #include <cmath>
 #include <functional>
 
+#include "gay_berne_kernel.h"
 #include "packed_list.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 
 namespace supple::core {
 namespace {
-
-Vec3 squares(const GayBerne& law) { return law.radii.cwiseAbs2(); }
-
-Vec3 softness(const GayBerne& law) {
-  Vec3 out;
-  for (int k = 0; k < 3; ++k) out[k] = math::pow(law.well[k], -1.0 / law.mu);
-  return out;
-}
-
-double volume(const GayBerne& law) {
-  const double ab = law.radii[0] * law.radii[1];
-  return (ab + law.radii[2] * law.radii[2]) * std::sqrt(ab);
-}
 
 Mat3 turned(const Mat3& q, const Vec3& diagonal) { return q * diagonal.asDiagonal() * q.transpose(); }
 
@@ -48,8 +36,8 @@ void require(const GayBerne& law) {
 PairLoad evaluate(const GayBerne& law, const PairPose& pose) {
   require(law);
   const Mat3 q_a = pose.orientation_a.toRotationMatrix(), q_b = pose.orientation_b.toRotationMatrix();
-  const Mat3 g_a = turned(q_a, squares(law)), g_b = turned(q_b, squares(law));
-  const Mat3 b_a = turned(q_a, softness(law)), b_b = turned(q_b, softness(law));
+  const Mat3 g_a = turned(q_a, squared_radii(law)), g_b = turned(q_b, squared_radii(law));
+  const Mat3 b_a = turned(q_a, softness_of(law)), b_b = turned(q_b, softness_of(law));
   const Mat3 g = g_a + g_b;
   const Mat3 g_inverse = g.inverse(), b_inverse = (b_a + b_b).inverse();
   const double d = pose.r.norm();
@@ -61,7 +49,7 @@ PairLoad evaluate(const GayBerne& law, const PairPose& pose) {
   const double rho6 = whole_power(rho, 6);
   const double radial = 4.0 * law.epsilon * (rho6 * rho6 - rho6);
   const double slope = 4.0 * law.epsilon * (6.0 * rho6 - 12.0 * rho6 * rho6) * rho / law.sigma;
-  const double eta = whole_power(std::sqrt(2.0 * volume(law) * volume(law) / g.determinant()), law.upsilon);
+  const double eta = whole_power(std::sqrt(2.0 * size_of(law) * size_of(law) / g.determinant()), law.upsilon);
   const double chi = whole_power(2.0 * u.dot(iota), law.mu);
   const double energy = radial * eta * chi;
 
@@ -78,6 +66,49 @@ PairLoad evaluate(const GayBerne& law, const PairPose& pose) {
           .force_b = -(eta * chi * slope * u + along - along.dot(u) * u),
           .torque_a = torque(g_a, b_a),
           .torque_b = torque(g_b, b_b)};
+}
+
+PairLoad evaluate(const SwitchedGayBerne& law, const PairPose& pose) {
+  const double d = pose.r.norm();
+  if (d >= law.cut_off) {
+    return {.energy = 0.0, .force_b = Vec3::Zero(), .torque_a = Vec3::Zero(), .torque_b = Vec3::Zero()};
+  }
+  PairLoad load = evaluate(law.ellipsoid, pose);
+  if (d <= law.switch_from) return load;
+  const double width = law.cut_off - law.switch_from;
+  const double t = (d - law.switch_from) / width;
+  const double share = 1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t));
+  const double slope = -30.0 * t * t * (1.0 - t) * (1.0 - t) / width;
+  load.force_b = share * load.force_b - load.energy * slope / d * pose.r;
+  load.torque_a *= share;
+  load.torque_b *= share;
+  load.energy *= share;
+  return load;
+}
+
+Stiffness stiffness(const SwitchedGayBerne& law) {
+  const GayBerne& e = law.ellipsoid;
+  require(e);
+  // The gap s = d - sigma_12 + gamma sigma is 2^(1/6) sigma at rest; at 0.9 of that
+  const double s = 0.9 * 1.122462048309373 * e.sigma;
+  const double rho6 = whole_power(e.sigma / s, 6);
+  const double bend = 4.0 * e.epsilon * (156.0 * rho6 - 42.0) * rho6 / (s * s);
+  const double slope = std::abs(4.0 * e.epsilon * (6.0 - 12.0 * rho6) * rho6 / s);
+  // det(G_A + G_B) is least where both are parallel, B at its softest.
+  const double eta = whole_power(size_of(e) / (2.0 * e.radii.prod()), e.upsilon);
+  const double deepest = eta * e.well.maxCoeff();
+  // What sigma_12 changes by with direction, over d (Kantorovich), and by turning one particle.
+  const double ratio = e.radii.maxCoeff() / e.radii.minCoeff();
+  const double lean = 0.5 * (ratio - 1.0 / ratio);
+  const double lever = 0.5 * e.radii.maxCoeff() * (ratio * ratio - 1.0);
+  // How fast the depths of the wells change with direction.
+  const double contrast = e.mu * (math::pow(e.well.maxCoeff() / e.well.minCoeff(), 1.0 / e.mu) - 1.0) +
+                          e.upsilon * (ratio * ratio - 1.0);
+  const double least = e.radii.minCoeff();
+  const double turning = slope * lever + e.epsilon * contrast;
+  return {.translation = deepest * (bend * (1.0 + lean * lean) + (slope * (1.0 + lean) + e.epsilon * contrast / least) *
+                                                                    (1.0 + lean) / least),
+          .rotation = deepest * (bend * lever * lever + (1.0 + contrast) * turning)};
 }
 
 void NeighbourList::Impl::stage_ellipsoids(const Vec3& radii2, const Vec3& softness,
@@ -105,8 +136,8 @@ void accumulate_geometric(NeighbourList& list, const GayBerne& law, std::span<co
   NeighbourList::Impl& impl = list.impl();
   const std::size_t n = impl.reference.size();
   SUPPLE_EXPECTS(orientations.size() == n && loads.force.size() == n && loads.torque.size() == n);
-  impl.stage_ellipsoids(squares(law), softness(law), orientations, executor);
-  const double volume2 = 2.0 * volume(law) * volume(law);
+  impl.stage_ellipsoids(squared_radii(law), softness_of(law), orientations, executor);
+  const double volume2 = 2.0 * size_of(law) * size_of(law);
   const packed::GayBerneNumbers numbers{.range2 = impl.range * impl.range,
                                         .epsilon4 = 4.0 * law.epsilon,
                                         .slope = 24.0 * law.epsilon / law.sigma,

@@ -36,9 +36,12 @@ double zero_energy(const BondedLaw<Law>&) {
 }
 template <class Law>
 double zero_energy(const GeometricLaw<Law>& list) {
-  return list.law.energy(list.range);
+  if constexpr (requires { list.law.energy(list.range); }) {
+    return list.law.energy(list.range);
+  } else {
+    return 0.0;
+  }
 }
-double zero_energy(const GeometricLaw<Repulsion>&) { return 0.0; }
 
 /// Calls visit(list) for every list of pairs of a scene, in one order.
 template <class Visit>
@@ -142,7 +145,7 @@ double largest_frequency(const ParticleSet& set, const ParticleState& rest, cons
   // Objects that only meet later have no pair at rest: one pair each is counted.
   for_each_geometric(interactions, [&](const auto& lists) {
     for (const auto& list : lists) {
-      const Stiffness k = stiffness(list.law);
+      const Stiffness k = pair_stiffness(list.law, list.range);
       for (std::uint32_t i = 0; i < set.size(); ++i) {
         if (set.object[i] == list.object_a || set.object[i] == list.object_b) add(k, i);
       }

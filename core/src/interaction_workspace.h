@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bond_runs.h"
+#include "gay_berne_kernel.h"
 #include "neighbour_grid.h"
 #include "pair_kernels.h"
 #include "supple/core/interactions.h"
@@ -83,6 +84,8 @@ struct InteractionWorkspace::Impl {
       bonded;
   std::tuple<std::vector<PackedGeometric<Cohesion>>, std::vector<PackedGeometric<LinearCohesion>>,
              std::vector<PackedGeometric<TabulatedCohesion>>, std::vector<PackedGeometric<LennardJones>>,
+             std::vector<PackedGeometric<SwitchedGayBerne>>, std::vector<PackedGeometric<Coplanarity>>,
+             std::vector<PackedGeometric<CoNormality>>, std::vector<PackedGeometric<CoCircularity>>,
              std::vector<PackedGeometric<Repulsion>>>
       geometric;
 

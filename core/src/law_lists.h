@@ -20,6 +20,10 @@ void for_each_geometric(All& laws, const Visit& visit) {
   visit(laws.geometric_linear_cohesion);
   visit(laws.geometric_tabulated_cohesion);
   visit(laws.geometric_lennard_jones);
+  visit(laws.gay_berne);
+  visit(laws.geometric_coplanarity);
+  visit(laws.geometric_co_normality);
+  visit(laws.geometric_co_circularity);
   visit(laws.repulsion);
 }
 

@@ -7,17 +7,14 @@
 #include <utility>
 
 #include "cross_matrix.h"
+#include "relative_hessian.h"
 #include "supple/core/math.h"
 
 namespace supple::core {
 namespace {
 
-using Vec9 = Eigen::Matrix<double, 9, 1>;
-using Mat9 = Eigen::Matrix<double, 9, 9>;
-
-/// Places in q and in y.
+/// Places in q.
 enum : int { kXA = 0, kThetaA = 3, kXB = 6, kThetaB = 9 };
-enum : int { kR = 0, kTurnA = 3, kTurnB = 6 };
 
 /// A vector in y.
 Vec9 stacked(const Vec3& r, const Vec3& turn_a, const Vec3& turn_b) {
@@ -71,7 +68,8 @@ PairHessian central_hessian(double first, double second, const PairPose& pose, H
   return h;
 }
 
-/// From second derivatives in y.
+}  // namespace
+
 PairHessian from_relative(const Mat9& second) {
   PairHessian h = PairHessian::Zero();
   add_relative(h, second.block<3, 3>(kR, kR));
@@ -84,6 +82,8 @@ PairHessian from_relative(const Mat9& second) {
   mirror(h);
   return h;
 }
+
+namespace {
 
 /// Terms e_1 ... of an energy k psi(d) sum e^2, with their derivatives in y.
 template <int count>

@@ -19,6 +19,7 @@
 #include "fields_looks.h"
 #include "fields_rules.h"
 #include "read_scene_faults.h"
+#include "supple/core/gay_berne.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/implicit/kernel.h"
 
@@ -149,6 +150,21 @@ void check_lennard_jones(Archive& archive, const InteractionDesc& d) {
   archive.check(!d.geometric || d.cut_off, "cut_off", "expected a cut-off for a geometric law", "none", "");
 }
 
+/// What the keys of the Gay-Berne law must say together.
+template <class Archive>
+void check_gay_berne(Archive& archive, const InteractionDesc& d) {
+  archive.check(d.depth.has_value(), "depth", "expected an energy > 0 [J]", "nothing", "this key is required");
+  archive.check(d.geometric, "geometric", "expected true for gay_berne", "false",
+                "it acts between all ellipsoids in range; for bonds there is directed_cohesion");
+  archive.check(d.cut_off.has_value(), "cut_off", "expected a cut-off for a geometric law", "none", "");
+  if (!d.cut_off) return;
+  const double length = 2.0 * d.semi_axes.maxCoeff();
+  archive.check(*d.cut_off > length, "cut_off", "expected more than the longest ellipsoid, " + number_text(length) + " [m]",
+                number_text(*d.cut_off), "");
+  archive.check(!d.switch_from || *d.switch_from < *d.cut_off, "switch_from",
+                "expected less than cut_off = " + number_text(*d.cut_off) + " [m]", number_text(d.switch_from.value_or(0.0)), "");
+}
+
 template <class Archive>
 void fields(Archive& archive, InteractionDesc& d) {
   using enum LawKind;
@@ -157,8 +173,8 @@ void fields(Archive& archive, InteractionDesc& d) {
   archive("neighbours", d.neighbours, between(1.0, 1000.0, kNumber), "bonds join particles up to this many apart in their order");
   archive("within", d.within, above(0.0, kLength),
           "instead: bonds join particles nearer than this at rest; with geometric: the range of the law");
-  archive("geometric", d.geometric, only({}, {Cohesion, LinearCohesion, LennardJones}),
-          "instead of bonds: all pairs of the object in range, found anew each step");
+  archive("geometric", d.geometric, only({}, {Cohesion, LinearCohesion, LennardJones, GayBerne, Coplanarity, CoNormality, CoCircularity}),
+          "instead of bonds: all pairs of the object in range, found anew each step; gay_berne has no bonds");
   archive("normalised", d.normalised, only({}, {Coplanarity, CoCircularity}),
           "weight psi / d^2 instead of psi, so that scale does not matter; strength is then in J");
   archive("paper_literal", d.paper_literal, only({}, {FormRadius}),
@@ -186,28 +202,45 @@ void fields(Archive& archive, InteractionDesc& d) {
           "force from a table with at most this error over F_max; absent: no table");
   archive("shape", d.shape, only(above(0.0, kNumber), {LinearCohesion, DirectedCohesion}), "a, how fast the force falls off");
   archive("eta", d.eta, only(at_least(0.0, kNumber), {LinearCohesion}), "stiffness at rest over F0 / r0");
-  archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {DirectedCohesion}),
+  archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {DirectedCohesion, GayBerne}),
                    "of each particle's ellipsoid, along its own x, y, z; bonded particles rest where theirs touch");
-  archive("depth", d.depth, only(above(0.0, kEnergy), {LennardJones}), "binding energy");
+  archive("depth", d.depth, only(above(0.0, kEnergy), {LennardJones, GayBerne}), "binding energy; of gay_berne epsilon");
+  archive("sigma", d.sigma, only(above(0.0, kLength), {GayBerne}),
+          "over which the force between surfaces falls off; absent: twice the smallest semi-axis");
+  archive("gamma", d.gamma, only(above(0.0, kNumber), {GayBerne}), "shift of the distance between surfaces, over sigma");
+  archive("wells", d.wells, only(above(0.0, kNumber), {GayBerne}), "depth for approach along the own x, y, z, over depth");
+  archive("upsilon", d.upsilon, only(between(0.0, core::SwitchedGayBerne::kLargestExponent, kNumber), {GayBerne}),
+          "exponent of the shapes' strength");
+  archive("mu", d.mu, only(between(1.0, core::SwitchedGayBerne::kLargestExponent, kNumber), {GayBerne}),
+          "exponent of the wells' strength");
   archive("repulsive", d.repulsive, only(between(2.0, core::LennardJones::kLargestExponent, kNumber), {LennardJones}),
           "n of (r0/d)^n");
   archive("attractive", d.attractive, only(between(1.0, core::LennardJones::kLargestExponent - 1, kNumber), {LennardJones}),
           "m of (r0/d)^m");
-  archive("cut_off", d.cut_off, only(above(0.0, kLength), {LennardJones}), "where force and energy become 0; absent: nowhere");
-  archive("switch_from", d.switch_from, only(above(0.0, kLength), {LennardJones}),
-          "where the potential begins to be switched off; absent: the force is shifted");
+  archive("cut_off", d.cut_off, only(above(0.0, kLength), {LennardJones, GayBerne}),
+          "where force and energy become 0; absent: nowhere");
+  archive("switch_from", d.switch_from, only(above(0.0, kLength), {LennardJones, GayBerne}),
+          "where the potential begins to be switched off; absent: the force is shifted; of gay_berne 0.9 cut_off");
   archive("range", d.range,
           only(above(0.0, kLength), {Form, FormRadius, DirectedForm, Coplanarity, CoNormality, CoCircularity}),
           "h of the weight (1 - d^2/h^2)^3; absent: weight 1");
   archive.check(!(archive.given("neighbours") && d.within), "within", "expected either neighbours or within", "both", "");
   archive.check(!(archive.given("neighbours") && d.geometric), "neighbours", "expected either neighbours or geometric", "both", "");
-  archive.check(!d.geometric || d.rest_distance, "rest_distance", "expected a length > 0 [m] for a geometric law", "nothing", "");
+  const bool by_range = d.law == Coplanarity || d.law == CoNormality || d.law == CoCircularity;
+  archive.check(!d.geometric || d.rest_distance || by_range || d.law == GayBerne, "rest_distance",
+                "expected a length > 0 [m] for a geometric law", "nothing", "");
+  archive.check(!d.geometric || d.range || !by_range, "range", "expected a length > 0 [m] for a geometric law", "nothing", "");
+  archive.check(!(d.geometric && d.normalised), "normalised", "expected either normalised or geometric", "both",
+                "psi / d^2 grows without bound where two particles meet");
   if (d.law == Cohesion) check_cohesion(archive, d);
   if (d.law == LennardJones) check_lennard_jones(archive, d);
+  if (d.law == GayBerne) check_gay_berne(archive, d);
   if (d.law == LinearCohesion || d.law == DirectedCohesion) {
     archive.check(d.scale_force.has_value(), "scale_force", "expected a force > 0 [N]", "nothing", "this key is required");
   }
-  archive.check(!(d.geometric && d.law == LennardJones && d.within), "within", "expected cut_off alone for the range", "both", "");
+  archive.check(!(d.geometric && (d.law == LennardJones || d.law == GayBerne) && d.within), "within",
+                "expected cut_off alone for the range", "both", "");
+  archive.check(!(d.geometric && by_range && d.within), "within", "expected range alone for a geometric law", "both", "");
 }
 
 template <class Archive>

@@ -36,9 +36,9 @@ template <> struct EnumNames<NormalKind> {
   static constexpr std::array<std::string_view, 2> names{"axis", "radial"};
 };
 template <> struct EnumNames<LawKind> {
-  static constexpr std::array<std::string_view, 12> names{
-      "cohesion",   "linear_cohesion", "directed_cohesion", "lennard_jones", "form",          "form_radius", "directed_form",
-      "bond_frame", "coplanarity",     "co_normality",      "co_circularity", "friction"};
+  static constexpr std::array<std::string_view, 13> names{
+      "cohesion",    "linear_cohesion", "directed_cohesion", "lennard_jones", "gay_berne",      "form", "form_radius",
+      "directed_form", "bond_frame",    "coplanarity",       "co_normality",  "co_circularity", "friction"};
 };
 template <> struct EnumNames<ShapeName> {
   static constexpr std::array<std::string_view, 14> names{"point",     "segment",  "square",  "rectangle", "disc",

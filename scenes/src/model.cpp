@@ -380,6 +380,7 @@ class LawBuilder {
       case LawKind::LennardJones:
         fill(laws.lennard_jones, d, bonds, [&](const core::PairPose& rest) { return lennard_jones(d, rest.r.norm()); });
         break;
+      case LawKind::GayBerne: break;  // geometric only
       case LawKind::Form:
         fill(laws.form, d, bonds, [&](const core::PairPose& rest) {
           return core::Form{d.strength, core::Form::fit_curvature(rest.r, rest.normal_a, rest.normal_b), weight};
@@ -431,7 +432,17 @@ class LawBuilder {
     };
     core::Interactions& laws = model_.interactions;
     const double r0 = d.rest_distance.value_or(0.0);
-    if (d.law == LawKind::LennardJones) {
+    const core::Weight weight{.range = d.range.value_or(0.0)};
+    if (d.law == LawKind::GayBerne) {
+      const core::SwitchedGayBerne law = gay_berne(d);
+      add_list(laws.gay_berne, law.cut_off, law);
+    } else if (d.law == LawKind::Coplanarity) {
+      add_list(laws.geometric_coplanarity, weight.range, core::Coplanarity{d.strength, weight});
+    } else if (d.law == LawKind::CoNormality) {
+      add_list(laws.geometric_co_normality, weight.range, core::CoNormality{d.strength, weight});
+    } else if (d.law == LawKind::CoCircularity) {
+      add_list(laws.geometric_co_circularity, weight.range, core::CoCircularity{d.strength, weight});
+    } else if (d.law == LawKind::LennardJones) {
       add_list(laws.geometric_lennard_jones, d.cut_off.value_or(0.0), lennard_jones(d, r0));
     } else if (d.law == LawKind::LinearCohesion) {
       const core::LinearCohesion law = linear_cohesion(d, r0);
@@ -460,6 +471,19 @@ class LawBuilder {
             .attractive = d.attractive,
             .cut_off = d.cut_off.value_or(0.0),
             .switch_from = d.switch_from.value_or(0.0)};
+  }
+
+  static core::SwitchedGayBerne gay_berne(const InteractionDesc& d) {
+    const double cut_off = d.cut_off.value_or(0.0);
+    return {.ellipsoid = {.epsilon = d.depth.value_or(0.0),
+                          .sigma = d.sigma.value_or(2.0 * d.semi_axes.minCoeff()),
+                          .gamma = d.gamma,
+                          .radii = d.semi_axes,
+                          .well = d.wells,
+                          .upsilon = d.upsilon,
+                          .mu = d.mu},
+            .switch_from = d.switch_from.value_or(kGayBerneSwitch * cut_off),
+            .cut_off = cut_off};
   }
 
   /// The table of the law's shape: one for all bonds of that shape.
@@ -570,6 +594,7 @@ class LawBuilder {
                      "use 'law: form', which knows flat shapes");
   }
 
+  static constexpr double kGayBerneSwitch = 0.9;  // of the cut-off
   /// |f| at the range of a geometric cohesion over the largest attraction.
   static constexpr double kGeometricTail = 1e-3;
 

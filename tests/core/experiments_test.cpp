@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "core/support.h"
 #include "supple/core/integrators.h"
@@ -65,6 +67,42 @@ TEST(Cantilever, BendsLikeTheBeamThatFormIsEquivalentTo) {
   }
   for (std::size_t k = 0; k + 1 < error.size(); ++k) EXPECT_NEAR(std::log2(error[k] / error[k + 1]), 2.0, 0.1) << k;
   EXPECT_LT(error.back(), 2e-3);
+}
+
+/// Energy over area of form between a particle and its six neighbours in a hexagonal sheet of spacing L, bent from flat
+/// to z = -(k_1 x^2 + k_2 y^2) / 2; the lattice is turned by `angle`.
+double bending_energy_density(double strength, double spacing, double k_1, double k_2, double angle) {
+  const auto pose = [&](double x, double y) {
+    return std::pair(Vec3(x, y, -0.5 * (k_1 * x * x + k_2 * y * y)), Vec3(k_1 * x, k_2 * y, 1.0).normalized());
+  };
+  const Form form{.strength = strength, .curvature = 0.0, .weight = {}};
+  double energy = 0.0;
+  for (int k = 0; k < 6; ++k) {
+    const double direction = angle + k * std::numbers::pi / 3.0;
+    const auto [x, n] = pose(spacing * std::cos(direction), spacing * std::sin(direction));
+    energy += 0.5 * evaluate(form, PairPose{.r = x, .normal_a = Vec3::UnitZ(), .normal_b = n}).energy;  // half is its own
+  }
+  return energy / (0.5 * std::sqrt(3.0) * spacing * spacing);
+}
+
+TEST(Sheet, BendsLikeThePlateThatFormIsEquivalentTo) {
+  // Kirchhoff's plate with D = 2 sqrt(3) k / L^2 and no Poisson effect, D (k_1^2 + k_2^2) / 2, in every direction.
+  constexpr double kStrength = 0.7;
+  for (const auto& [k_1, k_2] : {std::pair{1.0, 0.0}, std::pair{1.0, 1.0}, std::pair{1.0, -1.0}, std::pair{0.4, -0.9}}) {
+    for (const double angle : {0.0, 0.2, 0.5}) {
+      std::array<double, 4> error{};
+      for (std::size_t n = 0; n < error.size(); ++n) {
+        const double spacing = 0.2 / static_cast<double>(1 << n);
+        const double plate = std::sqrt(3.0) * kStrength / (spacing * spacing) * (k_1 * k_1 + k_2 * k_2);
+        error[n] = std::abs(bending_energy_density(kStrength, spacing, k_1, k_2, angle) / plate - 1.0);
+      }
+      // The slopes differ from the arcs by a quarter of (L k)^2 or so.
+      EXPECT_LT(error.back(), 1e-3) << k_1 << ' ' << k_2 << ' ' << angle;
+      for (std::size_t n = 0; n + 1 < error.size(); ++n) {
+        EXPECT_NEAR(std::log2(error[n] / error[n + 1]), 2.0, 0.1) << k_1 << ' ' << k_2 << ' ' << angle;
+      }
+    }
+  }
 }
 
 TEST(FreeSpiral, KeepsItsEnergyOverAMillionSteps) {

@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "core/two_bodies.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/core/interactions.h"
+#include "supple/core/pair_hessian.h"
 #include "support/allocations.h"
 
 namespace supple::core {
@@ -207,6 +210,138 @@ TEST(GayBerneLaw, RefusesSizesThatAreNotPositive) {
   law = kEllipsoids;
   law.mu = 0;
   EXPECT_THROW(static_cast<void>(evaluate(law, PairPose{.r = Vec3::UnitX()})), ContractViolation);
+}
+
+const SwitchedGayBerne kSwitched{.ellipsoid = kEllipsoids, .switch_from = 2.0, .cut_off = 2.8};
+
+TEST(SwitchedGayBerneLaw, HasForceAndTorqueOfItsEnergyAndGivesNoMoment) {
+  Draw draw(331);
+  for (int n = 0; n < 40; ++n) {
+    const TwoBodies bodies = apart(draw);
+    test::expect_gradient(kSwitched, bodies, "switched");
+    test::expect_no_moment(kSwitched, bodies, "switched");
+  }
+}
+
+TEST(SwitchedGayBerneLaw, IsTheWholeLawUpToItsSwitchAndEndsAtItsCutOff) {
+  PairPose pose;
+  pose.orientation_b = test::turn_about(Vec3(1, 2, 3), 0.4);
+  const auto at = [&pose](double d) {
+    pose.r = Vec3(d, 0, 0);
+    return pose;
+  };
+  EXPECT_EQ(evaluate(kSwitched, at(1.99)).energy, evaluate(kEllipsoids, at(1.99)).energy);
+  EXPECT_EQ(evaluate(kSwitched, at(2.8)).force_b, Vec3(Vec3::Zero()));
+  // S = 10 delta^3 and S' = -30 delta^2 / 0.8 with delta = 1e-3 of the width before the end.
+  const PairLoad whole = evaluate(kEllipsoids, at(2.7992)), end = evaluate(kSwitched, at(2.7992));
+  EXPECT_NEAR(end.energy / whole.energy, 1e-8, 1e-10);
+  EXPECT_NEAR(end.force_b.x(), 1e-8 * whole.force_b.x() + 3e-5 / 0.8 * whole.energy, 1e-6 * std::abs(whole.energy));
+}
+
+TEST(SwitchedGayBerneHessian, IsTheDerivativeOfTheLoads) {
+  // As for the other laws (pair_hessian_test.cpp), with fourth derivatives below 1000 times the second.
+  constexpr double kStep = 1e-5, kBound = 5e-8;
+  using Vec12 = Eigen::Matrix<double, 12, 1>;
+  Draw draw(332);
+  for (int n = 0; n < 20; ++n) {
+    const TwoBodies at = apart(draw);
+    PairHessian expected;
+    for (int k = 0; k < 12; ++k) {
+      const Vec12 h = kStep * Vec12::Unit(k);
+      expected.col(k) = -(test::generalised_force(evaluate(kSwitched, at.moved(h).pose())) -
+                          test::generalised_force(evaluate(kSwitched, at.moved(-h).pose()))) /
+                        (2.0 * kStep);
+    }
+    const PairLoad load = evaluate(kSwitched, at.pose());
+    for (const auto& [place, torque] : {std::pair{3, load.torque_a}, std::pair{9, load.torque_b}}) {
+      Mat3 m;
+      m << 0.0, -torque.z(), torque.y(), torque.z(), 0.0, -torque.x(), -torque.y(), torque.x(), 0.0;
+      expected.block<3, 3>(place, place) -= 0.5 * m;
+    }
+    const PairHessian exact = hessian(kSwitched, at.pose(), HessianKind::Exact);
+    EXPECT_LE((exact - expected).cwiseAbs().maxCoeff(), kBound * (1.0 + exact.cwiseAbs().maxCoeff()))
+        << exact - expected;
+    const PairHessian convex = hessian(kSwitched, at.pose(), HessianKind::PositiveSemiDefinite);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(convex, Eigen::EigenvaluesOnly);
+    EXPECT_GE(solver.eigenvalues()[0], -1e-13 * (1e-300 + convex.cwiseAbs().maxCoeff()));
+  }
+}
+
+TEST(SwitchedGayBerneHessian, OfSpheresAtRestIsTheSameInBothForms) {
+  const SwitchedGayBerne spheres{.ellipsoid = {}, .switch_from = 3.0, .cut_off = 4.0};
+  PairPose pose;
+  pose.r = std::pow(2.0, 1.0 / 6.0) * Vec3(0.6, 0.0, 0.8);
+  const PairHessian exact = hessian(spheres, pose, HessianKind::Exact);
+  EXPECT_LE((exact - hessian(spheres, pose, HessianKind::PositiveSemiDefinite)).cwiseAbs().maxCoeff(), 1e-11);
+  EXPECT_NEAR(exact(0, 0), 0.36 * 72.0 / std::pow(2.0, 1.0 / 3.0), 1e-10);  // of Lennard-Jones: 72 / 2^(1/3)
+}
+
+TEST(SwitchedGayBerneLaw, HasABoundedStiffness) {
+  Draw draw(333);
+  for (int n = 0; n < 200; ++n) {
+    SwitchedGayBerne law{.ellipsoid = kEllipsoids, .switch_from = 20.0, .cut_off = 30.0};
+    GayBerne& e = law.ellipsoid;
+    e.radii = Vec3(draw.uniform(0.4, 1.0), draw.uniform(0.4, 1.0), draw.uniform(0.4, 1.0));
+    e.well = Vec3(draw.uniform(0.2, 1.0), draw.uniform(0.2, 1.0), draw.uniform(0.2, 1.0));
+    e.sigma = 2.0 * e.radii.minCoeff();
+    PairPose pose = TwoBodies::random(draw).pose();
+    const Vec3 u = draw.direction();
+    Mat3 g = Mat3::Zero();
+    for (const Quat& q : {pose.orientation_a, pose.orientation_b}) {
+      const Mat3 frame = q.toRotationMatrix();
+      g += frame * e.radii.cwiseAbs2().asDiagonal() * frame.transpose();
+    }
+    const double touch = 1.0 / std::sqrt(0.5 * u.dot(g.inverse() * u));
+    const double gap = draw.uniform(0.9, 1.15) * std::pow(2.0, 1.0 / 6.0) * e.sigma;
+    pose.r = (gap + touch - e.gamma * e.sigma) * u;
+    const PairHessian h = hessian(law, pose, HessianKind::Exact);
+    const auto largest = [&h](int place) {
+      const Eigen::SelfAdjointEigenSolver<Mat3> solver(Mat3(h.block<3, 3>(place, place)), Eigen::EigenvaluesOnly);
+      return solver.eigenvalues().cwiseAbs().maxCoeff();
+    };
+    const Stiffness bound = stiffness(law);
+    EXPECT_LE(largest(0), bound.translation);
+    EXPECT_LE(largest(3), bound.rotation);
+    EXPECT_LE(largest(9), bound.rotation);
+  }
+}
+
+TEST(SwitchedGayBerneLoads, AreThoseOfEveryPairInRangeForEveryNumberOfThreads) {
+  Draw draw(334);
+  test::Particles p;
+  for (int i = 0; i < 216; ++i) {
+    p.add(1.75 * Vec3(i / 36, i / 6 % 6, i % 6) + draw.vector(0.1));
+    p.state.orientation.back() = draw.rotation();
+  }
+  SwitchedGayBerne law = kSwitched;
+  law.ellipsoid.radii = Vec3(0.4, 0.6, 0.8);
+  Interactions all;
+  all.gay_berne.push_back({.name = "ellipsoids", .range = law.cut_off, .law = law});
+  InteractionWorkspace workspace(p.set, all);
+  std::uint64_t hash = 0;
+  for (const int threads : {1, 2, 3}) {
+    Loads loads, external;
+    loads.reset(p.set.size());
+    external.reset(p.set.size());
+    accumulate_interactions(p.set, p.state, all, 0.0, Executor(threads), workspace, loads, external);
+    Hasher hasher;
+    hasher.add(loads.force);
+    hasher.add(loads.torque);
+    if (threads > 1) {
+      EXPECT_EQ(hasher.value(), hash) << threads;
+      continue;
+    }
+    hash = hasher.value();
+    const LawReport reference = report_laws(p.set, p.state, all, 0.0)[0];
+    double scale = 0.0;
+    for (const Vec3& f : reference.loads.force) scale = std::max(scale, f.norm());
+    EXPECT_NEAR(reference.energy, potential_energy(p.set, p.state, all), 1e-12 * std::abs(reference.energy));
+    for (std::size_t i = 0; i < p.set.size(); ++i) {
+      // A few hundred roundings of some forty terms.
+      EXPECT_LE((loads.force[i] - reference.loads.force[i]).norm(), 1e-12 * scale) << i;
+      EXPECT_LE((loads.torque[i] - reference.loads.torque[i]).norm(), 1e-12 * scale) << i;
+    }
+  }
 }
 
 }  // namespace

@@ -107,6 +107,13 @@ Crowd make_crowd(std::size_t count, std::uint64_t seed) {
   const Repulsion repulsion{.force = 1.0, .distance = 0.3, .length = 0.05, .tolerance = 1e-3};
   all.repulsion.push_back(
       {.name = "other", .object_a = 1, .object_b = 0, .range = repulsion.cut_off(), .law = repulsion});
+  const Weight ending{.range = 0.5};
+  all.geometric_coplanarity.push_back(
+      {.name = "flat", .object_a = 0, .object_b = 1, .range = 0.5, .law = {.strength = 0.4, .weight = ending}});
+  all.geometric_co_normality.push_back(
+      {.name = "parallel", .object_a = 0, .object_b = 0, .range = 0.5, .law = {.strength = 0.3, .weight = ending}});
+  all.geometric_co_circularity.push_back(
+      {.name = "round", .object_a = 1, .object_b = 1, .range = 0.5, .law = {.strength = 0.2, .weight = ending}});
   all.gravity = Vec3(0.1, 0.0, -9.81);
   all.external.push_back({.particle = 3, .force = Vec3(1, 2, 3), .torque = Vec3(0, 0, 4), .begin = 0, .end = 1});
   return crowd;
@@ -284,6 +291,9 @@ TEST(Interactions, CountWhatTheyVisit) {
   bonded.geometric_linear_cohesion.clear();
   bonded.geometric_tabulated_cohesion.clear();
   bonded.geometric_lennard_jones.clear();
+  bonded.geometric_coplanarity.clear();
+  bonded.geometric_co_normality.clear();
+  bonded.geometric_co_circularity.clear();
   bonded.repulsion.clear();
   EXPECT_TRUE(bonded.bonded_only());
   EXPECT_EQ(evaluate_loads(crowd.p, bonded, Executor(1)).counts.pairs_visited, kChainLaws * chain + 59 + 58);
@@ -386,7 +396,7 @@ TEST(LawReports, NameEveryLawAndAddUpToThePotentialEnergy) {
   const std::vector<LawReport> reports = report_laws(crowd.p.set, crowd.p.state, crowd.interactions, 0.5);
   ASSERT_EQ(reports.size(), crowd.interactions.law_count() + 2);  // gravity and external loads
   EXPECT_EQ(reports[3].name, "bond_frame");
-  EXPECT_EQ(reports[reports.size() - 7].name, "own");
+  EXPECT_EQ(reports[reports.size() - 10].name, "own");
   EXPECT_EQ(reports[reports.size() - 2].name, "gravity");
   EXPECT_EQ(reports.back().name, "external");
   double energy = 0.0, size = 0.0;

@@ -177,6 +177,43 @@ objects:
   }
 }
 
+/// Ellipsoids that fall together, with the two wells or those of `extra`.
+std::string ellipsoids(const std::string& integrator, const std::string& extra = "") {
+  return R"(
+schema: 1
+duration: 1 s
+frame_rate: 20
+)" + integrator +
+         R"(
+objects:
+  - name: cluster
+    particles: {arrange: grid, columns: 3, rows: 3, layers: 2, spacing: 0.25, disorder: 0.02, mass: 0.1,
+                inertia_axes: [0.06, 0.08, 0.1], spin: [0, 0, 1]}
+    interactions: [{law: gay_berne, geometric: true, semi_axes: [0.06, 0.08, 0.1], depth: 0.01, cut_off: 0.6)" +
+         extra + "}]\n";
+}
+
+TEST(GayBerneKey, MovesEllipsoidsByEveryMethodAndKeepsEnergy) {
+  Simulation plain = make(ellipsoids(""));
+  run(plain, 10);
+  EXPECT_LT(plain.audits().energy_error, 1e-3);
+  EXPECT_LT(plain.audits().momentum_error, 1e-12);
+  EXPECT_LT(plain.audits().angular_momentum_error, 1e-10);
+  Simulation threads = make(ellipsoids(""), 3);
+  run(threads, 10);
+  EXPECT_EQ(threads.state_hash(), plain.state_hash());
+  Simulation wells = make(ellipsoids("", ", wells: [1, 0.5, 0.2], mu: 2"));
+  run(wells, 10);
+  EXPECT_NE(wells.state_hash(), plain.state_hash());
+  Simulation implicit = make(ellipsoids(method("implicit_midpoint")));
+  run(implicit, 10);
+  EXPECT_TRUE(implicit.integration().within_tolerance);
+  for (std::size_t i = 0; i < 18; ++i) {
+    const Vec3 shift = implicit.state().particles.position[i] - plain.state().particles.position[i];
+    EXPECT_LT(shift.norm(), 0.02) << i;
+  }
+}
+
 TEST(RayleighKey, DampsDeformationByItsStiffnessAndMotionByItsMass) {
   const auto run_with = [](const std::string& damping) {
     std::string text = chain("");

@@ -411,6 +411,43 @@ TEST(GeometricLaws, ComeWithTheRangeOfTheLawOrTheirOwn) {
   EXPECT_EQ(pair.interactions.geometric_lennard_jones[0].range, 1.2);
 }
 
+TEST(GeometricLaws, OfNormalsEndAtTheRangeOfTheirWeight) {
+  const Model model = ring_with(
+      "{law: coplanarity, geometric: true, strength: 1, range: 0.9}, "
+      "{law: co_normality, geometric: true, strength: 2, range: 0.8}, "
+      "{law: co_circularity, geometric: true, strength: 3, range: 0.7}");
+  ASSERT_EQ(model.interactions.geometric_coplanarity.size(), 1u);
+  EXPECT_EQ(model.interactions.geometric_coplanarity[0].range, 0.9);
+  EXPECT_EQ(model.interactions.geometric_coplanarity[0].law.weight.range, 0.9);
+  EXPECT_EQ(model.interactions.geometric_co_normality[0].law.strength, 2.0);
+  EXPECT_EQ(model.interactions.geometric_co_circularity[0].range, 0.7);
+  EXPECT_TRUE(model.interactions.coplanarity.empty());
+}
+
+TEST(GayBerneLaws, TakeTheirEllipsoidsAndEndWithoutAJump) {
+  const Model model = ring_with(
+      "{law: gay_berne, geometric: true, semi_axes: [0.1, 0.2, 0.3], depth: 2, cut_off: 1.5, wells: [1, 0.5, 0.2], "
+      "upsilon: 3, mu: 2, gamma: 0.9}");
+  ASSERT_EQ(model.interactions.gay_berne.size(), 1u);
+  const auto& list = model.interactions.gay_berne[0];
+  EXPECT_EQ(list.name, "ring/gay_berne");
+  EXPECT_EQ(list.range, 1.5);
+  EXPECT_EQ(list.law.cut_off, 1.5);
+  EXPECT_EQ(list.law.switch_from, 0.9 * 1.5);
+  const core::GayBerne& law = list.law.ellipsoid;
+  EXPECT_EQ(law.epsilon, 2.0);
+  EXPECT_EQ(law.sigma, 0.2);
+  EXPECT_EQ(law.gamma, 0.9);
+  EXPECT_EQ(law.radii, Vec3(0.1, 0.2, 0.3));
+  EXPECT_EQ(law.well, Vec3(1.0, 0.5, 0.2));
+  EXPECT_EQ(law.upsilon, 3);
+  EXPECT_EQ(law.mu, 2);
+  const Model given =
+      ring_with("{law: gay_berne, geometric: true, semi_axes: [0.1, 0.2, 0.3], depth: 2, sigma: 0.15, cut_off: 1, switch_from: 0.8}");
+  EXPECT_EQ(given.interactions.gay_berne[0].law.ellipsoid.sigma, 0.15);
+  EXPECT_EQ(given.interactions.gay_berne[0].law.switch_from, 0.8);
+}
+
 TEST(LennardJonesLaws, TakeTheDepthOrTheForceOfThePaper) {
   const Model model = ring_with("{law: lennard_jones, depth: 2, cut_off: 3, switch_from: 2}");
   const core::LennardJones& law = model.interactions.lennard_jones[0].law[0];

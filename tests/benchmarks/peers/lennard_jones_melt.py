@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The standard Lennard-Jones melt side by side: LAMMPS (pair style lj/cut/opt) and core_bench, one core each.
+"""The standard Lennard-Jones melt side by side: LAMMPS (pair styles lj/cut/opt and lj/cut/omp) and core_bench, one core each.
 
 32,000 atoms, fcc of density 0.8442, T 3, cut-off 2.5, skin 0.3, time step 0.005, 100 steps. Both start from the positions
 and velocities that LAMMPS makes, and take turns; times are CPU times of the steps, set-up left out. LAMMPS is run as its
@@ -16,7 +16,7 @@ import tempfile
 import lammps_peer
 
 INPUT = """
-units lj
+{package}units lj
 atom_style atomic
 lattice fcc 0.8442
 region box block 0 20 0 20 0 20
@@ -24,24 +24,26 @@ create_box 1 box
 create_atoms 1 box
 mass 1 1.0
 velocity all create 3.0 87287 loop geom
-pair_style lj/cut/opt 2.5
+pair_style lj/cut/{style} 2.5
 pair_coeff 1 1 1.0 1.0 2.5
 neighbor 0.3 bin
 neigh_modify delay 0 every {every} check {check}
-fix 1 all nve
+fix 1 all nve{fix}
 thermo_style custom step temp pe etotal press
 thermo 100
 timestep 0.005
 """
 
 
+STYLES = {"opt": {"package": "", "fix": ""}, "omp": {"package": "package omp 1\n", "fix": "/omp"}}
+VARIANTS = [(style, check) for style in STYLES for check in ("no", "yes")]
 KEYS = ("temperature", "potential", "energy", "pressure")
 
 
-def run_lammps(check, steps, state):
+def run_lammps(style, check, steps, state):
     from lammps import lammps
     lmp = lammps(cmdargs=["-log", "none", "-screen", "none"])
-    lmp.commands_string(INPUT.format(every=20 if check == "no" else 1, check=check))
+    lmp.commands_string(INPUT.format(every=20 if check == "no" else 1, check=check, style=style, **STYLES[style]))
     lmp.command("run 0")
     names = dict(zip(KEYS, ("temp", "pe", "etotal", "press")))
     lammps_peer.run(lmp, steps, state, lambda: {key: lmp.get_thermo(name) for key, name in names.items()})
@@ -50,29 +52,30 @@ def run_lammps(check, steps, state):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     lammps_peer.add_arguments(parser, repeats=5, steps=100)
-    parser.add_argument("--lammps-run", nargs=2, metavar=("CHECK", "STATE"), help=argparse.SUPPRESS)
+    parser.add_argument("--lammps-run", nargs=3, metavar=("STYLE", "CHECK", "STATE"), help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.lammps_run:
-        run_lammps(args.lammps_run[0], args.steps, args.lammps_run[1])
+        style, check, state = args.lammps_run
+        run_lammps(style, check, args.steps, state)
         return
     runner = lammps_peer.Runner(args.venv)
     with tempfile.TemporaryDirectory() as folder:
         state = str(pathlib.Path(folder) / "state")
         best = {}
         for _ in range(args.repeats):
-            for check in ("no", "yes"):
-                peer = runner.json_of([runner.python, __file__, "--steps", str(args.steps), "--lammps-run", check, state])
+            for variant in VARIANTS:
+                peer = runner.json_of([runner.python, __file__, "--steps", str(args.steps), "--lammps-run", *variant, state])
                 rate = peer["particles"] * args.steps / peer["seconds"]
-                if rate > best.get(check, (0.0,))[0]:
-                    best[check] = (rate, peer)
+                if rate > best.get(variant, (0.0,))[0]:
+                    best[variant] = (rate, peer)
             for name, what in (("ours", "melt"), ("single", "melt_single")):
                 ours = runner.json_of([args.bench, what, state, str(args.steps)])
                 if ours["atom_steps_per_s"] > best.get(name, (0.0,))[0]:
                     best[name] = (ours["atom_steps_per_s"], ours)
     ours = best["ours"][1]
-    for check in ("no", "yes"):
-        rate, peer = best[check]
-        print(f"LAMMPS, lists checked: {check:3}  {rate / 1e6:7.3f} M atom-steps/s")
+    for variant in VARIANTS:
+        rate, peer = best[variant]
+        print(f"LAMMPS {variant[0]}, lists checked: {variant[1]:3}  {rate / 1e6:7.3f} M atom-steps/s")
         lammps_peer.print_beside(ours, peer, KEYS)
     print("pair forces in single precision, relative to those in double:")
     for when in ("first", "last"):
@@ -81,8 +84,8 @@ def main():
             print(f"    {when:5} {key:12} {abs(best['single'][1][name] / ours[name] - 1):.1e}")
     for name, text in (("ours", "ours"), ("single", "ours, single-precision forces")):
         print(f"{text:30} {best[name][0] / 1e6:7.3f} M atom-steps/s")
-        for check in ("no", "yes"):
-            print(f"ratio to LAMMPS, lists checked: {check:3}  {best[name][0] / best[check][0]:.2f}")
+        for variant in VARIANTS:
+            print(f"ratio to LAMMPS {variant[0]}, lists checked: {variant[1]:3}  {best[name][0] / best[variant][0]:.2f}")
 
 
 if __name__ == "__main__":

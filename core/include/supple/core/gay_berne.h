@@ -28,8 +28,23 @@ struct GayBerne {
   int mu = 1;                             ///< >= 1
 };
 
+/// The same with a potential that is switched off between two distances of the centres, so that force and energy end
+/// without a jump: S U with S = 1 - t^3 (10 - 15 t + 6 t^2), t = (d - switch_from) / (cut_off - switch_from) in [0, 1].
+struct SwitchedGayBerne {
+  GayBerne ellipsoid;
+  double switch_from = 0.0;  ///< [m], >= 0
+  double cut_off = 0.0;      ///< [m], > switch_from
+
+  static constexpr int kLargestExponent = 63;  ///< of upsilon and mu
+};
+
 /// The law without a cut-off. @pre d > 0
 [[nodiscard]] PairLoad evaluate(const GayBerne& law, const PairPose& pose);
+
+/// @pre d > 0
+[[nodiscard]] PairLoad evaluate(const SwitchedGayBerne& law, const PairPose& pose);
+/// Of the deepest wells, at gaps down to a tenth below that of rest.
+[[nodiscard]] Stiffness stiffness(const SwitchedGayBerne& law);
 
 /// Adds forces and torques between all particles of a list, cut off at its range without a shift.
 /// @param orientations  body to world, shape [particles]

@@ -10,6 +10,7 @@
 #include "supple/core/cohesion_variants.h"
 #include "supple/core/directed_form.h"
 #include "supple/core/executor.h"
+#include "supple/core/gay_berne.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/literal_form.h"
 #include "supple/core/neighbours.h"
@@ -117,6 +118,10 @@ struct Interactions {
   std::vector<GeometricLaw<LinearCohesion>> geometric_linear_cohesion;
   std::vector<GeometricLaw<TabulatedCohesion>> geometric_tabulated_cohesion;
   std::vector<GeometricLaw<LennardJones>> geometric_lennard_jones;
+  std::vector<GeometricLaw<SwitchedGayBerne>> gay_berne;
+  std::vector<GeometricLaw<Coplanarity>> geometric_coplanarity;      ///< of these three the weight ends at the range
+  std::vector<GeometricLaw<CoNormality>> geometric_co_normality;
+  std::vector<GeometricLaw<CoCircularity>> geometric_co_circularity;
   std::vector<GeometricLaw<Repulsion>> repulsion;
   std::vector<Friction> friction;
   std::vector<MediumDamping> medium;

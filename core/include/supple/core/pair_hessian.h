@@ -4,6 +4,7 @@
 
 #include "supple/core/cohesion_variants.h"
 #include "supple/core/directed_form.h"
+#include "supple/core/gay_berne.h"
 #include "supple/core/lennard_jones.h"
 #include "supple/core/pair_laws.h"
 
@@ -37,6 +38,9 @@ enum class HessianKind : std::uint8_t { Exact, PositiveSemiDefinite };
 [[nodiscard]] PairHessian hessian(const DirectedCohesion& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const TabulatedCohesion& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const DirectedForm& law, const PairPose& pose, HessianKind kind);
+/// Positive semi-definite: f'' J^T J with J the derivative of the gap d - sigma_12 and f'' raised to 0, f being the
+/// potential of the gap.
+[[nodiscard]] PairHessian hessian(const SwitchedGayBerne& law, const PairPose& pose, HessianKind kind);
 [[nodiscard]] PairHessian hessian(const Repulsion& law, const PairPose& pose, HessianKind kind);
 
 }  // namespace supple::core

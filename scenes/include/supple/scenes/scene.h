@@ -62,7 +62,7 @@ struct ParticlesDesc {
 };
 
 enum class LawKind : std::uint8_t {
-  Cohesion, LinearCohesion, DirectedCohesion, LennardJones, Form, FormRadius, DirectedForm, BondFrame, Coplanarity,
+  Cohesion, LinearCohesion, DirectedCohesion, LennardJones, GayBerne, Form, FormRadius, DirectedForm, BondFrame, Coplanarity,
   CoNormality, CoCircularity, Friction
 };
 
@@ -90,12 +90,17 @@ struct InteractionDesc {
   std::optional<double> table_error;       ///< cohesion from a table: largest error of the force over F_max
   double shape = 4.0;                      ///< linear_cohesion, directed_cohesion a
   double eta = 0.0;                        ///< linear_cohesion eta
-  Vec3 semi_axes = Vec3::Zero();           ///< directed_cohesion, of every particle in its own axes [m]
-  std::optional<double> depth;             ///< lennard_jones [J]
+  Vec3 semi_axes = Vec3::Zero();           ///< directed_cohesion, gay_berne, of every particle in its own axes [m]
+  std::optional<double> depth;             ///< lennard_jones, gay_berne [J]
+  std::optional<double> sigma;             ///< gay_berne [m]; absent: twice the smallest semi-axis
+  double gamma = 1.0;                      ///< gay_berne
+  Vec3 wells = Vec3::Ones();               ///< gay_berne, by own axis, over depth
+  int upsilon = 1;                         ///< gay_berne
+  int mu = 1;                              ///< gay_berne
   int repulsive = 12;                      ///< lennard_jones n
   int attractive = 6;                      ///< lennard_jones m
-  std::optional<double> cut_off;           ///< lennard_jones r1 [m]; absent: none
-  std::optional<double> switch_from;       ///< lennard_jones r_s [m]; absent: the force is shifted
+  std::optional<double> cut_off;           ///< lennard_jones r1 [m], absent: none; gay_berne
+  std::optional<double> switch_from;       ///< lennard_jones r_s [m], absent: the force is shifted; gay_berne
   std::optional<double> range;             ///< weight range h [m]; absent: psi = 1 (bonded)
 };
 
