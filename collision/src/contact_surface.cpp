@@ -49,12 +49,12 @@ struct Partners {
 class PairSolver {
  public:
   void solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
-             std::size_t k, const ContactSettings& settings, PairResult& out);
+             std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out);
 
  private:
   bool polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
   bool parts_are_sound(PairPressure& pressure, double extent);
-  bool thirds_press(std::span<const ContactBody> bodies, const PairResult& out);
+  bool thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
   void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
              const ContactSettings& settings, PairResult& out);
   void add_sums(const PatchSums& sums, const Vec3& reference, ContactSurface::Summary& summary);
@@ -161,7 +161,8 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
 }
 
 /// Whether a third body presses on the patches nearly as much as the pair does.
-bool PairSolver::thirds_press(std::span<const ContactBody> bodies, const PairResult& out) {
+/// @param boxes  of the bodies' surfaces
+bool PairSolver::thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out) {
   Box patch;
   for (std::size_t i = 0; i < cover_count_; ++i) {
     for (std::size_t k = 0; k < covers_[i].radius.size(); ++k) patch.include(covers_[i].rim_point(k));
@@ -172,7 +173,7 @@ bool PairSolver::thirds_press(std::span<const ContactBody> bodies, const PairRes
   value_.resize(out.points.point.size());
   bool press = false;
   for (const std::uint32_t c : third_) {
-    if (bodies[c].field.bound(patch).upper <= 0.0) continue;
+    if (!boxes[c].overlaps(patch) || bodies[c].field.bound(patch).upper <= 0.0) continue;
     third_bodies_.push_back(&bodies[c]);
     bodies[c].field.evaluate(out.points.point, value_);
     for (std::size_t i = 0; i < value_.size(); ++i) {
@@ -214,7 +215,8 @@ void PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodi
 }
 
 void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
-                       const Partners& partners, std::size_t k, const ContactSettings& settings, PairResult& out) {
+                       const Partners& partners, std::span<const Box> boxes, std::size_t k, const ContactSettings& settings,
+                       PairResult& out) {
   const BodyPair pair = candidates.pair[k];
   const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
   PairPressure pressure(a, b);
@@ -259,7 +261,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   bool fits = settings.only != ContactRule::March && polar(pressure, settings, extent, out);
   if (fits && cover_count_ > 0) {
     out.summary.rule = ContactRule::Polar;
-    if (!third_.empty() && settings.only != ContactRule::Polar) fits = !thirds_press(bodies, out);
+    if (!third_.empty() && settings.only != ContactRule::Polar) fits = !thirds_press(bodies, boxes, out);
   }
   if (!fits) {
     out.points.clear();
@@ -309,6 +311,9 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   if (candidates.pair.empty()) return;
   thread_local std::vector<PairResult> results;
   thread_local Partners partners;
+  thread_local std::vector<Box> boxes;
+  boxes.resize(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) boxes[i] = bodies[i].field ? bodies[i].field.surface_box() : Box{};
   if (results.size() < candidates.pair.size()) results.resize(candidates.pair.size());
   partners.build(bodies.size(), candidates.pair);
   struct Job {
@@ -316,13 +321,14 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
     const ContactCandidates& candidates;
     const ContactSettings& settings;
     const Partners& partners;
+    std::span<const Box> boxes;
     std::vector<PairResult>& results;
-  } job{bodies, candidates, settings, partners, results};
+  } job{bodies, candidates, settings, partners, boxes, results};
   constexpr std::size_t kBlock = 2;
   executor.for_blocks(candidates.pair.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
     thread_local PairSolver solver;
     for (std::size_t k = begin; k < end; ++k) {
-      solver.solve(job.bodies, job.candidates, job.partners, k, job.settings, job.results[k]);
+      solver.solve(job.bodies, job.candidates, job.partners, job.boxes, k, job.settings, job.results[k]);
     }
   });
   for (std::size_t k = 0; k < candidates.pair.size(); ++k) {

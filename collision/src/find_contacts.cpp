@@ -84,9 +84,15 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
   }
 }
 
-/// A point in the middle of the overlap of two convex bodies, or of the gap between them: on the line between the nearest
-/// points of their cores, which are found by going from one core to the other. None when the cores meet.
-std::optional<Vec3> between_cores(const ContactBody& a, const ContactBody& b) {
+/// Between two convex bodies.
+struct Between {
+  Vec3 middle = Vec3::Zero();  ///< of the overlap, or of the gap
+  bool apart = false;          ///< certainly no overlap
+};
+
+/// On the line between the nearest points of two cores, which are found by going from one to the other. None when the
+/// cores meet.
+std::optional<Between> between_cores(const ContactBody& a, const ContactBody& b) {
   constexpr int kSteps = 32;
   constexpr double kEnough = 1e-3;  // of the distance: the overlap is sought from here, not measured
   const std::span<const Pose> moving = a.fixed ? b.pose : a.pose;  // a place to begin at, near one of them
@@ -95,17 +101,23 @@ std::optional<Vec3> between_cores(const ContactBody& a, const ContactBody& b) {
   if (!on_a) return std::nullopt;
   std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
   if (!on_b) return std::nullopt;
+  constexpr double kRounding = 1e-12;
+  bool settled = false;  // the nearest points but for rounding, so that planes across the line part the cores
   for (int i = 0; i < kSteps; ++i) {
     const Vec3 before = on_a->point;
     on_a = a.field.core_point(on_b->point);
-    if ((on_a->point - before).norm() <= kEnough * (on_a->point - on_b->point).norm()) break;
+    const double moved = (on_a->point - before).norm(), between = (on_a->point - on_b->point).norm();
+    settled = moved <= kRounding * (between + before.lpNorm<Eigen::Infinity>());
+    if (moved <= kEnough * between) break;
     on_b = b.field.core_point(on_a->point);
   }
   const Vec3 across = on_b->point - on_a->point;
   const double distance = across.norm();
   if (!(distance > kEnough * (on_a->radius + on_b->radius))) return std::nullopt;
   const double middle = 0.5 * (std::min(on_a->radius, distance) + std::max(distance - on_b->radius, 0.0));
-  return Vec3(on_a->point + (middle / distance) * across);
+  constexpr double kMargin = 1e-9;  // covers the rounding, however long the cores are
+  return Between{on_a->point + (middle / distance) * across,
+                 settled && distance > (1.0 + kMargin) * (on_a->radius + on_b->radius)};
 }
 
 }  // namespace
@@ -175,11 +187,11 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
       Slot& slot = job.slots[k];
       slot.overlap = a.field.surface_box().intersection(b.field.surface_box());
       slot.seed.clear();
-      const std::optional<Vec3> between = between_cores(a, b);
+      const std::optional<Between> between = between_cores(a, b);
       slot.convex = between.has_value();
       slot.spacing = 0.0;
       if (slot.convex) {
-        slot.seed.push_back(*between);
+        if (!between->apart) slot.seed.push_back(between->middle);
         continue;
       }
       slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
@@ -197,7 +209,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
   out.offset.assign(1, 0);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const Slot& slot = slots[k];
-    if (slot.seed.empty() && slot.spacing > 0.0) continue;
+    if (slot.seed.empty() && (slot.convex || slot.spacing > 0.0)) continue;
     out.pair.push_back(pairs[k]);
     out.overlap.push_back(slot.overlap);
     out.spacing.push_back(slot.spacing);

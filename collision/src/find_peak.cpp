@@ -188,7 +188,9 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
       frame.peak = level;
       frame.u = first / std::sqrt(c1);
       frame.v = other / std::sqrt(c2);
-      frame.thickness = level / fall + level / rise;
+      frame.depth[0] = level / fall;
+      frame.depth[1] = level / rise;
+      frame.thickness = frame.depth[0] + frame.depth[1];
       // Sigma: (p_A - p_B)(x) = 0 with slope -steepness along the axis.
       const double cs = p.cosine, sn = p.sine;
       const double d_uu = (a_uu - b_uu) / steepness, d_uv = (a_uv - b_uv) / steepness, d_vv = (a_vv - b_vv) / steepness;

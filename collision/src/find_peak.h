@@ -22,6 +22,7 @@ struct PeakFrame {
   /// Height of Sigma to second order: t = rho^2 / 2 (uu cos^2 + 2 uv cos sin + vv sin^2).
   double height_uu = 0.0, height_uv = 0.0, height_vv = 0.0;
   double thickness = 0.0;    ///< of the overlap along the axis, to first order [m]
+  double depth[2] = {0.0, 0.0};  ///< share of A's and of B's squeezed region in it [m]
 };
 
 /// Starting points of one pair, and points that lie inside both bodies.

@@ -12,7 +12,9 @@ namespace {
 constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
 constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so that columns stay inside the rim
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
-constexpr double kUnseen = 5e-5;         // what a kink near the rim can do between the nodes of the two coarsest rules
+// What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
+constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
+constexpr double kSafetyAtFirst = 2.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -192,7 +194,7 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
     if (!(fall > 0.0)) return false;
     end[i] = pressure_[i] / fall;
   }
-  end[n - 1] = 0.5 * frame_.thickness;
+  end[n - 1] = frame_.depth[side];
   for (int iteration = 0; iteration < kEndSteps; ++iteration) {
     for (std::size_t i = 0; i + 1 < n; ++i) line_point_[i] = node_.point[i] + (sign * end[i]) * frame_.axis;
     line_point_[n - 1] = frame_.origin + (sign * end[n - 1]) * frame_.axis;
@@ -200,7 +202,12 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
     bool moved = false;
     for (std::size_t i = 0; i < n; ++i) {
       const double fall = -sign * line_slope_[i].dot(frame_.axis);
-      if (!(fall > kLeastOverhang * line_slope_[i].norm())) return false;
+      if (!(fall > kLeastOverhang * line_slope_[i].norm())) {
+        if (!(line_value_[i] < 0.0)) return false;
+        end[i] *= 0.5;  // so far beyond the surface that the support may have ended
+        moved = true;
+        continue;
+      }
       const double step = line_value_[i] / fall;
       if (std::abs(step) > tolerance * frame_.thickness && std::abs(line_value_[i]) > floor) moved = true;
       end[i] = std::max(end[i] + step, 0.0);
@@ -255,14 +262,15 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   const std::span<const PolarRule> rules = polar_rules();
   const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
-  const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 2 : error < 1e-5 ? 1 : 0, last - 1);
+  const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
   for (std::size_t r = first; r <= last; ++r) {
     start_rim(rules[r], r == first);
     if (!solve_rim(pressure, rules[r], error) || !solve_heights(pressure, rules[r], error)) return false;
     coarse_ = fine_;
     if (!integrate(rules[r])) return false;
     if (r == first) continue;
-    const double difference = kSafety * relative_difference(fine_, coarse_) + (r == 1 ? kUnseen : 0.0);
+    const double difference = (r == 1 ? kSafetyAtFirst : kSafety) * relative_difference(fine_, coarse_) +
+                              (r == 1 ? kUnseenAtFirst : r == 2 ? kUnseen : 0.0);
     if (difference > error && r < last) continue;
     estimate_ = difference + algebraic_error();
     thickness_ = 0.0;

@@ -46,8 +46,8 @@ double cardinal(int n, double x) {
 
 std::vector<PolarRule> make_polar() {
   std::vector<PolarRule> rules;
-  constexpr std::array<std::array<int, 3>, 6> kSizes{
-      {{3, 8, 2}, {4, 12, 3}, {6, 20, 3}, {8, 28, 4}, {12, 44, 5}, {16, 64, 6}}};
+  constexpr std::array<std::array<int, 3>, 7> kSizes{
+      {{2, 6, 2}, {3, 8, 2}, {4, 12, 3}, {6, 20, 3}, {8, 28, 4}, {12, 44, 5}, {16, 64, 6}}};
   for (const auto& size : kSizes) {
     PolarRule rule{.radial = size[0], .angular = size[1], .column = size[2], .cosine = {}, .sine = {},
                    .from_coarser = {}};

@@ -1,7 +1,6 @@
 #include "frame.h"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 
 #include "look_columns.h"
@@ -95,8 +94,11 @@ void flag_active_parts(const StageContext& context, Frame& frame) {
       if (sampled) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
     }
   };
-  for (const collision::BodyPair& pair : collision::overlapping_boxes(reach)) {
-    if ((pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b)) continue;
+  frame.reaching = collision::overlapping_boxes(reach);
+  std::erase_if(frame.reaching, [&](const collision::BodyPair& pair) {
+    return (pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b);
+  });
+  for (const collision::BodyPair& pair : frame.reaching) {
     const bool sampled = frame.convex[pair.a] == 0 || frame.convex[pair.b] == 0;
     flag(pair.a, reach[pair.b], sampled);
     flag(pair.b, reach[pair.a], sampled);
@@ -208,14 +210,14 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   }
   {
     StageTimer timer(profile(Stage::FindContacts), context.every_call);
-    const auto allowed = [&](std::uint32_t a, std::uint32_t b) {
-      const auto usable = [&](std::uint32_t i) {
-        return i >= bodies.size() || (collides(context, bodies[i]) && frame.indexed[i] != 0);
-      };
-      return usable(a) && usable(b) && context.rules.allowed(a, b);
+    const auto usable = [&](std::uint32_t i) {
+      return i >= bodies.size() || (collides(context, bodies[i]) && frame.indexed[i] != 0);
     };
-    const collision::ContactRules rules{.overrides = {}, .allowed = std::ref(allowed)};
-    frame.pairs = collision::broad_phase(frame.bodies, rules);
+    frame.pairs.clear();
+    for (const collision::BodyPair& pair : frame.reaching) {
+      if (!usable(pair.a) || !usable(pair.b)) continue;
+      if (frame.bodies[pair.a].field.surface_box().overlaps(frame.bodies[pair.b].field.surface_box())) frame.pairs.push_back(pair);
+    }
     if (!frame.pairs_present) {
       const auto present = [&](std::uint32_t a, std::uint32_t b) {
         const auto there = [&](std::uint32_t i) { return i >= bodies.size() || collides(context, bodies[i]); };

@@ -28,6 +28,7 @@ struct Frame {
   std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
   std::vector<std::uint8_t> convex;           ///< 1: a contact body that is convex; shape [bodies + fixed ones]
   std::vector<std::uint8_t> near;             ///< 1: its supports reach another body
+  std::vector<collision::BodyPair> reaching;  ///< pairs whose supports reach one another, sorted
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;

@@ -8,6 +8,8 @@
 namespace supple::scenes {
 namespace {
 
+constexpr int kCoarseCells = 12;  // of energies that only tell whether to look closer
+
 /// Mass of a whole body [kg]; infinite when a pin holds it.
 double mass_of(const StageContext& context, std::uint32_t body) {
   if (body >= context.bodies.size()) return std::numeric_limits<double>::infinity();
@@ -56,7 +58,6 @@ double OverloadWatch::capacity_of(const StageContext& context, const Frame& fram
                                   const collision::BodyPair& pair) {
   const std::uint32_t a = kind_of(context, pair.a), b = kind_of(context, pair.b);
   const auto [place, fresh] = capacity_.try_emplace(collision::BodyPair{std::min(a, b), std::max(a, b)}, 0.0);
-  constexpr int kCoarseCells = 12;
   if (fresh) {
     place->second = collision::contact_capacity(frame.bodies[pair.a], frame.bodies[pair.b], approach.normal, kCoarseCells);
   }
@@ -68,24 +69,25 @@ void OverloadWatch::look(const StageContext& context, const core::ParticleState&
   if (frame.surface.summary.empty()) return;
   find_mobility(context, particles, mobility_);
   for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
-    const double force = s.force.norm();
-    if (!(force > 0.0)) continue;
+    if (!(s.force.norm() > 0.0)) continue;
     const collision::Approach approach = collision::measure_approach(frame.bodies, mobility_, s);
     const double speed = std::max(approach.speed, 0.0);
     const double inverse = 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b);
     const double kinetic = inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
-    // The force of a contact rises with its depth up to the largest load, so force times depth is more than its energy.
-    const double estimate = kinetic + force * s.largest_overlap;
-    constexpr double kSafety = 0.4;  // of a coarse capacity, where half is the bound
-    if (!(estimate > kSafety * capacity_of(context, frame, approach, s.bodies))) continue;
-    double& worst = worst_[s.bodies];
-    constexpr double kWorthMeasuring = 1.1;
-    if (!(estimate > kWorthMeasuring * worst)) continue;
-    worst = estimate;
-
+    // A lens whose pressure falls to zero at its faces holds a sixth of largest pressure x area x thickness, a paraboloid's
+    // too; a fourth is on the safe side.
+    const double estimate = kinetic + 0.25 * s.largest_pressure * s.area * s.largest_overlap;
+    constexpr double kSafety = 0.45;  // of a coarse capacity, where half is the bound
+    const double coarse = capacity_of(context, frame, approach, s.bodies);
+    if (!(estimate > kSafety * coarse)) continue;
     const collision::ContactBody &a = frame.bodies[s.bodies.a], &b = frame.bodies[s.bodies.b];
+    if (!(kinetic + collision::shifted_energy(a, b, Vec3::Zero(), kCoarseCells) > kSafety * coarse)) continue;
+    double& worst = worst_[s.bodies];
     constexpr int kCells = 24;
+    constexpr double kWorthMeasuring = 1.02;
     const double energy = kinetic + collision::shifted_energy(a, b, Vec3::Zero(), kCells);
+    if (!(energy > kWorthMeasuring * worst)) continue;
+    worst = energy;
     const double capacity = collision::contact_capacity(a, b, approach.normal, kCells);
     if (!(energy > 0.5 * capacity)) continue;
     RunRecord::Overload found{.a = body_name(context.model, context.bodies, s.bodies.a),

@@ -29,7 +29,7 @@ class OverloadWatch {
 
   std::vector<collision::PartMobility> mobility_;
   std::map<collision::BodyPair, double> capacity_;  ///< when the pair, or one like it, was first seen [J]
-  std::map<collision::BodyPair, double> worst_;     ///< estimate of the energy that was last measured [J]
+  std::map<collision::BodyPair, double> worst_;     ///< energy when the capacity was last measured [J]
 };
 
 /// Turns back what approaches beyond its core (`collision::hold_cores`); books what pins and fixed bodies take, and what

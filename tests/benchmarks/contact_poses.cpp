@@ -228,7 +228,7 @@ struct Pair {
 
 template <class MakePose>
 void measure(std::string_view name, int poses, const MakePose& make_pose) {
-  constexpr std::array<double, 3> kErrors{1e-3, 1e-6, 1e-10};
+  constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
   constexpr int kRepeats = 10;
   struct Line {
     std::vector<double> cpu, error;

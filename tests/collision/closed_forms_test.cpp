@@ -153,5 +153,33 @@ TEST(MarchRule, ConvergesWithTheSquareOfTheCell) {
   EXPECT_LT(before, 1e-3);
 }
 
+TEST(DeepContact, OnAThinPlateNeedsNoMarching) {
+  // Beyond the plate's support there is no slope: the column into the stiff plate must start with its own, small depth.
+  const LinearSphere ball{Vec3(0, 0, 0.08), {0.1, 10.0}};
+  implicit::Skeleton skeleton;
+  implicit::Primitive square;
+  square.shape = implicit::ShapeKind::Rectangle;
+  square.size = Vec3(0.2, 0.2, 0.0);
+  square.kernel = implicit::Kernel::gascuel(0.03, 0.045, 30.0);
+  skeleton.primitive.push_back(square);
+  skeleton.part_count = 1;
+  const Pose pose;
+  implicit::PlacedSkeleton placed;
+  implicit::Field plate;
+  implicit::place_skeleton(skeleton, {&pose, 1}, placed);
+  implicit::index_field(skeleton, placed, plate);
+  Stage stage;
+  stage.add(ball, {ball.centre}, 1.0);
+  stage.add(plate, {Vec3::Zero()}, 1e4);
+  stage.bodies()[1].fixed = true;
+  stage.solve({.error = 1e-3});
+  ASSERT_EQ(stage.surface.summary.size(), 1u);
+  const ContactSurface::Summary& s = stage.surface.summary[0];
+  EXPECT_EQ(s.rule, ContactRule::Polar);
+  // U = pi E d^3 (1 - d / 2R) / 3 of p = E (1 - r/R) on a rigid plane; the plate gives way by 1e-4 of the depth.
+  const double d = 0.05;
+  EXPECT_NEAR(s.energy, 3.141592653589793 / 3.0 * d * d * d * (1.0 - d / 0.2), 1e-3 * s.energy);
+}
+
 }  // namespace
 }  // namespace supple::collision

@@ -173,5 +173,21 @@ TEST(ContactMaterial, CombinesByGeometricMeanAndByCompliance) {
   EXPECT_DOUBLE_EQ(m.dissipation, (0.5 * 3e4 + 0.1 * 1e4) / 4e4);
 }
 
+TEST(ConvexBodies, AreLeftOutWhenCertainlyApartAndKeptAtTheLeastOverlap) {
+  // Diagonal, so that the boxes overlap long before the balls do.
+  const double radius = implicit::iso_distance(implicit::Kernel::wyvill(1.0), 0.5);
+  const Vec3 direction = Vec3(1.0, 1.1, 0.9).normalized();
+  for (const double gap : {-1e-3, -1e-8, 1e-8, 1e-3}) {
+    testing::Blobs a({Vec3(0.3, 0.1, 0.2)}, 1.0), b({Vec3(0.3, 0.1, 0.2) + (2.0 * radius + gap) * direction}, 1.0);
+    testing::Stage stage;
+    stage.add(a.field, a.centre);
+    stage.add(b.field, b.centre);
+    stage.solve({.error = 1e-2});
+    ASSERT_EQ(broad_phase(stage.bodies(), {}).size(), 1u);
+    EXPECT_EQ(stage.candidates.pair.size(), gap < 0.0 ? 1u : 0u) << gap;
+    EXPECT_EQ(stage.surface.summary.size(), gap < 0.0 ? 1u : 0u) << gap;
+  }
+}
+
 }  // namespace
 }  // namespace supple::collision

@@ -30,8 +30,8 @@ struct ContactCandidates {
                                                 std::uint64_t* present = nullptr);
 
 /// Stage 5. Needs the samples of stage 4 for the bodies of the broad phase, but not of pairs of convex bodies. A sample is a seed when the other surface is,
-/// to first order, at most one sample spacing away. Pairs that have samples but no seed are left out; pairs without any
-/// samples are kept and searched by stage 6. `pairs_present` is left as it is.
+/// to first order, at most one sample spacing away. Pairs that have samples but no seed are left out, and convex ones whose
+/// cores are farther apart than both surfaces reach; pairs without any samples are kept and searched by stage 6. `pairs_present` is left as it is.
 void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair> pairs, const Executor& executor,
                    ContactCandidates& out);
 
