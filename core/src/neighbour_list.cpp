@@ -73,7 +73,7 @@ bool NeighbourList::update(std::span<const Vec3> positions, const Executor& exec
 
 /// Cells of the particles, in a box wrapped into it, and of the images that they see: those of whole boxes ahead in x,
 /// or level with them, by the order in which a list takes its neighbours.
-void NeighbourList::Impl::find_points() {
+void NeighbourList::Impl::find_points(const Executor& executor) {
   const auto n = static_cast<std::uint32_t>(reference.size());
   const double reach = range + skin;
   Box bounds;
@@ -115,10 +115,13 @@ void NeighbourList::Impl::find_points() {
     return std::min(static_cast<std::uint32_t>(c), inner[k] - 1);
   };
   if (!box) {
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const Vec3 u = reference[i] - origin;
-      cell[i] = index_of(cell_along(u.x(), 0), cell_along(u.y(), 1), cell_along(u.z(), 2));
-    }
+    const auto body = [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Vec3 u = reference[i] - origin;
+        cell[i] = index_of(cell_along(u.x(), 0), cell_along(u.y(), 1), cell_along(u.z(), 2));
+      }
+    };
+    executor.for_blocks(n, kPointBlock, std::cref(body));
     return;
   }
   unsorted_shift.resize(n);
@@ -156,7 +159,7 @@ void NeighbourList::Impl::find_points() {
 }
 
 /// Points sorted by cell, in order of points within one.
-void NeighbourList::Impl::sort_points() {
+void NeighbourList::Impl::sort_points(const Executor& executor) {
   const auto n = static_cast<std::uint32_t>(reference.size());
   const auto points = static_cast<std::uint32_t>(cell.size());
   grid.start.assign(std::size_t{grid.cells[0]} * grid.cells[1] * grid.cells[2] + 1, 0);
@@ -173,19 +176,25 @@ void NeighbourList::Impl::sort_points() {
   images.clear();
   for (std::vector<float>* v : {&grid.x, &grid.y, &grid.z}) v->resize(points + packed::kFloatRoom);
   position.resize(points + blocks());
+  const auto body = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const std::uint32_t p = order[e];
+      const std::uint32_t i = p < n ? p : image_source[p - n];
+      Vec3 x = reference[i];
+      if (!shift.empty()) x += shift[e] = unsorted_shift[p];
+      source[e] = i;
+      grid.image[e] = p < n ? 0 : 1;
+      position[e] = {x.x(), x.y(), x.z(), 0.0};
+      const Vec3 u = x - origin;
+      grid.x[e] = static_cast<float>(u.x());
+      grid.y[e] = static_cast<float>(u.y());
+      grid.z[e] = static_cast<float>(u.z());
+    }
+  };
+  executor.for_blocks(points, kPointBlock, std::cref(body));
+  if (points == n) return;
   for (std::uint32_t e = 0; e < points; ++e) {
-    const std::uint32_t p = order[e];
-    const std::uint32_t i = p < n ? p : image_source[p - n];
-    Vec3 x = reference[i];
-    if (!shift.empty()) x += shift[e] = unsorted_shift[p];
-    source[e] = i;
-    grid.image[e] = p < n ? 0 : 1;
-    if (p >= n) images.push_back(e);
-    position[e] = {x.x(), x.y(), x.z(), 0.0};
-    const Vec3 u = x - origin;
-    grid.x[e] = static_cast<float>(u.x());
-    grid.y[e] = static_cast<float>(u.y());
-    grid.z[e] = static_cast<float>(u.z());
+    if (grid.image[e] != 0) images.push_back(e);
   }
 }
 
@@ -212,9 +221,9 @@ void NeighbourList::Impl::build(const Executor& executor) {
   built = true;
   colour = {};
   if (reference.empty()) return;
-  find_points();
+  find_points(executor);
   lay_blocks();
-  sort_points();
+  sort_points(executor);
   const auto points = static_cast<std::uint32_t>(source.size());
   const Vec3 away = origin + (box ? box->length : Vec3(inverse_edge.cwiseInverse().cwiseProduct(
                                                       Vec3(inner[0], inner[1], inner[2])))) +

@@ -76,8 +76,8 @@ struct NeighbourList::Impl {
   }
 
  private:
-  void find_points();
-  void sort_points();
+  void find_points(const Executor& executor);
+  void sort_points(const Executor& executor);
   void lay_blocks();
   Vec3 origin, inverse_edge;                       ///< of the cells that hold particles
   std::array<std::uint32_t, 3> inner{};            ///< how many of those there are
