@@ -6,7 +6,7 @@ declare -A supple_packages=(
   [build]="cmake ninja-build g++ ccache
            libeigen3-dev libtbb-dev libxxhash-dev libhwy-dev
            libopenvdb-dev libboost-iostreams-dev
-           libdeflate-dev libopenexr-dev libosmesa6-dev libgl-dev libegl-dev
+           libdeflate-dev libopenexr-dev libosmesa6-dev libgl-dev libegl-dev libembree-dev
            libyaml-cpp-dev nlohmann-json3-dev libcli11-dev"
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
   [test]="libgtest-dev libcgal-dev"

@@ -39,12 +39,6 @@ void append(const Mesh& mesh, const Vec3& origin, DrawList& list) {
   SUPPLE_EXPECTS(largest < mesh.vertex_count());
 }
 
-const std::vector<double>* column(const Mesh& mesh, std::string_view name) {
-  for (const Mesh::Column& c : mesh.columns)
-    if (c.name == name) return &c.values;
-  return nullptr;
-}
-
 /// What decides the colour at the vertices of an item.
 void append_paint(const Item& item, std::vector<float>& out) {
   const Mesh& mesh = *item.mesh;
@@ -66,6 +60,12 @@ void append_paint(const Item& item, std::vector<float>& out) {
 double rung(double length) { return std::exp2(std::ceil(4.0 * std::log2(std::max(length, 1e-6))) / 4.0); }
 
 }  // namespace
+
+const std::vector<double>* column(const Mesh& mesh, std::string_view name) {
+  for (const Mesh::Column& c : mesh.columns)
+    if (c.name == name) return &c.values;
+  return nullptr;
+}
 
 bool is_painted(const Item& item) {
   return item.paint.kind != PaintKind::Plain || item.wireframe || !item.surface;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "supple/render/view.h"
@@ -53,6 +54,9 @@ struct MapFit {
 /// The map of `bounds` seen along `direction`, `size` texels an edge. Its edges grow in steps and its corner lies on
 /// whole texels, so that the map of a slowly changing box stands still and shadows do not swim from frame to frame.
 [[nodiscard]] MapFit fit_map(const Box& bounds, const Vec3& direction, int size);
+
+/// The values of a column, or null.
+[[nodiscard]] const std::vector<double>* column(const Mesh& mesh, std::string_view name);
 
 /// Whether the item's colour is not the same all over (or it is not all there), so that pixels must carry it.
 [[nodiscard]] bool is_painted(const Item& item);

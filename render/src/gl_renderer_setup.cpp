@@ -145,6 +145,7 @@ void GlRenderer::upload_materials(std::span<const Item> items) {
     out[3] = static_cast<float>(std::clamp(items[i].roughness, 0.02, 1.0));
     out[4 * columns] = static_cast<float>(std::clamp(items[i].metallic, 0.0, 1.0));
     out[4 * columns + 1] = is_painted(items[i]) ? 1.0F : 0.0F;
+    out[4 * columns + 2] = static_cast<float>(std::clamp(items[i].reflectance, 0.0, 1.0));
   }
   gl_.ActiveTexture(GL_TEXTURE0 + kMaterials);
   gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, static_cast<GLsizei>(columns), static_cast<GLsizei>(rows), 0, GL_RGBA,

@@ -1,16 +1,10 @@
 /// @file process_time.h
-/// CPU time of the process, all threads together.
+/// CPU time of scopes, all threads of the process together.
 #pragma once
 
-#include <ctime>
+#include "supple/core/cpu_time.h"
 
 namespace supple::render {
-
-[[nodiscard]] inline double process_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 /// Adds the CPU time of a scope.
 class CpuClock {

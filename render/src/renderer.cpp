@@ -1,6 +1,7 @@
 #include "supple/render/renderer.h"
 
 #include "gl_renderer.h"
+#include "path/path_renderer.h"
 #include "supple/core/error.h"
 
 namespace supple::render {
@@ -22,13 +23,26 @@ void check_settings(const RenderSettings& settings) {
     refuse("render.samples", "expected 1, 2, 4 or 8", std::to_string(samples));
   if (!(settings.shadow_softness >= 0.0 && settings.shadow_softness <= 0.5))
     refuse("render.shadow_softness", "expected an angle of 0 to 0.5 [rad]", std::to_string(settings.shadow_softness));
+  const int most = settings.most_samples;
+  if (most < 1 || most > 65536 || (most & (most - 1)) != 0)
+    refuse("render.most_samples", "expected a power of two up to 65536", std::to_string(most));
+  if (!(settings.noise >= 0.0)) refuse("render.noise", "expected a number >= 0", std::to_string(settings.noise));
+  if (!(settings.shutter >= 0.0)) refuse("render.shutter", "expected a time >= 0 [s]", std::to_string(settings.shutter));
 }
 
 }  // namespace
 
+bool has_path_tracer() {
+#ifdef SUPPLE_HAS_EMBREE
+  return true;
+#else
+  return false;
+#endif
+}
+
 std::unique_ptr<Renderer> make_renderer(const RenderSettings& settings) {
   check_settings(settings);
-  return make_gl_renderer(settings);
+  return settings.kind == RendererKind::Path ? make_path_renderer(settings) : make_gl_renderer(settings);
 }
 
 }  // namespace supple::render

@@ -160,7 +160,7 @@ vec3 ground_light(vec3 p, vec3 behind, float visible) {
 )";
 
 const char* const kItemLight = R"(
-uniform sampler2D materials;      // albedo and roughness of each item; in the next row, metallic and painted
+uniform sampler2D materials;      // albedo and roughness of each item; in the next row, metallic, painted, reflectance
 uniform sampler2D occlusion;
 uniform float occlusion_radius;   // [m]
 uniform int contact_taps;         // 0: no other item to touch
@@ -203,10 +203,10 @@ vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   int number = int(id) - 1;
   ivec2 row = ivec2(number & 4095, (number >> 12) * 2);
   vec4 material = texelFetch(materials, row, 0);
-  vec2 more = texelFetch(materials, row + ivec2(0, 1), 0).rg;
+  vec3 more = texelFetch(materials, row + ivec2(0, 1), 0).rgb;
   vec3 base = more.y > 0.5 ? own_albedo : material.rgb;
   vec3 albedo = base * (1.0 - more.x);
-  vec3 normal_reflectance = mix(vec3(0.04), base, more.x);
+  vec3 normal_reflectance = mix(vec3(more.z), base, more.x);
   float roughness = material.a;
   vec3 v = normalize(eye - p);
   vec3 h = normalize(v + to_light);

@@ -69,7 +69,14 @@ struct Arguments {
   bool no_film = false;
 };
 
-void print_profile(const fs::path& report) { std::printf("stages: see \"stages\" in %s\n", report.c_str()); }
+void print_profile(const scenes::RunResult& result) {
+  std::printf("stages: see \"stages\" in %s\n", result.report.c_str());
+  if (result.pictures.images == 0) return;
+  const auto& t = result.pictures.render;
+  std::printf("pictures: %d, CPU ms in all: context %.1f, shaders %.1f, upload %.1f, draw %.1f, read back %.1f, encode %.1f\n",
+              result.pictures.images, 1e3 * t.context, 1e3 * t.shaders, 1e3 * t.upload, 1e3 * t.draw, 1e3 * t.read_back,
+              1e3 * result.pictures.encode_s);
+}
 
 int report(const scenes::RunResult& result, const Arguments& arguments) {
   for (const std::string& warning : result.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
@@ -84,7 +91,7 @@ int report(const scenes::RunResult& result, const Arguments& arguments) {
     if (result.pictures_kept > 0) std::printf("frames: %d drawn, %d kept\n", result.pictures_drawn, result.pictures_kept);
     if (!result.film.empty()) std::printf("film:   %s\n", result.film.c_str());
     std::printf("result: %s (state %s)\n", result.report.c_str(), to_hex(result.state_hash).c_str());
-    if (arguments.profile) print_profile(result.report);
+    if (arguments.profile) print_profile(result);
   }
   return 0;
 }

@@ -1,6 +1,8 @@
 #include "camera.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 namespace supple::scenes {
 namespace {
@@ -36,7 +38,8 @@ std::span<const CameraDesc> cameras_of(const Scene& scene) {
 }
 
 render::Camera camera_at(const CameraDesc& desc, double time, double duration) {
-  render::Camera camera{.from = desc.from, .look_at = desc.look_at, .up = desc.up, .field_of_view = desc.field_of_view};
+  render::Camera camera{.from = desc.from, .look_at = desc.look_at, .up = desc.up, .field_of_view = desc.field_of_view,
+                        .aperture = desc.aperture, .focus = desc.focus.value_or(0.0)};
   if (!desc.keys.empty()) {
     const Row row = interpolate(desc.keys, time);
     camera.from = row.head<3>();
@@ -48,6 +51,32 @@ render::Camera camera_at(const CameraDesc& desc, double time, double duration) {
     camera.from = camera.look_at + turn * (camera.from - camera.look_at);
   }
   return camera;
+}
+
+bool may_show(const render::Camera& camera, double aspect, const Vec3& light, double softness, const Box& box) {
+  if (box.empty()) return false;
+  const Vec3 ahead = (camera.look_at - camera.from).normalized();
+  Vec3 right = ahead.cross(camera.up);
+  if (!(right.norm() > 1e-9)) return true;
+  right.normalize();
+  const Vec3 up = right.cross(ahead);
+  const double half_height = std::tan(0.5 * camera.field_of_view);
+  const double half_width = aspect * half_height;
+  // Normals of the pyramid's sides, pointing inward, and of the plane through the camera.
+  const std::array<Vec3, 5> inward = {ahead, half_width * ahead + right, half_width * ahead - right, half_height * ahead + up,
+                                      half_height * ahead - up};
+  const Vec3 travels = light.normalized();
+  for (const Vec3& side : inward) {
+    const Vec3 n = side.normalized();
+    const double nearest = n.dot(box.centre() - camera.from) + 0.5 * n.cwiseAbs().dot(box.extent());
+    // Rays of a soft sun leave its direction by up to its radius; those that go inward reach the picture somewhere.
+    if (nearest < -camera.aperture && n.dot(travels) <= -std::sin(softness)) return false;
+  }
+  return true;
+}
+
+double cell_for(double error, double pixel, double distance, double radius) {
+  return std::sqrt(8.0 * error * pixel * distance * radius);
 }
 
 }  // namespace supple::scenes

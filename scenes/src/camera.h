@@ -15,4 +15,15 @@ namespace supple::scenes {
 /// times) and 0 at the ends; the turntable turns at an even rate.
 [[nodiscard]] render::Camera camera_at(const CameraDesc& desc, double time, double duration);
 
+/// Whether anything of a box, or of the shadow it throws, may be in the picture. Conservative: false only where the box and
+/// all places in its shadow lie outside one side of the pyramid of view, or behind the camera.
+/// @param aspect    width over height
+/// @param softness  angular radius of the sun [rad]
+[[nodiscard]] bool may_show(const render::Camera& camera, double aspect, const Vec3& light, double softness, const Box& box);
+
+/// The largest lattice cell whose mesh of a surface of curvature radius `radius` stays within `error` pixels of it where it
+/// is seen from `distance` away: a chord h misses an arc by h^2 / (8 R).
+/// @param pixel  tangent of the angle of a pixel
+[[nodiscard]] double cell_for(double error, double pixel, double distance, double radius);
+
 }  // namespace supple::scenes

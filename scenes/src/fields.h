@@ -697,6 +697,7 @@ void fields(Archive& archive, Scene& d) {
   archive("light", d.light, {}, "the sun");
   archive("lights", d.lights, {}, "rectangles that shine; OpenGL takes the first four, without shadows");
   archive("background", d.background, {}, "behind everything, from top to bottom");
+  archive("render", d.render, {}, "how pictures are made");
   archive("ground", d.ground, {}, "a horizontal plane; absent: none");
   archive("output", d.output, {}, "what is written");
   archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",

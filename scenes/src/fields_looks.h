@@ -32,6 +32,7 @@ template <class Archive>
 void fields(Archive& archive, LookDesc& d) {
   using enum ColourByName;
   archive("metallic", d.metallic, between(0.0, 1.0, kNumber), "0: plastic; 1: a metal, which reflects in its colour");
+  archive("reflectance", d.reflectance, between(0.0, 1.0, kNumber), "of what is no metal, seen head on; 0: matt");
   archive("opacity", d.opacity, up_to(1.0, kNumber), "in steps of 1 / samples; shadows are those of an opaque body");
   archive("texture", d.texture, {}, "absent: none");
   archive("colour_by", d.colour_by, {}, "pressure: of contact [Pa]; stretch: of the bonds around, d / d0 - 1; speed: of the surface [m/s]");
@@ -65,6 +66,8 @@ void fields(Archive& archive, CameraDesc& d) {
   archive("look_at", d.look_at, any(kLength), "what is in the middle");
   archive("up", d.up, direction(), "what is up in the picture");
   archive("field_of_view_deg", d.field_of_view, degrees(1.0, 150.0), "vertical");
+  archive("aperture", d.aperture, at_least(0.0, kLength), "radius of the lens; 0: everything is sharp; renderer path");
+  archive("focus", d.focus, above(0.0, kLength).or_auto(), "distance that is sharp; auto: that of look_at");
   archive("turntable_deg", d.turntable, degrees(-36000.0, 36000.0), "how far it turns about 'up' through look_at during the scene");
   archive("keys", d.keys, {}, "places at times, joined smoothly; before the first and after the last it stands still");
   const Vec3 sight = d.look_at - d.from;
@@ -93,6 +96,22 @@ void fields(Archive& archive, AreaLightDesc& d) {
   archive("half_sizes", d.half_sizes, above(0.0, kLength).items(2, 2), "half its edges, the first one horizontal");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("intensity", d.intensity, at_least(0.0, kNumber), "radiance, relative to that of the sky");
+}
+
+template <class Archive>
+void fields(Archive& archive, RenderDesc& d) {
+  using enum RendererName;
+  const auto only = [&d](const Rule& rule) { return rule.only("renderer", d.renderer, {Path}); };
+  archive("renderer", d.renderer, {}, "gl: OpenGL; path: path tracing, in builds with Embree 3");
+  archive("pixel_error", d.pixel_error, above(0.0, kNumber).or_auto(),
+          "chooses the cells of meshes that only pictures show, by what the nearest camera sees; auto: output.cell decides");
+  archive("noise", d.noise, only(between(0.0, 1.0, kNumber)),
+          "standard error of a pixel over its brightness, before the filter, at which sampling ends; 0: most_samples");
+  archive("most_samples", d.most_samples, only(between(1.0, 65536.0, kNumber)), "a pixel, a power of two");
+  archive("denoise", d.denoise, only({}), "filter that follows normals, places and colours");
+  archive("exact_surface", d.exact_surface, only({}), "rays meet the field itself where objects touch nothing, so coarse meshes look smooth");
+  archive("shutter", d.shutter, only(between(0.0, 1.0, kNumber)), "exposure over the time between frames: what moves is blurred");
+  archive.check((d.most_samples & (d.most_samples - 1)) == 0, "most_samples", "expected a power of two", std::to_string(d.most_samples), "");
 }
 
 template <class Archive>

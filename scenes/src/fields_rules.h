@@ -61,6 +61,9 @@ template <> struct EnumNames<SplitName> {
 template <> struct EnumNames<CoreName> {
   static constexpr std::array<std::string_view, 2> names{"soft", "barrier"};
 };
+template <> struct EnumNames<RendererName> {
+  static constexpr std::array<std::string_view, 2> names{"gl", "path"};
+};
 template <> struct EnumNames<PatternName> {
   static constexpr std::array<std::string_view, 3> names{"checker", "stripes", "picture"};
 };

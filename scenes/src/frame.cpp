@@ -319,6 +319,10 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   }
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (!has_surface(bodies[i]) || std::binary_search(touching.begin(), touching.end(), i)) continue;
+    if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {
+      profile.present += 1;
+      continue;
+    }
     if (model.meshing.method == MeshingName::Tetrahedra) {
       surfaces[i] = implicit::polygonise(frame.field[i], lattice, context.executor, &counts);
       add_counts();

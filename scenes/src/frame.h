@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <functional>
 #include <vector>
 
 #include "supple/collision/find_contacts.h"
@@ -69,6 +70,7 @@ struct StageContext {
   bool skip = true;
   bool every_call = false;
   const implicit::DelaunayMesher* delaunay = nullptr;
+  const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
 };
 
 /// Stages 2 and 3 for one body.

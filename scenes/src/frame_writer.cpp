@@ -6,6 +6,7 @@
 #include "frame_tables.h"
 #include "output_files.h"
 #include "program_identity.h"
+#include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -61,7 +62,7 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
   }
   if (outputs_.images) {
     image_formats_ = scene.output.images ? scene.output.images->formats : ImagesDesc{}.formats;
-    pictures_ = std::make_unique<ScenePictures>(scene, model, context_kind(options.context));
+    pictures_ = std::make_unique<ScenePictures>(scene, model, context_kind(options.context), options.threads);
   }
   if (!outputs_.meshes || !has(scene.output.mesh, MeshName::Usd)) return;
   std::vector<io::UsdObject> objects;
@@ -75,6 +76,7 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
   const int frame = simulation.frame();
   if (!wanted(frame)) return;
   const std::vector<Mesh>* meshes = nullptr;
+  if (outputs_.images && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
   if (outputs_.images || outputs_.meshes) {
     report("surface", frame, done);
     meshes = &simulation.meshes();
@@ -118,6 +120,7 @@ bool FrameWriter::renews(int frame, std::uint64_t state_hash) const {
 void FrameWriter::renew(Simulation& simulation, Reporter& report, double done) {
   const int frame = simulation.frame();
   report("surface", frame, done);
+  if (outputs_.images && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
   const std::vector<Mesh>& meshes = simulation.meshes();
   if (outputs_.images && !pictures_are_current(frame, simulation.state_hash())) draw(simulation, report, done);
   const StageClock clock(simulation.profile(Stage::Export));
@@ -137,12 +140,23 @@ void FrameWriter::draw(Simulation& simulation, Reporter& report, double done) {
       if (has(image_formats_, ImageName::Exr)) layers = pictures_->layers();
     }
     const StageClock clock(simulation.profile(Stage::Export));
+    const double begin = process_cpu_seconds();
     if (has(image_formats_, ImageName::Png)) render::write_png(picture_path(camera, frame, ImageName::Png), image, mark);
     if (has(image_formats_, ImageName::Exr)) {
       render::write_exr(picture_path(camera, frame, ImageName::Exr), image, layers, pictures_->item_names(), mark);
     }
+    encode_s_ += process_cpu_seconds() - begin;
+    ++images_;
   }
   ++pictures_drawn_;
+}
+
+PictureTimes FrameWriter::picture_times() const {
+  return {.images = images_, .render = pictures_ ? pictures_->times() : render::RenderTimes{}, .encode_s = encode_s_};
+}
+
+void FrameWriter::add_warnings(std::vector<std::string>& warnings) const {
+  if (pictures_) warnings.insert(warnings.end(), pictures_->warnings().begin(), pictures_->warnings().end());
 }
 
 void FrameWriter::write_meshes(const Simulation& simulation, const std::vector<Mesh>& meshes) {

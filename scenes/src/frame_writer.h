@@ -41,6 +41,9 @@ class FrameWriter {
   /// Writes again what `renews` found.
   void renew(Simulation& simulation, Reporter& report, double done);
   [[nodiscard]] int pictures_drawn() const { return pictures_drawn_; }
+  /// CPU time of pictures by their parts [s].
+  [[nodiscard]] PictureTimes picture_times() const;
+  void add_warnings(std::vector<std::string>& warnings) const;
 
  private:
   [[nodiscard]] bool wanted(int frame) const { return options_.frames.empty() || options_.frames.contains(frame); }
@@ -64,6 +67,8 @@ class FrameWriter {
   std::unique_ptr<io::UsdAnimation> animation_;
   std::vector<Mesh> obstacles_;  // of the animation
   int pictures_drawn_ = 0;
+  int images_ = 0;
+  double encode_s_ = 0.0;
 };
 
 }  // namespace supple::scenes

@@ -809,6 +809,7 @@ Model build_model(const Scene& scene) {
     const auto& formats = scene.output.images->formats;
     if (std::find(formats.begin(), formats.end(), ImageName::Exr) != formats.end()) model.meshing.motion = true;
   }
+  if (scene.render.shutter > 0.0) model.meshing.motion = true;
   for (std::size_t i = 0; i < model.objects.size(); ++i) model.objects[i].look = scene.objects[i].look;
   if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
   model.scene_length = everything.extent().norm();

@@ -1,6 +1,9 @@
 #include "picture.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 
 #include "look_columns.h"
 #include "supple/render/glyphs.h"
@@ -19,7 +22,7 @@ Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
   return mesh;
 }
 
-render::RenderSettings settings_of(const Scene& scene, render::ContextKind context) {
+render::RenderSettings settings_of(const Scene& scene, render::ContextKind context, int threads) {
   render::RenderSettings settings;
   if (scene.output.images) {
     settings.width = scene.output.images->size.at(0);
@@ -28,6 +31,13 @@ render::RenderSettings settings_of(const Scene& scene, render::ContextKind conte
   }
   settings.shadow_softness = scene.light.softness;
   settings.context = context;
+  settings.kind = scene.render.renderer == RendererName::Path ? render::RendererKind::Path : render::RendererKind::Gl;
+  settings.threads = threads;
+  settings.noise = scene.render.noise;
+  settings.most_samples = scene.render.most_samples;
+  settings.denoise = scene.render.denoise;
+  settings.exact = scene.render.exact_surface;
+  settings.shutter = scene.render.shutter / scene.frame_rate;
   return settings;
 }
 
@@ -107,8 +117,8 @@ std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model) {
   return meshes;
 }
 
-ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::ContextKind context)
-    : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)), settings_(settings_of(scene, context)) {
+ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::ContextKind context, int threads)
+    : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)), settings_(settings_of(scene, context, threads)), cell_(model.cell) {
   for (const ObjectDesc& object : scene.objects) {
     const bool reads = object.look.texture && object.look.texture->pattern == PatternName::Picture;
     textures_.push_back(reads ? std::make_shared<const render::Image>(
@@ -124,18 +134,83 @@ void ScenePictures::add(render::Item item, std::string name) {
   item_names_.push_back(std::move(name));
 }
 
-void ScenePictures::add_objects(const std::vector<Mesh>& meshes) {
+void ScenePictures::limit_meshes(Simulation& simulation) const {
+  std::vector<render::Camera> cameras;
+  for (const CameraDesc& desc : cameras_of(scene_)) cameras.push_back(camera_at(desc, simulation.time(), scene_.duration));
+  const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
+  const double aspect = static_cast<double>(size.at(0)) / size.at(1);
+  if (scene_.render.renderer == RendererName::Gl) {
+    simulation.set_shown([cameras, aspect, light = scene_.light](const Box& box) {
+      return std::any_of(cameras.begin(), cameras.end(), [&](const render::Camera& camera) {
+        return may_show(camera, aspect, light.direction, light.softness, box);
+      });
+    });
+  }
+  if (!scene_.render.pixel_error || scene_.output.cell) return;
+  constexpr double kFiner = 8.0, kCoarser = 4.0;
+  double cell = kCoarser * cell_;
+  const core::ParticleState& state = simulation.state().particles;
+  for (const ObjectModel& object : simulation.model().objects) {
+    if (!(object.iso_radius > 0.0)) continue;
+    for (const render::Camera& camera : cameras) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (std::uint32_t p = object.first; p < object.last; ++p)
+        nearest = std::min(nearest, (state.position[p] - camera.from).norm());
+      const double distance = std::max(nearest - object.iso_radius, object.iso_radius);
+      const double pixel = 2.0 * std::tan(0.5 * camera.field_of_view) / size.at(1);
+      cell = std::min(cell, cell_for(*scene_.render.pixel_error, pixel, distance, object.iso_radius));
+    }
+  }
+  simulation.set_cell(std::max(cell, cell_ / kFiner));
+}
+
+void ScenePictures::warn_inside(Simulation& simulation, std::size_t camera) {
+  const std::vector<Body>& bodies = simulation.bodies();
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty() || !(implicit::FieldView(simulation.fields()[i]).value(view_.camera.from) > 0.0)) continue;
+    const std::string& name = cameras_of(scene_)[camera].name;
+    const std::string text = "camera" + (name.empty() ? "" : " '" + name + "'") + " stands inside of '" +
+                             scene_.objects[bodies[i].object].name + "', which it does not see";
+    if (std::find(warnings_.begin(), warnings_.end(), text) == warnings_.end()) warnings_.push_back(text);
+  }
+}
+
+void ScenePictures::add_objects(Simulation& simulation) {
+  const std::vector<Mesh>& meshes = simulation.meshes();
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const ObjectDesc& d = scene_.objects[i];
     if (!d.look.surface && !d.look.wireframe) continue;
     add({.mesh = &meshes[i], .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
          .opacity = d.look.opacity, .paint = paint_of(d.look, textures_[i]), .surface = d.look.surface,
-         .wireframe = d.look.wireframe},
+         .reflectance = d.look.reflectance, .wireframe = d.look.wireframe},
         d.name);
   }
+  if (scene_.render.renderer == RendererName::Path && scene_.render.exact_surface) add_fields(simulation);
   for (std::size_t i = 0; i < obstacles_.size(); ++i) {
     const ObstacleDesc& d = scene_.obstacles[i];
     if (d.visible) add({&obstacles_[i], d.colour, d.roughness, d.shape != ObstacleName::Box}, d.name);
+  }
+}
+
+/// Of objects in one piece that touch nothing: those that touch have been divided by others' fields.
+void ScenePictures::add_fields(Simulation& simulation) {
+  const std::vector<Body>& bodies = simulation.bodies();
+  std::vector<int> pieces(scene_.objects.size(), 0);
+  std::vector<std::size_t> body(scene_.objects.size(), 0);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    ++pieces[bodies[i].object];
+    body[bodies[i].object] = i;
+  }
+  for (const auto& contact : simulation.contacts().summary)
+    for (const std::uint32_t i : {contact.bodies.a, contact.bodies.b})
+      if (i < bodies.size()) pieces[bodies[i].object] = 0;
+  const std::vector<Mesh>& meshes = simulation.meshes();
+  for (render::Item& item : items_) {
+    const auto object = static_cast<std::size_t>(item.mesh - meshes.data());
+    if (item.mesh < meshes.data() || object >= meshes.size() || pieces[object] != 1) continue;
+    const implicit::Field* field = &simulation.fields()[body[object]];
+    item.field = [field](std::span<const Vec3> p, std::span<double> f, std::span<Vec3> g) { field->evaluate(p, f, g); };
+    item.field_reach = simulation.cell();
   }
 }
 
@@ -167,9 +242,10 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
 
 render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera) {
   view_.camera = camera_at(cameras_of(scene_)[camera], simulation.time(), scene_.duration);
+  warn_inside(simulation, camera);
   items_.clear();
   item_names_.clear();
-  add_objects(simulation.meshes());
+  add_objects(simulation);
   add_glyphs(simulation);
   render::Image image = renderer_->render(view_, items_);
   render::draw_scale_bars(image, bars_);

@@ -20,7 +20,14 @@ namespace supple::scenes {
 class ScenePictures {
  public:
   /// @throws Error{Io} when a texture cannot be read or no context can be made
-  ScenePictures(const Scene& scene, const Model& model, render::ContextKind context);
+  ScenePictures(const Scene& scene, const Model& model, render::ContextKind context, int threads);
+
+  /// For pictures alone: leaves out of the meshes what no camera sees (OpenGL; light between surfaces needs everything), and
+  /// chooses their cells by `render.pixel_error`. Call before the first `draw` of a state.
+  void limit_meshes(Simulation& simulation) const;
+
+  /// Objects inside of which a camera stood, as sentences; each once.
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
   /// The simulation's current state as the camera of this number sees it.
   [[nodiscard]] render::Image draw(Simulation& simulation, std::size_t camera);
@@ -30,7 +37,9 @@ class ScenePictures {
   [[nodiscard]] render::RenderTimes times() const { return renderer_->times(); }
 
  private:
-  void add_objects(const std::vector<Mesh>& meshes);
+  void warn_inside(Simulation& simulation, std::size_t camera);
+  void add_objects(Simulation& simulation);
+  void add_fields(Simulation& simulation);
   void add_glyphs(const Simulation& simulation);
   void add(render::Item item, std::string name);
 
@@ -44,6 +53,8 @@ class ScenePictures {
   std::unique_ptr<render::LayerRenderer> layer_renderer_;  ///< made when layers are first asked for
   std::vector<render::Item> items_;
   std::vector<std::string> item_names_;
+  double cell_ = 0.0;        ///< of the scene
+  std::vector<std::string> warnings_;
   std::deque<Mesh> glyphs_;  ///< of this picture
 };
 

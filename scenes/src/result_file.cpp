@@ -92,6 +92,10 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
           {"calls", p.calls}, {"cpu_s", p.cpu_s}, {"visited", p.visited}, {"present", p.present}};
     }
     json["stages"] = stages;
+    const render::RenderTimes& t = result.pictures.render;
+    json["pictures"] = {{"images", result.pictures.images}, {"context_cpu_s", t.context}, {"shaders_cpu_s", t.shaders},
+                        {"upload_cpu_s", t.upload},         {"draw_cpu_s", t.draw},       {"read_back_cpu_s", t.read_back},
+                        {"encode_cpu_s", result.pictures.encode_s}};
   }
   json["film"] = result.film.empty() ? ordered_json(nullptr) : ordered_json(result.film.filename().string());
   json["peak_memory_mb"] = peak_memory_mb();

@@ -167,6 +167,8 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     }
     result.pictures_drawn = writer.pictures_drawn();
     result.film = writer.finish(*simulation, report, *last);
+    result.pictures = writer.picture_times();
+    writer.add_warnings(result.warnings);
   });
 }
 
@@ -272,6 +274,8 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         }
         result.pictures_drawn = writer.pictures_drawn();
         result.film = writer.finish(*simulation, report, frame_count);
+        result.pictures = writer.picture_times();
+        writer.add_warnings(result.warnings);
       });
 }
 

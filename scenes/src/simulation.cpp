@@ -54,6 +54,7 @@ struct Simulation::Impl {
   bool pulled_fields = false;
   std::vector<Mesh> meshes;
   bool pulled_meshes = false;
+  std::function<bool(const Box&)> shown;
 
   Impl(Scene s, SimulationOptions o)
       : scene(std::move(s)),
@@ -434,7 +435,9 @@ struct Simulation::Impl {
   const std::vector<Mesh>& pull_meshes() {
     if (pulled_meshes) return meshes;
     pull_fields();
-    meshes = polygonise_objects(context(), state.particles, laws, pulled);
+    StageContext wanted = context();
+    if (shown) wanted.shown = &shown;
+    meshes = polygonise_objects(wanted, state.particles, laws, pulled);
     pulled_meshes = true;
     return meshes;
   }
@@ -565,6 +568,18 @@ void Simulation::set_cells(int cells) {
     if (!impl_->bodies[i].skeleton.primitive.empty()) all = all.united(impl_->pulled.field[i].surface_box());
   }
   if (!all.empty()) impl_->model.cell = all.extent().maxCoeff() / cells;
+  impl_->pulled_meshes = false;
+}
+
+void Simulation::set_cell(double cell) {
+  SUPPLE_EXPECTS(cell > 0.0);
+  if (cell == impl_->model.cell) return;
+  impl_->model.cell = cell;
+  impl_->pulled_meshes = false;
+}
+
+void Simulation::set_shown(std::function<bool(const Box&)> shown) {
+  impl_->shown = std::move(shown);
   impl_->pulled_meshes = false;
 }
 

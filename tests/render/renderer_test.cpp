@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "gl_context.h"
 #include "shapes.h"
 #include "support.h"
 
@@ -288,6 +289,37 @@ TEST(Renderer, RefusesSettingsAndCamerasThatCannotBe) {
   view = View();
   view.camera.field_of_view = 4.0;
   expect_error(ErrorKind::Usage, {"camera.field_of_view"}, [&] { static_cast<void>(renderer->render(view, {})); });
+}
+
+TEST(Renderer, NamesALibraryThatIsNotThereAndItsPackage) {
+  expect_error(ErrorKind::Io, {"libabsent.so.8", "cannot be loaded", "apt-get install libabsent8"},
+               [] { const Library library("libabsent.so.8", "libabsent8"); });
+}
+
+TEST(Renderer, NamesThePathTracersComponentWhereItIsAbsent) {
+  RenderSettings settings = small();
+  settings.kind = RendererKind::Path;
+  if (has_path_tracer()) {
+    EXPECT_NE(make_renderer(settings)->description().find("Embree"), std::string::npos);
+    settings.most_samples = 3;
+    expect_error(ErrorKind::Usage, {"render.most_samples", "found 3"}, [&] { static_cast<void>(make_renderer(settings)); });
+  } else {
+    expect_error(ErrorKind::Usage, {"Embree 3", "libembree-dev"}, [&] { static_cast<void>(make_renderer(settings)); });
+  }
+}
+
+TEST(Renderer, TimesItsWorkByParts) {
+  const Scene scene;
+  const std::unique_ptr<Renderer> renderer = make_renderer(small());
+  const RenderTimes made = renderer->times();
+  EXPECT_GT(made.context, 0.0);
+  EXPECT_GT(made.shaders, 0.0);
+  static_cast<void>(renderer->render(scene.view, scene.items));
+  const RenderTimes drawn = renderer->times();
+  EXPECT_GT(drawn.upload, made.upload);
+  EXPECT_GT(drawn.draw, made.draw);
+  EXPECT_GT(drawn.read_back, made.read_back);
+  EXPECT_EQ(drawn.context, made.context);
 }
 
 TEST(Renderer, DescribesItsDriver) {

@@ -2,10 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "camera.h"
 #include "supple/core/error.h"
 #include "supple/render/image.h"
+#include "supple/render/renderer.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
 
@@ -69,6 +72,85 @@ TEST(Camera, PassesItsKeysAndRestsAtBothEnds) {
   EXPECT_LT((camera_at(desc, 1.0 + h, 5.0).from - desc.keys[0].from).norm() / h, 1e-4);
 }
 
+TEST(Camera, SeesBoxesAndTheirShadows) {
+  const render::Camera camera{.from = Vec3(0, -5, 1), .look_at = Vec3(0, 0, 1), .up = Vec3::UnitZ(), .field_of_view = 0.6};
+  const auto shows = [&](const Vec3& at, const Vec3& light) {
+    return may_show(camera, 1.5, light, 0.03, Box{at, at}.inflated(0.3));
+  };
+  EXPECT_TRUE(shows(Vec3(0, 0, 1), Vec3(0, 0, -1)));
+  EXPECT_FALSE(shows(Vec3(0, -9, 1), Vec3(0, -1, -1)));  // behind, shadow goes away
+  EXPECT_TRUE(shows(Vec3(0, -9, 1), Vec3(0, 1, -0.2)));  // behind, shadow falls into the picture
+  EXPECT_FALSE(shows(Vec3(9, 0, 1), Vec3(0.4, 0, -1)));  // beside
+  EXPECT_TRUE(shows(Vec3(9, 0, 1), Vec3(-0.4, 0, -1)));
+  EXPECT_TRUE(shows(Vec3(0, 0, 9), Vec3(0, 0, -1)));     // above, shadow below
+  EXPECT_FALSE(shows(Vec3(0, 0, 9), Vec3(0, 0, 1)));
+}
+
+TEST(Camera, CellsKeepTheSagittaBelowTheError) {
+  const double cell = cell_for(0.5, 0.001, 4.0, 0.3);
+  EXPECT_NEAR(cell * cell / (8.0 * 0.3), 0.5 * 0.001 * 4.0, 1e-15);
+}
+
+TEST_F(Looks, WhatNoCameraSeesIsNotMeshed) {
+  const std::string text = R"(
+schema: 1
+duration: 0.1 s
+objects:
+  - name: seen
+    particles: {arrange: single, mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+  - name: unseen
+    particles: {arrange: single, at: [0, -9, 0], mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+camera: {from: [0, -3, 1], look_at: [0, 0, 0]}
+light: {direction: [0, -0.3, -1]}
+)";
+  const auto run = [&](const std::string& output, bool skip) {
+    const Scene scene = parse_scene(text + output, "looks.yaml", ".");
+    const RunResult done = run_scene(scene, {.folder = folder_, .frames = {1}, .threads = 1, .overwrite = true, .skip = skip});
+    EXPECT_EQ(done.outcome, "done") << done.reason;
+    return render::read_png(folder_ / "frames/looks.0001.png").pixels;
+  };
+  const auto visited = [&] {
+    std::ifstream file(folder_ / "result.json");
+    return nlohmann::json::parse(file).at("stages").at("polygonise").at("visited").get<std::uint64_t>();
+  };
+  const auto skipped = run("output: {images: {size: [160, 120]}}\n", true);
+  const std::uint64_t few = visited();
+  const auto whole = run("output: {images: {size: [160, 120]}}\n", false);
+  EXPECT_LT(2 * few, visited() + 10);
+  // The shadow map fits what is there, so shadows are sampled at other places: their edges differ, nothing else.
+  ASSERT_EQ(skipped.size(), whole.size());
+  double sum = 0.0;
+  int edges = 0;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    sum += std::abs(skipped[i] - whole[i]);
+    edges += std::abs(skipped[i] - whole[i]) > 24 ? 1 : 0;
+  }
+  EXPECT_LT(edges, static_cast<int>(whole.size() / 200));
+  EXPECT_LT(sum / static_cast<double>(whole.size()), 0.5);
+  run("output: {images: {size: [160, 120]}, mesh: ply}\n", true);  // files hold everything
+  EXPECT_TRUE(fs::exists(folder_ / "meshes/looks.unseen.0001.ply"));
+}
+
+TEST_F(Looks, PixelErrorsChooseTheCells) {
+  const auto visited = [&](const std::string& render) {
+    const RunResult done = run_scene(scene_with("", render + kOneCamera), {.folder = folder_, .frames = {1}, .threads = 1, .overwrite = true});
+    EXPECT_EQ(done.outcome, "done") << done.reason;
+    std::ifstream file(folder_ / "result.json");
+    return nlohmann::json::parse(file).at("stages").at("polygonise").at("visited").get<std::uint64_t>();
+  };
+  const std::uint64_t fine = visited("render: {pixel_error: 0.02}\n");
+  EXPECT_GT(fine, visited("render: {pixel_error: 0.5}\n"));
+}
+
+TEST_F(Looks, ACameraInsideAnObjectIsAWarning) {
+  const RunResult done = run_scene(scene_with("", "camera: {from: [0, 0.05, 0], look_at: [3, 0, 0]}\noutput: {images: {size: [32, 32]}}\n"),
+                                   {.folder = folder_, .frames = {1}, .threads = 1});
+  ASSERT_EQ(done.warnings.size(), 1u);
+  EXPECT_NE(done.warnings[0].find("inside of 'chain'"), std::string::npos) << done.warnings[0];
+}
+
 TEST_F(Looks, ChangeNoBitOfTheMotion) {
   const Scene plain = scene_with("", kOneCamera);
   const Scene coloured = scene_with("colour_by: stretch, range: [-0.1, 0.1], frames: 0.1", kOneCamera);
@@ -121,6 +203,41 @@ output: {images: {size: [96, 64], samples: 1}, film: true}
             render::read_png(folder_ / "frames/looks.above.0001.png").pixels);
   ASSERT_EQ(run_scene(scene_with("", kOneCamera), {.folder = folder_, .threads = 1, .overwrite = true}).outcome, "done");
   EXPECT_FALSE(fs::exists(folder_ / "looks.front.mp4"));
+}
+
+TEST_F(Looks, PathTracerDrawsTheSameSceneOrIsNamedAsAbsent) {
+  const std::string path = "render: {renderer: path, noise: 0, most_samples: 4}\n";
+  const RunResult done = run_scene(scene_with("", path + kOneCamera), {.folder = folder_, .frames = {1}, .threads = 1});
+  if (!render::has_path_tracer()) {
+    EXPECT_NE(done.reason.find("Embree"), std::string::npos) << done.reason;
+    return;
+  }
+  ASSERT_EQ(done.outcome, "done") << done.reason;
+  const render::Image traced = render::read_png(folder_ / "frames/looks.0001.png");
+  const render::Image drawn = first_picture(scene_with("", kOneCamera));
+  double sum = 0.0;
+  for (std::size_t i = 0; i < traced.pixels.size(); ++i) sum += std::abs(traced.pixels[i] - drawn.pixels[i]);
+  EXPECT_LT(sum / static_cast<double>(traced.pixels.size()), 12.0);
+  EXPECT_NE(traced.pixels, drawn.pixels);
+  // Each key of `render` changes something; the threads do not.
+  const auto with = [&](const std::string& keys, const std::string& camera = kOneCamera) {
+    return first_picture(scene_with("", "render: {renderer: path, noise: 0, most_samples: 4" + keys + "}\n" + camera)).pixels;
+  };
+  EXPECT_EQ(with(""), traced.pixels);
+  for (const char* keys : {", denoise: false", ", exact_surface: false", ", shutter: 1"}) EXPECT_NE(with(keys), traced.pixels) << keys;
+  EXPECT_NE(with("", "camera: {from: [0, -3, 1], look_at: [0, 0, 0], aperture: 0.3, focus: 1}\noutput: {images: {size: [160, 120]}}\n"),
+            traced.pixels);
+}
+
+TEST_F(Looks, PicturesAreTimedByTheirParts) {
+  const RunResult done = run_scene(scene_with("", kOneCamera), {.folder = folder_, .frames = {1}, .threads = 1});
+  EXPECT_EQ(done.pictures.images, 1);
+  for (const double part : {done.pictures.render.context, done.pictures.render.shaders, done.pictures.render.upload,
+                            done.pictures.render.draw, done.pictures.render.read_back, done.pictures.encode_s})
+    EXPECT_GT(part, 0.0);
+  std::ifstream file(folder_ / "result.json");
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  EXPECT_NE(text.find("\"read_back_cpu_s\""), std::string::npos);
 }
 
 TEST_F(Looks, AnAbsentTextureIsNamed) {

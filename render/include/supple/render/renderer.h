@@ -1,7 +1,8 @@
 /// @file supple/render/renderer.h
-/// Off-screen pictures of meshes by OpenGL 4.5 core: physically based shading in linear light with a filmic tone curve,
-/// soft shadows, ambient occlusion on the ground, multisampling. The context comes from OSMesa (no display, no GPU) or
-/// EGL surfaceless; the drawing code is the same.
+/// Off-screen pictures of meshes in linear light with a filmic tone curve, by OpenGL 4.5 core or by path tracing.
+/// OpenGL: physically based shading, soft shadows, ambient occlusion on the ground, multisampling; the context comes from
+/// OSMesa (no display, no GPU) or EGL surfaceless, the drawing code is the same. Path tracer (builds with Embree 3): light
+/// between surfaces, shadows and mirrors of everything, depth of field, motion blur.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 namespace supple::render {
 
+enum class RendererKind : std::uint8_t { Gl, Path };
 enum class ContextKind : std::uint8_t { Auto, OSMesa, Egl };
 
 struct RenderSettings {
@@ -22,6 +24,14 @@ struct RenderSettings {
   int shadow_size = 2048;         ///< shadow map edge [texel]; 0 switches shadows off
   double shadow_softness = 0.03;  ///< angular radius of the light [rad]
   ContextKind context = ContextKind::Auto;  ///< Auto: OSMesa
+  RendererKind kind = RendererKind::Gl;
+  // Of the path tracer alone:
+  int threads = 1;                ///< 0: all the machine has
+  double noise = 0.05;            ///< standard error of a pixel over its brightness, before the filter; 0: most_samples
+  int most_samples = 256;         ///< a pixel, a power of two up to 65536
+  bool denoise = true;            ///< filter by normals, places and colours
+  bool exact = true;              ///< meet Item::field
+  double shutter = 0.0;           ///< exposure [s]; vertices move by their columns velocity_x, velocity_y, velocity_z
 };
 
 /// CPU seconds of the process, threads of the driver included, since the renderer was made.
@@ -46,7 +56,10 @@ class Renderer {
   [[nodiscard]] virtual RenderTimes times() const = 0;
 };
 
-/// @throws Error{Usage} for sizes out of range, Error{Io} when the context cannot be made (naming the library looked for).
+/// Whether this build has a path tracer.
+[[nodiscard]] bool has_path_tracer();
+
+/// @throws Error{Usage} for sizes out of range or a path tracer this build has not, Error{Io} when the context cannot be made (naming the library looked for).
 /// A renderer is used by the thread that made it.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(const RenderSettings& settings);
 

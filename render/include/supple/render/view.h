@@ -3,8 +3,10 @@
 /// [0, 1] and become linear light (IEC 61966-2-1) before anything is computed with them.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +68,9 @@ struct Paint {
   double upper = 1.0;
 };
 
+/// Values and gradients of a field at points [m]; inside > 0. Called from several threads at once.
+using SurfaceField = std::function<void(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients)>;
+
 struct Item {
   const Mesh* mesh = nullptr;                ///< may be empty
   Vec3 colour = Vec3(0.8, 0.8, 0.8);         ///< sRGB in [0, 1]; of a metal, that of its reflection
@@ -75,6 +80,9 @@ struct Item {
   double opacity = 1.0;                      ///< (0, 1]; OpenGL: in steps of 1 / samples
   Paint paint = {};
   bool surface = true;                       ///< false: only what `wireframe` asks for
+  double reflectance = 0.04;                 ///< of the clear coat, head on; 0: matt
+  SurfaceField field = {};                   ///< whose zero the mesh is; the path tracer meets it instead of the triangles
+  double field_reach = 0.0;                  ///< how far from its triangle the surface may be [m]
   bool wireframe = false;                    ///< edges of the triangles, dark on a surface, in the item's colour without
 };
 

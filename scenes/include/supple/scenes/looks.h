@@ -27,6 +27,7 @@ enum class MapName : std::uint8_t { Viridis, Magma, Coolwarm, Turbo, Grey };
 /// objects[].look
 struct LookDesc {
   double metallic = 0.0;
+  double reflectance = 0.04;          ///< head on, of what is no metal
   double opacity = 1.0;
   std::optional<TextureDesc> texture;
   ColourByName colour_by = ColourByName::Colour;
@@ -54,6 +55,8 @@ struct CameraDesc {
   Vec3 look_at = Vec3::Zero();
   Vec3 up = Vec3::UnitZ();
   double field_of_view = 0.61;        ///< vertical [rad] (key field_of_view_deg)
+  double aperture = 0.0;              ///< radius of the lens [m]
+  std::optional<double> focus;        ///< distance that is sharp [m]; absent: that of look_at
   double turntable = 0.0;             ///< about the vertical through look_at, during the scene [rad] (key turntable_deg)
   std::vector<CameraKeyDesc> keys;    ///< by time; instead of from, look_at and field_of_view
 };
@@ -71,6 +74,19 @@ struct AreaLightDesc {
   Vec3 half_sizes = Vec3(0.5, 0.5, 0);  ///< across and along [m]
   Vec3 colour = Vec3::Ones();         ///< sRGB
   double intensity = 5.0;             ///< radiance, relative to that of the sky
+};
+
+enum class RendererName : std::uint8_t { Gl, Path };
+
+/// render: how pictures are made
+struct RenderDesc {
+  RendererName renderer = RendererName::Gl;
+  std::optional<double> pixel_error;  ///< largest distance of meshes to surfaces [pixel]; absent: by output.cell
+  double noise = 0.05;                ///< path: standard error of a pixel over its brightness, before the filter
+  int most_samples = 256;             ///< path: a pixel, a power of two
+  bool denoise = true;                ///< path
+  bool exact_surface = true;          ///< path: rays meet the field, not the triangles
+  double shutter = 0.0;               ///< path: exposure over the time between frames
 };
 
 struct BackgroundDesc {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/render/renderer.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
@@ -41,6 +42,13 @@ struct RunOptions {
   const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current frame (the signal's number)
 };
 
+/// CPU time of all pictures of a run, by their parts.
+struct PictureTimes {
+  int images = 0;
+  render::RenderTimes render;
+  double encode_s = 0.0;    ///< PNG
+};
+
 struct RunResult {
   std::string outcome;      ///< done, diverged, interrupted, limit, io, invalid
   std::string reason;       ///< empty when done
@@ -53,6 +61,7 @@ struct RunResult {
   std::filesystem::path report; ///< result.json, render.json or export.json
   std::filesystem::path film;   ///< empty: none
   std::vector<std::string> warnings;
+  PictureTimes pictures;
 };
 
 /// Simulates, surfaces, renders and films a scene into options.folder:

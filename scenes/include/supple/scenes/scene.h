@@ -369,6 +369,7 @@ struct Scene {
   LightDesc light;
   std::vector<AreaLightDesc> lights;
   BackgroundDesc background;
+  RenderDesc render;
   std::optional<GroundDesc> ground;
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key

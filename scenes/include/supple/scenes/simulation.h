@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -104,6 +105,10 @@ class Simulation {
   /// Edge of a lattice cell of `meshes` [m], and its choice by a number of cells along the longest side of all surfaces.
   [[nodiscard]] double cell() const;
   void set_cells(int cells);
+  void set_cell(double cell);
+  /// From now on `meshes` leaves out (as empty ones) bodies that touch nothing and whose surface lies in a box for which
+  /// this is false. An empty function: all are made.
+  void set_shown(std::function<bool(const Box&)> shown);
 
   [[nodiscard]] Energies energies();
   [[nodiscard]] Audits audits() const;

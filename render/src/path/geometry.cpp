@@ -1,0 +1,268 @@
+#include "geometry.h"
+
+#include <cstring>
+#include <limits>
+
+#include "../draw_list.h"
+#include "../lighting.h"
+#include "paint.h"
+#include "supple/core/error.h"
+#include "supple/core/executor.h"
+#include "supple/core/hash.h"
+
+namespace supple::render::path {
+namespace {
+
+constexpr float kNear = 1e-5F;
+
+void check(RTCDevice device) {
+  const RTCError code = rtcGetDeviceError(device);
+  if (code == RTC_ERROR_NONE) return;
+  const bool memory = code == RTC_ERROR_OUT_OF_MEMORY;
+  throw Error(memory ? ErrorKind::Limit : ErrorKind::Internal,
+              Fault{.place = "render", .key = {}, .expected = memory ? "no memory for the triangles of the picture"
+                                                                     : "Embree reports error " + std::to_string(code),
+                    .found = {}, .hint = {}});
+}
+
+Vec3f vector(const float* v) { return {v[0], v[1], v[2]}; }
+
+std::uint64_t topology_of(const Mesh& mesh) {
+  Hasher hasher;
+  for (const auto& t : mesh.triangle)
+    for (const std::uint32_t v : t) hasher.add(std::uint64_t{v});
+  return hasher.value();
+}
+
+}  // namespace
+
+/// What of an item stays between pictures.
+struct Geometry::Part {
+  RTCGeometry geometry = nullptr;
+  unsigned id = RTC_INVALID_GEOMETRY_ID;
+  std::uint64_t topology = 0;
+  bool moving = false;
+  std::vector<float> position;       ///< at the beginning, and for moving ones at the end; [vertices][4]
+  std::vector<float> position_end;
+  std::vector<Vec3f> normal;
+  std::vector<std::uint32_t> index;
+  PaintSource paint;
+};
+
+Geometry::Geometry() : device_(rtcNewDevice("set_affinity=0")) {
+  scene_ = rtcNewScene(device_);
+  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST);
+  check(device_);
+}
+
+Geometry::~Geometry() {
+  for (const auto& part : parts_)
+    if (part->geometry != nullptr) rtcReleaseGeometry(part->geometry);
+  rtcReleaseScene(scene_);
+  rtcReleaseDevice(device_);
+}
+
+void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutter, float wire) {
+  counts_ = {};
+  wire_ = wire;
+  const bool same_place = origin == origin_;
+  bool changed = scene_is_new_;
+  scene_is_new_ = false;
+  origin_ = origin;
+  for (std::size_t i = items.size(); i < parts_.size(); ++i) {
+    if (parts_[i]->geometry == nullptr) continue;
+    changed = true;
+    rtcDetachGeometry(scene_, parts_[i]->id);
+    rtcReleaseGeometry(parts_[i]->geometry);
+  }
+  parts_.resize(items.size());
+  items_.assign(items.begin(), items.end());
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    SUPPLE_EXPECTS(items[i].mesh != nullptr);
+    const Mesh& mesh = *items[i].mesh;
+    SUPPLE_EXPECTS(mesh.normal.size() == mesh.position.size());
+    if (!parts_[i]) parts_[i] = std::make_unique<Part>();
+    Part& part = *parts_[i];
+    part.paint = PaintSource(items[i]);
+
+    const std::size_t n = mesh.vertex_count();
+    const auto* vx = column(mesh, "velocity_x");
+    const auto* vy = column(mesh, "velocity_y");
+    const auto* vz = column(mesh, "velocity_z");
+    const bool moving = shutter > 0.0 && vx != nullptr && vy != nullptr && vz != nullptr;
+    std::vector<float> begin(4 * n), end(moving ? 4 * n : 0);
+    for (std::size_t v = 0; v < n; ++v) {
+      const Vec3 half = moving ? Vec3(0.5 * shutter * Vec3((*vx)[v], (*vy)[v], (*vz)[v])) : Vec3(Vec3::Zero());
+      const Vec3 p = mesh.position[v] - origin;
+      for (int k = 0; k < 3; ++k) {
+        begin[4 * v + static_cast<std::size_t>(k)] = static_cast<float>(p[k] - half[k]);
+        if (moving) end[4 * v + static_cast<std::size_t>(k)] = static_cast<float>(p[k] + half[k]);
+      }
+    }
+    part.normal.resize(n);
+    for (std::size_t v = 0; v < n; ++v) part.normal[v] = mesh.normal[v].cast<float>();
+
+    const std::uint64_t topology = topology_of(mesh);
+    const bool same_triangles = part.geometry != nullptr && topology == part.topology && moving == part.moving &&
+                                part.position.size() == begin.size();
+    if (same_triangles && same_place && begin == part.position && end == part.position_end) {
+      ++counts_.kept;
+      continue;
+    }
+    changed = true;
+    part.position = std::move(begin);
+    part.position_end = std::move(end);
+    if (same_triangles) {
+      // The buffers are Embree's copies: they keep their places.
+      std::memcpy(rtcGetGeometryBufferData(part.geometry, RTC_BUFFER_TYPE_VERTEX, 0), part.position.data(),
+                  part.position.size() * sizeof(float));
+      rtcUpdateGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+      if (moving) {
+        std::memcpy(rtcGetGeometryBufferData(part.geometry, RTC_BUFFER_TYPE_VERTEX, 1), part.position_end.data(),
+                    part.position_end.size() * sizeof(float));
+        rtcUpdateGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, 1);
+      }
+      rtcSetGeometryBuildQuality(part.geometry, RTC_BUILD_QUALITY_REFIT);
+      rtcCommitGeometry(part.geometry);
+      ++counts_.refitted;
+      continue;
+    }
+    if (part.geometry != nullptr) {
+      rtcDetachGeometry(scene_, part.id);
+      rtcReleaseGeometry(part.geometry);
+      part.geometry = nullptr;
+    }
+    part.topology = topology;
+    part.moving = moving;
+    part.index.clear();
+    for (const auto& t : mesh.triangle) part.index.insert(part.index.end(), t.begin(), t.end());
+    if (part.index.empty()) continue;
+    for (const std::uint32_t v : part.index) SUPPLE_EXPECTS(v < n);
+    part.geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (moving) rtcSetGeometryTimeStepCount(part.geometry, 2);
+    const auto fill = [&](unsigned slot, const std::vector<float>& from) {
+      void* to = rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, slot, RTC_FORMAT_FLOAT3, 4 * sizeof(float), n);
+      std::memcpy(to, from.data(), from.size() * sizeof(float));
+    };
+    fill(0, part.position);
+    if (moving) fill(1, part.position_end);
+    void* to = rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t),
+                                       mesh.triangle_count());
+    std::memcpy(to, part.index.data(), part.index.size() * sizeof(std::uint32_t));
+    // Wires alone throw no shadow.
+    rtcSetGeometryMask(part.geometry, items[i].surface ? 3u : 1u);
+    rtcCommitGeometry(part.geometry);
+    part.id = static_cast<unsigned>(i);
+    rtcAttachGeometryByID(scene_, part.geometry, part.id);
+    ++counts_.built;
+  }
+  // By one thread, so that the hierarchy, and with it the choice between triangles that a ray meets at one place, is always
+  // the same. A device with threads=1 would limit the threads of the whole process.
+  if (changed) Executor(1).run([this] { rtcJoinCommitScene(scene_); });
+  check(device_);
+}
+
+bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
+  float near_end = kNear;
+  for (int layer = 0; layer < 32; ++layer) {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit ray{};
+    ray.ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = near_end,
+               .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
+               .tfar = std::numeric_limits<float>::infinity(), .mask = 1u, .id = 0, .flags = 0};
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(scene_, &context, &ray);
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+
+    const Part& part = *parts_[ray.hit.geomID];
+    const Item& item = items_[ray.hit.geomID];
+    const std::uint32_t* corner = &part.index[3 * std::size_t{ray.hit.primID}];
+    const Vec3f weight(1.0F - ray.hit.u - ray.hit.v, ray.hit.u, ray.hit.v);
+    std::array<Vec3f, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = vector(&part.position[4 * std::size_t{corner[k]}]);
+      if (part.moving) p[k] += time * (vector(&part.position_end[4 * std::size_t{corner[k]}]) - p[k]);
+    }
+    hit.item = ray.hit.geomID;
+    hit.distance = ray.ray.tfar;
+    hit.point = weight[0] * p[0] + weight[1] * p[1] + weight[2] * p[2];
+    const Vec3f cross = (p[1] - p[0]).cross(p[2] - p[0]);
+    const float twice_area = std::max(cross.norm(), 1e-30F);
+    hit.face_normal = cross / twice_area;
+
+    // Behind a back face of a closed body, through the holes of a wireframe, past part of what is not opaque.
+    float edge = INFINITY;
+    for (std::size_t k = 0; item.wireframe && k < 3; ++k)
+      edge = std::min(edge, weight[static_cast<Eigen::Index>(k)] * twice_area / (p[(k + 2) % 3] - p[(k + 1) % 3]).norm());
+    const bool on_wire = item.wireframe && edge < wire_ * hit.distance;
+    const bool back = hit.face_normal.dot(direction) > 0.0F;
+    const bool visible = on_wire || (item.surface && (!back || item.two_sided) && choice < item.opacity);
+    if (!visible) {
+      near_end = hit.distance * (1.0F + 2e-6F) + kNear;
+      continue;
+    }
+    hit.normal = (weight[0] * part.normal[corner[0]] + weight[1] * part.normal[corner[1]] + weight[2] * part.normal[corner[2]]).normalized();
+    if (back) {
+      hit.face_normal = -hit.face_normal;
+      hit.normal = -hit.normal;
+    }
+    // Each tangent plane at a corner pulls the point out to itself.
+    hit.leave = Vec3f::Zero();
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const Vec3f n = back ? Vec3f(-part.normal[corner[k]]) : part.normal[corner[k]];
+      hit.leave += weight[k] * (hit.point - std::min(0.0F, (hit.point - p[static_cast<std::size_t>(k)]).dot(n)) * n);
+    }
+    hit.bsdf = part.paint.bsdf(item, corner, weight, p, hit.point + origin_.cast<float>(), hit.normal, on_wire);
+    if (exact && item.field && !on_wire && !part.moving) refine(item, direction, hit);
+    // A smooth normal may look away where the triangle does not.
+    if (hit.normal.dot(direction) > -0.02F) hit.normal = (hit.normal - (hit.normal.dot(direction) + 0.02F) * direction).normalized();
+    return true;
+  }
+  return false;
+}
+
+/// Newton's method along the ray. A hit that would leave the neighbourhood of its triangle stays: at outlines the surface
+/// may curve away from the ray.
+void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const {
+  const Vec3 along = direction.cast<double>();
+  const Vec3 start = hit.point.cast<double>() + origin_;
+  double t = 0.0;
+  Vec3 gradient = Vec3::Zero();
+  bool found = false;
+  for (int step = 0; step < 4 && !found; ++step) {
+    const Vec3 p = start + t * along;
+    double value = 0.0;
+    item.field(std::span(&p, 1), std::span(&value, 1), std::span(&gradient, 1));
+    const double slope = gradient.dot(along);
+    const double size = gradient.norm();
+    if (!(size > 0.0)) return;
+    if (!(slope > 0.05 * size)) break;  // grazing: the normal is good, the root may be far
+    const double move = -value / slope;
+    t += move;
+    if (std::abs(t) > item.field_reach) return;
+    found = std::abs(move) < 1e-4 * item.field_reach;
+  }
+  const Vec3f normal = -gradient.normalized().cast<float>();
+  if (normal.dot(hit.face_normal) < 0.3F) return;
+  hit.normal = normal;
+  if (!found) return;
+  const Vec3f p = (start + t * along - origin_).cast<float>();
+  hit.distance += static_cast<float>(t);
+  // Outside of triangle and surface both, so that neither shadows the other.
+  const float outward = (p - hit.point).dot(hit.face_normal);
+  if (outward > 0.0F) hit.leave = p;
+  hit.point = p;
+}
+
+bool Geometry::blocked(const Vec3f& from, const Vec3f& direction, float distance, float time) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRay ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = kNear,
+                .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
+                .tfar = distance, .mask = 2u, .id = 0, .flags = 0};
+  rtcOccluded1(scene_, &context, &ray);
+  return ray.tfar < 0.0F;
+}
+
+}  // namespace supple::render::path

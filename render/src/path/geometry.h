@@ -1,0 +1,65 @@
+/// @file geometry.h
+/// The triangles of a picture in Embree: what a ray meets first, and with which material.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "bsdf.h"
+#include "supple/render/view.h"
+
+namespace supple::render::path {
+
+/// Where a ray met an item.
+struct Hit {
+  float distance = 0.0F;
+  Vec3f point = Vec3f::Zero();        ///< of the triangle, relative to the origin [m]
+  Vec3f face_normal = Vec3f::Zero();  ///< unit, of the triangle, towards the ray
+  Vec3f normal = Vec3f::Zero();       ///< unit, smooth, of the field where the item has one
+  Vec3f leave = Vec3f::Zero();        ///< where paths go on: outside of the smooth surface (Hanika 2021)
+  Bsdf bsdf;
+  std::uint32_t item = 0;
+};
+
+class Geometry {
+ public:
+  Geometry();
+  ~Geometry();
+  Geometry(const Geometry&) = delete;
+  Geometry& operator=(const Geometry&) = delete;
+
+  /// Takes over the items of a picture. What is as it was keeps its hierarchy; what kept its triangles but moved refits it.
+  /// @param shutter  how long the picture is exposed [s]: vertices move by the columns velocity_x, velocity_y, velocity_z
+  /// @param wire     radius of the edges of wireframes over their distance
+  void set(std::span<const Item> items, const Vec3& origin, double shutter, float wire);
+
+  /// @param time    in [0, 1] of the exposure
+  /// @param choice  uniform, decides about opacity
+  /// @param exact   move the hit onto the field's surface
+  [[nodiscard]] bool meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const;
+  [[nodiscard]] bool blocked(const Vec3f& from, const Vec3f& direction, float distance, float time) const;
+
+  /// Hierarchies of the last `set`.
+  struct Counts {
+    int built = 0, refitted = 0, kept = 0;
+  };
+  [[nodiscard]] const Counts& counts() const { return counts_; }
+
+ private:
+  struct Part;
+  void refine(const Item& item, const Vec3f& direction, Hit& hit) const;
+
+  RTCDevice device_ = nullptr;
+  RTCScene scene_ = nullptr;
+  std::vector<std::unique_ptr<Part>> parts_;  ///< of each item
+  std::vector<Item> items_;
+  Vec3 origin_ = Vec3::Zero();
+  float wire_ = 0.0F;
+  bool scene_is_new_ = true;
+  Counts counts_;
+};
+
+}  // namespace supple::render::path

@@ -1,0 +1,50 @@
+/// @file integrator.h
+/// Light along random paths (Kajiya 1986): sun and rectangles are sampled at every bounce and weighed against directions
+/// that the surfaces choose (multiple importance sampling, Veach 1997); the even sky is met by those directions alone.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "../draw_list.h"
+#include "geometry.h"
+#include "lights.h"
+#include "supple/core/executor.h"
+
+namespace supple::render::path {
+
+struct GroundPlane {
+  float height = 0.0F;         ///< relative to the origin [m]
+  Vec3f albedo = Vec3f::Zero();
+  bool fades = false;          ///< into the background with distance, for the camera
+};
+
+struct TraceSettings {
+  int width = 0;
+  int height = 0;
+  int least_samples = 8;       ///< a pixel, a power of two
+  int most_samples = 256;      ///< a pixel, a power of two
+  double noise = 0.05;         ///< standard error of a pixel's luminance over (luminance + 0.1), RMS of a tile; 0: most_samples
+  int bounces = 6;             ///< surfaces along a path after the first
+  bool exact = true;           ///< hits lie on the surface of the field, where an item has one
+  double aperture = 0.0;       ///< radius of the lens [m]
+  double focus = 1.0;          ///< distance of the plane that is sharp, along the line of sight [m]
+  float largest_indirect = 10.0F;  ///< luminance that a bounce can add; keeps single bright paths out of a picture
+};
+
+/// One pixel after the other from the top left. Features are those of the first surface, for the denoiser.
+struct Film {
+  std::vector<Vec3f> radiance;     ///< mean over the covered part
+  std::vector<float> variance;     ///< of the mean luminance
+  std::vector<float> cover;        ///< in [0, 1]: not background
+  std::vector<Vec3f> albedo;
+  std::vector<Vec3f> normal;
+  std::vector<Vec3f> position;     ///< relative to the origin [m]
+  std::vector<std::uint32_t> samples;
+};
+
+/// The same bits for any number of threads: a tile of 8 x 8 pixels decides about its samples alone.
+void trace(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
+           const TraceSettings& settings, const Executor& executor, Film& film);
+
+}  // namespace supple::render::path

@@ -1,0 +1,88 @@
+#include "paint.h"
+
+#include "../draw_list.h"
+#include "../lighting.h"
+
+namespace supple::render::path {
+namespace {
+
+/// Bilinear, repeated.
+Vec3f texel(const std::vector<Vec3f>& texels, int width, int height, float u, float v) {
+  const float x = (u - std::floor(u)) * static_cast<float>(width) - 0.5F;
+  const float y = (v - std::floor(v)) * static_cast<float>(height) - 0.5F;
+  const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const auto at = [&](int i, int j) -> const Vec3f& {
+    return texels[static_cast<std::size_t>((j + height) % height) * static_cast<std::size_t>(width) +
+                  static_cast<std::size_t>((i + width) % width)];
+  };
+  return (1 - fy) * ((1 - fx) * at(x0, y0) + fx * at(x0 + 1, y0)) + fy * ((1 - fx) * at(x0, y0 + 1) + fx * at(x0 + 1, y0 + 1));
+}
+
+bool even(float x) { return (static_cast<long>(std::floor(x)) & 1) == 0; }
+
+}  // namespace
+
+PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)), second_(linear_colour(item.paint.colour)) {
+  const Mesh& mesh = *item.mesh;
+  const std::array<const std::vector<double>*, 3> rest = {column(mesh, "rest_x"), column(mesh, "rest_y"), column(mesh, "rest_z")};
+  const bool patterned = item.paint.kind == PaintKind::Checker || item.paint.kind == PaintKind::Stripes || item.paint.kind == PaintKind::Picture;
+  if (patterned && rest[0] != nullptr && rest[1] != nullptr && rest[2] != nullptr)
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+      rest_.push_back(Vec3((*rest[0])[v], (*rest[1])[v], (*rest[2])[v]).cast<float>());
+  if (item.paint.kind == PaintKind::Values) {
+    const std::vector<double>* values = column(mesh, item.paint.column);
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+      values_.push_back(static_cast<float>(values == nullptr ? item.paint.lower : (*values)[v]));
+  }
+  if (item.paint.kind == PaintKind::Picture) {
+    const Image& image = *item.paint.picture;
+    for (int y = image.height - 1; y >= 0; --y)
+      for (int x = 0; x < image.width; ++x) {
+        const std::uint8_t* p = &image.pixels[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x))];
+        texels_.push_back(linear_colour(Vec3(p[0], p[1], p[2]) / 255.0));
+      }
+  }
+}
+
+Vec3f PaintSource::colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,
+                          const Vec3f& world, const Vec3f& normal) const {
+  const Paint& paint = item.paint;
+  if (paint.kind == PaintKind::Plain) return first_;
+  if (paint.kind == PaintKind::Normals) return linear_colour(0.5 * normal.cast<double>() + Vec3::Constant(0.5));
+  if (paint.kind == PaintKind::Values) {
+    const float value = weight[0] * values_[corner[0]] + weight[1] * values_[corner[1]] + weight[2] * values_[corner[2]];
+    return linear_colour(colour_of(paint.map, (value - paint.lower) / (paint.upper - paint.lower)));
+  }
+  const bool own = !rest_.empty();
+  const Vec3f at = (own ? Vec3f(weight[0] * rest_[corner[0]] + weight[1] * rest_[corner[1]] + weight[2] * rest_[corner[2]]) : world) /
+                   static_cast<float>(paint.size);
+  if (paint.kind == PaintKind::Checker) return (even(at.x()) == even(at.y())) == even(at.z()) ? first_ : second_;
+  if (paint.kind == PaintKind::Stripes) return even(at.dot(paint.axis.normalized().cast<float>())) ? first_ : second_;
+  const Vec3f slope = own ? (rest_[corner[1]] - rest_[corner[0]]).cross(rest_[corner[2]] - rest_[corner[0]]).normalized()
+                          : (places[1] - places[0]).cross(places[2] - places[0]).normalized();
+  Vec3f share = slope.cwiseAbs2().cwiseAbs2();
+  share /= share.sum();
+  const int width = paint.picture->width, height = paint.picture->height;
+  const float aspect = static_cast<float>(width) / static_cast<float>(height);
+  return share.x() * texel(texels_, width, height, at.y(), at.z() * aspect) +
+         share.y() * texel(texels_, width, height, at.x(), at.z() * aspect) +
+         share.z() * texel(texels_, width, height, at.x(), at.y() * aspect);
+}
+
+Bsdf PaintSource::bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,
+                       const Vec3f& world, const Vec3f& normal, bool on_wire) const {
+  Vec3f base = on_wire ? Vec3f(first_ * (item.surface ? 0.08F : 1.0F)) : colour(item, corner, weight, places, world, normal);
+  const auto metallic = static_cast<float>(std::clamp(item.metallic, 0.0, 1.0));
+  const auto reflectance = static_cast<float>(std::clamp(item.reflectance, 0.0, 1.0));
+  Bsdf bsdf;
+  bsdf.diffuse = (1.0F - metallic) * base;
+  bsdf.normal_reflectance = (1.0F - metallic) * Vec3f::Constant(reflectance) + metallic * base;
+  // What reflects less than any solid does not reflect at grazing angles either (Lagarde & de Rousiers 2014).
+  bsdf.grazing_reflectance = std::min(1.0F, 50.0F * bsdf.normal_reflectance.maxCoeff());
+  const auto roughness = static_cast<float>(std::clamp(item.roughness, 0.02, 1.0));
+  bsdf.alpha = roughness * roughness;
+  return bsdf;
+}
+
+}  // namespace supple::render::path

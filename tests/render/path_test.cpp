@@ -1,0 +1,467 @@
+// The path tracer against closed forms: even light, the sky over a tilted plate, rectangles of light and their shadows.
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "path/denoise.h"
+#include "path/integrator.h"
+#include "shapes.h"
+#include "supple/render/renderer.h"
+#include "support.h"
+
+namespace supple::render::test {
+namespace {
+
+using path::Bsdf;
+using path::Film;
+using path::Lights;
+using path::Sampler;
+using path::Vec3f;
+
+constexpr float kPi = path::kPi;
+
+/// A picture of items without a tone curve.
+struct Studio {
+  View view;
+  path::TraceSettings settings;
+  Lights lights;
+  std::optional<path::GroundPlane> ground;
+  path::Geometry geometry;
+  double shutter = 0.0;
+
+  Studio() {
+    settings.width = settings.height = 32;
+    settings.noise = 0.0;
+    settings.most_samples = 16;
+    view.camera = {.from = Vec3(0, -5, 0), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.3};
+  }
+  Film trace(std::span<const Item> items, int threads = 1) {
+    geometry.set(items, view.camera.look_at, shutter, 0.0F);
+    settings.focus = view.camera.focus > 0.0 ? view.camera.focus : (view.camera.from - view.camera.look_at).norm();
+    settings.aperture = view.camera.aperture;
+    Film film;
+    path::trace(geometry, lights, ground, camera_matrices(view.camera, 1.0 * settings.width / settings.height, {}), settings,
+                Executor(threads), film);
+    return film;
+  }
+};
+
+Item matt(const Mesh& mesh, double albedo) {
+  // sRGB of a linear grey.
+  const double srgb = albedo <= 0.0031308 ? 12.92 * albedo : 1.055 * std::pow(albedo, 1.0 / 2.4) - 0.055;
+  return {.mesh = &mesh, .colour = Vec3::Constant(srgb), .roughness = 1.0, .reflectance = 0.0};
+}
+
+Mesh plate(double half, const Vec3& at, const Vec3& u, const Vec3& v) {
+  Mesh mesh;
+  add_quadrangle(mesh, at - half * u - half * v, at + half * u - half * v, at + half * u + half * v, at - half * u + half * v);
+  return mesh;
+}
+
+double rms_difference(const Film& a, const Film& b) {
+  double sum = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
+    if (!(a.cover[i] > 0.0F && b.cover[i] > 0.0F)) continue;
+    sum += (a.cover[i] * a.radiance[i] - b.cover[i] * b.radiance[i]).squaredNorm() / 3.0;
+    count += 1.0;
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST(PathTracer, FindsAWhiteBodyInEvenLightAsBrightAsTheLight) {
+  // The furnace test: what reflects everything cannot be seen, what reflects half is half as bright.
+  const Mesh ball = sphere(Vec3::Zero(), 0.5, 24);
+  Studio studio;
+  studio.lights.above = studio.lights.below = Vec3f::Ones();
+  for (const double albedo : {1.0, 0.5}) {
+    const Item item = matt(ball, albedo);
+    const Film film = studio.trace(std::span(&item, 1));
+    double covered = 0.0;
+    for (std::size_t i = 0; i < film.radiance.size(); ++i) {
+      covered += film.cover[i];
+      if (film.cover[i] > 0.0F) { EXPECT_NEAR(film.radiance[i].y(), albedo, 1e-4); }  // each path's weight is exact
+    }
+    EXPECT_GT(covered, 200.0);
+  }
+}
+
+TEST(PathTracer, LosesNoLightBetweenWhiteBodies) {
+  // Two touching balls trade light many times; in even light they too cannot be seen.
+  const std::array meshes = {sphere(Vec3(-0.35, 0, 0), 0.35, 24), sphere(Vec3(0.35, 0, 0), 0.35, 24)};
+  const std::array items = {matt(meshes[0], 1.0), matt(meshes[1], 1.0)};
+  Studio studio;
+  studio.settings.bounces = 64;
+  studio.settings.most_samples = 64;
+  studio.lights.above = studio.lights.below = Vec3f::Ones();
+  const Film film = studio.trace(items);
+  double sum = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < film.radiance.size(); ++i) {
+    sum += film.cover[i] * film.radiance[i].y();
+    count += film.cover[i];
+  }
+  // Roulette lets a fifth of some ten thousand paths or less end at 0 or go on heavier: deviation .25 / 100, four times.
+  EXPECT_NEAR(sum / count, 1.0, 0.01);
+}
+
+TEST(Sampler, FillsEveryElementaryIntervalOnceByPairs) {
+  // A (0, 4, 2)-net in base 2: of 16 points each box of 2^-a x 2^-(4-a) holds one.
+  for (int pixel = 0; pixel < 20; ++pixel)
+    for (int a = 0; a <= 4; ++a) {
+      std::set<int> boxes;
+      for (std::uint32_t s = 16; s < 32; ++s) {
+        const Eigen::Vector2f u = Sampler(pixel, 7, s).pair();
+        boxes.insert(static_cast<int>(u.x() * static_cast<float>(1 << a)) * 16 + static_cast<int>(u.y() * static_cast<float>(1 << (4 - a))));
+      }
+      EXPECT_EQ(boxes.size(), 16u) << pixel << ' ' << a;
+    }
+}
+
+TEST(Bsdf, ReflectsNoMoreThanComesInFromAnyAngle) {
+  for (const float alpha : {0.02F, 0.2F, 0.6F, 1.0F})
+    for (const float reflectance : {0.0F, 0.04F, 0.5F})
+      for (const float cosine : {0.05F, 0.3F, 0.7F, 1.0F}) {
+        const Bsdf bsdf{.diffuse = Vec3f::Ones() * (1.0F - reflectance), .normal_reflectance = Vec3f::Constant(reflectance),
+                        .grazing_reflectance = reflectance > 0.0F ? 1.0F : 0.0F, .alpha = alpha};
+        const Vec3f out(std::sqrt(1.0F - cosine * cosine), 0.0F, cosine);
+        double sum = 0.0;
+        constexpr std::uint32_t kSamples = 4096;
+        for (std::uint32_t s = 0; s < kSamples; ++s) {
+          Sampler random(1, 2, s);
+          const float which = random.number();
+          const Vec3f in = bsdf.sample(out, which, random.pair());
+          const float density = bsdf.density(out, in);
+          if (density > 0.0F) sum += bsdf.evaluate(out, in).y() / density;
+        }
+        EXPECT_LT(sum / kSamples, 1.0 + 0.02) << alpha << ' ' << reflectance << ' ' << cosine;  // 4 standard errors
+      }
+}
+
+TEST(Bsdf, DensitiesIntegrateToTheShareAboveTheHorizonAndAgreeWithValues) {
+  for (const float alpha : {0.15F, 0.5F}) {
+    const Bsdf bsdf{.diffuse = Vec3f::Constant(0.4F), .normal_reflectance = Vec3f::Constant(0.1F), .alpha = alpha};
+    const Vec3f out = Vec3f(0.6F, 0.0F, 0.8F);
+    // Mid-point rule in cos and angle; the lobe is smooth over many cells.
+    double density = 0.0, reflected = 0.0;
+    constexpr int kCos = 400, kAngle = 800;
+    for (int i = 0; i < kCos; ++i)
+      for (int k = 0; k < kAngle; ++k) {
+        const float c = (static_cast<float>(i) + 0.5F) / kCos, s = std::sqrt(1.0F - c * c);
+        const float angle = 2.0F * kPi * (static_cast<float>(k) + 0.5F) / kAngle;
+        const Vec3f in(s * std::cos(angle), s * std::sin(angle), c);
+        density += bsdf.density(out, in);
+        reflected += bsdf.evaluate(out, in).y();
+      }
+    const double cell = 2.0 * M_PI / (static_cast<double>(kCos) * kAngle);
+    double above = 0.0, sampled = 0.0;
+    constexpr std::uint32_t kSamples = 16384;
+    for (std::uint32_t s = 0; s < kSamples; ++s) {
+      Sampler random(3, 4, s);
+      const float which = random.number();
+      const Vec3f in = bsdf.sample(out, which, random.pair());
+      if (in.z() <= 0.0F) continue;
+      above += 1.0 / kSamples;
+      sampled += bsdf.evaluate(out, in).y() / bsdf.density(out, in) / kSamples;
+    }
+    EXPECT_NEAR(density * cell, above, 0.005);
+    EXPECT_NEAR(sampled, reflected * cell, 0.005);
+    // Reciprocity: f itself is symmetric.
+    const Vec3f in = Vec3f(-0.3F, 0.5F, std::sqrt(1.0F - 0.34F));
+    EXPECT_NEAR(bsdf.evaluate(out, in).y() / in.z(), bsdf.evaluate(in, out).y() / out.z(), 1e-5);
+  }
+}
+
+TEST(PathTracer, LightsATiltedPlateByItsShareOfSkyAndOfWhatIsBelow) {
+  Studio studio;
+  studio.settings.most_samples = 256;
+  studio.lights.above = Vec3f::Constant(2.0F);
+  studio.lights.below = Vec3f::Constant(0.5F);
+  for (const double tilt : {0.0, 0.6, 1.2}) {  // of the normal from the horizon upward
+    const Vec3 up(0, std::sin(tilt), std::cos(tilt));
+    const Mesh mesh = plate(4.0, Vec3::Zero(), Vec3::UnitX(), up);
+    const Item item = matt(mesh, 0.6);
+    const Film film = studio.trace(std::span(&item, 1));
+    const double normal_z = mesh.normal[0].z();
+    ASSERT_LT(mesh.normal[0].y(), 0.0);
+    const double expected = 0.6 * (2.0 * 0.5 * (1.0 + normal_z) + 0.5 * 0.5 * (1.0 - normal_z));
+    const double mean = std::accumulate(film.radiance.begin(), film.radiance.end(), 0.0,
+                                        [](double s, const Vec3f& v) { return s + v.y(); }) / static_cast<double>(film.radiance.size());
+    // A sample is 1.2 or .3 with about even chance: deviation .45, over 512 for 32^2 x 256 samples, four times.
+    EXPECT_NEAR(mean, expected, 4.0 * 0.45 / 512.0) << tilt;
+  }
+}
+
+TEST(PathTracer, GivesTheSunItsIrradianceWhateverItsSize) {
+  const Mesh mesh = plate(2.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ());
+  const Item item = matt(mesh, 0.5);
+  Studio studio;
+  studio.lights.sun = {.to_light = Vec3f(0.6F, -0.8F, 0.0F), .irradiance = Vec3f::Constant(kPi), .cosine = 1.0F};
+  for (const double radius : {0.0, 0.05, 0.3}) {
+    studio.lights.sun.cosine = static_cast<float>(std::cos(radius));
+    studio.settings.most_samples = 64;
+    const Film film = studio.trace(std::span(&item, 1));
+    const double mean = std::accumulate(film.radiance.begin(), film.radiance.end(), 0.0,
+                                        [](double s, const Vec3f& v) { return s + v.y(); }) / static_cast<double>(film.radiance.size());
+    EXPECT_NEAR(mean, 0.5 * 0.8, 0.004) << radius;  // albedo times E / pi times the cosine; the disc is above the plate
+  }
+}
+
+/// Irradiance over pi of unit radiance from the rectangle [x0, x1] x [y0, y1] at height h over the origin, which faces it
+/// (Hottel's view factor of a corner, four times).
+double corner_factor(double a, double b, double h) {
+  const double x = a / h, y = b / h;
+  return 0.5 / M_PI * (x / std::sqrt(1 + x * x) * std::atan(y / std::sqrt(1 + x * x)) + y / std::sqrt(1 + y * y) * std::atan(x / std::sqrt(1 + y * y)));
+}
+double view_factor(double x0, double x1, double y0, double y1, double h) {
+  return corner_factor(x1, y1, h) - corner_factor(x0, y1, h) - corner_factor(x1, y0, h) + corner_factor(x0, y0, h);
+}
+
+TEST(PathTracer, ShadesTheEdgeOfARectanglesShadowByItsVisiblePart) {
+  // Floor at z = 0, a light of 1 x 1 at z = 2, and at z = 1 a half plane over x > 0. From the floor at x, the light is
+  // seen for light coordinates below -x.
+  Studio studio;
+  const Mesh floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  Mesh shade;
+  add_quadrangle(shade, Vec3(0, -9, 1), Vec3(9, -9, 1), Vec3(9, 9, 1), Vec3(0, 9, 1));
+  std::array items = {matt(floor, 1.0), matt(shade, 0.0)};
+  items[1].two_sided = true;
+  studio.lights.rectangles = {{.centre = Vec3f(0, 0, 2), .u = Vec3f(0.5F, 0, 0), .v = Vec3f(0, -0.5F, 0), .front = -Vec3f::UnitZ(),
+                               .radiance = Vec3f::Constant(3.0F)}};
+  studio.settings.most_samples = 1024;
+  studio.settings.width = studio.settings.height = 4;
+  for (const double x : {-1.0, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6}) {
+    studio.view.camera = {.from = Vec3(x - 1.5, 0, 0.5), .look_at = Vec3(x, 0, 0), .up = Vec3::UnitZ(), .field_of_view = 0.002};
+    const Vec3f shift = Vec3f(static_cast<float>(-x), 0, 0);  // places are relative to what is looked at
+    studio.lights.rectangles[0].centre = Vec3f(0, 0, 2) + shift;
+    const Film film = studio.trace(items);
+    const double upper = std::clamp(-x, -0.5, 0.5);
+    const double expected = 3.0 * view_factor(-0.5 - x, upper - x, -0.5, 0.5, 2.0);
+    double mean = 0.0;
+    for (const Vec3f& v : film.radiance) mean += v.y() / 16.0;
+    // 16,384 stratified samples of at most 3 x .08 / (share): below .002 in every case.
+    EXPECT_NEAR(mean, expected, 0.003) << x;
+  }
+}
+
+TEST(PathTracer, ConvergesAtLeastAsTheRootOfTheSamples) {
+  const Mesh ball = sphere(Vec3(0, 0, 0.1), 0.5, 16);
+  const Item item{.mesh = &ball, .colour = Vec3(0.8, 0.5, 0.3), .roughness = 0.5};
+  Studio studio;
+  studio.lights.above = Vec3f::Ones();
+  studio.lights.sun = {.to_light = Vec3f(0.3F, -0.5F, 0.8F).normalized(), .irradiance = Vec3f::Constant(3.0F), .cosine = 0.99F};
+  studio.ground = path::GroundPlane{.height = -0.4F, .albedo = Vec3f::Constant(0.5F)};
+  studio.settings.width = studio.settings.height = 16;
+  studio.settings.most_samples = 4096;
+  const Film reference = studio.trace(std::span(&item, 1));
+  std::vector<double> x, y;
+  for (const int n : {4, 16, 64, 256}) {
+    studio.settings.least_samples = studio.settings.most_samples = n;
+    const Film film = studio.trace(std::span(&item, 1));
+    x.push_back(std::log(n));
+    y.push_back(std::log(rms_difference(film, reference)));
+  }
+  const double mx = (x[0] + x[1] + x[2] + x[3]) / 4, my = (y[0] + y[1] + y[2] + y[3]) / 4;
+  double slope = 0.0, norm = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    slope += (x[i] - mx) * (y[i] - my);
+    norm += (x[i] - mx) * (x[i] - mx);
+  }
+  EXPECT_LT(slope / norm, -0.47);  // independent samples: -1/2; stratified ones fall faster
+  EXPECT_GT(slope / norm, -1.5);
+}
+
+TEST(PathTracer, TakesSamplesUntilTheStatedNoise) {
+  const Mesh ball = sphere(Vec3::Zero(), 0.5, 16);
+  const Item item{.mesh = &ball, .colour = Vec3(0.8, 0.5, 0.3)};
+  Studio studio;
+  studio.lights.above = Vec3f::Ones();
+  studio.lights.sun = {.to_light = Vec3f(0.3F, -0.5F, 0.8F).normalized(), .irradiance = Vec3f::Constant(3.0F), .cosine = 0.98F};
+  studio.settings.width = studio.settings.height = 24;
+  studio.settings.most_samples = 2048;
+  const Film reference = studio.trace(std::span(&item, 1));
+  double before = 0.0;
+  studio.settings.most_samples = 1024;
+  for (const double noise : {0.2, 0.05, 0.02}) {
+    studio.settings.noise = noise;
+    const Film film = studio.trace(std::span(&item, 1));
+    const double samples = std::accumulate(film.samples.begin(), film.samples.end(), 0.0);
+    EXPECT_GT(samples, before);
+    before = samples;
+    double sum = 0.0, count = 0.0;
+    for (std::size_t i = 0; i < film.radiance.size(); ++i) {
+      const double exact = path::luminance(reference.radiance[i]) * reference.cover[i];
+      const double error = (path::luminance(film.radiance[i]) * film.cover[i] - exact) / (exact + 0.1);
+      sum += error * error;
+      count += 1.0;
+    }
+    EXPECT_LT(std::sqrt(sum / count), 1.2 * noise) << noise;  // the reference has noise of its own
+  }
+}
+
+TEST(PathTracer, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
+  const std::array meshes = {sphere(Vec3(-0.5, 0, 0.5), 0.5, 24), sphere(Vec3(0.45, 0, 0.45), 0.45, 24)};
+  const std::array items = {Item{.mesh = &meshes[0], .colour = Vec3(0.9, 0.3, 0.1)},
+                            Item{.mesh = &meshes[1], .colour = Vec3(0.1, 0.3, 0.9), .roughness = 0.2, .metallic = 1.0}};
+  View view;
+  view.ground = Ground{};
+  view.area_lights = {{.at = Vec3(0, -1, 2)}};
+  RenderSettings settings;
+  settings.width = 96;
+  settings.height = 64;
+  settings.kind = RendererKind::Path;
+  settings.most_samples = 16;
+  const Image one = make_renderer(settings)->render(view, items);
+  for (const int threads : {2, 3}) {
+    settings.threads = threads;
+    const std::unique_ptr<Renderer> renderer = make_renderer(settings);
+    EXPECT_EQ(renderer->render(view, items).pixels, one.pixels) << threads;
+    EXPECT_EQ(renderer->render(view, items).pixels, one.pixels) << threads;
+  }
+}
+
+TEST(PathTracer, AgreesWithOpenGlOnABallInTheSun) {
+  const Mesh ball = sphere(Vec3(0, 0, 0.5), 0.5, 48);
+  const Item item{.mesh = &ball, .colour = Vec3(0.7, 0.3, 0.2), .roughness = 0.9};
+  View view;
+  view.camera = {.from = Vec3(0.5, -4, 1.6), .look_at = Vec3(0, 0, 0.4)};
+  view.ground = Ground{};
+  RenderSettings settings;
+  settings.width = 96;
+  settings.height = 72;
+  const Image gl = make_renderer(settings)->render(view, std::span(&item, 1));
+  settings.kind = RendererKind::Path;
+  const Image path = make_renderer(settings)->render(view, std::span(&item, 1));
+  double sum = 0.0;
+  for (std::size_t i = 0; i < gl.pixels.size(); ++i) sum += std::abs(gl.pixels[i] - path.pixels[i]);
+  // OpenGL knows light between surfaces only by rules of thumb: some 4 % of the range.
+  EXPECT_LT(sum / static_cast<double>(gl.pixels.size()), 10.0);
+}
+
+TEST(PathTracer, MeetsTheFieldInsteadOfACoarseMesh) {
+  const Mesh fine = sphere(Vec3::Zero(), 0.6, 96);
+  const Mesh coarse = sphere(Vec3::Zero(), 0.6, 5);
+  Item item{.mesh = &fine, .colour = Vec3(0.7, 0.5, 0.3), .roughness = 0.3};
+  Studio studio;
+  studio.settings.width = studio.settings.height = 64;
+  studio.settings.most_samples = 64;
+  studio.lights.above = Vec3f::Ones();
+  studio.lights.sun = {.to_light = Vec3f(0.3F, -0.5F, 0.8F).normalized(), .irradiance = Vec3f::Constant(3.0F), .cosine = 0.99F};
+  const Film exact = studio.trace(std::span(&item, 1));
+  item.mesh = &coarse;
+  const Film faceted = studio.trace(std::span(&item, 1));
+  item.field = [](std::span<const Vec3> p, std::span<double> f, std::span<Vec3> g) {
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      f[i] = 0.36 - p[i].squaredNorm();
+      g[i] = -2.0 * p[i];
+    }
+  };
+  item.field_reach = 0.1;
+  const Film smooth = studio.trace(std::span(&item, 1));
+  const auto inner = [&](const Film& film) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < film.position.size(); ++i)
+      if (exact.cover[i] >= 1.0F && exact.position[i].y() < -0.3F) sum += (film.normal[i] - exact.normal[i]).squaredNorm();
+    return std::sqrt(sum);
+  };
+  EXPECT_LT(inner(smooth), 0.1 * inner(faceted));
+  // Away from the outline every hit lies on the ball and has its normal.
+  for (std::size_t i = 0; i < smooth.position.size(); ++i)
+    if (smooth.cover[i] >= 1.0F && smooth.position[i].y() < -0.3F) {
+      EXPECT_NEAR(smooth.position[i].norm(), 0.6, 1e-3);  // the mean over a pixel lies a little inside
+      EXPECT_GT(smooth.normal[i].normalized().dot(smooth.position[i].normalized()), 0.9999F);
+    }
+}
+
+TEST(PathTracer, BlursWhatMovesAndWhatIsOutOfFocus) {
+  Mesh ball = sphere(Vec3::Zero(), 0.2, 16);
+  for (const char* name : {"velocity_x", "velocity_y", "velocity_z"})
+    ball.columns.push_back({name, std::vector<double>(ball.vertex_count(), name[9] == 'x' ? 10.0 : 0.0)});
+  const Item item = matt(ball, 0.5);
+  Studio studio;
+  studio.settings.most_samples = 64;
+  const auto width_of = [&](const Film& film) {
+    int width = 0;
+    for (int x = 0; x < 32; ++x) width += film.cover[static_cast<std::size_t>(16 * 32 + x)] > 0.0F ? 1 : 0;
+    return width;
+  };
+  const auto total = [](const Film& film) { return std::accumulate(film.cover.begin(), film.cover.end(), 0.0); };
+  const Film still = studio.trace(std::span(&item, 1));
+  studio.shutter = 0.04;
+  const Film moving = studio.trace(std::span(&item, 1));
+  // .4 m at 5 m with 32 pixels over 2 x 5 tan(.15) m: 8.5 pixels more, and the same light in all.
+  EXPECT_NEAR(width_of(moving) - width_of(still), 8.5, 2.0);
+  EXPECT_NEAR(total(moving), total(still), 0.03 * total(still));
+  studio.shutter = 0.0;
+  studio.view.camera.aperture = 0.2;
+  EXPECT_LE(std::abs(width_of(studio.trace(std::span(&item, 1))) - width_of(still)), 2);  // in focus
+  studio.view.camera.focus = 10.0;
+  // A point at 5 m spreads over 2 x .2 (10 - 5)/10 = .2 m there: 4.2 pixels, of which the outermost are hardly met.
+  const int wider = width_of(studio.trace(std::span(&item, 1))) - width_of(still);
+  EXPECT_GE(wider, 2);
+  EXPECT_LE(wider, 5);
+}
+
+TEST(PathTracer, FilterBringsAFewSamplesNearerToMany) {
+  const Mesh ball = sphere(Vec3(0, 0, 0.1), 0.5, 32);
+  const Item item{.mesh = &ball, .colour = Vec3(0.8, 0.5, 0.3)};
+  Studio studio;
+  studio.settings.width = studio.settings.height = 64;
+  studio.lights.above = Vec3f::Ones();
+  studio.lights.sun = {.to_light = Vec3f(0.3F, -0.5F, 0.8F).normalized(), .irradiance = Vec3f::Constant(3.0F), .cosine = 0.995F};
+  studio.ground = path::GroundPlane{.height = -0.4F, .albedo = Vec3f::Constant(0.5F)};
+  studio.settings.most_samples = 512;
+  const Film reference = studio.trace(std::span(&item, 1));
+  studio.settings.most_samples = 8;
+  Film film = studio.trace(std::span(&item, 1));
+  const double before = rms_difference(film, reference);
+  path::denoise(64, 64, Vec3f(0, -5, 0), static_cast<float>(2.0 * std::tan(0.15) / 64.0), Executor(1), film);
+  EXPECT_LT(rms_difference(film, reference), 0.7 * before);  // much of the picture is outlines at this size
+}
+
+TEST(PathTracer, KeepsAndRefitsHierarchies) {
+  Mesh a = sphere(Vec3::Zero(), 0.5, 8), b = sphere(Vec3::UnitX(), 0.3, 8);
+  const std::array items = {matt(a, 0.5), matt(b, 0.5)};
+  path::Geometry geometry;
+  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  EXPECT_EQ(geometry.counts().built, 2);
+  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  EXPECT_EQ(geometry.counts().kept, 2);
+  for (Vec3& p : b.position) p += Vec3(0.5, 0, 0);
+  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  EXPECT_EQ(geometry.counts().kept, 1);
+  EXPECT_EQ(geometry.counts().refitted, 1);
+  // The moved one is met where it is now.
+  path::Hit hit;
+  EXPECT_TRUE(geometry.meet(Vec3f(1.5F, -2, 0), Vec3f::UnitY(), 0.0F, 0.0F, false, hit));
+  EXPECT_FALSE(geometry.meet(Vec3f(0.95F, -2, 0), Vec3f::UnitY(), 0.0F, 0.0F, false, hit));
+  b = sphere(Vec3::UnitX(), 0.3, 9);
+  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  EXPECT_EQ(geometry.counts().built, 1);
+}
+
+TEST(PathTracer, PaintsLikeOpenGl) {
+  Mesh sheet = plate(0.5, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ());
+  sheet.columns.push_back({"value", {0.0, 1.0, 1.0, 0.0}});
+  auto picture = std::make_shared<Image>(Image{.width = 2, .height = 2, .pixels = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}});
+  for (Vec3& p : sheet.position) p.y() = 0.05;
+  View view;
+  view.camera = {.from = Vec3(0, -5, 0), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.21};
+  view.light.direction = Vec3(0, 1, -0.3);
+  RenderSettings settings;
+  settings.width = settings.height = 48;
+  settings.denoise = false;
+  settings.noise = 0.05;
+  Item item{.mesh = &sheet, .colour = Vec3(0.9, 0.3, 0.2), .roughness = 1.0, .reflectance = 0.0};
+  for (const PaintKind kind : {PaintKind::Plain, PaintKind::Checker, PaintKind::Stripes, PaintKind::Picture, PaintKind::Values, PaintKind::Normals}) {
+    item.paint = {.kind = kind, .colour = Vec3(0.1, 0.2, 0.6), .size = kind == PaintKind::Picture ? 1.0 : 0.25, .picture = picture, .column = "value"};
+    settings.kind = RendererKind::Gl;
+    const Image gl = make_renderer(settings)->render(view, std::span(&item, 1));
+    settings.kind = RendererKind::Path;
+    const Image traced = make_renderer(settings)->render(view, std::span(&item, 1));
+    double sum = 0.0;
+    for (std::size_t i = 0; i < gl.pixels.size(); ++i) sum += std::abs(gl.pixels[i] - traced.pixels[i]);
+    EXPECT_LT(sum / static_cast<double>(gl.pixels.size()), 9.0) << static_cast<int>(kind);
+  }
+}
+
+}  // namespace
+}  // namespace supple::render::test
