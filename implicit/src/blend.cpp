@@ -80,6 +80,12 @@ void BlendIndex::for_neighbours(const Nodes& nodes, std::size_t k, const Use& us
   }
 }
 
+double BlendIndex::weight(std::uint32_t a, std::uint32_t b) const noexcept {
+  const auto first = neighbour_.begin() + offset_[a], last = neighbour_.begin() + offset_[a + 1];
+  const auto at = std::lower_bound(first, last, b);
+  return at != last && *at == b ? weight_[static_cast<std::size_t>(at - neighbour_.begin())] : 0.0;
+}
+
 Combined BlendIndex::combine(std::span<const NodeSample> nodes, std::span<double> share) const noexcept {
   Combined out;
   std::fill(share.begin(), share.end(), 0.0);

@@ -33,6 +33,9 @@ class BlendIndex {
   [[nodiscard]] BlendRule rule() const noexcept { return rule_; }
   [[nodiscard]] std::uint32_t node_of(std::uint32_t part) const noexcept { return node_.empty() ? part : node_[part]; }
 
+  /// Of the edge between two nodes of a graph, 0 where there is none.
+  [[nodiscard]] double weight(std::uint32_t a, std::uint32_t b) const noexcept;
+
   /// @param nodes  at one point, in rising order   @param share  receives dF/df_k, shape of nodes
   [[nodiscard]] Combined combine(std::span<const NodeSample> nodes, std::span<double> share) const noexcept;
 

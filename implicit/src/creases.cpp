@@ -1,0 +1,370 @@
+#include "supple/implicit/creases.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "field_index.h"
+#include "supple/core/error.h"
+
+namespace supple::implicit {
+namespace {
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+/// Boxes of the supports by node; empty for nodes without primitives.
+std::vector<Box> node_supports(const Field::Index& index) {
+  std::vector<Box> box;
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    const std::uint32_t node = index.blend.node_of(index.primitive[i].part);
+    if (node >= box.size()) box.resize(node + 1);
+    box[node] = box[node].united(index.support[i]);
+  }
+  return box;
+}
+
+/// F_k of one node.
+class NodeField {
+ public:
+  NodeField(const Field& field, std::uint32_t node, const Box& support, const Box& surface)
+      : field_(&field), node_(node) {
+    for (int k = 0; k < 3; ++k) {
+      box_.lower[k] = std::max(support.lower[k], surface.lower[k]);
+      box_.upper[k] = std::min(support.upper[k], surface.upper[k]);
+    }
+    if ((box_.upper.array() < box_.lower.array()).any()) box_ = {};
+  }
+
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const { evaluate(points, values, {}); }
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+    const Field::Index& index = field_->index();
+    thread_local FieldParts parts;
+    thread_local std::vector<NodeSample> nodes;
+    part_rows(index, points, parts);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      gather(index.blend, i, parts, nodes);
+      const NodeSample own = value_of(nodes);
+      values[i] = own.value - index.iso;
+      Vec3 gradient = own.gradient;
+      for (const NodeSample& other : nodes) {
+        const double w = other.node == node_ ? 0.0 : index.blend.weight(node_, other.node);
+        if (w == 0.0) continue;
+        const NodeSample& less = other.value < own.value ? other : own;
+        values[i] += w * less.value;
+        gradient += w * less.gradient;
+      }
+      if (!gradients.empty()) gradients[i] = gradient;
+    }
+  }
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { field_->evaluate_parts(points, parts); }
+
+  [[nodiscard]] Interval bound(const Box& box) const {
+    Interval own, total;
+    double scale = 0.0;
+    each(box, false, [&](std::span<const BlendIndex::NodeBound> nodes, double size) {
+      scale = size;
+      for (const auto& n : nodes) {
+        if (n.node == node_) own = n.value;
+      }
+      total = own;
+      for (const auto& n : nodes) {
+        const double w = n.node == node_ ? 0.0 : field_->index().blend.weight(node_, n.node);
+        total.lower += w * std::min(n.value.lower, own.lower);
+        total.upper += w * std::min(n.value.upper, own.upper);
+      }
+    });
+    const double iso = field_->index().iso, round_off = 64.0 * kEps * (scale + iso);
+    return {std::max(total.lower - iso - round_off, -iso), total.upper - iso + round_off};
+  }
+  [[nodiscard]] double gradient_bound(const Box& box) const {
+    double total = 0.0;
+    each(box, true, [&](std::span<const BlendIndex::NodeBound> nodes, double size) {
+      double own = 0.0;
+      for (const auto& n : nodes) {
+        if (n.node == node_) own = n.slope;
+      }
+      total = own;
+      for (const auto& n : nodes) {
+        if (n.node != node_) total += field_->index().blend.weight(node_, n.node) * std::max(n.slope, own);
+      }
+      total += 64.0 * kEps * size;
+    });
+    return total;
+  }
+  [[nodiscard]] Box surface_box() const { return box_; }
+  [[nodiscard]] double feature_size() const { return field_->feature_size(); }
+
+ private:
+  static void gather(const BlendIndex& blend, std::size_t i, const FieldParts& parts, std::vector<NodeSample>& nodes) {
+    nodes.clear();
+    for (std::uint32_t r = parts.offset[i]; r < parts.offset[i + 1]; ++r) {
+      const std::uint32_t node = blend.node_of(parts.part[r]);
+      auto at = std::find_if(nodes.begin(), nodes.end(), [&](const NodeSample& n) { return n.node == node; });
+      if (at == nodes.end()) at = nodes.insert(nodes.end(), NodeSample{.node = node});
+      at->value += parts.value[r];
+      at->gradient += parts.gradient[r];
+    }
+  }
+  [[nodiscard]] NodeSample value_of(const std::vector<NodeSample>& nodes) const {
+    const auto at = std::find_if(nodes.begin(), nodes.end(), [&](const NodeSample& n) { return n.node == node_; });
+    return at == nodes.end() ? NodeSample{.node = node_} : *at;
+  }
+  /// Calls use(bounds of the nodes that the box touches, size of what was added).
+  template <class Use>
+  void each(const Box& box, bool with_slope, const Use& use) const {
+    const Field::Index& index = field_->index();
+    thread_local std::vector<BlendIndex::NodeBound> nodes;
+    nodes.clear();
+    double scale = 0.0;
+    for (const std::uint32_t id : candidates_of(index, box)) {
+      if (!index.support[id].overlaps(box)) continue;
+      const PrimitiveBound one = bound_primitive(index, id, box, with_slope);
+      const std::uint32_t node = index.blend.node_of(index.primitive[id].part);
+      auto at = std::find_if(nodes.begin(), nodes.end(), [&](const auto& n) { return n.node == node; });
+      if (at == nodes.end()) at = nodes.insert(nodes.end(), BlendIndex::NodeBound{.node = node});
+      at->value.lower += one.value.lower;
+      at->value.upper += one.value.upper;
+      at->slope += one.slope;
+      scale += with_slope ? index.shape[id].lipschitz : index.shape[id].peak;
+    }
+    use(nodes, scale);
+  }
+
+  const Field* field_;
+  std::uint32_t node_;
+  Box box_;
+};
+
+/// The point near `start` where the fields of up to three bodies vanish together: Newton's method, smallest steps.
+std::optional<Vec3> meeting_point(std::span<const FieldView> fields, std::span<const std::uint32_t> bodies,
+                                  const Vec3& start, double farthest) {
+  constexpr int kMaxIterations = 20;
+  Vec3 x = start;
+  const std::size_t n = std::min<std::size_t>(bodies.size(), 3);
+  for (int i = 0; i < kMaxIterations; ++i) {
+    std::array<double, 3> f{};
+    std::array<Vec3, 3> g{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+    double largest = 0.0;
+    for (std::size_t k = 0; k < n; ++k) {
+      f[k] = fields[bodies[k]].value(x, g[k]);
+      largest = std::max(largest, std::abs(f[k]));
+    }
+    if (largest <= 1e-13) return x;
+    const Vec3 along = g[0].cross(g[1]);
+    const Vec3 third = n == 3 ? g[2] : along;
+    const Vec3 step = -(f[0] * g[1].cross(third) + f[1] * third.cross(g[0]) + f[2] * along) / along.dot(third);
+    x += step;
+    if (!((x - start).norm() <= farthest)) return std::nullopt;
+    if (step.norm() <= kEps * x.cwiseAbs().maxCoeff()) return x;
+  }
+  return std::nullopt;
+}
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+/// The node whose field is the largest at each point.
+std::vector<std::uint32_t> owners(std::span<const FieldView> fields, std::span<const Vec3> points, const Executor& executor) {
+  constexpr std::size_t kPointsPerTask = 512;
+  std::vector<std::uint32_t> owner(points.size(), 0);
+  executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {
+    const auto own = points.subspan(begin, end - begin);
+    Box box;
+    for (const Vec3& p : own) box.include(p);
+    std::vector<double> best(own.size(), -std::numeric_limits<double>::infinity()), value(own.size());
+    for (std::uint32_t k = 0; k < fields.size(); ++k) {
+      if (!fields[k].surface_box().overlaps(box)) continue;
+      fields[k].evaluate(own, value);
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        if (!(value[i] > best[i])) continue;
+        best[i] = value[i];
+        owner[begin + i] = k;
+      }
+    }
+  });
+  return owner;
+}
+
+/// The border of a disc of triangles as a loop of vertices, counter-clockwise; empty when they are not one disc.
+std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> open;
+  for (const Triangle& t : triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::pair edge{t[k], t[(k + 1) % 3]};
+      const auto reverse = std::find(open.begin(), open.end(), std::pair{edge.second, edge.first});
+      if (reverse != open.end()) {
+        open.erase(reverse);
+      } else {
+        open.push_back(edge);
+      }
+    }
+  }
+  if (open.size() != triangles.size() + 2) return {};
+  std::vector<std::uint32_t> loop{open.front().first};
+  for (std::uint32_t v = open.front().second; v != loop.front();) {
+    loop.push_back(v);
+    const auto next = std::find_if(open.begin(), open.end(), [v](const auto& edge) { return edge.first == v; });
+    if (next == open.end() || loop.size() > open.size()) return {};
+    v = next->second;
+  }
+  return loop.size() == open.size() ? loop : std::vector<std::uint32_t>{};
+}
+
+/// Puts a vertex onto the crease in every cell whose vertices belong to several nodes, and turns edges that cross the crease
+/// (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here).
+class Sharpener {
+ public:
+  Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor, Mesh& mesh)
+      : whole_(whole), fields_(fields), lattice_(lattice), mesh_(mesh), owner_(owners(fields, mesh.position, executor)) {}
+
+  void run() {
+    struct Piece {
+      std::array<std::int64_t, 3> cell;
+      std::uint32_t triangle;
+    };
+    std::vector<Piece> pieces;
+    for (std::uint32_t i = 0; i < mesh_.triangle_count(); ++i) {
+      const Triangle& t = mesh_.triangle[i];
+      const Vec3 centre = (mesh_.position[t[0]] + mesh_.position[t[1]] + mesh_.position[t[2]]) / 3.0;
+      const Vec3 at = (centre - lattice_.origin) / lattice_.cell;
+      pieces.push_back({{static_cast<std::int64_t>(std::floor(at.x())), static_cast<std::int64_t>(std::floor(at.y())),
+                         static_cast<std::int64_t>(std::floor(at.z()))}, i});
+    }
+    std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+      return a.cell != b.cell ? a.cell < b.cell : a.triangle < b.triangle;
+    });
+    std::vector<Triangle> kept, cell;
+    for (std::size_t begin = 0, end = 0; begin < pieces.size(); begin = end) {
+      cell.clear();
+      for (end = begin; end < pieces.size() && pieces[end].cell == pieces[begin].cell; ++end) {
+        cell.push_back(mesh_.triangle[pieces[end].triangle]);
+      }
+      if (!star(cell, pieces[begin].cell)) kept.insert(kept.end(), cell.begin(), cell.end());
+    }
+    turn_edges();
+    mesh_.triangle = std::move(kept);
+    mesh_.triangle.insert(mesh_.triangle.end(), star_.begin(), star_.end());
+  }
+
+ private:
+  /// Replaces the triangles of a cell by those around a point of the crease. @return whether that was done
+  bool star(std::span<const Triangle> triangles, const std::array<std::int64_t, 3>& cell) {
+    std::vector<std::uint32_t> nodes;
+    for (const Triangle& t : triangles) {
+      for (const std::uint32_t v : t) nodes.push_back(owner_[v]);
+    }
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    if (nodes.size() < 2 || nodes.size() > 3) return false;
+    const std::vector<std::uint32_t> loop = border(triangles);
+    if (loop.empty()) return false;
+    Vec3 middle = Vec3::Zero();
+    for (const std::uint32_t v : loop) middle += mesh_.position[v] / static_cast<double>(loop.size());
+    const std::optional<Vec3> point = meeting_point(fields_, nodes, middle, 2.0 * lattice_.cell);
+    if (!point || !(whole_.value(*point) <= 1e-12)) return false;  // a third node covers it
+    // In its own cell a cone over the loop crosses nothing; a little beyond, its triangles must face outward.
+    const Vec3 at = (*point - lattice_.origin) / lattice_.cell;
+    for (int k = 0; k < 3; ++k) {
+      const double offset = at[k] - static_cast<double>(cell[static_cast<std::size_t>(k)]);
+      if (offset < -kBeyond || offset > 1.0 + kBeyond) return false;
+    }
+    for (std::size_t k = 0; k < loop.size(); ++k) {
+      if (!faces_out(loop[k], loop[(k + 1) % loop.size()], *point)) return false;
+    }
+    const auto fresh = static_cast<std::uint32_t>(mesh_.position.size());
+    mesh_.position.push_back(*point);
+    Vec3 normal = Vec3::Zero();
+    for (const std::uint32_t node : nodes) {
+      Vec3 gradient;
+      (void)fields_[node].value(*point, gradient);
+      if (gradient.squaredNorm() > 0.0) normal -= gradient.normalized();
+    }
+    mesh_.normal.push_back(normal.squaredNorm() > 0.0 ? Vec3(normal.normalized()) : Vec3::UnitZ());
+    for (std::size_t k = 0; k < loop.size(); ++k) star_.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
+    return true;
+  }
+
+  [[nodiscard]] bool faces_out(std::uint32_t a, std::uint32_t b, const Vec3& c) const {
+    const Vec3 &p = mesh_.position[a], &q = mesh_.position[b];
+    return (q - p).cross(c - p).dot(mesh_.normal[a] + mesh_.normal[b]) > 0.0;
+  }
+
+  /// An edge between two nodes' vertices and two points of the crease becomes the edge between the points.
+  void turn_edges() {
+    struct Side {
+      std::uint32_t low, high, triangle;
+    };
+    std::vector<Side> sides;
+    for (std::uint32_t i = 0; i < star_.size(); ++i) {
+      const auto [a, b, top] = star_[i];
+      if (owner_[a] != owner_[b]) sides.push_back({std::min(a, b), std::max(a, b), i});
+    }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+      return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+    });
+    for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+      if (sides[i].low != sides[i + 1].low || sides[i].high != sides[i + 1].high) continue;
+      Triangle &s = star_[sides[i].triangle], &t = star_[sides[i + 1].triangle];
+      const auto [p, q, x] = s;
+      const std::uint32_t y = t[2];
+      const auto out = [&](std::uint32_t a, std::uint32_t b, std::uint32_t own, std::uint32_t c) {
+        const Vec3& origin = mesh_.position[a];
+        return (mesh_.position[b] - origin).cross(mesh_.position[c] - origin).dot(mesh_.normal[own]) > 0.0;
+      };
+      if (out(x, p, p, y) && out(y, q, q, x)) {
+        s = {x, p, y};
+        t = {y, q, x};
+      }
+      ++i;
+    }
+  }
+
+  static constexpr double kBeyond = 1.0;  // [cells]
+  FieldView whole_;
+  std::span<const FieldView> fields_;  ///< of the nodes
+  const Lattice& lattice_;
+  Mesh& mesh_;
+  std::vector<std::uint32_t> owner_;
+  std::vector<Triangle> star_;
+};
+
+}  // namespace
+
+bool has_creases(const Field& field) {
+  const Field::Index& index = field.packed();
+  if (index.blend.rule() != BlendRule::Graph) return false;
+  const std::vector<Box> box = node_supports(index);
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t k = 0; k < box.size(); ++k) {
+    if (!box[k].empty()) order.push_back(k);
+  }
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return box[a].lower.x() != box[b].lower.x() ? box[a].lower.x() < box[b].lower.x() : a < b;
+  });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    for (std::size_t j = i + 1; j < order.size() && box[order[j]].lower.x() <= box[order[i]].upper.x(); ++j) {
+      if (box[order[i]].overlaps(box[order[j]]) && index.blend.weight(order[i], order[j]) < 1.0) return true;
+    }
+  }
+  return false;
+}
+
+Mesh march_creases(const Field& field, const Lattice& lattice, const Executor& executor, MarchCounts* counts) {
+  const Field::Index& index = field.index();
+  SUPPLE_EXPECTS(index.blend.rule() == BlendRule::Graph);
+  const Box all = field.surface_box();
+  const std::vector<Box> box = node_supports(index);
+  std::vector<NodeField> nodes;
+  for (std::uint32_t k = 0; k < box.size(); ++k) {
+    if (!box[k].empty()) nodes.emplace_back(field, k, box[k], all);
+  }
+  const std::vector<FieldView> views(nodes.begin(), nodes.end());
+  Mesh mesh = march_cubes(field, {.lattice = lattice}, executor, counts);
+  Sharpener(field, views, lattice, executor, mesh).run();
+  return mesh;
+}
+
+}  // namespace supple::implicit

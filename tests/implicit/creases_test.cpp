@@ -1,0 +1,139 @@
+#include "supple/implicit/creases.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "implicit/bodies.h"
+#include "implicit/mesh_checks.h"
+#include "support/mesh_distance.h"
+#include "supple/core/error.h"
+#include "supple/implicit/march_cubes.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+constexpr double kRadius = 0.454202019;  // of a lone Wyvill point with R = 1
+constexpr double kApart = 0.3;           // of each of two centres from their middle
+
+/// Two balls along a tilted axis.
+const Vec3 kAxis = Vec3(0.8, 0.36, 0.48);
+Body two_balls(double weight) {
+  Body body = body_of({{wyvill_point(1.0), kApart * kAxis}, {wyvill_point(1.0), -kApart * kAxis}});
+  body.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, weight}}};
+  body.place();
+  return body;
+}
+
+Lattice lattice_of(double cell) { return {.origin = Vec3(0.013, -0.007, 0.004), .cell = cell}; }
+
+/// Distances from the circle where the two balls meet to a mesh: RMS and largest.
+struct CreaseError {
+  double rms = 0.0, largest = 0.0;
+};
+CreaseError crease_error(const Mesh& mesh, double cell) {
+  const supple::testing::MeshDistance distance(mesh, cell);
+  const Vec3 u = kAxis.unitOrthogonal(), v = kAxis.cross(u);
+  const double radius = std::sqrt(kRadius * kRadius - kApart * kApart);
+  CreaseError error;
+  for (int i = 0; i < 1000; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 1000.0;
+    const double d = distance(radius * (std::cos(angle) * u + std::sin(angle) * v));
+    error.rms += d * d / 1000.0;
+    error.largest = std::max(error.largest, d);
+  }
+  error.rms = std::sqrt(error.rms);
+  return error;
+}
+
+TEST(Creases, LieOnTheCircleWhereTwoBallsMeet) {
+  const Body body = two_balls(0.0);
+  for (const double cell : {0.08, 0.04}) {
+    const Mesh mesh = march_creases(body.field, lattice_of(cell), Executor(2));
+    const MeshReport report = inspect(mesh);
+    EXPECT_TRUE(report.closed && report.oriented);
+    EXPECT_EQ(report.components, 1u);
+    EXPECT_EQ(report.euler_characteristic, 2);
+    EXPECT_EQ(self_intersections(mesh, cell), 0u);
+    const CreaseError sharp = crease_error(mesh, cell);
+    const CreaseError cut = crease_error(march_cubes(body.field, {.lattice = lattice_of(cell)}, Executor(2)), cell);
+    EXPECT_LT(4.0 * sharp.rms, cut.rms);
+    EXPECT_LT(sharp.rms, 0.06 * cell);
+    EXPECT_LT(sharp.largest, 0.3 * cell);  // where the crease only grazes a cell
+    // Two caps of height kRadius + kApart, less at most the sagitta of a cell's diagonal all over.
+    const double cap = kRadius + kApart, exact = 2.0 * std::numbers::pi * cap * cap * (3.0 * kRadius - cap) / 3.0;
+    EXPECT_LT(report.volume, exact);
+    EXPECT_GT(report.volume, exact - report.area * 3.0 * cell * cell / (8.0 * kRadius));
+    std::vector<double> values(mesh.vertex_count());
+    body.field.evaluate(mesh.position, values);
+    for (const double f : values) ASSERT_NEAR(f, 0.0, 1e-9);
+    for (const Vec3& n : mesh.normal) ASSERT_NEAR(n.norm(), 1.0, 1e-12);
+  }
+}
+
+TEST(Creases, AreTheSurfaceOfOtherMeshersForAnyGraph) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Body body = random_body({.seed = seed, .parts = 8, .half_width = 0.5, .only_points = true});
+    Random random(seed);
+    body.skeleton.blend.rule = BlendRule::Graph;
+    for (std::uint32_t a = 0; a < 8; ++a) {
+      for (std::uint32_t b = a + 1; b < 8; ++b) {
+        if (random.below(3) > 0) body.skeleton.blend.edge.push_back({a, b, random.below(2) == 0 ? 1.0 : 0.4});
+      }
+    }
+    body.place();
+    const double cell = 0.03;
+    const Mesh mesh = march_creases(body.field, lattice_of(cell), Executor(1));
+    const MeshReport report = inspect(mesh);
+    EXPECT_TRUE(report.closed && report.oriented) << seed;
+    const Mesh plain = polygonise(body.field, lattice_of(cell), Executor(1));
+    const MeshReport expected = inspect(plain);
+    EXPECT_EQ(report.components, expected.components) << seed;
+    EXPECT_NEAR(report.volume, expected.volume, 0.1 * cell * expected.area) << seed;
+    std::vector<double> values(mesh.vertex_count());
+    std::vector<Vec3> gradients(mesh.vertex_count());
+    body.field.evaluate(mesh.position, values, gradients);
+    const supple::testing::MeshDistance distance(plain, cell);
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      ASSERT_LT(distance(mesh.position[v]), 2.0 * cell) << seed;
+      ASSERT_LT(std::abs(values[v]), 1e-4 * cell * gradients[v].norm()) << seed;
+    }
+  }
+}
+
+TEST(Creases, DoNotDependOnThreads) {
+  const Body body = two_balls(0.5);
+  const std::uint64_t expected = hash_of(march_creases(body.field, lattice_of(0.05), Executor(1)));
+  for (const int threads : {2, 8}) {
+    EXPECT_EQ(hash_of(march_creases(body.field, lattice_of(0.05), Executor(threads))), expected);
+  }
+}
+
+TEST(Creases, AreWhereNodesMeetWithoutBlending) {
+  EXPECT_TRUE(has_creases(two_balls(0.0).field));
+  EXPECT_TRUE(has_creases(two_balls(0.9).field));
+  EXPECT_FALSE(has_creases(two_balls(1.0).field));
+  Body body = two_balls(0.0);
+  body.skeleton.blend.node = {0, 0};
+  body.skeleton.blend.edge.clear();
+  body.place();
+  EXPECT_FALSE(has_creases(body.field));  // one node
+  body = two_balls(0.0);
+  body.skeleton.blend = {};
+  body.place();
+  EXPECT_FALSE(has_creases(body.field));  // a sum
+  EXPECT_THROW((void)march_creases(body.field, lattice_of(0.1), Executor(1)), ContractViolation);
+  const Body apart = [] {
+    Body far = body_of({{wyvill_point(1.0), Vec3::Zero()}, {wyvill_point(1.0), Vec3(2.5, 0, 0)}});
+    far.skeleton.blend = {.rule = BlendRule::Graph};
+    far.place();
+    return far;
+  }();
+  EXPECT_FALSE(has_creases(apart.field));
+}
+
+}  // namespace
+}  // namespace supple::implicit
