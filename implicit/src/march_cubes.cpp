@@ -334,6 +334,16 @@ std::uint32_t shift_of(const Leaf& leaf) { return static_cast<std::uint32_t>(lea
 /// Triangles that stay: only the numbers of their vertices move, each with its leaf.
 void renumber(const Neighbourhood& around, const Leaf& leaf, std::array<std::uint32_t, 3>* triangle) {
   const std::uint32_t own = shift_of(leaf);
+  bool alike = true;
+  for (unsigned step = 1; step < 8; ++step) {
+    alike = alike && (around.leaf(step) == nullptr || shift_of(*around.leaf(step)) == own);
+  }
+  if (alike) {
+    if (own == 0 || leaf.triangles == 0) return;
+    std::uint32_t* vertex = triangle->data();
+    for (std::size_t i = 0; i < 3 * std::size_t{leaf.triangles}; ++i) vertex[i] += own;
+    return;
+  }
   for (std::size_t i = 0; i < leaf.triangles; ++i) {
     for (std::uint32_t& v : triangle[i]) {
       std::uint32_t shift = own;

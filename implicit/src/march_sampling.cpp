@@ -138,8 +138,9 @@ class BlobSampler final : public Sampler {
     const Block* near_block = nullptr;
     const Leaf* near_leaf = nullptr;
     blobs::EdgeBatch edges;
-    std::vector<Leaf> old_leaf;
-    std::vector<float> old_values;
+    // Of the block at work; copied into it at the end, so that blocks hold no more than they need.
+    std::vector<Leaf> leaves;
+    std::vector<float> values;
     static Workspace& of_thread() {
       thread_local Workspace work;
       return work;
@@ -255,26 +256,26 @@ class BlobSampler final : public Sampler {
 
   /// Samples the marked leaves; the others are kept.
   void sample_block(Block& block, Workspace& work) const {
-    work.old_leaf.swap(block.leaf);
-    work.old_values.swap(block.values);
     const auto old_leaf_of = block.leaf_of;
-    block.leaf.clear();
-    block.values.clear();
+    work.leaves.clear();
+    work.values.clear();
     grid_.gather(block.base(), kBlockNodes, 0, work.block);
     for (unsigned slot = 0; slot < 8; ++slot) {
       if ((block.changed >> slot & 1u) != 0) {
         block.leaf_of[slot] = kOutside;
         if (work.block.count > 0) sample_leaf(block, slot, work);
       } else if (old_leaf_of[slot] >= 0) {
-        Leaf leaf = work.old_leaf[static_cast<std::size_t>(old_leaf_of[slot])];
-        const auto from = work.old_values.begin() + static_cast<std::ptrdiff_t>(leaf.first_tile * kTileNodes);
-        leaf.first_tile = static_cast<std::uint32_t>(block.values.size() / kTileNodes);
-        block.values.insert(block.values.end(), from,
-                            from + static_cast<std::ptrdiff_t>(kTileNodes * static_cast<std::size_t>(std::popcount(leaf.active))));
-        block.leaf_of[slot] = static_cast<std::int8_t>(block.leaf.size());
-        block.leaf.push_back(leaf);
+        Leaf leaf = block.leaf[static_cast<std::size_t>(old_leaf_of[slot])];
+        const auto from = block.values.begin() + static_cast<std::ptrdiff_t>(leaf.first_tile * kTileNodes);
+        leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
+        work.values.insert(work.values.end(), from,
+                           from + static_cast<std::ptrdiff_t>(kTileNodes * static_cast<std::size_t>(std::popcount(leaf.active))));
+        block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size());
+        work.leaves.push_back(leaf);
       }
     }
+    block.leaf.assign(work.leaves.begin(), work.leaves.end());
+    block.values.assign(work.values.begin(), work.values.end());
   }
 
   void sample_leaf(Block& block, unsigned slot, Workspace& work) const {
@@ -287,7 +288,7 @@ class BlobSampler final : public Sampler {
     }
     Leaf leaf;
     leaf.slot = static_cast<std::uint8_t>(slot);
-    leaf.first_tile = static_cast<std::uint32_t>(block.values.size() / kTileNodes);
+    leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
     bool inside = false;
     for (unsigned tile = 0; tile < 8; ++tile) {
       const auto at = corner_of(tile, kTile);
@@ -300,21 +301,21 @@ class BlobSampler final : public Sampler {
         set_tile(leaf, tile, inside ? ~std::uint64_t{0} : 0);
         continue;
       }
-      const std::size_t first = block.values.size();
-      block.values.resize(first + kTileNodes);
+      const std::size_t first = work.values.size();
+      work.values.resize(first + kTileNodes);
       set_tile(leaf, tile,
                blobs::evaluate_tile(work.tile,
                                     {static_cast<float>(tile_corner[0]), static_cast<float>(tile_corner[1]),
                                      static_cast<float>(tile_corner[2])},
-                                    iso_, block.values.data() + first));
+                                    iso_, work.values.data() + first));
       leaf.active = static_cast<std::uint8_t>(leaf.active | 1u << tile);
     }
     if (leaf.active == 0) {
       block.leaf_of[slot] = inside ? kInside : kOutside;
       return;
     }
-    block.leaf_of[slot] = static_cast<std::int8_t>(block.leaf.size());
-    block.leaf.push_back(leaf);
+    block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size());
+    work.leaves.push_back(leaf);
   }
 
   const Field::Index& index_;

@@ -1,6 +1,7 @@
 #include "supple/implicit/surface_grid.h"
 
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/VolumeToMesh.h>
 
 #include <algorithm>
 #include <array>
@@ -489,6 +490,32 @@ double UnitedField::feature_size() const {
   double least = std::numeric_limits<double>::infinity();
   for (const FieldView& field : fields_) least = std::min(least, field.feature_size());
   return least;
+}
+
+Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor) {
+  SUPPLE_EXPECTS(grid.impl_ != nullptr);
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec3I> triangles;
+  std::vector<openvdb::Vec4I> quadrangles;
+  executor.run([&] { openvdb::tools::volumeToMesh(*grid.impl_->grid, points, triangles, quadrangles); });
+  Mesh mesh;
+  for (const auto& p : points) mesh.position.push_back(Vec3(p.x(), p.y(), p.z()));
+  // Clockwise from outside, as it gives them for F < 0 inside.
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangle.push_back({a, c, b}); };
+  for (const auto& t : triangles) add(t[0], t[1], t[2]);
+  for (const auto& q : quadrangles) {
+    add(q[0], q[1], q[2]);
+    add(q[0], q[2], q[3]);
+  }
+  mesh.normal.resize(points.size());
+  constexpr std::size_t kPointsPerTask = 512;
+  executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {
+    std::array<double, kPointsPerTask> values;
+    const auto normals = std::span(mesh.normal).subspan(begin, end - begin);
+    field.evaluate(std::span(mesh.position).subspan(begin, end - begin), std::span(values).first(end - begin), normals);
+    for (Vec3& n : normals) n = n.squaredNorm() > 0.0 ? Vec3(-n.normalized()) : Vec3::UnitZ();
+  });
+  return mesh;
 }
 
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid> grids) {

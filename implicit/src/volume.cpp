@@ -7,45 +7,89 @@
 
 namespace supple::implicit {
 
-double enclosed_volume(const FieldView& field, double cell) {
-  SUPPLE_EXPECTS(cell > 0.0);
-  const Box box = field.surface_box();
-  if (box.empty()) return 0.0;
-  SUPPLE_EXPECTS(box.lower.allFinite() && box.upper.allFinite());
-  constexpr int kEdge = 4;  // cells along a block
-  constexpr std::size_t kCells = kEdge * kEdge * kEdge;
-  const double edge = kEdge * cell;
+namespace {
+
+constexpr int kEdge = 4;  // cells along a block
+constexpr std::size_t kCells = kEdge * kEdge * kEdge;
+
+/// Middles of a block's cells, and how much of each lies inside [cells].
+struct Block {
   std::array<Vec3, kCells> points;
   std::array<double, kCells> values;
   std::array<Vec3, kCells> gradients;
+  std::array<double, kCells> share;
+};
+
+/// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may hold some of the body;
+/// the middles of the cells are set in both, the shares in the second.
+template <class Whole, class Cut>
+void for_blocks_of(const FieldView& field, double cell, const Whole& whole, const Cut& cut) {
+  SUPPLE_EXPECTS(cell > 0.0);
+  const Box box = field.surface_box();
+  if (box.empty()) return;
+  SUPPLE_EXPECTS(box.lower.allFinite() && box.upper.allFinite());
+  const double edge = kEdge * cell;
+  Block block;
   const Vec3 first = (box.lower / edge).array().floor(), last = (box.upper / edge).array().floor();
-  double cells = 0.0;
   for (double z = first.z(); z <= last.z(); ++z) {
     for (double y = first.y(); y <= last.y(); ++y) {
       for (double x = first.x(); x <= last.x(); ++x) {
         const Vec3 corner = edge * Vec3(x, y, z);
         const Interval bound = field.bound({corner, corner + Vec3::Constant(edge)});
         if (bound.upper < 0.0) continue;
-        if (bound.lower > 0.0) {
-          cells += static_cast<double>(kCells);
-          continue;
-        }
         for (std::size_t i = 0; i < kCells; ++i) {
           const auto k = static_cast<int>(i);
-          points[i] = corner + cell * (Vec3(k % kEdge, k / kEdge % kEdge, k / (kEdge * kEdge)) + Vec3::Constant(0.5));
+          block.points[i] = corner + cell * (Vec3(k % kEdge, k / kEdge % kEdge, k / (kEdge * kEdge)) + Vec3::Constant(0.5));
         }
-        field.evaluate(points, values, gradients);
-        double sum = 0.0;
+        if (bound.lower > 0.0) {
+          whole(block);
+          continue;
+        }
+        field.evaluate(block.points, block.values, block.gradients);
         for (std::size_t i = 0; i < kCells; ++i) {
           // Distance from the tangent plane over the width of the cell along its normal.
-          const double width = cell * gradients[i].cwiseAbs().sum();
-          sum += width > 0.0 ? std::clamp(0.5 + values[i] / width, 0.0, 1.0) : (values[i] > 0.0 ? 1.0 : 0.0);
+          const double width = cell * block.gradients[i].cwiseAbs().sum();
+          const double f = block.values[i];
+          block.share[i] = width > 0.0 ? std::clamp(0.5 + f / width, 0.0, 1.0) : (f > 0.0 ? 1.0 : 0.0);
         }
-        cells += sum;
+        cut(block);
       }
     }
   }
+}
+
+}  // namespace
+
+double enclosed_volume(const FieldView& field, double cell) {
+  double cells = 0.0;
+  for_blocks_of(
+      field, cell, [&](const Block&) { cells += static_cast<double>(kCells); },
+      [&](const Block& block) {
+        double sum = 0.0;
+        for (const double share : block.share) sum += share;
+        cells += sum;
+      });
   return cells * cell * cell * cell;
+}
+
+std::vector<double> part_volumes(const FieldView& field, double cell, std::size_t part_count) {
+  std::vector<double> volume(part_count, 0.0);
+  FieldParts parts;
+  const auto give = [&](const Block& block, bool whole) {
+    field.evaluate_parts(block.points, parts);
+    for (std::size_t i = 0; i < kCells; ++i) {
+      const double share = whole ? 1.0 : block.share[i];
+      if (share == 0.0 || parts.offset[i] == parts.offset[i + 1]) continue;
+      std::uint32_t best = parts.offset[i];
+      for (std::uint32_t r = best + 1; r < parts.offset[i + 1]; ++r) {
+        if (parts.value[r] > parts.value[best]) best = r;
+      }
+      volume[parts.part[best]] += share * cell * cell * cell;
+    }
+  };
+  for_blocks_of(
+      field, cell, [&](const Block& block) { give(block, true); }, [&](const Block& block) { give(block, false); });
+  return volume;
 }
 
 Primitive scaled(const Primitive& primitive, double scale) {

@@ -364,6 +364,7 @@ void fields(Archive& archive, BlendDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, VolumeDesc& d) {
+  archive("of", d.of, {}, "object: one scale for all its kernels; particle: the part of the body in which the particle's share of the field is the largest, a scale for its own kernels");
   archive("target", d.target, above(0.0, kVolume).or_auto(), "V0; auto: the volume at the start");
   archive("rate", d.rate, up_to(1000.0, kRate), "alpha: kernels grow by alpha (V0 - V) / V0");
   archive("damping", d.damping, between(0.0, 0.15, kNumber), "beta: against change of the volume");
@@ -580,7 +581,7 @@ template <class Archive>
 void fields(Archive& archive, MeshingDesc& d) {
   using enum MeshingName;
   const auto only = [&d](const Rule& rule) { return rule.only("method", d.method, {Delaunay}); };
-  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra); auto: cubes, the faster one; delaunay: triangles of guaranteed quality, needs the component supple_cgal");
+  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra); auto: cubes or openvdb, whichever costs less by counts, and vertices on the creases of blending graphs; openvdb: through a grid; delaunay: triangles of guaranteed quality, needs the component supple_cgal");
   archive("error", d.error, above(0.0, kLength).or_auto(), "largest distance of a triangle's centroid to the surface, for cubes; auto: by the cell");
   archive("angle_deg", d.angle, only(degrees(1.0, 30.0)), "least angle of a triangle");
   archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
@@ -588,6 +589,13 @@ void fields(Archive& archive, MeshingDesc& d) {
   archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
   archive.check(!d.error || d.method == Auto || d.method == Cubes, "error", "expected method auto or cubes with an error",
                 std::string(name_of(d.method)), "leave out 'method'");
+}
+
+template <class Archive>
+void fields(Archive& archive, GriddingDesc& d) {
+  archive("of", d.of, {}, "a grid of each object under its name, one of all named 'scene', or both");
+  archive("content", d.content, {}, "signed distance near the surface to first order, or the field");
+  archive("half_width", d.half_width, between(1.0, 100.0, kNumber), "of the band on each side of the surface, in cells");
 }
 
 template <class Archive>
@@ -599,6 +607,7 @@ void fields(Archive& archive, OutputDesc& d) {
   archive("mesh", d.mesh, {}, "surfaces; ply, obj: a file an object and frame; usd: one file with all frames");
   archive("grid", d.grid, {}, "fields a frame");
   archive("meshing", d.meshing, {}, "how surfaces become meshes");
+  archive("gridding", d.gridding, {}, "how fields become grids");
   archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids; auto: 8 cells across the smallest thickness, 64 along each object");
   archive.check(!d.film || !d.images || std::count(d.images->formats.begin(), d.images->formats.end(), ImageName::Png) > 0, "film",
                 "expected images as png for a film", "none", "add png to output.images.formats");

@@ -52,6 +52,9 @@ template <> struct EnumNames<KernelName> {
   static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",
                                                          "nishimura", "blinn",   "cauchy",      "blanc_schlick"};
 };
+template <> struct EnumNames<VolumeOfName> {
+  static constexpr std::array<std::string_view, 2> names{"object", "particle"};
+};
 template <> struct EnumNames<BlendName> {
   static constexpr std::array<std::string_view, 4> names{"sum", "graph", "ricci", "gradient"};
 };
@@ -83,7 +86,13 @@ template <> struct EnumNames<MeshName> {
   static constexpr std::array<std::string_view, 3> names{"ply", "obj", "usd"};
 };
 template <> struct EnumNames<MeshingName> {
-  static constexpr std::array<std::string_view, 4> names{"auto", "cubes", "tetrahedra", "delaunay"};
+  static constexpr std::array<std::string_view, 5> names{"auto", "cubes", "tetrahedra", "delaunay", "openvdb"};
+};
+template <> struct EnumNames<GriddedName> {
+  static constexpr std::array<std::string_view, 3> names{"objects", "scene", "both"};
+};
+template <> struct EnumNames<GridContentName> {
+  static constexpr std::array<std::string_view, 2> names{"distance", "field"};
 };
 template <> struct EnumNames<GridName> {
   static constexpr std::array<std::string_view, 1> names{"vdb"};

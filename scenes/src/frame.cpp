@@ -7,8 +7,11 @@
 #include "supple/collision/deformed_field.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/parts.h"
+#include "supple/implicit/creases.h"
 #include "supple/implicit/mesh_motion.h"
+#include "supple/implicit/mesh_routes.h"
 #include "supple/implicit/polygonise.h"
+#include "supple/implicit/surface_grid.h"
 
 namespace supple::scenes {
 namespace {
@@ -338,7 +341,22 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
       profile.present += report.seeds + report.inserted;
       continue;
     }
+    const bool automatic = model.meshing.method == MeshingName::Auto && !model.meshing.error;
     implicit::MarchCounts marched;
+    if (model.meshing.method == MeshingName::OpenVdb ||
+        (automatic &&
+         !implicit::estimate_routes(bodies[i].skeleton, frame.placed[i].support, model.cell).prefers_cubes())) {
+      const implicit::SurfaceGrid grid =
+          implicit::make_surface_grid(frame.field[i], {.lattice = lattice}, context.executor);
+      surfaces[i] = implicit::mesh_of(grid, frame.field[i], context.executor);
+      continue;
+    }
+    if (automatic && implicit::has_creases(frame.field[i])) {
+      surfaces[i] = implicit::march_creases(frame.field[i], lattice, context.executor, &marched);
+      profile.visited += marched.leaves;
+      profile.present += 8 * marched.blocks;
+      continue;
+    }
     surfaces[i] = frame.mesher[i].make(frame.field[i], {.lattice = lattice, .error = model.meshing.error.value_or(0.0)},
                                        context.executor, &marched);
     profile.visited += marched.leaves;
@@ -369,7 +387,10 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   }
   return meshes;
 } catch (const Error& error) {
-  // The names of the mesher's arguments become those of the scene's keys.
+  rethrow_with_scene_keys(error);
+}
+
+void rethrow_with_scene_keys(const Error& error) {
   std::vector<Fault> faults = error.faults();
   for (Fault& fault : faults) {
     if (fault.key == "lattice.cell") fault.key = "output.cell";

@@ -91,4 +91,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
 [[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
                                                    const core::Interactions& laws, Frame& frame);
 
+/// The names of meshers' and grids' arguments become those of the scene's keys.
+[[noreturn]] void rethrow_with_scene_keys(const Error& error);
+
 }  // namespace supple::scenes

@@ -85,7 +85,7 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
   const StageClock clock(simulation.profile(Stage::Export));
   if (outputs_.meshes) write_meshes(simulation, *meshes);
   if (animation_) add_to_animation(simulation, *meshes);
-  if (outputs_.grids) write_grid_file(options_.folder, name_, frame, simulation);
+  if (outputs_.grids) write_grid_file(options_.folder, name_, frame, simulation, grids_);
   write_tables(simulation);
 }
 

@@ -9,6 +9,7 @@
 
 #include "picture.h"
 #include "supple/core/io/usd_file.h"
+#include "supple/implicit/surface_grid.h"
 #include "supple/scenes/run.h"
 
 namespace supple::scenes {
@@ -66,6 +67,7 @@ class FrameWriter {
   std::unique_ptr<ScenePictures> pictures_;
   std::unique_ptr<io::UsdAnimation> animation_;
   std::vector<Mesh> obstacles_;  // of the animation
+  std::vector<implicit::GridUpdater> grids_;  // by body
   int pictures_drawn_ = 0;
   int images_ = 0;
   double encode_s_ = 0.0;

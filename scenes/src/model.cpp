@@ -645,6 +645,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     object.holds_volume = true;
     object.volume = {d.volume->target.value_or(0.0), d.volume->rate, d.volume->damping};
     object.volume_cell = kVolumeCell * object.iso_radius;
+    object.holds_parts = d.volume->of == VolumeOfName::Particle;
   }
 
   const std::vector<double> nearest = nearest_distances(arrangement.position);

@@ -4,8 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "frame.h"
 #include "supple/core/cpu_time.h"
-#include "supple/implicit/surface_grid.h"
+#include "supple/core/error.h"
 
 namespace supple::scenes {
 namespace {
@@ -54,18 +55,36 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
   fs::remove(folder / "result.json", ignored);
 }
 
-void write_grid_file(const fs::path& folder, const std::string& name, int frame, Simulation& simulation) {
+void write_grid_file(const fs::path& folder, const std::string& name, int frame, Simulation& simulation,
+                     std::vector<implicit::GridUpdater>& updaters) try {
   const std::vector<Body>& bodies = simulation.bodies();
+  const GriddingDesc& gridding = simulation.scene().output.gridding;
   const Executor executor(1);
-  std::vector<implicit::SurfaceGrid> grids;
+  implicit::GridOptions options;
+  options.lattice.cell = simulation.cell();
+  options.half_width = gridding.half_width;
+  options.content = gridding.content == GridContentName::Field ? implicit::GridContent::Field
+                                                               : implicit::GridContent::SignedDistance;
+  std::vector<const implicit::SurfaceGrid*> grids;
+  std::vector<implicit::FieldView> fields;
+  updaters.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
-    implicit::GridOptions options;
-    options.lattice.cell = simulation.cell();
+    const implicit::Field& field = simulation.fields()[i];
+    fields.emplace_back(field);
+    if (gridding.of == GriddedName::Scene) continue;
     options.name = bodies[i].name;
-    grids.push_back(implicit::make_surface_grid(simulation.fields()[i], options, executor));
+    grids.push_back(&updaters[i].make(field, options, executor));
+  }
+  implicit::SurfaceGrid whole;
+  if (gridding.of != GriddedName::Objects && !fields.empty()) {
+    options.name = "scene";
+    whole = implicit::make_surface_grid(implicit::UnitedField(fields), options, executor);
+    grids.push_back(&whole);
   }
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);
+} catch (const Error& error) {
+  rethrow_with_scene_keys(error);
 }
 
 fs::path write_contact_sheet(const fs::path& folder, const std::string& name, int last) {

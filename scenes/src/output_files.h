@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "supple/implicit/surface_grid.h"
 #include "supple/render/image.h"
 #include "supple/scenes/simulation.h"
 
@@ -18,7 +19,9 @@ namespace supple::scenes {
 /// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result).
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
-void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation);
+/// @param updaters  by body, kept from frame to frame: only what moved is made anew
+void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation,
+                     std::vector<implicit::GridUpdater>& updaters);
 /// NAME_sheet.png: twelve frames spread over 1 .. last that exist, 3 rows of 4. Empty when none does.
 std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, int last);
 

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "fields_rules.h"
 #include "read_scene_faults.h"
+#include "supple/implicit/mesh_routes.h"
 
 namespace supple::scenes {
 namespace {
@@ -59,13 +61,45 @@ std::size_t contact_body_count(const Model& model) {
   return bodies;
 }
 
-/// Which mesher is taken. OpenVDB's is not among them: it is slower on every body that was measured.
-std::string meshing_of(const Scene& scene) {
+/// Estimates of the ways to a mesh, all objects together, where the particles begin.
+implicit::RouteEstimate routes_of(const Model& model) {
+  implicit::RouteEstimate sum;
+  for (const ObjectModel& object : model.objects) {
+    if (object.skeleton.primitive.empty()) continue;
+    std::vector<Pose> poses;
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      poses.push_back({model.initial.position[i], model.initial.orientation[i]});
+    }
+    implicit::PlacedSkeleton placed;
+    implicit::place_skeleton(object.skeleton, poses, placed);
+    const implicit::RouteEstimate one = implicit::estimate_routes(object.skeleton, placed.support, model.cell);
+    sum.leaves += one.leaves;
+    sum.cubes_ms += one.cubes_ms;
+    sum.openvdb_ms += one.openvdb_ms;
+  }
+  return sum;
+}
+
+/// Which mesher is taken, and why.
+std::string meshing_of(const Scene& scene, const Model& model) {
   const MeshingDesc& d = scene.output.meshing;
-  if (d.method == MeshingName::Tetrahedra) return "tetrahedra";
-  if (d.method == MeshingName::Delaunay) return "Delaunay refinement by CGAL, tetrahedra where objects touch";
-  return std::string(d.error ? "marching cubes to the error asked for" : "marching cubes") +
-         (d.method == MeshingName::Auto ? " (auto: the faster one)" : "") + ", tetrahedra where objects touch";
+  const std::string touching = ", tetrahedra where objects touch";
+  switch (d.method) {
+    case MeshingName::Tetrahedra: return "tetrahedra";
+    case MeshingName::Delaunay: return "Delaunay refinement by CGAL" + touching;
+    case MeshingName::OpenVdb: return "OpenVDB grid and volumeToMesh" + touching;
+    case MeshingName::Cubes: return std::string(d.error ? "marching cubes to the error asked for" : "marching cubes") + touching;
+    case MeshingName::Auto: break;
+  }
+  if (d.error) return "marching cubes to the error asked for" + touching;
+  const implicit::RouteEstimate routes = routes_of(model);
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "auto: %s (by counts marching cubes %.2g ms, by way of OpenVDB %.2g ms)",
+                routes.prefers_cubes() ? "marching cubes" : "OpenVDB", routes.cubes_ms, routes.openvdb_ms);
+  const bool graph = std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) {
+    return o.skeleton.blend.rule == implicit::BlendRule::Graph;
+  });
+  return text.data() + std::string(graph ? ", vertices on creases" : "") + touching;
 }
 
 }  // namespace
@@ -132,7 +166,7 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
 
   const bool mesh = mesh_wanted && surfaces;
   add(Stage::Polygonise, mesh,
-      mesh ? "needed by " + list({{outputs.images, "images"}, {outputs.meshes, "mesh files"}}) + "; " + meshing_of(scene)
+      mesh ? "needed by " + list({{outputs.images, "images"}, {outputs.meshes, "mesh files"}}) + "; " + meshing_of(scene, model)
            : (surfaces ? "no image or mesh file is requested" : "no object has a skeleton"));
   add(Stage::Render, outputs.images, outputs.images ? "images are requested" : "no image is requested");
   const bool files = outputs.images || outputs.film || outputs.meshes || outputs.grids || outputs.contacts || outputs.particles;

@@ -76,7 +76,12 @@ struct Simulation::Impl {
     state.particles = model.initial;
     state.links = core::unbroken(model.links);
     state.broken_for.assign(model.links.size(), 0.0);
-    state.volumes.resize(model.objects.size());
+    std::uint32_t volumes = 0;
+    for (ObjectModel& object : model.objects) {
+      object.first_volume = volumes;
+      volumes += object.holds_parts ? object.last - object.first : 1;
+    }
+    state.volumes.resize(volumes);
     form_bodies();
     measure_volumes();
     for (const Body& body : bodies) state.samples.push_back({.distance = std::vector<double>(body.samples.size(), -1.0)});
@@ -153,35 +158,49 @@ struct Simulation::Impl {
     for (Body& body : bodies) {
       const ObjectModel& object = model.objects[body.object];
       if (!object.holds_volume) continue;
-      const double scale = state.volumes[body.object].scale;
+      const auto scale_of = [&](std::uint32_t part) {
+        return state.volumes[object.first_volume + (object.holds_parts ? part : 0)].scale;
+      };
       for (std::size_t k = 0; k < body.skeleton.primitive.size(); ++k) {
-        body.skeleton.primitive[k] = implicit::scaled(object.skeleton.primitive[k], scale);
+        const implicit::Primitive& primitive = object.skeleton.primitive[k];
+        body.skeleton.primitive[k] = implicit::scaled(primitive, scale_of(primitive.part));
       }
-      for (std::size_t k = 0; k < body.samples.size(); ++k) body.samples.reach[k] = scale * object.samples.reach[k];
+      for (std::size_t k = 0; k < body.samples.size(); ++k) {
+        body.samples.reach[k] = scale_of(body.samples.part[k]) * object.samples.reach[k];
+      }
     }
   }
 
-  /// Volume of a body that its object holds [m^3].
-  double volume_of(std::size_t body) {
+  /// Volumes of a body that its object holds [m^3]: its own, or those of its particles.
+  std::vector<double> volumes_of(std::size_t body) {
     place_and_index(context(), state.particles, body, pulled);
-    return implicit::enclosed_volume(pulled.field[body], model.objects[bodies[body].object].volume_cell);
+    const ObjectModel& object = model.objects[bodies[body].object];
+    if (object.holds_parts) return implicit::part_volumes(pulled.field[body], object.volume_cell, object.last - object.first);
+    return {implicit::enclosed_volume(pulled.field[body], object.volume_cell)};
   }
 
   /// Targets that the scene leaves to the start.
   void measure_volumes() {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       ObjectModel& object = model.objects[bodies[i].object];
-      if (object.holds_volume && !(object.volume.target > 0.0)) object.volume.target = volume_of(i);
+      if (!object.holds_volume) continue;
+      object.part_target.assign(object.holds_parts ? object.last - object.first : 1, object.volume.target);
+      if (!(object.volume.target > 0.0)) object.part_target = volumes_of(i);
     }
   }
 
-  /// Between two steps: kernels grow or shrink towards the volume their object holds.
+  /// Between two steps: kernels grow or shrink towards the volume their object, or particle, holds.
   void control_volumes() {
     bool any = false;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const ObjectModel& object = model.objects[bodies[i].object];
-      if (!object.holds_volume || !(object.volume.target > 0.0)) continue;
-      implicit::control_volume(object.volume, volume_of(i), dt(), state.volumes[bodies[i].object]);
+      if (!object.holds_volume) continue;
+      const std::vector<double> volumes = volumes_of(i);
+      for (std::size_t k = 0; k < volumes.size(); ++k) {
+        implicit::VolumeControl control = object.volume;
+        control.target = object.part_target[k];
+        if (control.target > 0.0) implicit::control_volume(control, volumes[k], dt(), state.volumes[object.first_volume + k]);
+      }
       any = true;
     }
     if (any) scale_kernels();
@@ -521,7 +540,7 @@ void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());
   SUPPLE_EXPECTS(state.links.broken.size() == impl_->model.links.size());
   SUPPLE_EXPECTS(state.broken_for.size() == impl_->model.links.size());
-  SUPPLE_EXPECTS(state.volumes.size() == impl_->model.objects.size());
+  SUPPLE_EXPECTS(state.volumes.size() == impl_->state.volumes.size());
   impl_->drop_results();
   impl_->take(std::move(state));
 }

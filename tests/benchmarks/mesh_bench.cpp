@@ -4,7 +4,8 @@
 /// method along the analytic gradient, in double precision).
 ///
 ///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
-///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the blobs moved
+///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the blobs moved;
+///                                              /field: the field stage against its floors
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
 ///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
 #include <algorithm>
@@ -125,10 +126,11 @@ std::string hash_of(const Mesh& mesh) {
 
 struct Method {
   std::string_view name;
-  int refinements;  ///< -1: tetrahedra
+  int refinements;  ///< -1: tetrahedra, -2: a grid and OpenVDB's volumeToMesh
 };
 /// "refined" starts from a lattice of twice the cell, "refined_twice" of four times.
-constexpr std::array<Method, 4> kMethods{{{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}}};
+constexpr std::array<Method, 5> kMethods{
+    {{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}, {"openvdb", -2}}};
 
 /// 1 % of the blobs, those nearest to one on the surface.
 std::vector<std::uint32_t> blobs_at_the_side(const Body& body) {
@@ -237,7 +239,9 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
     const double begin = cpu_seconds();
     body.place();
     const double indexed = cpu_seconds();
-    if (method.refinements < 0) {
+    if (method.refinements == -2) {
+      mesh = mesh_of(make_surface_grid(body.field, {.lattice = lattice}, executor), body.field, executor);
+    } else if (method.refinements < 0) {
       mesh = polygonise(body.field, lattice, executor);
     } else {
       made = &mesher.make(body.field, {.lattice = coarse, .refinements = method.refinements}, executor, &counts);
@@ -285,59 +289,106 @@ int report_errors(Body& body, const Lattice& lattice, const char* path) {
   return 0;
 }
 
+/// Calls use(corner x, y, z, values) for the tiles of a grid of n^3 nodes that some support reaches, all evaluated.
+template <class Use>
+void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n, const Use& use) {
+  const auto iso = static_cast<float>(field.packed().iso);
+  blobs::BlobGrid grid;
+  grid.build(field.packed().primitive, lattice);
+  blobs::BlobList block, leaf, tile;
+  alignas(64) float tile_values[blobs::kTileNodes];
+  const auto for_corners = [](int edge, const auto& at) {
+    for (int c = 0; c < 8; ++c) at(edge * (c & 1), edge * (c >> 1 & 1), edge * (c >> 2));
+  };
+  const auto centre = [](int x, int y, int z, float half) {
+    return std::array{static_cast<float>(x) + half, static_cast<float>(y) + half, static_cast<float>(z) + half};
+  };
+  for (std::int64_t bz = 0; bz < n; bz += 16) {
+    for (std::int64_t by = 0; by < n; by += 16) {
+      for (std::int64_t bx = 0; bx < n; bx += 16) {
+        grid.gather({bx, by, bz}, 16, 0, block);
+        if (block.count == 0) continue;
+        for_corners(8, [&](int lx, int ly, int lz) {
+          (void)blobs::select(block, centre(lx, ly, lz, 4.0F), 4.0F, leaf);
+          if (leaf.count == 0) return;
+          for_corners(4, [&](int tx, int ty, int tz) {
+            const int x0 = lx + tx, y0 = ly + ty, z0 = lz + tz;
+            (void)blobs::select(leaf, centre(x0, y0, z0, 2.0F), 2.0F, tile);
+            if (tile.count == 0) return;
+            blobs::evaluate_tile(tile, centre(x0, y0, z0, 0.0F), iso, tile_values);
+            use(bx + x0, by + y0, bz + z0, tile_values);
+          });
+        });
+      }
+    }
+  }
+}
+
+/// Values where bounds admit a surface, candidate search included.
+double sample_seconds(const Field& field, const Lattice& lattice, blobs::BlobGrid& kept, march::BlockTable& table) {
+  const Executor executor(1);
+  const double begin = cpu_seconds();
+  const auto sampler = march::make_sampler(field, lattice, kept);
+  sampler->prepare(executor, table);
+  sampler->sample(executor, table);
+  return cpu_seconds() - begin;
+}
+
+/// The field stage against two floors: the kernel values of all nodes of the leaves that hold surface at 14 G/s, and evaluating
+/// every tile that a support reaches.
+void measure_field(const std::string& name, const Body& body, const Lattice& lattice, int cells) {
+  constexpr double kValuesPerSecond = 14e9;
+  double stage = 1e300, touched = 1e300, sum = 0.0, values = 0.0;
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    blobs::BlobGrid kept;
+    march::BlockTable table;
+    stage = std::min(stage, sample_seconds(body.field, lattice, kept, table));
+    const double begin = cpu_seconds();
+    evaluate_touched(body.field, lattice, cells + 1,
+                     [&](std::int64_t, std::int64_t, std::int64_t, const float* tile) { sum += static_cast<double>(tile[0]); });
+    touched = std::min(touched, cpu_seconds() - begin);
+    if (repeat > 0) continue;
+    blobs::BlobList near, leaf_list;
+    for (const march::Block& block : table.block) {
+      if (block.leaf.empty()) continue;
+      kept.gather(block.base(), march::kBlockNodes, 0, near);
+      for (const march::Leaf& leaf : block.leaf) {
+        const unsigned bits = leaf.slot;
+        const std::array centre{8.0F * static_cast<float>(bits & 1u) + 4.0F, 8.0F * static_cast<float>(bits >> 1 & 1u) + 4.0F,
+                                8.0F * static_cast<float>(bits >> 2) + 4.0F};
+        (void)blobs::select(near, centre, 4.0F, leaf_list);
+        values += static_cast<double>(leaf_list.count) * 8 * blobs::kTileNodes;
+      }
+    }
+  }
+  const double floor = values / kValuesPerSecond;
+  std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"items\": %.4g, \"items_per_s\": %.4g, "
+              "\"floor_cpu_ms\": %.4g, \"over_floor\": %.3g, \"touched_cpu_ms\": %.4g, \"over_touched\": %.3g, \"hash\": \"%s\"}\n",
+              name.c_str(), 1e3 * stage, values, values / stage, 1e3 * floor, stage / floor, 1e3 * touched, stage / touched,
+              to_hex(static_cast<std::uint64_t>(std::abs(sum))).c_str());
+  std::fflush(stdout);
+}
+
 /// The field on all nodes in single precision, x fastest, for other meshers: node count, origin and cell as float64, then
 /// the values. Times: evaluating wherever a support reaches, and only where bounds admit a surface.
 int write_grid(Body& body, const Lattice& lattice, int cells, const char* path) {
-  const Executor executor(1);
   const auto n = static_cast<std::int64_t>(cells) + 1;
   const auto iso = static_cast<float>(body.skeleton.iso);
   std::vector<float> values(static_cast<std::size_t>(n * n * n), -iso);
-  const std::span<const PackedPrimitive> primitives = body.field.packed().primitive;
   double touched = 1e300, surface = 1e300;
   for (int repeat = 0; repeat < 3; ++repeat) {
-    double begin = cpu_seconds();
-    blobs::BlobGrid grid;
-    grid.build(primitives, lattice);
-    blobs::BlobList block, leaf, tile;
-    alignas(64) float tile_values[blobs::kTileNodes];
-    const auto for_corners = [](int edge, const auto& use) {
-      for (int c = 0; c < 8; ++c) use(edge * (c & 1), edge * (c >> 1 & 1), edge * (c >> 2));
-    };
-    const auto centre = [](int x, int y, int z, float half) {
-      return std::array{static_cast<float>(x) + half, static_cast<float>(y) + half, static_cast<float>(z) + half};
-    };
-    for (std::int64_t bz = 0; bz < n; bz += 16) {
-      for (std::int64_t by = 0; by < n; by += 16) {
-        for (std::int64_t bx = 0; bx < n; bx += 16) {
-          grid.gather({bx, by, bz}, 16, 0, block);
-          if (block.count == 0) continue;
-          for_corners(8, [&](int lx, int ly, int lz) {
-            (void)blobs::select(block, centre(lx, ly, lz, 4.0F), 4.0F, leaf);
-            if (leaf.count == 0) return;
-            for_corners(4, [&](int tx, int ty, int tz) {
-              const int x0 = lx + tx, y0 = ly + ty, z0 = lz + tz;
-              (void)blobs::select(leaf, centre(x0, y0, z0, 2.0F), 2.0F, tile);
-              if (tile.count == 0) return;
-              blobs::evaluate_tile(tile, centre(x0, y0, z0, 0.0F), iso, tile_values);
-              for (int row = 0; row < 16; ++row) {
-                const std::int64_t y = by + y0 + row % 4, z = bz + z0 + row / 4, x = bx + x0;
-                if (y >= n || z >= n || x >= n) continue;
-                std::copy_n(tile_values + 4 * row, std::min<std::int64_t>(4, n - x),
-                            values.begin() + (z * n + y) * n + x);
-              }
-            });
-          });
-        }
+    const double begin = cpu_seconds();
+    evaluate_touched(body.field, lattice, n, [&](std::int64_t x, std::int64_t y0, std::int64_t z0, const float* tile) {
+      for (int row = 0; row < 16; ++row) {
+        const std::int64_t y = y0 + row % 4, z = z0 + row / 4;
+        if (y >= n || z >= n || x >= n) continue;
+        std::copy_n(tile + 4 * row, std::min<std::int64_t>(4, n - x), values.begin() + (z * n + y) * n + x);
       }
-    }
+    });
     touched = std::min(touched, cpu_seconds() - begin);
-    begin = cpu_seconds();
-    march::BlockTable table;
     blobs::BlobGrid kept;
-    const auto sampler = march::make_sampler(body.field, lattice, kept);
-    sampler->prepare(executor, table);
-    sampler->sample(executor, table);
-    surface = std::min(surface, cpu_seconds() - begin);
+    march::BlockTable table;
+    surface = std::min(surface, sample_seconds(body.field, lattice, kept, table));
   }
   std::ofstream out(path, std::ios::binary);
   const double header[5] = {static_cast<double>(n), lattice.origin.x(), lattice.origin.y(), lattice.origin.z(),
@@ -380,6 +431,10 @@ int main(int argc, char** argv) {
       const std::string name = body_name + '/' + std::to_string(cells) + "/moved";
       if (body_name != "w1" && name.compare(0, filter.size(), filter) == 0) {
         measure_moved(name, body, frame.lattice(cells));
+      }
+      const std::string field = body_name + '/' + std::to_string(cells) + "/field";
+      if (body_name != "w1" && field.compare(0, filter.size(), filter) == 0) {
+        measure_field(field, body, frame.lattice(cells), cells);
       }
       const std::string grid = body_name + '/' + std::to_string(cells) + "/grid";
       if (body_name != "w1" && grid.compare(0, filter.size(), filter) == 0) {

@@ -12,6 +12,9 @@
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "supple/core/hash.h"
+#include "supple/core/mesh.h"
+#include "supple/implicit/march_cubes.h"
+#include "supple/implicit/mesh_routes.h"
 
 // OpenVDB loses one node when the topology of a file ends early: RootNode::readTopology holds it by a plain pointer.
 extern "C" const char* __lsan_default_suppressions();
@@ -277,6 +280,37 @@ TEST(SurfaceGrid, OfUnitedBodiesHasTheDistanceToTheNearest) {
       }
     }
   }
+}
+
+TEST(SurfaceGrid, BecomesAMeshNearTheSurfaceByOpenVdb) {
+  const Body body = body_of({{wyvill_point(1.0), kOrigin}, {wyvill_point(0.8), kOrigin + Vec3(0.5, 0, 0)}});
+  const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(1));
+  const Mesh mesh = mesh_of(grid, body.field, Executor(2));
+  const MeshReport report = inspect(mesh);
+  const MeshReport exact = inspect(march_cubes(body.field, {.lattice = {.cell = 0.01}}, Executor(1)));
+  EXPECT_TRUE(report.closed && report.oriented);
+  EXPECT_EQ(report.components, exact.components);
+  EXPECT_NEAR(report.volume, exact.volume, 0.1 * kCell * exact.area);
+  std::vector<double> values(mesh.vertex_count());
+  std::vector<Vec3> gradients(mesh.vertex_count());
+  body.field.evaluate(mesh.position, values, gradients);
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    ASSERT_LT(std::abs(values[v]), 0.2 * kCell * gradients[v].norm());
+    ASSERT_NEAR(mesh.normal[v].dot(gradients[v].normalized()), -1.0, 1e-12);
+  }
+}
+
+TEST(MeshRoutes, CostByCountsAndCubesCostLess) {
+  Body body = random_body({.seed = 8, .parts = 60, .half_width = 2.0, .only_points = true});
+  const RouteEstimate blobs = estimate_routes(body.skeleton, body.placed.support, 0.05);
+  EXPECT_TRUE(blobs.prefers_cubes());
+  EXPECT_GT(blobs.cubes_ms, 0.0);
+  EXPECT_NEAR(estimate_routes(body.skeleton, body.placed.support, 0.1).leaves, 0.25 * blobs.leaves, 1e-9 * blobs.leaves);
+  body.skeleton.blend.rule = BlendRule::Ricci;  // double precision
+  const RouteEstimate blended = estimate_routes(body.skeleton, body.placed.support, 0.05);
+  EXPECT_GT(blended.cubes_ms, blobs.cubes_ms);
+  EXPECT_EQ(blended.openvdb_ms, blobs.openvdb_ms);
+  EXPECT_EQ(estimate_routes({}, {}, 0.05).leaves, 0.0);
 }
 
 TEST(SurfaceGrid, IsReadByTheToolsOfOpenVdb) {

@@ -113,5 +113,19 @@ TEST(Volume, ControlFollowsItsLaw) {
   EXPECT_DOUBLE_EQ(fresh.scale, 1.02);
 }
 
+TEST(PartVolumes, AddUpAndFollowTheTerritories) {
+  const double cell = 0.03;
+  // Two equal balls share alike by symmetry; a third one apart has what a lone ball has.
+  const testing::Body body = testing::body_of({{testing::wyvill_point(1.0), Vec3(-0.3, 0, 0)},
+                                               {testing::wyvill_point(1.0), Vec3(0.3, 0, 0)},
+                                               {testing::wyvill_point(0.6), Vec3(0, 3, 0)}});
+  const std::vector<double> parts = part_volumes(body.field, cell, 3);
+  EXPECT_NEAR(parts[0] + parts[1] + parts[2], enclosed_volume(body.field, cell), 1e-12);
+  EXPECT_NEAR(parts[0], parts[1], 1e-12);
+  // The tangent planes err by the square of the cell over the radius, 0.273.
+  EXPECT_NEAR(parts[2], 0.392496505 * 0.6 * 0.6 * 0.6, cell * cell / (0.273 * 0.273) * parts[2]);
+  EXPECT_GT(parts[0], parts[2]);
+}
+
 }  // namespace
 }  // namespace supple::implicit

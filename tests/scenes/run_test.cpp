@@ -9,6 +9,7 @@
 
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/implicit/surface_grid.h"
 #include "supple/render/image.h"
 #include "supple/render/layers.h"
 #include "supple/scenes/inspect.h"
@@ -265,6 +266,49 @@ TEST_F(Run, GathersTheFramesBeforeARestartToo) {
   stopped.resume = true;
   ASSERT_EQ(run_scene(scene_, stopped).outcome, "done");
   EXPECT_EQ(bytes_of(folder_ / "drops.usda"), bytes_of(o.folder / "drops.usda"));
+}
+
+TEST_F(Run, WritesGridsOfObjectsOfTheSceneOrBoth) {
+  scene_.output.images.reset();
+  scene_.output.film = false;
+  const auto grids_of = [&](GriddedName of, GridContentName content) {
+    scene_.output.gridding.of = of;
+    scene_.output.gridding.content = content;
+    RunOptions again = options();
+    again.overwrite = true;
+    EXPECT_EQ(run_scene(scene_, again).outcome, "done");
+    return folder_ / "grids/drops.0001.vdb";
+  };
+  const auto refused = [](const fs::path& file, const std::string& name) {
+    try {
+      (void)implicit::read_grid(file, name);
+      return false;
+    } catch (const Error&) {
+      return true;
+    }
+  };
+  const fs::path objects = grids_of(GriddedName::Objects, GridContentName::Distance);
+  EXPECT_LT(implicit::read_grid(objects, "left").interpolate(Vec3(-0.3, 0, 0)), 0.0);
+  EXPECT_GT(implicit::read_grid(objects, "left").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  EXPECT_TRUE(refused(objects, "scene"));
+  const fs::path scene = grids_of(GriddedName::Scene, GridContentName::Distance);
+  EXPECT_TRUE(refused(scene, "left"));
+  EXPECT_LT(implicit::read_grid(scene, "scene").interpolate(Vec3(-0.3, 0, 0)), 0.0);
+  EXPECT_LT(implicit::read_grid(scene, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  const fs::path both = grids_of(GriddedName::Both, GridContentName::Field);
+  EXPECT_GT(implicit::read_grid(both, "right").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  EXPECT_GT(implicit::read_grid(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
+}
+
+TEST_F(Run, RefusesGridsOfTooManyVoxelsByTheKeyOfTheScene) {
+  scene_.output.images.reset();
+  scene_.output.film = false;
+  scene_.output.mesh.clear();
+  scene_.output.cell = 1e-5;
+  const RunResult refused = run_scene(scene_, options());
+  EXPECT_EQ(refused.outcome, "limit");
+  EXPECT_NE(refused.reason.find("output.cell: expected a surface in at most"), std::string::npos) << refused.reason;
+  EXPECT_NE(refused.reason.find("use cells of at least"), std::string::npos) << refused.reason;
 }
 
 TEST_F(Run, SaysWhenAFolderCannotBeMade) {

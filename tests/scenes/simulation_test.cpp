@@ -52,6 +52,55 @@ std::uint64_t hash_after(const Scene& scene, int frames, SimulationOptions optio
   return simulation.state_hash();
 }
 
+/// Two balls in a row about `kMiddle`.
+const Vec3 kMiddle(0.013, 0.007, 0.004);
+Mesh mesh_of_graph(const std::string& meshing) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+objects:
+  - name: pair
+    particles: {arrange: line, count: 2, spacing: 0.4, at: [0.013, 0.007, 0.004], mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    blend: {rule: graph}
+output: {mesh: ply, cell: 0.05, meshing: )" + meshing + "}\n");
+  return simulation.meshes().front();
+}
+
+TEST(Meshes, HaveCreasesWhereNodesOfAGraphUnite) {
+  // The surfaces of the two balls meet on a circle in the plane between them; cubes have no vertex of it.
+  const auto on_crease = [](const Mesh& mesh) {
+    constexpr double kRadius = 0.8 * 0.454202019;
+    const double circle = std::sqrt(kRadius * kRadius - 0.2 * 0.2);
+    return std::count_if(mesh.position.begin(), mesh.position.end(), [&](const Vec3& p) {
+      const Vec3 d = p - kMiddle;
+      return std::abs(d.x()) < 1e-6 && std::abs(std::hypot(d.y(), d.z()) - circle) < 1e-6;
+    });
+  };
+  EXPECT_GT(on_crease(mesh_of_graph("{}")), 20);
+  EXPECT_EQ(on_crease(mesh_of_graph("{method: cubes}")), 0);
+  EXPECT_TRUE(inspect(mesh_of_graph("{}")).closed);
+}
+
+TEST(Meshes, ByWayOfAGridAreNotThoseOfCubes) {
+  const Mesh cubes = mesh_of_graph("{method: cubes}"), grid = mesh_of_graph("{method: openvdb}");
+  EXPECT_TRUE(inspect(grid).closed);
+  EXPECT_NE(grid.triangle_count(), cubes.triangle_count());
+  EXPECT_NEAR(inspect(grid).volume, inspect(cubes).volume, 0.02 * inspect(cubes).volume);
+}
+
+TEST(Meshes, ThatAreLeftOpenTakeTheCheaperWayWhichThePlanNames) {
+  const auto reason = [](const std::string& meshing) {
+    const Simulation simulation = make(two_balls("output: {mesh: ply, meshing: " + meshing + "}"));
+    const StepPlan plan = plan_step(simulation.scene(), simulation.model(), requested_outputs(simulation.scene()));
+    return plan.stages[static_cast<std::size_t>(Stage::Polygonise)].reason;
+  };
+  EXPECT_NE(reason("{}").find("auto: marching cubes (by counts marching cubes "), std::string::npos) << reason("{}");
+  EXPECT_NE(reason("{}").find("by way of OpenVDB "), std::string::npos);
+  EXPECT_NE(reason("{method: openvdb}").find("volumeToMesh"), std::string::npos);
+  EXPECT_EQ(reason("{method: cubes}").find("auto"), std::string::npos);
+}
+
 TEST(Meshes, ByAComponentThatIsAbsentAreRefusedByItsName) {
   try {
     (void)make(two_balls("output: {mesh: ply, meshing: {method: delaunay}}"));
@@ -389,6 +438,20 @@ TEST(HeldVolume, OfMergingDropsStaysThatOfTheStart) {
   EXPECT_LT(held_most, 0.04);  // the lag of the controller behind a drift of 0.9 / s is 2 %, cells and mesh err by one
   EXPECT_LT(simulation.state().volumes[1].scale, 0.97);
   EXPECT_EQ(simulation.state().volumes[0].scale, 1.0);
+}
+
+TEST(HeldVolume, OfEveryParticleStaysToo) {
+  Simulation simulation(library_scene("objects/blob_keeps_its_volume", {"objects.held.volume.of=particle"}));
+  ASSERT_EQ(simulation.state().volumes.size(), 5u);  // the free object's, and those of four particles
+  const auto volume = [&] { return inspect(simulation.meshes().at(1)).volume; };
+  const double start = volume();
+  run(simulation, 25);
+  EXPECT_NEAR(volume(), start, 0.04 * start);
+  for (std::size_t k = 1; k < 5; ++k) {
+    const auto& held = simulation.state().volumes[k];
+    EXPECT_LT(held.scale, 0.99);
+    EXPECT_NEAR(held.volume, 0.25 * start, 0.05 * start);  // four alike
+  }
 }
 
 TEST(HeldVolume, ContinuesFromASavedStateWithTheSameBitsForAnyThreads) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "supple/core/executor.h"
+#include "supple/core/mesh.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/polygonise.h"
 
@@ -47,6 +48,7 @@ class SurfaceGrid {
   friend class GridUpdater;
   friend SurfaceGrid make_surface_grid(const FieldView&, const GridOptions&, const Executor&);
   friend void write_grids(const std::filesystem::path&, std::span<const SurfaceGrid* const>);
+  friend Mesh mesh_of(const SurfaceGrid&, const FieldView&, const Executor&);
   friend SurfaceGrid read_grid(const std::filesystem::path&, const std::string&);
   struct Impl;
   std::unique_ptr<Impl> impl_;
@@ -101,6 +103,10 @@ class UnitedField {
  private:
   std::vector<FieldView> fields_;
 };
+
+/// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles cut in two; normals are
+/// those of the field. Vertices lie near the surface, not on it.
+[[nodiscard]] Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor);
 
 /// Writes one .vdb with all grids, by temporary file and rename. @throws Error{Io}
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid> grids);

@@ -4,6 +4,9 @@
 /// multiplied by a scale, which keeps it smooth at the skeleton and compact.
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "supple/core/hash.h"
 #include "supple/implicit/field_view.h"
 #include "supple/implicit/skeleton.h"
@@ -14,6 +17,10 @@ namespace supple::implicit {
 /// of the tangent plane. Errs by the square of the cell over the radii of curvature; changes smoothly while the surface moves.
 /// @param cell  [m], > 0   @pre the surface box is bounded
 [[nodiscard]] double enclosed_volume(const FieldView& field, double cell);
+
+/// The same by part: a cell's volume is that of the part with the largest share of the field at its middle (ties: the lower
+/// one), so the territories of all parts add up to `enclosed_volume` but for rounding. Shape [part_count].
+[[nodiscard]] std::vector<double> part_volumes(const FieldView& field, double cell, std::size_t part_count);
 
 /// The primitive with all lengths of its kernel (of its support, for shapes that give that) multiplied by `scale` > 0; values
 /// on the kernel's range stay, slopes are divided by it. The shape's own size stays.

@@ -227,8 +227,11 @@ struct BlendDesc {
   double fade = 0.0;                    ///< graph: how long the blend of a broken bond fades [s]
 };
 
-/// objects[].volume: kernels grow and shrink so that the object keeps its volume
+enum class VolumeOfName : std::uint8_t { Object, Particle };
+
+/// objects[].volume: kernels grow and shrink so that the object, or each of its particles, keeps its volume
 struct VolumeDesc {
+  VolumeOfName of = VolumeOfName::Object;
   std::optional<double> target;       ///< [m^3]; absent: that of the start
   double rate = 2.0;                  ///< alpha [1/s]
   double damping = 0.05;              ///< beta
@@ -329,7 +332,9 @@ struct ImagesDesc {
 enum class TableName : std::uint8_t { Csv, Vtk };
 enum class MeshName : std::uint8_t { Ply, Obj, Usd };
 enum class GridName : std::uint8_t { Vdb };
-enum class MeshingName : std::uint8_t { Auto, Cubes, Tetrahedra, Delaunay };
+enum class MeshingName : std::uint8_t { Auto, Cubes, Tetrahedra, Delaunay, OpenVdb };
+enum class GriddedName : std::uint8_t { Objects, Scene, Both };
+enum class GridContentName : std::uint8_t { Distance, Field };
 
 struct MeshingDesc {
   MeshingName method = MeshingName::Auto;  ///< of bodies that touch no other
@@ -340,6 +345,12 @@ struct MeshingDesc {
   bool motion = false;                     ///< columns of velocity and owner
 };
 
+struct GriddingDesc {
+  GriddedName of = GriddedName::Objects;                 ///< one grid an object, one of all, or both
+  GridContentName content = GridContentName::Distance;
+  double half_width = 3.0;                               ///< of the band [cells]
+};
+
 struct OutputDesc {
   std::optional<ImagesDesc> images;
   bool film = false;                  ///< needs images
@@ -348,6 +359,7 @@ struct OutputDesc {
   std::vector<MeshName> mesh;
   std::vector<GridName> grid;
   MeshingDesc meshing;
+  GriddingDesc gridding;
   std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
 };
 
