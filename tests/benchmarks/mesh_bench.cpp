@@ -3,6 +3,8 @@
 /// memory, a hash, and the distances of vertices and of triangle centroids to the exact surface in cells (RMS; Newton's
 /// method along the analytic gradient, in double precision).
 ///
+///   mesh_bench --bounded BODY CELLS            Hausdorff distances of cubes and tetrahedra to a mesh of a quarter of the cell
+///                                              and back, with a bounded error (needs the component supple_cgal)
 ///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
 ///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the blobs moved;
 ///                                              /field: the field stage against its floors
@@ -26,6 +28,9 @@
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/implicit/surface_grid.h"
+#ifdef SUPPLE_HAS_CGAL
+#include "supple/cgal/surface_meshes.h"
+#endif
 
 namespace {
 
@@ -399,6 +404,28 @@ int write_grid(Body& body, const Lattice& lattice, int cells, const char* path) 
   return out.good() ? 0 : 1;
 }
 
+#ifdef SUPPLE_HAS_CGAL
+/// The reference errs by a sixteenth of what the meshes do.
+int report_bounded(const std::string& name, const Body& body, const Frame& frame, int cells) {
+  const Executor executor(2);
+  const Lattice lattice = frame.lattice(cells);
+  const double error = 0.01 * lattice.cell;
+  const Mesh exact = polygonise(body.field, frame.lattice(4 * cells), executor);
+  for (const bool cubes : {true, false}) {
+    const Mesh mesh = cubes ? march_cubes(body.field, {.lattice = lattice}, executor) : polygonise(body.field, lattice, executor);
+    const double begin = cpu_seconds();
+    const double there = cgal::one_sided_hausdorff_distance(mesh, exact, error);
+    const double back = cgal::one_sided_hausdorff_distance(exact, mesh, error);
+    std::printf("{\"name\": \"implicit/bounded/%s/%d/%s\", \"cpu_ms_min\": %.4g, \"items\": %zu, \"error\": %.4g, "
+                "\"error_kind\": \"hausdorff_over_h\", \"back_over_h\": %.4g, \"bound_over_h\": 0.01}\n",
+                name.c_str(), cells, cubes ? "cubes" : "tetrahedra", 1e3 * (cpu_seconds() - begin), mesh.triangle_count(),
+                there / lattice.cell, back / lattice.cell);
+    std::fflush(stdout);
+  }
+  return 0;
+}
+#endif
+
 bool starts_alike(std::string_view a, std::string_view b) {
   const std::size_t n = std::min(a.size(), b.size());
   return a.substr(0, n) == b.substr(0, n);
@@ -407,6 +434,15 @@ bool starts_alike(std::string_view a, std::string_view b) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 4 && std::string_view(argv[1]) == "--bounded") {
+#ifdef SUPPLE_HAS_CGAL
+    const Body body = make_body(argv[2]);
+    return report_bounded(argv[2], body, frame_of(body), std::stoi(argv[3]));
+#else
+    std::fputs("built without the component supple_cgal\n", stderr);
+    return 2;
+#endif
+  }
   if (argc == 5 && std::string_view(argv[1]) == "--errors") {
     Body body = make_body(argv[2]);
     return report_errors(body, frame_of(body).lattice(std::stoi(argv[3])), argv[4]);
