@@ -10,17 +10,13 @@ namespace {
 
 constexpr std::uint32_t kElsewhere = 0xffffffff;
 
-/// The blend among the particles of a piece. @param part  of the piece by particle of the object, or kElsewhere
-implicit::Blend take_blend(const implicit::Blend& all, const std::vector<std::uint32_t>& part, std::uint32_t part_count) {
+/// The blend among the particles of a piece. @param particle  of the piece, counted from the first of the object
+implicit::Blend take_blend(const implicit::Blend& all, std::span<const std::uint32_t> particle) {
   implicit::Blend blend = all;
   if (all.rule == implicit::BlendRule::Sum) return blend;
-  blend.node.assign(part_count, 0);
-  std::vector<std::uint32_t> present;  // nodes that the piece has particles of, rising
-  for (std::size_t k = 0; k < part.size(); ++k) {
-    if (part[k] == kElsewhere) continue;
-    blend.node[part[k]] = all.node[k];
-    present.push_back(all.node[k]);
-  }
+  blend.node.clear();
+  for (const std::uint32_t p : particle) blend.node.push_back(all.node[p]);
+  std::vector<std::uint32_t> present = blend.node;  // nodes that the piece has particles of, rising
   std::sort(present.begin(), present.end());
   present.erase(std::unique(present.begin(), present.end()), present.end());
   const auto renumbered = [&](std::uint32_t node) {
@@ -36,27 +32,51 @@ implicit::Blend take_blend(const implicit::Blend& all, const std::vector<std::ui
   return blend;
 }
 
+/// Numbers of things by the particle that carries them, so that a piece is cut out in the time that its own size takes.
+class Carried {
+ public:
+  /// @param part_of  the particle of each thing, counted from the first of the object
+  Carried(std::size_t particles, std::size_t things, const auto& part_of) : first_(particles + 1, 0), thing_(things) {
+    for (std::size_t k = 0; k < things; ++k) ++first_[part_of(k) + 1];
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    std::vector<std::size_t> place(first_.begin(), first_.end() - 1);
+    for (std::size_t k = 0; k < things; ++k) thing_[place[part_of(k)]++] = k;
+  }
+  /// Those that any of the particles carries, ascending.
+  [[nodiscard]] std::vector<std::size_t> of(std::span<const std::uint32_t> particle) const {
+    std::vector<std::size_t> out;
+    for (const std::uint32_t p : particle) {
+      for (std::size_t k = first_[p]; k < first_[p + 1]; ++k) out.push_back(thing_[k]);
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+  }
+
+ private:
+  std::vector<std::size_t> first_, thing_;
+};
+
 /// The primitives and seeds that the particles of a piece carry.
-void take_part(const ObjectModel& object, Body& body) {
-  std::vector<std::uint32_t> part(object.last - object.first, kElsewhere);
-  for (std::uint32_t k = 0; k < body.particle.size(); ++k) part[body.particle[k] - object.first] = k;
+void take_part(const ObjectModel& object, const Carried& primitives, const Carried& seeds, Body& body) {
+  std::vector<std::uint32_t> particle;  // ascending, so that a place in it is found by bisection
+  for (const std::uint32_t p : body.particle) particle.push_back(p - object.first);
+  const auto place = [](const auto& sorted, auto value) {
+    return static_cast<std::uint32_t>(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin());
+  };
 
   body.skeleton.part_count = static_cast<std::uint32_t>(body.particle.size());
   body.skeleton.iso = object.skeleton.iso;
-  body.skeleton.blend = take_blend(object.skeleton.blend, part, body.skeleton.part_count);
-  std::vector<std::uint32_t> primitive(object.skeleton.primitive.size(), kElsewhere);
-  for (std::size_t k = 0; k < object.skeleton.primitive.size(); ++k) {
+  body.skeleton.blend = take_blend(object.skeleton.blend, particle);
+  const std::vector<std::size_t> primitive = primitives.of(particle);
+  for (const std::size_t k : primitive) {
     implicit::Primitive copy = object.skeleton.primitive[k];
-    if (part[copy.part] == kElsewhere) continue;
-    copy.part = part[copy.part];
-    primitive[k] = static_cast<std::uint32_t>(body.skeleton.primitive.size());
+    copy.part = place(particle, copy.part);
     body.skeleton.primitive.push_back(copy);
   }
   const implicit::SampleLayout& all = object.samples;
-  for (std::size_t s = 0; s < all.size(); ++s) {
-    if (part[all.part[s]] == kElsewhere) continue;
-    body.samples.primitive.push_back(primitive[all.primitive[s]]);
-    body.samples.part.push_back(part[all.part[s]]);
+  for (const std::size_t s : seeds.of(particle)) {
+    body.samples.primitive.push_back(place(primitive, std::size_t{all.primitive[s]}));
+    body.samples.part.push_back(place(particle, all.part[s]));
     body.samples.foot.push_back(all.foot[s]);
     body.samples.direction.push_back(all.direction[s]);
     body.samples.reach.push_back(all.reach[s]);
@@ -146,10 +166,14 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
       bodies[body_of[piece[i]]].particle.push_back(i);
     }
     const std::size_t pieces = bodies.size() - begin;
+    const std::size_t particles = object.last - object.first;
+    const auto& primitive = object.skeleton.primitive;
+    const Carried primitives(particles, primitive.size(), [&](std::size_t k) { return primitive[k].part; });
+    const Carried seeds(particles, object.samples.size(), [&](std::size_t s) { return object.samples.part[s]; });
     for (std::size_t k = 0; k < pieces; ++k) {
       Body& body = bodies[begin + k];
       if (pieces > 1) body.name += '.' + std::to_string(k + 1);
-      take_part(object, body);
+      take_part(object, primitives, seeds, body);
     }
   }
   return bodies;

@@ -126,6 +126,15 @@ TEST(SeparateBodies, TouchEachOther) {
   EXPECT_EQ(one.bodies().size(), 2u);
 }
 
+// Six that move make 15 pairs, and each of them two with what stands still.
+TEST(SeparateBodies, AreCountedAsPairsOneByOne) {
+  Simulation simulation = make(row_of_balls(true) + "ground: {height: -1}\nobstacles: [{name: end, shape: plane, at: [3, 0, 0], normal: [-1, 0, 0]}]\n");
+  simulation.step();
+  const StageProfile found = simulation.profile()[static_cast<std::size_t>(Stage::FindContacts)];
+  ASSERT_GT(found.calls, 0u);
+  EXPECT_EQ(found.present, 27 * found.calls);
+}
+
 TEST(SeparateBodies, HaveTheSameBitsForAnyThreadsAndWithoutSkips) {
   const auto hash_of = [](SimulationOptions options) {
     Simulation simulation = make(row_of_balls(true), ".", options);
