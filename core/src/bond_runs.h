@@ -60,7 +60,7 @@ struct Runs {
   bool normal = false;          ///< whether a law knows normals
 
   [[nodiscard]] bool empty() const { return groups.empty(); }
-  [[nodiscard]] Work work() { return {numbers.data(), rows.data()->value.data(), room}; }
+  [[nodiscard]] Work work() { return {numbers.data(), rows.empty() ? nullptr : rows.front().value.data(), room}; }
 };
 
 /// Takes the lists whose bonds mostly follow each other. @return for every list, law after law as in `bonded_lists`,
