@@ -9,7 +9,7 @@ declare -A supple_packages=(
            libdeflate-dev libopenexr-dev libosmesa6-dev libgl-dev libegl-dev libembree-dev
            libyaml-cpp-dev nlohmann-json3-dev libcli11-dev"
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
-  [test]="libgtest-dev libcgal-dev"
+  [test]="libgtest-dev libcgal-dev libopenvdb-tools"
   [check]="clang"
 )
 declare -A supple_purpose=(

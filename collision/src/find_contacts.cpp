@@ -1,23 +1,50 @@
 #include "supple/collision/find_contacts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
 namespace supple::collision {
 namespace {
 
-/// The axis along which the finite box centres spread most.
-int longest_axis(std::span<const Box> boxes) {
-  Box spread;
-  for (const Box& box : boxes) {
-    if (!box.empty() && box.lower.allFinite() && box.upper.allFinite()) spread.include(box.centre());
+/// Two axes for a sweep: the finite box centres spread most along `sweep` and second most along `across`, where they are
+/// cut into strips of about two boxes each.
+struct Strips {
+  int sweep = 0;
+  int across = 1;
+  double begin = 0.0;  ///< of the first strip [m]
+  double width = 1.0;  ///< [m]
+  std::uint32_t count = 1;
+
+  explicit Strips(std::span<const Box> boxes) {
+    constexpr double kMostStrips = 65536.0;
+    Box spread;
+    Vec3 extent = Vec3::Zero();
+    double finite = 0.0;
+    for (const Box& box : boxes) {
+      if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) continue;
+      spread.include(box.centre());
+      extent += box.extent();
+      finite += 1.0;
+    }
+    if (spread.empty()) return;
+    std::array<int, 3> axis = {0, 1, 2};
+    std::stable_sort(axis.begin(), axis.end(), [&](int i, int j) { return spread.extent()[i] > spread.extent()[j]; });
+    sweep = axis[0];
+    across = axis[1];
+    begin = spread.lower[across];
+    const double length = spread.extent()[across];
+    if (!(length > 0.0)) return;
+    width = std::max(2.0 * extent[across] / finite, length / kMostStrips);
+    count = static_cast<std::uint32_t>(length / width) + 1;
   }
-  if (spread.empty()) return 0;
-  Eigen::Index axis = 0;
-  spread.extent().maxCoeff(&axis);
-  return static_cast<int>(axis);
-}
+
+  /// The strip of a coordinate, the outer ones without end.
+  [[nodiscard]] std::uint32_t of(double x) const {
+    return static_cast<std::uint32_t>(std::clamp((x - begin) / width, 0.0, static_cast<double>(count - 1)));
+  }
+};
 
 bool allowed(std::span<const ContactBody> bodies, const ContactRules& rules, std::uint32_t a, std::uint32_t b) {
   return !(bodies[a].fixed && bodies[b].fixed) && (!rules.allowed || rules.allowed(a, b));
@@ -123,7 +150,8 @@ std::optional<Between> between_cores(const ContactBody& a, const ContactBody& b)
 }  // namespace
 
 std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes) {
-  const int axis = longest_axis(boxes);
+  const Strips strips(boxes);
+  const int axis = strips.sweep;
   std::vector<std::uint32_t> order;
   for (std::uint32_t i = 0; i < boxes.size(); ++i) {
     if (!boxes[i].empty()) order.push_back(i);
@@ -131,14 +159,32 @@ std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes) {
   std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
     return boxes[i].lower[axis] != boxes[j].lower[axis] ? boxes[i].lower[axis] < boxes[j].lower[axis] : i < j;
   });
+  constexpr std::uint32_t kWide = 8;  // strips; wider boxes are few and kept in a list of their own
+  struct Range {
+    std::uint32_t first, last;
+    [[nodiscard]] bool wide() const { return last - first >= kWide; }
+  };
+  const auto range_of = [&](std::uint32_t i) {
+    return Range{strips.of(boxes[i].lower[strips.across]), strips.of(boxes[i].upper[strips.across])};
+  };
   std::vector<BodyPair> pairs;
-  std::vector<std::uint32_t> open;  // boxes that reach the sweep position
+  std::vector<std::vector<std::uint32_t>> open(strips.count);  // boxes that reach the sweep position, by strip
+  std::vector<std::uint32_t> wide;
   for (const std::uint32_t i : order) {
-    std::erase_if(open, [&](std::uint32_t j) { return boxes[j].upper[axis] < boxes[i].lower[axis]; });
-    for (const std::uint32_t j : open) {
-      if (boxes[i].overlaps(boxes[j])) pairs.push_back({std::min(i, j), std::max(i, j)});
+    const Range mine = range_of(i);
+    const auto meet = [&](std::vector<std::uint32_t>& others, const auto& here) {
+      std::erase_if(others, [&](std::uint32_t j) { return boxes[j].upper[axis] < boxes[i].lower[axis]; });
+      for (const std::uint32_t j : others) {
+        if (boxes[i].overlaps(boxes[j]) && here(j)) pairs.push_back({std::min(i, j), std::max(i, j)});
+      }
+    };
+    meet(wide, [](std::uint32_t) { return true; });
+    for (std::uint32_t strip = mine.first; strip <= mine.last; ++strip) {
+      // Two that share several strips meet in the first of them.
+      meet(open[strip], [&](std::uint32_t j) { return strip == std::max(mine.first, range_of(j).first); });
+      if (!mine.wide()) open[strip].push_back(i);
     }
-    open.push_back(i);
+    if (mine.wide()) wide.push_back(i);
   }
   std::sort(pairs.begin(), pairs.end());
   return pairs;

@@ -17,6 +17,33 @@ double uniform(std::mt19937_64& engine, double low, double high) {
   return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53;
 }
 
+TEST(OverlappingBoxes, AreThoseThatBruteForceFinds) {
+  std::mt19937_64 engine(11);
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  for (const double longest : {0.0, 0.05, 0.4, 3.0}) {     // points, small ones, middling ones, and some across everything
+    for (const Vec3& spread : {Vec3(10, 4, 1), Vec3(1, 1, 1), Vec3(0, 0, 5), Vec3(0, 0, 0)}) {
+      std::vector<Box> boxes;
+      for (int i = 0; i < 400; ++i) {
+        const Vec3 at(uniform(engine, -1, 1), uniform(engine, -1, 1), uniform(engine, -1, 1));
+        const Vec3 half(uniform(engine, 0, 1), uniform(engine, 0, 1), uniform(engine, 0, 1));
+        const Vec3 centre = at.cwiseProduct(spread), reach = (i % 40 == 0 ? 4.0 : 0.5) * longest * half;
+        boxes.push_back({centre - reach, centre + reach});
+      }
+      boxes.push_back({});
+      boxes.push_back({Vec3(-kFar, -kFar, -kFar), Vec3(kFar, kFar, -0.5)});
+      boxes.push_back({Vec3(-kFar, -kFar, -kFar), Vec3(kFar, kFar, kFar)});
+      std::vector<BodyPair> expected;
+      for (std::uint32_t a = 0; a < boxes.size(); ++a) {
+        for (std::uint32_t b = a + 1; b < boxes.size(); ++b) {
+          if (!boxes[a].empty() && !boxes[b].empty() && boxes[a].overlaps(boxes[b])) expected.push_back({a, b});
+        }
+      }
+      EXPECT_EQ(overlapping_boxes(boxes), expected) << longest << ' ' << spread.transpose();
+    }
+  }
+  EXPECT_TRUE(overlapping_boxes({}).empty());
+}
+
 TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
   std::mt19937_64 engine(3);
   std::vector<LinearSphere> spheres;

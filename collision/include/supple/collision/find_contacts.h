@@ -19,7 +19,8 @@ struct ContactCandidates {
   std::uint64_t pairs_present = 0;     ///< pairs that the rules allow, as `broad_phase` counts them
 };
 
-/// Pairs of boxes that overlap, by sweep and prune along the longest axis; sorted. Empty boxes overlap nothing.
+/// Pairs of boxes that overlap, by sweep and prune along the longest axis in strips across the next; sorted.
+/// Empty boxes overlap nothing.
 [[nodiscard]] std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes);
 
 /// Pairs that the rules allow, touching or not; asks for each of them.
