@@ -288,6 +288,27 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
+/// Joins what one pair gave, if it touches. @param parted  whether A, B have several parts, whose forces need the regions
+void add_result(const PairResult& result, std::array<bool, 2> parted, ContactSurface& out) {
+  if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0) return;
+  const auto index = static_cast<std::uint32_t>(out.summary.size());
+  out.summary.push_back(result.summary);
+  out.pair.insert(out.pair.end(), result.points.point.size(), index);
+  append(out.point, result.points.point);
+  append(out.normal, result.points.normal);
+  append(out.area, result.points.area);
+  append(out.pressure, result.points.pressure);
+  if (!parted[0] && !parted[1]) return;
+  for (std::size_t i = 0; i < result.points.volume_point.size(); ++i) {
+    const std::uint8_t side = result.points.volume_side[i];
+    if (!parted[side]) continue;
+    out.volume_pair.push_back(index);
+    out.volume_side.push_back(side);
+    out.volume_point.push_back(result.points.volume_point[i]);
+    out.volume_weight.push_back(result.points.volume_weight[i]);
+  }
+}
+
 }  // namespace
 
 void ContactSurface::clear() {
@@ -314,8 +335,11 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   thread_local std::vector<Box> boxes;
   boxes.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) boxes[i] = bodies[i].field ? bodies[i].field.surface_box() : Box{};
-  if (results.size() < candidates.pair.size()) results.resize(candidates.pair.size());
   partners.build(bodies.size(), candidates.pair);
+  // In portions, so that what a pair leaves behind is joined while it is still near, and buffers stay small.
+  constexpr std::size_t kPortion = 1024, kBlock = 2;
+  const std::size_t pairs = candidates.pair.size();
+  if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
   struct Job {
     std::span<const ContactBody> bodies;
     const ContactCandidates& candidates;
@@ -323,28 +347,20 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
     const Partners& partners;
     std::span<const Box> boxes;
     std::vector<PairResult>& results;
-  } job{bodies, candidates, settings, partners, boxes, results};
-  constexpr std::size_t kBlock = 2;
-  executor.for_blocks(candidates.pair.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
-    thread_local PairSolver solver;
-    for (std::size_t k = begin; k < end; ++k) {
-      solver.solve(job.bodies, job.candidates, job.partners, job.boxes, k, job.settings, job.results[k]);
+    std::size_t first;
+  } job{bodies, candidates, settings, partners, boxes, results, 0};
+  for (; job.first < pairs; job.first += kPortion) {
+    const std::size_t count = std::min(kPortion, pairs - job.first);
+    executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
+      thread_local PairSolver solver;
+      for (std::size_t k = begin; k < end; ++k) {
+        solver.solve(job.bodies, job.candidates, job.partners, job.boxes, job.first + k, job.settings, job.results[k]);
+      }
+    });
+    for (std::size_t k = 0; k < count; ++k) {
+      const BodyPair& pair = candidates.pair[job.first + k];
+      add_result(results[k], {bodies[pair.a].pose.size() > 1, bodies[pair.b].pose.size() > 1}, out);
     }
-  });
-  for (std::size_t k = 0; k < candidates.pair.size(); ++k) {
-    const PairResult& result = results[k];
-    if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0) continue;
-    const auto index = static_cast<std::uint32_t>(out.summary.size());
-    out.summary.push_back(result.summary);
-    out.pair.insert(out.pair.end(), result.points.point.size(), index);
-    append(out.point, result.points.point);
-    append(out.normal, result.points.normal);
-    append(out.area, result.points.area);
-    append(out.pressure, result.points.pressure);
-    out.volume_pair.insert(out.volume_pair.end(), result.points.volume_point.size(), index);
-    append(out.volume_side, result.points.volume_side);
-    append(out.volume_point, result.points.volume_point);
-    append(out.volume_weight, result.points.volume_weight);
   }
 }
 

@@ -193,12 +193,12 @@ collision::ContactRules make_body_rules(const Model& model, const std::vector<Bo
   }
 
   collision::ContactRules rules;
-  for (const auto& override : model.rules.overrides) {
-    for (std::uint32_t a = 0; a < count; ++a) {
-      for (std::uint32_t b = a + 1; b < count; ++b) {
-        if (collision::BodyPair{object[a], object[b]} == override.pair) {
-          rules.overrides.push_back({{a, b}, override.material});
-        }
+  if (!model.rules.overrides.empty()) {
+    std::vector<std::vector<std::uint32_t>> of_object(model.objects.size() + model.fixed.size());
+    for (std::uint32_t k = 0; k < count; ++k) of_object[object[k]].push_back(k);
+    for (const auto& override : model.rules.overrides) {
+      for (const std::uint32_t a : of_object[override.pair.a]) {
+        for (const std::uint32_t b : of_object[override.pair.b]) rules.overrides.push_back({{a, b}, override.material});
       }
     }
   }

@@ -197,6 +197,19 @@ void add_own_repulsion(const Scene& scene, Model& model) {
   }
 }
 
+/// Whether every body of an object, now and later, is convex by construction: such bodies find each other without samples.
+bool only_convex(const ObjectModel& object) {
+  if (object.breaks) return false;
+  if (!object.separate) return implicit::has_convex_core(object.skeleton);
+  implicit::Skeleton one{.primitive = std::vector<implicit::Primitive>(1), .part_count = 1, .iso = object.skeleton.iso, .blend = {}};
+  for (std::size_t k = 0; k < object.skeleton.primitive.size(); ++k) {
+    one.primitive[0] = object.skeleton.primitive[k];
+    if (k > 0 && one.primitive[0].part == object.skeleton.primitive[k - 1].part) return false;
+    if (!implicit::has_convex_core(one)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 double iso_radius(const implicit::Primitive& primitive, double iso) {
@@ -243,18 +256,25 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   }
 
   const auto count = static_cast<std::uint32_t>(model.objects.size());
+  std::vector<std::uint8_t> convex;
+  for (const ObjectModel& object : model.objects) convex.push_back(only_convex(object) ? 1 : 0);
+  for (const FixedBody& body : model.fixed) convex.push_back(body.field().core_point(Vec3::Zero()) ? 1 : 0);
   for (std::uint32_t i = 0; i < count; ++i) {
     ObjectModel& object = model.objects[i];
     if (!object.collides) continue;
     bool touches = object.breaks || object.separate;
-    for (std::uint32_t j = 0; j < count + model.fixed.size() && !touches; ++j) {
+    bool needs_samples = convex[i] == 0;
+    for (std::uint32_t j = 0; j < count + model.fixed.size() && !(touches && needs_samples); ++j) {
       const bool other = j >= count || (j != i && model.objects[j].collides);
-      touches = other && (!model.rules.allowed || model.rules.allowed(i, j));
+      if (!other || (model.rules.allowed && !model.rules.allowed(i, j))) continue;
+      touches = true;
+      needs_samples = needs_samples || convex[j] == 0;
     }
     if (!touches) continue;
+    model.contact_frequency = std::max(model.contact_frequency, contact_frequency(object, model.particles));
+    if (!needs_samples) continue;
     const double spacing = scene.contact.sample_spacing.value_or(2.0 * object.iso_radius / kSamplesAcross);
     object.samples = implicit::make_sample_layout(object.skeleton, spacing);
-    model.contact_frequency = std::max(model.contact_frequency, contact_frequency(object, model.particles));
   }
 }
 

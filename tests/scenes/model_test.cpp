@@ -254,8 +254,19 @@ TEST(Ground, IsTheLastBody) {
   EXPECT_EQ(std::get<implicit::HalfSpace>(model.fixed[0].solid).point.z(), -0.5);
   ASSERT_EQ(model.rules.overrides.size(), 1u);
   EXPECT_EQ(model.rules.overrides[0].pair, (collision::BodyPair{0, 1}));
-  EXPECT_GT(model.objects[0].samples.size(), 0u);
   EXPECT_TRUE(model_of(std::string(kHead) + kBall + "ground: {collides: false}\n").fixed.empty());
+}
+
+TEST(Seeds, AreMadeOnlyForWhatIsNotAllConvex) {
+  const std::string ring = "  - name: ring\n    particles: {at: [0, 0, 2]}\n    skeleton: [{shape: ring, radius: 1, kernel: {radius: 0.2}}]\n    contact: {}\n";
+  const std::string pair = "  - name: pair\n    particles: {arrange: line, count: 2, spacing: 0.5}\n" +
+                           std::string("    skeleton: [{shape: point, kernel: {radius: 0.5}}]\n    contact: {}\n");
+  const auto seeds = [](const std::string& rest) { return model_of(std::string(kHead) + rest).objects[0].samples.size(); };
+  EXPECT_EQ(seeds(kBall + std::string("ground: {}\n")), 0u);
+  EXPECT_GT(seeds(kBall + ring), 0u);
+  EXPECT_EQ(seeds(kBall + ring + "pairs: [{objects: [ball, ring], collide: false}]\n"), 0u);
+  EXPECT_GT(seeds(pair + "ground: {}\n"), 0u);
+  EXPECT_EQ(seeds(pair + "    separate: true\nground: {}\n"), 0u);
 }
 
 TEST(Skeletons, GoToTheParticlesNamed) {

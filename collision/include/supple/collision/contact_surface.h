@@ -35,7 +35,7 @@ struct ContactSurface {
   std::vector<double> area;          ///< quadrature weight [m^2]
   std::vector<double> pressure;      ///< p_A = p_B [Pa], >= 0
 
-  // In the two squeezed regions V_A = {0 < p_A < p_B} and V_B, for the energy rule.
+  // In the two squeezed regions V_A = {0 < p_A < p_B} and V_B of bodies with several parts, for the energy rule.
   std::vector<std::uint32_t> volume_pair;
   std::vector<std::uint8_t> volume_side;  ///< 0: in V_A, 1: in V_B
   std::vector<Vec3> volume_point;         ///< world [m]

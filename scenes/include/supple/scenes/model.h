@@ -25,7 +25,7 @@ struct ObjectModel {
   std::uint32_t first = 0;                ///< its particles are [first, last)
   std::uint32_t last = 0;
   implicit::Skeleton skeleton;            ///< empty: the object has no surface
-  implicit::SampleLayout samples;         ///< empty unless it can touch something
+  implicit::SampleLayout samples;         ///< empty unless it can touch something, itself or that not convex
   collision::ContactMaterial material;
   bool collides = false;                  ///< has `contact` and a surface
   bool hinges_join = false;               ///< the laws act between two hinges
