@@ -51,6 +51,7 @@ struct Arguments {
   std::string grids;
   std::string particles;
   std::string contacts;
+  std::string sample_tables;
   std::vector<std::string> words;
   int threads = 0;
   int cells = 0;
@@ -162,7 +163,8 @@ int render(const Arguments& arguments) {
 
 int export_files(Arguments arguments) {
   for (const auto& [key, formats] : {std::pair{"mesh", &arguments.meshes}, {"grid", &arguments.grids},
-                                     {"particles", &arguments.particles}, {"contacts", &arguments.contacts}}) {
+                                     {"particles", &arguments.particles}, {"contacts", &arguments.contacts},
+                                     {"samples", &arguments.sample_tables}}) {
     if (!formats->empty()) arguments.set.push_back("output." + std::string(key) + "=[" + *formats + ']');
   }
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
@@ -283,6 +285,7 @@ int parse_and_call(int argc, char** argv) {
   export_verb->add_option("--grid", a.grids, "fields: vdb");
   export_verb->add_option("--particles", a.particles, "particles and bonds: csv, vtk");
   export_verb->add_option("--contacts", a.contacts, "points of the contact surfaces: csv, vtk");
+  export_verb->add_option("--samples", a.sample_tables, "points spread evenly over the surfaces: csv, vtk");
   export_verb->footer("Example: supple export scenes/library/contacts/two_balls.yaml --out out/two_balls --mesh usd --particles vtk");
 
   CLI::App* info_verb = app.add_subcommand("info", "what a run folder holds: outcome, audits, times, files");

@@ -599,15 +599,25 @@ void fields(Archive& archive, GriddingDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, SamplingDesc& d) {
+  archive("spacing", d.spacing, above(0.0, kLength).or_auto(),
+          "no two samples of an object are nearer than half of it, no place of its surface is farther than it from all; auto: four cells");
+  archive("density", d.density, above(0.0, kInverseArea), "instead: samples a square metre, to a tenth where the surface is smooth and at rest");
+  archive.check(!(d.spacing && d.density), "density", "expected either spacing or density", "both", "");
+}
+
+template <class Archive>
 void fields(Archive& archive, OutputDesc& d) {
   archive("images", d.images, {}, "a PNG a frame");
   archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
   archive("contacts", d.contacts, {}, "points of the contact surfaces a frame; vtk: .vtp files and a .pvd");
   archive("particles", d.particles, {}, "particles and bonds a frame; vtk: .vtp files and a .pvd");
+  archive("samples", d.samples, {}, "points spread evenly over the surfaces a frame, which ride on their particles: id, owner, normal and area; as if nothing touched; vtk: .vtp files and a .pvd");
   archive("mesh", d.mesh, {}, "surfaces; ply, obj: a file an object and frame; usd: one file with all frames");
   archive("grid", d.grid, {}, "fields a frame");
   archive("meshing", d.meshing, {}, "how surfaces become meshes");
   archive("gridding", d.gridding, {}, "how fields become grids");
+  archive("sampling", d.sampling, {}, "how far apart samples are");
   archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids; auto: 8 cells across the smallest thickness, 64 along each object");
   archive.check(!d.film || !d.images || std::count(d.images->formats.begin(), d.images->formats.end(), ImageName::Png) > 0, "film",
                 "expected images as png for a film", "none", "add png to output.images.formats");

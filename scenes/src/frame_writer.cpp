@@ -54,7 +54,7 @@ void Reporter::operator()(const std::string& stage, int frame, double done) {
 FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOptions& options, OutputRequest outputs)
     : scene_(scene), options_(options), outputs_(outputs), name_(scene_name(scene)) {
   for (const auto& [wanted, part] : {std::pair{outputs.images, "frames"}, {outputs.meshes, "meshes"}, {outputs.grids, "grids"},
-                                     {outputs.contacts, "contacts"}, {outputs.particles, "particles"}}) {
+                                     {outputs.contacts, "contacts"}, {outputs.particles, "particles"}, {outputs.samples, "samples"}}) {
     if (wanted) io::make_writable_folder(options.folder / part);
   }
   for (const CameraDesc& camera : cameras_of(scene)) {
@@ -64,6 +64,7 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
     image_formats_ = scene.output.images ? scene.output.images->formats : ImagesDesc{}.formats;
     pictures_ = std::make_unique<ScenePictures>(scene, model, context_kind(options.context), options.threads);
   }
+  if (outputs_.samples) samples_ = std::make_unique<SceneSamples>(scene.output.sampling, model.cell);
   if (!outputs_.meshes || !has(scene.output.mesh, MeshName::Usd)) return;
   std::vector<io::UsdObject> objects;
   for (const ObjectDesc& o : scene.objects) objects.push_back({o.name, o.colour, o.roughness});
@@ -74,6 +75,7 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
 
 void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
   const int frame = simulation.frame();
+  if (samples_) follow(simulation, report, done);
   if (!wanted(frame)) return;
   const std::vector<Mesh>* meshes = nullptr;
   if (outputs_.images && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
@@ -114,15 +116,24 @@ bool FrameWriter::pictures_are_current(int frame, std::uint64_t state_hash) cons
 }
 
 bool FrameWriter::renews(int frame, std::uint64_t state_hash) const {
-  return wanted(frame) && (animation_ || (outputs_.images && !pictures_are_current(frame, state_hash)));
+  return samples_ || (wanted(frame) && (animation_ || (outputs_.images && !pictures_are_current(frame, state_hash))));
+}
+
+void FrameWriter::follow(Simulation& simulation, Reporter& report, double done) {
+  report("samples", simulation.frame(), done);
+  const StageClock clock(simulation.profile(Stage::Export));
+  samples_->follow(simulation, Executor(options_.threads));
 }
 
 void FrameWriter::renew(Simulation& simulation, Reporter& report, double done) {
   const int frame = simulation.frame();
+  if (samples_) follow(simulation, report, done);
+  const bool draws = outputs_.images && !pictures_are_current(frame, simulation.state_hash());
+  if (!wanted(frame) || !(animation_ || draws)) return;
   report("surface", frame, done);
   if (outputs_.images && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
   const std::vector<Mesh>& meshes = simulation.meshes();
-  if (outputs_.images && !pictures_are_current(frame, simulation.state_hash())) draw(simulation, report, done);
+  if (draws) draw(simulation, report, done);
   const StageClock clock(simulation.profile(Stage::Export));
   if (animation_) add_to_animation(simulation, meshes);
 }
@@ -192,6 +203,7 @@ void FrameWriter::write_tables(Simulation& simulation) {
   if (outputs_.particles) {
     write_points(options_.folder / "particles", name_, frame, output.particles, particle_points(simulation));
   }
+  if (outputs_.samples) write_points(options_.folder / "samples", name_, frame, output.samples, samples_->points());
 }
 
 void FrameWriter::write_time_list(const char* part, int last) {
@@ -211,6 +223,7 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
   }
   if (outputs_.particles && has(scene_.output.particles, TableName::Vtk)) write_time_list("particles", last);
   if (outputs_.contacts && has(scene_.output.contacts, TableName::Vtk)) write_time_list("contacts", last);
+  if (outputs_.samples && has(scene_.output.samples, TableName::Vtk)) write_time_list("samples", last);
   if (!outputs_.images) return {};
   report("film", last, 0.99);
   fs::path first_film;

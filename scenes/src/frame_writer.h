@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "picture.h"
+#include "scene_samples.h"
 #include "supple/core/io/usd_file.h"
 #include "supple/implicit/surface_grid.h"
 #include "supple/scenes/run.h"
@@ -31,12 +32,12 @@ class FrameWriter {
   /// Makes the folders. @throws Error{Io}
   FrameWriter(const Scene& scene, const Model& model, const RunOptions& options, OutputRequest outputs);
 
-  /// Everything asked for of the present frame.
+  /// Everything asked for of the present frame. Samples are carried on from the frames seen before, so all must be.
   void write(Simulation& simulation, Reporter& report, double done);
   /// Films, contact sheets and lists over all frames 1 .. last that are there. Returns the film, if there is one.
   std::filesystem::path finish(Simulation& simulation, Reporter& report, int last);
 
-  /// Whether a frame that was written before must be seen again: for a file over all frames, or because its picture is
+  /// Whether a frame that was written before must be seen again: for a file over all frames or for samples, or because its picture is
   /// absent or one of another scene or state.
   [[nodiscard]] bool renews(int frame, std::uint64_t state_hash) const;
   /// Writes again what `renews` found.
@@ -52,6 +53,7 @@ class FrameWriter {
   [[nodiscard]] std::string fingerprint(std::uint64_t state_hash) const;
   [[nodiscard]] bool pictures_are_current(int frame, std::uint64_t state_hash) const;
   void draw(Simulation& simulation, Reporter& report, double done);
+  void follow(Simulation& simulation, Reporter& report, double done);
   void write_meshes(const Simulation& simulation, const std::vector<Mesh>& meshes);
   void write_tables(Simulation& simulation);
   void add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes);
@@ -66,6 +68,7 @@ class FrameWriter {
   std::vector<ImageName> image_formats_;
   std::unique_ptr<ScenePictures> pictures_;
   std::unique_ptr<io::UsdAnimation> animation_;
+  std::unique_ptr<SceneSamples> samples_;
   std::vector<Mesh> obstacles_;  // of the animation
   std::vector<implicit::GridUpdater> grids_;  // by body
   int pictures_drawn_ = 0;

@@ -39,7 +39,7 @@ fs::path frame_path(const fs::path& folder, const std::string& name, int frame) 
 
 void remove_outputs(const fs::path& folder, const std::string& name) {
   std::error_code ignored;
-  for (const char* part : {"states", "frames", "meshes", "grids", "contacts", "particles"}) {
+  for (const char* part : {"states", "frames", "meshes", "grids", "contacts", "particles", "samples"}) {
     if (!fs::is_directory(folder / part)) continue;
     for (const auto& entry : fs::directory_iterator(folder / part)) {
       if (entry.path().filename().string().starts_with(name + ".")) fs::remove(entry.path(), ignored);
@@ -48,7 +48,7 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string file = entry.path().filename().string();
     if (!file.starts_with(name + '.') && !file.starts_with(name + '_')) continue;
-    for (const char* end : {".mp4", "_sheet.png", ".usda", "_particles.pvd", "_contacts.pvd"}) {
+    for (const char* end : {".mp4", "_sheet.png", ".usda", "_particles.pvd", "_contacts.pvd", "_samples.pvd"}) {
       if (file.ends_with(end)) fs::remove(entry.path(), ignored);
     }
   }

@@ -115,7 +115,8 @@ OutputRequest requested_outputs(const Scene& scene) {
           .meshes = !o.mesh.empty(),
           .grids = !o.grid.empty(),
           .contacts = !o.contacts.empty(),
-          .particles = !o.particles.empty()};
+          .particles = !o.particles.empty(),
+          .samples = !o.samples.empty()};
 }
 
 bool StepPlan::on(Stage stage) const { return stages[static_cast<std::size_t>(stage)].on; }
@@ -140,16 +141,16 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
   const bool surfaces = std::any_of(model.objects.begin(), model.objects.end(),
                                     [](const ObjectModel& o) { return !o.skeleton.primitive.empty(); });
   const bool mesh_wanted = outputs.images || outputs.meshes;
-  const bool field = surfaces && (contact || mesh_wanted || outputs.grids);
+  const bool field = surfaces && (contact || mesh_wanted || outputs.grids || outputs.samples);
   std::string field_reason;
   if (!surfaces) {
     field_reason = "no object has a skeleton";
   } else if (field) {
     field_reason = "needed by " + list({{contact, "contact"}, {outputs.images, "images"}, {outputs.meshes, "mesh files"},
-                                        {outputs.grids, "grid files"}}) +
+                                        {outputs.grids, "grid files"}, {outputs.samples, "sample tables"}}) +
                    (contact ? "" : " (at output frames only)");
   } else {
-    field_reason = "no contact is possible and no image, mesh or grid is requested";
+    field_reason = "no contact is possible and no image, mesh, grid or sample is requested";
   }
   add(Stage::PlaceSkeleton, field, field_reason);
   add(Stage::IndexField, field, field_reason);
@@ -169,11 +170,12 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
       mesh ? "needed by " + list({{outputs.images, "images"}, {outputs.meshes, "mesh files"}}) + "; " + meshing_of(scene, model)
            : (surfaces ? "no image or mesh file is requested" : "no object has a skeleton"));
   add(Stage::Render, outputs.images, outputs.images ? "images are requested" : "no image is requested");
-  const bool files = outputs.images || outputs.film || outputs.meshes || outputs.grids || outputs.contacts || outputs.particles;
+  const bool files = outputs.images || outputs.film || outputs.meshes || outputs.grids || outputs.contacts || outputs.particles ||
+                     outputs.samples;
   add(Stage::Export, files,
       files ? list({{outputs.images, "images"}, {outputs.film, "film"}, {outputs.meshes, "mesh files"},
                     {outputs.grids, "grid files"}, {outputs.contacts, "contact tables"},
-                    {outputs.particles, "particle tables"}})
+                    {outputs.particles, "particle tables"}, {outputs.samples, "sample tables"}})
             : "no output file is requested");
   return plan;
 }

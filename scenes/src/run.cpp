@@ -67,7 +67,7 @@ std::optional<int> last_saved_frame(const fs::path& folder, const std::string& n
 
 OutputRequest outputs_of(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = requested_outputs(scene);
-  if (options.simulate_only) outputs.images = outputs.film = outputs.meshes = outputs.grids = false;
+  if (options.simulate_only) outputs.images = outputs.film = outputs.meshes = outputs.grids = outputs.samples = false;
   return outputs;
 }
 
@@ -153,7 +153,8 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     Reporter report(options, *last);
     for (int frame = 1; frame <= *last; ++frame) {
       if (was_interrupted(options, result)) return;
-      if (!options.frames.empty() && !options.frames.contains(frame)) continue;
+      const bool wanted = options.frames.empty() || options.frames.contains(frame);
+      if (!wanted && !(outputs.samples && frame < *options.frames.rbegin())) continue;  // samples depend on all frames before
       State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
       if (pictures_only && !options.overwrite && !writer.renews(frame, state.hash())) {
         ++result.pictures_kept;
@@ -282,7 +283,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
 RunResult render_run(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = outputs_of(scene, options);
   outputs.images = true;
-  outputs.contacts = outputs.particles = outputs.meshes = outputs.grids = false;
+  outputs.contacts = outputs.particles = outputs.meshes = outputs.grids = outputs.samples = false;
   return replay(scene, options, outputs, "render.json");
 }
 
@@ -303,10 +304,10 @@ fs::path make_sheet(const Scene& scene, const fs::path& folder) {
 RunResult export_run(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = outputs_of(scene, options);
   outputs.images = outputs.film = false;
-  if (!outputs.contacts && !outputs.particles && !outputs.meshes && !outputs.grids) {
+  if (!outputs.contacts && !outputs.particles && !outputs.meshes && !outputs.grids && !outputs.samples) {
     throw Error(ErrorKind::Usage, Fault{.place = scene.source.string(),
                                         .key = "output",
-                                        .expected = "expected a mesh, grid, particles or contacts to export",
+                                        .expected = "expected a mesh, grid, particles, contacts or samples to export",
                                         .found = "none",
                                         .hint = "name them: supple export SCENE --mesh usd --particles vtk"});
   }

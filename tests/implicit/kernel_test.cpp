@@ -24,6 +24,7 @@ struct TableRow {
   const char* name;
   Kernel kernel;
   double iso_distance, iso_slope, lipschitz, steepest;  ///< R = 1, iso 0.5
+  double bend;  ///< largest |d2f/dd2|; 0: not in the table
 };
 
 class KernelTable : public ::testing::TestWithParam<TableRow> {};
@@ -34,6 +35,14 @@ TEST_P(KernelTable, HasItsIsoDistanceSlopeAndSteepestSlope) {
   EXPECT_NEAR(iso_slope(row.kernel, 0.5), row.iso_slope, 5e-7);
   EXPECT_NEAR(lipschitz(row.kernel), row.lipschitz, 5e-7);
   EXPECT_NEAR(row.kernel.steepest, row.steepest, 5e-7);
+  double bend = 0.0;
+  for (int i = 0; i <= 3000; ++i) {
+    const double d = i / 3000.0, q = std::min(d * d, 1.0 - 1e-12);
+    bend = std::max(bend, std::abs(4.0 * q * second_slope(row.kernel, q) + 2.0 * evaluate(row.kernel, q).slope));
+  }
+  if (row.bend > 0.0) {
+    EXPECT_NEAR(bend, row.bend, 5e-7);
+  }
   EXPECT_EQ(peak(row.kernel), 1.0);
   EXPECT_NEAR(at(row.kernel, 0.0), 1.0, 1e-15);
 }
@@ -41,13 +50,13 @@ TEST_P(KernelTable, HasItsIsoDistanceSlopeAndSteepestSlope) {
 INSTANTIATE_TEST_SUITE_P(
     Kernels, KernelTable,
     ::testing::Values(
-        TableRow{"wyvill", Kernel::wyvill(1.0), 0.454202019, 1.716776, 1.717300, 1.0 / std::sqrt(5.0)},
-        TableRow{"soft_object", Kernel::soft_object(1.0), 0.5, 1.583333, 1.583430, 0.503470},
-        TableRow{"murakami", Kernel::murakami(1.0), 0.541196100, 1.530734, 1.539601, 1.0 / std::sqrt(3.0)},
-        TableRow{"nishimura", Kernel::nishimura(1.0), 1.0 - 1.0 / std::sqrt(3.0), 1.732051, 2.0, 1.0 / 3.0},
+        TableRow{"wyvill", Kernel::wyvill(1.0), 0.454202019, 1.716776, 1.717300, 1.0 / std::sqrt(5.0), 6.0},
+        TableRow{"soft_object", Kernel::soft_object(1.0), 0.5, 1.583333, 1.583430, 0.503470, 4.888889},
+        TableRow{"murakami", Kernel::murakami(1.0), 0.541196100, 1.530734, 1.539601, 1.0 / std::sqrt(3.0), 8.0},
+        TableRow{"nishimura", Kernel::nishimura(1.0), 1.0 - 1.0 / std::sqrt(3.0), 1.732051, 2.0, 1.0 / 3.0, 6.0},
         // Slope 2 + 16 p / 9 at rho = 1/2 for every hardness, and steepest there.
-        TableRow{"blanc_schlick", Kernel::blanc_schlick(1.0, 0.1), 0.5, 2.0 + 1.6 / 9.0, 2.0 + 1.6 / 9.0, 0.5},
-        TableRow{"blanc_schlick_hard", Kernel::blanc_schlick(1.0, 9.0), 0.5, 18.0, 18.0, 0.5}),
+        TableRow{"blanc_schlick", Kernel::blanc_schlick(1.0, 0.1), 0.5, 2.0 + 1.6 / 9.0, 2.0 + 1.6 / 9.0, 0.5, 0.0},
+        TableRow{"blanc_schlick_hard", Kernel::blanc_schlick(1.0, 9.0), 0.5, 18.0, 18.0, 0.5, 0.0}),
     [](const auto& row) { return row.param.name; });
 
 TEST(BlinnKernel, IsAGaussianLessItsTangentAtTheSupport) {

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "supple/core/error.h"
@@ -173,6 +175,66 @@ TEST_F(Run, ExportsFromSavedStatesWhatTheRunWouldHaveWritten) {
   EXPECT_TRUE(fs::exists(other.folder / "export.json"));
   EXPECT_EQ(bytes_of(other.folder / "result.json"), before);  // of the run, not of what came after
   EXPECT_THROW((void)export_run(quiet, other), Error);
+}
+
+std::vector<std::uint64_t> ids_of(const fs::path& path) {
+  std::vector<std::uint64_t> ids;
+  std::ifstream in(path);
+  std::string line;
+  std::getline(in, line);
+  EXPECT_EQ(line, "x_m,y_m,z_m,id,object,owner,normal_x,normal_y,normal_z,area_m2");
+  while (std::getline(in, line)) {
+    std::size_t at = 0;
+    for (int comma = 0; comma < 3; ++comma) at = line.find(',', at) + 1;
+    ids.push_back(std::stoull(line.substr(at)));
+  }
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+TEST_F(Run, WritesEvenSamplesThatRideOnTheirParticles) {
+  scene_.output = {};
+  scene_.output.samples = {TableName::Csv, TableName::Vtk};
+  scene_.output.sampling.spacing = 0.03;
+  const std::uint64_t state = run_scene(scene_, options()).state_hash;
+  EXPECT_TRUE(fs::exists(folder_ / "drops_samples.pvd"));
+  const std::vector<std::uint64_t> first = ids_of(folder_ / "samples/drops.0001.csv");
+  const std::vector<std::uint64_t> last = ids_of(folder_ / "samples/drops.0005.csv");
+  EXPECT_GT(first.size(), 100u);
+  std::vector<std::uint64_t> kept;
+  std::set_intersection(first.begin(), first.end(), last.begin(), last.end(), std::back_inserter(kept));
+  EXPECT_GT(kept.size(), first.size() * 9 / 10);
+
+  // Asking for them changes no state; saved states give the same ones, also of a single frame, and so does a run that
+  // was stopped and resumed.
+  Scene quiet = scene_;
+  quiet.output = {};
+  RunOptions other = options();
+  other.folder = folder_ / "other";
+  EXPECT_EQ(run_scene(quiet, other).state_hash, state);
+  other.frames = {4};
+  ASSERT_EQ(export_run(scene_, other).outcome, "done");
+  EXPECT_FALSE(fs::exists(other.folder / "samples/drops.0003.csv"));
+  EXPECT_EQ(bytes_of(folder_ / "samples/drops.0004.csv"), bytes_of(other.folder / "samples/drops.0004.csv"));
+  const auto before = bytes_of(folder_ / "samples/drops.0005.csv");
+  for (const char* file : {"states/drops.0004.state", "states/drops.0005.state", "samples/drops.0005.csv"}) fs::remove(folder_ / file);
+  RunOptions resumed = options();
+  resumed.resume = true;
+  resumed.threads = 3;
+  ASSERT_EQ(run_scene(scene_, resumed).outcome, "done");
+  EXPECT_EQ(bytes_of(folder_ / "samples/drops.0005.csv"), before);
+
+  // By density instead, and the key of the spacing in what is refused.
+  scene_.output.sampling = {.spacing = {}, .density = 4e3};
+  RunOptions dense = options();
+  dense.folder = folder_ / "dense";
+  ASSERT_EQ(run_scene(scene_, dense).outcome, "done");
+  EXPECT_GT(ids_of(dense.folder / "samples/drops.0001.csv").size(), 2 * first.size());
+  scene_.output.sampling = {.spacing = 1e-6, .density = {}};
+  dense.overwrite = true;
+  const RunResult refused = run_scene(scene_, dense);
+  EXPECT_EQ(refused.outcome, "limit");
+  EXPECT_NE(refused.reason.find("output.sampling.spacing"), std::string::npos) << refused.reason;
 }
 
 TEST_F(Run, KeepsPicturesThatShowTheSameSceneAndState) {

@@ -15,13 +15,16 @@
 
 namespace supple::implicit {
 
-/// Index s is the same sample in every array; samples are in the order of their ids.
+/// The samples of one body; index s is the same sample in every array, and samples are in the order of their ids.
 struct EvenSampleSet {
-  std::vector<std::uint64_t> id;     ///< never given twice
+  std::vector<std::uint64_t> id;
   std::vector<std::uint32_t> part;   ///< with the largest share of the field there
   std::vector<Vec3> local;           ///< place in the part's frame [m]
   std::vector<Vec3> point;           ///< on F = 0 [m]
   std::vector<Vec3> normal;          ///< unit, outward
+  std::vector<double> area;          ///< of the surface nearer to it than to the others of its side [m^2]
+  std::size_t components = 0;        ///< of the surface they were last fitted to
+  long euler_characteristic = 0;     ///< of that surface
   [[nodiscard]] std::size_t size() const noexcept { return id.size(); }
 };
 
@@ -30,25 +33,27 @@ struct EvenSampleCounts {
   bool remade = false;  ///< the surface has another number of parts or holes than at the last call
 };
 
+/// Fits the samples of any number of bodies to their surfaces, again and again.
 class EvenSampler {
  public:
   /// @param spacing  d [m]: no two samples are nearer than d/2, and no point of the surface that a lattice of cells d/6 sees
-  /// is farther than d from all of them   @pre d > 0
+  /// is farther than d from all of them; samples whose normals are more than a right angle apart, as on the two sides of a
+  /// sheet, do not count for each other   @pre d > 0
   explicit EvenSampler(double spacing);
 
-  /// Samples of the body as it is now; valid until the next call. Kept samples are carried by their parts and projected
-  /// onto the surface. After a change of topology all are made anew, with new ids.
+  /// Brings the samples of a body to its surface as it is now; an empty set is filled. Kept samples are carried by their
+  /// parts and projected onto the surface. After a change of topology all are made anew. New samples get ids that this
+  /// sampler has given to no other. Areas add up to that of the lattice's mesh.
   /// @param parts  world poses, shape [part_count]
-  const EvenSampleSet& update(const Field& field, std::span<const Pose> parts, const Executor& executor,
-                              EvenSampleCounts* counts = nullptr);
+  EvenSampleCounts update(const Field& field, std::span<const Pose> parts, const Executor& executor, EvenSampleSet& set);
 
  private:
   double spacing_;
   CubeMesher mesher_;
-  EvenSampleSet set_;
   std::uint64_t next_id_ = 0;
-  std::size_t components_ = 0;
-  long euler_ = 0;
 };
+
+/// The spacing at which a large smooth surface gets about this many samples a square metre: 1.28 / sqrt(density).
+[[nodiscard]] double even_spacing(double density);
 
 }  // namespace supple::implicit

@@ -62,6 +62,7 @@ struct OutputRequest {
   bool grids = false;
   bool contacts = false;
   bool particles = false;
+  bool samples = false;
 };
 /// What the scene's `output` asks for.
 [[nodiscard]] OutputRequest requested_outputs(const Scene& scene);

@@ -33,7 +33,7 @@ struct RunOptions {
   int threads = 0;                              ///< 0: all the machine has
   bool overwrite = false;                       ///< a folder with a result may be replaced
   bool resume = false;                          ///< continue from the last state in the folder
-  bool simulate_only = false;                   ///< no images, meshes, grids or film
+  bool simulate_only = false;                   ///< no images, meshes, grids, samples or film
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
   implicit::DelaunayMesher delaunay{};          ///< see SimulationOptions::delaunay
@@ -66,7 +66,7 @@ struct RunResult {
 
 /// Simulates, surfaces, renders and films a scene into options.folder:
 /// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, NAME.usda, grids/, contacts/,
-/// particles/, NAME_contacts.pvd, NAME_particles.pvd as asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
+/// particles/, samples/, NAME_contacts.pvd, NAME_particles.pvd, NAME_samples.pvd as asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
 /// @throws Error{Io} when not even the folder can be made or is in use, Error{Usage}
 [[nodiscard]] RunResult run_scene(const Scene& scene, const RunOptions& options);
 

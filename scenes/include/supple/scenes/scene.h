@@ -351,15 +351,22 @@ struct GriddingDesc {
   double half_width = 3.0;                               ///< of the band [cells]
 };
 
+struct SamplingDesc {
+  std::optional<double> spacing;      ///< [m]; absent: by density, or four cells
+  std::optional<double> density;      ///< instead: samples a square metre [1/m^2]
+};
+
 struct OutputDesc {
   std::optional<ImagesDesc> images;
   bool film = false;                  ///< needs images
   std::vector<TableName> contacts;    ///< formats; empty: none
   std::vector<TableName> particles;
+  std::vector<TableName> samples;     ///< even samples of the surfaces
   std::vector<MeshName> mesh;
   std::vector<GridName> grid;
   MeshingDesc meshing;
   GriddingDesc gridding;
+  SamplingDesc sampling;
   std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
 };
 

@@ -1,0 +1,36 @@
+/// Even samples of the surfaces of a scene, carried from frame to frame.
+#pragma once
+
+#include <vector>
+
+#include "supple/core/executor.h"
+#include "supple/core/io/vtk_files.h"
+#include "supple/implicit/even_samples.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+/// What it holds follows from the states of the frames it was shown, so it is no part of State: outputs of a run that was
+/// resumed, or of saved states, show it the earlier frames again.
+class SceneSamples {
+ public:
+  /// @param cell  lattice cell of the scene's meshes [m]
+  SceneSamples(const SamplingDesc& sampling, double cell);
+
+  /// Samples of the present frame. A body that broke since the last frame begins anew in its pieces.
+  void follow(Simulation& simulation, const Executor& executor);
+
+  /// The samples of the last frame followed, with id, object, owner (number of the particle), normal and area.
+  [[nodiscard]] io::PointSet points() const;
+
+ private:
+  struct OfBody {
+    std::uint32_t object = 0;
+    std::vector<std::uint32_t> particle;
+    implicit::EvenSampleSet set;
+  };
+  implicit::EvenSampler sampler_;
+  std::vector<OfBody> bodies_;
+};
+
+}  // namespace supple::scenes
