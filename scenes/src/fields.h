@@ -31,7 +31,7 @@ template <class Archive>
 void fields(Archive& archive, TimeStepDesc& d) {
   archive("size", d.size, above(0.0, kTime).or_auto(), "largest step; a step is always frame / 2^k");
   archive("substeps", d.substeps, between(1.0, 1048576.0, kNumber).or_auto(), "steps a frame, a power of two");
-  archive("max_substeps", d.max_substeps, between(1.0, 1048576.0, kNumber), "finer than this is refused");
+  archive("max_substeps", d.max_substeps, between(1.0, 1048576.0, kNumber), "automatic steps finer than this are refused");
   if (d.substeps) {
     const int n = *d.substeps;
     archive.check((n & (n - 1)) == 0, "substeps", "expected a power of two", std::to_string(n), "");
