@@ -92,6 +92,22 @@ std::vector<double> part_volumes(const FieldView& field, double cell, std::size_
   return volume;
 }
 
+Skeleton by_primitive(const Skeleton& skeleton) {
+  Skeleton out = skeleton;
+  out.part_count = static_cast<std::uint32_t>(skeleton.primitive.size());
+  out.blend.node.clear();
+  std::uint32_t nodes = 0;
+  for (std::uint32_t k = 0; k < out.part_count; ++k) {
+    Primitive& primitive = out.primitive[k];
+    out.blend.node.push_back(skeleton.blend.node.empty() ? primitive.part : skeleton.blend.node[primitive.part]);
+    nodes = std::max(nodes, out.blend.node.back() + 1);
+    primitive.part = k;
+  }
+  // Nodes that hold no primitive may be the last ones.
+  std::erase_if(out.blend.edge, [nodes](const BlendEdge& e) { return e.b >= nodes; });
+  return out;
+}
+
 Primitive scaled(const Primitive& primitive, double scale) {
   SUPPLE_EXPECTS(scale > 0.0);
   Primitive out = primitive;

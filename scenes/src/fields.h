@@ -327,6 +327,7 @@ void fields(Archive& archive, SkeletonDesc& d) {
   archive("turn_deg", d.turn, degrees(-360.0, 360.0), "rotation in the particle's frame");
   archive("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
           "which particles carry it, from 0, negative from the end; absent: all");
+  archive("volume", d.volume, above(0.0, kVolume), "held by each of its copies, where the object's volume is held by primitive; absent: as the object says");
   archive.required("kernel", d.kernel, {}, "how the field falls off");
   const bool own_scale = d.shape == Ellipsoid || d.shape == Superquadric || d.shape == Directed;
   check_points(archive, d);
@@ -364,7 +365,7 @@ void fields(Archive& archive, BlendDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, VolumeDesc& d) {
-  archive("of", d.of, {}, "object: one scale for all its kernels; particle: the part of the body in which the particle's share of the field is the largest, a scale for its own kernels");
+  archive("of", d.of, {}, "object: one scale for all its kernels; particle: the part of the body in which the particle's share of the field is the largest, a scale for its own kernels; primitive: the same for every primitive");
   archive("target", d.target, above(0.0, kVolume).or_auto(), "V0; auto: the volume at the start");
   archive("rate", d.rate, up_to(1000.0, kRate), "alpha: kernels grow by alpha (V0 - V) / V0");
   archive("damping", d.damping, between(0.0, 0.15, kNumber), "beta: against change of the volume");
@@ -510,6 +511,11 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive.check(!d.volume || !d.skeleton.empty(), "volume", "expected a skeleton, whose volume it is", "none", "");
   archive.check(!d.volume || (!d.breaking && !d.separate), "volume", "expected an object that stays one body",
                 d.breaking ? "'breaking'" : "'separate'", "");
+  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
+    archive.check(!d.skeleton[k].volume || (d.volume && d.volume->of == VolumeOfName::Primitive), "skeleton[" + std::to_string(k) + "].volume",
+                  "expected the object's volume to be held by primitive", d.volume ? std::string(name_of(d.volume->of)) : "not held",
+                  "add 'volume: {of: primitive}'");
+  }
   archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking, "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
   archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");

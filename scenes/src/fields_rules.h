@@ -53,7 +53,7 @@ template <> struct EnumNames<KernelName> {
                                                          "nishimura", "blinn",   "cauchy",      "blanc_schlick"};
 };
 template <> struct EnumNames<VolumeOfName> {
-  static constexpr std::array<std::string_view, 2> names{"object", "particle"};
+  static constexpr std::array<std::string_view, 3> names{"object", "particle", "primitive"};
 };
 template <> struct EnumNames<BlendName> {
   static constexpr std::array<std::string_view, 4> names{"sum", "graph", "ricci", "gradient"};

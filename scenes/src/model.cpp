@@ -185,8 +185,11 @@ implicit::Kernel kernel_of(const KernelDesc& d, double radius, double iso) {
   return Kernel::wyvill(radius);
 }
 
-implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object, std::uint32_t n, ModelFaults& faults) {
+/// @param volume  receives what the scene says each primitive holds, or 0 [m^3]
+implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object, std::uint32_t n, std::vector<double>& volume,
+                                  ModelFaults& faults) {
   implicit::Skeleton skeleton;
+  std::vector<std::pair<implicit::Primitive, double>> all;
   skeleton.part_count = n;
   skeleton.iso = d.iso;
   for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
@@ -231,11 +234,14 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
     }
     for (const std::uint32_t part : carriers) {
       primitive.part = part;
-      skeleton.primitive.push_back(primitive);
+      all.emplace_back(primitive, s.volume.value_or(0.0));
     }
   }
-  std::stable_sort(skeleton.primitive.begin(), skeleton.primitive.end(),
-                   [](const implicit::Primitive& a, const implicit::Primitive& b) { return a.part < b.part; });
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first.part < b.first.part; });
+  for (const auto& [primitive, held] : all) {
+    skeleton.primitive.push_back(primitive);
+    volume.push_back(held);
+  }
   return skeleton;
 }
 
@@ -631,7 +637,8 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     faults.add(key + ".particles.file", "expected at least one particle", "none", "");
     return;
   }
-  object.skeleton = build_skeleton(d, key, n, faults);
+  std::vector<double> volume;
+  object.skeleton = build_skeleton(d, key, n, volume, faults);
   if (d.blend) {
     object.skeleton.blend = blend_of(*d.blend, key + ".blend", arrangement.position, faults);
     object.fade = d.blend->fade;
@@ -643,9 +650,12 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
 
   if (d.volume && !object.skeleton.primitive.empty()) {
     object.holds_volume = true;
-    object.volume = {d.volume->target.value_or(0.0), d.volume->rate, d.volume->damping};
+    object.volume = {.rate = d.volume->rate, .damping = d.volume->damping};
     object.volume_cell = kVolumeCell * object.iso_radius;
-    object.holds_parts = d.volume->of == VolumeOfName::Particle;
+    object.volume_of = d.volume->of;
+    if (object.volume_of != VolumeOfName::Primitive) volume.assign(object.volume_of == VolumeOfName::Particle ? n : 1, 0.0);
+    for (double& target : volume) target = target > 0.0 ? target : d.volume->target.value_or(0.0);
+    object.target = std::move(volume);
   }
 
   const std::vector<double> nearest = nearest_distances(arrangement.position);

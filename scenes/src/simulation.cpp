@@ -79,7 +79,7 @@ struct Simulation::Impl {
     std::uint32_t volumes = 0;
     for (ObjectModel& object : model.objects) {
       object.first_volume = volumes;
-      volumes += object.holds_parts ? object.last - object.first : 1;
+      volumes += std::max<std::uint32_t>(1, static_cast<std::uint32_t>(object.target.size()));
     }
     state.volumes.resize(volumes);
     form_bodies();
@@ -158,25 +158,46 @@ struct Simulation::Impl {
     for (Body& body : bodies) {
       const ObjectModel& object = model.objects[body.object];
       if (!object.holds_volume) continue;
-      const auto scale_of = [&](std::uint32_t part) {
-        return state.volumes[object.first_volume + (object.holds_parts ? part : 0)].scale;
+      const auto scale_of = [&](std::size_t primitive) {
+        switch (object.volume_of) {
+          case VolumeOfName::Object: return state.volumes[object.first_volume].scale;
+          case VolumeOfName::Particle: return state.volumes[object.first_volume + object.skeleton.primitive[primitive].part].scale;
+          case VolumeOfName::Primitive: break;
+        }
+        return state.volumes[object.first_volume + primitive].scale;
       };
       for (std::size_t k = 0; k < body.skeleton.primitive.size(); ++k) {
-        const implicit::Primitive& primitive = object.skeleton.primitive[k];
-        body.skeleton.primitive[k] = implicit::scaled(primitive, scale_of(primitive.part));
+        body.skeleton.primitive[k] = implicit::scaled(object.skeleton.primitive[k], scale_of(k));
       }
       for (std::size_t k = 0; k < body.samples.size(); ++k) {
-        body.samples.reach[k] = scale_of(body.samples.part[k]) * object.samples.reach[k];
+        body.samples.reach[k] = scale_of(body.samples.primitive[k]) * object.samples.reach[k];
       }
     }
   }
 
-  /// Volumes of a body that its object holds [m^3]: its own, or those of its particles.
+  /// Volumes of a body that its object holds [m^3]: its own, or those of its particles or primitives.
   std::vector<double> volumes_of(std::size_t body) {
-    place_and_index(context(), state.particles, body, pulled);
     const ObjectModel& object = model.objects[bodies[body].object];
-    if (object.holds_parts) return implicit::part_volumes(pulled.field[body], object.volume_cell, object.last - object.first);
+    if (object.volume_of == VolumeOfName::Primitive) return primitive_volumes(bodies[body], object.volume_cell);
+    place_and_index(context(), state.particles, body, pulled);
+    if (object.volume_of == VolumeOfName::Particle) {
+      return implicit::part_volumes(pulled.field[body], object.volume_cell, object.target.size());
+    }
     return {implicit::enclosed_volume(pulled.field[body], object.volume_cell)};
+  }
+
+  std::vector<double> primitive_volumes(const Body& body, double cell) const {
+    std::vector<Pose> poses;
+    for (const implicit::Primitive& primitive : body.skeleton.primitive) {
+      const std::uint32_t particle = body.particle[primitive.part];
+      poses.push_back({state.particles.position[particle], state.particles.orientation[particle]});
+    }
+    const implicit::Skeleton skeleton = implicit::by_primitive(body.skeleton);
+    implicit::PlacedSkeleton placed;
+    implicit::Field field;
+    implicit::place_skeleton(skeleton, poses, placed);
+    implicit::index_field(skeleton, placed, field);
+    return implicit::part_volumes(field, cell, poses.size());
   }
 
   /// Targets that the scene leaves to the start.
@@ -184,12 +205,15 @@ struct Simulation::Impl {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       ObjectModel& object = model.objects[bodies[i].object];
       if (!object.holds_volume) continue;
-      object.part_target.assign(object.holds_parts ? object.last - object.first : 1, object.volume.target);
-      if (!(object.volume.target > 0.0)) object.part_target = volumes_of(i);
+      if (std::all_of(object.target.begin(), object.target.end(), [](double v) { return v > 0.0; })) continue;
+      const std::vector<double> volumes = volumes_of(i);
+      for (std::size_t k = 0; k < volumes.size(); ++k) {
+        if (!(object.target[k] > 0.0)) object.target[k] = volumes[k];
+      }
     }
   }
 
-  /// Between two steps: kernels grow or shrink towards the volume their object, or particle, holds.
+  /// Between two steps: kernels grow or shrink towards the volume that their object, particle or primitive holds.
   void control_volumes() {
     bool any = false;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -198,7 +222,7 @@ struct Simulation::Impl {
       const std::vector<double> volumes = volumes_of(i);
       for (std::size_t k = 0; k < volumes.size(); ++k) {
         implicit::VolumeControl control = object.volume;
-        control.target = object.part_target[k];
+        control.target = object.target[k];
         if (control.target > 0.0) implicit::control_volume(control, volumes[k], dt(), state.volumes[object.first_volume + k]);
       }
       any = true;

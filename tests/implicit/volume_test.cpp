@@ -127,5 +127,36 @@ TEST(PartVolumes, AddUpAndFollowTheTerritories) {
   EXPECT_GT(parts[0], parts[2]);
 }
 
+TEST(PartVolumes, ByPrimitiveSplitWhatAPartHas) {
+  // Two primitives on the first part of three, the last part with none; by every rule of blending.
+  testing::Body body = testing::body_of({{testing::wyvill_point(1.0), Vec3(-0.3, 0, 0)},
+                                         {testing::wyvill_point(1.0), Vec3(0.4, 0.1, 0)},
+                                         {testing::wyvill_point(1.0), Vec3(3, 0, 0)}});
+  body.skeleton.primitive.pop_back();
+  Primitive second = testing::wyvill_point(0.7);
+  second.offset.position = Vec3(0, 0.5, 0);
+  body.skeleton.primitive.insert(body.skeleton.primitive.begin() + 1, second);
+  for (const BlendRule rule : {BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient}) {
+    body.skeleton.blend = {.rule = rule};
+    if (rule == BlendRule::Graph) body.skeleton.blend.edge = {{0, 1, 0.5}, {1, 2, 1.0}};
+    body.place();
+    const std::vector<double> parts = part_volumes(body.field, 0.04, 3);
+    testing::Body apart;
+    apart.skeleton = by_primitive(body.skeleton);
+    apart.parts = {body.parts[0], body.parts[0], body.parts[1]};
+    apart.place();
+    testing::Random random(5);
+    for (int i = 0; i < 100; ++i) {
+      const Vec3 x = random.in_box(1.2);
+      EXPECT_NEAR(FieldView(apart.field).value(x), FieldView(body.field).value(x), 1e-14);
+    }
+    const std::vector<double> primitives = part_volumes(apart.field, 0.04, 3);
+    EXPECT_GT(primitives[1], 0.0);
+    EXPECT_NEAR(primitives[0] + primitives[1] + primitives[2], parts[0] + parts[1] + parts[2], 1e-12);
+    // Where a part's primitives together outweigh the other part but neither does alone, territory changes hands.
+    EXPECT_LE(primitives[0] + primitives[1], parts[0] + 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace supple::implicit

@@ -22,6 +22,10 @@ namespace supple::implicit {
 /// one), so the territories of all parts add up to `enclosed_volume` but for rounding. Shape [part_count].
 [[nodiscard]] std::vector<double> part_volumes(const FieldView& field, double cell, std::size_t part_count);
 
+/// The same body with every primitive on a part of its own, numbered like the primitives: `part_volumes` of its field, placed
+/// with the pose of each primitive's own part, are those of the primitives.
+[[nodiscard]] Skeleton by_primitive(const Skeleton& skeleton);
+
 /// The primitive with all lengths of its kernel (of its support, for shapes that give that) multiplied by `scale` > 0; values
 /// on the kernel's range stay, slopes are divided by it. The shape's own size stays.
 [[nodiscard]] Primitive scaled(const Primitive& primitive, double scale);
@@ -32,7 +36,7 @@ struct VolumeControl {
   double damping = 0.05; ///< beta [1], < 1/6
 };
 
-/// Part of State, by body.
+/// Part of State, by body, part or primitive.
 struct VolumeState {
   double scale = 1.0;    ///< of the kernels
   double volume = 0.0;   ///< at the last step [m^3]; 0: not measured yet

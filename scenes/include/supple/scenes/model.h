@@ -33,10 +33,10 @@ struct ObjectModel {
   bool separate = false;                  ///< each particle is a body of its own
   double fade = 0.0;                      ///< how long a broken bond's blend fades [s]
   bool holds_volume = false;              ///< kernels are scaled by State::volumes
-  implicit::VolumeControl volume;         ///< target 0: what the first step measures
-  bool holds_parts = false;               ///< each particle holds its own
-  std::vector<double> part_target{};      ///< of the object, or by particle [m^3]; the simulation measures what the scene leaves open
-  std::uint32_t first_volume = 0;         ///< in State::volumes: of the object, or of its first particle
+  VolumeOfName volume_of = VolumeOfName::Object;
+  implicit::VolumeControl volume;         ///< but for the target
+  std::vector<double> target{};           ///< of the object, or by particle or primitive [m^3]; 0: that of the start
+  std::uint32_t first_volume = 0;         ///< of `target` in State::volumes
   double volume_cell = 0.0;               ///< of the cells that measure it [m]
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface

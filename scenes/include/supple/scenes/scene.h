@@ -141,6 +141,7 @@ struct SkeletonDesc {
   double turn = 0.0;                  ///< [rad] (key turn_deg)
   bool convolve = false;              ///< segment, triangle, polygon, ring, arc: integrate the kernel over the shape
   std::vector<int> particles;         ///< which particles carry it; empty: all
+  std::optional<double> volume;       ///< target of volume: {of: primitive} [m^3]; absent: the object's
   KernelDesc kernel;
 };
 
@@ -227,9 +228,9 @@ struct BlendDesc {
   double fade = 0.0;                    ///< graph: how long the blend of a broken bond fades [s]
 };
 
-enum class VolumeOfName : std::uint8_t { Object, Particle };
+enum class VolumeOfName : std::uint8_t { Object, Particle, Primitive };
 
-/// objects[].volume: kernels grow and shrink so that the object, or each of its particles, keeps its volume
+/// objects[].volume: kernels grow and shrink so that the object, or each of its particles or primitives, keeps its volume
 struct VolumeDesc {
   VolumeOfName of = VolumeOfName::Object;
   std::optional<double> target;       ///< [m^3]; absent: that of the start

@@ -55,7 +55,7 @@ struct State {
   core::Ledger ledger;
   core::LinkState links;               ///< what broke and yielded
   std::vector<double> broken_for;      ///< since when each link is broken, up to its object's `fade` [s], shape [links]
-  std::vector<implicit::VolumeState> volumes;  ///< by object, or by its particles where these hold theirs
+  std::vector<implicit::VolumeState> volumes;  ///< by object, or by its particles or primitives where these hold theirs
   ApartPairs apart;                    ///< pieces of one object that touch each other by now
   std::vector<implicit::SampleState> samples;  ///< by body
   RunRecord record;
