@@ -32,7 +32,7 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
   std::array<double, 3> low, high;
   low.fill(1e300);
   high.fill(-1e300);
-  double least_inverse = 1e300;
+  double least_inverse = 1e300, inverse_r2 = 0.0, radius = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     for (int k = 0; k < 3; ++k) {
       const auto axis = static_cast<std::size_t>(k);
@@ -41,7 +41,11 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
       low[axis] = std::min(low[axis], u);
       high[axis] = std::max(high[axis], u);
     }
-    radius_[i] = per_cell / std::sqrt(primitives[i].inverse_r2);
+    if (primitives[i].inverse_r2 != inverse_r2) {  // most often all are alike
+      inverse_r2 = primitives[i].inverse_r2;
+      radius = per_cell / std::sqrt(inverse_r2);
+    }
+    radius_[i] = radius;
     least_inverse = std::min(least_inverse, primitives[i].inverse_r2);
   }
   reach_ = n == 0 ? 0.0 : per_cell / std::sqrt(least_inverse);
@@ -76,42 +80,43 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
     ++start_[bin_of_[i] + 1];
   }
   for (std::size_t b = 0; b < bins; ++b) start_[b + 1] += start_[b];
+  order_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) order_[start_[bin_of_[i]]++] = static_cast<std::uint32_t>(i);
   for (auto* array : {&x_, &y_, &z_}) array->resize(n + kLanes);
   scale_.resize(n + kLanes);
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t to = start_[bin_of_[i]]++;
+  double last_radius = 0.0;
+  float scale = 0.0F;
+  for (std::size_t to = 0; to < n; ++to) {
+    const std::size_t i = order_[to];
     x_[to] = cells_[3 * i];
     y_[to] = cells_[3 * i + 1];
     z_[to] = cells_[3 * i + 2];
-    scale_[to] = static_cast<float>(1.0 / radius_[i]);
+    if (radius_[i] != last_radius) {
+      last_radius = radius_[i];
+      scale = static_cast<float>(1.0 / last_radius);
+    }
+    scale_[to] = scale;
   }
   for (std::size_t b = bins; b > 0; --b) start_[b] = start_[b - 1];
   start_[0] = 0;
 }
 
 void BlobGrid::compare(bool comparable) {
-  change_.cells.clear();
+  change_.balls.clear();
   change_.all = !comparable;
   if (!comparable) return;
-  // Wider than what the search for blobs near a box lets through, so that all else sees the same lists.
   const auto reached = [](const double* centre, double radius) {
-    CellBox box;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double reach = 1.001 * radius + 0.01;
-      box.lower[k] = static_cast<std::int64_t>(std::floor(centre[k] - reach));
-      box.upper[k] = static_cast<std::int64_t>(std::ceil(centre[k] + reach));
-    }
-    return box;
+    return Ball{{centre[0], centre[1], centre[2]}, 1.001 * radius + 0.01};
   };
   const std::size_t n = radius_.size();
   for (std::size_t i = 0; i < n; ++i) {
     const double *now = &cells_[3 * i], *last = &last_cells_[3 * i];
     if (now[0] == last[0] && now[1] == last[1] && now[2] == last[2] && radius_[i] == last_radius_[i]) continue;
-    change_.cells.push_back(reached(last, last_radius_[i]));
-    change_.cells.push_back(reached(now, radius_[i]));
-    if (4 * change_.cells.size() > n + 64) {  // looking at all is then cheaper
+    change_.balls.push_back(reached(last, last_radius_[i]));
+    change_.balls.push_back(reached(now, radius_[i]));
+    if (4 * change_.balls.size() > n + 64) {  // looking at all is then cheaper
       change_.all = true;
-      change_.cells.clear();
+      change_.balls.clear();
       return;
     }
   }

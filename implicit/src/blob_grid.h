@@ -30,10 +30,15 @@ struct CellBox {
 
 class BlobGrid {
  public:
-  /// What is different from the last build: everything, or the cells that supports left and entered.
+  /// A support, a little wider than what the search for blobs near a box lets through [cells].
+  struct Ball {
+    std::array<double, 3> centre;
+    double radius;
+  };
+  /// What is different from the last build: everything, or what supports left and entered.
   struct Change {
     bool all = true;
-    std::vector<CellBox> cells;
+    std::vector<Ball> balls;
   };
   /// @pre all primitives are Wyvill points
   void build(std::span<const PackedPrimitive> primitives, const Lattice& lattice);
@@ -44,7 +49,7 @@ class BlobGrid {
   [[nodiscard]] std::size_t bytes() const noexcept {
     return (x_.capacity() + y_.capacity() + z_.capacity() + cells_.capacity() + last_cells_.capacity() +
             radius_.capacity() + last_radius_.capacity()) * sizeof(double) +
-           scale_.capacity() * sizeof(float) + (start_.capacity() + bin_of_.capacity()) * sizeof(std::uint32_t);
+           scale_.capacity() * sizeof(float) + (start_.capacity() + bin_of_.capacity() + order_.capacity()) * sizeof(std::uint32_t);
   }
   /// Largest R [cells].
   [[nodiscard]] double reach() const noexcept { return reach_; }
@@ -78,7 +83,7 @@ class BlobGrid {
   std::vector<std::uint32_t> start_;  ///< blobs of bin b are [start_[b], start_[b + 1])
   std::vector<double> x_, y_, z_;     ///< [cells]
   std::vector<float> scale_;          ///< cell / R
-  std::vector<std::uint32_t> bin_of_;
+  std::vector<std::uint32_t> bin_of_, order_;
   std::vector<double> cells_, last_cells_;    ///< centres by id, of this build and the last
   std::vector<double> radius_, last_radius_;  ///< R [cells] by id
   Lattice lattice_;

@@ -22,19 +22,25 @@ namespace {
 
 constexpr std::size_t kBlocksPerTask = 8;
 
+/// A block and the seven above it, by the steps along x, y, z in bits; null where there is none.
+using BlocksAbove = std::array<const Block*, 8>;
+BlocksAbove blocks_above(const BlockTable& table, const Block& block) {
+  BlocksAbove above{&block};
+  for (unsigned step = 1; step < 8; ++step) {
+    above[step] = table.find({block.coord[0] + static_cast<std::int32_t>(step & 1u),
+                              block.coord[1] + static_cast<std::int32_t>(step >> 1 & 1u),
+                              block.coord[2] + static_cast<std::int32_t>(step >> 2)});
+  }
+  return above;
+}
+
 /// A leaf and its upper neighbours as the marching of its cells sees them.
 class Neighbourhood {
  public:
-  Neighbourhood(const BlockTable& table, const Block& block, unsigned slot) {
+  Neighbourhood(const BlocksAbove& above, unsigned slot) {
     for (unsigned step = 0; step < 8; ++step) {
-      BlockCoord at = block.coord;
-      unsigned there = 0;
-      for (unsigned k = 0; k < 3; ++k) {
-        const unsigned x = (slot >> k & 1u) + (step >> k & 1u);
-        at[k] += static_cast<std::int32_t>(x >> 1);
-        there |= (x & 1u) << k;
-      }
-      const Block* owner = at == block.coord ? &block : table.find(at);
+      const Block* owner = above[slot & step];
+      const unsigned there = slot ^ step;
       const std::int8_t index = owner == nullptr ? kOutside : owner->leaf_of[there];
       if (owner != nullptr && (owner->changed >> there & 1u) != 0) changed_ = true;
       leaf_[step] = index >= 0 ? &owner->leaf[static_cast<std::size_t>(index)] : nullptr;
@@ -141,30 +147,28 @@ void count_leaf(const Neighbourhood& around, Leaf& leaf, std::vector<std::uint8_
   corners.resize(static_cast<std::size_t>(out - corners.data()));
 }
 
-/// The seven blocks above a block, null where there is none.
-std::array<const Block*, 8> blocks_above(const BlockTable& table, const Block& block) {
-  std::array<const Block*, 8> above{&block};
-  for (unsigned step = 1; step < 8; ++step) {
-    above[step] = table.find({block.coord[0] + static_cast<std::int32_t>(step & 1u),
-                              block.coord[1] + static_cast<std::int32_t>(step >> 1 & 1u),
-                              block.coord[2] + static_cast<std::int32_t>(step >> 2)});
-  }
-  return above;
-}
-
 /// Counts the leaves of a block and finds those whose vertices change.
 void count_block(const BlockTable& table, Block& block) {
-  const auto above = blocks_above(table, block);
+  const BlocksAbove above = blocks_above(table, block);
   block.touched = std::any_of(above.begin(), above.end(), [](const Block* b) { return b != nullptr && b->changed != 0; });
   if (!block.touched) {
     for (Leaf& leaf : block.leaf) leaf.solve = leaf.emit = false;
     return;
   }
+  thread_local std::vector<std::uint8_t> last;
+  last.swap(block.corners);
   block.corners.clear();
   for (Leaf& leaf : block.leaf) {
-    const Neighbourhood around(table, block, leaf.slot);
+    const Neighbourhood around(above, leaf.slot);
     leaf.solve = around.changed();
+    const auto first = last.begin() + leaf.first_cell;
     leaf.first_cell = static_cast<std::uint32_t>(block.corners.size());
+    if (!leaf.solve) {
+      std::ptrdiff_t cells = 0;
+      for (const Plane plane : leaf.cells) cells += std::popcount(plane);
+      block.corners.insert(block.corners.end(), first, first + cells);
+      continue;
+    }
     leaf.vertices = leaf.triangles = 0;
     count_leaf(around, leaf, block.corners);
   }
@@ -173,8 +177,9 @@ void count_block(const BlockTable& table, Block& block) {
 /// Triangles follow the vertices of a leaf and its upper neighbours.
 void mark_triangles(const BlockTable& table, Block& block) {
   if (!block.touched) return;
+  const BlocksAbove above = blocks_above(table, block);
   for (Leaf& leaf : block.leaf) {
-    const Neighbourhood around(table, block, leaf.slot);
+    const Neighbourhood around(above, leaf.slot);
     leaf.emit = around.changed();
     for (unsigned step = 0; step < 8; ++step) {
       leaf.emit = leaf.emit || (around.leaf(step) != nullptr && around.leaf(step)->solve);
@@ -331,61 +336,77 @@ void expect_owned(const Neighbourhood& around, const BlockCoord& block) {
 
 std::uint32_t shift_of(const Leaf& leaf) { return static_cast<std::uint32_t>(leaf.first_vertex - leaf.old_vertex); }
 
-/// Triangles that stay: only the numbers of their vertices move, each with its leaf.
-void renumber(const Neighbourhood& around, const Leaf& leaf, std::array<std::uint32_t, 3>* triangle) {
-  const std::uint32_t own = shift_of(leaf);
-  bool alike = true;
-  for (unsigned step = 1; step < 8; ++step) {
-    alike = alike && (around.leaf(step) == nullptr || shift_of(*around.leaf(step)) == own);
-  }
-  if (alike) {
-    if (own == 0 || leaf.triangles == 0) return;
-    std::uint32_t* vertex = triangle->data();
-    for (std::size_t i = 0; i < 3 * std::size_t{leaf.triangles}; ++i) vertex[i] += own;
+/// Vertices of the last call that move by `more` further than those of the triangles' own leaf.
+struct Further {
+  std::uint32_t first, count, more;
+};
+
+/// Triangles that stay: only the numbers of their vertices move, by their own leaf's shift or as `further` says.
+void renumber(std::span<std::uint32_t> vertex, std::uint32_t own, std::span<const Further> further) {
+  if (further.empty()) {
+    if (own == 0) return;
+    for (std::uint32_t& v : vertex) v += own;
     return;
   }
-  for (std::size_t i = 0; i < leaf.triangles; ++i) {
-    for (std::uint32_t& v : triangle[i]) {
-      std::uint32_t shift = own;
-      if (v - leaf.old_vertex >= leaf.vertices) {
-        for (unsigned step = 1; step < 8; ++step) {
-          const Leaf* other = around.leaf(step);
-          if (other != nullptr && v - other->old_vertex < other->vertices) shift = shift_of(*other);
-        }
-      }
-      v += shift;
-    }
+  thread_local std::vector<std::uint32_t> shift;
+  shift.assign(vertex.size(), own);
+  for (const Further& f : further) {
+    for (std::size_t i = 0; i < vertex.size(); ++i) shift[i] += vertex[i] - f.first < f.count ? f.more : 0;
   }
+  for (std::size_t i = 0; i < vertex.size(); ++i) vertex[i] += shift[i];
 }
 
-/// The same for a block where all leaves stay and, with the blocks above, move alike. @return whether that was so
-bool renumber_alike(const BlockTable& table, const Block& block, Mesh& mesh) {
-  if (block.touched) return false;
-  const std::uint32_t shift = shift_of(block.leaf.front());
+/// A leaf's, or those of leaves that follow each other.
+std::span<std::uint32_t> vertices_of(const Leaf& first, const Leaf& last, Mesh& mesh) {
+  const std::size_t count = last.first_triangle + last.triangles - first.first_triangle;
+  return {mesh.triangle.data()->data() + 3 * first.first_triangle, 3 * count};
+}
+
+void renumber_leaf(const Neighbourhood& around, const Leaf& leaf, Mesh& mesh) {
+  std::array<Further, 7> further;
+  std::size_t n = 0;
+  for (unsigned step = 1; step < 8; ++step) {
+    const Leaf* other = around.leaf(step);
+    if (other == nullptr || other->vertices == 0 || shift_of(*other) == shift_of(leaf)) continue;
+    further[n++] = {static_cast<std::uint32_t>(other->old_vertex), other->vertices, shift_of(*other) - shift_of(leaf)};
+  }
+  renumber(vertices_of(leaf, leaf, mesh), shift_of(leaf), std::span(further).first(n));
+}
+
+/// The same for a block where all leaves stay; they move alike.
+void renumber_block(const BlockTable& table, const Block& block, Mesh& mesh) {
+  const std::uint32_t own = shift_of(block.leaf.front());
+  std::array<Further, 7 * 8> further;
+  std::size_t n = 0;
   for (const Block* above : blocks_above(table, block)) {
-    if (above == nullptr) continue;
+    if (above == nullptr || above == &block) continue;
     for (const Leaf& leaf : above->leaf) {
-      if (shift_of(leaf) != shift) return false;
+      if (leaf.solve || leaf.vertices == 0 || shift_of(leaf) == own) continue;
+      const auto first = static_cast<std::uint32_t>(leaf.old_vertex);
+      const std::uint32_t more = shift_of(leaf) - own;
+      if (n > 0 && further[n - 1].first + further[n - 1].count == first && further[n - 1].more == more) {
+        further[n - 1].count += leaf.vertices;
+      } else {
+        further[n++] = {first, leaf.vertices, more};
+      }
     }
   }
-  if (shift == 0) return true;
-  const Leaf &first = block.leaf.front(), &last = block.leaf.back();
-  if (first.first_triangle == last.first_triangle + last.triangles) return true;
-  std::uint32_t* vertex = mesh.triangle[first.first_triangle].data();
-  std::uint32_t* end = vertex + 3 * (last.first_triangle + last.triangles - first.first_triangle);
-  for (; vertex != end; ++vertex) *vertex += shift;
-  return true;
+  renumber(vertices_of(block.leaf.front(), block.leaf.back(), mesh), own, std::span(further).first(n));
 }
 
 void emit_triangles(const BlockTable& table, const Block& block, const std::vector<float>& along, Mesh& mesh) {
-  if (renumber_alike(table, block, mesh)) return;
+  if (!block.touched) {
+    renumber_block(table, block, mesh);
+    return;
+  }
   thread_local VertexTable vertices;
   thread_local std::array<std::array<std::uint32_t, 3>, (512 + 1) * kMostTriangles> found;
+  const BlocksAbove above = blocks_above(table, block);
   for (const Leaf& leaf : block.leaf) {
     if (leaf.triangles == 0) continue;
-    const Neighbourhood around(table, block, leaf.slot);
+    const Neighbourhood around(above, leaf.slot);
     if (!leaf.emit) {
-      renumber(around, leaf, mesh.triangle.data() + leaf.first_triangle);
+      renumber_leaf(around, leaf, mesh);
       continue;
     }
     expect_owned(around, block.coord);
@@ -478,7 +499,9 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   move_runs(same_vertices, vertices, mesh.normal);
   move_runs(same_vertices, vertices, scratch.along);
   move_runs(same_triangles, triangles, mesh.triangle);
-  for_each_block([&](Block& block) { sampler.solve(table, block, mesh, scratch.along); });
+  for_each_block([&](Block& block) {
+    if (block.touched) sampler.solve(table, block, mesh, scratch.along);
+  });
   for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.along, mesh); });
 }
 

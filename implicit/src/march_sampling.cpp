@@ -218,22 +218,27 @@ class BlobSampler final : public Sampler {
     return marked_blocks(table);
   }
 
-  /// Marks the leaves whose closed boxes meet what has changed.
+  /// Marks the leaves whose closed boxes meet what has changed; a leaf's box ends at the next leaf's first node.
   [[nodiscard]] std::vector<std::uint32_t> changed_blocks(BlockTable& table) const {
     for (Block& block : table.block) block.changed = 0;
-    for (blobs::CellBox cells : grid_.change().cells) {
-      for (std::size_t k = 0; k < 3; ++k) --cells.lower[k];  // a leaf's box ends at the next leaf's first node
+    for (const blobs::BlobGrid::Ball& ball : grid_.change().balls) {
+      blobs::CellBox cells;
+      for (std::size_t k = 0; k < 3; ++k) {
+        cells.lower[k] = static_cast<std::int64_t>(std::floor(ball.centre[k] - ball.radius)) - 1;
+        cells.upper[k] = static_cast<std::int64_t>(std::ceil(ball.centre[k] + ball.radius));
+      }
       for_blocks_in(table, cells, [&](std::size_t b) {
         Block& block = table.block[b];
         const Cells base = block.base();
         for (unsigned slot = 0; slot < 8; ++slot) {
           const auto corner = corner_of(slot, kLeafNodes);
-          bool meets = true;
+          double distance2 = 0.0;
           for (std::size_t k = 0; k < 3; ++k) {
-            const std::int64_t low = base[k] + corner[k];
-            meets = meets && cells.lower[k] < low + kLeafNodes && low <= cells.upper[k];
+            const double low = static_cast<double>(base[k] + corner[k]);
+            const double off = std::max({low - ball.centre[k], ball.centre[k] - low - kLeafNodes, 0.0});
+            distance2 += off * off;
           }
-          if (meets) block.changed = static_cast<std::uint8_t>(block.changed | 1u << slot);
+          if (distance2 <= ball.radius * ball.radius) block.changed = static_cast<std::uint8_t>(block.changed | 1u << slot);
         }
       });
     }
