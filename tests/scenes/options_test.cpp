@@ -256,6 +256,11 @@ void add_object_rules(std::vector<Option>& all) {
                           one, other));
   };
   volume("of=particle", "object", "particle");
+  all.push_back(differs("objects.volume.of=primitive", In::State,
+                        {.skeleton = "{shape: point, kernel: {radius: 0.3}}, {shape: point, at: [0, 0.1, 0], kernel: {radius: 0.25}}",
+                         .object = "volume: {of: $, target: 0.01}"}, "particle", "primitive"));
+  all.push_back(differs("objects.skeleton.volume", In::State,
+                        {.skeleton = "{shape: point$, kernel: {radius: 0.3}}", .object = "volume: {of: primitive}"}, "", ", volume: 0.02"));
   volume("target", "auto", "0.2");
   volume("rate", "2", "20");
   volume("damping", "0.05", "0.1");
@@ -522,7 +527,7 @@ void add_files(std::vector<Option>& all) {
          formats == std::string("exr") ? "png" : "exr", formats);
   }
   file("film", "images: {size: [48, 36], samples: 1}, film: $", "false", "true");
-  for (const char* what : {"contacts", "particles"}) {
+  for (const char* what : {"contacts", "particles", "samples"}) {
     for (const char* format : {"csv", "vtk"}) file(what + std::string("=") + format, std::string(what) + ": $", "none", format);
   }
   for (const char* format : {"ply", "obj", "usd"}) file("mesh=" + std::string(format), "cell: 0.1, mesh: $", "none", format);
@@ -530,6 +535,8 @@ void add_files(std::vector<Option>& all) {
   file("meshing.motion", "cell: 0.1, mesh: ply, meshing: {motion: $}", "false", "true");
   for (const char* of : {"scene", "both"}) file("gridding.of=" + std::string(of), "cell: 0.1, grid: vdb, gridding: {of: $}", "objects", of);
   file("gridding.content=field", "cell: 0.1, grid: vdb, gridding: {content: $}", "distance", "field");
+  file("sampling.spacing", "samples: csv, sampling: {spacing: $}", "auto", "0.05");
+  file("sampling.density", "samples: csv, sampling: {density: $}", "200", "400");
   file("gridding.half_width", "cell: 0.1, grid: vdb, gridding: {half_width: $}", "3", "5");
 }
 
