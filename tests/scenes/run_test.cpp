@@ -373,6 +373,38 @@ TEST_F(Run, RefusesGridsOfTooManyVoxelsByTheKeyOfTheScene) {
   EXPECT_NE(refused.reason.find("use cells of at least"), std::string::npos) << refused.reason;
 }
 
+TEST_F(Run, RefusesTooFineCellsWordForWord) {
+  const std::string ball = R"(
+schema: 1
+duration: 0.1 s
+frame_rate: 10
+objects:
+  - name: ball
+    particles: {mass: 1}
+    skeleton: [{shape: point, kernel: {radius: 1}}]
+output: )";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"{mesh: ply, cell: 1.8 mm}",
+       "output.cell: expected at most 1000000000 lattice nodes around the body, found about 1.38e+09 with cells of 0.0018 m; "
+       "use cells of at least 0.00211 m"},
+      {"{grid: vdb, cell: 0.1 mm}",
+       "output.cell: expected a surface in at most 200000000 voxels, found about 6.78e+09 with cells of 0.0001 m; use cells of "
+       "at least 0.000611 m"},
+      {"{samples: csv, sampling: {spacing: 10 mm}}",
+       "output.sampling.spacing: expected at most 1000000000 lattice nodes around the body, found about 1.74e+09 with cells of "
+       "0.00167 m; use cells of at least 0.00211 m, which are a sixth of the spacing"},
+      {"{mesh: ply, meshing: {error: 1e-12}}",
+       "output.meshing.error: expected an error of at most 1e-12 m, found 0.000175 m with cells of 0.0156 m; allow at least "
+       "0.000184 m"}};
+  for (const auto& [output, message] : cases) {
+    RunOptions o = options();
+    o.overwrite = true;
+    const RunResult refused = run_scene(parse_scene(ball + output + '\n', "ball.yaml", "."), o);
+    EXPECT_EQ(refused.outcome, "limit");
+    EXPECT_EQ(refused.reason, message);
+  }
+}
+
 TEST_F(Run, SaysWhenAFolderCannotBeMade) {
   std::ofstream(fs::path(testing::TempDir()) / "plain_file") << "x";
   RunOptions o = options();
