@@ -75,12 +75,11 @@ void flow(const PairPose& pose, double share, std::size_t frame, LinkState& stat
   turn = (turn * rotation_exp(share * rotation_log(turn.conjugate() * now))).normalized();
 }
 
-void forget_broken(const Links& links, const LinkState& state, std::vector<std::uint32_t>& first,
-                   std::vector<std::uint32_t>& second, const auto& keep) {
+/// Takes the pairs out for which `gone` holds; `keep` moves what goes with the others.
+void forget_pairs(std::vector<std::uint32_t>& first, std::vector<std::uint32_t>& second, const auto& gone, const auto& keep) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < first.size(); ++k) {
-    const std::size_t link = find_link(links, first[k], second[k]);
-    if (link != kNone && state.broken[link] != 0) continue;
+    if (gone(first[k], second[k])) continue;
     first[kept] = first[k];
     second[kept] = second[k];
     keep(kept, k);
@@ -88,6 +87,30 @@ void forget_broken(const Links& links, const LinkState& state, std::vector<std::
   }
   first.resize(kept);
   second.resize(kept);
+}
+
+/// All lists of geometric laws.
+auto geometric_lists(auto& laws) {
+  return std::tie(laws.geometric_cohesion, laws.geometric_linear_cohesion, laws.geometric_tabulated_cohesion,
+                  laws.geometric_lennard_jones, laws.gay_berne, laws.geometric_coplanarity, laws.geometric_co_normality,
+                  laws.geometric_co_circularity, laws.repulsion);
+}
+
+/// The same for the bonds of lists of laws.
+void forget_laws(auto& lists, const auto& gone) {
+  for (auto& list : lists) {
+    auto& laws = list.law;
+    forget_pairs(list.first, list.second, gone, [&laws](std::size_t to, std::size_t from) { laws[to] = laws[from]; });
+    laws.erase(laws.begin() + static_cast<std::ptrdiff_t>(list.first.size()), laws.end());
+  }
+}
+
+/// The same for all bonds and friction.
+void forget_bonds(Interactions& interactions, const auto& gone) {
+  std::apply([&gone](auto&... lists) { (forget_laws(lists, gone), ...); }, bonded_lists(interactions));
+  for (Friction& friction : interactions.friction) {
+    forget_pairs(friction.first, friction.second, gone, [](std::size_t, std::size_t) {});
+  }
 }
 
 }  // namespace
@@ -232,18 +255,39 @@ Interactions intact(const Interactions& interactions, const Links& links, const 
     left.bond_frame[links.frame_list[frame]].law[links.frame_bond[frame]] = present_frame(links, state, frame);
   }
   if (std::find(state.broken.begin(), state.broken.end(), 1) == state.broken.end()) return left;
-  const auto filter = [&](auto& lists) {
-    for (auto& list : lists) {
-      auto& laws = list.law;
-      forget_broken(links, state, list.first, list.second, [&laws](std::size_t to, std::size_t from) { laws[to] = laws[from]; });
-      laws.erase(laws.begin() + static_cast<std::ptrdiff_t>(list.first.size()), laws.end());
-    }
-  };
-  std::apply([&filter](auto&... lists) { (filter(lists), ...); }, bonded_lists(left));
-  for (Friction& friction : left.friction) {
-    forget_broken(links, state, friction.first, friction.second, [](std::size_t, std::size_t) {});
-  }
+  forget_bonds(left, [&](std::uint32_t a, std::uint32_t b) {
+    const std::size_t link = find_link(links, a, b);
+    return link != kNone && state.broken[link] != 0;
+  });
   return left;
+}
+
+Interactions without_resting(const ParticleSet& set, const Interactions& interactions,
+                             std::span<const std::uint8_t> resting) {
+  SUPPLE_EXPECTS(resting.size() == set.size());
+  Interactions left = interactions;
+  const auto both_rest = [&](std::uint32_t a, std::uint32_t b) { return resting[a] != 0 && resting[b] != 0; };
+  forget_bonds(left, both_rest);
+  forget_laws(left.literal_form, both_rest);
+  std::vector<std::uint8_t> moves;  // by object: any of its particles
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (moves.size() <= set.object[i]) moves.resize(set.object[i] + 1, 0);
+    if (resting[i] == 0) moves[set.object[i]] = 1;
+  }
+  const auto thin = [&](auto& laws) {
+    std::erase_if(laws, [&](const auto& law) { return moves[law.object_a] == 0 && moves[law.object_b] == 0; });
+  };
+  std::apply([&thin](auto&... lists) { (thin(lists), ...); }, geometric_lists(left));
+  return left;
+}
+
+std::vector<std::array<std::uint32_t, 2>> acting_objects(const Interactions& interactions) {
+  std::vector<std::array<std::uint32_t, 2>> pairs;
+  const auto add = [&pairs](const auto& laws) {
+    for (const auto& law : laws) pairs.push_back({law.object_a, law.object_b});
+  };
+  std::apply([&add](const auto&... lists) { (add(lists), ...); }, geometric_lists(interactions));
+  return pairs;
 }
 
 std::vector<std::uint32_t> find_pieces(const ParticleSet& set, const Links& links, const LinkState& state) {

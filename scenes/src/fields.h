@@ -564,6 +564,12 @@ void fields(Archive& archive, ContactDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, SleepDesc& d) {
+  archive("speed", d.speed, above(0.0, kSpeed), "a body is quiet while its kinetic energy is less than that of its mass at this speed");
+  archive("time", d.time, above(0.0, kTime), "for which all bodies that touch one another must have been quiet to fall asleep together");
+}
+
+template <class Archive>
 void fields(Archive& archive, GroundDesc& d) {
   archive("height", d.height, any(kLength), "z of the plane");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
@@ -717,6 +723,7 @@ void fields(Archive& archive, Scene& d) {
   archive("obstacles", d.obstacles, {}, "solids that stand still");
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
   archive("contact", d.contact, {}, "how contact is computed");
+  archive("sleep", d.sleep, {}, "bodies that rest are not moved until something touches them or a load on them changes; absent: never");
   archive("camera", d.camera, {}, "who looks on");
   archive("cameras", d.cameras, {}, "several onlookers, instead of 'camera': images NAME.CAMERA.0001.png and a film each");
   archive("light", d.light, {}, "the sun");

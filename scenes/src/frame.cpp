@@ -81,29 +81,30 @@ void index(const StageContext& context, std::size_t i, Frame& frame) {
   frame.indexed[i] = 1;
 }
 
-/// The bodies of contact by index, then the fixed ones. Bodies without contact keep an empty view.
-void view_bodies(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+/// What contact sees of one body.
+void view_body(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
   const Model& model = context.model;
+  const Body& own = context.bodies[i];
+  collision::ContactBody& body = frame.bodies[i];
+  core::gather_motion(model.particles, particles, own.particle, frame.velocity[i], frame.spin[i]);
+  body.field = frame.field[i];
+  body.material = model.objects[own.object].material;
+  body.pose = frame.pose[i];
+  body.velocity = frame.velocity[i];
+  body.angular_velocity = frame.spin[i];
+  body.samples = &frame.samples[i];
+  body.core_value = std::numeric_limits<double>::infinity();
+  for (const implicit::Primitive& primitive : own.skeleton.primitive) {
+    body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);
+  }
+}
+
+/// The bodies that do not move, after the others.
+void view_fixed_bodies(const Model& model, std::size_t first, Frame& frame) {
   static const Pose kStill{};
   static const Vec3 kZero = Vec3::Zero();
-  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
-    const Body& own = context.bodies[i];
-    collision::ContactBody& body = frame.bodies[i];
-    if (!collides(context, own)) continue;
-    core::gather_motion(model.particles, particles, own.particle, frame.velocity[i], frame.spin[i]);
-    body.field = frame.field[i];
-    body.material = model.objects[own.object].material;
-    body.pose = frame.pose[i];
-    body.velocity = frame.velocity[i];
-    body.angular_velocity = frame.spin[i];
-    body.samples = &frame.samples[i];
-    body.core_value = std::numeric_limits<double>::infinity();
-    for (const implicit::Primitive& primitive : own.skeleton.primitive) {
-      body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);
-    }
-  }
   for (std::size_t k = 0; k < model.fixed.size(); ++k) {
-    collision::ContactBody& body = frame.bodies[context.bodies.size() + k];
+    collision::ContactBody& body = frame.bodies[first + k];
     body.field = model.fixed[k].field();
     body.material = model.fixed[k].material;
     body.pose = {&kStill, 1};
@@ -115,34 +116,90 @@ void view_bodies(const StageContext& context, const core::ParticleState& particl
   }
 }
 
+bool rests(const StageContext& context, std::uint32_t i) {
+  return context.awake != nullptr && !std::binary_search(context.awake->begin(), context.awake->end(), i);
+}
+
+/// Calls use(i) for every body that is awake and collides.
+template <class Use>
+void for_awake(const StageContext& context, const Use& use) {
+  const std::size_t count = context.awake != nullptr ? context.awake->size() : context.bodies.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = context.awake != nullptr ? (*context.awake)[k] : k;
+    if (collides(context, context.bodies[i])) use(i);
+  }
+}
+
+/// Bodies that rest are placed when they have fallen asleep, and stay.
+void place_resting(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+  if (frame.resting_placed) return;
+  frame.resting_placed = true;
+  frame.resting.clear();
+  for (std::uint32_t i = 0; context.awake != nullptr && i < context.bodies.size(); ++i) {
+    if (!collides(context, context.bodies[i]) || !rests(context, i)) continue;
+    place(context, particles, i, frame);
+    frame.resting.push_back(i);
+  }
+  frame.resting_boxes.build(frame.reach, frame.resting);
+}
+
+/// Pairs of bodies whose supports reach one another, one of them awake; sorted.
+void find_reaching(const StageContext& context, Frame& frame) {
+  const std::size_t moving = context.bodies.size();
+  if (frame.resting.empty()) {
+    frame.reaching = collision::overlapping_boxes(frame.reach);
+  } else {
+    std::vector<std::uint32_t> number;  // of the boxes in the sweep
+    std::vector<Box> boxes;
+    const auto add = [&](std::size_t i) {
+      number.push_back(static_cast<std::uint32_t>(i));
+      boxes.push_back(frame.reach[i]);
+    };
+    for_awake(context, add);
+    const std::size_t awake = number.size();
+    for (std::size_t i = moving; i < frame.reach.size(); ++i) add(i);
+    frame.reaching = collision::overlapping_boxes(boxes);
+    for (collision::BodyPair& pair : frame.reaching) pair = {number[pair.a], number[pair.b]};
+    std::vector<std::uint32_t> found;
+    for (std::size_t k = 0; k < awake; ++k) {
+      found.clear();
+      frame.resting_boxes.find(boxes[k], found);
+      for (const std::uint32_t j : found) frame.reaching.push_back({std::min(number[k], j), std::max(number[k], j)});
+    }
+    std::sort(frame.reaching.begin(), frame.reaching.end());
+  }
+  std::erase_if(frame.reaching, [&](const collision::BodyPair& pair) {
+    return (pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b);
+  });
+}
+
 /// Flags the bodies whose supports reach another body, and the parts that do: the only ones that are sampled, unless
 /// both bodies are convex, which need no samples to find each other. A rule on State alone, so it decides which kept
 /// distances move on.
 void flag_active_parts(const StageContext& context, Frame& frame) {
   const std::size_t moving = context.bodies.size();
-  std::vector<Box>& reach = frame.reach;
-  for (std::size_t i = 0; i < moving; ++i) {
+  for (const std::uint32_t i : frame.reached) {
     frame.near[i] = 0;
-    frame.active[i].assign(context.bodies[i].particle.size(), 0);
-    if (!collides(context, context.bodies[i])) reach[i] = {};
+    frame.active[i].clear();
   }
+  frame.reached.clear();
+  find_reaching(context, frame);
   const auto flag = [&](std::size_t i, const Box& other, bool sampled) {
     if (i >= moving) return;
+    if (frame.active[i].empty()) frame.active[i].assign(context.bodies[i].particle.size(), 0);
     for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
       if (!frame.placed[i].support[k].overlaps(other)) continue;
+      if (frame.near[i] == 0) frame.reached.push_back(static_cast<std::uint32_t>(i));
       frame.near[i] = 1;
       if (sampled) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
     }
   };
-  frame.reaching = collision::overlapping_boxes(reach);
-  std::erase_if(frame.reaching, [&](const collision::BodyPair& pair) {
-    return (pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b);
-  });
   for (const collision::BodyPair& pair : frame.reaching) {
     const bool sampled = frame.convex[pair.a] == 0 || frame.convex[pair.b] == 0;
-    flag(pair.a, reach[pair.b], sampled);
-    flag(pair.b, reach[pair.a], sampled);
+    flag(pair.a, frame.reach[pair.b], sampled);
+    flag(pair.b, frame.reach[pair.a], sampled);
   }
+  std::sort(frame.reached.begin(), frame.reached.end());
 }
 
 bool any_active(const std::vector<std::uint8_t>& flags) {
@@ -167,7 +224,14 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
       bodies(reach.size()),
       loads(reach.size()),
       dissipative(reach.size()) {
-  for (std::size_t i = 0; i < all.size(); ++i) convex[i] = implicit::has_convex_core(all[i].skeleton) ? 1 : 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    convex[i] = implicit::has_convex_core(all[i].skeleton) ? 1 : 0;
+    primitives_present += all[i].skeleton.primitive.size();
+    if (!has_surface(all[i]) || !model.objects[all[i].object].collides) continue;
+    ++bodies_present;
+    samples_present += all[i].samples.size();
+  }
+  view_fixed_bodies(model, all.size(), *this);
   for (std::size_t k = 0; k < model.fixed.size(); ++k) {
     const implicit::FieldView solid = model.fixed[k].field();
     reach[all.size() + k] = solid.surface_box();
@@ -208,41 +272,44 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     return context.profile[static_cast<std::size_t>(stage)];
   };
   frame.surface.clear();
+  frame.pressed.clear();
   {
     StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      profile(Stage::PlaceSkeleton).present += bodies[i].skeleton.primitive.size();
-      if (!collides(context, bodies[i])) continue;
+    place_resting(context, particles, frame);
+    for_awake(context, [&](std::size_t i) {
       place(context, particles, i, frame);
       profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size();
-    }
+    });
+    profile(Stage::PlaceSkeleton).present += frame.primitives_present;
     flag_active_parts(context, frame);
   }
   // Bodies whose supports reach no other body cannot touch: their fields are not even indexed.
-  bool near = false;
+  const bool near = !frame.reached.empty();
   {
     StageTimer timer(profile(Stage::IndexField), context.every_call);
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (!collides(context, bodies[i])) continue;
-      ++profile(Stage::IndexField).present;
-      if (context.skip && frame.near[i] == 0) continue;
+    const auto index_one = [&](std::size_t i) {
       index(context, i, frame);
+      view_body(context, particles, i, frame);
       ++profile(Stage::IndexField).visited;
+    };
+    profile(Stage::IndexField).present += frame.bodies_present;
+    if (!context.skip) {
+      for_awake(context, index_one);
+    } else {
+      for (const std::uint32_t i : frame.reached) index_one(i);
+      if (energy) for_awake(context, [&](std::size_t i) { view_body(context, particles, i, frame); });
     }
-    near = any_active(frame.near);
   }
-  view_bodies(context, particles, frame);
   if (context.skip && !near) return;
   {
     StageTimer timer(profile(Stage::SampleSurface), context.every_call);
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Body& body = bodies[i];
-      if (!collides(context, body)) continue;
-      profile(Stage::SampleSurface).present += body.samples.size();
+    profile(Stage::SampleSurface).present += frame.samples_present;
+    for (const std::uint32_t i : frame.reached) {
       if (!any_active(frame.active[i])) {
         frame.samples[i] = {};
         continue;
       }
+      const Body& body = bodies[i];
       implicit::sample_surface(body.skeleton, body.samples, frame.pose[i], frame.field[i], frame.active[i],
                                context.executor, samples[i], frame.samples[i]);
       profile(Stage::SampleSurface).visited += frame.samples[i].visited;
@@ -251,7 +318,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   {
     StageTimer timer(profile(Stage::FindContacts), context.every_call);
     const auto usable = [&](std::uint32_t i) {
-      return i >= bodies.size() || (collides(context, bodies[i]) && frame.indexed[i] != 0);
+      return i >= bodies.size() || frame.near[i] != 0 || (!context.skip && collides(context, bodies[i]));
     };
     frame.pairs.clear();
     for (const collision::BodyPair& pair : frame.reaching) {
@@ -270,6 +337,9 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     collision::ContactSettings settings = model.contact;
     settings.energy = energy;
     collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
+    for (const auto& s : frame.surface.summary) frame.pressed.insert(frame.pressed.end(), {s.bodies.a, s.bodies.b});
+    std::sort(frame.pressed.begin(), frame.pressed.end());
+    frame.pressed.erase(std::unique(frame.pressed.begin(), frame.pressed.end()), frame.pressed.end());
     profile(Stage::SolveContactSurface).present += frame.candidates.pair.size();
     profile(Stage::SolveContactSurface).visited += frame.surface.summary.size();
   }
@@ -282,7 +352,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   if (context.skip && frame.surface.summary.empty()) return;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
   StageTimer timer(profile, context.every_call);
-  for (std::size_t i = 0; i < frame.bodies.size(); ++i) {
+  for (const std::uint32_t i : frame.pressed) {
     for (collision::PartLoads* loads : {&frame.loads[i], &frame.dissipative[i]}) {
       loads->force.assign(frame.bodies[i].pose.size(), Vec3::Zero());
       loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
@@ -291,17 +361,17 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, frame.loads,
                                     &frame.traction_force, frame.dissipative);
   if (frame.reaction.dissipated_power != 0.0) out.dissipative.reset(model.particles.size());
-  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
-    if (frame.bodies[i].pose.empty()) continue;
+  for (const std::uint32_t i : frame.pressed) {
+    if (i >= context.bodies.size()) {
+      out.force_on_fixed += frame.loads[i].force[0];
+      out.moment_on_fixed += frame.loads[i].torque[0];
+      continue;
+    }
     const std::vector<std::uint32_t>& particle = context.bodies[i].particle;
     if (frame.reaction.dissipated_power != 0.0) {
       core::add_part_loads(frame.dissipative[i].force, frame.dissipative[i].torque, particle, out.dissipative);
     }
     core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, particle, out.internal);
-  }
-  for (std::size_t i = context.bodies.size(); i < frame.loads.size(); ++i) {
-    out.force_on_fixed += frame.loads[i].force[0];
-    out.moment_on_fixed += frame.loads[i].torque[0];
   }
   profile.visited += frame.surface.point.size();
   profile.present += frame.surface.point.size();

@@ -8,6 +8,7 @@
 
 #include "supple/collision/find_contacts.h"
 #include "supple/collision/react.h"
+#include "supple/collision/sleep.h"
 #include "supple/core/executor.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
@@ -26,9 +27,13 @@ struct Frame {
   std::vector<Box> reach;                     ///< box of all supports; holds the surface box
   std::vector<implicit::Field> field;
   std::vector<std::uint8_t> indexed;          ///< 1: `field` belongs to this frame
+  std::uint64_t primitives_present = 0;       ///< of all bodies
+  std::uint64_t bodies_present = 0;           ///< that collide
+  std::uint64_t samples_present = 0;          ///< of these
   std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
   std::vector<std::uint8_t> convex;           ///< 1: a contact body that is convex; shape [bodies + fixed ones]
   std::vector<std::uint8_t> near;             ///< 1: its supports reach another body
+  std::vector<std::uint32_t> reached;         ///< bodies in `reaching`, ascending; the others have no flags
   std::vector<collision::BodyPair> reaching;  ///< pairs whose supports reach one another, sorted
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
@@ -41,8 +46,14 @@ struct Frame {
   collision::ContactSurface surface;
   std::vector<collision::PartLoads> loads;    ///< by body
   std::vector<collision::PartLoads> dissipative;  ///< the part of them that takes energy, by body
+  std::vector<std::uint32_t> pressed;         ///< contact bodies in `surface`, ascending: the only ones with loads
   collision::ReactionReport reaction;
   std::vector<Vec3> traction_force;           ///< by pair of `surface`
+
+  // bodies that rest, placed and boxed once
+  std::vector<std::uint32_t> resting;         ///< ascending
+  collision::BoxTree resting_boxes;           ///< their `reach`
+  bool resting_placed = false;                ///< false: to be made anew
 
   Frame(const Model& model, const std::vector<Body>& all);
 };
@@ -70,6 +81,7 @@ struct StageContext {
   bool skip = true;
   bool every_call = false;
   const implicit::DelaunayMesher* delaunay = nullptr;
+  const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
 };
 

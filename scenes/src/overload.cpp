@@ -30,11 +30,12 @@ std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
 
 }  // namespace
 
-void find_mobility(const StageContext& context, const core::ParticleState& particles,
+void find_mobility(const StageContext& context, const core::ParticleState& particles, const Frame& frame,
                    std::vector<collision::PartMobility>& mobility) {
   const core::ParticleSet& set = context.model.particles;
   mobility.resize(context.bodies.size() + context.model.fixed.size());
-  for (std::size_t b = 0; b < context.bodies.size(); ++b) {
+  for (const std::uint32_t b : frame.pressed) {
+    if (b >= context.bodies.size()) continue;
     const std::vector<std::uint32_t>& particle = context.bodies[b].particle;
     mobility[b].inverse_mass.resize(particle.size());
     mobility[b].inverse_inertia.resize(particle.size());
@@ -67,7 +68,7 @@ double OverloadWatch::capacity_of(const StageContext& context, const Frame& fram
 void OverloadWatch::look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
                          RunRecord& record) {
   if (frame.surface.summary.empty()) return;
-  find_mobility(context, particles, mobility_);
+  find_mobility(context, particles, frame, mobility_);
   for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
     if (!(s.force.norm() > 0.0)) continue;
     const collision::Approach approach = collision::measure_approach(frame.bodies, mobility_, s);
@@ -114,12 +115,12 @@ bool hold_cores(const StageContext& context, Frame& frame, core::ParticleState& 
   if (std::none_of(frame.surface.summary.begin(), frame.surface.summary.end(), deep)) return false;
   const core::ParticleSet& set = context.model.particles;
   std::vector<collision::PartMobility> mobility;
-  find_mobility(context, particles, mobility);
+  find_mobility(context, particles, frame, mobility);
   std::vector<collision::PartLoads> impulses(frame.bodies.size());
-  for (std::size_t b = 0; b < frame.bodies.size(); ++b) {
+  for (const std::uint32_t b : frame.pressed) {
     impulses[b].force.assign(frame.bodies[b].pose.size(), Vec3::Zero());
     impulses[b].torque.assign(frame.bodies[b].pose.size(), Vec3::Zero());
-    if (b < context.bodies.size() && !frame.bodies[b].pose.empty()) {
+    if (b < context.bodies.size()) {
       core::gather_motion(set, particles, context.bodies[b].particle, frame.velocity[b], frame.spin[b]);
     }
   }

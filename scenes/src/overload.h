@@ -10,8 +10,8 @@
 
 namespace supple::scenes {
 
-/// What moves the parts of the bodies, by contact body; fixed ones stay empty.
-void find_mobility(const StageContext& context, const core::ParticleState& particles,
+/// What moves the parts of the bodies that touch, by contact body; fixed ones stay empty.
+void find_mobility(const StageContext& context, const core::ParticleState& particles, const Frame& frame,
                    std::vector<collision::PartMobility>& mobility);
 
 /// Looks at every pair that touches. A pair is overloaded when the kinetic energy of its approach (with the masses of the

@@ -38,6 +38,11 @@ struct Simulation::Impl {
   State last_frame;
   // What State::links and State::apart leave of the model.
   core::Interactions laws;
+  // What State::sleep leaves of these: particles that rest are pinned, and nothing is computed between them.
+  core::ParticleSet particles;
+  core::Interactions awake_laws;
+  std::vector<std::uint32_t> awake;          ///< bodies, ascending
+  std::vector<collision::BodyPair> tied;     ///< bodies that laws act between
   std::vector<Body> bodies;
   collision::ContactRules rules;
   Frame frame;
@@ -63,6 +68,7 @@ struct Simulation::Impl {
         executor(options.threads),
         plan(plan_step(scene, model, requested_outputs(scene))),
         laws(model.interactions),
+        particles(model.particles),
         frame(model, bodies),
         workspace(model.particles, laws),
         integrator(plan_integrator(scene, model)),
@@ -85,11 +91,23 @@ struct Simulation::Impl {
     form_bodies();
     measure_volumes();
     for (const Body& body : bodies) state.samples.push_back({.distance = std::vector<double>(body.samples.size(), -1.0)});
+    if (scene.sleep) state.sleep.reset(bodies.size());
+    form_awake();
     choose_step();
     book_audits();
   }
 
-  StageContext context() { return {model, bodies, rules, executor, profile, options.skip, options.profile, &options.delaunay}; }
+  StageContext context() {
+    return {.model = model,
+            .bodies = bodies,
+            .rules = rules,
+            .executor = executor,
+            .profile = profile,
+            .skip = options.skip,
+            .every_call = options.profile,
+            .delaunay = &options.delaunay,
+            .awake = awake.size() < bodies.size() ? &awake : nullptr};
+  }
 
   /// Bodies, rules and frames for the present pieces.
   void form_bodies() {
@@ -105,14 +123,47 @@ struct Simulation::Impl {
   /// The laws that are left, and what is made from them.
   void form_laws() {
     laws = core::intact(model.interactions, model.links, state.links);
-    workspace = core::InteractionWorkspace(model.particles, laws);
+    form_awake();
+  }
+
+  /// What moves and acts while some bodies rest.
+  void form_awake() {
+    awake.clear();
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+      if (!state.sleep.asleep(i)) awake.push_back(i);
+    }
+    frame.resting_placed = false;
+    particles = model.particles;
+    if (awake.size() == bodies.size()) {
+      awake_laws = laws;
+    } else {
+      std::vector<std::uint8_t> resting(particles.size(), 0);
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!state.sleep.asleep(i)) continue;
+        for (const std::uint32_t p : bodies[i].particle) {
+          resting[p] = 1;
+          particles.pinned[p] |= core::kPinPosition | core::kPinOrientation;
+        }
+      }
+      awake_laws = core::without_resting(particles, laws, resting);
+    }
+    workspace = core::InteractionWorkspace(particles, awake_laws);
+    if (!scene.sleep) return;
+    integrator_workspace = core::IntegratorWorkspace();
+    tie_bodies();
   }
 
   void take(State other) {
     state = std::move(other);
-    form_laws();
     form_bodies();
+    form_laws();
     SUPPLE_EXPECTS(state.samples.size() == bodies.size());
+    SUPPLE_EXPECTS(state.sleep.island.size() == (scene.sleep ? bodies.size() : 0));
+    std::vector<std::uint32_t> pushed;  // a state may have been given an impulse
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+      if (state.sleep.asleep(i) && specific_energy(bodies[i]) > 0.0) pushed.push_back(i);
+    }
+    wake(pushed);
   }
 
   /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces.
@@ -126,6 +177,8 @@ struct Simulation::Impl {
     if (change.broke == 0 && !fades) return;
     const std::vector<Body> before = std::move(bodies);
     form_bodies();
+    if (scene.sleep) state.sleep.reset(bodies.size());
+    form_awake();
     if (bodies.size() == before.size()) return;
     inherit_apart(before);
     std::vector<implicit::SampleState> samples;
@@ -218,7 +271,7 @@ struct Simulation::Impl {
     bool any = false;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const ObjectModel& object = model.objects[bodies[i].object];
-      if (!object.holds_volume) continue;
+      if (!object.holds_volume || state.sleep.asleep(i)) continue;
       const std::vector<double> volumes = volumes_of(i);
       for (std::size_t k = 0; k < volumes.size(); ++k) {
         implicit::VolumeControl control = object.volume;
@@ -331,8 +384,8 @@ struct Simulation::Impl {
     return k;
   }
 
-  void evaluate_forces(const core::ParticleState& particles, double at, core::ForceSample& out) {
-    const std::size_t n = model.particles.size();
+  void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out) {
+    const std::size_t n = particles.size();
     out.internal.reset(n);
     out.external.reset(n);
     out.force_on_fixed.setZero();
@@ -342,14 +395,116 @@ struct Simulation::Impl {
       StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
       StageTimer timer(p, options.profile);
       const core::InteractionCounts counts = core::accumulate_interactions(
-          model.particles, particles, laws, at, executor, workspace, out.internal, out.external);
+          particles, at_state, awake_laws, at, executor, workspace, out.internal, out.external);
       p.visited += counts.pairs_visited;
       p.present += counts.pairs_present;
     }
     if (contact_on()) {
-      find_contact_surface(context(), particles, state.samples, frame, false);
+      find_contact_surface(context(), at_state, state.samples, frame, false);
       apply_reactions(context(), frame, out);
     }
+  }
+
+  /// Bodies that act on each other by laws, which makes them one island: the first of two objects with all others.
+  void tie_bodies() {
+    tied.clear();
+    for (const auto& [a, b] : core::acting_objects(laws)) {
+      std::uint32_t first = 0;
+      while (first < bodies.size() && bodies[first].object != a && bodies[first].object != b) ++first;
+      for (std::uint32_t i = first + 1; i < bodies.size(); ++i) {
+        if (bodies[i].object == a || bodies[i].object == b) tied.push_back({first, i});
+      }
+    }
+  }
+
+  /// Wakes the islands of bodies. @return those that were asleep
+  std::vector<std::uint32_t> wake(const std::vector<std::uint32_t>& which) {
+    const std::vector<std::uint32_t> rose = collision::wake(which, state.sleep);
+    if (rose.empty()) return rose;
+    form_awake();
+    state.kick.valid = false;
+    return rose;
+  }
+
+  /// Before a step: bodies under a load that changes in it are awake and not quiet.
+  void wake_loaded() {
+    if (!scene.sleep) return;
+    std::vector<std::uint32_t> loaded;
+    for (const core::ExternalLoad& load : laws.external) {
+      if (load.factor(time()) == load.factor(time() + dt())) continue;
+      for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+        if (std::binary_search(bodies[i].particle.begin(), bodies[i].particle.end(), load.particle)) loaded.push_back(i);
+      }
+    }
+    wake(loaded);
+    for (const std::uint32_t i : loaded) state.sleep.quiet_for[i] = 0.0;
+  }
+
+  /// After a step: what an awake body touches wakes. With velocity Verlet it gets the half kick that its pins took.
+  void wake_touched() {
+    if (awake.size() == bodies.size()) return;
+    std::vector<std::uint32_t> touched;
+    for (const auto& s : frame.surface.summary) {
+      if (!(s.force.norm() > 0.0)) continue;
+      for (const std::uint32_t i : {s.bodies.a, s.bodies.b}) {
+        if (state.sleep.asleep(i)) touched.push_back(i);
+      }
+    }
+    if (touched.empty()) return;
+    const core::Loads loads = state.kick.sample.internal;
+    for (const std::uint32_t i : wake(touched)) {
+      if (integrator.settings.method != core::Integrator::Symplectic) break;
+      for (const std::uint32_t p : bodies[i].particle) {
+        const Vec3 j = core::free_translation(particles.pinned[p], 0.5 * dt() * loads.force[p]);
+        const Vec3 turn = core::free_rotation(particles.pinned[p], 0.5 * dt() * loads.torque[p]);
+        state.particles.velocity[p] += j / particles.mass[p];
+        state.particles.angular_momentum[p] += turn;
+        state.ledger.pin_impulse += j;
+        state.ledger.pin_angular_impulse += state.particles.position[p].cross(j) + turn;
+      }
+    }
+  }
+
+  /// Kinetic energy over mass [J/kg].
+  [[nodiscard]] double specific_energy(const Body& body) const {
+    double energy = 0.0, mass = 0.0;
+    for (const std::uint32_t p : body.particle) {
+      const Vec3& momentum = state.particles.angular_momentum[p];
+      energy += 0.5 * particles.mass[p] * state.particles.velocity[p].squaredNorm() +
+                0.5 * momentum.dot(core::angular_velocity(particles, state.particles, p));
+      mass += particles.mass[p];
+    }
+    return energy / mass;
+  }
+
+  /// After a step: islands that have been quiet for long enough stop, and what they had is booked as held and dissipated.
+  void lay_to_sleep() {
+    if (!scene.sleep || awake.empty()) return;
+    std::vector<double> energy(bodies.size(), 0.0);
+    for (const std::uint32_t i : awake) {
+      // What still grows or shrinks does not rest.
+      energy[i] = model.objects[bodies[i].object].holds_volume ? std::numeric_limits<double>::infinity() : specific_energy(bodies[i]);
+    }
+    std::vector<collision::BodyPair> joined = tied;
+    for (const auto& s : frame.surface.summary) {
+      if (s.force.norm() > 0.0) joined.push_back(s.bodies);
+    }
+    const std::vector<std::uint32_t> slept =
+        collision::fall_asleep({scene.sleep->speed, scene.sleep->time}, dt(), energy, joined, state.sleep);
+    if (slept.empty()) return;
+    for (const std::uint32_t i : slept) {
+      for (const std::uint32_t p : bodies[i].particle) {
+        Vec3 &v = state.particles.velocity[p], &turn = state.particles.angular_momentum[p];
+        const Vec3 momentum = particles.mass[p] * v;
+        state.ledger.dissipated += 0.5 * momentum.dot(v) + 0.5 * turn.dot(core::angular_velocity(particles, state.particles, p));
+        state.ledger.pin_impulse -= momentum;
+        state.ledger.pin_angular_impulse -= state.particles.position[p].cross(momentum) + turn;
+        v.setZero();
+        turn.setZero();
+      }
+    }
+    form_awake();
+    state.kick.valid = false;
   }
 
   void step() {
@@ -361,19 +516,22 @@ struct Simulation::Impl {
       refine_step();
     }
     note_apart();
-    const core::ForceModel forces = [this](const core::ParticleState& particles, double at, core::ForceSample& out) {
-      evaluate_forces(particles, at, out);
+    wake_loaded();
+    const core::ForceModel forces = [this](const core::ParticleState& at_state, double at, core::ForceSample& out) {
+      evaluate_forces(at_state, at, out);
     };
-    {
+    if (awake.empty()) {
+      frame.surface.clear();
+    } else {
       StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
       // Timed with the force evaluation inside, whose share `Simulation::profile` takes off again.
       StageTimer timer(p, options.profile);
       const core::StepReport report =
-          core::advance(integrator.settings, model.particles, laws, forces, time(), dt(), state.particles,
+          core::advance(integrator.settings, particles, awake_laws, forces, time(), dt(), state.particles,
                         state.kick, state.ledger, executor, workspace, integrator_workspace);
       book_work(report);
-      p.visited += model.particles.size();
-      p.present += model.particles.size();
+      for (const std::uint32_t i : awake) p.visited += bodies[i].particle.size();
+      p.present += particles.size();
     }
     ++state.steps;
     ++state.substep;
@@ -386,9 +544,11 @@ struct Simulation::Impl {
       if (last_frame.record.valid) take(last_frame);
       throw_diverged(divergence, step, at);
     }
+    wake_touched();
     watch_pressing();
     update_links();
     control_volumes();
+    lay_to_sleep();
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
       ++state.frame;

@@ -80,6 +80,8 @@ void add_motion(std::vector<Option>& all) {
                          .scene = "planar: $"}, "false", "true"));
   in_scene("time_step.size", "time_step: {size: $}", "auto", "0.1 ms");
   in_scene("time_step.substeps", "time_step: {substeps: $}", "auto", "1024");
+  in_scene("sleep.speed", "sleep: {speed: $, time: 0.02}", "1e-6", "100");
+  in_scene("sleep.time", "sleep: {speed: 100, time: $}", "0.02", "10");
   in_scene("time_step.max_substeps", "time_step: {max_substeps: $}", "4096", "1");
   for (const char* method : {"rk4", "adaptive", "backward_euler", "implicit_midpoint"}) {
     in_scene("integrator.method=" + std::string(method), "integrator: {method: $}", "symplectic", method);

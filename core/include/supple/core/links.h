@@ -3,6 +3,7 @@
 /// What happened is a LinkState; `intact` gives the laws that are left, so everything else works on plain Interactions.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -84,6 +85,14 @@ LinkChange update_links(const ParticleSet& set, const ParticleState& state, cons
 
 /// The interactions without the bonds (and friction) of broken links, with the present rest data.
 [[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);
+
+/// The interactions without what acts between particles that rest alone: their bonds and friction, and geometric laws of
+/// objects all of whose particles do. Loads from outside stay. @param resting  1: rests, shape [particles]
+[[nodiscard]] Interactions without_resting(const ParticleSet& set, const Interactions& interactions,
+                                           std::span<const std::uint8_t> resting);
+
+/// Every two objects, or one with itself, between whose particles a geometric law acts.
+[[nodiscard]] std::vector<std::array<std::uint32_t, 2>> acting_objects(const Interactions& interactions);
 
 /// The piece that each particle belongs to, named by its smallest particle: shape [particles]. Objects that cannot break
 /// are one piece; the others fall into what unbroken links connect.

@@ -290,6 +290,12 @@ struct ContactDesc {
   std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
 };
 
+/// sleep: bodies that rest are not moved
+struct SleepDesc {
+  double speed = 0.01;                ///< [m/s]
+  double time = 0.5;                  ///< [s]
+};
+
 struct GroundDesc {
   double height = 0.0;                ///< [m]
   Vec3 colour = Vec3(0.80, 0.80, 0.78);
@@ -384,6 +390,7 @@ struct Scene {
   std::vector<ObstacleDesc> obstacles;  ///< sorted by name
   std::vector<PairDesc> pairs;
   ContactDesc contact;
+  std::optional<SleepDesc> sleep;     ///< absent: nothing sleeps
   CameraDesc camera;
   std::vector<CameraDesc> cameras;    ///< instead of camera: an image sequence and a film each
   LightDesc light;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "supple/collision/sleep.h"
 #include "supple/core/integrate.h"
 #include "supple/core/links.h"
 #include "supple/core/particles.h"
@@ -58,6 +59,7 @@ struct State {
   std::vector<implicit::VolumeState> volumes;  ///< by object, or by its particles or primitives where these hold theirs
   ApartPairs apart;                    ///< pieces of one object that touch each other by now
   std::vector<implicit::SampleState> samples;  ///< by body
+  collision::SleepState sleep;         ///< which bodies rest; empty where the scene has no `sleep`
   RunRecord record;
 
   [[nodiscard]] std::uint64_t hash() const;    ///< of everything but the record
