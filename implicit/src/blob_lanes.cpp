@@ -116,43 +116,6 @@ PotentialBounds Select(const BlobList& from, const std::array<float, 3>& centre,
   return {sum_of_lanes(lower) - error, high + error};
 }
 
-// With t = 1 - rho^2 the second derivatives of (1 - rho^2)^3 along unit vectors lie between -6 t^2 and
-// max(0, t (24 - 30 t)), which is largest at t = 0.4; F then lies within half of that times the squared distance to the
-// centre of what the gradient there predicts.
-PotentialBounds Expand(const BlobList& list, const std::array<float, 3>& centre, float half) {
-  const D d;
-  const V cx = hn::Set(d, centre[0]), cy = hn::Set(d, centre[1]), cz = hn::Set(d, centre[2]);
-  const V around = hn::Set(d, half), one = hn::Set(d, 1.0F), zero = hn::Zero(d);
-  alignas(64) float value[kLanes] = {}, gx[kLanes] = {}, gy[kLanes] = {}, gz[kLanes] = {}, up[kLanes] = {},
-                    down[kLanes] = {};
-  const auto add = [&](float* sums, std::size_t lane, V v) HWY_ATTR {
-    hn::Store(hn::Add(hn::Load(d, sums + lane), v), d, sums + lane);
-  };
-  for (std::size_t i = 0; i < list.count; i += kWidth) {
-    V s, x, y, z;
-    const Distances q = distances(list, i, cx, cy, cz, around, s, x, y, z);
-    const V dx = hn::MulSub(s, cx, x), dy = hn::MulSub(s, cy, y), dz = hn::MulSub(s, cz, z);
-    const V t = hn::Max(hn::NegMulAdd(dz, dz, hn::NegMulAdd(dy, dy, hn::NegMulAdd(dx, dx, one))), zero);
-    const V near = hn::Max(hn::Sub(one, q.near2), zero), far = hn::Max(hn::Sub(one, q.far2), zero);
-    const std::size_t lane = i % kLanes;
-    const V t2s = hn::Mul(hn::Mul(t, t), s), s2 = hn::Mul(s, s);
-    add(value, lane, cube(t));
-    add(gx, lane, hn::Mul(t2s, dx));
-    add(gy, lane, hn::Mul(t2s, dy));
-    add(gz, lane, hn::Mul(t2s, dz));
-    const V steep = hn::Min(hn::Max(hn::Set(d, 0.4F), far), near);
-    const V bend = hn::Mul(steep, hn::NegMulAdd(hn::Set(d, 30.0F), steep, hn::Set(d, 24.0F)));
-    add(up, lane, hn::Mul(s2, hn::Max(bend, zero)));
-    add(down, lane, hn::Mul(s2, hn::Mul(near, near)));
-  }
-  const float middle = sum_of_lanes(value);
-  const float turn = 6.0F * half * (std::abs(sum_of_lanes(gx)) + std::abs(sum_of_lanes(gy)) + std::abs(sum_of_lanes(gz)));
-  const float diagonal2 = 3.0F * half * half;
-  const float rise = 0.5F * diagonal2 * sum_of_lanes(up), fall = 3.0F * diagonal2 * sum_of_lanes(down);
-  const float error = round_off(list.count, middle + turn + rise + fall);
-  return {middle - turn - fall - error, middle + turn + rise + error};
-}
-
 std::uint64_t EvaluateTile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values) {
   const D d;
   constexpr std::size_t kPlane = std::size_t{kTile} * kTile;
@@ -440,7 +403,6 @@ namespace supple::implicit::blobs {
 
 HWY_EXPORT(Gather);
 HWY_EXPORT(Select);
-HWY_EXPORT(Expand);
 HWY_EXPORT(EvaluateTile);
 HWY_EXPORT(SolveEdges);
 HWY_EXPORT(PlaceVertices);
@@ -468,10 +430,6 @@ void gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std
 
 PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
   return HWY_DYNAMIC_DISPATCH(Select)(from, centre, half, list);
-}
-
-PotentialBounds expand(const BlobList& list, const std::array<float, 3>& centre, float half) {
-  return HWY_DYNAMIC_DISPATCH(Expand)(list, centre, half);
 }
 
 std::uint64_t evaluate_tile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values) {

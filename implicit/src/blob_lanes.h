@@ -49,9 +49,6 @@ struct PotentialBounds {
 [[nodiscard]] PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half,
                                      BlobList& list);
 
-/// Tighter bounds on the same cube: Taylor's expansion around the centre, with bounds of the second derivatives.
-[[nodiscard]] PotentialBounds expand(const BlobList& list, const std::array<float, 3>& centre, float half);
-
 /// F = sum f - iso at the kTileNodes nodes of the tile whose lowest node is `corner`; x fastest.
 /// @return bit per node: F > 0
 std::uint64_t evaluate_tile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values);

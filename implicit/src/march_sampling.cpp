@@ -270,16 +270,16 @@ class BlobSampler final : public Sampler {
         block.leaf_of[slot] = kOutside;
         if (work.block.count > 0) sample_leaf(block, slot, work);
       } else if (old_leaf_of[slot] >= 0) {
-        Leaf leaf = block.leaf[static_cast<std::size_t>(old_leaf_of[slot])];
+        block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size());
+        Leaf& leaf = work.leaves.emplace_back(block.leaf[static_cast<std::size_t>(old_leaf_of[slot])]);
         const auto from = block.values.begin() + static_cast<std::ptrdiff_t>(leaf.first_tile * kTileNodes);
         leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
         work.values.insert(work.values.end(), from,
                            from + static_cast<std::ptrdiff_t>(kTileNodes * static_cast<std::size_t>(std::popcount(leaf.active))));
-        block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size());
-        work.leaves.push_back(leaf);
       }
     }
-    block.leaf.assign(work.leaves.begin(), work.leaves.end());
+    block.leaf.resize(work.leaves.size());
+    std::copy(work.leaves.begin(), work.leaves.end(), block.leaf.begin());
     block.values.assign(work.values.begin(), work.values.end());
   }
 
@@ -291,7 +291,7 @@ class BlobSampler final : public Sampler {
       block.leaf_of[slot] = whole == Verdict::Inside ? kInside : kOutside;
       return;
     }
-    Leaf leaf;
+    Leaf& leaf = work.leaves.emplace_back();
     leaf.slot = static_cast<std::uint8_t>(slot);
     leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
     bool inside = false;
@@ -299,8 +299,7 @@ class BlobSampler final : public Sampler {
       const auto at = corner_of(tile, kTile);
       const std::array<int, 3> tile_corner{corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]};
       const auto tile_centre = centre_of(tile_corner, kTile);
-      Verdict here = verdict(blobs::select(work.leaf, tile_centre, 0.5F * kTile, work.tile));
-      if (here == Verdict::Unknown) here = verdict(blobs::expand(work.tile, tile_centre, 0.5F * kTile));
+      const Verdict here = verdict(blobs::select(work.leaf, tile_centre, 0.5F * kTile, work.tile));
       if (here != Verdict::Unknown) {
         inside = here == Verdict::Inside;
         set_tile(leaf, tile, inside ? ~std::uint64_t{0} : 0);
@@ -317,10 +316,10 @@ class BlobSampler final : public Sampler {
     }
     if (leaf.active == 0) {
       block.leaf_of[slot] = inside ? kInside : kOutside;
+      work.leaves.pop_back();
       return;
     }
-    block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size());
-    work.leaves.push_back(leaf);
+    block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size() - 1);
   }
 
   const Field::Index& index_;
