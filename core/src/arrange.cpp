@@ -109,7 +109,7 @@ void disorder(Arrangement& arrangement, double distance) {
 }
 
 Arrangement arrange_geodesic(int frequency, double radius) {
-  SUPPLE_EXPECTS(frequency >= 1 && frequency <= 31 && radius > 0.0);
+  SUPPLE_EXPECTS(frequency >= 1 && frequency <= 300 && radius > 0.0);
   const double golden = 0.5 * (1.0 + std::sqrt(5.0));
   std::vector<Vec3> corner;
   for (const double one : {1.0, -1.0}) {

@@ -59,7 +59,7 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive("arrange", d.arrange, {}, "how the particles lie; generators lie in the x-y plane");
   archive.required("count", d.count, only(between(1.0, kMostCount, kNumber), {Line, Ring, Spiral}), "how many");
   archive.required("radius", d.radius, only(above(0.0, kLength), {Ring, Geodesic}), "of the circle or sphere");
-  archive.required("frequency", d.frequency, only(between(1.0, 31.0, kNumber), {Geodesic}),
+  archive.required("frequency", d.frequency, only(between(1.0, 300.0, kNumber), {Geodesic}),
                    "parts of each edge of an icosahedron; 10 frequency^2 + 2 particles");
   archive.required("inner_radius", d.inner_radius, only(at_least(0.0, kLength), {Spiral}), "where the spiral begins");
   archive.required("outer_radius", d.outer_radius, only(above(0.0, kLength), {Spiral}), "where the spiral ends");

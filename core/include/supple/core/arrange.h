@@ -36,7 +36,7 @@ enum class NormalDirection : std::uint8_t {
 /// Moves every particle by a vector of a ball of radius `distance`, by its index alone: the same in every run.
 void disorder(Arrangement& arrangement, double distance);
 /// A closed shell: the icosahedron, each edge cut in `frequency` and its faces in triangles, projected to the sphere about
-/// the origin; 10 frequency^2 + 2 particles, normals outward, the first and the twelfth opposite. @pre frequency <= 31
+/// the origin; 10 frequency^2 + 2 particles, normals outward, the first and the twelfth opposite. @pre frequency <= 300
 [[nodiscard]] Arrangement arrange_geodesic(int frequency, double radius);
 /// One particle at the origin, normal +z.
 [[nodiscard]] Arrangement arrange_single();
