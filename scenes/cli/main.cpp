@@ -152,7 +152,7 @@ int run(const Arguments& arguments) {
 int render(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.sheet) {
-    std::printf("sheet:  %s\n", scenes::make_sheet(scene, folder_of(scene, arguments)).c_str());
+    for (const auto& sheet : scenes::make_sheets(scene, folder_of(scene, arguments))) std::printf("sheet:  %s\n", sheet.c_str());
     return 0;
   }
   tool::ProgressBar bar = make_bar(arguments);

@@ -51,14 +51,19 @@ void Reporter::operator()(const std::string& stage, int frame, double done) {
   options_.progress({stage, frame, frame_count_, elapsed, left});
 }
 
+std::vector<std::string> image_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const CameraDesc& camera : cameras_of(scene)) {
+    names.push_back(camera.name.empty() ? scene_name(scene) : scene_name(scene) + '.' + camera.name);
+  }
+  return names;
+}
+
 FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOptions& options, OutputRequest outputs)
-    : scene_(scene), options_(options), outputs_(outputs), name_(scene_name(scene)) {
+    : scene_(scene), options_(options), outputs_(outputs), name_(scene_name(scene)), image_names_(image_names(scene)) {
   for (const auto& [wanted, part] : {std::pair{outputs.images, "frames"}, {outputs.meshes, "meshes"}, {outputs.grids, "grids"},
                                      {outputs.contacts, "contacts"}, {outputs.particles, "particles"}, {outputs.samples, "samples"}}) {
     if (wanted) io::make_writable_folder(options.folder / part);
-  }
-  for (const CameraDesc& camera : cameras_of(scene)) {
-    image_names_.push_back(camera.name.empty() ? name_ : name_ + '.' + camera.name);
   }
   if (outputs_.images) {
     image_formats_ = scene.output.images ? scene.output.images->formats : ImagesDesc{}.formats;

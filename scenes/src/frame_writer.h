@@ -27,6 +27,9 @@ class Reporter {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
+/// Stems of the pictures of a scene, one a camera.
+[[nodiscard]] std::vector<std::string> image_names(const Scene& scene);
+
 class FrameWriter {
  public:
   /// Makes the folders. @throws Error{Io}

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <optional>
 
 #include "read_scene_archive.h"
@@ -117,11 +118,21 @@ bool among(const std::array<std::string_view, N>& keys, std::string_view key) {
   return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
-/// @param taken  whether a key counts, on every level
-void add_content(const Node& node, const auto& taken, Hasher& hasher) {
+/// What a scene's file names stand for. A file that cannot be read is a fault of whoever needs it.
+void add_file(const std::filesystem::path& path, Hasher& hasher) {
+  std::error_code status;
+  if (!std::filesystem::is_regular_file(path, status)) return;
+  std::ifstream file(path, std::ios::binary);
+  const std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  hasher.add(content);
+}
+
+/// @param taken   whether a key counts, on every level
+/// @param folder  where files named by keys `file` are looked for
+void add_content(const Node& node, const auto& taken, const std::filesystem::path& folder, Hasher& hasher) {
   hasher.add(static_cast<std::uint64_t>(node.kind));
   hasher.add(node.text);
-  for (const Node* item : node.items) add_content(*item, taken, hasher);
+  for (const Node* item : node.items) add_content(*item, taken, folder, hasher);
   std::vector<const Node::Entry*> entries;
   for (const Node::Entry& entry : node.entries) {
     if (taken(entry.key)) entries.push_back(&entry);
@@ -129,19 +140,20 @@ void add_content(const Node& node, const auto& taken, Hasher& hasher) {
   std::sort(entries.begin(), entries.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
   for (const Node::Entry* entry : entries) {
     hasher.add(entry->key);
-    add_content(*entry->value, taken, hasher);
+    add_content(*entry->value, taken, folder, hasher);
+    if (entry->key == "file" && entry->value->kind == Node::Kind::Scalar) add_file(folder / entry->value->text, hasher);
   }
 }
 
 /// Of everything that decides the motion, whatever the order of the keys.
-std::uint64_t content_hash(const Node& root) {
+std::uint64_t content_hash(const Node& root, const std::filesystem::path& folder) {
   Hasher hasher;
-  add_content(root, [](std::string_view key) { return !among(kLooks, key); }, hasher);
+  add_content(root, [](std::string_view key) { return !among(kLooks, key); }, folder, hasher);
   return hasher.value();
 }
 
 /// Of everything that decides a picture of a given state.
-std::uint64_t picture_hash(const Node& root) {
+std::uint64_t picture_hash(const Node& root, const std::filesystem::path& folder) {
   const auto all = [](std::string_view /*key*/) { return true; };
   Hasher hasher;
   std::vector<const Node::Entry*> seen;
@@ -155,7 +167,7 @@ std::uint64_t picture_hash(const Node& root) {
   std::sort(seen.begin(), seen.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
   for (const Node::Entry* entry : seen) {
     hasher.add(entry->key);
-    add_content(*entry->value, all, hasher);
+    add_content(*entry->value, all, folder, hasher);
   }
   return hasher.value();
 }
@@ -204,8 +216,8 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   std::sort(scene.objects.begin(), scene.objects.end(), by_name);
   std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
-  scene.content_hash = content_hash(*root);
-  scene.picture_hash = picture_hash(*root);
+  scene.content_hash = content_hash(*root, folder);
+  scene.picture_hash = picture_hash(*root, folder);
   return scene;
 }
 

@@ -287,18 +287,22 @@ RunResult render_run(const Scene& scene, const RunOptions& options) {
   return replay(scene, options, outputs, "render.json");
 }
 
-fs::path make_sheet(const Scene& scene, const fs::path& folder) {
-  const std::string name = scene_name(scene);
-  const auto last = last_saved_frame(folder, name, scene.frame_count());
-  const fs::path sheet = last ? write_contact_sheet(folder, name, *last) : fs::path();
-  if (sheet.empty()) {
+std::vector<fs::path> make_sheets(const Scene& scene, const fs::path& folder) {
+  std::vector<fs::path> sheets;
+  if (const auto last = last_saved_frame(folder, scene_name(scene), scene.frame_count())) {
+    for (const std::string& name : image_names(scene)) {
+      const fs::path sheet = write_contact_sheet(folder, name, *last);
+      if (!sheet.empty()) sheets.push_back(sheet);
+    }
+  }
+  if (sheets.empty()) {
     throw Error(ErrorKind::Io, Fault{.place = (folder / "frames").string(),
                                      .key = {},
                                      .expected = "expected frames of a run",
                                      .found = "none",
                                      .hint = "draw them first: supple render SCENE --out FOLDER"});
   }
-  return sheet;
+  return sheets;
 }
 
 RunResult export_run(const Scene& scene, const RunOptions& options) {

@@ -198,6 +198,8 @@ output: {images: {size: [96, 64], samples: 1}, film: true}
   for (const char* file : {"frames/looks.front.0001.png", "frames/looks.above.0003.png", "looks.front.mp4", "looks.above.mp4",
                            "looks.front_sheet.png", "looks.above_sheet.png"})
     EXPECT_TRUE(fs::exists(folder_ / file)) << file;
+  const std::vector<fs::path> sheets = make_sheets(scene, folder_);
+  EXPECT_EQ(sheets, (std::vector<fs::path>{folder_ / "looks.front_sheet.png", folder_ / "looks.above_sheet.png"}));
   EXPECT_FALSE(fs::exists(folder_ / "frames/looks.0001.png"));
   EXPECT_NE(render::read_png(folder_ / "frames/looks.front.0001.png").pixels,
             render::read_png(folder_ / "frames/looks.above.0001.png").pixels);

@@ -267,5 +267,30 @@ TEST(SceneReference, SchemaSaysWhatIsRequiredAndForWhich) {
   EXPECT_TRUE(ring);
 }
 
+TEST(SceneHashes, KnowWhatIsInTheFilesThatAreNamed) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "scene_hashes";
+  std::filesystem::create_directories(folder);
+  const auto read = [&](const std::string& points, const std::string& picture) {
+    std::ofstream(folder / "points.csv") << points;
+    std::ofstream(folder / "skin.png") << picture;
+    return parse_scene(R"(
+schema: 1
+duration: 1 s
+objects:
+  - name: cloud
+    particles: {arrange: file, file: points.csv}
+    look: {texture: {pattern: picture, file: skin.png}}
+)", "cloud.yaml", folder);
+  };
+  const Scene scene = read("x,y,z\n0,0,0\n", "red");
+  const Scene moved = read("x,y,z\n0,0,1\n", "red");
+  const Scene painted = read("x,y,z\n0,0,0\n", "blue");
+  EXPECT_EQ(read("x,y,z\n0,0,0\n", "red").content_hash, scene.content_hash);
+  EXPECT_NE(moved.content_hash, scene.content_hash);
+  EXPECT_EQ(painted.content_hash, scene.content_hash);
+  EXPECT_NE(painted.picture_hash, scene.picture_hash);
+  std::filesystem::remove_all(folder);
+}
+
 }  // namespace
 }  // namespace supple::scenes

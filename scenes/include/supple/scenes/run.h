@@ -74,8 +74,9 @@ struct RunResult {
 /// Pictures that are there and show the same scene and state are kept, unless options.overwrite. Leaves render.json.
 [[nodiscard]] RunResult render_run(const Scene& scene, const RunOptions& options);
 
-/// NAME_sheet.png of the frames that a run has: twelve spread over all, 4 a row. @throws Error{Io} when there is none
-std::filesystem::path make_sheet(const Scene& scene, const std::filesystem::path& folder);
+/// NAME_sheet.png of the frames that a run has, one a camera: twelve spread over all, 4 a row.
+/// @throws Error{Io} when there are none
+std::vector<std::filesystem::path> make_sheets(const Scene& scene, const std::filesystem::path& folder);
 
 /// Writes the files that the scene's `output` asks for, images and film left out, from the saved states of a run. Leaves
 /// export.json as its report. @throws Error{Usage} when no file is asked for

@@ -400,8 +400,8 @@ struct Scene {
   std::optional<GroundDesc> ground;
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key
-  std::uint64_t content_hash = 0;     ///< of all keys but those of looks, output and duration; not a key
-  std::uint64_t picture_hash = 0;     ///< of all keys that decide a picture of a state; not a key
+  std::uint64_t content_hash = 0;     ///< of all keys but those of looks, output and duration, and of files they name; not a key
+  std::uint64_t picture_hash = 0;     ///< of all keys that decide a picture of a state, and of files they name; not a key
 
   /// Frame n shows t = (n - 1) / frame_rate; frame 1 is the initial state.
   [[nodiscard]] int frame_count() const;
