@@ -208,7 +208,7 @@ TEST(GridUpdater, HasTheTreeOfAWholeGridWhateverMoved) {
     int kept = 0;
     for (int step = 0; step < 8; ++step) {
       if (step % 4 != 3) {  // one part moves, or a kernel grows, or nothing happens
-        body.parts[random.below(60)].position += random.in_box(0.2);
+        body.parts[random.below(60)].position += random.in_box(step % 2 == 0 ? 0.2 : 1.5);
       } else if (step == 7) {
         body.skeleton.primitive[3].kernel = Kernel::wyvill(0.9 * body.skeleton.primitive[3].kernel.radius);
       }
