@@ -169,7 +169,8 @@ double friction_mollifier(double speed, double regularisation) noexcept {
 
 ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
                      const ReactionSettings& settings, std::span<PartLoads> loads,
-                     std::vector<Vec3>* traction_force, std::span<PartLoads> dissipative_loads) {
+                     std::vector<Vec3>* traction_force, std::span<PartLoads> dissipative_loads,
+                     std::vector<double>* pair_power) {
   SUPPLE_EXPECTS(loads.size() == bodies.size());
   SUPPLE_EXPECTS(dissipative_loads.empty() || dissipative_loads.size() == bodies.size());
   SUPPLE_EXPECTS(settings.friction_speed > 0.0);
@@ -177,6 +178,7 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
   thread_local std::vector<double> load;
   ReactionReport report;
   if (traction_force != nullptr) traction_force->assign(surface.summary.size(), Vec3::Zero());
+  if (pair_power != nullptr) pair_power->assign(surface.summary.size(), 0.0);
   std::size_t point_begin = 0, volume_begin = 0;
   for (std::uint32_t k = 0; k < surface.summary.size(); ++k) {
     const ContactSurface::Summary& summary = surface.summary[k];
@@ -222,6 +224,7 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
     for (const int s : {0, 1}) sides[s].move_to(loads[body_of[s]]);
     const PairMaterial material = material_of(bodies, rules, pair);
     Vec3 dissipative = Vec3::Zero(), dissipative_twist = Vec3::Zero();
+    const double power_before = report.dissipated_power;
     if (material.friction > 0.0 || material.dissipation > 0.0) {
       for (std::size_t i = 0; i < n; ++i) {
         const Vec3 v = sides[0].velocity(i, x[i]) - sides[1].velocity(i, x[i]);
@@ -247,6 +250,7 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
         sides[s].move_to(loads[body_of[s]]);
       }
     }
+    if (pair_power != nullptr) (*pair_power)[k] = report.dissipated_power - power_before;
     if (traction_force != nullptr) (*traction_force)[k] = dissipative - push;
     report.energy += summary.energy;
   }

@@ -622,7 +622,7 @@ template <class Archive>
 void fields(Archive& archive, OutputDesc& d) {
   archive("images", d.images, {}, "a PNG a frame");
   archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
-  archive("contacts", d.contacts, {}, "points of the contact surfaces a frame; vtk: .vtp files and a .pvd");
+  archive("contacts", d.contacts, {}, "points of the contact surfaces, and of every pair that touches force, area, energy and dissipation, a frame; vtk: .vtp files and a .pvd each");
   archive("particles", d.particles, {}, "particles and bonds a frame; vtk: .vtp files and a .pvd");
   archive("samples", d.samples, {}, "points spread evenly over the surfaces a frame, which ride on their particles: id, owner, normal and area; as if nothing touched; vtk: .vtp files and a .pvd");
   archive("mesh", d.mesh, {}, "surfaces; ply, obj: a file an object and frame; usd: one file with all frames");
@@ -639,17 +639,18 @@ void fields(Archive& archive, OutputDesc& d) {
 template <class Archive>
 void fields(Archive& archive, ObstacleDesc& d) {
   using enum ObstacleName;
-  const auto only = [&d](const Rule& rule, ObstacleName shape) { return rule.only("shape", d.shape, {shape}); };
+  const auto only = [&d](const Rule& rule, std::initializer_list<ObstacleName> shapes) { return rule.only("shape", d.shape, shapes); };
   archive.required("name", d.name, identifier(), "unique, also among the objects");
-  archive("shape", d.shape, {}, "plane, box, or heights over x and y");
-  archive("at", d.at, any(kLength), "a point of the plane, the middle of the box, added to the heights");
-  archive("normal", d.normal, only(direction(), Plane), "out of the solid");
-  archive("extent", d.extent, only(above(0.0, kLength), Plane), "half the edge of the square that is drawn");
-  archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength), Box), "along its x, y, z");
-  archive("rounding", d.rounding, only(at_least(0.0, kLength), Box), "radius of its edges in contact");
-  archive("turn_axis", d.turn_axis, only(direction(), Box), "with turn_deg");
-  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), Box), "rotation");
-  archive.required("file", d.file, only({}, Heights), "CSV of x, y, z [m] on a regular grid, relative to the scene's folder");
+  archive("shape", d.shape, {}, "plane, box, heights over x and y, or a closed mesh");
+  archive("at", d.at, any(kLength), "a point of the plane, the middle of the box, added to heights and meshes");
+  archive("normal", d.normal, only(direction(), {Plane}), "out of the solid");
+  archive("extent", d.extent, only(above(0.0, kLength), {Plane}), "half the edge of the square that is drawn");
+  archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength), {Box}), "along its x, y, z");
+  archive("rounding", d.rounding, only(at_least(0.0, kLength), {Box}), "radius of its edges in contact");
+  archive("turn_axis", d.turn_axis, only(direction(), {Box, ObstacleName::Mesh}), "with turn_deg");
+  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh}), "rotation");
+  archive.required("file", d.file, only({}, {Heights, ObstacleName::Mesh}), "CSV of x, y, z [m] on a regular grid; a mesh as OBJ or PLY [m]; relative to the scene's folder");
+  archive("voxel", d.voxel, only(above(0.0, kLength).or_auto(), {ObstacleName::Mesh}), "cell of the lattice that keeps its distances, about which edges are rounded; auto: a 64th of its longest side");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive("visible", d.visible, {}, "drawn");

@@ -46,7 +46,7 @@ template <> struct EnumNames<ShapeName> {
                                                           "arc",       "curve",    "superquadric", "directed"};
 };
 template <> struct EnumNames<ObstacleName> {
-  static constexpr std::array<std::string_view, 3> names{"plane", "box", "heights"};
+  static constexpr std::array<std::string_view, 4> names{"plane", "box", "heights", "mesh"};
 };
 template <> struct EnumNames<KernelName> {
   static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",

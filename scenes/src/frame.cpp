@@ -349,6 +349,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   const Model& model = context.model;
   frame.reaction = {};
   frame.traction_force.clear();
+  frame.pair_power.clear();
   if (context.skip && frame.surface.summary.empty()) return;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
   StageTimer timer(profile, context.every_call);
@@ -359,7 +360,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
     }
   }
   frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, frame.loads,
-                                    &frame.traction_force, frame.dissipative);
+                                    &frame.traction_force, frame.dissipative, &frame.pair_power);
   if (frame.reaction.dissipated_power != 0.0) out.dissipative.reset(model.particles.size());
   for (const std::uint32_t i : frame.pressed) {
     if (i >= context.bodies.size()) {

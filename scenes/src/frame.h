@@ -49,6 +49,7 @@ struct Frame {
   std::vector<std::uint32_t> pressed;         ///< contact bodies in `surface`, ascending: the only ones with loads
   collision::ReactionReport reaction;
   std::vector<Vec3> traction_force;           ///< by pair of `surface`
+  std::vector<double> pair_power;             ///< that damping and friction take [W], by pair of `surface`
 
   // bodies that rest, placed and boxed once
   std::vector<std::uint32_t> resting;         ///< ascending

@@ -2,6 +2,8 @@
 
 #include <span>
 
+#include "supple/scenes/contact_report.h"
+
 namespace supple::scenes {
 namespace {
 
@@ -50,6 +52,35 @@ io::PointSet contact_points(Simulation& simulation) {
   std::vector<Vec3> force(n);
   for (std::size_t s = 0; s < n; ++s) force[s] = -surface.pressure[s] * surface.area[s] * surface.normal[s];
   set(points.add("force_a_n", {"force_ax_n", "force_ay_n", "force_az_n"}), force);
+  return points;
+}
+
+io::PointSet contact_pairs(Simulation& simulation) {
+  const ContactReport report = report_contacts(simulation);
+  io::PointSet points;
+  for (const ContactReport::Pair& pair : report.pairs) points.position.push_back(pair.centre_of_pressure);
+  const auto add = [&](const char* name, const auto& value) {
+    std::vector<double>& values = points.add(name);
+    for (std::size_t k = 0; k < values.size(); ++k) values[k] = static_cast<double>(value(report.pairs[k]));
+  };
+  using Pair = ContactReport::Pair;
+  add("body_a", [](const Pair& p) { return p.bodies.a; });
+  add("body_b", [](const Pair& p) { return p.bodies.b; });
+  std::vector<Vec3> force, elastic;
+  for (const Pair& pair : report.pairs) {
+    force.push_back(pair.force);
+    elastic.push_back(pair.elastic_force);
+  }
+  set(points.add("force_a_n", {"force_ax_n", "force_ay_n", "force_az_n"}), force);
+  set(points.add("elastic_force_a_n", {"elastic_force_ax_n", "elastic_force_ay_n", "elastic_force_az_n"}), elastic);
+  add("area_m2", [](const Pair& p) { return p.area; });
+  add("largest_pressure_pa", [](const Pair& p) { return p.largest_pressure; });
+  add("largest_overlap_m", [](const Pair& p) { return p.largest_overlap; });
+  add("energy_j", [](const Pair& p) { return p.energy; });
+  add("dissipated_power_w", [](const Pair& p) { return p.dissipated_power; });
+  add("dissipated_work_j", [&](const Pair&) { return report.dissipated_work; });
+  add("error_estimate", [](const Pair& p) { return p.error_estimate; });
+  add("points", [](const Pair& p) { return p.last - p.first; });
   return points;
 }
 

@@ -11,5 +11,7 @@ namespace supple::scenes {
 
 /// Every quadrature point of the contact surfaces with bodies, normal, area, pressure and the elastic force on body A.
 [[nodiscard]] io::PointSet contact_points(Simulation& simulation);
+/// One point a pair that touches, at its centre of pressure.
+[[nodiscard]] io::PointSet contact_pairs(Simulation& simulation);
 
 }  // namespace supple::scenes

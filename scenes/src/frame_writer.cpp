@@ -204,20 +204,23 @@ void FrameWriter::add_to_animation(const Simulation& simulation, const std::vect
 void FrameWriter::write_tables(Simulation& simulation) {
   const int frame = simulation.frame();
   const OutputDesc& output = scene_.output;
-  if (outputs_.contacts) write_points(options_.folder / "contacts", name_, frame, output.contacts, contact_points(simulation));
+  if (outputs_.contacts) {
+    write_points(options_.folder / "contacts", name_, frame, output.contacts, contact_points(simulation));
+    write_points(options_.folder / "contacts", name_ + ".pairs", frame, output.contacts, contact_pairs(simulation));
+  }
   if (outputs_.particles) {
     write_points(options_.folder / "particles", name_, frame, output.particles, particle_points(simulation));
   }
   if (outputs_.samples) write_points(options_.folder / "samples", name_, frame, output.samples, samples_->points());
 }
 
-void FrameWriter::write_time_list(const char* part, int last) {
+void FrameWriter::write_time_list(const std::string& part, int last, const std::string& what) {
   std::vector<io::TimedFile> files;
   for (int frame = 1; frame <= last; ++frame) {
-    const fs::path file = fs::path(part) / numbered(name_, frame, ".vtp");
+    const fs::path file = fs::path(part) / numbered(what.empty() ? name_ : name_ + '.' + what, frame, ".vtp");
     if (fs::exists(options_.folder / file)) files.push_back({(frame - 1) / scene_.frame_rate, file});
   }
-  io::write_pvd(options_.folder / (name_ + '_' + part + ".pvd"), files);
+  io::write_pvd(options_.folder / (name_ + '_' + (what.empty() ? part : what) + ".pvd"), files);
 }
 
 fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last) {
@@ -227,7 +230,10 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
     animation_->finish();
   }
   if (outputs_.particles && has(scene_.output.particles, TableName::Vtk)) write_time_list("particles", last);
-  if (outputs_.contacts && has(scene_.output.contacts, TableName::Vtk)) write_time_list("contacts", last);
+  if (outputs_.contacts && has(scene_.output.contacts, TableName::Vtk)) {
+    write_time_list("contacts", last);
+    write_time_list("contacts", last, "pairs");
+  }
   if (outputs_.samples && has(scene_.output.samples, TableName::Vtk)) write_time_list("samples", last);
   if (!outputs_.images) return {};
   report("film", last, 0.99);

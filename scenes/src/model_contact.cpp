@@ -6,6 +6,7 @@
 
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
+#include "supple/core/io/read_mesh.h"
 #include "supple/core/math.h"
 
 namespace supple::scenes {
@@ -87,6 +88,18 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
   return {Vec3(points[0].x(), points[0].y(), 0.0) + d.at, spacing, columns, rows, heights, d.slope};
 }
 
+/// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
+void add_mesh(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults, FixedBody& body) try {
+  Mesh mesh = io::read_mesh(scene.source.parent_path() / d.file);
+  const Quat turn(Eigen::AngleAxisd(d.turn, d.turn_axis));
+  for (Vec3& x : mesh.position) x = d.at + turn * x;
+  body.solid = implicit::MeshSolid(mesh, {.voxel = d.voxel.value_or(0.0), .slope = d.slope});
+} catch (const Error& error) {
+  const Fault& fault = error.faults().front();
+  if (error.kind() != ErrorKind::Scene || !fault.place.empty()) throw;
+  faults.add(key + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
+}
+
 void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
   if (scene.ground && scene.ground->collides) {
     const GroundDesc& d = *scene.ground;
@@ -101,6 +114,8 @@ void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
       body.solid = implicit::SolidBox(pose, d.half_sizes, d.rounding, d.slope);
     } else if (d.shape == ObstacleName::Heights) {
       body.solid = height_field(scene, d, "obstacles." + d.name, faults);
+    } else if (d.shape == ObstacleName::Mesh) {
+      add_mesh(scene, d, "obstacles." + d.name, faults, body);
     }
     model.fixed.push_back(std::move(body));
   }

@@ -48,7 +48,7 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string file = entry.path().filename().string();
     if (!file.starts_with(name + '.') && !file.starts_with(name + '_')) continue;
-    for (const char* end : {".mp4", "_sheet.png", ".usda", "_particles.pvd", "_contacts.pvd", "_samples.pvd"}) {
+    for (const char* end : {".mp4", "_sheet.png", ".usda", "_particles.pvd", "_contacts.pvd", "_pairs.pvd", "_samples.pvd"}) {
       if (file.ends_with(end)) fs::remove(entry.path(), ignored);
     }
   }

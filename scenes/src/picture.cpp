@@ -16,6 +16,7 @@ Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
   constexpr int kFiner = 4;  // facets along a cell of the heights
   if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) return box->mesh();
   if (const auto* heights = std::get_if<implicit::HeightField>(&body.solid)) return heights->mesh(kFiner);
+  if (const auto* solid = std::get_if<implicit::MeshSolid>(&body.solid)) return solid->mesh();
   const Vec3 u = d.extent * d.normal.unitOrthogonal(), v = d.normal.cross(u);
   Mesh mesh;
   add_quadrangle(mesh, d.at - u - v, d.at + u - v, d.at + u + v, d.at - u + v);

@@ -746,6 +746,11 @@ const std::vector<Vec3>& Simulation::contact_forces() {
   return impl_->pulled.traction_force;
 }
 
+const std::vector<double>& Simulation::contact_powers() {
+  impl_->pull_contacts();
+  return impl_->pulled.pair_power;
+}
+
 const std::vector<implicit::Field>& Simulation::fields() {
   impl_->pull_fields();
   return impl_->pulled.field;

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <numbers>
 
+#include "model_contact.h"
+#include "supple/scenes/contact_report.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
 
@@ -74,6 +76,73 @@ TEST(Bounce, ReboundsAsAsked) {
     ASSERT_EQ(e.size(), 1u);
     EXPECT_NEAR(e[0], asked, 0.01);
   }
+}
+
+TEST(Bounce, LosesSpeedFromBounceToBounceByTheClosedForm) {
+  // A stiff ball, whose weight does nothing while it touches: what is left of a speed v is the e with dissipation_for(e, v) = d.
+  Simulation simulation = library("contacts/bounces");
+  const double d = 0.0842;
+  const auto left = [d](double v) {
+    double low = 0.05, high = 1.0;
+    for (int i = 0; i < 60; ++i) {
+      const double e = 0.5 * (low + high);
+      (dissipation_for(e, v) > d ? low : high) = e;
+    }
+    return 0.5 * (low + high);
+  };
+  double down = 0.0;
+  bool below = false;
+  std::vector<double> found, expected;
+  while (found.size() < 4 && simulation.time() < 2.9) {
+    simulation.step();
+    const double z = simulation.state().particles.position[0].z(), v = simulation.state().particles.velocity[0].z();
+    const double speed = std::sqrt(std::max(0.0, v * v + 2.0 * 9.81 * (z - 0.1)));  // where the ball meets the floor
+    if (z > 0.1 && v < 0.0) down = speed;
+    if (z <= 0.1) below = true;
+    if (z > 0.1 && v > 0.0 && below) {
+      found.push_back(speed);
+      expected.push_back(left(down) * down);
+      below = false;
+    }
+  }
+  ASSERT_EQ(found.size(), 4u);
+  EXPECT_NEAR(found[0] / std::sqrt(2.0 * 9.81), 0.8, 0.02);  // as the scene says
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(found[k], expected[k], 0.005 * expected[k]);
+}
+
+TEST(Contacts, AreReportedByOneCall) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+ground: {height: 0, modulus: 1e12, friction: 0.5}
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0, 0, 0.09], mass: 0.2, velocity: [1, 0, -0.5]}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 2e4, friction: 0.5, dissipation: 0.4}
+)");
+  const ContactReport report = report_contacts(simulation);
+  ASSERT_EQ(report.pairs.size(), 1u);
+  const ContactReport::Pair& pair = report.pairs[0];
+  EXPECT_EQ(pair.a, "ball");
+  EXPECT_EQ(pair.b, "ground");
+  EXPECT_EQ(pair.last - pair.first, report.points.point.size());
+  double area = 0.0;
+  for (std::size_t i = pair.first; i < pair.last; ++i) area += report.points.area[i];
+  EXPECT_NEAR(pair.area, area, 1e-12 * area);
+  // One moving body, sliding without spin on a plane so stiff that the contact is flat: damping adds d times the approach of 0.5 m/s to the pressure, and friction
+  // is mu times that; their power is what acts against the velocity.
+  EXPECT_NEAR(pair.force.z(), pair.elastic_force.z() * (1.0 + 0.4 * 0.5), 1e-5 * pair.force.z());
+  EXPECT_NEAR(pair.force.x(), -0.5 * pair.force.z(), 1e-5 * pair.force.z());
+  const Vec3 velocity(1, 0, -0.5);
+  EXPECT_NEAR(pair.dissipated_power, -(pair.force - pair.elastic_force).dot(velocity), 1e-5 * pair.dissipated_power);
+  EXPECT_EQ(report.dissipated_power, pair.dissipated_power);
+  EXPECT_EQ(report.energy, pair.energy);
+  EXPECT_GT(report.energy, 0.0);
+  EXPECT_LE((report.loads.force[0] - pair.force).norm(), 1e-12 * pair.force.norm());
+  EXPECT_EQ(report.dissipated_work, 0.0);
+  simulation.step();
+  EXPECT_GT(report_contacts(simulation).dissipated_work, 0.0);
 }
 
 TEST(Bounce, RestsAtTheDepthThatCarriesTheWeight) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
@@ -62,6 +63,117 @@ TEST(Obstacles, CarryABallAsTheGroundDoes) {
               on_ground, 1e-7);
   EXPECT_NEAR(rest_height(make(ball_over("obstacles: [{name: floor, shape: heights, file: flat.csv, modulus: 1e6}]"), folder)),
               on_ground, 1e-7);
+}
+
+/// A cuboid of half sizes (2, 2, 0.5) with its upper face at z = 0, as squares; `open` leaves one side out.
+void write_slab(const fs::path& file, bool open) {
+  std::ofstream out(file);
+  for (const double z : {-1.0, 0.0}) {
+    for (const double y : {-2.0, 2.0}) {
+      for (const double x : {-2.0, 2.0}) out << "v " << x << ' ' << y << ' ' << z << '\n';
+    }
+  }
+  out << "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\n";
+  if (!open) out << "f 2 4 8 6\n";
+}
+
+TEST(Obstacles, OfMeshesCarryABallAsTheGroundDoes) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  write_slab(folder / "slab.obj", false);
+  const double on_ground = rest_height(make(ball_over("ground: {height: 0, modulus: 1e6}")));
+  // Beside a flat face the spline is exact; distances are kept in single precision.
+  EXPECT_NEAR(rest_height(make(ball_over("obstacles: [{name: floor, shape: mesh, file: slab.obj, modulus: 1e6}]"), folder)),
+              on_ground, 1e-6);
+  // Turned about x by a quarter, the face at y = 2 is up.
+  EXPECT_NEAR(rest_height(make(ball_over("obstacles: [{name: floor, shape: mesh, file: slab.obj, voxel: 0.05, turn_axis: [1, 0, 0], "
+                                         "turn_deg: 90, at: [0, -0.5, -2], modulus: 1e6}]"),
+                               folder)),
+              on_ground, 1e-6);
+}
+
+TEST(Obstacles, OfMeshesPressAsTheBallTheyShowWithFinerVoxels) {
+  // An octahedron with faces cut finely, on a sphere of 0.3 m; pressures rise by the same 1e5 Pa/m in both balls.
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  constexpr int kCuts = 48;
+  {
+    std::ofstream out(folder / "sphere.obj");
+    int vertices = 0;
+    std::string faces;
+    for (int octant = 0; octant < 8; ++octant) {
+      const Vec3 side((octant & 1) != 0 ? -0.3 : 0.3, (octant & 2) != 0 ? -0.3 : 0.3, (octant & 4) != 0 ? -0.3 : 0.3);
+      const bool mirrored = side.prod() < 0.0;
+      const auto at = [&](int i, int j) { return vertices + 1 + j * (kCuts + 1) - j * (j - 1) / 2 + i; };
+      for (int j = 0; j <= kCuts; ++j) {
+        for (int i = 0; i + j <= kCuts; ++i) {
+          const auto face = [&](int a, int b, int c) {
+            faces += "f " + std::to_string(a) + ' ' + std::to_string(mirrored ? c : b) + ' ' + std::to_string(mirrored ? b : c) + '\n';
+          };
+          if (i + j < kCuts) face(at(i, j), at(i + 1, j), at(i, j + 1));
+          if (i + j < kCuts - 1) face(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+          const Vec3 x = Vec3(i, j, kCuts - i - j).normalized().cwiseProduct(side);
+          out.precision(17);
+          out << "v " << x.x() << ' ' << x.y() << ' ' << x.z() << '\n';
+        }
+      }
+      vertices += (kCuts + 1) * (kCuts + 2) / 2;
+    }
+    out << faces;
+  }
+  // Closed form: the circle where both are at pressure p, summed over p by Simpson's rule.
+  const double rise = 1e5, radius = 0.1, other = 0.3, distance = 0.37;
+  const double most = (radius + other - distance) / (2.0 / rise);
+  const auto circle = [&](double p) {
+    const double a = radius - p / rise, b = other - p / rise, z = (distance * distance + a * a - b * b) / (2.0 * distance);
+    return std::numbers::pi * (a * a - z * z);
+  };
+  double exact = 0.0;
+  for (int k = 0; k < 100; ++k) {
+    const double p = most * k / 100.0, h = most / 100.0;
+    exact += h / 6.0 * (circle(p) + 4.0 * circle(p + 0.5 * h) + circle(p + h));
+  }
+  double error[2];
+  for (const int finer : {0, 1}) {
+    Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+obstacles: [{name: ball, shape: mesh, file: sphere.obj, modulus: 2e4, slope: 5, voxel: )" + std::to_string(0.3 / (8 << finer)) + R"(}]
+objects:
+  - name: drop
+    particles: {arrange: single, at: [0, 0, 0.37], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 2e4}
+)", folder);
+    ASSERT_EQ(simulation.contacts().summary.size(), 1u);
+    error[finer] = 1.0 - simulation.contacts().summary[0].force.z() / exact;
+  }
+  // The surface lies h^2 / 3 R deeper, so about twice that of the depth, 0.03 m, is missing, and a quarter with half the voxel.
+  EXPECT_NEAR(error[0], 2.0 * 0.0375 * 0.0375 / 0.9 / 0.03, 0.3 * error[0]);
+  EXPECT_NEAR(error[0] / error[1], 4.0, 0.6);
+}
+
+TEST(Obstacles, RefuseMeshesThatAreOpenOrTooFine) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  write_slab(folder / "open.obj", true);
+  write_slab(folder / "slab.obj", false);
+  const auto message = [&](const std::string& keys) -> std::string {
+    try {
+      make(ball_over("obstacles: [{name: floor, shape: mesh, " + keys + "}]"), folder);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no fault";
+  };
+  EXPECT_NE(message("file: open.obj").find("obstacles.floor.file: expected a closed surface, every edge between two triangles, found an edge "
+                                           "with another number of them"),
+            std::string::npos)
+      << message("file: open.obj");
+  EXPECT_NE(message("file: slab.obj, voxel: 1 mm").find("obstacles.floor.voxel: expected at most 64000000 cells around the mesh, found "),
+            std::string::npos)
+      << message("file: slab.obj, voxel: 1 mm");
+  EXPECT_NE(message("file: absent.obj").find("absent.obj"), std::string::npos);
 }
 
 TEST(Obstacles, RefuseHeightsThatAreNoGrid) {

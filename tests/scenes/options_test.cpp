@@ -392,6 +392,8 @@ void add_contact(std::vector<Option>& all) {
   obstacle("turn_axis", "shape: box, at: [0, 0, -0.2], half_sizes: [0.3, 0.3, 0.1], turn_deg: 10, turn_axis: $", "[0, 0, 1]", "[0, 1, 0]");
   obstacle("turn_deg", "shape: box, at: [0, 0, -0.2], half_sizes: [0.3, 0.3, 0.1], turn_axis: [0, 1, 0], turn_deg: $", "0", "10");
   obstacle("file", "shape: heights, at: [0, 0, -0.12], file: $", "heights.csv", "more_heights.csv");
+  obstacle("shape=mesh", "at: [0, 0, -0.2], $", "shape: box, half_sizes: [0.5, 0.5, 0.1]", "shape: mesh, file: block.obj");
+  obstacle("voxel", "at: [0, 0, -0.2], shape: mesh, file: block.obj, voxel: $", "0.05", "0.04");
   obstacle("slope", "shape: plane, at: [0, 0, -0.12], slope: $", "1", "2");
   obstacle("friction", "shape: plane, at: [0, 0, -0.12], friction: $", "0.5", "0.1");
   all.push_back(differs("obstacles.modulus", In::State,
@@ -571,6 +573,8 @@ class Options : public testing::Test {
         }
       }
       write(more ? "more_heights.csv" : "heights.csv", heights);
+      write("block.obj", "v -0.5 -0.5 -0.1\nv 0.5 -0.5 -0.1\nv -0.5 0.5 -0.1\nv 0.5 0.5 -0.1\nv -0.5 -0.5 0.1\nv 0.5 -0.5 0.1\n"
+                         "v -0.5 0.5 0.1\nv 0.5 0.5 0.1\nf 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n");
       render::Image picture{.width = 4, .height = 4, .pixels = std::vector<std::uint8_t>(48)};
       for (std::size_t k = 0; k < picture.pixels.size(); ++k) picture.pixels[k] = static_cast<std::uint8_t>((more ? 90 : 40) * (k % 3));
       render::write_png(folder() / (more ? "more_texture.png" : "texture.png"), picture);

@@ -167,7 +167,7 @@ TEST_F(Run, ExportsFromSavedStatesWhatTheRunWouldHaveWritten) {
   ASSERT_EQ(run_scene(quiet, other).outcome, "done");
   const auto before = bytes_of(other.folder / "result.json");
   EXPECT_EQ(export_run(scene_, other).outcome, "done");
-  for (const char* file : {"drops.usda", "drops_particles.pvd", "drops_contacts.pvd", "meshes/drops.left.0003.obj",
+  for (const char* file : {"drops.usda", "drops_particles.pvd", "drops_contacts.pvd", "drops_pairs.pvd", "contacts/drops.pairs.0003.vtp", "contacts/drops.pairs.0003.csv", "meshes/drops.left.0003.obj",
                            "meshes/drops.right.0003.ply", "particles/drops.0003.vtp", "contacts/drops.0003.vtp",
                            "contacts/drops.0003.csv"}) {
     EXPECT_EQ(bytes_of(folder_ / file), bytes_of(other.folder / file)) << file;

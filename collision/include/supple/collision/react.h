@@ -33,8 +33,10 @@ struct ReactionReport {
 /// Adds to loads[i] (sized to the parts of body i) what contact does to body i. Forces and moments of a pair sum to zero.
 /// @param dissipative  if not empty: receives the dissipative part of the same loads, by body, sized like `loads`
 /// @param traction_force  if not null: total force on A of each pair, dissipative part included, shape [pairs]
+/// @param pair_power  if not null: what damping and friction take of each pair [W], shape [pairs]
 ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
                      const ReactionSettings& settings, std::span<PartLoads> loads,
-                     std::vector<Vec3>* traction_force = nullptr, std::span<PartLoads> dissipative = {});
+                     std::vector<Vec3>* traction_force = nullptr, std::span<PartLoads> dissipative = {},
+                     std::vector<double>* pair_power = nullptr);
 
 }  // namespace supple::collision

@@ -12,6 +12,7 @@
 #include "supple/core/interactions.h"
 #include "supple/core/links.h"
 #include "supple/implicit/field.h"
+#include "supple/implicit/mesh_solid.h"
 #include "supple/implicit/solids.h"
 #include "supple/implicit/surface_samples.h"
 #include "supple/implicit/volume.h"
@@ -46,7 +47,7 @@ struct ObjectModel {
 /// A solid that stands still and touches every object that has contact.
 struct FixedBody {
   std::string name;
-  std::variant<implicit::HalfSpace, implicit::SolidBox, implicit::HeightField> solid;
+  std::variant<implicit::HalfSpace, implicit::SolidBox, implicit::HeightField, implicit::MeshSolid> solid;
   collision::ContactMaterial material;
   [[nodiscard]] implicit::FieldView field() const {
     return std::visit([](const auto& s) { return implicit::FieldView(s); }, solid);

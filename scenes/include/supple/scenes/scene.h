@@ -306,20 +306,21 @@ struct GroundDesc {
   double friction = 0.5;
 };
 
-enum class ObstacleName : std::uint8_t { Plane, Box, Heights };
+enum class ObstacleName : std::uint8_t { Plane, Box, Heights, Mesh };
 
 /// obstacles[]: solids that stand still and touch every object that has contact
 struct ObstacleDesc {
   std::string name;
   ObstacleName shape = ObstacleName::Box;
-  Vec3 at = Vec3::Zero();             ///< a point of the plane; the middle of the box; added to the heights [m]
+  Vec3 at = Vec3::Zero();             ///< a point of the plane; the middle of the box; added to heights and meshes [m]
   Vec3 normal = Vec3::UnitZ();        ///< plane: outward
   double extent = 2.0;                ///< plane: half the edge of the square that is drawn [m]
   Vec3 half_sizes = Vec3::Zero();     ///< box [m]
   double rounding = 0.0;              ///< box: radius of its edges [m]
-  Vec3 turn_axis = Vec3::UnitZ();     ///< box, with turn
-  double turn = 0.0;                  ///< box [rad] (key turn_deg)
-  std::string file;                   ///< heights: CSV of x, y, z on a regular grid, beside the scene
+  Vec3 turn_axis = Vec3::UnitZ();     ///< box, mesh, with turn
+  double turn = 0.0;                  ///< box, mesh [rad] (key turn_deg)
+  std::string file;                   ///< heights: CSV of x, y, z on a regular grid; mesh: OBJ or PLY; beside the scene
+  std::optional<double> voxel;        ///< mesh [m]; absent: a 64th of its longest side
   Vec3 colour = Vec3(0.72, 0.74, 0.78);  ///< sRGB
   double roughness = 0.6;
   bool visible = true;

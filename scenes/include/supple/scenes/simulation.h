@@ -97,6 +97,8 @@ class Simulation {
   [[nodiscard]] std::span<const collision::ContactBody> contact_bodies();
   /// Total force on body A of each contact, damping and friction included [N], shape [contacts().summary].
   [[nodiscard]] const std::vector<Vec3>& contact_forces();
+  /// What damping and friction take of each contact [W], shape [contacts().summary].
+  [[nodiscard]] const std::vector<double>& contact_powers();
   /// Loads of contact on all particles at the current state.
   [[nodiscard]] const core::Loads& contact_loads();
   /// Fields of the bodies at the current state; valid until the next step.

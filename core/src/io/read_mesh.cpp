@@ -1,0 +1,263 @@
+#include "supple/core/io/read_mesh.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
+
+namespace supple::io {
+namespace {
+
+constexpr std::size_t kLargestFile = std::size_t{2} << 30;
+
+[[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found) {
+  throw Error(ErrorKind::Scene, Fault{.place = place, .key = {}, .expected = expected, .found = found, .hint = {}});
+}
+
+/// The words of a text, line by line.
+class Lines {
+ public:
+  explicit Lines(std::string_view text) : rest_(text) {}
+  /// @return false at the end
+  bool next(std::string_view& line) {
+    if (rest_.empty()) return false;
+    const std::size_t end = rest_.find('\n');
+    line = rest_.substr(0, end);
+    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    ++number_;
+    return true;
+  }
+  [[nodiscard]] std::size_t number() const { return number_; }
+  [[nodiscard]] std::string_view rest() const { return rest_; }
+
+ private:
+  std::string_view rest_;
+  std::size_t number_ = 0;
+};
+
+std::string_view take_word(std::string_view& line) {
+  const std::size_t begin = std::min(line.find_first_not_of(" \t"), line.size());
+  const std::size_t end = std::min(line.find_first_of(" \t", begin), line.size());
+  const std::string_view word = line.substr(begin, end - begin);
+  line.remove_prefix(end);
+  return word;
+}
+
+template <class Number>
+std::optional<Number> parse(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  Number value{};
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (!std::isfinite(value)) return std::nullopt;
+  }
+  return value;
+}
+
+void add_fan(const std::vector<std::uint32_t>& corner, Mesh& mesh) {
+  for (std::size_t k = 2; k < corner.size(); ++k) mesh.triangle.push_back({corner[0], corner[k - 1], corner[k]});
+}
+
+Mesh read_obj(std::string_view text, const std::string& path) {
+  Mesh mesh;
+  Lines lines(text);
+  std::string_view line;
+  std::vector<std::uint32_t> corner;
+  while (lines.next(line)) {
+    const std::string whole(line.substr(0, 60));
+    const std::string place = path + ':' + std::to_string(lines.number());
+    line = line.substr(0, line.find('#'));
+    const std::string_view kind = take_word(line);
+    if (kind == "v") {
+      Vec3 x;
+      for (int k = 0; k < 3; ++k) {
+        const std::optional<double> value = parse<double>(take_word(line));
+        if (!value) refuse(place, "expected 'v' and three finite numbers", '\'' + whole + '\'');
+        x[k] = *value;
+      }
+      mesh.position.push_back(x);
+    } else if (kind == "f") {
+      corner.clear();
+      for (std::string_view word = take_word(line); !word.empty(); word = take_word(line)) {
+        const std::optional<long long> index = parse<long long>(word.substr(0, word.find('/')));
+        const auto count = static_cast<long long>(mesh.position.size());
+        const long long at = !index ? -1 : *index > 0 ? *index - 1 : count + *index;  // negative ones count from the last
+        if (!index || *index == 0 || at < 0 || at >= count) {
+          refuse(place, "expected 'f' and numbers of vertices above it", '\'' + whole + '\'');
+        }
+        corner.push_back(static_cast<std::uint32_t>(at));
+      }
+      if (corner.size() < 3) refuse(place, "expected a face of at least three corners", '\'' + whole + '\'');
+      add_fan(corner, mesh);
+    }
+  }
+  return mesh;
+}
+
+enum class PlyType { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
+
+std::optional<PlyType> ply_type(std::string_view name) {
+  if (name == "char" || name == "int8") return PlyType::Int8;
+  if (name == "uchar" || name == "uint8") return PlyType::Uint8;
+  if (name == "short" || name == "int16") return PlyType::Int16;
+  if (name == "ushort" || name == "uint16") return PlyType::Uint16;
+  if (name == "int" || name == "int32") return PlyType::Int32;
+  if (name == "uint" || name == "uint32") return PlyType::Uint32;
+  if (name == "float" || name == "float32") return PlyType::Float;
+  if (name == "double" || name == "float64") return PlyType::Double;
+  return std::nullopt;
+}
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::Float;
+  std::optional<PlyType> count;  ///< of a list
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+};
+
+/// Numbers of a PLY file one after another, from text or from bytes.
+class PlyNumbers {
+ public:
+  PlyNumbers(std::string_view content, bool binary, const std::string& path) : rest_(content), binary_(binary), path_(path) {}
+
+  double next(PlyType type) {
+    if (!binary_) {
+      const std::size_t begin = std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size());
+      const std::size_t end = std::min(rest_.find_first_of(" \t\r\n", begin), rest_.size());
+      const std::string_view word = rest_.substr(begin, end - begin);
+      rest_.remove_prefix(end);
+      const std::optional<double> value = parse<double>(word);
+      if (!value) refuse(path_, "expected a finite number for every property", word.empty() ? "the end of the file" : '\'' + std::string(word.substr(0, 60)) + '\'');
+      return *value;
+    }
+    switch (type) {
+      case PlyType::Int8: return take<std::int8_t>();
+      case PlyType::Uint8: return take<std::uint8_t>();
+      case PlyType::Int16: return take<std::int16_t>();
+      case PlyType::Uint16: return take<std::uint16_t>();
+      case PlyType::Int32: return take<std::int32_t>();
+      case PlyType::Uint32: return take<std::uint32_t>();
+      case PlyType::Float: return static_cast<double>(take<float>());
+      case PlyType::Double: return take<double>();
+    }
+    return 0.0;
+  }
+
+ private:
+  template <class Number>
+  Number take() {
+    Number value{};
+    if (rest_.size() < sizeof value) refuse(path_, "expected a number for every property", "the end of the file");
+    std::memcpy(&value, rest_.data(), sizeof value);
+    rest_.remove_prefix(sizeof value);
+    return value;
+  }
+
+  std::string_view rest_;
+  bool binary_;
+  const std::string& path_;
+};
+
+Mesh read_ply(std::string_view text, const std::string& path) {
+  Lines lines(text);
+  std::string_view line;
+  bool binary = false, ended = false, first = true;
+  std::vector<PlyElement> elements;
+  while (!ended && lines.next(line)) {
+    const std::string place = path + ':' + std::to_string(lines.number());
+    const std::string whole(line.substr(0, 60));
+    const std::string_view kind = take_word(line);
+    if (first && kind != "ply") refuse(place, "expected a file that begins with 'ply'", '\'' + whole + '\'');
+    first = false;
+    if (kind == "format") {
+      const std::string_view name = take_word(line);
+      binary = name == "binary_little_endian";
+      if (!binary && name != "ascii") refuse(place, "expected ascii or binary_little_endian", '\'' + whole + '\'');
+    } else if (kind == "element") {
+      PlyElement element{.name = std::string(take_word(line)), .count = 0, .properties = {}};
+      const std::optional<std::size_t> count = parse<std::size_t>(take_word(line));
+      if (!count || *count > text.size()) refuse(place, "expected an element with a number not beyond the file's size", '\'' + whole + '\'');
+      element.count = *count;
+      elements.push_back(std::move(element));
+    } else if (kind == "property") {
+      PlyProperty property;
+      std::string_view type = take_word(line);
+      const bool list = type == "list";
+      if (list) {
+        property.count = ply_type(take_word(line));
+        type = take_word(line);
+      }
+      const std::optional<PlyType> known = ply_type(type);
+      if (elements.empty() || !known || (list && !property.count)) refuse(place, "expected a property of a known type", '\'' + whole + '\'');
+      property.type = *known;
+      property.name = take_word(line);
+      elements.back().properties.push_back(std::move(property));
+    } else if (kind == "end_header") {
+      ended = true;
+    }
+  }
+  if (!ended) refuse(path, "expected 'end_header'", "the end of the file");
+
+  Mesh mesh;
+  PlyNumbers numbers(lines.rest(), binary, path);
+  std::vector<std::uint32_t> corner;
+  for (const PlyElement& element : elements) {
+    for (std::size_t k = 0; k < element.count; ++k) {
+      Vec3 x = Vec3::Zero();
+      for (const PlyProperty& property : element.properties) {
+        if (!property.count) {
+          const double value = numbers.next(property.type);
+          for (int axis = 0; axis < 3; ++axis) {
+            if (property.name.size() == 1 && property.name[0] == "xyz"[axis]) x[axis] = value;
+          }
+          continue;
+        }
+        const bool faces = element.name == "face" && (property.name == "vertex_indices" || property.name == "vertex_index");
+        corner.clear();
+        const double length = numbers.next(*property.count);
+        for (double i = 0.0; i < length; i += 1.0) {
+          const double index = numbers.next(property.type);
+          if (!faces) continue;
+          if (!(index >= 0.0) || index >= static_cast<double>(mesh.position.size())) {
+            refuse(path, "expected faces of the vertices before them", "vertex " + std::to_string(static_cast<long long>(index)));
+          }
+          corner.push_back(static_cast<std::uint32_t>(index));
+        }
+        add_fan(corner, mesh);
+      }
+      if (element.name != "vertex") continue;
+      if (!x.allFinite()) refuse(path, "expected finite positions", "vertex " + std::to_string(k));
+      mesh.position.push_back(x);
+    }
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Mesh read_mesh(const std::filesystem::path& path) {
+  const std::string extension = path.extension().string();
+  if (extension != ".obj" && extension != ".ply") refuse(path.string(), "expected a mesh in a file .obj or .ply", "'" + extension + '\'');
+  const std::vector<std::byte> bytes = read_file(path, kLargestFile);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  Mesh mesh = extension == ".obj" ? read_obj(text, path.string()) : read_ply(text, path.string());
+  if (mesh.triangle.empty()) refuse(path.string(), "expected a mesh with faces", "none");
+  return mesh;
+}
+
+}  // namespace supple::io

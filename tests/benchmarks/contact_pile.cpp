@@ -1,0 +1,95 @@
+/// @file contact_pile.cpp
+/// Many balls in a bin, one JSON object a line: CPU time of a step once they have settled, and of the same after they have
+/// fallen asleep. From 10,000 on the balls begin where they nearly rest, and ten steps are measured.
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "supple/core/cpu_time.h"
+#include "supple/core/hash.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
+
+namespace {
+
+using namespace supple;
+using namespace supple::scenes;
+
+constexpr int kMany = 10000;
+constexpr double kDiameter = 0.1;
+
+std::string pile(int count, bool sleeps) {
+  const bool many = count >= kMany;
+  const int side = std::max(2, static_cast<int>(std::ceil(std::cbrt(count) - 1e-9)));
+  const int layers = (count + side * side - 1) / (side * side);
+  const double spacing = many ? 0.985 * kDiameter : 1.1 * kDiameter;  // many: pressed a little on all sides
+  const double wall = 0.5 * side * spacing + (many ? 0.0 : 0.1 * kDiameter);
+  const auto text = [](double x) { return std::to_string(x); };
+  const std::string columns = "columns: " + std::to_string(side) + ", rows: " + std::to_string(side);
+  const auto plane = [&](const char* name, double x, double y) {
+    return "  - {name: " + std::string(name) + ", shape: plane, at: [" + text(x) + ", " + text(y) + ", 0], normal: [" +
+           text(-x) + ", " + text(-y) + ", 0]}\n";
+  };
+  return "schema: 1\nduration: 20 s\nframe_rate: 24\ntime_step: {substeps: 64}\ngravity: [0, 0, -9.81]\ncontact: {error: 0.01}\n" +
+         std::string(sleeps ? "sleep: {speed: 0.02, time: 0.1}\n" : "") +
+         "objects:\n  - name: balls\n    particles: {arrange: grid, " + columns + ", layers: " + std::to_string(layers) + ", spacing: " +
+         text(spacing) + ", disorder: " + text(many ? 5e-4 : 4e-3) + ", at: [0, 0, " + text(0.5 * layers * spacing) +
+         "], mass: 0.05}\n    separate: true\n"
+         "    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.075, thickness: 0.05, slope: 10}}]\n"
+         "    contact: {modulus: 4e4, friction: 0.3, dissipation: 0.5}\n    medium: {linear: 2, angular: 2}\n"
+         "ground: {height: 0}\nobstacles:\n" +
+         plane("left", -wall, 0) + plane("right", wall, 0) + plane("front", 0, -wall) + plane("back", 0, wall);
+}
+
+double peak_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+void measure(int count, bool sleeps) {
+  const double begin = process_cpu_seconds();
+  Simulation simulation(parse_scene(pile(count, sleeps), "pile.yaml", "."));
+  const double made = process_cpu_seconds() - begin;
+  constexpr int kSettle = 3072, kSteps = 10;  // two seconds
+  for (int k = 0; k < kSettle && count < kMany; ++k) simulation.step();
+  double least = std::numeric_limits<double>::infinity(), all = 0.0;
+  for (int k = 0; k < kSteps; ++k) {
+    const double before = process_cpu_seconds();
+    simulation.step();
+    const double step = process_cpu_seconds() - before;
+    least = std::min(least, step);
+    all += step;
+  }
+  const double memory = peak_mb();
+  const auto& island = simulation.state().sleep.island;
+  const auto asleep = std::count_if(island.begin(), island.end(), [](std::uint32_t i) { return i != collision::SleepState::kAwake; });
+  const std::size_t contacts = simulation.contacts().summary.size();
+  double fastest = 0.0;
+  for (const Vec3& v : simulation.state().particles.velocity) fastest = std::max(fastest, v.norm());
+  std::printf("{\"name\": \"collision/pile/balls=%zu%s\", \"cpu_ms_step_min\": %.4g, \"cpu_ms_step_mean\": %.4g, \"contacts\": %zu, "
+              "\"cpu_us_contact\": %.3g, \"asleep\": %td, \"largest_speed\": %.2g, \"made_cpu_s\": %.3g, \"peak_mb\": %.0f, \"hash\": \"%s\"}\n",
+              simulation.bodies().size(), sleeps ? ",sleep" : "", 1e3 * least, 1e3 * all / kSteps, contacts,
+              1e6 * least / static_cast<double>(std::max<std::size_t>(contacts, 1)), asleep, fastest, made, memory,
+              to_hex(simulation.state_hash()).c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<int> counts;
+  for (int i = 1; i < argc; ++i) counts.push_back(std::max(1, std::atoi(argv[i])));
+  if (counts.empty()) counts = {10, 100, 1000, 100000};
+  for (const int count : counts) {
+    measure(count, false);
+    if (count < kMany) measure(count, true);
+  }
+  return 0;
+}
