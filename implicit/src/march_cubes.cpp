@@ -359,6 +359,7 @@ void renumber(std::span<std::uint32_t> vertex, std::uint32_t own, std::span<cons
 /// A leaf's, or those of leaves that follow each other.
 std::span<std::uint32_t> vertices_of(const Leaf& first, const Leaf& last, Mesh& mesh) {
   const std::size_t count = last.first_triangle + last.triangles - first.first_triangle;
+  if (count == 0) return {};
   return {mesh.triangle.data()->data() + 3 * first.first_triangle, 3 * count};
 }
 
