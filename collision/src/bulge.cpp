@@ -1,8 +1,14 @@
 #include <algorithm>
+#include <cmath>
 
 #include "supple/collision/deformed_field.h"
 
 namespace supple::collision {
+namespace {
+
+constexpr double kLambda = 6.0;  // w = lambda a0 / k at most: a0 is the largest value iff lambda <= 6
+
+}  // namespace
 
 double BulgeProfile::value(double x) const noexcept {
   if (!(x > 0.0) || x >= width) return 0.0;
@@ -27,8 +33,15 @@ double BulgeProfile::slope(double x) const noexcept {
 }
 
 double effective_width(double width, double height, double stiffness) noexcept {
-  constexpr double kLambda = 6.0;
   return std::min(width, kLambda * height / stiffness);
+}
+
+double volume_keeping_height(double displaced, double area, double load, double steepness, double width) noexcept {
+  if (!(displaced > 0.0) || !(area > 0.0) || !(load > 0.0) || !(steepness > 0.0)) return 0.0;
+  const double held = 96.0 * displaced * load * steepness / (area * area);  // w (24 a0 + w)
+  const double height = std::sqrt(held / (kLambda * (24.0 + kLambda)));
+  if (kLambda * height <= width) return height;
+  return std::max((held / width - width) / 24.0, 0.0);
 }
 
 }  // namespace supple::collision

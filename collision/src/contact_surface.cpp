@@ -9,6 +9,7 @@
 #include "find_peak.h"
 #include "march_rule.h"
 #include "polar_rule.h"
+#include "sample_rule.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
@@ -55,12 +56,18 @@ class PairSolver {
   bool polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
   bool parts_are_sound(PairPressure& pressure, double extent);
   bool thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
+  bool samples(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
+               const ContactSettings& settings, PairResult& out);
   void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
              const ContactSettings& settings, PairResult& out);
+  void begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out);
+  template <class Rule>
+  void keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out);
   void add_sums(const PatchSums& sums, const Vec3& reference, ContactSurface::Summary& summary);
 
   PeakFinder finder_;
   PolarRuleSolver polar_;
+  SampleRuleSolver samples_;
   MarchRuleSolver march_;
   StartPoints starts_;
   std::vector<PolarCover> covers_;
@@ -190,28 +197,56 @@ bool PairSolver::thirds_press(std::span<const ContactBody> bodies, std::span<con
   return press;
 }
 
-void PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
-                       const ContactSettings& settings, PairResult& out) {
+/// Forgets what a rule that did not fit has left, and finds the third bodies that reach the overlap.
+void PairSolver::begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out) {
   const BodyPair pair = out.summary.bodies;
   out.summary = {};
   out.summary.bodies = pair;
+  out.points.clear();
+  first_ = Vec3::Zero();
+  load_ = 0.0;
   third_bodies_.clear();
   for (const std::uint32_t c : third_) {
     if (bodies[c].field.bound(overlap).upper > 0.0) third_bodies_.push_back(&bodies[c]);
   }
-  first_ = Vec3::Zero();
-  load_ = 0.0;
+}
+
+/// The summary of a rule that sees all patches at once.
+template <class Rule>
+void PairSolver::keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out) {
+  add_sums(rule.sums(), reference, out.summary);
+  out.summary.rule = name;
+  out.summary.error_estimate = rule.estimate();
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  out.summary.largest_overlap = rule.thickness();
+  out.summary.patches = std::max(1u, static_cast<std::uint32_t>(cover_count_));
+}
+
+bool PairSolver::samples(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
+                         const ContactSettings& settings, PairResult& out) {
+  begin_anew(bodies, overlap, out);
+  const BodyPair pair = out.summary.bodies;
+  const Vec3 reference = overlap.centre();
+  // The spacing of the kept samples, or what they would have.
+  constexpr double kAcrossFeature = 3.0;
+  const double first = spacing > 0.0 ? spacing : pressure.feature_size() / kAcrossFeature;
+  if (!samples_.solve(pressure, bodies[pair.a], bodies[pair.b], third_bodies_, overlap, first, settings, columns_, reference,
+                      out.points)) {
+    return false;
+  }
+  keep(samples_, ContactRule::Samples, reference, out);
+  return true;
+}
+
+void PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
+                       const ContactSettings& settings, PairResult& out) {
+  begin_anew(bodies, overlap, out);
   const Vec3 reference = overlap.centre();
   if (!march_.solve(pressure, third_bodies_, overlap, settings.error, settings.max_refinement, reference,
                     out.points)) {
     return;
   }
-  add_sums(march_.sums(), reference, out.summary);
-  out.summary.rule = ContactRule::March;
-  out.summary.error_estimate = march_.estimate();
-  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
-  out.summary.largest_overlap = march_.thickness();
-  out.summary.patches = std::max(1u, static_cast<std::uint32_t>(cover_count_));
+  keep(march_, ContactRule::March, reference, out);
 }
 
 void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
@@ -258,22 +293,33 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   } else {
     finder_.start_from_seeds(pressure, seeds, spacing, starts_);
   }
-  bool fits = settings.only != ContactRule::March && polar(pressure, settings, extent, out);
+  const bool any = settings.only == ContactRule::None;
+  bool fits = (any || settings.only == ContactRule::Polar) && polar(pressure, settings, extent, out);
+  RuleReason reason = any ? RuleReason::Fits : RuleReason::Asked;
+  if (any && !fits) reason = RuleReason::NoGraph;
   if (fits && cover_count_ > 0) {
     out.summary.rule = ContactRule::Polar;
-    if (!third_.empty() && settings.only != ContactRule::Polar) fits = !thirds_press(bodies, boxes, out);
+    if (any && !third_.empty()) fits = !thirds_press(bodies, boxes, out);
+    if (!fits) reason = RuleReason::ThirdBody;
   }
-  if (!fits) {
-    out.points.clear();
-    if (settings.only == ContactRule::Polar) {
-      out.summary = {};
-      out.summary.bodies = pair;
-      out.summary.error_estimate = 1.0;
-    } else {
+  if (!fits && settings.only == ContactRule::Polar) {
+    begin_anew(bodies, overlap, out);
+    out.summary.error_estimate = 1.0;
+  } else if (!fits) {
+    // Samples meet a plane sheet of points where marching fills the box with cells: cheaper at every error.
+    fits = settings.only != ContactRule::March && samples(pressure, bodies, overlap, spacing, settings, out);
+    if (!fits && settings.only != ContactRule::Samples) {
+      if (any && a.skeleton == nullptr && b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
       march(pressure, bodies, overlap, settings, out);
+    } else if (!fits) {
+      begin_anew(bodies, overlap, out);
+      const auto touches = [&](const Vec3& hill) { return finder_.climb(pressure, hill, extent).has_value(); };
+      if (std::any_of(starts_.hill.begin(), starts_.hill.end(), touches)) out.summary.error_estimate = 1.0;
     }
   }
+  out.summary.reason = reason;
   ContactSurface::Summary& summary = out.summary;
+  summary.load = load_;
   if (load_ > 0.0) summary.centre_of_pressure = first_ / load_;
   summary.energy = out.points.energy;
   summary.displaced_a = out.points.displaced[0];

@@ -76,7 +76,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
   const auto is_own = [&](const ContactSurface::Summary& s) {
     return (s.bodies.a == body || s.bodies.b == body) && s.largest_pressure > 0.0;
   };
-  if (settings.attenuation > 0.0) {
+  if (settings.attenuation > 0.0 || settings.keep_volume) {
     // All bulges together stay below half of what would lift the empty space around the body onto its surface.
     const auto touching = static_cast<double>(std::count_if(surface.summary.begin(), surface.summary.end(), is_own));
     const double highest = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
@@ -87,11 +87,20 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       Vec3 slope;
       static_cast<void>(b.field.value(s.centre_of_pressure, slope));
       const double steepness = b.material.modulus * slope.norm();
-      double height = std::min(settings.attenuation * s.largest_pressure, highest);
       double width = settings.width * b.field.feature_size() * steepness;
       if (std::isnan(width)) width = kInfinity;
       // Where the kernels of the other body end, the bulge must have ended too.
-      width = effective_width(std::min(width, 0.9 * depth_outside(b)), height, 1.0);
+      width = std::min(width, 0.9 * depth_outside(b));
+      double height = settings.attenuation * s.largest_pressure;
+      if (settings.keep_volume) {
+        Vec3 own;
+        static_cast<void>(bodies[body].field.value(s.centre_of_pressure, own));
+        const double across = (b.material.modulus * slope - bodies[body].material.modulus * own).norm();
+        const double displaced = s.bodies.a == body ? s.displaced_a : s.displaced_b;
+        height = volume_keeping_height(displaced, s.area, s.load, across, width);
+      }
+      height = std::min(height, highest);
+      width = effective_width(width, height, 1.0);
       // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
       height = std::min(height, width / 3.0);
       if (!(height > 0.0)) continue;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "shapes.h"
 #include "supple/core/error.h"
@@ -36,30 +37,74 @@ Eigen::Vector2d concentric(double a, double b) {
   return {r * cos, r * sin};
 }
 
-/// 2 m^2 directions of equal solid angle, m even, mirror-symmetric in x, y, z, none in a coordinate plane: concentric
-/// maps of m x m cells to discs and Lambert's equal-area map of those to the hemispheres.
+/// The direction of cell (i, j) of m x m on the half sphere of one side of z: the concentric map to a disc and Lambert's
+/// equal-area map of that to the half sphere.
+Vec3 direction_of(double i, double j, int m, double side) {
+  const Eigen::Vector2d d = concentric((2.0 * i + 1.0) / m - 1.0, (2.0 * j + 1.0) / m - 1.0);
+  const double r2 = d.squaredNorm();
+  const double lift = std::sqrt(2.0 - r2);
+  return Vec3(d.x() * lift, d.y() * lift, side * (1.0 - r2)).normalized();
+}
+
+/// 2 m^2 directions of equal solid angle, m even, mirror-symmetric in x, y, z, none in a coordinate plane.
 template <class Use>
 void for_sphere(int m, const Use& use) {
   for (const double side : {1.0, -1.0}) {
     for (int j = 0; j < m; ++j) {
-      for (int i = 0; i < m; ++i) {
-        const Eigen::Vector2d d = concentric((2.0 * i + 1.0) / m - 1.0, (2.0 * j + 1.0) / m - 1.0);
-        const double r2 = d.squaredNorm();
-        const double lift = std::sqrt(2.0 - r2);
-        use(Vec3(d.x() * lift, d.y() * lift, side * (1.0 - r2)).normalized());
-      }
+      for (int i = 0; i < m; ++i) use(direction_of(i, j, m, side));
     }
   }
 }
 
+/// A cone of directions around `axis`, all of them where the sine of its half angle is 1 or more.
+struct Cone {
+  Vec3 axis = Vec3::UnitX();
+  double half_angle = kPi;
+  /// Directions from a ball of radius `slack` around the origin towards a ball.
+  static Cone towards(const Vec3& centre, double radius, double slack) {
+    const double distance = centre.norm(), sine = (radius + slack) / distance;
+    if (!(sine < 1.0)) return {};
+    return {centre / distance, math::atan2(sine, std::sqrt(1.0 - sine * sine))};
+  }
+};
+
+/// Those of the directions that lie in a cone, and a few more, by halving blocks of cells.
+template <class Use>
+void for_sphere(int m, const Cone& cone, const Use& use) {
+  constexpr double kStretch = 3.0;  // of the map from the square to the half sphere, at most
+  const auto visit = [&](const auto& self, double side, int i, int j, int width) -> void {
+    if (i >= m || j >= m) return;
+    if (width == 1) {
+      use(direction_of(i, j, m, side));
+      return;
+    }
+    const double middle = 0.5 * (width - 1);
+    const Vec3 u = direction_of(std::min(i + middle, m - 1.0), std::min(j + middle, m - 1.0), m, side);
+    const double off = math::atan2(u.cross(cone.axis).norm(), u.dot(cone.axis));
+    if (off > cone.half_angle + kStretch * std::numbers::sqrt2 * width / m) return;
+    const int half = width / 2;
+    for (const int dj : {0, half}) {
+      for (const int di : {0, half}) self(self, side, i + di, j + dj, half);
+    }
+  };
+  int width = 1;
+  while (width < m) width *= 2;
+  for (const double side : {1.0, -1.0}) visit(visit, side, 0, 0, width);
+}
+
 class LayoutBuilder {
  public:
-  LayoutBuilder(const Skeleton& skeleton, double spacing) : skeleton_(skeleton), asked_(spacing) {}
+  /// @param near  keeps the seeds whose rays meet it; null: all   @param parts  world poses, with `near`
+  LayoutBuilder(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box* near, SampleLayout& out)
+      : skeleton_(skeleton), asked_(spacing), parts_(parts), near_(near), layout_(out) {}
 
-  SampleLayout build() {
+  /// @return seeds looked at
+  std::size_t build() {
+    layout_.clear();
     for (std::size_t i = 0; i < skeleton_.primitive.size(); ++i) {
       primitive_ = &skeleton_.primitive[i];
       id_ = static_cast<std::uint32_t>(i);
+      if (near_ != nullptr && !find_near()) continue;
       const Kernel& kernel = primitive_->kernel;
       const double peak = evaluate(kernel, 0.0).value;
       rho_ = skeleton_.iso < peak ? iso_distance(kernel, skeleton_.iso) : 0.5 * kernel.radius;
@@ -89,10 +134,59 @@ class LayoutBuilder {
         case ShapeKind::Arc: arc(size.x(), size.y()); break;
       }
     }
-    return std::move(layout_);
+    return seen_;
   }
 
  private:
+  /// The ball around the box in the frame of the unstretched primitive. @return whether the support reaches it
+  [[nodiscard]] bool find_near() {
+    const Vec3& stretch = primitive_->stretch;
+    const Vec3 centre = primitive_->offset.to_body(parts_[primitive_->part].to_body(near_->centre()));
+    const double radius = 0.5 * near_->extent().norm();
+    near_centre_ = centre.cwiseQuotient(stretch);
+    near_radius_ = radius / stretch.minCoeff();
+    const Box support = support_box(*primitive_);
+    return !support.lower.allFinite() || !support.upper.allFinite() || support.inflated(radius).contains(centre);
+  }
+
+  /// Directions from points at most `slack` off the origin that may meet the ball; all without one.
+  [[nodiscard]] Cone near_cone(double slack) const {
+    return near_ == nullptr ? Cone{} : Cone::towards(near_centre_, near_radius_, slack);
+  }
+  template <class Use>
+  void for_directions(int m, double slack, const Use& use) const {
+    if (near_ == nullptr) {
+      for_sphere(m, use);
+    } else {
+      for_sphere(m, near_cone(slack), use);
+    }
+  }
+
+  /// The cells of n along [-half, half] of an axis that the ball covers: [first, second).
+  [[nodiscard]] std::pair<int, int> near_cells(int axis, double half, int n) const {
+    if (near_ == nullptr) return {0, n};
+    const auto cell = [&](double x) { return std::clamp(0.5 * (x / half + 1.0) * n, 0.0, static_cast<double>(n)); };
+    return {static_cast<int>(cell(near_centre_[axis] - near_radius_)),
+            std::min(n, static_cast<int>(cell(near_centre_[axis] + near_radius_)) + 1)};
+  }
+
+  /// Whether the stretch [0, reach] of a ray in the part's frame meets the box.
+  [[nodiscard]] bool meets_near(const Vec3& foot, const Vec3& direction, double reach) const {
+    const Pose& pose = parts_[primitive_->part];
+    const Vec3 from = pose.to_world(foot), along = pose.orientation * direction;
+    double low = 0.0, high = reach;
+    for (int k = 0; k < 3; ++k) {
+      const double first = (near_->lower[k] - from[k]) / along[k], second = (near_->upper[k] - from[k]) / along[k];
+      if (along[k] == 0.0) {
+        if (from[k] < near_->lower[k] || from[k] > near_->upper[k]) return false;
+        continue;
+      }
+      low = std::max(low, std::min(first, second));
+      high = std::min(high, std::max(first, second));
+    }
+    return low <= high;
+  }
+
   /// A seed of the unstretched shape.
   void add(const Vec3& foot, const Vec3& direction, double reach, const Vec3& spread) {
     const Vec3& stretch = primitive_->stretch;
@@ -108,10 +202,14 @@ class LayoutBuilder {
   }
 
   void push(const Vec3& foot, const Vec3& direction, double reach, const Vec3& spread) {
+    ++seen_;
+    const Vec3 from = primitive_->offset.to_world(foot);
+    const Vec3 along = (primitive_->offset.orientation * direction).normalized();
+    if (near_ != nullptr && !meets_near(from, along, reach)) return;
     layout_.primitive.push_back(id_);
     layout_.part.push_back(primitive_->part);
-    layout_.foot.push_back(primitive_->offset.to_world(foot));
-    layout_.direction.push_back((primitive_->offset.orientation * direction).normalized());
+    layout_.foot.push_back(from);
+    layout_.direction.push_back(along);
     layout_.reach.push_back(reach);
     layout_.spread.push_back(spread);
   }
@@ -122,7 +220,7 @@ class LayoutBuilder {
   void slab(const Vec3& half) {
     const double R = primitive_->kernel.radius;
     const int m = sphere_count(rho_);
-    for_sphere(m, [&](const Vec3& u) {
+    for_directions(m, half.norm(), [&](const Vec3& u) {
       const Vec3 corner(std::copysign(half.x(), u.x()), std::copysign(half.y(), u.y()), std::copysign(half.z(), u.z()));
       add(corner, u, R, {0.0, 0.0, 2.0 * kPi / (m * m)});
     });
@@ -132,7 +230,8 @@ class LayoutBuilder {
       const int j = (k + 2) % 3;
       const int turns = count_for(2.0 * kPi * rho_ / spacing_, 4, 8);
       const int cells = count_for(2.0 * half[k] / spacing_, 1, 1);
-      for (int c = 0; c < cells; ++c) {
+      const auto [first, last] = near_cells(k, half[k], cells);
+      for (int c = first; c < last; ++c) {
         for (int t = 0; t < turns; ++t) {
           const auto [sin, cos] = math::sin_cos((2.0 * t + 1.0) * kPi / turns);
           Vec3 foot, u = Vec3::Zero();
@@ -151,9 +250,11 @@ class LayoutBuilder {
       if (!(half[i] > 0.0 && half[j] > 0.0)) continue;
       const int columns = count_for(2.0 * half[i] / spacing_, 1, 1);
       const int rows = count_for(2.0 * half[j] / spacing_, 1, 1);
+      const auto [first_column, last_column] = near_cells(i, half[i], columns);
+      const auto [first_row, last_row] = near_cells(j, half[j], rows);
       for (const double side : {1.0, -1.0}) {
-        for (int r = 0; r < rows; ++r) {
-          for (int c = 0; c < columns; ++c) {
+        for (int r = first_row; r < last_row; ++r) {
+          for (int c = first_column; c < last_column; ++c) {
             Vec3 foot;
             foot[k] = side * half[k];
             foot[i] = half[i] * ((2.0 * c + 1.0) / columns - 1.0);
@@ -198,13 +299,18 @@ class LayoutBuilder {
     Vec3 size = primitive_->size;
     if (primitive_->shape == ShapeKind::Directed) size = 0.5 * (size + primitive_->control[0]);
     const int m = sphere_count(rho_ / R * size.maxCoeff());
-    for_sphere(m, [&](const Vec3& s) {
+    const auto use = [&](const Vec3& s) {
       // x = D s maps solid angles by abc / |D s|^3.
       const Vec3 x = size.cwiseProduct(s);
       const double length = x.norm();
       const double reach = length * R / std::sqrt(foot(view_, x).q);  // u is homogeneous of degree one
       add(Vec3::Zero(), x / length, reach, {0.0, 0.0, 2.0 * kPi / (m * m) * size.prod() / (length * length * length)});
-    });
+    };
+    if (near_ == nullptr) {
+      for_sphere(m, use);
+    } else {
+      for_sphere(m, Cone::towards(near_centre_.cwiseQuotient(size), near_radius_ / size.minCoeff(), 0.0), use);
+    }
   }
 
   /// Two unit vectors that complete z to a right-handed frame.
@@ -325,19 +431,41 @@ class LayoutBuilder {
 
   const Skeleton& skeleton_;
   double asked_;          ///< spacing on the surface [m]
+  std::span<const Pose> parts_;
+  const Box* near_;
   double spacing_ = 0.0;  ///< of the unstretched shape [m]
   ShapeView view_;
   const Primitive* primitive_ = nullptr;
   std::uint32_t id_ = 0;
   double rho_ = 0.0;  ///< distance of the lone primitive's surface [m]
-  SampleLayout layout_;
+  Vec3 near_centre_ = Vec3::Zero();  ///< of the ball around `near_`, in the frame of the unstretched primitive [m]
+  double near_radius_ = 0.0;
+  std::size_t seen_ = 0;
+  SampleLayout& layout_;
 };
 
 }  // namespace
 
+void SampleLayout::clear() noexcept {
+  primitive.clear();
+  part.clear();
+  foot.clear();
+  direction.clear();
+  reach.clear();
+  spread.clear();
+}
+
 SampleLayout make_sample_layout(const Skeleton& skeleton, double spacing) {
   SUPPLE_EXPECTS(spacing > 0.0);
-  return LayoutBuilder(skeleton, spacing).build();
+  SampleLayout layout;
+  LayoutBuilder(skeleton, spacing, {}, nullptr, layout).build();
+  return layout;
+}
+
+std::size_t make_sample_layout(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box& near,
+                               SampleLayout& out) {
+  SUPPLE_EXPECTS(spacing > 0.0 && parts.size() == skeleton.part_count);
+  return LayoutBuilder(skeleton, spacing, parts, &near, out).build();
 }
 
 }  // namespace supple::implicit

@@ -203,7 +203,8 @@ int check(const Arguments& arguments) {
 int explain(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.simulate_only) scene.output = {};
-  std::fputs(scenes::explain(scenes::Simulation(std::move(scene), simulation_options(1))).c_str(), stdout);
+  scenes::Simulation simulation(std::move(scene), simulation_options(1));
+  std::fputs(scenes::explain(simulation).c_str(), stdout);
   return 0;
 }
 

@@ -61,6 +61,9 @@ template <> struct EnumNames<BlendName> {
 template <> struct EnumNames<SplitName> {
   static constexpr std::array<std::string_view, 2> names{"energy", "contribution"};
 };
+template <> struct EnumNames<RuleName> {
+  static constexpr std::array<std::string_view, 4> names{"auto", "samples", "polar", "march"};
+};
 template <> struct EnumNames<CoreName> {
   static constexpr std::array<std::string_view, 2> names{"soft", "barrier"};
 };

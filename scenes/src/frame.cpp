@@ -93,6 +93,7 @@ void view_body(const StageContext& context, const core::ParticleState& particles
   body.velocity = frame.velocity[i];
   body.angular_velocity = frame.spin[i];
   body.samples = &frame.samples[i];
+  body.skeleton = &own.skeleton;
   body.core_value = std::numeric_limits<double>::infinity();
   for (const implicit::Primitive& primitive : own.skeleton.primitive) {
     body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);

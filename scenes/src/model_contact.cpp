@@ -28,6 +28,16 @@ double lag(double x) {
   return sum;
 }
 
+collision::ContactRule rule_of(RuleName name) {
+  switch (name) {
+    case RuleName::Samples: return collision::ContactRule::Samples;
+    case RuleName::Polar: return collision::ContactRule::Polar;
+    case RuleName::March: return collision::ContactRule::March;
+    case RuleName::Auto: break;
+  }
+  return collision::ContactRule::None;
+}
+
 constexpr std::uint32_t kNobody = 0xffffffff;
 
 /// Index of an object, or of a fixed body after them.
@@ -255,10 +265,11 @@ double dissipation_for(double restitution, double speed) {
 void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   add_fixed_bodies(scene, model, faults);
   model.contact.error = scene.contact.error;
+  model.contact.only = rule_of(scene.contact.rule);
   model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy
                                                                   : collision::SplitRule::Contribution;
   model.reaction.friction_speed = scene.contact.friction_speed;
-  model.bulge = {scene.contact.bulge, scene.contact.bulge_width};
+  model.bulge = {.attenuation = scene.contact.bulge, .width = scene.contact.bulge_width, .keep_volume = scene.contact.bulge_volume};
 
   std::vector<BodyPair> forbidden;
   add_pairs(scene, model, faults, forbidden);

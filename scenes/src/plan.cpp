@@ -102,6 +102,12 @@ std::string meshing_of(const Scene& scene, const Model& model) {
   return text.data() + std::string(graph ? ", vertices on creases" : "") + touching;
 }
 
+/// Which rule samples the contact surface, and why.
+std::string rule_of_contact(const ContactDesc& d) {
+  if (d.rule != RuleName::Auto) return std::string(name_of(d.rule)) + ": the scene asks for it";
+  return "auto: polar where patches are seen whole from their peak, else samples, else march, to " + number_text(d.error);
+}
+
 }  // namespace
 
 std::span<const StageInfo> stage_table() { return kTable; }
@@ -161,7 +167,7 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
                                                          : "fewer than two bodies may touch");
   add(Stage::SampleSurface, contact, contact ? contact_reason + "; only parts near another body are sampled" : contact_reason);
   add(Stage::FindContacts, contact, contact_reason);
-  add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair" : contact_reason);
+  add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair; " + rule_of_contact(scene.contact) : contact_reason);
   add(Stage::React, contact, contact ? "runs when a contact surface was found" : contact_reason);
   add(Stage::Integrate, true, plan_integrator(scene, model).reason);
 

@@ -27,10 +27,23 @@ std::string body_name(const Simulation& simulation, std::uint32_t body) {
 std::string rule_name(collision::ContactRule rule) {
   switch (rule) {
     case collision::ContactRule::Polar: return "polar";
+    case collision::ContactRule::Samples: return "samples";
     case collision::ContactRule::March: return "march";
     case collision::ContactRule::None: break;
   }
   return "none";
+}
+
+/// Why the rule was taken.
+std::string reason_text(collision::RuleReason reason) {
+  switch (reason) {
+    case collision::RuleReason::Asked: return "the scene asks for it";
+    case collision::RuleReason::Fits: return "smooth patches, each seen whole from its peak";
+    case collision::RuleReason::NoGraph: return "a patch that is no graph over a disc";
+    case collision::RuleReason::ThirdBody: return "a third body presses on the patch";
+    case collision::RuleReason::NoSkeleton: return "no polar patch, and no skeleton to send rays from";
+  }
+  return "";
 }
 
 ordered_json loads_json(const core::Loads& loads) {
@@ -81,6 +94,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
     ordered_json pair = {{"a", body_name(simulation, s.bodies.a)},
                          {"b", body_name(simulation, s.bodies.b)},
                          {"rule", rule_name(s.rule)},
+                         {"rule_reason", reason_text(s.reason)},
                          {"force_n", vector(s.force)},
                          {"moment_nm", vector(s.moment)},
                          {"area_m2", s.area},
@@ -172,7 +186,7 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   return text(json);
 }
 
-std::string explain(const Simulation& simulation) {
+std::string explain(Simulation& simulation) {
   const Scene& scene = simulation.scene();
   const Model& model = simulation.model();
   std::string out = scene.title.empty() ? std::string() : scene.title + "\n";
@@ -200,6 +214,17 @@ std::string explain(const Simulation& simulation) {
     line("%-4s %-24s %-10s %s", planned.on ? "on" : "off", std::string(info(planned.stage).name).c_str(),
          std::string(info(planned.stage).module).c_str(), planned.reason.c_str());
   }
+  if (!plan.on(Stage::SolveContactSurface)) return out;
+  const std::vector<collision::ContactSurface::Summary>& pairs = simulation.contacts().summary;
+  constexpr std::size_t kMostShown = 10;
+  line("\n%zu contact%s at frame %d", pairs.size(), plural(pairs.size()), simulation.frame());
+  for (std::size_t k = 0; k < std::min(pairs.size(), kMostShown); ++k) {
+    const auto& s = pairs[k];
+    line("  %s, %s: %s (%s), %llu points, error at most %.1e", body_name(simulation, s.bodies.a).c_str(),
+         body_name(simulation, s.bodies.b).c_str(), rule_name(s.rule).c_str(), reason_text(s.reason).c_str(),
+         static_cast<unsigned long long>(s.points), s.error_estimate);
+  }
+  if (pairs.size() > kMostShown) line("  and %zu more", pairs.size() - kMostShown);
   return out;
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <numbers>
 #include <random>
 
 #include "bodies.h"
@@ -49,6 +51,18 @@ TEST(BulgeProfile, DoesNotPopAtFirstTouch) {
   EXPECT_NEAR(peak({k, 0.0, width}), 2.0 * width * k / 27.0, 1e-6);  // the plain width leaves 2 w k / 27
 }
 
+TEST(BulgeProfile, HoldsTheVolumeOfASphereOnAPlane) {
+  // a = 1, delta = .1, k = k_i = 1: V = .030369 and a0 = .035901 by the circumference of the rim of a sphere on a plane,
+  // a0^2 = 24 k k_i V / (pi a lambda (24 + lambda)); |grad(p_A - p_B)| = k + k_i. There pi b^2 and the load of
+  // p = delta / 2 (1 - r^2 / b^2) on it have area^2 / (2 load) = 2 pi b^2 / delta, b^2 = 2 a delta.
+  const double delta = 0.1, b2 = 2.0 * delta, area = std::numbers::pi * b2, load = 0.25 * delta * area;
+  EXPECT_NEAR(volume_keeping_height(0.030369, area, load, 2.0, 1.0), 0.035901, 1e-6);
+  // A zone narrower than 6 a0 takes a lower, steeper bulge of the same volume.
+  const double width = 0.1, height = volume_keeping_height(0.030369, area, load, 2.0, width);
+  EXPECT_NEAR(width * (24.0 * height + width), 6.0 * 30.0 * 0.035901 * 0.035901, 1e-5);
+  EXPECT_EQ(volume_keeping_height(0.0, area, load, 2.0, 1.0), 0.0);
+}
+
 /// Two touching bodies of blobs of different stiffness, and points around them.
 struct Touching {
   Blobs left{{Vec3(-0.4, 0, 0), Vec3(0, 0.1, 0), Vec3(-0.2, 0.3, 0.1)}, 1.0};
@@ -78,6 +92,40 @@ TEST(DeformedField, IsZeroOnTheContactSurfaceForBothBodies) {
     field.evaluate(scene.stage.surface.point, values);
     for (const double v : values) EXPECT_LE(std::abs(v), 1e-10);
   }
+}
+
+TEST(DeformedField, KeepsItsVolumeWhenAskedTo) {
+  // Volume of {F >= 0} by midpoints of cells. The slopes of Wyvill kernels fall off beside the contact, where the bulge is,
+  // so that it holds a quarter too much.
+  const Blobs left({Vec3(-0.42, 0, 0)}, 1.0), right({Vec3(0.42, 0.02, 0.01)}, 1.0);
+  Stage stage;
+  stage.add(left.field, left.centre, 1e4);
+  stage.add(right.field, right.centre, 1e4);
+  stage.solve({.error = 1e-4});
+  ASSERT_EQ(stage.surface.summary.size(), 1u);
+  const auto volume = [](const auto& field) {
+    constexpr int kCells = 120;
+    const double half = 0.6, h = 2.0 * half / kCells;
+    std::vector<Vec3> row(kCells);
+    std::vector<double> value(kCells);
+    int inside = 0;
+    for (int k = 0; k < kCells; ++k) {
+      for (int j = 0; j < kCells; ++j) {
+        for (int i = 0; i < kCells; ++i) {
+          row[static_cast<std::size_t>(i)] = Vec3(-0.42 - half + (i + 0.5) * h, -half + (j + 0.5) * h, -half + (k + 0.5) * h);
+        }
+        field.evaluate(row, value);
+        inside += static_cast<int>(std::count_if(value.begin(), value.end(), [](double v) { return v >= 0.0; }));
+      }
+    }
+    return inside * h * h * h;
+  };
+  const double rest = volume(left.field), lost = stage.surface.summary[0].displaced_a;
+  const auto with = [&](const BulgeSettings& settings) {
+    return volume(DeformedField(stage.bodies(), 0, stage.surface, settings));
+  };
+  EXPECT_NEAR(with({.attenuation = 0.0}), rest - lost, 0.02 * lost);
+  EXPECT_NEAR(with({.width = 1.0, .keep_volume = true}), rest, 0.3 * lost);
 }
 
 TEST(DeformedField, NeverGivesOnePointToTwoBodies) {

@@ -364,6 +364,9 @@ void add_contact(std::vector<Option>& all) {
   const std::string rubs = "{modulus: 1000, friction: 0.5, dissipation: 0.1}";
   on_ground("contact.error", rubs, ground + "contact: {error: $}", "1e-2", "1e-6");
   on_ground("contact.split=contribution", rubs, ground + "contact: {split: $}", "energy", "contribution");
+  on_ground("contact.rule=samples", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "samples");
+  on_ground("contact.rule=polar", rubs, ground + "contact: {error: 1e-2, rule: $}", "march", "polar");
+  on_ground("contact.rule=march", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "march");
   on_ground("contact.friction_speed", rubs, ground + "contact: {friction_speed: $}", "0.001", "0.5");
   on_ground("ground.height", rubs, "ground: {height: $, modulus: 1e4}", "-0.1", "-0.08");
   on_ground("ground.collides", rubs, "ground: {height: -0.1, collides: $}", "true", "false");
@@ -410,6 +413,7 @@ void add_contact(std::vector<Option>& all) {
                            .scene = "contact: {" + keys + "}\noutput: {cell: 0.03}", .timing = shortly}, one, other));
   };
   beside("bulge", "bulge: $", "0", "0.5");
+  beside("bulge_volume", "bulge_volume: $", "false", "true");
   beside("bulge_width", "bulge: 0.5, bulge_width: $", "0.05", "0.5");
   // Samples only say where to look for a contact: its points, and so the last digits, depend on them.
   all.push_back(differs("contact.sample_spacing", In::State,

@@ -80,7 +80,7 @@ TEST(StepPlan, IsNotWellFormedWhenAStageReadsWhatNobodyWrote) {
 }
 
 TEST(Explain, NamesEveryStageWithItsReason) {
-  const Simulation simulation(parse_scene(kOneObject, "one.yaml", "."));
+  Simulation simulation(parse_scene(kOneObject, "one.yaml", "."));
   const std::string text = explain(simulation);
   for (const StageInfo& stage : stage_table()) EXPECT_NE(text.find(stage.name), std::string::npos) << text;
   EXPECT_NE(text.find("off  find_contacts"), std::string::npos) << text;

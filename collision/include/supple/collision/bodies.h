@@ -11,6 +11,7 @@
 
 #include "supple/core/types.h"
 #include "supple/implicit/field_view.h"
+#include "supple/implicit/skeleton.h"
 #include "supple/implicit/surface_samples.h"
 
 namespace supple::collision {
@@ -35,6 +36,8 @@ struct ContactBody {
   std::span<const Vec3> velocity;            ///< of the parts' centres [m/s], shape [parts]
   std::span<const Vec3> angular_velocity;    ///< of the parts, world axes [rad/s], shape [parts]
   const implicit::SurfaceSamples* samples = nullptr;  ///< null: the body offers no seeds (a half-space)
+  /// What the rule by samples sends its rays from, placed by `pose`; null: the body offers none.
+  const implicit::Skeleton* skeleton = nullptr;
   bool fixed = false;                        ///< takes forces without moving; two fixed bodies do not touch
   double core_value = std::numeric_limits<double>::infinity();  ///< F where the body is deepest [1], or less; for hard cores
 };

@@ -16,14 +16,26 @@ namespace supple::collision {
 enum class ContactRule : std::uint8_t {
   None,   ///< no overlap was found
   Polar,  ///< Gauss-Legendre in radius times trapezoid in angle about the point of largest pressure
+  Samples,  ///< where the seed rays of both bodies cross Sigma (Gascuel 1993), refined by denser seeds
   March,  ///< tetrahedra over the overlap box, points projected onto Sigma
+};
+
+/// Why a pair got its rule.
+enum class RuleReason : std::uint8_t {
+  Asked,       ///< `ContactSettings::only`
+  Fits,        ///< polar: every patch is seen whole from its peak
+  NoGraph,     ///< not polar: a patch is no graph over a disc, or has no peak
+  ThirdBody,   ///< not polar: a third body presses on a patch
+  NoSkeleton,  ///< neither polar nor samples: neither body has a skeleton
 };
 
 struct ContactSettings {
   double error = 1e-4;   ///< relative error of force, area and centre of pressure asked for, in [1e-10, 0.1]
   bool energy = true;    ///< false: energy, displaced volumes and squeezed regions only where the parts of a body need them
   int max_refinement = 6;  ///< refinements before the estimate is accepted as it is
-  ContactRule only = ContactRule::None;  ///< None: the cheapest rule that fits; otherwise this rule alone
+  /// None: the cheapest rule that fits, polar before samples before marching; otherwise this rule alone. A pair that it does
+  /// not fit (no smooth patch; two bodies without skeletons) then has no force, and an error estimate of 1.
+  ContactRule only = ContactRule::None;
 };
 
 /// Quadrature points of all pairs, sorted by (pair, order of the rule); one array per attribute.
@@ -44,9 +56,11 @@ struct ContactSurface {
   struct Summary {
     BodyPair bodies;
     ContactRule rule = ContactRule::None;
+    RuleReason reason = RuleReason::Fits;
     Vec3 force = Vec3::Zero();             ///< elastic force on A, -integral p N dA [N]; B gets the opposite
     Vec3 moment = Vec3::Zero();            ///< of the force on A about the world origin [N m]
     double area = 0.0;                     ///< [m^2]
+    double load = 0.0;                     ///< integral of p dA [N]
     Vec3 centre_of_pressure = Vec3::Zero();  ///< integral x p dA / integral p dA [m]
     double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]
     double largest_pressure = 0.0;         ///< [Pa]

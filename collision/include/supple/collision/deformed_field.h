@@ -23,7 +23,15 @@ struct BulgeProfile {
 struct BulgeSettings {
   double attenuation = 0.4;  ///< alpha: a0 = alpha times the largest contact pressure; 0 switches bulges off
   double width = 0.15;       ///< w: zone width as a share of the other body's feature size [1], > 0
+  bool keep_volume = false;  ///< a0 in place of `attenuation` such that the bulge holds what the contact displaces, to first order
 };
+
+/// Height a0 [Pa] of a bulge of k = 1 that holds the volume `displaced` [m^3]. The rim of Sigma holds
+/// w (24 a0 + w) / 48 times the integral of ds / (|grad_Sigma p| |grad(p_A - p_B)|), which is area^2 / (2 load steepness) for
+/// pressures that fall as a paraboloid; a sphere on a plane is Gascuel's case.
+/// @param width  of the zone at most [Pa]: beyond it a lower one grows instead
+/// @param load  integral of p dA [N]   @param steepness  |grad(p_A - p_B)| [Pa/m]
+[[nodiscard]] double volume_keeping_height(double displaced, double area, double load, double steepness, double width) noexcept;
 
 /// The claim of body i on space: p^_i = p_i inside every other body, p_i + h(...) outside (the bulge around each body
 /// that it touches), in Pa. Space goes to the largest positive claim, so body i with its contacts is

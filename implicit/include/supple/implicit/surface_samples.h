@@ -27,12 +27,19 @@ struct SampleLayout {
   /// [m] (0, b, 0), a corner or centre [sr] (0, 0, c), a disc's rim (0, b, c). On the surface: that area / (u . n).
   std::vector<Vec3> spread;
   [[nodiscard]] std::size_t size() const noexcept { return part.size(); }
+  void clear() noexcept;
 };
 
 /// Seeds whose spacing on the surface of the lone primitive is at most `spacing` [m] (each stands for at most
 /// spacing^2), spread evenly and symmetrically: sphere-like around points and ellipsoids, faces plus rounded borders
 /// around plates, boxes, discs and segments. At least 32 a primitive. @pre spacing > 0
 [[nodiscard]] SampleLayout make_sample_layout(const Skeleton& skeleton, double spacing);
+
+/// The same seeds, but only those whose rays meet a box; replaces the content of `out`, keeps its capacity.
+/// @param parts  world poses, shape [part_count]   @param near  world [m]
+/// @return how many seeds were looked at: those of points, plates, boxes, ellipsoids only around the box
+std::size_t make_sample_layout(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box& near,
+                               SampleLayout& out);
 
 /// What survives a step: rho per seed [m]; NaN-free; negative = no root was found. Part of State.
 struct SampleState {

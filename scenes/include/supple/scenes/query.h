@@ -26,6 +26,6 @@ struct MeshQuery {
 [[nodiscard]] std::string query_mesh(Simulation& simulation, const MeshQuery& query);
 
 /// The plan as text (`supple explain`): stages with reasons, time step, sizes.
-[[nodiscard]] std::string explain(const Simulation& simulation);
+[[nodiscard]] std::string explain(Simulation& simulation);
 
 }  // namespace supple::scenes

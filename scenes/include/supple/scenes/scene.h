@@ -277,15 +277,18 @@ struct PairDesc {
 };
 
 enum class SplitName : std::uint8_t { Energy, Contribution };
+enum class RuleName : std::uint8_t { Auto, Samples, Polar, March };
 enum class CoreName : std::uint8_t { Soft, Barrier };
 
 /// contact: of the scene
 struct ContactDesc {
   double error = 1e-4;
+  RuleName rule = RuleName::Auto;
   SplitName split = SplitName::Energy;
   CoreName core = CoreName::Soft;
   double friction_speed = 1e-3;       ///< [m/s]
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
+  bool bulge_volume = false;          ///< bulges that hold what the contact displaces
   double bulge_width = 0.15;          ///< share of the other body's feature size
   std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
 };

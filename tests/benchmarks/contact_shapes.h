@@ -1,0 +1,218 @@
+/// @file contact_shapes.h
+/// Bodies for contact queries in random poses, and the closed forms of spheres of linear pressure: the isobar at
+/// pressure p is a circle.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <ctime>
+#include <numbers>
+#include <random>
+
+#include "supple/collision/contact_surface.h"
+#include "supple/core/math.h"
+#include "supple/implicit/field.h"
+
+namespace supple::benchmarks {
+
+inline constexpr double kPi = std::numbers::pi;
+
+class Draw {
+ public:
+  explicit Draw(std::uint64_t seed) : engine_(seed) {}
+  double uniform(double lower, double upper) {
+    return lower + (upper - lower) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
+  }
+  double logarithmic(double lower, double upper) { return std::exp(uniform(std::log(lower), std::log(upper))); }
+  Vec3 direction() {
+    const double z = uniform(-1.0, 1.0), r = std::sqrt(1.0 - z * z);
+    const auto [s, c] = math::sin_cos(uniform(0.0, 2.0 * kPi));
+    return {r * c, r * s, z};
+  }
+  Quat rotation() {
+    const Vec3 axis = direction();
+    return Quat(Eigen::AngleAxisd(uniform(0.0, kPi), axis));
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// One part of a body that moves as a whole; only pose and field differ.
+inline collision::ContactBody single_part(const implicit::FieldView& field, double modulus, const Pose& pose) {
+  static const Vec3 kStill = Vec3::Zero();
+  collision::ContactBody body;
+  body.field = field;
+  body.material.modulus = modulus;
+  body.pose = {&pose, 1};
+  body.velocity = {&kStill, 1};
+  body.angular_velocity = {&kStill, 1};
+  return body;
+}
+
+/// A rigid body: its field and samples in the pose it was put in.
+class Rigid {
+ public:
+  Rigid(implicit::Skeleton skeleton, double modulus, double spacing)
+      : skeleton_(std::move(skeleton)), modulus_(modulus), layout_(implicit::make_sample_layout(skeleton_, spacing)) {
+    put({});
+    implicit::SampleState kept;
+    implicit::sample_surface(skeleton_, layout_, {&pose_, 1}, field_, {}, Executor(1), kept, rest_);
+  }
+  void put(const Pose& pose) {
+    pose_ = pose;
+    implicit::place_skeleton(skeleton_, {&pose_, 1}, placed_);
+    implicit::index_field(skeleton_, placed_, field_);
+    samples_ = rest_;
+    for (std::size_t i = 0; i < samples_.point.size(); ++i) {
+      samples_.point[i] = pose.position + pose.orientation * rest_.point[i];
+      samples_.normal[i] = pose.orientation * rest_.normal[i];
+    }
+  }
+  [[nodiscard]] collision::ContactBody body() const {
+    collision::ContactBody b = single_part(field_, modulus_, pose_);
+    b.samples = &samples_;
+    b.skeleton = &skeleton_;
+    return b;
+  }
+
+ private:
+  implicit::Skeleton skeleton_;
+  double modulus_;
+  implicit::SampleLayout layout_;
+  implicit::PlacedSkeleton placed_;
+  implicit::Field field_;
+  implicit::SurfaceSamples rest_, samples_;
+  Pose pose_;
+};
+
+/// Sphere of radius r with p = E (1 - d / r) inside: Gascuel's kernel, linear as far as the surface.
+inline implicit::Skeleton linear_shape(implicit::ShapeKind shape, const Vec3& size, double r) {
+  implicit::Skeleton skeleton;
+  implicit::Primitive p;
+  p.shape = shape;
+  p.size = size;
+  p.kernel = implicit::Kernel::gascuel(r, 1.5 * r, 0.5 / r);
+  skeleton.primitive.push_back(p);
+  skeleton.part_count = 1;
+  return skeleton;
+}
+inline implicit::Skeleton linear_sphere(double r) { return linear_shape(implicit::ShapeKind::Point, Vec3::Zero(), r); }
+/// F = slope (r - d) there, so that p = E (1 - d / r) has the modulus E / (slope r) = 2 E.
+inline constexpr double kLinearModulus = 2.0;
+
+inline implicit::Skeleton wyvill_shape(implicit::ShapeKind shape, const Vec3& size, double support) {
+  implicit::Skeleton skeleton;
+  implicit::Primitive p;
+  p.shape = shape;
+  p.size = size;
+  p.kernel = implicit::Kernel::wyvill(support);
+  skeleton.primitive.push_back(p);
+  skeleton.part_count = 1;
+  return skeleton;
+}
+
+/// Ten blobs in a lump, their supports overlapping.
+inline implicit::Skeleton ten_blobs(std::uint64_t seed) {
+  Draw draw(seed);
+  implicit::Skeleton skeleton;
+  for (int i = 0; i < 10; ++i) {
+    implicit::Primitive p;
+    p.kernel = implicit::Kernel::wyvill(0.1 * draw.uniform(0.8, 1.2));
+    p.offset.position = 0.05 * draw.direction();
+    skeleton.primitive.push_back(p);
+  }
+  skeleton.part_count = 1;
+  return skeleton;
+}
+
+/// What a query answers, for comparison.
+struct Answer {
+  double force = 0.0;
+  double area = 0.0;
+  Vec3 centre = Vec3::Zero();
+};
+
+/// Integrals over z of a stack of discs: pressures from 0 to p_max, radius^2 rho2(p), height z(p) over the origin along
+/// `axis`; dz/dp by `slope`. F = pi integral of rho^2 dp; area = 2 pi integral of sqrt(rho^2 z'^2 + (rho rho')^2) dp.
+template <class Disc>
+Answer stack_of_discs(double p_max, const Vec3& origin, const Vec3& axis, const Disc& disc) {
+  // p = p_max sin^2(t) is smooth at both ends; Simpson's rule with enough nodes for round-off.
+  constexpr int kNodes = 4000;
+  Answer sum;
+  double load = 0.0, first = 0.0;
+  for (int i = 0; i <= kNodes; ++i) {
+    const double t = 0.5 * kPi * i / kNodes;
+    const double weight = (i == 0 || i == kNodes ? 1.0 : i % 2 == 1 ? 4.0 : 2.0) * 0.5 * kPi / kNodes / 3.0;
+    const double s = std::sin(t), c = std::cos(t);
+    const double p = p_max * s * s, dp = 2.0 * p_max * s * c * weight;
+    const auto [rho2, rho_rate, z, z_rate] = disc(p);  // rho^2, d(rho^2)/dp / 2, z, dz/dp
+    const double ring = 2.0 * kPi * std::sqrt(std::max(rho2, 0.0) * z_rate * z_rate + rho_rate * rho_rate);
+    sum.force += kPi * rho2 * dp;
+    sum.area += ring * dp;
+    load += p * ring * dp;
+    first += p * z * ring * dp;
+  }
+  sum.centre = origin + (first / load) * axis;
+  return sum;
+}
+
+/// Two spheres of linear pressure: A at `centre`, B a distance D along `axis`.
+inline Answer spheres(double ra, double ea, double rb, double eb, double D, const Vec3& centre, const Vec3& axis) {
+  const double p_max = (ra + rb - D) / (ra / ea + rb / eb);
+  return stack_of_discs(p_max, centre, axis, [=](double p) {
+    const double a = ra * (1.0 - p / ea), b = rb * (1.0 - p / eb);
+    const double da = -ra / ea, db = -rb / eb;
+    const double z = (D * D + a * a - b * b) / (2.0 * D), dz = (a * da - b * db) / D;
+    return std::array<double, 4>{a * a - z * z, a * da - z * dz, z, dz};
+  });
+}
+
+/// A sphere of linear pressure at height h over a body whose pressure is k times the depth.
+inline Answer sphere_on_flat(double r, double e, double k, double h, const Vec3& centre, const Vec3& down) {
+  const double p_max = (r - h) / (r / e + 1.0 / k);
+  return stack_of_discs(p_max, centre, down, [=](double p) {
+    const double a = r * (1.0 - p / e), z = h + p / k;
+    return std::array<double, 4>{a * a - z * z, -a * r / e - z / k, z, 1.0 / k};
+  });
+}
+
+inline double cpu_microseconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
+}
+
+inline double difference(const collision::ContactSurface::Summary& s, const Answer& exact) {
+  return std::max({std::abs(s.force.norm() / exact.force - 1.0), std::abs(s.area / exact.area - 1.0),
+                   (s.centre_of_pressure - exact.centre).norm() / std::sqrt(exact.area)});
+}
+
+/// One pose: the bodies in it, and the closed form where there is one.
+struct Pair {
+  std::array<collision::ContactBody, 2> bodies;
+  bool known = false;
+  Answer exact;
+};
+
+/// Places B such that a surface point of it is pressed into one of A by `depth`, normal against normal.
+inline void press(Rigid& a, Rigid& b, double depth, Draw& draw) {
+  const auto point_of = [&](Rigid& body, const Pose& pose) {
+    body.put(pose);
+    const implicit::SurfaceSamples& samples = *body.body().samples;
+    std::size_t i = 0;
+    do {
+      i = static_cast<std::size_t>(draw.uniform(0.0, 1.0) * static_cast<double>(samples.point.size()));
+    } while (samples.valid[i] == 0);
+    return std::pair(samples.point[i], samples.normal[i]);
+  };
+  const auto [x, n] = point_of(a, {draw.uniform(0.0, 1.0) * draw.direction(), draw.rotation()});
+  const auto [y, m] = point_of(b, {});
+  const Quat spin(Eigen::AngleAxisd(draw.uniform(-kPi, kPi), n));
+  const Quat turn = (spin * Quat::FromTwoVectors(m, -n)).normalized();
+  b.put({x - depth * n - turn * y, turn});
+}
+
+}  // namespace supple::benchmarks
