@@ -89,7 +89,7 @@ constexpr const char* kResultFile = "result.json";
 
 std::string overload_text(const RunRecord::Overload& o) {
   std::array<char, 160> numbers{};
-  std::snprintf(numbers.data(), numbers.size(), " overloaded from t = %.6g s: energy of approach and contact %.4g J, capacity %.4g J",
+  std::snprintf(numbers.data(), numbers.size(), " overloaded from t = %.6g s: energy of approach and contact %.4g J, more than half of what they can hold, %.4g J",
                 o.time, o.energy, o.capacity);
   return o.a + " and " + o.b + numbers.data();
 }

@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 Simulation make(const std::string& text) { return Simulation(parse_scene(text, "test.yaml", ".")); }
 
-Simulation library(const std::string& name) {
-  return Simulation(read_scene(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"), {}));
+Simulation library(const std::string& name, const std::vector<std::string>& overrides = {}) {
+  return Simulation(read_scene(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"), overrides));
 }
 
 /// A ball of linear pressure (half its modulus at its centre) dropped by 0.2 m, in equal steps of a millisecond or less.
@@ -227,6 +227,40 @@ TEST(Cradle, PassesTheSpeedOfTheFirstBallToTheLast) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_LT(std::abs(v[i].x()), 0.1);
   EXPECT_LT(simulation.audits().momentum_error, 1e-13);
   EXPECT_LT(simulation.audits().energy_error, 1e-3);
+}
+
+TEST(Ring, HoldsABallThatIsTooLargeForIt) {
+  Simulation simulation = library("contacts/ball_in_ring", {"contact.error=0.1", "objects.ball.particles.at=[0, 0, 0.11]",
+                                                            "objects.ball.medium.linear=60", "objects.ball.contact.friction=0"});
+  // Where the ball first touches the ring: surfaces lie at sqrt(1 - 2^(-1/3)) of the supports.
+  const double reach = std::sqrt(1.0 - std::cbrt(0.5)) * (0.4 + 0.1);
+  const double first_touch = std::sqrt(reach * reach - 0.2 * 0.2);
+  EXPECT_TRUE(simulation.contacts().point.empty());
+  while (simulation.frame() < 25) simulation.step_frame();
+  const Vec3 at = simulation.state().particles.position[0];
+  EXPECT_LT(at.z(), first_touch);
+  EXPECT_GT(at.z(), first_touch - 0.03);
+  EXPECT_LT(std::hypot(at.x(), at.y()), 1e-12);
+  const Vec3 force = simulation.contact_loads().force[0];
+  EXPECT_NEAR(force.z(), 9.81, 1e-5 * 9.81);
+  EXPECT_LT(std::hypot(force.x(), force.y()), 1e-12 * force.z());
+}
+
+TEST(SpiralHitByThreeBalls, KeepsItsMomentaAndTurnsThemBack) {
+  Simulation simulation = library("contacts/spiral_three_balls", {"contact.error=1e-2"});
+  const core::ParticleState start = simulation.state().particles;
+  const auto& model = simulation.model();
+  while (simulation.frame() < 25) simulation.step_frame();
+  const Audits audits = simulation.audits();
+  EXPECT_LT(audits.momentum_error, 1e-12);
+  EXPECT_LT(audits.angular_momentum_error, 1e-12);
+  EXPECT_LT(audits.energy_error, 1e-3);
+  EXPECT_LT(audits.contact_residual, 1e-9);
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    const Vec3 before = start.velocity[i], after = simulation.state().particles.velocity[i];
+    if (before.norm() == 0.0) continue;  // the spiral
+    EXPECT_LT(after.dot(before), 0.0) << model.objects[model.particles.object[i]].name;
+  }
 }
 
 TEST(Tunnelling, HappensAtNoSpeedAndPhaseOfAutomaticSteps) {
