@@ -9,13 +9,11 @@ source "$here/parts.sh"
 
 if [[ ${1:-} == -h || ${1:-} == --help ]]; then
   echo "usage: scripts/mutate.sh [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
-  echo "A run over all modules writes docs/reports/mutations.md."
+  echo "A module all of whose defects are killed gets its report, docs/reports/mutations/MODULE.md."
   exit 0
 fi
 modules=("$@")
-all=0
 if ((${#modules[@]} == 0)); then
-  all=1
   for list in "$supple_root"/tests/*/mutations.txt; do
     [[ -f $list ]] && modules+=("$(basename "$(dirname "$list")")")
   done
@@ -60,14 +58,33 @@ echo "configuring a copy of the tree"
 cmake -S "$tree" -B "$work/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPPLE_BUILD_TOOL=OFF >"$work/configure.log" 2>&1 ||
   { tail -n 30 "$work/configure.log"; exit 1; }
 
-declare -a rows=()
-killed=0 bad=0
+# write_report MODULE KILLED ROW...
+write_report() {
+  local module=$1 killed=$2
+  shift 2
+  mkdir -p "$supple_root/docs/reports/mutations"
+  {
+    echo "# Planted defects: $module"
+    echo
+    echo "Written by \`scripts/mutate.sh $module\`: each defect is planted alone, and the tests named beside it must fail."
+    echo "$killed defects, $killed killed."
+    echo
+    echo "| file | source | planted instead | tests | result |"
+    echo "|---|---|---|---|---|"
+    printf '%s\n' "$@"
+  } >"$supple_root/docs/reports/mutations/$module.md"
+  echo "wrote docs/reports/mutations/$module.md"
+}
+
+failed=0
 for module in "${modules[@]}"; do
   target=${module}_tests
   echo "$module: building the tests without defects"
   build "$target" || { tail -n 40 "$work/build.log"; exit 1; }
   program=$work/build/bin/$target
-  number=0
+  cp "$program" "$work/sound"
+  declare -a rows=()
+  number=0 killed=0 bad=0
   while IFS= read -r line || [[ -n $line ]]; do
     number=$((number + 1))
     [[ -z $line || $line == \#* ]] && continue
@@ -80,8 +97,7 @@ for module in "${modules[@]}"; do
     fi
     file=${field[0]} from=${field[1]} to=${field[2]} filter=${field[3]}
     cp "$tree/$file" "$work/original" || { bad=$((bad + 1)); continue; }
-    build "$target" || { echo "  $place: the restored tree does not build"; tail -n 40 "$work/build.log"; exit 1; }
-    if ! timeout 120 "$program" --gtest_brief=1 --gtest_filter="$filter" >"$work/test.log" 2>&1; then
+    if ! timeout 120 "$work/sound" --gtest_brief=1 --gtest_filter="$filter" >"$work/test.log" 2>&1; then
       verdict="the tests fail without the defect"
     elif ! grep -Eq '\[  PASSED  \] [1-9][0-9]* test' "$work/test.log"; then
       verdict="the filter names no test"
@@ -99,21 +115,8 @@ for module in "${modules[@]}"; do
     printf '  %-8s %s  %s: %s -> %s\n' "$verdict" "$place" "$file" "$from" "$to"
     rows+=("| $file | \`${from//|/\\|}\` | \`${to//|/\\|}\` | \`${filter//|/\\|}\` | $verdict |")
   done <"$supple_root/tests/$module/mutations.txt"
+  echo "$module: $killed killed, $bad not"
+  if ((bad == 0 && killed > 0)); then write_report "$module" "$killed" "${rows[@]}"; fi
+  failed=$((failed + bad))
 done
-
-echo "$killed killed, $bad not"
-if ((all == 1 && bad == 0)); then
-  mkdir -p "$supple_root/docs/reports"
-  {
-    echo "# Planted defects"
-    echo
-    echo "Written by \`scripts/mutate.sh\`: each defect is planted alone, and the tests named beside it must fail."
-    echo "$killed defects, $killed killed."
-    echo
-    echo "| file | source | planted instead | tests | result |"
-    echo "|---|---|---|---|---|"
-    printf '%s\n' "${rows[@]}"
-  } >"$supple_root/docs/reports/mutations.md"
-  echo "wrote docs/reports/mutations.md"
-fi
-((bad == 0))
+((failed == 0))

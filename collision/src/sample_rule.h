@@ -85,7 +85,7 @@ class SampleRuleSolver {
   std::vector<Column> column_;
   PressureBatch at_, moved_;
   std::vector<double> share_, third_, value_, weight_;
-  std::vector<Vec3> slope_, third_slope_, fall_slope_;
+  std::vector<Vec3> slope_, third_slope_;
   PatchSums sums_;
   double spacing_ = 0.0;
   double largest_cell_ = 0.0;  // on Sigma, by share [m^2]
