@@ -61,6 +61,9 @@ void Gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std
   }
 }
 
+/// Centres are near a cube within half their radius, squared and relative.
+constexpr float kNear2 = 0.25F;
+
 /// Distances of eight or sixteen blobs to a cube, scaled by their radius.
 struct Distances {
   V near2, far2;
@@ -87,13 +90,25 @@ HWY_INLINE float round_off(std::size_t count, float size) {
 
 HWY_INLINE V cube(V t) { return hn::Mul(t, hn::Mul(t, t)); }
 
-PotentialBounds Select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
+/// Writes those marked behind the first `count` of a list. @return how many they are now
+HWY_INLINE std::size_t append(V s, V x, V y, V z, hn::Mask<D> keep, BlobList& list, std::size_t count) {
+  const D d;
+  hn::StoreU(hn::Compress(s, keep), d, list.scale.data() + count);
+  hn::StoreU(hn::Compress(x, keep), d, list.x.data() + count);
+  hn::StoreU(hn::Compress(y, keep), d, list.y.data() + count);
+  hn::StoreU(hn::Compress(z, keep), d, list.z.data() + count);
+  return count + hn::CountTrue(d, keep);
+}
+
+/// @param far  null: the order stays
+HWY_INLINE PotentialBounds select_into(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list,
+                                       BlobList* far) {
   const D d;
   list.reserve(from.count);
+  if (far != nullptr) far->reserve(from.count);
   const V cx = hn::Set(d, centre[0]), cy = hn::Set(d, centre[1]), cz = hn::Set(d, centre[2]);
   const V around = hn::Set(d, half), one = hn::Set(d, 1.0F);
-  float *scale = list.scale.data(), *px = list.x.data(), *py = list.y.data(), *pz = list.z.data();
-  std::size_t count = 0;
+  std::size_t count = 0, far_count = 0;
   alignas(64) float lower[kLanes] = {}, upper[kLanes] = {};
   for (std::size_t i = 0; i < from.count; i += kWidth) {
     V s, x, y, z;
@@ -103,21 +118,81 @@ PotentialBounds Select(const BlobList& from, const std::array<float, 3>& centre,
     float *low = lower + i % kLanes, *high = upper + i % kLanes;
     hn::Store(hn::Add(hn::Load(d, high), cube(most)), d, high);
     hn::Store(hn::Add(hn::Load(d, low), cube(least)), d, low);
-    hn::StoreU(hn::Compress(s, keep), d, scale + count);
-    hn::StoreU(hn::Compress(x, keep), d, px + count);
-    hn::StoreU(hn::Compress(y, keep), d, py + count);
-    hn::StoreU(hn::Compress(z, keep), d, pz + count);
-    count += hn::CountTrue(d, keep);
+    if (far == nullptr) {
+      count = append(s, x, y, z, keep, list, count);
+    } else {
+      const auto near = hn::Lt(q.near2, hn::Set(d, kNear2));
+      count = append(s, x, y, z, near, list, count);
+      far_count = append(s, x, y, z, hn::AndNot(near, keep), *far, far_count);
+    }
   }
-  list.count = count;
+  for (std::size_t i = 0; i < far_count; i += kWidth) {
+    const auto move = [&](const std::vector<float>& out, std::vector<float>& in) HWY_ATTR {
+      hn::StoreU(hn::LoadU(d, out.data() + i), d, in.data() + count + i);
+    };
+    move(far->scale, list.scale);
+    move(far->x, list.x);
+    move(far->y, list.y);
+    move(far->z, list.z);
+  }
+  list.near = count;
+  list.count = count + far_count;
   list.pad();
   const float high = sum_of_lanes(upper);
-  const float error = round_off(count, high);
+  const float error = round_off(list.count, high);
   return {sum_of_lanes(lower) - error, high + error};
 }
 
-std::uint64_t EvaluateTile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values) {
+PotentialBounds SelectTile(const BlobList& from, const std::array<float, 3>& centre, TileBlobs& tile) {
   const D d;
+  const hn::RebindToUnsigned<D> du;
+  for (BlobPlaces* places : {&tile.near, &tile.far}) {
+    if (places->place.size() < from.count + kLanes) places->place.resize(2 * from.count + kLanes);
+  }
+  const V cx = hn::Set(d, centre[0]), cy = hn::Set(d, centre[1]), cz = hn::Set(d, centre[2]);
+  const V around = hn::Set(d, 0.5F * kTile), one = hn::Set(d, 1.0F);
+  std::uint32_t *near = tile.near.place.data(), *far = tile.far.place.data();
+  alignas(64) float lower[kLanes] = {}, upper[kLanes] = {};
+  for (std::size_t i = 0; i < from.count; i += kWidth) {
+    V s, x, y, z;
+    const Distances q = distances(from, i, cx, cy, cz, around, s, x, y, z);
+    const auto keep = hn::Lt(q.near2, hn::Set(d, kReach2)), close = hn::Lt(q.near2, hn::Set(d, kNear2));
+    const V most = hn::Max(hn::Sub(one, q.near2), hn::Zero(d)), least = hn::Max(hn::Sub(one, q.far2), hn::Zero(d));
+    float *low = lower + i % kLanes, *high = upper + i % kLanes;
+    hn::Store(hn::Add(hn::Load(d, high), cube(most)), d, high);
+    hn::Store(hn::Add(hn::Load(d, low), cube(least)), d, low);
+    const auto place = hn::Iota(du, static_cast<std::uint32_t>(i));
+    const auto rest = hn::AndNot(close, keep);
+    hn::StoreU(hn::Compress(place, hn::RebindMask(du, close)), du, near);
+    hn::StoreU(hn::Compress(place, hn::RebindMask(du, rest)), du, far);
+    near += hn::CountTrue(d, close);
+    far += hn::CountTrue(d, rest);
+  }
+  tile.near.count = static_cast<std::size_t>(near - tile.near.place.data());
+  tile.far.count = static_cast<std::size_t>(far - tile.far.place.data());
+  const float high = sum_of_lanes(upper);
+  const float error = round_off(tile.count(), high);
+  return {sum_of_lanes(lower) - error, high + error};
+}
+
+PotentialBounds Select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
+  return select_into(from, centre, half, list, nullptr);
+}
+PotentialBounds SelectNearFirst(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list,
+                                BlobList& far) {
+  return select_into(from, centre, half, list, &far);
+}
+
+HWY_INLINE std::uint64_t mask_bits(hn::Mask<D> mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(D(), mask, bits);
+  return std::uint64_t{static_cast<unsigned>(bits[0]) | static_cast<unsigned>(bits[1]) << 8};
+}
+
+TileSums EvaluateTile(const BlobList& list, const TileBlobs& tile, const std::array<float, 3>& corner, float iso, float sure,
+                      float* values) {
+  const D d;
+  constexpr std::size_t kBetweenLooks = 8;
   constexpr std::size_t kPlane = std::size_t{kTile} * kTile;
   constexpr std::size_t kParts = kPlane / kWidth;
   alignas(64) float nodes[2][kPlane];
@@ -135,7 +210,7 @@ std::uint64_t EvaluateTile(const BlobList& list, const std::array<float, 3>& cor
   for (std::size_t k = 0; k < kTile; ++k) z[k] = hn::Set(d, corner[2] + static_cast<float>(k));
   const V one = hn::Set(d, 1.0F), zero = hn::Zero(d);
   const float *scale = list.scale.data(), *px = list.x.data(), *py = list.y.data(), *pz = list.z.data();
-  for (std::size_t i = 0; i < list.count; ++i) {
+  const auto add = [&](std::size_t i) HWY_ATTR {
     const V s = hn::Set(d, scale[i]), cx = hn::Set(d, px[i]), cy = hn::Set(d, py[i]), cz = hn::Set(d, pz[i]);
     V rest[kParts];
     for (std::size_t p = 0; p < kParts; ++p) {
@@ -149,6 +224,20 @@ std::uint64_t EvaluateTile(const BlobList& list, const std::array<float, 3>& cor
         sum[k][p] = hn::MulAdd(hn::Mul(t, t), t, sum[k][p]);
       }
     }
+  };
+  const auto is_sure = [&]() HWY_ATTR {
+    V least = sum[0][0];
+    for (std::size_t k = 0; k < kTile; ++k) {
+      for (std::size_t p = 0; p < kParts; ++p) least = hn::Min(least, sum[k][p]);
+    }
+    return hn::AllTrue(d, hn::Gt(least, hn::Set(d, sure)));
+  };
+  std::size_t added = 0;
+  for (const BlobPlaces* places : {&tile.near, &tile.far}) {
+    for (std::size_t n = 0; n < places->count; ++n) {
+      add(places->place[n]);
+      if (++added % kBetweenLooks == 0 && added < tile.count() && is_sure()) return {~std::uint64_t{0}, added};
+    }
   }
   const V level = hn::Set(d, iso);
   std::uint64_t inside = 0;
@@ -157,12 +246,65 @@ std::uint64_t EvaluateTile(const BlobList& list, const std::array<float, 3>& cor
       const std::size_t at = k * kPlane + p * kWidth;
       const V f = hn::Sub(sum[k][p], level);
       hn::StoreU(f, d, values + at);
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, hn::Gt(f, zero), bits);
-      inside |= std::uint64_t{static_cast<unsigned>(bits[0]) | static_cast<unsigned>(bits[1]) << 8} << at;
+      inside |= mask_bits(hn::Gt(f, zero)) << at;
     }
   }
-  return inside;
+  return {inside, added};
+}
+
+SureCubes FindSureCubes(const BlobList& list, const std::array<float, 3>& corner, int edge, float iso) {
+  const D d;
+  constexpr int kCubes = 4;
+  constexpr std::size_t kPlane = std::size_t{kCubes} * kCubes, kParts = kPlane / kWidth, kBetweenLooks = 8;
+  // Computed terms differ from exact ones by up to 60 roundings each. A sum of more terms, none negative, is no less.
+  const V level = hn::Set(d, iso + 5e-6F * static_cast<float>(list.near + 1));
+  const float half = 0.5F * static_cast<float>(edge - 1), step = static_cast<float>(edge);
+  alignas(64) float centres[2][kPlane];
+  for (std::size_t i = 0; i < kPlane; ++i) {
+    centres[0][i] = corner[0] + half + step * static_cast<float>(i % kCubes);
+    centres[1][i] = corner[1] + half + step * static_cast<float>(i / kCubes);
+  }
+  V x[kParts], y[kParts], z[kCubes], sum[kCubes][kParts];
+  for (std::size_t p = 0; p < kParts; ++p) {
+    x[p] = hn::Load(d, centres[0] + p * kWidth);
+    y[p] = hn::Load(d, centres[1] + p * kWidth);
+    for (std::size_t k = 0; k < kCubes; ++k) sum[k][p] = hn::Zero(d);
+  }
+  for (std::size_t k = 0; k < kCubes; ++k) z[k] = hn::Set(d, corner[2] + half + step * static_cast<float>(k));
+  const V one = hn::Set(d, 1.0F), zero = hn::Zero(d), around = hn::Set(d, half);
+  const auto least = [&]() HWY_ATTR {
+    V value = sum[0][0];
+    for (std::size_t k = 0; k < kCubes; ++k) {
+      for (std::size_t p = 0; p < kParts; ++p) value = hn::Min(value, sum[k][p]);
+    }
+    return value;
+  };
+  std::size_t i = 0;
+  for (; i < list.near; ++i) {
+    const V s = hn::Set(d, list.scale[i]), cx = hn::Set(d, list.x[i]), cy = hn::Set(d, list.y[i]), cz = hn::Set(d, list.z[i]);
+    const V reach = hn::Mul(s, around);
+    V rest[kParts];
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const V dx = hn::Add(hn::Abs(hn::MulSub(s, x[p], cx)), reach), dy = hn::Add(hn::Abs(hn::MulSub(s, y[p], cy)), reach);
+      rest[p] = hn::NegMulAdd(dy, dy, hn::NegMulAdd(dx, dx, one));
+    }
+    for (std::size_t k = 0; k < kCubes; ++k) {
+      const V dz = hn::Add(hn::Abs(hn::MulSub(s, z[k], cz)), reach);
+      for (std::size_t p = 0; p < kParts; ++p) {
+        const V t = hn::Max(hn::NegMulAdd(dz, dz, rest[p]), zero);
+        sum[k][p] = hn::MulAdd(hn::Mul(t, t), t, sum[k][p]);
+      }
+    }
+    if (i % kBetweenLooks == kBetweenLooks - 1 && hn::AllTrue(d, hn::Gt(least(), level))) return {~std::uint64_t{0}, i + 1};
+    if (i == list.near / 2 && !hn::AllTrue(d, hn::Gt(least(), zero))) return {0, i + 1};
+  }
+  std::uint64_t inside = 0;
+  for (std::size_t k = 0; k < kCubes; ++k) {
+    for (std::size_t p = 0; p < kParts; ++p) {
+      inside |= mask_bits(hn::Gt(sum[k][p], level)) << (k * kPlane + p * kWidth);
+    }
+  }
+  return {inside, i};
 }
 
 /// The potential and S = sum t^2 scale (scale x - centre), so that grad F = -6 S.
@@ -403,7 +545,10 @@ namespace supple::implicit::blobs {
 
 HWY_EXPORT(Gather);
 HWY_EXPORT(Select);
+HWY_EXPORT(SelectNearFirst);
+HWY_EXPORT(SelectTile);
 HWY_EXPORT(EvaluateTile);
+HWY_EXPORT(FindSureCubes);
 HWY_EXPORT(SolveEdges);
 HWY_EXPORT(PlaceVertices);
 HWY_EXPORT(ProjectPoints);
@@ -432,8 +577,22 @@ PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre,
   return HWY_DYNAMIC_DISPATCH(Select)(from, centre, half, list);
 }
 
-std::uint64_t evaluate_tile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values) {
-  return HWY_DYNAMIC_DISPATCH(EvaluateTile)(list, corner, iso, values);
+PotentialBounds select_near_first(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list,
+                                  BlobList& far) {
+  return HWY_DYNAMIC_DISPATCH(SelectNearFirst)(from, centre, half, list, far);
+}
+
+PotentialBounds select_tile(const BlobList& from, const std::array<float, 3>& centre, TileBlobs& tile) {
+  return HWY_DYNAMIC_DISPATCH(SelectTile)(from, centre, tile);
+}
+
+TileSums evaluate_tile(const BlobList& list, const TileBlobs& tile, const std::array<float, 3>& corner, float iso, float sure,
+                       float* values) {
+  return HWY_DYNAMIC_DISPATCH(EvaluateTile)(list, tile, corner, iso, sure, values);
+}
+
+SureCubes find_sure_cubes(const BlobList& list, const std::array<float, 3>& corner, int edge, float iso) {
+  return HWY_DYNAMIC_DISPATCH(FindSureCubes)(list, corner, edge, iso);
 }
 
 void solve_edges(const BlobList& list, float iso, EdgeBatch& edges) {

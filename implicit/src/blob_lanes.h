@@ -22,6 +22,7 @@ inline constexpr std::size_t kLanes = 16;  ///< widest vector; lists may be read
 struct BlobList {
   std::vector<float> scale, x, y, z;
   std::size_t count = 0;
+  std::size_t near = 0;  ///< those that select_near_first has put first
 
   void reserve(std::size_t blobs);
   /// Fills the slots that vectors read beyond the end with blobs that reach nothing.
@@ -49,9 +50,41 @@ struct PotentialBounds {
 [[nodiscard]] PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half,
                                      BlobList& list);
 
-/// F = sum f - iso at the kTileNodes nodes of the tile whose lowest node is `corner`; x fastest.
-/// @return bit per node: F > 0
-std::uint64_t evaluate_tile(const BlobList& list, const std::array<float, 3>& corner, float iso, float* values);
+/// The same, those first whose centre lies within half a radius of the cube: the most of the sum inside a body.
+/// @param far  scratch
+PotentialBounds select_near_first(const BlobList& from, const std::array<float, 3>& centre, float half,
+                                                BlobList& list, BlobList& far);
+
+/// Places of blobs in a list.
+struct BlobPlaces {
+  std::vector<std::uint32_t> place;
+  std::size_t count = 0;
+};
+/// Those that reach a tile; the near ones are the most of the sum inside a body.
+struct TileBlobs {
+  BlobPlaces near, far;
+  [[nodiscard]] std::size_t count() const { return near.count + far.count; }
+};
+/// As select, for the cube of half edge kTile / 2, as places. Near are those whose centre lies within half a radius of it.
+[[nodiscard]] PotentialBounds select_tile(const BlobList& from, const std::array<float, 3>& centre, TileBlobs& tile);
+
+struct TileSums {
+  std::uint64_t inside = 0;   ///< bit per node: F > 0
+  std::size_t added = 0;      ///< blobs; fewer than there are when `sure` was reached
+};
+/// F = sum f - iso at the kTileNodes nodes of the tile whose lowest node is `corner`; x fastest. Near blobs come first.
+/// Ends as soon as the partial sums of all nodes exceed `sure` >= iso: no term is negative and rounding is monotone, so
+/// partial sums never fall and all nodes are inside. `values` is then not written.
+TileSums evaluate_tile(const BlobList& list, const TileBlobs& tile, const std::array<float, 3>& corner, float iso, float sure,
+                       float* values);
+
+struct SureCubes {
+  std::uint64_t inside = 0;  ///< bit per cube, x fastest
+  std::size_t added = 0;     ///< blobs
+};
+/// Which of 4^3 cubes of `edge`^3 nodes are sure to lie inside, by bounds of the near blobs alone: F > 0 at their nodes in
+/// evaluate_tile. None where after half of the blobs some cube has no part in any. @param corner  lowest node
+SureCubes find_sure_cubes(const BlobList& list, const std::array<float, 3>& corner, int edge, float iso);
 
 /// Edges of one tile that the surface crosses.
 struct EdgeBatch {

@@ -605,7 +605,7 @@ struct CubeMesher::Impl {
   double iso = 0.0;
   bool kept = false;  ///< table and mesh are those of the grid's last build
 
-  const Mesh& march(const FieldView& field, const Lattice& lattice, const Executor& executor, MarchCounts& counts);
+  const Mesh& march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
   /// The last mesh, refined.
   const Mesh& refine(int refinements, const Executor& executor, MarchCounts& counts);
 };
@@ -646,7 +646,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   MarchCounts local;
   MarchCounts& count = counts != nullptr ? *counts : local;
   if (options.error == 0.0) {
-    const Mesh& mesh = impl_->march(field, options.lattice, executor, count);
+    const Mesh& mesh = impl_->march(field, options.lattice, options.skip, executor, count);
     return options.refinements == 0 ? mesh : impl_->refine(options.refinements, executor, count);
   }
   constexpr int kRefinements = 2, kHalvings = 6;  // cells of 1/2 to 1/64 of the feature size
@@ -654,7 +654,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   lattice.cell = 0.5 * field.feature_size();
   double found = 0.0;
   for (int halving = 0; halving < kHalvings; ++halving, lattice.cell *= 0.5) {
-    const Mesh& mesh = impl_->march(field, lattice, executor, count);
+    const Mesh& mesh = impl_->march(field, lattice, options.skip, executor, count);
     count.error = found = centroid_error(field, mesh, executor);
     if (found <= options.error) return mesh;
     if (found > std::pow(4.0, kRefinements) * options.error) continue;  // a refinement divides errors by four
@@ -672,14 +672,14 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
                                  .hint = "allow at least " + lattice::three_digits(1.05 * found) + " m"});
 }
 
-const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& lattice, const Executor& executor,
+const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor,
                                     MarchCounts& counts) {
   const Field* points = field.as_field();
   const double level = points != nullptr ? points->packed().iso : 0.0;
   if (!kept || level != iso) grid.forget();
   kept = false;
   iso = level;
-  sampler = march::make_sampler(field, lattice, grid);
+  sampler = march::make_sampler(field, lattice, skip, grid);
   sampler->prepare(executor, table);
   sampler->sample(executor, table);
   march::assemble(table, *sampler, lattice, executor, scratch, mesh);
@@ -693,6 +693,7 @@ const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& latti
     counts.leaves += block.leaf.size();
     counts.leaves_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
     counts.nodes += block.values.size();
+    counts.kernel_values += block.kernel_values;
     counts.bytes += sizeof(march::Block) + block.leaf.capacity() * sizeof(march::Leaf) +
                     block.values.capacity() * sizeof(float) + block.corners.capacity();
   }

@@ -1,7 +1,8 @@
 /// @file march_leaves.h
 /// What marching cubes keeps of a field: blocks of 2^3 leaves of 8^3 nodes, each leaf cut into 2^3 tiles of 4^3 nodes.
-/// A node belongs to one leaf, a cell and an edge to the leaf of its lowest node. A tile holds values unless bounds
-/// show that F keeps one sign on all cells that it owns; then only the sign is known.
+/// A node belongs to one leaf, a cell and an edge to the leaf of its lowest node. A tile holds values unless bounds show
+/// that F keeps one sign on all cells that it owns, or partial sums that it is inside and no node next to it is outside;
+/// then only the sign is known.
 #pragma once
 
 #include <array>
@@ -71,6 +72,15 @@ void for_tile_cells(const Leaf& leaf, unsigned tile, const Use& use) {
   }
 }
 
+/// The tiles of a leaf among those of its block, and one of them.
+[[nodiscard]] constexpr std::uint64_t block_tiles(unsigned slot) {
+  return std::uint64_t{0x330033} << (2 * (slot & 1u) + 8 * (slot >> 1 & 1u) + 32 * (slot >> 2));
+}
+[[nodiscard]] constexpr std::uint64_t block_tile(unsigned slot, unsigned tile) {
+  return std::uint64_t{1} << (2 * (slot & 1u) + 8 * (slot >> 1 & 1u) + 32 * (slot >> 2) + (tile & 1u) +
+                              4 * (tile >> 1 & 1u) + 16 * (tile >> 2));
+}
+
 /// Where a leaf without values lies.
 inline constexpr std::int8_t kOutside = -1, kInside = -2;
 
@@ -82,6 +92,11 @@ struct Block {
   std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, leaf by leaf tile by tile
   std::uint8_t changed = 0;  ///< bit by slot: sampled anew in this call
   bool touched = false;      ///< it or an upper neighbour has changed leaves
+  // Of its 4^3 tiles, bit x + 4 y + 16 z.
+  std::uint64_t outside = ~std::uint64_t{0};  ///< those with nodes outside
+  std::uint64_t early = 0;    ///< those inside by partial sums, whose values nobody needs yet
+  std::uint64_t needed = 0;   ///< of these, those next to a node outside
+  std::uint64_t kernel_values = 0;  ///< taken in this call
 
   /// All outside, memory kept.
   void clear() {
@@ -90,6 +105,8 @@ struct Block {
     values.clear();
     corners.clear();
     changed = 0;
+    outside = ~std::uint64_t{0};
+    early = needed = kernel_values = 0;
   }
   [[nodiscard]] bool uniform() const { return leaf.empty(); }
   [[nodiscard]] blobs::Cells base() const {

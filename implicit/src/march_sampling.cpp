@@ -1,5 +1,7 @@
 #include "march_sampling.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -35,6 +37,21 @@ Plane spread(std::uint64_t tile_plane, int tx, int ty) {
   return rows << tx << (8 * ty);
 }
 
+/// Of a tile in a leaf.
+std::array<int, 3> corner_in(const std::array<int, 3>& leaf_corner, unsigned tile) {
+  const auto at = corner_of(tile, kTile);
+  return {leaf_corner[0] + at[0], leaf_corner[1] + at[1], leaf_corner[2] + at[2]};
+}
+
+/// The signs of a tile, bit x + 4 y + 16 z.
+std::uint64_t tile_inside(const Leaf& leaf, unsigned tile) {
+  std::uint64_t inside = 0;
+  for (std::size_t k = 0; k < kTile; ++k) {
+    inside |= _pext_u64(leaf.inside[kTile * (tile >> 2) + k], tile_plane(tile)) << (16 * k);
+  }
+  return inside;
+}
+
 void set_tile(Leaf& leaf, unsigned tile, std::uint64_t inside) {
   const auto at = corner_of(tile, kTile);
   for (int k = 0; k < kTile; ++k) {
@@ -50,11 +67,85 @@ Vec3 position_of(const Lattice& lattice, const Block& block, int x, int y, int z
   return p;
 }
 
+/// The tiles around those of a block.
+class TileSurroundings {
+ public:
+  TileSurroundings(const BlockTable& table, const Block& block) {
+    for (std::size_t n = 0; n < 27; ++n) {
+      const auto [dx, dy, dz] = step_of(n);
+      around_[n] = table.find({block.coord[0] + dx, block.coord[1] + dy, block.coord[2] + dz});
+      const std::uint64_t outside = around_[n] != nullptr ? around_[n]->outside : ~std::uint64_t{0};
+      if (outside == 0) continue;
+      for (int z = first(dz); z <= last(dz); ++z) {
+        for (int y = first(dy); y <= last(dy); ++y) {
+          const std::uint64_t row = outside >> (4 * y + 16 * z) & 0xfu;
+          const std::uint64_t seen = dx < 0 ? row >> 3 : dx > 0 ? (row & 1u) << 5 : row << 1;
+          outside_[at(z, dz)] |= seen << (kSide * at(y, dy));
+        }
+      }
+    }
+  }
+
+  /// Those of `tiles` that have a node outside one step away, along the axes or diagonals.
+  [[nodiscard]] std::uint64_t next_to_outside(std::uint64_t tiles) const {
+    std::array<std::uint64_t, kSide> near = outside_;
+    for (std::uint64_t& plane : near) {
+      plane |= plane << 1 | plane >> 1;
+      plane |= plane << kSide | plane >> kSide;
+    }
+    std::uint64_t found = 0;
+    for (; tiles != 0; tiles &= tiles - 1) {
+      const int bit = std::countr_zero(tiles), x = bit & 3, y = bit >> 2 & 3, z = bit >> 4;
+      const auto above = static_cast<std::size_t>(z);
+      if (((near[above] | near[above + 1] | near[above + 2]) >> (x + 1 + kSide * (y + 1)) & 1u) == 0) continue;
+      for (std::size_t n = 0; n < 27; ++n) {
+        const auto [dx, dy, dz] = step_of(n);
+        if ((outside_[static_cast<std::size_t>(z + dz + 1)] >> (x + dx + 1 + kSide * (y + dy + 1)) & 1u) == 0) continue;
+        if ((outside_nodes(x + dx, y + dy, z + dz) & facing(dx, dy, dz)) == 0) continue;
+        found |= std::uint64_t{1} << bit;
+        break;
+      }
+    }
+    return found;
+  }
+
+ private:
+  static constexpr int kSide = 6;  // a block's four tiles and one on each side
+  static std::array<int, 3> step_of(std::size_t n) {
+    const int i = static_cast<int>(n);
+    return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+  }
+  static int first(int step) { return step < 0 ? 3 : 0; }
+  static int last(int step) { return step > 0 ? 0 : 3; }
+  static std::size_t at(int tile, int step) { return static_cast<std::size_t>(tile + 4 * step + 1); }
+
+  /// The nodes of a tile that face the tile from which it lies these steps away.
+  static std::uint64_t facing(int dx, int dy, int dz) {
+    std::uint64_t nodes = ~std::uint64_t{0};
+    if (dx != 0) nodes &= dx > 0 ? 0x1111111111111111u : 0x8888888888888888u;
+    if (dy != 0) nodes &= dy > 0 ? 0x000f000f000f000fu : 0xf000f000f000f000u;
+    if (dz != 0) nodes &= dz > 0 ? 0xffffu : std::uint64_t{0xffff} << 48;
+    return nodes;
+  }
+  [[nodiscard]] std::uint64_t outside_nodes(int x, int y, int z) const {
+    const auto step = [](int tile) { return static_cast<std::size_t>((tile + 4) >> 2); };
+    const Block* block = around_[step(x) + 3 * step(y) + 9 * step(z)];
+    if (block == nullptr) return ~std::uint64_t{0};
+    const auto bits = [](int a, int b, int c) { return static_cast<unsigned>((a & 1) | (b & 1) << 1 | (c & 1) << 2); };
+    const std::int8_t index = block->leaf_of[bits(x >> 1, y >> 1, z >> 1)];
+    if (index < 0) return index == kInside ? 0 : ~std::uint64_t{0};
+    return ~tile_inside(block->leaf[static_cast<std::size_t>(index)], bits(x, y, z));
+  }
+
+  std::array<const Block*, 27> around_{};
+  std::array<std::uint64_t, kSide> outside_{};  ///< tiles with nodes outside, bit x + 6 y
+};
+
 /// Bodies of Wyvill points, in single precision.
 class BlobSampler final : public Sampler {
  public:
-  BlobSampler(const Field::Index& index, const Lattice& lattice, blobs::BlobGrid& grid)
-      : index_(index), lattice_(lattice), iso_(static_cast<float>(index.iso)), grid_(grid) {}
+  BlobSampler(const Field::Index& index, const Lattice& lattice, bool skip, blobs::BlobGrid& grid)
+      : index_(index), lattice_(lattice), skip_(skip), iso_(static_cast<float>(index.iso)), grid_(grid) {}
 
   void prepare(const Executor&, BlockTable& table) override {
     grid_.build(index_.primitive, lattice_);
@@ -67,10 +158,13 @@ class BlobSampler final : public Sampler {
 
   void sample(const Executor& executor, BlockTable& table) override {
     const std::vector<std::uint32_t> blocks = grid_.change().all ? all_blocks(table) : changed_blocks(table);
+    // A node that touches one outside lies a cell's slope above the iso value at most, but for rare places.
+    sure_ = skip_ ? iso_ + static_cast<float>(kSteepest / grid_.reach()) : std::numeric_limits<float>::infinity();
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
       Workspace& work = Workspace::of_thread();
       for (std::size_t i = begin; i < end; ++i) sample_block(table.block[blocks[i]], work);
     });
+    if (skip_) evaluate_needed(executor, table);
   }
 
   void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const override {
@@ -87,8 +181,7 @@ class BlobSampler final : public Sampler {
         if ((leaf.active >> tile & 1u) == 0) continue;
         const std::uint32_t count = leaf.tile_vertex[tile + 1] - leaf.tile_vertex[tile];
         if (count == 0) continue;
-        const auto at = corner_of(tile, kTile);
-        const std::array<int, 3> tile_corner{corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]};
+        const auto tile_corner = corner_in(corner, tile);
         collect_edges(table, block, leaf, tile, corner, work.edges);
         (void)blobs::select(work.leaf, centre_of(tile_corner, kTile), 0.5F * kTile, work.tile);
         blobs::solve_edges(work.tile, iso_, work.edges);
@@ -122,8 +215,7 @@ class BlobSampler final : public Sampler {
                           work.around_leaf);
       work.near_leaf = &leaf;
     }
-    const auto at = corner_of(tile, kTile);
-    (void)blobs::select(work.around_leaf, centre_of({corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]}, kTile),
+    (void)blobs::select(work.around_leaf, centre_of(corner_in(corner, tile), kTile),
                         0.5F * kTile + static_cast<float>(kAround), work.tile);
     blobs::project_points(work.tile, iso_, placement_of(block), points.data()->data(), normals.data()->data(),
                           points.size(), work.near);
@@ -133,7 +225,9 @@ class BlobSampler final : public Sampler {
 
  private:
   struct Workspace {
-    BlobList block, leaf, tile, near;
+    blobs::TileBlobs tile_blobs;
+    BlobList gathered, block, leaf, tile, near, far;
+    std::uint64_t sure = 0;                // tiles of the block at work that are sure to be inside
     BlobList around_block, around_leaf;    // of the block and leaf that points were last projected near
     const Block* near_block = nullptr;
     const Leaf* near_leaf = nullptr;
@@ -163,10 +257,9 @@ class BlobSampler final : public Sampler {
   static void collect_edges(const BlockTable& table, const Block& block, const Leaf& leaf, unsigned tile,
                             const std::array<int, 3>& corner, blobs::EdgeBatch& edges) {
     const float* values = tile_values(block, leaf, tile);
-    const auto at = corner_of(tile, kTile);
     std::array<const float*, 3> next{};  // of the tiles above
     for (unsigned axis = 0; axis < 3; ++axis) {
-      std::array<int, 3> above{corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]};
+      std::array<int, 3> above = corner_in(corner, tile);
       above[axis] += kTile;
       next[axis] = tile_at(table, block, above[0], above[1], above[2]);
     }
@@ -220,7 +313,10 @@ class BlobSampler final : public Sampler {
 
   /// Marks the leaves whose closed boxes meet what has changed; a leaf's box ends at the next leaf's first node.
   [[nodiscard]] std::vector<std::uint32_t> changed_blocks(BlockTable& table) const {
-    for (Block& block : table.block) block.changed = 0;
+    for (Block& block : table.block) {
+      block.changed = 0;
+      block.kernel_values = 0;
+    }
     for (const blobs::BlobGrid::Ball& ball : grid_.change().balls) {
       blobs::CellBox cells;
       for (std::size_t k = 0; k < 3; ++k) {
@@ -261,70 +357,222 @@ class BlobSampler final : public Sampler {
 
   /// Samples the marked leaves; the others are kept.
   void sample_block(Block& block, Workspace& work) const {
+    gather(block, work);
+    work.sure = 0;
+    if (skip_ && grid_.reach() >= kSureTiles && work.block.count > 0) {
+      const blobs::SureCubes sure = blobs::find_sure_cubes(work.block, {0.0F, 0.0F, 0.0F}, kTile, iso_);
+      block.kernel_values += kTileNodes * sure.added;
+      work.sure = sure.inside;
+    }
+    rebuild(block, work, [&](unsigned slot, const Leaf* old) {
+      if ((block.changed >> slot & 1u) == 0) {
+        if (old != nullptr) keep_leaf(block, *old, 0, work);
+        return;
+      }
+      block.leaf_of[slot] = kOutside;
+      block.outside |= block_tiles(slot);
+      block.early &= ~block_tiles(slot);
+      if (work.block.count > 0) sample_leaf(block, slot, work);
+    });
+  }
+
+  void gather(const Block& block, Workspace& work) const {
+    if (grid_.reach() < kSureTiles) {
+      grid_.gather(block.base(), kBlockNodes, 0, work.block);
+      return;
+    }
+    grid_.gather(block.base(), kBlockNodes, 0, work.gathered);
+    blobs::select_near_first(work.gathered, centre_of({0, 0, 0}, kBlockNodes), 0.5F * kBlockNodes, work.block, work.far);
+  }
+
+  [[nodiscard]] Verdict select_leaf(const std::array<int, 3>& corner, Workspace& work) const {
+    const auto centre = centre_of(corner, kLeafNodes);
+    return verdict(grid_.reach() < kSureCubes
+                       ? blobs::select(work.block, centre, 0.5F * kLeafNodes, work.leaf)
+                       : blobs::select_near_first(work.block, centre, 0.5F * kLeafNodes, work.leaf, work.far));
+  }
+  [[nodiscard]] Verdict select_tile(const std::array<int, 3>& corner, Workspace& work) const {
+    return verdict(blobs::select_tile(work.leaf, centre_of(corner, kTile), work.tile_blobs));
+  }
+
+  /// Calls make(slot, leaf of the last call or null), which may add a leaf to those at work.
+  template <class Make>
+  void rebuild(Block& block, Workspace& work, const Make& make) const {
     const auto old_leaf_of = block.leaf_of;
     work.leaves.clear();
     work.values.clear();
-    grid_.gather(block.base(), kBlockNodes, 0, work.block);
     for (unsigned slot = 0; slot < 8; ++slot) {
-      if ((block.changed >> slot & 1u) != 0) {
-        block.leaf_of[slot] = kOutside;
-        if (work.block.count > 0) sample_leaf(block, slot, work);
-      } else if (old_leaf_of[slot] >= 0) {
-        block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size());
-        Leaf& leaf = work.leaves.emplace_back(block.leaf[static_cast<std::size_t>(old_leaf_of[slot])]);
-        const auto from = block.values.begin() + static_cast<std::ptrdiff_t>(leaf.first_tile * kTileNodes);
-        leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
-        work.values.insert(work.values.end(), from,
-                           from + static_cast<std::ptrdiff_t>(kTileNodes * static_cast<std::size_t>(std::popcount(leaf.active))));
-      }
+      make(slot, old_leaf_of[slot] >= 0 ? &block.leaf[static_cast<std::size_t>(old_leaf_of[slot])] : nullptr);
     }
     block.leaf.resize(work.leaves.size());
     std::copy(work.leaves.begin(), work.leaves.end(), block.leaf.begin());
     block.values.assign(work.values.begin(), work.values.end());
   }
 
+  /// Adds a leaf as it was, with values for `more` of its tiles where bounds do not decide them.
+  void keep_leaf(Block& block, const Leaf& old, unsigned more, Workspace& work) const {
+    const auto corner = corner_of(old.slot, kLeafNodes);
+    if (more != 0 && select_leaf(corner, work) != Verdict::Unknown) more = 0;
+    Leaf& leaf = work.leaves.emplace_back(old);
+    leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
+    for (unsigned tile = 0; tile < 8; ++tile) {
+      const std::size_t first = work.values.size();
+      if ((old.active >> tile & 1u) != 0) {
+        const float* values = tile_values(block, old, tile);
+        work.values.insert(work.values.end(), values, values + kTileNodes);
+      } else if ((more >> tile & 1u) != 0) {
+        const auto tile_corner = corner_in(corner, tile);
+        if (select_tile(tile_corner, work) != Verdict::Unknown) continue;
+        work.values.resize(first + kTileNodes);
+        block.kernel_values += kTileNodes * work.tile_blobs.count();
+        blobs::evaluate_tile(work.leaf, work.tile_blobs, point(tile_corner), iso_, std::numeric_limits<float>::infinity(),
+                             work.values.data() + first);
+        leaf.active = static_cast<std::uint8_t>(leaf.active | 1u << tile);
+      }
+    }
+    finish_leaf(block, work);
+  }
+
+  /// The leaf made last stays when something in it is needed.
+  static void finish_leaf(Block& block, Workspace& work) {
+    const Leaf& leaf = work.leaves.back();
+    if (leaf.active == 0 && is_uniform(leaf)) {
+      block.leaf_of[leaf.slot] = leaf.inside[0] != 0 ? kInside : kOutside;
+      work.leaves.pop_back();
+    } else {
+      block.leaf_of[leaf.slot] = static_cast<std::int8_t>(work.leaves.size() - 1);
+    }
+  }
+
+  static std::array<float, 3> point(const std::array<int, 3>& node) {
+    return {static_cast<float>(node[0]), static_cast<float>(node[1]), static_cast<float>(node[2])};
+  }
+
+  static void set_inside(Block& block, unsigned slot) {
+    block.leaf_of[slot] = kInside;
+    block.outside &= ~block_tiles(slot);
+  }
+
   void sample_leaf(Block& block, unsigned slot, Workspace& work) const {
-    const auto corner = corner_of(slot, kLeafNodes);
-    const auto centre = centre_of(corner, kLeafNodes);
-    const Verdict whole = verdict(blobs::select(work.block, centre, 0.5F * kLeafNodes, work.leaf));
-    if (whole != Verdict::Unknown) {
-      block.leaf_of[slot] = whole == Verdict::Inside ? kInside : kOutside;
+    const std::uint64_t own = block_tiles(slot);
+    if ((work.sure & own) == own) {
+      block.early |= own;
+      set_inside(block, slot);
       return;
+    }
+    const auto corner = corner_of(slot, kLeafNodes);
+    const Verdict whole = select_leaf(corner, work);
+    if (whole != Verdict::Unknown) {
+      block.leaf_of[slot] = kOutside;
+      if (whole == Verdict::Inside) set_inside(block, slot);
+      return;
+    }
+    std::uint64_t sure = 0;  // of its cubes of 2^3 nodes
+    if (skip_ && grid_.reach() >= kSureCubes) {
+      const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(corner), kTile / 2, iso_);
+      block.kernel_values += kTileNodes * cubes.added;
+      sure = cubes.inside;
     }
     Leaf& leaf = work.leaves.emplace_back();
     leaf.slot = static_cast<std::uint8_t>(slot);
     leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
-    bool inside = false;
     for (unsigned tile = 0; tile < 8; ++tile) {
-      const auto at = corner_of(tile, kTile);
-      const std::array<int, 3> tile_corner{corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]};
-      const auto tile_centre = centre_of(tile_corner, kTile);
-      const Verdict here = verdict(blobs::select(work.leaf, tile_centre, 0.5F * kTile, work.tile));
-      if (here != Verdict::Unknown) {
-        inside = here == Verdict::Inside;
-        set_tile(leaf, tile, inside ? ~std::uint64_t{0} : 0);
-        continue;
+      const std::uint64_t bit = block_tile(slot, tile);
+      std::uint64_t inside = ~std::uint64_t{0};
+      if ((work.sure & bit) != 0 || (~sure & block_tiles(tile)) == 0) {
+        block.early |= bit;
+      } else {
+        inside = sample_tile(block, leaf, tile, work);
       }
-      const std::size_t first = work.values.size();
-      work.values.resize(first + kTileNodes);
-      set_tile(leaf, tile,
-               blobs::evaluate_tile(work.tile,
-                                    {static_cast<float>(tile_corner[0]), static_cast<float>(tile_corner[1]),
-                                     static_cast<float>(tile_corner[2])},
-                                    iso_, work.values.data() + first));
+      set_tile(leaf, tile, inside);
+      if (inside == ~std::uint64_t{0}) block.outside &= ~bit;
+    }
+    finish_leaf(block, work);
+  }
+
+  /// @return bit per node: F > 0
+  std::uint64_t sample_tile(Block& block, Leaf& leaf, unsigned tile, Workspace& work) const {
+    const auto corner = corner_in(corner_of(leaf.slot, kLeafNodes), tile);
+    const Verdict here = select_tile(corner, work);
+    if (here != Verdict::Unknown) return here == Verdict::Inside ? ~std::uint64_t{0} : 0;
+    const std::size_t first = work.values.size();
+    work.values.resize(first + kTileNodes);
+    const blobs::TileSums sums = blobs::evaluate_tile(work.leaf, work.tile_blobs, point(corner), iso_, sure_, work.values.data() + first);
+    block.kernel_values += kTileNodes * sums.added;
+    if (sums.added < work.tile_blobs.count()) {
+      work.values.resize(first);
+      block.early |= block_tile(leaf.slot, tile);
+    } else {
       leaf.active = static_cast<std::uint8_t>(leaf.active | 1u << tile);
     }
-    if (leaf.active == 0) {
-      block.leaf_of[slot] = inside ? kInside : kOutside;
-      work.leaves.pop_back();
-      return;
-    }
-    block.leaf_of[slot] = static_cast<std::int8_t>(work.leaves.size() - 1);
+    return sums.inside;
   }
+
+  static bool is_uniform(const Leaf& leaf) {
+    return (leaf.inside[0] == 0 || leaf.inside[0] == ~Plane{0}) &&
+           std::all_of(leaf.inside.begin(), leaf.inside.end(), [&](Plane plane) { return plane == leaf.inside[0]; });
+  }
+
+  /// Gives values to the tiles whose sums ended early where a node next to them is outside.
+  void evaluate_needed(const Executor& executor, BlockTable& table) const {
+    std::vector<std::uint32_t> blocks;
+    for (std::size_t b = 0; b < table.block.size(); ++b) {
+      if (table.block[b].early != 0) blocks.push_back(static_cast<std::uint32_t>(b));
+    }
+    // Signs of all blocks are read before a block is written.
+    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        Block& block = table.block[blocks[i]];
+        block.needed = TileSurroundings(table, block).next_to_outside(block.early);
+      }
+    });
+    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      Workspace& work = Workspace::of_thread();
+      for (std::size_t i = begin; i < end; ++i) {
+        if (table.block[blocks[i]].needed != 0) evaluate_needed(table.block[blocks[i]], work);
+      }
+    });
+  }
+
+  void evaluate_needed(Block& block, Workspace& work) const {
+    gather(block, work);
+    rebuild(block, work, [&](unsigned slot, const Leaf* old) {
+      unsigned more = 0;
+      for (unsigned tile = 0; tile < 8; ++tile) more |= (block.needed & block_tile(slot, tile)) != 0 ? 1u << tile : 0u;
+      if (old != nullptr) {
+        keep_leaf(block, *old, more, work);
+      } else if (more != 0) {
+        keep_leaf(block, whole_leaf(block, slot, work), more, work);
+      }
+    });
+    block.early &= ~block.needed;
+  }
+
+  /// A leaf inside, numbered as if it had been in the last mesh: without vertices, behind the leaf before it.
+  static Leaf whole_leaf(const Block& block, unsigned slot, const Workspace& work) {
+    Leaf leaf;
+    leaf.slot = static_cast<std::uint8_t>(slot);
+    leaf.inside.fill(~Plane{0});
+    const auto after = std::find_if(block.leaf.begin(), block.leaf.end(), [&](const Leaf& l) { return l.slot > slot; });
+    if (!work.leaves.empty()) {
+      leaf.first_vertex = work.leaves.back().first_vertex + work.leaves.back().vertices;
+      leaf.first_triangle = work.leaves.back().first_triangle + work.leaves.back().triangles;
+    } else if (after != block.leaf.end()) {
+      leaf.first_vertex = after->first_vertex;
+      leaf.first_triangle = after->first_triangle;
+    }
+    return leaf;
+  }
+
+  /// Largest slope of a sum of Wyvill points next to its surface, times their radius.
+  static constexpr double kSteepest = 3.5;
+  /// Radii in cells from which bounds show that cubes of 2^3 and of 4^3 nodes lie inside.
+  static constexpr double kSureCubes = 5.0, kSureTiles = 9.0;
 
   const Field::Index& index_;
   Lattice lattice_;
-  float iso_;
+  bool skip_;
+  float iso_, sure_ = 0.0F;
   blobs::BlobGrid& grid_;
 };
 
@@ -506,12 +754,12 @@ class ViewSampler final : public Sampler {
 
 }  // namespace
 
-std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, blobs::BlobGrid& grid) {
+std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip, blobs::BlobGrid& grid) {
   SUPPLE_EXPECTS(std::isfinite(lattice.cell) && lattice.cell > 0.0 && lattice.origin.allFinite());
   if (const Field* points = field.as_field()) {
     const Field::Index& index = points->packed();
     if (index.size() > 0 && index.uniform && index.primitive[0].kind == PackedKind::PointWyvill && !index.blend.active()) {
-      return std::make_unique<BlobSampler>(index, lattice, grid);
+      return std::make_unique<BlobSampler>(index, lattice, skip, grid);
     }
   }
   return std::make_unique<ViewSampler>(field, lattice);

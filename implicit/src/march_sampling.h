@@ -34,7 +34,8 @@ class Sampler {
 
 /// In single precision for a body of Wyvill points, through the view for any other.
 /// @param grid  kept by the caller, for its memory
-[[nodiscard]] std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice,
+/// @param skip  whether sums may end early where they are sure to be inside
+[[nodiscard]] std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip,
                                                     blobs::BlobGrid& grid);
 
 /// Values of the tile that holds a node of the block or beyond its upper faces, null where there are none.

@@ -460,7 +460,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
       profile.present += 8 * marched.blocks;
       continue;
     }
-    surfaces[i] = frame.mesher[i].make(frame.field[i], {.lattice = lattice, .error = model.meshing.error.value_or(0.0)},
+    surfaces[i] = frame.mesher[i].make(frame.field[i], {.lattice = lattice, .error = model.meshing.error.value_or(0.0), .skip = context.skip},
                                        context.executor, &marched);
     profile.visited += marched.leaves;
     profile.present += 8 * marched.blocks;

@@ -15,6 +15,7 @@
 #include <cstdio>
 #include <ctime>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -300,7 +301,8 @@ void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n
   const auto iso = static_cast<float>(field.packed().iso);
   blobs::BlobGrid grid;
   grid.build(field.packed().primitive, lattice);
-  blobs::BlobList block, leaf, tile;
+  blobs::BlobList block, leaf;
+  blobs::TileBlobs tile;
   alignas(64) float tile_values[blobs::kTileNodes];
   const auto for_corners = [](int edge, const auto& at) {
     for (int c = 0; c < 8; ++c) at(edge * (c & 1), edge * (c >> 1 & 1), edge * (c >> 2));
@@ -318,9 +320,9 @@ void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n
           if (leaf.count == 0) return;
           for_corners(4, [&](int tx, int ty, int tz) {
             const int x0 = lx + tx, y0 = ly + ty, z0 = lz + tz;
-            (void)blobs::select(leaf, centre(x0, y0, z0, 2.0F), 2.0F, tile);
-            if (tile.count == 0) return;
-            blobs::evaluate_tile(tile, centre(x0, y0, z0, 0.0F), iso, tile_values);
+            (void)blobs::select_tile(leaf, centre(x0, y0, z0, 2.0F), tile);
+            if (tile.count() == 0) return;
+            blobs::evaluate_tile(leaf, tile, centre(x0, y0, z0, 0.0F), iso, std::numeric_limits<float>::infinity(), tile_values);
             use(bx + x0, by + y0, bz + z0, tile_values);
           });
         });
@@ -333,7 +335,7 @@ void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n
 double sample_seconds(const Field& field, const Lattice& lattice, blobs::BlobGrid& kept, march::BlockTable& table) {
   const Executor executor(1);
   const double begin = cpu_seconds();
-  const auto sampler = march::make_sampler(field, lattice, kept);
+  const auto sampler = march::make_sampler(field, lattice, true, kept);
   sampler->prepare(executor, table);
   sampler->sample(executor, table);
   return cpu_seconds() - begin;

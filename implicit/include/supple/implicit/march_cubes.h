@@ -21,6 +21,7 @@ struct MarchCounts {
   std::uint64_t leaves = 0;         ///< leaves of 8^3 nodes that hold values
   std::uint64_t leaves_sampled = 0; ///< places of leaves that were looked at in this call
   std::uint64_t nodes = 0;          ///< values held
+  std::uint64_t kernel_values = 0;  ///< terms of the sums on nodes that this call took, in single precision
   std::uint64_t bytes = 0;          ///< held besides the mesh
   bool single_precision = false;    ///< the body is nothing but Wyvill points
   double cell = 0.0;                ///< edge of a cell that was used [m]
@@ -38,6 +39,8 @@ struct MarchOptions {
   /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
   /// chosen: cells of half the field's feature size, halved until at most two refinements do, see `make`.
   double error = 0.0;
+  /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them. Changes no bit.
+  bool skip = true;
 };
 
 /// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh of Wyvill points
