@@ -177,6 +177,7 @@ const Field::Index& Field::index() const {
   if (!index.built.load(std::memory_order_acquire)) {
     const std::lock_guard lock(index.build_mutex);
     if (!index.built.load(std::memory_order_relaxed)) {
+      index.pack_balls();
       index.build_leaves();
       index.build_levels();
       index.built.store(true, std::memory_order_release);
@@ -342,7 +343,7 @@ Mat3 Field::hessian(const Vec3& point) const {
     }
     return 0.5 * (sum + sum.transpose());
   }
-  for (std::size_t i = 0; i < index_->size(); ++i) sum += primitive_hessian(*index_, i, point);
+  for (std::size_t i = 0; i < index_->size(); ++i) sum += primitive_hessian(index(), i, point);
   return sum;
 }
 

@@ -118,6 +118,25 @@ void set_box(NodePack& pack, std::size_t slot, const Box& box) noexcept {
 
 }  // namespace
 
+void Field::Index::pack_balls() {
+  if (ball_radius.empty()) return;
+  const std::size_t n = size();
+  shape.resize(n);
+  rounded.resize(n);
+  support.resize(n);
+  double extent = 0.0;
+  Primitive ball;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (ball.kernel.radius != ball_radius[i]) ball.kernel = Kernel::wyvill(ball_radius[i]);
+    const Vec3 position(primitive[i].position[0], primitive[i].position[1], primitive[i].position[2]);
+    PackedPrimitive same;
+    pack(ball, nullptr, position, Mat3::Identity(), same, shape[i], rounded[i]);
+    support[i] = placed_support(ball, position, Mat3::Identity());
+    extent += support[i].extent().sum();
+  }
+  typical_extent = extent / (3.0 * static_cast<double>(n));
+}
+
 void Field::Index::build_leaves() {
   const std::size_t n = size();
   order.resize(n);
@@ -218,15 +237,34 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   index.iso = skeleton.iso;
   index.blend.assign(skeleton.blend, skeleton.part_count);
   index.primitive.resize(n);
-  index.shape.resize(n);
-  index.rounded.resize(n);
-  index.support.assign(placed.support.begin(), placed.support.end());
   index.feature_size = kInfinity;
   index.uniform = true;
   index.convolved = false;
   index.surface_box.reset();
-  double extent = 0.0;
+  index.core_radius.reset();
   index.control.clear();
+  index.ball_radius.clear();
+  index.built.store(false, std::memory_order_release);
+  if (placed.radius.size() == n && n > Field::Index::kScanLimit && !index.blend.active()) {
+    index.ball_radius = placed.radius;
+    double last = 0.0, inverse_r2 = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double R = placed.radius[i];
+      if (R != last) {
+        inverse_r2 = 1.0 / (R * R);
+        index.feature_size = std::min(index.feature_size, R);
+        last = R;
+      }
+      const Vec3& at = placed.position[i];
+      index.primitive[i] = {.position = {at.x(), at.y(), at.z()}, .inverse_r2 = inverse_r2, .gradient_factor = -6.0 / (R * R),
+                            .kind = PackedKind::PointWyvill, .part = skeleton.primitive[i].part};
+    }
+    return;
+  }
+  index.shape.resize(n);
+  index.rounded.resize(n);
+  index.support.assign(placed.support.begin(), placed.support.end());
+  double extent = 0.0;
   for (const Primitive& p : skeleton.primitive) index.control.insert(index.control.end(), p.control.begin(), p.control.end());
   const Vec3* control = index.control.data();
   for (std::size_t i = 0; i < n; ++i) {
@@ -238,12 +276,10 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
     index.convolved = index.convolved || skeleton.primitive[i].convolved;
     extent += placed.support[i].extent().sum();
   }
-  index.core_radius.reset();
   if (has_convex_core(skeleton) && evaluate(skeleton.primitive[0].kernel, 0.0).value > skeleton.iso) {
     index.core_radius = iso_distance(skeleton.primitive[0].kernel, skeleton.iso);
   }
   index.typical_extent = n > 0 ? extent / (3.0 * static_cast<double>(n)) : 0.0;
-  index.built.store(false, std::memory_order_release);
 }
 
 }  // namespace supple::implicit

@@ -85,6 +85,8 @@ struct Field::Index {
   bool cull = true;
   bool uniform = true;          ///< all primitives are of one kind
   bool convolved = false;       ///< some primitive is a convolution
+  /// Of many Wyvill points only their places are packed at once; shapes, rounded boxes and supports follow with the hierarchy.
+  std::vector<double> ball_radius;
   BlendIndex blend;
   std::optional<double> core_radius;  ///< of a convex body: from its core to the surface [m]
   std::vector<PackedPrimitive> primitive;  ///< by id
@@ -110,6 +112,7 @@ struct Field::Index {
   std::atomic<bool> built{false};
   std::mutex build_mutex;
 
+  void pack_balls();
   void build_leaves();
   void build_levels();
 };

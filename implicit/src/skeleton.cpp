@@ -220,27 +220,54 @@ bool has_convex_core(const Skeleton& skeleton) noexcept {
   return false;
 }
 
+namespace {
+
+/// Turned alike in all directions.
+bool is_wyvill_ball(const Primitive& p) noexcept {
+  return p.shape == ShapeKind::Point && p.kernel.kind == KernelKind::Wyvill && p.stretch == Vec3::Ones() && !p.convolved;
+}
+
+Box with_slack(const Box& own, const Vec3& position) noexcept {
+  const double reach = std::max(-own.lower.minCoeff(), own.upper.maxCoeff());
+  const Vec3 slack = Vec3::Constant(1e-12 * reach) + 1e-15 * position.cwiseAbs();
+  return {position + own.lower - slack, position + own.upper + slack};
+}
+
+}  // namespace
+
+Box placed_support(const Primitive& primitive, const Vec3& position, const Mat3& rotation) noexcept {
+  return with_slack(support_of(primitive, rotation).whole, position);
+}
+
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out) {
   SUPPLE_EXPECTS(parts.size() == skeleton.part_count);
   const std::size_t n = skeleton.primitive.size();
   out.position.resize(n);
   out.rotation.resize(n);
   out.support.resize(n);
+  out.radius.resize(n);
+  bool balls = true;
   for (std::size_t i = 0; i < n; ++i) {
     const Primitive& primitive = skeleton.primitive[i];
     SUPPLE_EXPECTS(primitive.part < parts.size());
-    SUPPLE_EXPECTS(well_formed(primitive));
     const Pose& part = parts[primitive.part];
     const Vec3 position = part.to_world(primitive.offset.position);
-    const Mat3 rotation = part.orientation.toRotationMatrix() * primitive.offset.orientation.toRotationMatrix();
+    const Mat3 rotation = primitive.offset.orientation.coeffs() == Quat::Identity().coeffs()
+                              ? part.orientation.toRotationMatrix()
+                              : Mat3(part.orientation.toRotationMatrix() * primitive.offset.orientation.toRotationMatrix());
     out.position[i] = position;
     out.rotation[i] = rotation;
-    Box box = support_of(primitive, rotation).whole;
-    // Wider than f's round-off, so that what lies outside is exactly zero.
-    const double reach = std::max(-box.lower.minCoeff(), box.upper.maxCoeff());
-    const Vec3 slack = Vec3::Constant(1e-12 * reach) + 1e-15 * position.cwiseAbs();
-    out.support[i] = {position + box.lower - slack, position + box.upper + slack};
+    const double R = out.radius[i] = primitive.kernel.radius;
+    if (is_wyvill_ball(primitive)) {
+      SUPPLE_EXPECTS(R > 0.0 && primitive.taper > 0.0);
+      out.support[i] = with_slack({Vec3::Constant(-R), Vec3::Constant(R)}, position);
+      continue;
+    }
+    balls = false;
+    SUPPLE_EXPECTS(well_formed(primitive));
+    out.support[i] = placed_support(primitive, position, rotation);
   }
+  if (!balls) out.radius.clear();
 }
 
 bool well_formed(const Primitive& p) noexcept {

@@ -97,7 +97,11 @@ struct PlacedSkeleton {
   std::vector<Vec3> position;  ///< origin of the primitive [m], shape [primitives]
   std::vector<Mat3> rotation;  ///< primitive frame -> world, shape [primitives]
   std::vector<Box> support;    ///< box of {f_k > 0} [m], shape [primitives]
+  std::vector<double> radius;  ///< R where all are unstretched points with Wyvill's kernel, else empty [m]
 };
+
+/// Box of {f > 0} of a primitive placed in the world, wider than the round-off of f: what lies outside is exactly zero.
+[[nodiscard]] Box placed_support(const Primitive& primitive, const Vec3& position, const Mat3& rotation) noexcept;
 
 /// Stage 2. @param parts  world poses of the body's parts, shape [part_count]
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out);
