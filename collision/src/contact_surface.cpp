@@ -106,6 +106,7 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
     }
     add_sums(polar_.sums(), frame->origin, out.summary);
     out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
+    out.summary.kinks += polar_.kinks();
     if (frame->peak > largest_before) {
       out.summary.largest_pressure = frame->peak;
       out.summary.largest_overlap = polar_.thickness();

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "supple/collision/bodies.h"
+#include "supple/implicit/field.h"
+#include "supple/implicit/kinks.h"
 
 namespace supple::collision {
 
@@ -53,6 +55,13 @@ class PairPressure {
     field_[side].evaluate(points, values);
     for (double& v : values) v *= modulus_[side];
     evaluations_ += points.size();
+  }
+
+  /// Appends where derivatives of either pressure jump, as far as the fields tell.
+  void kinks(const Box& box, std::vector<implicit::Kink>& out) const {
+    for (const implicit::FieldView& view : field_) {
+      if (const implicit::Field* field = view.as_field()) kinks_of(*field, box, out);
+    }
   }
 
   [[nodiscard]] double modulus(int side) const noexcept { return modulus_[side]; }

@@ -27,6 +27,13 @@ struct PatchSums {
     load += weight * pressure;
     area += weight;
   }
+  void add(const PatchSums& other) {
+    force += other.force;
+    moment += other.moment;
+    first += other.first;
+    load += other.load;
+    area += other.area;
+  }
   [[nodiscard]] Vec3 centre() const { return load > 0.0 ? Vec3(first / load) : Vec3::Zero().eval(); }
 };
 

@@ -14,6 +14,7 @@ constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so t
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
+constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
 constexpr double kSafetyAtFirst = 2.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
@@ -26,17 +27,19 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 void PolarRuleSolver::start_rim(const PolarRule& rule, bool first) {
   const auto n = static_cast<std::size_t>(rule.angular);
   if (!first) {
-    coarse_radius_.swap(rim_radius_);
-    coarse_height_.swap(rim_height_);
+    coarse_radius_.swap(rim_.radius);
+    coarse_height_.swap(rim_.height);
   }
-  rim_radius_.resize(n);
-  rim_height_.resize(n);
+  rim_.cosine = rule.cosine;
+  rim_.sine = rule.sine;
+  rim_.radius.resize(n);
+  rim_.height.resize(n);
   const std::size_t coarse = coarse_radius_.size();
   for (std::size_t k = 0; k < n; ++k) {
     if (first) {
       const double c = rule.cosine[k], s = rule.sine[k];
-      rim_radius_[k] = std::sqrt(2.0 * frame_.peak);
-      rim_height_[k] = frame_.peak * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+      rim_.radius[k] = std::sqrt(2.0 * frame_.peak);
+      rim_.height[k] = frame_.peak * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
       continue;
     }
     double radius = 0.0, height = 0.0;
@@ -45,14 +48,14 @@ void PolarRuleSolver::start_rim(const PolarRule& rule, bool first) {
       radius += row[j] * coarse_radius_[j];
       height += row[j] * coarse_height_[j];
     }
-    rim_radius_[k] = radius;
-    rim_height_[k] = height;
+    rim_.radius[k] = radius;
+    rim_.height[k] = height;
   }
 }
 
-bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, double error) {
-  const auto n = static_cast<std::size_t>(rule.angular);
-  rim_.resize(n);
+bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error) {
+  const std::size_t n = rays.size();
+  rim_batch_.resize(n);
   low_.assign(n, 0.0);
   high_.assign(n, std::numeric_limits<double>::infinity());
   done_.assign(n, 0);
@@ -62,22 +65,22 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, d
   rim_error_ = 0.0;
   for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
     for (std::size_t k = 0; k < n; ++k) {
-      const Vec3 e = rule.cosine[k] * frame_.u + rule.sine[k] * frame_.v;
-      rim_.point[k] = frame_.origin + rim_radius_[k] * e + rim_height_[k] * frame_.axis;
+      const Vec3 e = direction(rays.cosine[k], rays.sine[k]);
+      rim_batch_.point[k] = frame_.origin + rays.radius[k] * e + rays.height[k] * frame_.axis;
     }
-    pressure.evaluate(rim_);
+    pressure.evaluate(rim_batch_);
     for (std::size_t k = 0; k < n; ++k) {
       if (done_[k] != 0) continue;
-      const Vec3 e = rule.cosine[k] * frame_.u + rule.sine[k] * frame_.v;
-      const Vec3 &ga = rim_.slope_a[k], &gb = rim_.slope_b[k];
-      const double a = rim_.a[k], b = rim_.b[k];
+      const Vec3 e = direction(rays.cosine[k], rays.sine[k]);
+      const Vec3 &ga = rim_batch_.slope_a[k], &gb = rim_batch_.slope_b[k];
+      const double a = rim_batch_.a[k], b = rim_batch_.b[k];
       const double ar = ga.dot(e), at = ga.dot(frame_.axis), br = gb.dot(e), bt = gb.dot(frame_.axis);
       // p where the line along the axis meets Sigma, and its slope along rho on Sigma, to first order.
       const double rate = bt - at;
       if (!(rate > kLeastCosine * (gb - ga).norm())) return false;
       const double on_sigma = (a * bt - b * at) / rate;
       const double along = (ar * bt - br * at) / rate;
-      double& radius = rim_radius_[k];
+      double& radius = rays.radius[k];
       // Newton's first steps may stray from Sigma, where the sign of on_sigma says little: they set no bracket.
       if (iteration >= kFreeRimSteps) (on_sigma > 0.0 ? low_[k] : high_[k]) = radius;
       double next = along < 0.0 ? radius - on_sigma / along : 2.0 * radius;
@@ -88,7 +91,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, d
       }
       const double step = next - radius;
       const double lift = ((a - b) + (ar - br) * step) / rate;
-      const bool settled = std::abs(lift) <= enough * std::max(frame_.thickness, std::abs(rim_height_[k]));
+      const bool settled = std::abs(lift) <= enough * std::max(frame_.thickness, std::abs(rays.height[k]));
       if (near && settled) {
         // Both bodies must fall away from the axis beyond the rim, or their squeezed regions reach over it.
         if (!(-at > kLeastOverhang * ga.norm()) || !(bt > kLeastOverhang * gb.norm())) return false;
@@ -98,14 +101,14 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, const PolarRule& rule, d
         rim_error_ = std::max(rim_error_, step * step / (radius * radius));
       }
       radius = next;
-      rim_height_[k] += lift;
-      if (radius * e.norm() > extent_ || !std::isfinite(radius + rim_height_[k])) return false;
+      rays.height[k] += lift;
+      if (radius * e.norm() > extent_ || !std::isfinite(radius + rays.height[k])) return false;
     }
   }
   return open == 0;
 }
 
-bool PolarRuleSolver::solve_heights(PairPressure& pressure, const PolarRule& rule, double error) {
+void PolarRuleSolver::place_nodes(const PolarRule& rule) {
   const auto angles = static_cast<std::size_t>(rule.angular), radii = static_cast<std::size_t>(rule.radial);
   const GaussRule& gauss = gauss_rule(rule.radial);
   const std::size_t n = angles * radii;
@@ -115,12 +118,12 @@ bool PolarRuleSolver::solve_heights(PairPressure& pressure, const PolarRule& rul
   weight_.resize(n);
   const double sector = 2.0 * std::numbers::pi / rule.angular;
   for (std::size_t k = 0; k < angles; ++k) {
-    const double c = rule.cosine[k], s = rule.sine[k], rim = rim_radius_[k];
+    const double c = rule.cosine[k], s = rule.sine[k], rim = rim_.radius[k];
     const Vec3 e = c * frame_.u + s * frame_.v;
     // Through the curvature at the origin and the rim.
     const double square =
         0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
-    const double fourth = rim_height_[k] - square;
+    const double fourth = rim_.height[k] - square;
     for (std::size_t j = 0; j < radii; ++j) {
       const std::size_t i = k * radii + j;
       const double r = gauss.node[j], r2 = r * r;
@@ -129,6 +132,10 @@ bool PolarRuleSolver::solve_heights(PairPressure& pressure, const PolarRule& rul
       weight_[i] = sector * gauss.weight[j] * rim * rim * r * jacobian_;
     }
   }
+}
+
+bool PolarRuleSolver::solve_heights(PairPressure& pressure, double error) {
+  const std::size_t n = node_.size();
   const double round_off = 4.0 * kEpsilon * pressure.largest_modulus();
   const double enough = std::max(round_off, std::min(1e-11 * pressure.largest_modulus(), 1e-3 * error * frame_.peak));
   for (int iteration = 0; iteration < kHeightSteps; ++iteration) {
@@ -154,8 +161,8 @@ bool PolarRuleSolver::solve_heights(PairPressure& pressure, const PolarRule& rul
   return residual_ <= 1e-6 * frame_.peak;
 }
 
-bool PolarRuleSolver::integrate(const PolarRule& rule) {
-  const std::size_t n = static_cast<std::size_t>(rule.angular) * static_cast<std::size_t>(rule.radial);
+bool PolarRuleSolver::integrate() {
+  const std::size_t n = node_.size();
   area_.resize(n);
   normal_.resize(n);
   pressure_.resize(n);
@@ -218,10 +225,9 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   return false;
 }
 
-bool PolarRuleSolver::add_columns(PairPressure& pressure, const PolarRule& rule, int side, double error,
-                                  PatchPoints& points) {
+bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, double error, PatchPoints& points) {
   if (!column_ends(pressure, side, std::min(1e-3, 0.1 * std::sqrt(error)))) return false;
-  const GaussRule& gauss = gauss_rule(rule.column);
+  const GaussRule& gauss = gauss_rule(column);
   const std::size_t n = node_.size();
   thickness_ += end_[side][n];
   const double sign = side == 0 ? 1.0 : -1.0;
@@ -263,34 +269,54 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
   const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
+  bool parted = false;
+  parted_ = 0;
   for (std::size_t r = first; r <= last; ++r) {
     start_rim(rules[r], r == first);
-    if (!solve_rim(pressure, rules[r], error) || !solve_heights(pressure, rules[r], error)) return false;
+    if (!solve_rim(pressure, rim_, error)) return false;
+    place_nodes(rules[r]);
+    if (!solve_heights(pressure, error)) return false;
     coarse_ = fine_;
-    if (!integrate(rules[r])) return false;
+    if (!integrate()) return false;
+    if (r == first) find_kinks(pressure);
+    if (!parted && error < kSplitBelow && kinks_cross()) {
+      parted = true;
+      if (solve_split(pressure, settings)) {
+        parted_ = static_cast<std::uint32_t>(crossing_.size());
+        return finish(pressure, rules[last].column, columns, error, points);
+      }
+      r = first - 1;  // begins again as if there were no kinks
+      continue;
+    }
     if (r == first) continue;
     const double difference = (r == 1 ? kSafetyAtFirst : kSafety) * relative_difference(fine_, coarse_) +
                               (r == 1 ? kUnseenAtFirst : r == 2 ? kUnseen : 0.0);
     if (difference > error && r < last) continue;
     estimate_ = difference + algebraic_error();
-    thickness_ = 0.0;
-    for (const int side : {0, 1}) {
-      if (!columns[static_cast<std::size_t>(side)]) {
-        thickness_ += 0.5 * frame_.thickness;
-      } else if (!add_columns(pressure, rules[r], side, error, points)) {
-        return false;
-      }
-    }
-    for (std::size_t i = 0; i < node_.size(); ++i) {
-      points.point.push_back(node_.point[i]);
-      points.normal.push_back(normal_[i]);
-      points.area.push_back(area_[i]);
-      points.pressure.push_back(pressure_[i]);
-    }
-    points.residual = std::max(points.residual, residual_);
-    return true;
+    return finish(pressure, rules[r].column, columns, error, points);
   }
   return false;
+}
+
+/// Columns, and what was found, to `points`.
+bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::array<bool, 2>& columns, double error,
+                             PatchPoints& points) {
+  thickness_ = 0.0;
+  for (const int side : {0, 1}) {
+    if (!columns[static_cast<std::size_t>(side)]) {
+      thickness_ += 0.5 * frame_.thickness;
+    } else if (!add_columns(pressure, column, side, error, points)) {
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    points.point.push_back(node_.point[i]);
+    points.normal.push_back(normal_[i]);
+    points.area.push_back(area_[i]);
+    points.pressure.push_back(pressure_[i]);
+  }
+  points.residual = std::max(points.residual, residual_);
+  return true;
 }
 
 bool PolarCover::contains(const Vec3& x, double slack) const {

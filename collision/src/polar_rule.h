@@ -1,7 +1,8 @@
 /// @file polar_rule.h
 /// Spectral quadrature on a smooth patch of Sigma: Gauss-Legendre in the radius times the trapezoid rule in the angle
 /// about the point of largest pressure, both exponentially convergent because the integrand is smooth, periodic and
-/// vanishes at the rim. Columns along the axis carry the integrals over the squeezed regions.
+/// vanishes at the rim. Where kinks of a field cross the patch, radii are parted at them, and angles where kinks meet the rim
+/// and as finely as the error asks. Columns along the axis carry the integrals over the squeezed regions.
 #pragma once
 
 #include <array>
@@ -12,6 +13,7 @@
 #include "patch_points.h"
 #include "quadrature.h"
 #include "supple/collision/contact_surface.h"
+#include "supple/implicit/kinks.h"
 
 namespace supple::collision {
 
@@ -27,24 +29,60 @@ class PolarRuleSolver {
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about the frame's origin
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
+  [[nodiscard]] std::uint32_t kinks() const noexcept { return parted_; }  ///< that the patch was parted at
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< of the overlap through the peak [m]
 
  private:
-  bool solve_rim(PairPressure& pressure, const PolarRule& rule, double error);
-  bool solve_heights(PairPressure& pressure, const PolarRule& rule, double error);
-  bool integrate(const PolarRule& rule);
-  bool add_columns(PairPressure& pressure, const PolarRule& rule, int side, double error, PatchPoints& points);
+  /// Directions from the peak, and where the rim is met on them.
+  struct Rays {
+    std::vector<double> cosine, sine, radius, height;
+    [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
+  };
+  bool solve_rim(PairPressure& pressure, Rays& rays, double error);
+  void place_nodes(const PolarRule& rule);
+  bool solve_heights(PairPressure& pressure, double error);
+  bool integrate();
+  bool finish(PairPressure& pressure, int column, const std::array<bool, 2>& columns, double error, PatchPoints& points);
+  bool add_columns(PairPressure& pressure, int column, int side, double error, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double algebraic_error() const;
+  [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
+
+  // Patches that kinks cross: split_rule.cpp.
+  struct Panel {
+    double begin = 0.0, end = 0.0;  // angles
+    std::size_t first = 0, last = 0;  // of `kept_`
+    PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with fewer radii besides
+    double by_angle = 0.0, by_radius = 0.0;  // differences of these
+    bool halved = false;              // or a half of one
+    int nodes = 0;                    // on a ray that no kink crosses
+  };
+  struct Crossing {
+    std::size_t ray, kink;
+    double radius, height;  // radius over that of the rim
+    double left, right;     // it lies between these
+    bool good;
+  };
+  void find_kinks(PairPressure& pressure);
+  bool kinks_cross();
+  bool solve_split(PairPressure& pressure, const ContactSettings& settings);
+  void follow_rim();
+  [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
+  void find_corners(PairPressure& pressure, std::vector<double>& turns);
+  void find_crossings(PairPressure& pressure, double error);
+  bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
+  void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
+  [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   PeakFrame frame_;
   double jacobian_ = 0.0;  // |u| |v|
   double extent_ = 0.0;
-  std::vector<double> rim_radius_, rim_height_, coarse_radius_, coarse_height_;
+  Rays rim_;
+  std::vector<double> coarse_radius_, coarse_height_;
   std::vector<double> low_, high_;
   std::vector<std::uint8_t> done_;
-  PressureBatch rim_, node_;
+  PressureBatch rim_batch_, node_;
   std::vector<double> height_, weight_, area_, pressure_, end_[2];
   std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
   std::vector<double> line_value_;
@@ -56,10 +94,24 @@ class PolarRuleSolver {
   double estimate_ = 1.0;
   double thickness_ = 0.0;
 
+  std::uint32_t parted_ = 0;
+  std::vector<implicit::Kink> kinks_;
+  std::vector<std::size_t> crossing_;  // kinks that cross the patch
+  std::vector<Panel> panels_;
+  std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
+  std::vector<Vec3> fine_rim_;
+  Rays rays_;
+  std::vector<double> square_, fourth_;  // heights along a ray: s^2 (square + s^2 fourth)
+  std::vector<Crossing> crossings_;
+  std::vector<std::size_t> ray_nodes_, ray_fewer_;  // first node of a ray, and of those with fewer radii
+  PressureBatch kept_;
+  std::vector<double> kept_weight_, kept_area_, kept_pressure_;
+  std::vector<Vec3> kept_normal_;
+
  public:
   /// The rim of the last solve: its radius by angle (equally spaced), and its world points.
-  [[nodiscard]] const std::vector<double>& rim_radius() const noexcept { return rim_radius_; }
-  [[nodiscard]] const std::vector<double>& rim_height() const noexcept { return rim_height_; }
+  [[nodiscard]] const std::vector<double>& rim_radius() const noexcept { return rim_.radius; }
+  [[nodiscard]] const std::vector<double>& rim_height() const noexcept { return rim_.height; }
 };
 
 /// The ground that a polar patch covers.

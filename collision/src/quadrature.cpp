@@ -79,6 +79,36 @@ const GaussRule& gauss_rule(int n) {
   return rules[static_cast<std::size_t>(n)];
 }
 
+const KronrodRule& kronrod_rule(bool finer) {
+  // The positive nodes from the outside, the middle one last.
+  const auto make = [](std::span<const double> node, std::span<const double> weight, std::span<const double> gauss) {
+    KronrodRule rule;
+    const std::size_t half = node.size() - 1;
+    for (std::size_t k = 0; k <= 2 * half; ++k) {
+      const std::size_t i = k <= half ? k : 2 * half - k;
+      rule.node.push_back(k <= half ? -node[i] : node[i]);
+      rule.weight.push_back(weight[i]);
+      rule.gauss_weight.push_back(i % 2 == 1 ? gauss[i / 2] : 0.0);
+    }
+    return rule;
+  };
+  static const KronrodRule coarse = make(std::array{0.960491268708020283423507092629080, 0.774596669241483377035853079956480,
+                                                    0.434243749346802558002071502844628, 0.0},
+                                         std::array{0.104656226026467265193823857192073, 0.268488089868333440728569280666710,
+                                                    0.401397414775962222905051818618432, 0.450916538658474142345110087045571},
+                                         std::array{5.0 / 9.0, 8.0 / 9.0});
+  static const KronrodRule fine = make(
+      std::array{0.991455371120812639206854697526329, 0.949107912342758524526189684047851, 0.864864423359769072789712788640926,
+                 0.741531185599394439863864773280788, 0.586087235467691130294144691258258, 0.405845151377397166906606412076961,
+                 0.207784955007898467600689403773245, 0.0},
+      std::array{0.022935322010529224963732008058970, 0.063092092629978553290700663189204, 0.104790010322250183839876322541518,
+                 0.140653259715525918745189590510238, 0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
+                 0.204432940075298892414161999234649, 0.209482141084727828012999174891714},
+      std::array{0.129484966168869693270611432679082, 0.279705391489276667901467771423780, 0.381830050505118944950369775488975,
+                 0.417959183673469387755102040816327});
+  return finer ? fine : coarse;
+}
+
 std::span<const PolarRule> polar_rules() {
   static const std::vector<PolarRule> rules = make_polar();
   return rules;

@@ -14,6 +14,15 @@ struct GaussRule {
 /// @pre 1 <= n <= 16
 [[nodiscard]] const GaussRule& gauss_rule(int n);
 
+/// Gauss-Legendre on (-1, 1) and its extension by Kronrod: every second node is the smaller rule's.
+struct KronrodRule {
+  std::vector<double> node;          ///< rising
+  std::vector<double> weight;        ///< sum to 2
+  std::vector<double> gauss_weight;  ///< of the smaller rule, 0 where it has no node
+};
+/// @param finer  7 and 15 nodes in place of 3 and 7 (Kronrod 1965; QUADPACK)
+[[nodiscard]] const KronrodRule& kronrod_rule(bool finer);
+
 /// The rules of the polar quadrature from coarse to fine (theory of spectral quadrature on a smooth patch).
 struct PolarRule {
   int radial;

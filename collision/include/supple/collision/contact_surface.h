@@ -70,6 +70,7 @@ struct ContactSurface {
     double residual = 0.0;                 ///< largest |p_A - p_B| / max(P_A, P_B) at the points [1]
     double error_estimate = 0.0;           ///< relative, of force, area and centre of pressure (the largest)
     std::uint32_t patches = 0;             ///< connected components found
+    std::uint32_t kinks = 0;               ///< kinks of the fields (implicit/kinks.h) that polar patches were parted at
     std::uint64_t points = 0;              ///< quadrature points on Sigma
     std::uint64_t evaluations = 0;         ///< field evaluations spent
   };

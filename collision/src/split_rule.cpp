@@ -1,0 +1,457 @@
+/// Polar quadrature of a patch that kinks of a field cross. Along a ray from the peak the pressures are smooth between
+/// kinks: Gauss-Legendre on each piece. The integral along a ray is smooth in the angle but where a kink meets the rim or
+/// touches the ray: Gauss-Kronrod on panels between the former, halved where the two rules of a panel differ.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "polar_rule.h"
+#include "supple/core/math.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr double kWidest = 2.2;          // panel at the beginning [rad]
+constexpr double kWidestCoarse = 3.3;
+constexpr int kMostRadial = 16;
+constexpr double kUnseen = 0.03;         // of the error asked for: slivers beyond a kink between two rays
+constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
+constexpr std::size_t kMostPanels = 48;  // that the estimate may ask for
+constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
+constexpr int kCornerSteps = 8;
+constexpr int kCrossingSteps = 6;
+constexpr double kSameTurn = 1e-7;       // [rad]
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+/// Points of the Gauss rule on a piece of a ray.
+int nodes_on(int radial, double share) {
+  return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), 2, kMostRadial);
+}
+
+/// Kinks so near to another, to the peak or to the rim are left out: the error is of the square.
+double shortest_piece(double error) { return 3e-3 * std::sqrt(error); }
+
+void weigh(PatchSums& sums, const Vec3& x, const Vec3& normal, double weight, double pressure) {
+  if (weight != 0.0) sums.add(x, normal, weight, pressure);
+}
+
+/// Of force, area and first moment, over those of `all`.
+double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSums& all) {
+  const double force = (a.force - b.force).norm() / std::max(all.force.norm(), 1e-3 * all.load);
+  const double area = std::abs(a.area - b.area) / all.area;
+  const Vec3 first = (a.first - b.first) - (a.load - b.load) * all.centre();
+  return std::max({force, area, first.norm() / (all.load * std::sqrt(all.area))});
+}
+
+/// What the finer of two rules is off by at most, which differ by x. On panels that were never halved it converges faster
+/// than the coarser one, as in QUADPACK (Piessens et al. 1983, sec. 2.2.4.1); the few points of the coarsest rules, and
+/// panels at the end of a crossing, are not that regular.
+constexpr double kRegular = 2000.0;
+double estimate_of(double regular, double halved, bool fine) {
+  constexpr double kHalf = 0.5;
+  const double share = fine ? std::min(1.0, std::sqrt(kRegular * regular)) : kHalf;
+  return share * regular + kHalf * halved;
+}
+/// The difference that an error allows.
+double difference_for(double error, bool fine) { return fine ? std::max(error, std::cbrt(error * error / kRegular)) : error; }
+
+}  // namespace
+
+void PolarRuleSolver::find_kinks(PairPressure& pressure) {
+  kinks_.clear();
+  Box box;
+  for (const Vec3& x : rim_batch_.point) box.include(x);
+  for (const Vec3& x : node_.point) box.include(x);
+  pressure.kinks(box, kinks_);
+  double square = 0.0;
+  for (const Vec3& x : rim_batch_.point) square = std::max(square, (x - frame_.origin).squaredNorm());
+  constexpr double kMargin = 1.2;  // what finer rules may find the rim to reach beyond
+  const double reach = kMargin * std::sqrt(square);
+  std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
+}
+
+/// Whether some change their side on the patch, as far as its nodes show and the rim as they give it; keeps which.
+bool PolarRuleSolver::kinks_cross() {
+  crossing_.clear();
+  if (kinks_.empty()) return false;
+  follow_rim();
+  for (std::size_t k = 0; k < kinks_.size(); ++k) {
+    const bool side = kinks_[k].value(frame_.origin) > 0.0;
+    const auto other = [&](const Vec3& x) { return (kinks_[k].value(x) > 0.0) != side; };
+    if (std::any_of(fine_rim_.begin(), fine_rim_.end(), other) ||
+        std::any_of(node_.point.begin(), node_.point.end(), other)) {
+      crossing_.push_back(k);
+    }
+  }
+  return !crossing_.empty();
+}
+
+/// The rim found so far as a trigonometric sum, and points of it that leave no room for a kink between them.
+void PolarRuleSolver::follow_rim() {
+  const std::size_t n = rim_.size(), half = n / 2;
+  for (const int which : {0, 1}) {
+    const std::vector<double>& f = which == 0 ? rim_.radius : rim_.height;
+    std::vector<double>& out = wave_[which];
+    out.assign(2 * half + 2, 0.0);
+    for (std::size_t m = 0; m <= half; ++m) {
+      const double scale = (m == 0 || 2 * m == n ? 1.0 : 2.0) / static_cast<double>(n);
+      for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t at = m * k % n;
+        out[2 * m] += scale * f[k] * rim_.cosine[at];
+        out[2 * m + 1] += scale * f[k] * rim_.sine[at];
+      }
+    }
+  }
+  fine_rim_.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    for (const double part : {0.0, 0.25, 0.5, 0.75}) {
+      const auto [s, c] = math::sin_cos(kTurn * (static_cast<double>(i) + part) / static_cast<double>(n));
+      const auto [radius, height] = rim_at(c, s);
+      fine_rim_.push_back(frame_.origin + radius * direction(c, s) + height * frame_.axis);
+    }
+  }
+}
+
+std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const {
+  std::array<double, 2> sum{};
+  double c = 1.0, s = 0.0;
+  for (std::size_t m = 0; 2 * m < wave_[0].size(); ++m) {
+    for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
+      sum[which] += wave_[which][2 * m] * c + wave_[which][2 * m + 1] * s;
+    }
+    const double next = c * cosine - s * sine;
+    s = s * cosine + c * sine;
+    c = next;
+  }
+  return sum;
+}
+
+/// Angles where a kink meets the rim: p_A = p_B = s = 0.
+void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<double>& turns) {
+  const std::vector<Vec3>& rim = fine_rim_;
+  const std::size_t n = rim.size();
+  std::vector<std::size_t> kink;
+  PressureBatch& batch = rim_batch_;
+  batch.point.clear();
+  for (const std::size_t k : crossing_) {
+    double before = kinks_[k].value(rim[n - 1]);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double here = kinks_[k].value(rim[i]);
+      if ((before > 0.0) != (here > 0.0)) {
+        batch.point.push_back(rim[i] + here / (here - before) * (rim[(i + n - 1) % n] - rim[i]));
+        kink.push_back(k);
+      }
+      before = here;
+    }
+  }
+  if (kink.empty()) return;
+  batch.resize(batch.point.size());
+  std::vector<double> last(kink.size(), 0.0);
+  for (int step = 0; step < kCornerSteps; ++step) {
+    pressure.evaluate(batch);
+    bool moved = false;
+    for (std::size_t i = 0; i < kink.size(); ++i) {
+      Vec3 slope;
+      const double s = kinks_[kink[i]].value(batch.point[i], slope);
+      Mat3 rows;
+      rows.row(0) = batch.slope_a[i];
+      rows.row(1) = batch.slope_b[i];
+      rows.row(2) = slope;
+      const double volume = rows.determinant();
+      const Vec3 value(batch.a[i], batch.b[i], s);
+      const Vec3 &a = batch.slope_a[i], &b = batch.slope_b[i];
+      Vec3 move = -(value[0] * b.cross(slope) + value[1] * slope.cross(a) + value[2] * a.cross(b)) / volume;
+      last[i] = move.norm();
+      if (!(last[i] <= extent_)) move.setZero();
+      batch.point[i] += move;
+      moved = moved || last[i] > 1e-9 * extent_;
+    }
+    if (!moved) break;
+  }
+  for (std::size_t i = 0; i < kink.size(); ++i) {
+    if (!(last[i] <= 1e-6 * extent_)) continue;  // the panels find it by halving
+    const Vec3 d = batch.point[i] - frame_.origin;
+    const double turn = math::atan2(d.dot(frame_.v) / frame_.v.squaredNorm(), d.dot(frame_.u) / frame_.u.squaredNorm());
+    turns.push_back(turn < 0.0 ? turn + kTurn : turn);
+  }
+}
+
+double PolarRuleSolver::model_height(std::size_t ray, double share) const {
+  const double square = share * share;
+  return square * (square_[ray] + square * fourth_[ray]);
+}
+
+/// Where the rays cross kinks: first on the heights as the curvature at the peak and the rim give them, then on Sigma.
+void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
+  const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
+  crossings_.clear();
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
+    const auto place = [&](double share) -> Vec3 { return frame_.origin + share * reach + model_height(i, share) * frame_.axis; };
+    std::array<Vec3, kSamples + 1> at;
+    for (int j = 0; j <= kSamples; ++j) at[static_cast<std::size_t>(j)] = place(static_cast<double>(j) / kSamples);
+    for (const std::size_t k : crossing_) {
+      const implicit::Kink& kink = kinks_[k];
+      const auto between = [&](double left, double s_left, double right, double s_right) {
+        double share = left + (right - left) * s_left / (s_left - s_right);
+        for (int step = 0; step < 3; ++step) {
+          const double s = kink.value(place(share));
+          ((s > 0.0) == (s_left > 0.0) ? left : right) = share;
+          ((s > 0.0) == (s_left > 0.0) ? s_left : s_right) = s;
+          share = left + (right - left) * s_left / (s_left - s_right);
+        }
+        crossings_.push_back({i, k, share, model_height(i, share), std::max(0.0, share - 0.5 / kSamples),
+                              share + 0.5 / kSamples, false});
+      };
+      std::array<double, kSamples + 1> s;
+      for (std::size_t j = 0; j < s.size(); ++j) s[j] = kink.value(at[j]);
+      for (std::size_t j = 0; j < kSamples; ++j) {
+        const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;
+        if ((s[j] > 0.0) != (s[j + 1] > 0.0)) {
+          between(left, s[j], right, s[j + 1]);
+          continue;
+        }
+        // A ray that dips through a kink and back between two samples: at the vertex of a parabola through three of them.
+        if (j == 0 || (s[j - 1] > 0.0) != (s[j] > 0.0)) continue;
+        const double bend = s[j - 1] - 2.0 * s[j] + s[j + 1], slope = 0.5 * (s[j + 1] - s[j - 1]);
+        if (!(bend * s[j] > 0.0) || !(std::abs(slope) < std::abs(bend))) continue;
+        const double vertex = left - slope / bend / kSamples;
+        const double dip = kink.value(place(vertex));
+        if ((dip > 0.0) == (s[j] > 0.0)) continue;
+        const double before = vertex < left ? left - 1.0 / kSamples : left, after = vertex < left ? left : right;
+        between(before, vertex < left ? s[j - 1] : s[j], vertex, dip);
+        between(vertex, dip, after, vertex < left ? s[j] : s[j + 1]);
+      }
+    }
+  }
+  PressureBatch& batch = rim_batch_;
+  batch.resize(crossings_.size());
+  std::size_t open = crossings_.size();
+  for (int step = 0; step < kCrossingSteps && open > 0; ++step) {
+    for (std::size_t c = 0; c < crossings_.size(); ++c) {
+      const Crossing& x = crossings_[c];
+      batch.point[c] = frame_.origin + (x.radius * rays_.radius[x.ray]) * direction(rays_.cosine[x.ray], rays_.sine[x.ray]) +
+                       x.height * frame_.axis;
+    }
+    pressure.evaluate(batch);
+    for (std::size_t c = 0; c < crossings_.size(); ++c) {
+      Crossing& x = crossings_[c];
+      if (x.good) continue;
+      const Vec3 e = rays_.radius[x.ray] * direction(rays_.cosine[x.ray], rays_.sine[x.ray]);
+      Vec3 slope;
+      const double s = kinks_[x.kink].value(batch.point[c], slope), gap = batch.a[c] - batch.b[c];
+      const Vec3 across = batch.slope_a[c] - batch.slope_b[c];
+      const double gr = across.dot(e), gt = across.dot(frame_.axis), sr = slope.dot(e), st = slope.dot(frame_.axis);
+      const double determinant = gr * st - gt * sr;
+      const double radius = x.radius + (gt * s - st * gap) / determinant;
+      if (!std::isfinite(radius)) continue;
+      const double next = std::clamp(radius, x.left, x.right);  // two that lie close must not change places
+      const double moved = next - x.radius;
+      x.height -= (gap + gr * moved) / gt;
+      x.radius = next;
+      x.good = std::abs(moved) <= enough && next == radius;
+      if (x.good) --open;
+    }
+  }
+  const double shortest = shortest_piece(error);
+  std::erase_if(crossings_, [&](const Crossing& x) { return !x.good || x.radius < shortest || x.radius > 1.0 - shortest; });
+  std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& x, const Crossing& y) {
+    return x.ray != y.ray ? x.ray < y.ray : x.radius != y.radius ? x.radius < y.radius : x.kink < y.kink;
+  });
+}
+
+/// Sums of the panels from `first` on.
+bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
+  const std::size_t per_panel = rule.node.size();
+  const std::size_t count = (panels_.size() - first) * per_panel;
+  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &square_, &fourth_}) {
+    column->resize(count);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Panel& panel = panels_[first + i / per_panel];
+    const auto [s, c] = math::sin_cos(0.5 * (panel.begin + panel.end) + 0.5 * (panel.end - panel.begin) * rule.node[i % per_panel]);
+    rays_.cosine[i] = c;
+    rays_.sine[i] = s;
+    const auto [radius, height] = rim_at(c, s);
+    rays_.radius[i] = radius;
+    rays_.height[i] = height;
+    if (!(radius > 0.0)) return false;
+  }
+  const double rim_error = rim_error_;
+  if (!solve_rim(pressure, rays_, error)) return false;
+  rim_error_ = std::max(rim_error_, rim_error);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
+    square_[i] = 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+    fourth_[i] = rays_.height[i] - square_[i];
+  }
+  find_crossings(pressure, error);
+
+  const double shortest = shortest_piece(error);
+  foot_.clear();
+  height_.clear();
+  weight_.clear();
+  ray_nodes_.clear();
+  ray_fewer_.clear();
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Panel& panel = panels_[first + i / per_panel];
+    const double half = 0.5 * (panel.end - panel.begin), rim = rays_.radius[i];
+    const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
+    const std::size_t crossing_begin = next;
+    while (next < crossings_.size() && crossings_[next].ray == i) ++next;
+    const auto nodes = [&](int most, double angle) {
+      double left = 0.0, lift_left = 0.0;
+      for (std::size_t c = crossing_begin; c <= next; ++c) {
+        const double right = c < next ? crossings_[c].radius : 1.0;
+        const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
+        if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
+        const GaussRule& gauss = gauss_rule(nodes_on(most, right - left));
+        for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+          const double along = gauss.node[j], r = left + (right - left) * along;
+          foot_.push_back(frame_.origin + (r * rim) * e);
+          height_.push_back(model_height(i, r) + lift_left + along * (lift_right - lift_left));
+          weight_.push_back(angle * half * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
+        }
+        left = right;
+        lift_left = lift_right;
+      }
+    };
+    ray_nodes_.push_back(foot_.size());
+    nodes(panel.nodes, rule.weight[i % per_panel]);
+    ray_fewer_.push_back(foot_.size());
+    const double fewer = rule.gauss_weight[i % per_panel];
+    if (fewer > 0.0) nodes(panel.nodes > 4 ? panel.nodes - 2 : panel.nodes - 1, fewer);
+  }
+  ray_nodes_.push_back(foot_.size());
+  node_.resize(foot_.size());
+  const double residual = residual_, lift = lift_;
+  if (!solve_heights(pressure, error)) return false;
+  if (!integrate()) return false;
+  residual_ = std::max(residual_, residual);
+  lift_ = std::max(lift_, lift);
+  for (std::size_t p = first; p < panels_.size(); ++p) keep_panel(panels_[p], rule, (p - first) * per_panel);
+  return true;
+}
+
+/// Adds up a panel's rays from `ray` on and keeps its nodes.
+void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
+  panel.fine = panel.angular = panel.radial = {};
+  panel.first = kept_.point.size();
+  for (std::size_t k = 0; k < rule.node.size(); ++k) {
+    for (std::size_t i = ray_nodes_[ray + k]; i < ray_fewer_[ray + k]; ++i) {
+      const Vec3 x = node_.point[i] - frame_.origin;
+      weigh(panel.fine, x, normal_[i], area_[i], pressure_[i]);
+      weigh(panel.angular, x, normal_[i], area_[i] * (rule.gauss_weight[k] / rule.weight[k]), pressure_[i]);
+      kept_.point.push_back(node_.point[i]);
+      kept_.slope_a.push_back(node_.slope_a[i]);
+      kept_.slope_b.push_back(node_.slope_b[i]);
+      kept_weight_.push_back(weight_[i]);
+      kept_area_.push_back(area_[i]);
+      kept_pressure_.push_back(pressure_[i]);
+      kept_normal_.push_back(normal_[i]);
+    }
+    for (std::size_t i = ray_fewer_[ray + k]; i < ray_nodes_[ray + k + 1]; ++i) {
+      weigh(panel.radial, node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
+    }
+  }
+  panel.last = kept_.point.size();
+}
+
+bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
+  const double error = settings.error;
+  const bool fine = error < 1e-4;
+  const KronrodRule& rule = kronrod_rule(fine);
+  const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;
+  const double widest = fine ? kWidest : kWidestCoarse;
+  std::vector<double> turns;
+  find_corners(pressure, turns);
+  if (turns.empty()) turns.push_back(0.0);
+  std::sort(turns.begin(), turns.end());
+  turns.push_back(turns.front() + kTurn);
+  panels_.clear();
+  for (std::size_t t = 0; t + 1 < turns.size(); ++t) {
+    const double width = turns[t + 1] - turns[t];
+    if (width < kSameTurn) continue;
+    const int parts = static_cast<int>(std::ceil(width / widest));
+    for (int i = 0; i < parts; ++i) {
+      Panel panel;
+      panel.begin = turns[t] + width * i / parts;
+      panel.end = turns[t] + width * (i + 1) / parts;
+      panel.nodes = radial;
+      panels_.push_back(panel);
+    }
+  }
+  kept_.resize(0);
+  kept_weight_.clear();
+  kept_area_.clear();
+  kept_pressure_.clear();
+  kept_normal_.clear();
+  residual_ = lift_ = rim_error_ = 0.0;
+  std::size_t begin = 0, solved = panels_.size();
+  PatchSums all;
+  for (;;) {
+    if (!solve_panels(pressure, rule, error, begin)) return false;
+    all = {};
+    for (const Panel& panel : panels_) all.add(panel.fine);
+    if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
+    double regular = 0.0, halved = 0.0;
+    for (Panel& panel : panels_) {
+      panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
+      panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
+      (panel.halved ? halved : regular) += panel.by_angle + panel.by_radius;
+    }
+    estimate_ = estimate_of(regular, halved, fine);
+    if (estimate_ <= kEnough * error || solved >= kMostPanels) break;
+    // New ones go to the end; the angles are put in order when all is done.
+    const auto count = static_cast<double>(panels_.size());
+    const double share_regular = 0.5 * difference_for(error, fine) / count, share_halved = 0.5 * error / count;
+    std::vector<Panel> finer;
+    std::erase_if(panels_, [&](const Panel& panel) {
+      const double share = panel.halved ? share_halved : share_regular;
+      const bool more = panel.by_radius > share && panel.nodes < kMostRadial, halve = panel.by_angle > share;
+      if (!more && !halve) return false;
+      Panel next;
+      next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
+      next.begin = panel.begin;
+      next.halved = panel.halved || halve;
+      if (halve) {
+        next.end = 0.5 * (panel.begin + panel.end);
+        finer.push_back(next);
+        next.begin = next.end;
+      }
+      next.end = panel.end;
+      finer.push_back(next);
+      return true;
+    });
+    if (finer.empty()) break;
+    begin = panels_.size();
+    solved += finer.size();
+    panels_.insert(panels_.end(), finer.begin(), finer.end());
+  }
+  std::sort(panels_.begin(), panels_.end(), [](const Panel& a, const Panel& b) { return a.begin < b.begin; });
+  node_.resize(0);
+  weight_.clear();
+  area_.clear();
+  pressure_.clear();
+  normal_.clear();
+  fine_ = {};
+  for (const Panel& panel : panels_) {
+    const auto keep = [&panel](auto& to, const auto& from) {
+      to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(panel.first), from.begin() + static_cast<std::ptrdiff_t>(panel.last));
+    };
+    keep(node_.point, kept_.point);
+    keep(node_.slope_a, kept_.slope_a);
+    keep(node_.slope_b, kept_.slope_b);
+    keep(weight_, kept_weight_);
+    keep(area_, kept_area_);
+    keep(pressure_, kept_pressure_);
+    keep(normal_, kept_normal_);
+    fine_.add(panel.fine);
+  }
+  node_.resize(node_.point.size());
+  estimate_ += kUnseen * error + algebraic_error();
+  return true;
+}
+
+}  // namespace supple::collision

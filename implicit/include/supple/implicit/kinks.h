@@ -1,0 +1,43 @@
+/// @file supple/implicit/kinks.h
+/// Where derivatives of a field jump: between the regions of a shape whose nearest point is on a face, an edge or a corner,
+/// and where a kernel goes over to another formula or ends. Quadrature rules part their intervals there.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "supple/core/types.h"
+
+namespace supple::implicit {
+
+class Field;
+
+/// {s = 0} of a function s that is smooth near there.
+struct Kink {
+  enum class Form : std::uint8_t {
+    Plane,   ///< s = first row of `to_local` . (x - origin) - level
+    Offset,  ///< at the distance `level` from the box [-half, half], measured in y = to_local (x - origin)
+    Disc,    ///< the same from the disc of radius half.x in y_z = 0
+  };
+  Form form = Form::Plane;
+  Vec3 origin = Vec3::Zero();           ///< world [m]
+  Mat3 to_local = Mat3::Identity();
+  Vec3 half = Vec3::Zero();             ///< [m]
+  double level = 0.0;                   ///< [m]; > 0 but for planes
+
+  /// s [m], a signed distance to first order where `to_local` does not stretch, and its gradient [1].
+  [[nodiscard]] double value(const Vec3& x, Vec3& gradient) const noexcept;
+  [[nodiscard]] double value(const Vec3& x) const noexcept {
+    Vec3 unused;
+    return value(x, unused);
+  }
+  /// What s changes by at most within a distance of x [m].
+  [[nodiscard]] double change(const Vec3& x, double distance) const noexcept;
+};
+
+/// Appends the kinks of the primitives whose supports may meet the box; some of them may not meet the box, or the body.
+/// @return whether these are all: not so for curves, arcs, rings, superquadrics, tapered and convolved primitives, and not
+///         for fields that combine their parts by another rule than the sum
+bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out);
+
+}  // namespace supple::implicit

@@ -1,0 +1,124 @@
+#include "supple/implicit/kinks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "field_index.h"
+
+namespace supple::implicit {
+
+double Kink::value(const Vec3& x, Vec3& gradient) const noexcept {
+  const Vec3 d = x - origin;
+  if (form == Form::Plane) {
+    gradient = to_local.row(0);
+    return gradient.dot(d) - level;
+  }
+  const Vec3 y = to_local * d;
+  Vec3 v = y - y.cwiseMax(-half).cwiseMin(half);
+  if (form == Form::Disc) {
+    const double rho = std::sqrt(y.x() * y.x() + y.y() * y.y());
+    const double share = rho > half.x() ? (rho - half.x()) / rho : 0.0;
+    v = {share * y.x(), share * y.y(), y.z()};
+  }
+  gradient = to_local.transpose() * v / level;
+  return 0.5 * (v.squaredNorm() / level - level);
+}
+
+double Kink::change(const Vec3& x, double distance) const noexcept {
+  Vec3 gradient;
+  (void)value(x, gradient);
+  // The second derivatives of a squared distance to a convex set are at most 2.
+  const double bend = form == Form::Plane ? 0.0 : to_local.squaredNorm() / level;
+  return distance * (gradient.norm() + 0.5 * bend * distance);
+}
+
+namespace {
+
+/// Distances at which a kernel changes its formula; unused entries are 0. Its support is one of them.
+std::array<double, 2> levels_of(const Kernel& kernel) noexcept {
+  const double R = kernel.radius;
+  switch (kernel.kind) {
+    case KernelKind::Gascuel: return {kernel.thickness, R};
+    case KernelKind::Nishimura: return {R / 3.0, R};
+    case KernelKind::BlancSchlick: return {0.5 * R, R};
+    default: return {0.0, R};
+  }
+}
+
+}  // namespace
+
+bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
+  const Field::Index& index = field.index();
+  bool complete = !index.blend.active();
+  // Alone, a primitive's potential is beyond the iso value wherever the body is.
+  const double farthest = index.size() == 1 && index.shape[0].view.gain == 0.0 && index.iso > 0.0 && index.iso < index.shape[0].peak
+                              ? (1.0 - 1e-9) * iso_distance(index.shape[0].kernel, index.iso)
+                              : std::numeric_limits<double>::infinity();
+  for (const std::uint32_t id : candidates_of(index, box)) {
+    const PackedShape& shape = index.shape[id];
+    Kink kink;
+    kink.origin = {index.primitive[id].position[0], index.primitive[id].position[1], index.primitive[id].position[2]};
+    const Mat3 A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
+    const auto plane = [&](const Vec3& along, double at) {
+      const Vec3 normal = A.transpose() * along;  // unit after the division, as the level is then a distance
+      const double length = normal.norm();
+      Kink side{.form = Kink::Form::Plane, .origin = kink.origin};
+      side.to_local.row(0) = normal / length;
+      side.level = at / length;
+      out.push_back(side);
+    };
+    bool levels = true;
+    if (shape.foot == PackedFoot::Slab) {
+      kink.form = Kink::Form::Offset;
+      kink.half = {shape.half[0], shape.half[1], shape.half[2]};
+      for (int k = 0; k < 3; ++k) {
+        if (kink.half[k] > 0.0) {
+          plane(Vec3::Unit(k), kink.half[k]);
+          plane(Vec3::Unit(k), -kink.half[k]);
+        }
+      }
+    } else if (shape.foot == PackedFoot::Disc) {
+      kink.form = Kink::Form::Disc;
+      kink.half = {shape.half[0], 0.0, 0.0};
+      Kink edge = kink;
+      edge.form = Kink::Form::Offset;
+      edge.half.setZero();
+      edge.level = shape.half[0];
+      edge.to_local = A;
+      edge.to_local.row(2).setZero();
+      out.push_back(edge);
+    } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Directed) {
+      for (int k = 0; k < 3; ++k) plane(Vec3::Unit(k), 0.0);
+      levels = false;
+      complete = complete && index.size() == 1;
+    } else if (shape.foot == PackedFoot::Scalar &&
+               (shape.view.kind == ShapeKind::Triangle || shape.view.kind == ShapeKind::Polygon)) {
+      const std::span<const Vec3> corner = shape.view.control;
+      for (std::size_t i = 0; i < corner.size(); ++i) {
+        const std::size_t next = (i + 1) % corner.size(), last = (i + 2) % corner.size();
+        const Vec3 edge = corner[next] - corner[i];
+        const Vec3 across = edge.cross(edge.cross(corner[last] - corner[i]));
+        plane(across, across.dot(corner[i]));
+        plane(edge, edge.dot(corner[i]));
+        plane(edge, edge.dot(corner[next]));
+      }
+      levels = false;
+      complete = complete && index.size() == 1;
+    } else {
+      complete = false;
+      levels = false;
+    }
+    if (!levels) continue;
+    kink.to_local = A;
+    for (const double level : levels_of(shape.kernel)) {
+      if (!(level > 0.0) || level >= farthest) continue;
+      kink.level = level;
+      out.push_back(kink);
+    }
+  }
+  return complete;
+}
+
+}  // namespace supple::implicit

@@ -1,0 +1,277 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "bodies.h"
+#include "supple/implicit/kinks.h"
+
+namespace supple::collision {
+namespace {
+
+using implicit::Kernel;
+using implicit::Kink;
+using implicit::Primitive;
+using implicit::ShapeKind;
+using testing::Stage;
+
+/// A field of primitives in one part.
+struct Body {
+  implicit::Skeleton skeleton;
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  explicit Body(std::vector<Primitive> primitives, const Pose& pose = {}) {
+    skeleton.primitive = std::move(primitives);
+    skeleton.part_count = 1;
+    implicit::place_skeleton(skeleton, {&pose, 1}, placed);
+    implicit::index_field(skeleton, placed, field);
+  }
+};
+
+Primitive make(ShapeKind shape, const Vec3& size, const Kernel& kernel, const Vec3& at = Vec3::Zero()) {
+  Primitive p;
+  p.shape = shape;
+  p.size = size;
+  p.kernel = kernel;
+  p.offset = {at, Quat(0.8, 0.3, -0.4, 0.2).normalized()};
+  return p;
+}
+
+/// Largest error of the polynomial through the values of f at the 21 Chebyshev points of [a, b].
+template <class F>
+double interpolation_error(double a, double b, const F& f) {
+  constexpr int n = 20;
+  std::vector<double> x, y, w;
+  for (int k = 0; k <= n; ++k) {
+    x.push_back(0.5 * (a + b) - 0.5 * (b - a) * math::sin_cos(std::numbers::pi * k / n).cos);
+    y.push_back(f(x.back()));
+    w.push_back((k % 2 == 0 ? 1.0 : -1.0) * (k == 0 || k == n ? 0.5 : 1.0));
+  }
+  double worst = 0.0;
+  for (int i = 0; i < 97; ++i) {
+    const double at = a + (b - a) * (i + 0.37) / 97.0;
+    double top = 0.0, bottom = 0.0;
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      top += w[k] * y[k] / (at - x[k]);
+      bottom += w[k] / (at - x[k]);
+    }
+    worst = std::max(worst, std::abs(top / bottom - f(at)));
+  }
+  return worst;
+}
+
+TEST(Kinks, PartEveryLineIntoPiecesOnWhichTheFieldIsSmooth) {
+  Primitive triangle = make(ShapeKind::Triangle, Vec3::Zero(), Kernel::wyvill(1.0));
+  triangle.control = {Vec3(-0.5, -0.3, 0), Vec3(0.6, -0.2, 0), Vec3(0.0, 0.5, 0)};
+  Primitive directed = make(ShapeKind::Directed, Vec3(1.0, 1.2, 1.1), Kernel::wyvill(1.2));
+  directed.control = {Vec3(1.3, 1.0, 1.4)};
+  const Kernel wyvill = Kernel::wyvill(1.0);
+  const std::vector<std::vector<Primitive>> bodies{
+      {make(ShapeKind::Rectangle, Vec3(0.4, 0.3, 0), wyvill)},
+      {make(ShapeKind::Segment, Vec3(0.4, 0, 0), wyvill)},
+      {make(ShapeKind::Box, Vec3(0.3, 0.2, 0.25), Kernel::soft_object(1.0))},
+      {make(ShapeKind::Disc, Vec3(0.4, 0, 0), wyvill)},
+      {triangle},
+      {directed},
+      {make(ShapeKind::Point, Vec3::Zero(), Kernel::nishimura(1.8))},
+      {make(ShapeKind::Point, Vec3::Zero(), Kernel::blanc_schlick(1.6, 0.5)),
+       make(ShapeKind::Ellipsoid, Vec3(0.9, 0.7, 0.8), wyvill, Vec3(0.5, 0.1, 0))},
+      {make(ShapeKind::Rectangle, Vec3(0.3, 0.3, 0), Kernel::gascuel(0.4, 0.7, 1.5)),
+       make(ShapeKind::Disc, Vec3(0.3, 0, 0), Kernel::murakami(0.8), Vec3(0.2, 0.3, 0.2))},
+  };
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const Body body(bodies[b], {Vec3(0.3, -0.2, 0.1), Quat(0.5, 0.1, 0.7, -0.3).normalized()});
+    std::vector<Kink> kinks;
+    EXPECT_TRUE(kinks_of(body.field, body.field.surface_box(), kinks)) << b;
+    double whole = 0.0;
+    for (int line = 0; line < 40; ++line) {
+      // Lines that pass the middle at a distance, clear of the cores, whose distance has a cone of its own.
+      const auto [s, c] = math::sin_cos(1.7 * line);
+      const double z = 2.0 * (line + 0.5) / 40.0 - 1.0;
+      const Vec3 n(std::sqrt(1.0 - z * z) * c, std::sqrt(1.0 - z * z) * s, z);
+      const Vec3 along = n.unitOrthogonal();
+      const auto at = [&](double t) -> Vec3 { return Vec3(0.3, -0.2, 0.1) + 0.55 * n + t * along; };
+      const auto f = [&](double t) { return implicit::FieldView(body.field).value(at(t)); };
+      constexpr double kReach = 0.5;
+      std::vector<double> cut{-kReach, kReach};
+      for (const Kink& kink : kinks) {
+        constexpr int kSteps = 2000;
+        for (int i = 0; i < kSteps; ++i) {
+          double low = -kReach + 2.0 * kReach * i / kSteps, high = low + 2.0 * kReach / kSteps;
+          const bool side = kink.value(at(low)) > 0.0;
+          if ((kink.value(at(high)) > 0.0) == side) continue;
+          for (int k = 0; k < 50; ++k) ((kink.value(at(0.5 * (low + high))) > 0.0) == side ? low : high) = 0.5 * (low + high);
+          cut.push_back(low);
+        }
+      }
+      std::sort(cut.begin(), cut.end());
+      whole = std::max(whole, interpolation_error(-kReach, kReach, f));
+      for (std::size_t i = 0; i + 1 < cut.size(); ++i) {
+        // 21 points leave 1e-8 where the nearest pole is as far away as the piece is long; tiny pieces only round.
+        if (cut[i + 1] - cut[i] < 1e-9) continue;
+        EXPECT_LT(interpolation_error(cut[i], cut[i + 1], f), 1e-7) << b << " line " << line;
+      }
+    }
+    EXPECT_GT(whole, 1e-5) << b;  // otherwise the pieces prove nothing
+  }
+}
+
+TEST(Kinks, HaveTheSlopeOfTheirFunctionAndStayOutOfALonePoint) {
+  const Body plate({make(ShapeKind::Rectangle, Vec3(0.4, 0.3, 0), Kernel::wyvill(1.0)),
+                    make(ShapeKind::Disc, Vec3(0.4, 0, 0), Kernel::wyvill(1.0))});
+  std::vector<Kink> kinks;
+  EXPECT_TRUE(kinks_of(plate.field, plate.field.surface_box(), kinks));
+  EXPECT_EQ(kinks.size(), 4u + 1u + 1u + 1u);  // sides, the support; the disc's edge, its support
+  const Vec3 x(0.31, -0.47, 0.29);
+  for (const Kink& kink : kinks) {
+    for (int k = 0; k < 3; ++k) {
+      for (const double way : {-0.4, 0.4}) {
+        EXPECT_LE(std::abs(kink.value(x + way * Vec3::Unit(k)) - kink.value(x)), kink.change(x, 0.4) + 1e-12);
+      }
+    }
+    Vec3 slope;
+    EXPECT_EQ(kink.value(x, slope), kink.value(x));
+    for (int k = 0; k < 3; ++k) {
+      constexpr double h = 1e-5;  // leaves h^2 f''' / 6, far below the tolerance
+      EXPECT_NEAR(slope[k], (kink.value(x + h * Vec3::Unit(k)) - kink.value(x - h * Vec3::Unit(k))) / (2.0 * h), 1e-7);
+    }
+  }
+  kinks.clear();
+  const Body point({make(ShapeKind::Point, Vec3::Zero(), Kernel::wyvill(1.0))});
+  EXPECT_TRUE(kinks_of(point.field, point.field.surface_box(), kinks));
+  EXPECT_TRUE(kinks.empty());
+  Primitive tapered = make(ShapeKind::Segment, Vec3(0.4, 0, 0), Kernel::wyvill(1.0));
+  tapered.taper = 0.5;
+  EXPECT_FALSE(kinks_of(Body({tapered}).field, point.field.surface_box(), kinks));
+}
+
+/// Integrals over z = 0 of [F]+, of its points and of the area of {F > 0}: along lines of y between rim and kinks by Gauss's
+/// rule, over x = middle - half cos(phi) by a fine composite one in phi, in which the lengths of the lines are smooth at the ends
+/// of the patch. Nothing of the polar rule is in it.
+struct PlaneSums {
+  double force = 0.0, area = 0.0;
+  Vec3 first = Vec3::Zero();
+};
+PlaneSums on_plane(const implicit::Field& field, const std::vector<Kink>& kinks, double reach, int lines) {
+  constexpr std::array<double, 4> kNode{0.069431844202973714, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629};
+  constexpr std::array<double, 4> kWeight{0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693};
+  const implicit::FieldView view(field);
+  PlaneSums sums;
+  // F has one hill along a line, at y.
+  const auto hill = [&](double x) {
+    double low = -reach, high = reach;
+    for (int k = 0; k < 90; ++k) {
+      const double third = (high - low) / 3.0;
+      if (view.value(Vec3(x, low + third, 0)) < view.value(Vec3(x, high - third, 0))) {
+        low += third;
+      } else {
+        high -= third;
+      }
+    }
+    return 0.5 * (low + high);
+  };
+  const auto highest = [&](double x) { return view.value(Vec3(x, hill(x), 0)); };
+  double inside = -reach, end[2];
+  while (highest(inside) <= 0.0) inside += 0.01 * reach;
+  inside += 0.02 * reach;
+  for (const int side : {0, 1}) {
+    double in = inside, out = side == 0 ? -reach : reach;
+    for (int k = 0; k < 60; ++k) (highest(0.5 * (in + out)) > 0.0 ? in : out) = 0.5 * (in + out);
+    end[side] = in;
+  }
+  for (int line = 0; line < lines; ++line) {
+    for (std::size_t q = 0; q < kNode.size(); ++q) {
+      const auto [s, c] = math::sin_cos(std::numbers::pi * (line + kNode[q]) / lines);
+      const double x = 0.5 * (end[0] + end[1]) - 0.5 * (end[1] - end[0]) * c;
+      const double dx = 0.5 * (end[1] - end[0]) * s * std::numbers::pi / lines * kWeight[q];
+      std::vector<double> cut;
+      const double top = hill(x);
+      for (const double side : {-reach, reach}) {
+        double in = top, out = side;
+        for (int k = 0; k < 60; ++k) (view.value(Vec3(x, 0.5 * (in + out), 0)) > 0.0 ? in : out) = 0.5 * (in + out);
+        cut.push_back(in);
+      }
+      const auto cut_at_roots = [&](const auto& g) {
+        constexpr int kSteps = 64;
+        for (int i = 0; i < kSteps; ++i) {
+          double low = -reach + 2.0 * reach * i / kSteps, high = low + 2.0 * reach / kSteps;
+          const bool side = g(low) > 0.0;
+          if ((g(high) > 0.0) == side) continue;
+          for (int k = 0; k < 48; ++k) ((g(0.5 * (low + high)) > 0.0) == side ? low : high) = 0.5 * (low + high);
+          cut.push_back(0.5 * (low + high));
+        }
+      };
+      for (const Kink& kink : kinks) cut_at_roots([&](double y) { return kink.value(Vec3(x, y, 0)); });
+      std::sort(cut.begin(), cut.end());
+      for (std::size_t i = 0; i + 1 < cut.size(); ++i) {
+        const double width = cut[i + 1] - cut[i];
+        if (view.value(Vec3(x, 0.5 * (cut[i] + cut[i + 1]), 0)) <= 0.0) continue;
+        sums.area += dx * width;
+        for (std::size_t g = 0; g < kNode.size(); ++g) {
+          const Vec3 at(x, cut[i] + width * kNode[g], 0);
+          const double p = dx * width * kWeight[g] * view.value(at);
+          sums.force += p;
+          sums.first += p * at;
+        }
+      }
+    }
+  }
+  return sums;
+}
+
+TEST(SplitRule, AcrossTheEdgesAndTheCornerOfAPlateKeepsItsBoundAndTheErrorAsked) {
+  // A plate leans with a corner on a rigid plane: three regions of its field lie on the patch.
+  for (const double lean : {0.1, 0.35}) {
+    Primitive p;
+    p.shape = ShapeKind::Rectangle;
+    p.size = Vec3(0.5, 0.5, 0);
+    p.kernel = Kernel::wyvill(1.0);
+    const Quat turn = (Quat(Eigen::AngleAxisd(lean, Vec3::UnitX())) * Quat(Eigen::AngleAxisd(-0.8 * lean, Vec3::UnitY()))).normalized();
+    // The lowest corner lies .41 above the plane, and the surface .454 from it.
+    const Vec3 corner = turn * Vec3(-0.5, -0.5, 0);
+    const Pose pose{-corner + Vec3(0, 0, 0.41), turn};
+    const Body plate({p}, pose);
+    const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1e9};
+    std::vector<Kink> kinks;
+    ASSERT_TRUE(kinks_of(plate.field, plate.field.surface_box(), kinks));
+    const PlaneSums exact = on_plane(plate.field, kinks, 0.9, 1000);
+    double last = 1.0;
+    for (const double asked : {1e-3, 1e-6, 1e-8}) {
+      Stage stage;
+      stage.add(plate.field, {pose.position});
+      stage.add(plane).fixed = true;
+      const ContactSurface& s = stage.solve({.error = asked});
+      ASSERT_EQ(s.summary.size(), 1u);
+      const ContactSurface::Summary& sum = s.summary[0];
+      ASSERT_EQ(sum.rule, ContactRule::Polar);
+      EXPECT_GE(sum.kinks, 2u) << lean;
+      const double error = std::max({std::abs(sum.force.z() / exact.force - 1.0), std::abs(sum.area / exact.area - 1.0),
+                                     (sum.centre_of_pressure - exact.first / exact.force).head<2>().norm() / std::sqrt(exact.area)});
+      EXPECT_LE(sum.error_estimate, asked);
+      EXPECT_LE(error, sum.error_estimate + 2e-9) << lean << " " << asked;  // 2e-9: the compliance of the plane and the lines
+      EXPECT_LT(sum.points, 4000u);
+      last = error;
+    }
+    EXPECT_LT(last, 1e-8);
+  }
+}
+
+TEST(SplitRule, IsLeftAloneWhereNoKinkCrosses) {
+  Primitive p;
+  p.shape = ShapeKind::Rectangle;
+  p.size = Vec3(0.5, 0.5, 0);
+  p.kernel = Kernel::wyvill(1.0);
+  const Pose pose{Vec3(0, 0, 0.4), Quat::Identity()};
+  const Body plate({p}, pose);
+  const testing::WyvillSphere ball{Vec3(0.1, 0.05, -0.25), {0.6, 0.5}};
+  Stage stage;
+  stage.add(plate.field, {pose.position});
+  stage.add(ball, {ball.centre});
+  const ContactSurface& s = stage.solve({.error = 1e-6});
+  ASSERT_EQ(s.summary.size(), 1u);
+  EXPECT_EQ(s.summary[0].rule, ContactRule::Polar);
+  EXPECT_EQ(s.summary[0].kinks, 0u);
+}
+
+}  // namespace
+}  // namespace supple::collision
