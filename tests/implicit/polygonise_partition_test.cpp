@@ -1,12 +1,15 @@
 // Meshes of bodies that touch: space is divided by the largest positive field.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
+#include "support/mesh_distance.h"
 #include "supple/implicit/polygonise.h"
 
 namespace supple::implicit {
@@ -94,6 +97,40 @@ TEST(PolygonisePartition, OfTwoBallsSharesTheContactBitForBit) {
       } else {
         ASSERT_LE(std::abs(views[m].value(p)), 1e-12);
       }
+    }
+  }
+}
+
+// The rim of a contact is met as well as the crease of a union: both meshes have the same vertices on it.
+TEST(PolygonisePartition, MeetsTheCircleThatIsTheRimOfTwoBalls) {
+  constexpr double kRadius = 0.5, kApart = 0.35;
+  const double rim = std::sqrt(kRadius * kRadius - kApart * kApart);
+  for (const double tilt : {0.0, 0.3, 0.7}) {
+    const Vec3 axis = Vec3(1.0, tilt, 0.5 * tilt * tilt).normalized(), u = axis.unitOrthogonal(), v = axis.cross(u);
+    const std::vector<FunctionField> balls{sphere(kApart * axis, kRadius), sphere(-kApart * axis, kRadius)};
+    for (const double cell : {0.08, 0.04, 0.02}) {
+      const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(cell), Executor(1));
+      expect_all_closed(mesh);
+      std::array<std::set<std::array<double, 3>>, 2> on_rim;
+      for (std::size_t m = 0; m < 2; ++m) {
+        const supple::testing::MeshDistance distance(mesh[m], cell);
+        double rms = 0.0, largest = 0.0;
+        for (int i = 0; i < 1000; ++i) {
+          const double angle = 2.0 * std::numbers::pi * i / 1000.0;
+          const double d = distance(rim * (std::cos(angle) * u + std::sin(angle) * v));
+          rms += d * d / 1000.0;
+          largest = std::max(largest, d);
+        }
+        EXPECT_LT(std::sqrt(rms), 0.065 * cell) << tilt << " " << cell;
+        EXPECT_LT(largest, 0.3 * cell) << tilt << " " << cell;  // where the rim only grazes a tetrahedron
+        EXPECT_EQ(self_intersections(mesh[m], cell), 0u);
+        for (const Vec3& p : mesh[m].position) {
+          const double along = p.dot(axis), across = (p - along * axis).norm();
+          if (std::hypot(along, across - rim) < 1e-9) on_rim[m].insert({p.x(), p.y(), p.z()});
+        }
+      }
+      EXPECT_EQ(on_rim[0], on_rim[1]);  // bit for bit
+      EXPECT_GT(static_cast<double>(on_rim[0].size()), 2.0 * std::numbers::pi * rim / cell);  // more than one a cell
     }
   }
 }
