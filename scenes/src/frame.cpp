@@ -379,6 +379,26 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   profile.present += frame.surface.point.size();
 }
 
+namespace {
+
+/// The meshes of bodies that touch, with the distances that the scene asks for; angles are held by none of them.
+std::vector<Mesh> divide(const MeshingDesc& d, std::span<const implicit::FieldView> views, const implicit::Lattice& lattice,
+                         const Executor& executor, implicit::PolygoniseCounts& counts) {
+  implicit::Lattice coarsest = lattice;
+  if (d.method == MeshingName::Delaunay) {
+    const double size = d.size.value_or(2.0 * lattice.cell);
+    coarsest.cell = size / std::sqrt(3.0);  // the longest edge of a tetrahedron is no longer than the size
+    return implicit::polygonise_partition_within(views, coarsest, {d.distance.value_or(0.1 * size), "mesh.distance"}, executor, &counts);
+  }
+  if (!d.error) return implicit::polygonise_partition(views, lattice, executor, &counts);
+  coarsest.cell = views.front().feature_size();
+  for (const implicit::FieldView& view : views) coarsest.cell = std::min(coarsest.cell, view.feature_size());
+  coarsest.cell *= 0.5;
+  return implicit::polygonise_partition_within(views, coarsest, {*d.error}, executor, &counts);
+}
+
+}  // namespace
+
 std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
                                      const core::Interactions& laws, Frame& frame) try {
   const Model& model = context.model;
@@ -419,7 +439,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
     claims.reserve(touching.size());
     for (const std::uint32_t i : touching) claims.emplace_back(drawn, i, frame.surface, model.bulge);
     const std::vector<implicit::FieldView> views(claims.begin(), claims.end());
-    std::vector<Mesh> parts = implicit::polygonise_partition(views, lattice, context.executor, &counts);
+    std::vector<Mesh> parts = divide(model.meshing, views, lattice, context.executor, counts);
     add_counts();
     for (std::size_t k = 0; k < touching.size(); ++k) surfaces[touching[k]] = std::move(parts[k]);
   }
@@ -498,6 +518,7 @@ void rethrow_with_scene_keys(const Error& error) {
   for (Fault& fault : faults) {
     if (fault.key == "lattice.cell") fault.key = "output.cell";
     if (fault.key == "mesh.error") fault.key = "output.meshing.error";
+    if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
   }
   throw Error(error.kind(), std::move(faults));

@@ -10,6 +10,7 @@
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "support/mesh_distance.h"
+#include "supple/core/error.h"
 #include "supple/implicit/polygonise.h"
 
 namespace supple::implicit {
@@ -132,6 +133,61 @@ TEST(PolygonisePartition, MeetsTheCircleThatIsTheRimOfTwoBalls) {
       EXPECT_EQ(on_rim[0], on_rim[1]);  // bit for bit
       EXPECT_GT(static_cast<double>(on_rim[0].size()), 2.0 * std::numbers::pi * rim / cell);  // more than one a cell
     }
+  }
+}
+
+/// Distance to the surface of the ball round `centre` without what lies nearer to the other ball: its cap and the disc.
+double distance_to_half(const Vec3& p, const Vec3& axis, double apart, double radius) {
+  const double along = p.dot(axis), across = (p - along * axis).norm(), rim = std::sqrt(radius * radius - apart * apart);
+  const Vec3 from = p - apart * axis;
+  const double to_rim = std::hypot(along, across - rim);
+  // The foot on the ball lies on the cap where it is on this side of the plane.
+  const bool on_cap = apart + radius * from.dot(axis) / from.norm() >= 0.0;
+  const double to_cap = on_cap ? std::abs(from.norm() - radius) : to_rim;
+  return std::min(to_cap, across <= rim ? std::abs(along) : to_rim);
+}
+
+// Meshes to a stated error, where bodies touch: both ways, and with the contact shared bit for bit.
+TEST(PolygonisePartition, ReachesTheErrorThatIsAskedForWhereBodiesTouch) {
+  constexpr double kRadius = 0.5, kApart = 0.35;
+  const Vec3 axis = Vec3(1.0, 0.3, 0.045).normalized(), u = axis.unitOrthogonal(), v = axis.cross(u);
+  const std::vector<FunctionField> balls{sphere(kApart * axis, kRadius), sphere(-kApart * axis, kRadius)};
+  std::size_t last = 0;
+  for (const double error : {2e-2, 5e-3, 2e-3}) {
+    const std::vector<Mesh> mesh = polygonise_partition_within(views_of(balls), lattice_of(0.25), {error}, Executor(2));
+    expect_all_closed(mesh);
+    EXPECT_EQ(contact_triangles(mesh[0], 1, false), contact_triangles(mesh[1], 0, true));
+    EXPECT_GT(mesh[0].triangle_count(), 2 * last);
+    last = mesh[0].triangle_count();
+    for (const auto& [m, side] : {std::pair{0, 1.0}, std::pair{1, -1.0}}) {
+      const Mesh& one = mesh[static_cast<std::size_t>(m)];
+      double there = 0.0, back = 0.0;
+      for (const auto& t : one.triangle) {
+        const Vec3 c = (one.position[t[0]] + one.position[t[1]] + one.position[t[2]]) / 3.0;
+        there = std::max(there, distance_to_half(c, side * axis, kApart, kRadius));
+      }
+      EXPECT_LE(there, 1.5 * error);  // to first order: at the rim up to sqrt(2) of what either side says
+      EXPECT_GT(there, error / 64.0);
+      const supple::testing::MeshDistance distance(one, std::sqrt(error));
+      for (int i = 0; i < 4000; ++i) {  // of the disc, the rim and the cap
+        const double angle = 2.399963 * i, share = (i + 0.5) / 4000.0, z = side * (kApart + kRadius) * share;
+        const double rim = std::sqrt(kRadius * kRadius - kApart * kApart);
+        const double across = std::sqrt(std::max(kRadius * kRadius - std::pow(z - side * kApart, 2), 0.0));
+        const Vec3 turn = std::cos(angle) * u + std::sin(angle) * v;
+        for (const Vec3& p : {Vec3(z * axis + across * turn), Vec3(rim * std::sqrt(share) * turn), Vec3(rim * turn)}) {
+          back = std::max(back, distance(p));
+        }
+      }
+      EXPECT_LE(back, 4.0 * error) << error;
+    }
+  }
+  try {
+    (void)polygonise_partition_within(views_of(balls), lattice_of(0.25), {1e-9, "some.key"}, Executor(2));
+    FAIL() << "no error";
+  } catch (const Error& caught) {
+    EXPECT_EQ(caught.kind(), ErrorKind::Limit);
+    EXPECT_EQ(caught.faults().front().key, "some.key");
+    EXPECT_NE(std::string(caught.what()).find("where objects touch"), std::string::npos);
   }
 }
 

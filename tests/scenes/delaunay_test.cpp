@@ -71,6 +71,49 @@ TEST(DelaunayScene, NamesTheKeyWhenTheBoundsTakeTooMuch) {
   }
 }
 
+// Objects that touch share their contact bit for bit, within the size and the distance asked for.
+TEST(DelaunayScene, DividesObjectsThatTouchWithinSizeAndDistance) {
+  const auto meshes_of = [](const std::string& meshing) {
+    const std::string text = R"(
+schema: 1
+duration: 1 s
+objects:
+  - name: left
+    particles: {arrange: single, at: [0, 0, 0], mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 6 kPa}
+  - name: right
+    particles: {arrange: single, at: [0.6, 0.03, 0.02], mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 6 kPa}
+output: {mesh: ply, cell: 0.1, meshing: )" + meshing + "}\n";
+    Simulation simulation(parse_scene(text, "test.yaml", "."), {.delaunay = cgal::delaunay_mesh});
+    return simulation.meshes();
+  };
+  const auto shared = [](const std::vector<Mesh>& mesh) {
+    std::size_t count = 0;
+    for (const Vec3& p : mesh[0].position) {
+      count += static_cast<std::size_t>(std::count(mesh[1].position.begin(), mesh[1].position.end(), p));
+    }
+    return count;
+  };
+  const std::vector<Mesh> coarse = meshes_of("{method: delaunay, size: 0.15, distance: 0.03}");
+  ASSERT_EQ(coarse.size(), 2u);
+  for (const Mesh& mesh : coarse) {
+    const MeshReport report = inspect(mesh);
+    EXPECT_TRUE(report.closed && report.oriented);
+    for (const auto& t : mesh.triangle) {
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_LE((mesh.position[t[k]] - mesh.position[t[(k + 1) % 3]]).norm(), 0.15);
+    }
+  }
+  EXPECT_GT(shared(coarse), 10u);
+  const std::vector<Mesh> fine = meshes_of("{method: delaunay, size: 0.15, distance: 0.005}");
+  EXPECT_GT(fine[0].triangle_count(), 3 * coarse[0].triangle_count());
+  EXPECT_GT(shared(fine), shared(coarse));
+  const std::vector<Mesh> cubes = meshes_of("{error: 0.005}"), plain = meshes_of("{method: cubes}");
+  EXPECT_GT(cubes[0].triangle_count(), plain[0].triangle_count());
+}
+
 TEST(DelaunayScene, IsNamedInThePlan) {
   const Simulation simulation = make("{method: delaunay}");
   const StepPlan plan = plan_step(simulation.scene(), simulation.model(), requested_outputs(simulation.scene()));

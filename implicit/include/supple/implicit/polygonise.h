@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "supple/core/executor.h"
@@ -55,5 +56,18 @@ struct PolygoniseCounts {
 /// An unbounded body (a ground) shapes the others and gets an empty mesh. @throws Error{Usage} when all are unbounded.
 [[nodiscard]] std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice,
                                                      const Executor& executor, PolygoniseCounts* counts = nullptr);
+
+/// How far the meshes of bodies that touch may lie from their surfaces.
+struct PartitionError {
+  double largest = 0.0;             ///< of the centroids of all triangles [m], > 0
+  std::string key = "mesh.error";   ///< named when it cannot be reached
+};
+
+/// polygonise_partition on the coarsest of the lattices with cells of coarsest.cell, half of that, ... where every centroid lies
+/// within the error of its body's surface, to first order: |D| / |grad D| with D = F_m - max(0, F_j). Bodies still share
+/// their contact bit for bit. @throws Error{Limit} when cells of a 32nd of coarsest.cell do not reach it.
+[[nodiscard]] std::vector<Mesh> polygonise_partition_within(std::span<const FieldView> fields, const Lattice& coarsest,
+                                                            const PartitionError& error, const Executor& executor,
+                                                            PolygoniseCounts* counts = nullptr);
 
 }  // namespace supple::implicit
