@@ -164,7 +164,7 @@ class BlobSampler final : public Sampler {
       Workspace& work = Workspace::of_thread();
       for (std::size_t i = begin; i < end; ++i) sample_block(table.block[blocks[i]], work);
     });
-    if (skip_) evaluate_needed(executor, table);
+    if (skip_) evaluate_needed(executor, blocks, table);
   }
 
   void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const override {
@@ -359,7 +359,7 @@ class BlobSampler final : public Sampler {
   void sample_block(Block& block, Workspace& work) const {
     gather(block, work);
     work.sure = 0;
-    if (skip_ && grid_.reach() >= kSureTiles && work.block.count > 0) {
+    if (skip_ && has_sure(kSureTiles) && work.block.count > 0) {
       const blobs::SureCubes sure = blobs::find_sure_cubes(work.block, {0.0F, 0.0F, 0.0F}, kTile, iso_);
       block.kernel_values += kTileNodes * sure.added;
       work.sure = sure.inside;
@@ -377,7 +377,7 @@ class BlobSampler final : public Sampler {
   }
 
   void gather(const Block& block, Workspace& work) const {
-    if (grid_.reach() < kSureTiles) {
+    if (!has_sure(kSureTiles)) {
       grid_.gather(block.base(), kBlockNodes, 0, work.block);
       return;
     }
@@ -387,7 +387,7 @@ class BlobSampler final : public Sampler {
 
   [[nodiscard]] Verdict select_leaf(const std::array<int, 3>& corner, Workspace& work) const {
     const auto centre = centre_of(corner, kLeafNodes);
-    return verdict(grid_.reach() < kSureCubes
+    return verdict(!has_sure(kSureCubes)
                        ? blobs::select(work.block, centre, 0.5F * kLeafNodes, work.leaf)
                        : blobs::select_near_first(work.block, centre, 0.5F * kLeafNodes, work.leaf, work.far));
   }
@@ -468,7 +468,7 @@ class BlobSampler final : public Sampler {
       return;
     }
     std::uint64_t sure = 0;  // of its cubes of 2^3 nodes
-    if (skip_ && grid_.reach() >= kSureCubes) {
+    if (skip_ && has_sure(kSureCubes)) {
       const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(corner), kTile / 2, iso_);
       block.kernel_values += kTileNodes * cubes.added;
       sure = cubes.inside;
@@ -514,10 +514,18 @@ class BlobSampler final : public Sampler {
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
-  void evaluate_needed(const Executor& executor, BlockTable& table) const {
+  /// @param sampled  blocks that were, in this call: only next to them can an outside node be new
+  void evaluate_needed(const Executor& executor, std::span<const std::uint32_t> sampled, BlockTable& table) const {
+    std::vector<std::uint8_t> near(table.block.size());
+    for (const std::uint32_t b : sampled) {
+      const Cells low = table.block[b].base();
+      const blobs::CellBox around{{low[0] - 1, low[1] - 1, low[2] - 1},
+                                  {low[0] + kBlockNodes, low[1] + kBlockNodes, low[2] + kBlockNodes}};
+      for_blocks_in(table, around, [&](std::size_t n) { near[n] = 1; });
+    }
     std::vector<std::uint32_t> blocks;
     for (std::size_t b = 0; b < table.block.size(); ++b) {
-      if (table.block[b].early != 0) blocks.push_back(static_cast<std::uint32_t>(b));
+      if (near[b] != 0 && table.block[b].early != 0) blocks.push_back(static_cast<std::uint32_t>(b));
     }
     // Signs of all blocks are read before a block is written.
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
@@ -568,6 +576,9 @@ class BlobSampler final : public Sampler {
   static constexpr double kSteepest = 3.5;
   /// Radii in cells from which bounds show that cubes of 2^3 and of 4^3 nodes lie inside.
   static constexpr double kSureCubes = 5.0, kSureTiles = 9.0;
+  /// Beyond this bounds of tiles and leaves decide nearly as much.
+  static constexpr double kSureMost = 16.0;
+  [[nodiscard]] bool has_sure(double from) const { return grid_.reach() >= from && grid_.reach() <= kSureMost; }
 
   const Field::Index& index_;
   Lattice lattice_;
