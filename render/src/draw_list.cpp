@@ -172,6 +172,54 @@ MapFit fit_map(const Box& bounds, const Vec3& direction, int size) {
           .extent = extent.cast<float>()};
 }
 
+AreaMap fit_area_map(const AreaLight& light, const Vec3& origin, std::span<const float> vertices, int size) {
+  constexpr float kWidest = 4.0F;
+  const RectangleEdges edges = rectangle_edges(light);
+  Eigen::Matrix3f axes;
+  // Seen along the last axis with the first to the right, the second is up: front faces keep their turn.
+  axes << edges.u.normalized().cast<float>().transpose(), -edges.v.normalized().cast<float>().transpose(),
+      light.facing.normalized().cast<float>().transpose();
+  const Eigen::Vector3f middle = (light.at - origin).cast<float>();
+  const float nearest = 0.02F * static_cast<float>(light.half_sizes.minCoeff());
+  Eigen::Vector2f least = Eigen::Vector2f::Constant(INFINITY), most = -least;
+  float first = INFINITY, last = 0.0F;
+  for (std::size_t i = 0; i + 6 <= vertices.size(); i += 6) {
+    const Eigen::Vector3f q = axes * (Eigen::Vector3f(vertices[i], vertices[i + 1], vertices[i + 2]) - middle);
+    if (!(q.z() > 0.0F)) continue;
+    const float z = std::max(q.z(), nearest);
+    const Eigen::Vector2f tangent = (q.head<2>() / z).cwiseMax(-kWidest).cwiseMin(kWidest);
+    least = least.cwiseMin(tangent);
+    most = most.cwiseMax(tangent);
+    first = std::min(first, z);
+    last = std::max(last, z);
+  }
+  AreaMap map;
+  if (!(last > 0.0F)) return map;
+  // Edges grow in steps and lie on whole texels, as in fit_map.
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const double extent = rung((most[k] - least[k]) * (1.0 + 4.0 / size) + 1e-6);
+    const double texel = extent / size;
+    map.extent[k] = static_cast<float>(extent);
+    map.lower[k] = static_cast<float>(texel * std::floor((0.5 * (least[k] + most[k]) - 0.5 * extent) / texel + 0.5));
+  }
+  map.lower.z() = 1.02F / first;
+  map.extent.z() = map.lower.z() - 0.98F / last;
+  // With w the depth z: x / w and y / w run from -1 to 1 over the tangents, z / w over 1 / depth.
+  Eigen::Matrix4f projection = Eigen::Matrix4f::Zero();
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    projection(k, k) = 2.0F / map.extent[k];
+    projection(k, 2) = -2.0F * map.lower[k] / map.extent[k] - 1.0F;
+  }
+  projection(2, 2) = 2.0F * map.lower.z() / map.extent.z() - 1.0F;
+  projection(2, 3) = -2.0F / map.extent.z();
+  projection(3, 2) = 1.0F;
+  Eigen::Matrix4f to_light = Eigen::Matrix4f::Identity();
+  to_light.block<3, 3>(0, 0) = axes;
+  to_light.block<3, 1>(0, 3) = -(axes * middle);
+  map.to_clip = projection * to_light;
+  return map;
+}
+
 Eigen::Vector3f linear_colour(const Vec3& srgb) {
   const auto decode = [](double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); };
   return srgb.cwiseMax(0.0).cwiseMin(1.0).unaryExpr(decode).cast<float>();

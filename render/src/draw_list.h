@@ -55,6 +55,17 @@ struct MapFit {
 /// whole texels, so that the map of a slowly changing box stands still and shadows do not swim from frame to frame.
 [[nodiscard]] MapFit fit_map(const Box& bounds, const Vec3& direction, int size);
 
+/// What an area light sees, in perspective from its middle along `front`: u to the right. Tangents are lateral over depth.
+struct AreaMap {
+  Eigen::Matrix4f to_clip = Eigen::Matrix4f::Identity();  ///< world (relative to the origin) to clip; depth is affine in 1 / depth
+  Eigen::Vector3f lower = Eigen::Vector3f::Zero();        ///< least tangents; 1 / depth of the near plane [1/m]
+  Eigen::Vector3f extent = Eigen::Vector3f::Zero();       ///< of the tangents and of 1 / depth; 0: the light sees nothing
+};
+
+/// The map of the vertices before the light, of `size` texels an edge. Tangents beyond 4 are left out.
+/// @param vertices  as DrawList::vertices, relative to `origin`
+[[nodiscard]] AreaMap fit_area_map(const AreaLight& light, const Vec3& origin, std::span<const float> vertices, int size);
+
 /// The values of a column, or null.
 [[nodiscard]] const std::vector<double>* column(const Mesh& mesh, std::string_view name);
 

@@ -1,6 +1,7 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfFloatAttribute.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
@@ -8,11 +9,13 @@
 #include <ImfStandardAttributes.h>
 #include <half.h>
 
-#include <array>
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <initializer_list>
 #include <utility>
 
-#include "srgb.h"
+#include "lighting.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/render/layers.h"
@@ -40,23 +43,25 @@ class Memory final : public Imf::OStream {
 };
 
 std::vector<half> halves(const std::vector<float>& values) {
-  return {values.begin(), values.end()};
+  std::vector<half> out;
+  out.reserve(values.size());
+  // Larger light than a half holds is as bright as it can be.
+  for (const float v : values) out.emplace_back(std::isfinite(v) ? std::clamp(v, -static_cast<float>(HALF_MAX), static_cast<float>(HALF_MAX)) : v);
+  return out;
 }
 
 constexpr const char* kFingerprint = "fingerprint";
 
 }  // namespace
 
-void write_exr(const std::filesystem::path& path, const Image& picture, const Layers& layers,
+void write_exr(const std::filesystem::path& path, const LinearImage& picture, const Layers& layers,
                std::span<const std::string> objects, std::string_view fingerprint) {
   const std::size_t count = static_cast<std::size_t>(layers.width) * static_cast<std::size_t>(layers.height);
   SUPPLE_EXPECTS(picture.width == layers.width && picture.height == layers.height && count > 0);
-  SUPPLE_EXPECTS(picture.pixels.size() == 3 * count && layers.depth.size() == count && layers.normal.size() == 3 * count);
+  SUPPLE_EXPECTS(picture.rgba.size() == 4 * count && layers.depth.size() == count && layers.normal.size() == 3 * count);
   SUPPLE_EXPECTS(layers.velocity.size() == 3 * count && layers.object.size() == count);
 
-  std::vector<half> colour(3 * count);
-  for (std::size_t i = 0; i < 3 * count; ++i) colour[i] = half(static_cast<float>(linear_of_srgb(picture.pixels[i])));
-  const std::vector<half> normal = halves(layers.normal), velocity = halves(layers.velocity);
+  const std::vector<half> colour = halves(picture.rgba), normal = halves(layers.normal), velocity = halves(layers.velocity);
 
   Imf::Header header(layers.width, layers.height);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -64,6 +69,7 @@ void write_exr(const std::filesystem::path& path, const Image& picture, const La
   std::string names;
   for (std::size_t i = 0; i < objects.size(); ++i) names += (i > 0 ? ", " : "") + std::to_string(i + 1) + ' ' + objects[i];
   header.insert("objects", Imf::StringAttribute(names));
+  header.insert("exposure", Imf::FloatAttribute(kExposure));
   if (!fingerprint.empty()) header.insert(kFingerprint, Imf::StringAttribute(std::string(fingerprint)));
 
   Imf::FrameBuffer buffer;
@@ -73,10 +79,11 @@ void write_exr(const std::filesystem::path& path, const Image& picture, const La
     char* base = const_cast<char*>(static_cast<const char*>(first));
     buffer.insert(name, Imf::Slice(type, base, stride, stride * static_cast<std::size_t>(layers.width)));
   };
-  const auto add_vector = [&](std::array<const char*, 3> channels, const std::vector<half>& values) {
-    for (std::size_t k = 0; k < 3; ++k) add(channels[k], Imf::HALF, &values[k], 3 * sizeof(half));
+  const auto add_vector = [&](std::initializer_list<const char*> channels, const std::vector<half>& values) {
+    const half* value = values.data();
+    for (const char* channel : channels) add(channel, Imf::HALF, value++, channels.size() * sizeof(half));
   };
-  add_vector({"R", "G", "B"}, colour);
+  add_vector({"R", "G", "B", "A"}, colour);
   add_vector({"N.X", "N.Y", "N.Z"}, normal);
   add_vector({"velocity.X", "velocity.Y", "velocity.Z"}, velocity);
   add("Z", Imf::FLOAT, layers.depth.data(), sizeof(float));

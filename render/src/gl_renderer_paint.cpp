@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "gl_renderer.h"
 #include "process_time.h"
@@ -35,7 +36,7 @@ GLuint make_map_texture(const Gl& gl) {
 GLuint make_picture_texture(const Gl& gl, const Image& image) {
   GLuint texture = 0;
   gl.GenTextures(1, &texture);
-  gl.ActiveTexture(GL_TEXTURE0 + kPicture);
+  gl.ActiveTexture(GL_TEXTURE0 + kUploads);
   gl.BindTexture(GL_TEXTURE_2D, texture);
   // Upside down, so that v grows upward.
   const std::size_t row = 3 * static_cast<std::size_t>(image.width);
@@ -55,7 +56,6 @@ GLuint make_picture_texture(const Gl& gl, const Image& image) {
 
 GlRenderer::Painting::Painting(const Gl& gl, const Target& first, int samples)
     : geometry(gl, shaders::painted_surface(), shaders::painted_geometry()),
-      lit_items(gl, shaders::whole_picture(), shaders::lit_items(samples, true)),
       target(add_colour(gl, first, {.colour = GL_RGBA8, .samples = samples})),
       maps(make_map_texture(gl)) {
   gl.GenBuffers(1, &buffer);
@@ -73,17 +73,21 @@ void GlRenderer::make_painting() {
   gl_.VertexAttribPointer(2, 3, GL_FLOAT, GL_FALSE, 3 * sizeof(float), nullptr);
 }
 
-void GlRenderer::upload_pictures(std::span<const Item> items) {
+void GlRenderer::upload_pictures(const View& view, std::span<const Item> items) {
+  std::set<std::shared_ptr<const Image>> shown;
+  const auto add = [&](const Paint& paint) {
+    if (paint.kind == PaintKind::Picture) shown.insert(paint.picture);
+  };
+  for (const Item& item : items) add(item.paint);
+  if (view.ground) add(view.ground->paint);
   // A picture lives as long as someone shows it.
-  for (auto at = painting_->pictures.begin(); at != painting_->pictures.end();) {
-    const bool shown = std::any_of(items.begin(), items.end(), [&](const Item& item) { return item.paint.picture == at->first; });
-    if (!shown) gl_.DeleteTextures(1, &at->second);
-    at = shown ? std::next(at) : painting_->pictures.erase(at);
+  for (auto at = pictures_.begin(); at != pictures_.end();) {
+    const bool stays = shown.contains(at->first);
+    if (!stays) gl_.DeleteTextures(1, &at->second);
+    at = stays ? std::next(at) : pictures_.erase(at);
   }
-  for (const Item& item : items) {
-    if (item.paint.kind != PaintKind::Picture || painting_->pictures.contains(item.paint.picture)) continue;
-    painting_->pictures[item.paint.picture] = make_picture_texture(gl_, *item.paint.picture);
-  }
+  for (const auto& picture : shown)
+    if (!pictures_.contains(picture)) pictures_[picture] = make_picture_texture(gl_, *picture);
 }
 
 void GlRenderer::set_paint(const Program& program, const Item& item) const {
@@ -97,7 +101,7 @@ void GlRenderer::set_paint(const Program& program, const Item& item) const {
   program.set("map_row", (static_cast<float>(paint.map) + 0.5F) / static_cast<float>(kColourMapNames.size()));
   if (paint.kind != PaintKind::Picture) return;
   program.set("picture_aspect", static_cast<float>(paint.picture->width) / static_cast<float>(paint.picture->height));
-  bind(kPicture, painting_->pictures.at(paint.picture), GL_TEXTURE_2D);
+  bind(kPicture, pictures_.at(paint.picture), GL_TEXTURE_2D);
 }
 
 /// Which faces, and which samples of a pixel: an item of opacity a takes a share a of them, each item others first.

@@ -12,10 +12,26 @@ GlRenderer::Programs::Programs(const Gl& gl, int samples)
       ground_occlusion(gl, shaders::whole_picture(), shaders::ground_occlusion()),
       geometry(gl, shaders::surface(), shaders::geometry()),
       occlusion(gl, shaders::whole_picture(), shaders::screen_occlusion(samples)),
-      blur(gl, shaders::whole_picture(), shaders::occlusion_blur()),
-      classify(gl, shaders::whole_picture(), shaders::classify(samples)),
-      ground(gl, shaders::whole_picture(), shaders::lit_ground()),
-      items(gl, shaders::whole_picture(), shaders::lit_items(samples, false)) {}
+      blur(gl, shaders::whole_picture(), shaders::occlusion_blur()) {}
+
+GlRenderer::LightPrograms::LightPrograms(const Gl& gl, const shaders::Lighting& lighting)
+    : classify(gl, shaders::whole_picture(), shaders::classify(lighting)),
+      ground(gl, shaders::whole_picture(), shaders::lit_ground(lighting)),
+      items(gl, shaders::whole_picture(), shaders::lit_items(lighting)) {}
+
+shaders::Lighting GlRenderer::lighting(const View& view, bool scene_linear) const {
+  return {.samples = samples_,
+          .painted = painted_,
+          .area_lights = !view.area_lights.empty(),
+          .ground_paint = view.ground && view.ground->paint.kind != PaintKind::Plain,
+          .scene_linear = scene_linear};
+}
+
+const GlRenderer::LightPrograms& GlRenderer::light_programs(const shaders::Lighting& lighting) {
+  std::unique_ptr<LightPrograms>& programs = light_programs_[lighting];
+  if (!programs) programs = std::make_unique<LightPrograms>(gl_, lighting);
+  return *programs;
+}
 
 GlRenderer::GlRenderer(const RenderSettings& settings)
     : settings_(settings),
@@ -50,7 +66,7 @@ void GlRenderer::prime() {
   view.camera = {.from = Vec3(0, -4, 0), .look_at = Vec3::Zero()};
   view.ground = Ground{.height = -0.5};
   priming_ = true;
-  draw(view, items);
+  static_cast<void>(draw(view, items));
   priming_ = false;
 }
 
@@ -107,18 +123,19 @@ void GlRenderer::bind_textures() {
   gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 
   // The shadow map is read twice: as numbers, and as comparisons filtered over two by two texels.
-  GLuint sampler = 0;
-  gl_.GenSamplers(1, &sampler);
-  gl_.SamplerParameteri(sampler, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  gl_.SamplerParameteri(sampler, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  gl_.SamplerParameteri(sampler, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  gl_.SamplerParameteri(sampler, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  gl_.SamplerParameteri(sampler, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-  gl_.SamplerParameteri(sampler, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-  gl_.BindSampler(kShadowCompare, sampler);
+  gl_.GenSamplers(1, &compare_sampler_);
+  gl_.SamplerParameteri(compare_sampler_, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl_.SamplerParameteri(compare_sampler_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  gl_.SamplerParameteri(compare_sampler_, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  gl_.SamplerParameteri(compare_sampler_, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  gl_.SamplerParameteri(compare_sampler_, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  gl_.SamplerParameteri(compare_sampler_, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+  gl_.BindSampler(kShadowCompare, compare_sampler_);
 }
 
-void GlRenderer::upload(std::span<const Item> items) {
+void GlRenderer::upload(const View& view, std::span<const Item> items) {
+  upload_pictures(view, items);
+  if (list_.indices.empty()) return;
   gl_.BindVertexArray(item_array_);
   gl_.BindBuffer(GL_ARRAY_BUFFER, vertex_buffer_);
   gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(list_.vertices.size() * sizeof(float)),
@@ -131,7 +148,6 @@ void GlRenderer::upload(std::span<const Item> items) {
   gl_.BindBuffer(GL_ARRAY_BUFFER, painting_->buffer);
   gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(list_.paint.size() * sizeof(float)), list_.paint.data(),
                  GL_STREAM_DRAW);
-  upload_pictures(items);
 }
 
 void GlRenderer::upload_materials(std::span<const Item> items) {

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <limits>
 
-#include "srgb.h"
 #include "supple/core/error.h"
 
 namespace supple::render {
@@ -58,8 +57,6 @@ bool well_formed(const Image& image) {
 }
 
 }  // namespace
-
-double linear_of_srgb(std::uint8_t value) { return linear_table()[value]; }
 
 Image downscale(const Image& image, int width) {
   SUPPLE_EXPECTS(well_formed(image));

@@ -60,6 +60,16 @@ vec4 encoded(vec3 light) {
 }
 )";
 
+// Patterns are averaged over the pixel: the box filter of a square wave has a closed form (Heckbert 1989, sec. 3.4).
+const char* const kWave = R"(
+float wave(float x, float width) {   // +1 and -1 in turn, period 2, averaged over the width
+  float w = max(width, 1e-4);
+  float a = abs(fract((x - 0.5 * w) * 0.5) - 0.5);
+  float b = abs(fract((x + 0.5 * w) * 0.5) - 0.5);
+  return 2.0 * (a - b) / w;
+}
+)";
+
 std::string header(int samples) {
   const std::string kind = samples > 1 ? "MS" : "";
   const std::string sample = samples > 1 ? "s" : "0";

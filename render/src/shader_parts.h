@@ -10,6 +10,7 @@ extern const char* const kVersion;
 extern const char* const kDisc;      ///< pixel_turn, kGoldenTurn
 extern const char* const kGeometry;  ///< eye_ray, eye_depth, ground_depth, unpack_normal
 extern const char* const kPixel;     ///< background_colour, encoded
+extern const char* const kWave;      ///< wave
 
 /// Version, number of samples and access to the geometry buffer, which is a multisampled texture above one sample.
 [[nodiscard]] std::string header(int samples);

@@ -4,9 +4,20 @@
 /// Ids in the geometry buffer: 0 no item, 1 + item. Items whose colour is not one for all (`painted`) write it, too.
 #pragma once
 
+#include <compare>
 #include <string>
 
 namespace supple::render::shaders {
+
+/// What the lighting of a picture needs. Branches are not free where nobody takes them, so each choice has programs of its own.
+struct Lighting {
+  int samples = 1;            ///< of the geometry buffer
+  bool painted = false;       ///< albedos of the geometry buffer where a material says so
+  bool area_lights = false;
+  bool ground_paint = false;
+  bool scene_linear = false;  ///< radiance times cover, and cover, instead of the display's colours
+  auto operator<=>(const Lighting&) const = default;
+};
 
 // Vertex stages.
 [[nodiscard]] std::string position_only();  ///< to_clip
@@ -22,9 +33,8 @@ namespace supple::render::shaders {
 [[nodiscard]] std::string painted_geometry();             ///< and the square root of the albedo
 [[nodiscard]] std::string screen_occlusion(int samples);  ///< ambient occlusion of items at half size, with depth
 [[nodiscard]] std::string occlusion_blur();
-[[nodiscard]] std::string classify(int samples);          ///< background; depth .1 ground, .5 nothing, .9 items
-[[nodiscard]] std::string lit_ground();                   ///< for pixels of ground alone
-/// For pixels with at least one sample on an item; `painted`: albedos of the geometry buffer where a material says so.
-[[nodiscard]] std::string lit_items(int samples, bool painted);
+[[nodiscard]] std::string classify(const Lighting& lighting);    ///< background; depth .1 ground, .5 nothing, .9 items
+[[nodiscard]] std::string lit_ground(const Lighting& lighting);  ///< for pixels of ground alone
+[[nodiscard]] std::string lit_items(const Lighting& lighting);   ///< for pixels with at least one sample on an item
 
 }  // namespace supple::render::shaders

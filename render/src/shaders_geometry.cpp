@@ -17,7 +17,6 @@ uvec2 packed_geometry(vec3 normal) {
 }
 )";
 
-// Patterns are averaged over the pixel: the box filter of a square wave has a closed form (Heckbert 1989, sec. 3.4).
 const char* const kPaint = R"(
 uniform int paint;           // PaintKind
 uniform vec3 first;          // linear
@@ -29,13 +28,6 @@ uniform float picture_aspect;
 uniform sampler2D maps;      // a row for each colour map
 uniform float map_row;
 uniform vec2 value_range;
-
-float wave(float x, float width) {   // +1 and -1 in turn, period 2, averaged over the width
-  float w = max(width, 1e-4);
-  float a = abs(fract((x - 0.5 * w) * 0.5) - 0.5);
-  float b = abs(fract((x + 0.5 * w) * 0.5) - 0.5);
-  return 2.0 * (a - b) / w;
-}
 
 vec3 albedo(vec3 at, vec3 n) {
   vec3 scaled = at / paint_size;
@@ -139,7 +131,7 @@ void main() { data = packed_geometry(world_normal); })";
 }
 
 std::string painted_geometry() {
-  return std::string(kVersion) + kPacking + kPaint + R"(
+  return std::string(kVersion) + kPacking + kWave + kPaint + R"(
 centroid in vec3 world_normal;
 in vec3 painted_at;
 layout(location = 0) out uvec2 data;

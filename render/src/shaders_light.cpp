@@ -73,16 +73,96 @@ vec3 filmic(vec3 radiance) {
 }
 )";
 
-/// Rectangles without shadows. Diffuse by the contour integral of Lambert (Baum, Rushmeier & Winget 1989, clipped to the
-/// horizon by its closed-form fit, Hill & Heitz 2016); glossy by the point of the rectangle nearest to the mirrored view
-/// (Karis 2013).
-const char* const kAreaLight = R"(
+/// What becomes of light: a colour of the display over the background, or radiance and cover for compositing.
+const char* const kShown = R"(
+#ifdef SCENE_LINEAR
+vec4 background(vec3 behind) { return vec4(0.0); }
+vec4 shown(vec3 radiance, float cover, vec3 behind) { return vec4(max(radiance, 0.0) * cover, cover); }
+vec4 stored(vec4 light) { return light; }
+#else
+vec4 background(vec3 behind) { return vec4(behind, 1.0); }
+vec4 shown(vec3 radiance, float cover, vec3 behind) { return vec4(mix(behind, filmic(radiance), cover), 1.0); }
+vec4 stored(vec4 light) { return encoded(light.rgb); }
+#endif
+)";
+
+const char* const kAreaUniforms = R"(
 uniform int area_lights;
 uniform vec3 area_centre[4];
 uniform vec3 area_u[4];        // half the edge along either side [m]
 uniform vec3 area_v[4];
 uniform vec3 area_radiance[4];
+)";
 
+/// Share of a rectangle a point sees: percentage-closer soft shadows for rectangles, in a perspective map from the middle
+/// of each along its normal. With k the reciprocal of the depth, the point s of the rectangle is hidden by what lies at
+/// t + s (k_blocker - k) in the map, t the receiver's place there, and the tangent plane of the receiver is affine in k.
+const char* const kAreaShadow = R"(
+uniform sampler2D area_depth;            // a map for each light, two by two
+uniform sampler2DShadow area_compare;
+uniform vec3 area_lower[4];              // least tangents in the map, k of its near plane
+uniform vec3 area_extent[4];             // their extents, and that of k; 0: no map
+uniform float area_texels;               // edge of one map
+
+float area_visibility(int i, vec3 p, vec3 n) {
+  vec2 half_sizes = vec2(length(area_u[i]), length(area_v[i]));
+  vec3 across = area_u[i] / half_sizes.x;
+  vec3 along = -area_v[i] / half_sizes.y;
+  vec3 front = cross(along, across);
+  vec3 q = p - area_centre[i];
+  q = vec3(dot(q, across), dot(q, along), dot(q, front));
+  vec3 m = vec3(dot(n, across), dot(n, along), dot(n, front));
+  vec3 extent = max(area_extent[i], 1e-9);
+  vec2 texel = extent.xy / area_texels;
+  float step = max(texel.x, texel.y) * max(q.z, 0.0);
+  q += m * (1.2 * step);
+  float k = 1.0 / max(q.z, 1e-6);
+  vec2 place = (q.xy * k - area_lower[i].xy) / extent.xy;
+  float depth = (area_lower[i].z - k) / extent.z;
+  bool seen = area_extent[i].z > 0.0 && q.z > 0.0 && depth > 0.0;
+  // In units of the map: how depth grows along the receiver's plane, and what counts as the same surface.
+  vec2 slope = clamp(-m.xy / min(dot(m, q), -0.05 * length(q)) * extent.xy / extent.z, -4.0, 4.0);
+  float slack = 0.75 * step * k * k / extent.z;
+
+  float turn = pixel_turn() * 0.15915494;
+  vec2 start = vec2(turn, fract(turn * 17.0 + 0.37));
+  const vec2 kPlastic = vec2(0.75487767, 0.56984029);   // Roberts 2018
+  vec2 corner = 0.5 * vec2(float(i & 1), float(i >> 1));
+  vec2 low = vec2(0.5) / area_texels;   // outside of a map nothing hides
+  int search = seen ? 24 : 0;
+  float blockers = 0.0;
+  float sum = 0.0;
+  for (int j = 0; j < search; ++j) {
+    // Half of them as far as the nearest blocker may lie, half nearer and nearer.
+    float level = (j & 1) == 0 ? 1.0 : (float(j) + 0.5) / 24.0;
+    vec2 s = (fract(start + float(j) * kPlastic) * 2.0 - 1.0) * half_sizes;
+    vec2 offset = s * (max(depth, 0.0) * extent.z * level * level) / extent.xy;
+    vec2 there = clamp(place + offset, low, 1.0 - low);
+    float found = there == place + offset ? textureLod(area_depth, corner + 0.5 * there, 0.0).r : 1.0;
+    float apart = (depth - found) * extent.z;
+    // Only what lies between here and the rectangle hides some of it.
+    bool between = all(lessThan(abs(offset) * extent.xy, half_sizes * apart + 1.5 * texel));
+    float blocked = between && found < depth + dot(slope, offset) - slack ? 1.0 : 0.0;
+    blockers += blocked;
+    sum += blocked * apart;
+  }
+  vec2 reach = max(half_sizes * (sum / max(blockers, 1.0)), 1.2 * texel) / extent.xy;
+  int taps = blockers > 0.5 ? 32 : 0;
+  float lit = 0.0;
+  for (int j = 0; j < taps; ++j) {
+    vec2 offset = (fract(start + float(j) * kPlastic) * 2.0 - 1.0) * reach;
+    float limit = min(depth + dot(slope, offset) - slack, 1.0);
+    vec2 there = clamp(place + offset, low, 1.0 - low);
+    lit += there == place + offset ? texture(area_compare, vec3(corner + 0.5 * there, limit)) : 1.0;
+  }
+  return taps > 0 ? lit / 32.0 : 1.0;
+}
+)";
+
+/// Rectangles. Diffuse by the contour integral of Lambert (Baum, Rushmeier & Winget 1989, clipped to the
+/// horizon by its closed-form fit, Hill & Heitz 2016); glossy by the point of the rectangle nearest to the mirrored view
+/// (Karis 2013).
+const char* const kAreaLight = R"(
 vec3 edge_integral(vec3 a, vec3 b) {
   float x = clamp(dot(a, b), -0.9999, 0.9999);
   return cross(a, b) * (acos(x) * inversesqrt(1.0 - x * x));
@@ -103,19 +183,20 @@ float rectangle_share(vec3 p, vec3 n, vec3 c, vec3 u, vec3 v) {
 vec3 area_diffuse(vec3 p, vec3 n) {
   vec3 sum = vec3(0.0);
   for (int i = 0; i < area_lights; ++i) {
-    float lit = dot(p - area_centre[i], cross(area_u[i], area_v[i])) > 0.0 ? 1.0 : 0.0;
+    float lit = dot(p - area_centre[i], cross(area_u[i], area_v[i])) > 0.0 ? area_visibility(i, p, n) : 0.0;
     sum += area_radiance[i] * (lit * rectangle_share(p, n, area_centre[i], area_u[i], area_v[i]));
   }
   return sum;
 }
 
 vec3 area_light(vec3 p, vec3 n, vec3 v, vec3 albedo, vec3 normal_reflectance, float a2) {
-  vec3 sum = albedo * area_diffuse(p, n);
+  vec3 sum = vec3(0.0);
   vec3 mirrored = reflect(-v, n);
   for (int i = 0; i < area_lights; ++i) {
     vec3 c = area_centre[i];
     vec3 front = normalize(cross(area_u[i], area_v[i]));
-    float lit = dot(p - c, front) > 0.0 ? 1.0 : 0.0;
+    float lit = dot(p - c, front) > 0.0 ? area_visibility(i, p, n) : 0.0;
+    sum += area_radiance[i] * albedo * (lit * rectangle_share(p, n, c, area_u[i], area_v[i]));
     float t = dot(c - p, front) / min(dot(mirrored, front), -1e-3);
     vec3 hit = p + mirrored * max(t, 0.0) - c;
     float u = clamp(dot(hit, area_u[i]) / dot(area_u[i], area_u[i]), -1.0, 1.0);
@@ -140,22 +221,65 @@ vec3 area_light(vec3 p, vec3 n, vec3 v, vec3 albedo, vec3 normal_reflectance, fl
 }
 )";
 
+/// The pattern of the ground lies in its x and y; `across` and `up` are what a pixel spans of it.
+const char* const kGroundPaint = R"(
+uniform int ground_paint;           // PaintKind
+uniform vec3 ground_second;
+uniform float ground_paint_size;    // [m]
+uniform vec2 ground_axis;
+uniform sampler2D ground_picture;
+uniform float ground_aspect;
+
+vec3 ground_colour(vec2 at, vec2 across, vec2 up) {
+  at /= ground_paint_size;
+  across /= ground_paint_size;
+  up /= ground_paint_size;
+  if (ground_paint == 1) {
+    vec2 width = abs(across) + abs(up);
+    return mix(ground_second, ground_albedo, 0.5 + 0.5 * wave(at.x, width.x) * wave(at.y, width.y));
+  }
+  if (ground_paint == 2) {
+    float t = dot(at, ground_axis);
+    return mix(ground_second, ground_albedo, 0.5 + 0.5 * wave(t, abs(dot(across, ground_axis)) + abs(dot(up, ground_axis))));
+  }
+  if (ground_paint == 3) {
+    vec2 proportion = vec2(1.0, ground_aspect);
+    return textureGrad(ground_picture, at * proportion, across * proportion, up * proportion).rgb;
+  }
+  return ground_albedo;
+}
+)";
+
 const char* const kGroundLight = R"(
-uniform vec3 ground_albedo;
 uniform float camera_distance;
 uniform sampler2D ground_visibility;
 uniform mat4 ground_to_unit;
 uniform float ground_occluded;    // 0: nothing stands above the ground
+uniform vec2 ground_origin;       // of the pattern
 
-vec3 ground_light(vec3 p, vec3 behind, float visible) {
+vec2 ground_place(vec2 pixel) {
+  vec3 ray = eye_ray(pixel);
+  return (eye + (transpose(mat3(view)) * ray) * ground_depth(ray)).xy;
+}
+
+vec4 ground_light(vec3 p, vec3 behind, float visible) {
   vec2 at = (ground_to_unit * vec4(p, 1.0)).xy;
   float ao = mix(1.0, textureLod(ground_visibility, clamp(at, 0.0, 1.0), 0.0).r, ground_occluded);
-  vec3 radiance = ground_albedo * (sun * (max(to_light.z, 0.0) * visible) + sky * ao + area_diffuse(p, vec3(0.0, 0.0, 1.0)));
+#ifdef GROUND_PAINT
+  vec3 albedo = ground_colour(p.xy - ground_origin, ground_place(gl_FragCoord.xy + vec2(1.0, 0.0)) - p.xy,
+                              ground_place(gl_FragCoord.xy + vec2(0.0, 1.0)) - p.xy);
+#else
+  vec3 albedo = ground_albedo;
+#endif
+  vec3 radiance = sun * (max(to_light.z, 0.0) * visible) + sky * ao;
+#ifdef AREA_LIGHTS
+  radiance += area_diffuse(p, vec3(0.0, 0.0, 1.0));
+#endif
   // Into the background with distance and towards the horizon, so that there is no edge.
   float away = length(p.xy) / camera_distance;
   float down = (eye.z - p.z) / length(eye - p);
   float fade = (1.0 - smoothstep(0.7, 3.2, away)) * smoothstep(0.02, 0.22, down);
-  return mix(behind, filmic(radiance), fade);
+  return shown(albedo * radiance, fade, behind);
 }
 )";
 
@@ -199,7 +323,7 @@ float contact_line(uint id, float depth) {
   return 1.0 - 0.6 * min(touching * 0.5, 1.0);
 }
 
-vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_albedo) {
+vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_albedo) {
   int number = int(id) - 1;
   ivec2 row = ivec2(number & 4095, (number >> 12) * 2);
   vec4 material = texelFetch(materials, row, 0);
@@ -241,14 +365,27 @@ vec3 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   float split = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
   vec3 gloss = normal_reflectance * (-1.04 * split + r.z) + (1.04 * split + r.w);
   radiance += seen * gloss * ao;
+#ifdef AREA_LIGHTS
   radiance += area_light(p, n, v, albedo, normal_reflectance, a2);
+#endif
 
   // A rim of light from behind parts the item from a ground of the same brightness.
   float edge = pow(1.0 - nv, 4.0);
   radiance += sky * (0.22 * edge * ao) * (0.4 + 0.6 * albedo) * smoothstep(-0.4, 0.8, n.z);
-  return filmic(radiance) * contact_line(id, depth);
+  return shown(radiance, 1.0, vec3(0.0)) * vec4(vec3(contact_line(id, depth)), 1.0);
 }
 )";
+
+std::string choices(const Lighting& lighting) {
+  return std::string(lighting.area_lights ? "#define AREA_LIGHTS\n" : "") + (lighting.ground_paint ? "#define GROUND_PAINT\n" : "") +
+         (lighting.scene_linear ? "#define SCENE_LINEAR\n" : "");
+}
+
+/// What falls on ground and items beside sun and sky, and the ground's own colour.
+std::string lights(const Lighting& lighting) {
+  return (lighting.area_lights ? std::string(kAreaUniforms) + kAreaShadow + kAreaLight : std::string()) +
+         "uniform vec3 ground_albedo;\n" + (lighting.ground_paint ? std::string(kWave) + kGroundPaint : std::string());
+}
 
 std::string painted_access(int samples) {
   return std::string("uniform sampler2D") + (samples > 1 ? "MS" : "") + " paints;\n" +
@@ -260,32 +397,34 @@ std::string painted_access(int samples) {
 
 // Sorts the pixels for the passes that follow: a software rasteriser takes both sides of every branch, but leaves out
 // whole patches that fail the depth test. The background is drawn on the way.
-std::string classify(int samples) {
-  return header(samples) + kGeometry + kPixel + R"(
+std::string classify(const Lighting& lighting) {
+  return header(lighting.samples) + choices(lighting) + kGeometry + kPixel + kLight + kShown + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   uint any = 0u;
   for (int s = 0; s < SAMPLES; ++s) any |= GEOMETRY(pixel, s).g;
   bool is_floor = ground_depth(eye_ray(gl_FragCoord.xy)) < depth_range.y;
   gl_FragDepth = any > 0u ? 0.9 : (is_floor ? 0.1 : 0.5);
-  colour = encoded(background_colour());
+  colour = stored(background(background_colour()));
 })";
 }
 
-std::string lit_ground() {
-  return std::string(kVersion) + kDisc + kGeometry + kPixel + kShadow + kLight + kAreaLight + kGroundLight + R"(
+std::string lit_ground(const Lighting& lighting) {
+  return std::string(kVersion) + choices(lighting) + kDisc + kGeometry + kPixel + kShadow + kLight + kShown + lights(lighting) +
+         kGroundLight + R"(
 void main() {
   vec3 ray = eye_ray(gl_FragCoord.xy);
   vec3 p = eye + (transpose(mat3(view)) * ray) * ground_depth(ray);
-  colour = encoded(ground_light(p, background_colour(), sun_visibility(p, vec3(0.0, 0.0, 1.0), true)));
+  colour = stored(ground_light(p, background_colour(), sun_visibility(p, vec3(0.0, 0.0, 1.0), true)));
 })";
 }
 
 // Each surface of a pixel is lit once, whatever number of its samples it covers. Surfaces: one for each item (two for
 // an item that folds over itself within the pixel), the ground, and the background.
-std::string lit_items(int samples, bool painted) {
-  return header(samples) + (painted ? painted_access(samples) : std::string("#define ALBEDO(at, s) vec3(0.0)\n")) + kDisc +
-         kGeometry + kPixel + kShadow + kLight + kAreaLight + kGroundLight + kItemLight + R"(
+std::string lit_items(const Lighting& lighting) {
+  return header(lighting.samples) + choices(lighting) +
+         (lighting.painted ? painted_access(lighting.samples) : std::string("#define ALBEDO(at, s) vec3(0.0)\n")) + kDisc + kGeometry +
+         kPixel + kShadow + kLight + kShown + lights(lighting) + kGroundLight + kItemLight + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 ray = eye_ray(gl_FragCoord.xy);
@@ -307,7 +446,7 @@ void main() {
     open[s] = true;
   }
   float footprint = 2.0 * half_extent.y / picture_size.y;   // of the pixel, at depth 1
-  vec3 sum = vec3(0.0);
+  vec4 sum = vec4(0.0);
   int left = SAMPLES;
   while (left > 0) {
     bool found = false;
@@ -343,13 +482,13 @@ void main() {
     bool is_floor = !is_item && surface_depth < depth_range.y * 0.5 * kNowhere;
     vec3 p = eye + along * surface_depth;
     float visible = sun_visibility(p, n, is_item || is_floor);
-    vec3 lit = behind;
+    vec4 lit = background(behind);
     if (is_item) lit = item_light(p, n, surface_depth, surface_id, visible, own_albedo);
     if (is_floor) lit = ground_light(p, behind, visible);
     sum += lit * float(count);
   }
 
-  colour = encoded(sum / float(SAMPLES));
+  colour = stored(sum / float(SAMPLES));
 })";
 }
 

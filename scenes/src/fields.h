@@ -576,6 +576,7 @@ template <class Archive>
 void fields(Archive& archive, GroundDesc& d) {
   archive("height", d.height, any(kLength), "z of the plane");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
+  archive("texture", d.texture, {}, "by x and y; absent: none");
   archive("visible", d.visible, {}, "drawn");
   archive("collides", d.collides, {}, "with every object that has contact");
   archive("modulus", d.modulus, above(0.0, kPressure), "P of the half-space");
@@ -587,7 +588,7 @@ template <class Archive>
 void fields(Archive& archive, ImagesDesc& d) {
   archive("size", d.size, between(16.0, 16384.0, kNumber).items(2, 2), "width, height [pixel]");
   archive("samples", d.samples, between(1.0, 8.0, kNumber), "a pixel: 1, 2, 4 or 8");
-  archive("formats", d.formats, {}, "exr: half floats in linear light with depth, normals, velocities and numbers of objects");
+  archive("formats", d.formats, {}, "exr: half floats, light before exposure and tone curve times cover, cover, depth, normals, velocities and numbers of objects");
   archive.check(!d.formats.empty(), "formats", "expected a format of images", "none", "write 'images: false' for no images");
   archive.check((d.samples & (d.samples - 1)) == 0, "samples", "expected 1, 2, 4 or 8", std::to_string(d.samples), "");
 }
@@ -656,6 +657,7 @@ void fields(Archive& archive, ObstacleDesc& d) {
   archive("voxel", d.voxel, only(above(0.0, kLength).or_auto(), {ObstacleName::Mesh}), "cell of the lattice that keeps its distances, about which edges are rounded; auto: a 64th of its longest side");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
+  archive("texture", d.texture, {}, "by the obstacle's own axes from 'at'; absent: none");
   archive("visible", d.visible, {}, "drawn");
   archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is modulus times slope times depth");
   archive("slope", d.slope, above(0.0, kSlope), "of its field");

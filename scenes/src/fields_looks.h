@@ -15,7 +15,7 @@ namespace supple::scenes {
 template <class Archive>
 void fields(Archive& archive, TextureDesc& d) {
   using enum PatternName;
-  archive("pattern", d.pattern, {}, "sticks to the body as it moves and deforms; picture: projected along the three axes of the object");
+  archive("pattern", d.pattern, {}, "sticks to the body as it moves and deforms; picture: projected along the three axes of the object, on the ground from above");
   archive("colour", d.colour, between(0.0, 1.0, kNumber).only("pattern", d.pattern, {Checker, Stripes}), "sRGB, in turn with the object's");
   archive("size", d.size, above(0.0, kLength), "edge of a cube, thickness of a slice, width of the picture");
   archive("axis", d.axis, direction().only("pattern", d.pattern, {Stripes}), "across the slices");

@@ -149,18 +149,18 @@ void FrameWriter::draw(Simulation& simulation, Reporter& report, double done) {
   report("render", frame, done);
   for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
     render::Image image;
+    render::LinearImage linear;
     render::Layers layers;
+    const bool exr = has(image_formats_, ImageName::Exr);
     {
       const StageClock clock(simulation.profile(Stage::Render));
-      image = pictures_->draw(simulation, camera);
-      if (has(image_formats_, ImageName::Exr)) layers = pictures_->layers();
+      image = pictures_->draw(simulation, camera, exr ? &linear : nullptr);
+      if (exr) layers = pictures_->layers();
     }
     const StageClock clock(simulation.profile(Stage::Export));
     const double begin = process_cpu_seconds();
     if (has(image_formats_, ImageName::Png)) render::write_png(picture_path(camera, frame, ImageName::Png), image, mark);
-    if (has(image_formats_, ImageName::Exr)) {
-      render::write_exr(picture_path(camera, frame, ImageName::Exr), image, layers, pictures_->item_names(), mark);
-    }
+    if (exr) render::write_exr(picture_path(camera, frame, ImageName::Exr), linear, layers, pictures_->item_names(), mark);
     encode_s_ += process_cpu_seconds() - begin;
     ++images_;
   }

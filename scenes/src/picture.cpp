@@ -23,6 +23,19 @@ Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
   return mesh;
 }
 
+/// Places in the axes of an obstacle, a little inside of it: its faces may lie between two cubes of a pattern.
+void add_own_places(const ObstacleDesc& d, Mesh& mesh) {
+  const double inside = 1e-3 * d.texture->size;
+  const Quat to_own(Eigen::AngleAxisd(-d.turn, d.turn_axis.normalized()));
+  std::array<std::vector<double>, 3> places;
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+    const Vec3 p = to_own * Vec3(mesh.position[v] - inside * mesh.normal[v] - d.at);
+    for (std::size_t k = 0; k < 3; ++k) places[k].push_back(p[static_cast<Eigen::Index>(k)]);
+  }
+  constexpr std::array kNames = {"rest_x", "rest_y", "rest_z"};
+  for (std::size_t k = 0; k < 3; ++k) mesh.columns.push_back({.name = kNames[k], .values = std::move(places[k])});
+}
+
 render::RenderSettings settings_of(const Scene& scene, render::ContextKind context, int threads) {
   render::RenderSettings settings;
   if (scene.output.images) {
@@ -42,10 +55,25 @@ render::RenderSettings settings_of(const Scene& scene, render::ContextKind conte
   return settings;
 }
 
+/// Reads the picture of a texture that has one. @throws Error{Io}
+render::Paint paint_of(const std::optional<TextureDesc>& texture, const std::filesystem::path& folder) {
+  render::Paint paint;
+  if (!texture) return paint;
+  constexpr std::array kKinds = {render::PaintKind::Checker, render::PaintKind::Stripes, render::PaintKind::Picture};
+  paint.kind = kKinds[static_cast<std::size_t>(texture->pattern)];
+  paint.colour = texture->colour;
+  paint.size = texture->size;
+  paint.axis = texture->axis;
+  if (texture->pattern == PatternName::Picture) paint.picture = std::make_shared<const render::Image>(render::read_png(folder / texture->file));
+  return paint;
+}
+
 render::View view_of(const Scene& scene) {
   render::View view;
   view.light = {.direction = scene.light.direction, .intensity = scene.light.intensity};
-  if (scene.ground && scene.ground->visible) view.ground = render::Ground{scene.ground->height, scene.ground->colour};
+  if (scene.ground && scene.ground->visible) {
+    view.ground = render::Ground{scene.ground->height, scene.ground->colour, paint_of(scene.ground->texture, scene.source.parent_path())};
+  }
   view.background_top = scene.background.top;
   view.background_bottom = scene.background.bottom;
   for (const AreaLightDesc& d : scene.lights) {
@@ -72,16 +100,8 @@ Quantity quantity_of(ColourByName by) {
   return {"", ""};
 }
 
-render::Paint paint_of(const LookDesc& look, const std::shared_ptr<const render::Image>& texture) {
-  render::Paint paint;
-  if (look.texture) {
-    constexpr std::array kKinds = {render::PaintKind::Checker, render::PaintKind::Stripes, render::PaintKind::Picture};
-    paint.kind = kKinds[static_cast<std::size_t>(look.texture->pattern)];
-    paint.colour = look.texture->colour;
-    paint.size = look.texture->size;
-    paint.axis = look.texture->axis;
-    paint.picture = texture;
-  }
+render::Paint paint_of(const LookDesc& look, const std::filesystem::path& folder) {
+  render::Paint paint = paint_of(look.texture, folder);
   if (look.colour_by == ColourByName::Normals) paint.kind = render::PaintKind::Normals;
   const Quantity quantity = quantity_of(look.colour_by);
   if (*quantity.column != '\0') {
@@ -114,18 +134,16 @@ std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model) {
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
     const FixedBody& body = model.fixed[model.fixed.size() - scene.obstacles.size() + i];
     meshes.push_back(scene.obstacles[i].visible ? obstacle_mesh(scene.obstacles[i], body) : Mesh());
+    if (scene.obstacles[i].texture) add_own_places(scene.obstacles[i], meshes.back());
   }
   return meshes;
 }
 
 ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::ContextKind context, int threads)
     : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)), settings_(settings_of(scene, context, threads)), cell_(model.cell) {
-  for (const ObjectDesc& object : scene.objects) {
-    const bool reads = object.look.texture && object.look.texture->pattern == PatternName::Picture;
-    textures_.push_back(reads ? std::make_shared<const render::Image>(
-                                    render::read_png(scene.source.parent_path() / object.look.texture->file))
-                              : nullptr);
-  }
+  const std::filesystem::path folder = scene.source.parent_path();
+  for (const ObjectDesc& object : scene.objects) paints_.push_back(paint_of(object.look, folder));
+  for (const ObstacleDesc& obstacle : scene.obstacles) obstacle_paints_.push_back(paint_of(obstacle.texture, folder));
   obstacles_ = obstacle_meshes(scene, model);
   renderer_ = render::make_renderer(settings_);
 }
@@ -182,14 +200,16 @@ void ScenePictures::add_objects(Simulation& simulation) {
     const ObjectDesc& d = scene_.objects[i];
     if (!d.look.surface && !d.look.wireframe) continue;
     add({.mesh = &meshes[i], .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
-         .opacity = d.look.opacity, .paint = paint_of(d.look, textures_[i]), .surface = d.look.surface,
+         .opacity = d.look.opacity, .paint = paints_[i], .surface = d.look.surface,
          .reflectance = d.look.reflectance, .wireframe = d.look.wireframe},
         d.name);
   }
   if (scene_.render.renderer == RendererName::Path && scene_.render.exact_surface) add_fields(simulation);
   for (std::size_t i = 0; i < obstacles_.size(); ++i) {
     const ObstacleDesc& d = scene_.obstacles[i];
-    if (d.visible) add({&obstacles_[i], d.colour, d.roughness, d.shape != ObstacleName::Box}, d.name);
+    if (!d.visible) continue;
+    add({.mesh = &obstacles_[i], .colour = d.colour, .roughness = d.roughness, .two_sided = d.shape != ObstacleName::Box,
+         .paint = obstacle_paints_[i]}, d.name);
   }
 }
 
@@ -241,14 +261,14 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
   }
 }
 
-render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera) {
+render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera, render::LinearImage* linear) {
   view_.camera = camera_at(cameras_of(scene_)[camera], simulation.time(), scene_.duration);
   warn_inside(simulation, camera);
   items_.clear();
   item_names_.clear();
   add_objects(simulation);
   add_glyphs(simulation);
-  render::Image image = renderer_->render(view_, items_);
+  render::Image image = renderer_->render(view_, items_, linear);
   render::draw_scale_bars(image, bars_);
   if (view_.ground) item_names_.emplace_back("ground");
   return image;

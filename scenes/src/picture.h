@@ -29,8 +29,8 @@ class ScenePictures {
   /// Objects inside of which a camera stood, as sentences; each once.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
-  /// The simulation's current state as the camera of this number sees it.
-  [[nodiscard]] render::Image draw(Simulation& simulation, std::size_t camera);
+  /// The simulation's current state as the camera of this number sees it, and its light unless `linear` is null.
+  [[nodiscard]] render::Image draw(Simulation& simulation, std::size_t camera, render::LinearImage* linear);
   /// Depth, normals, velocities and numbers behind the picture that was drawn last, and what its items are called.
   [[nodiscard]] render::Layers layers();
   [[nodiscard]] const std::vector<std::string>& item_names() const { return item_names_; }
@@ -45,7 +45,8 @@ class ScenePictures {
 
   const Scene& scene_;
   render::View view_;
-  std::vector<std::shared_ptr<const render::Image>> textures_;  ///< of each object, may be null
+  std::vector<render::Paint> paints_;           ///< of each object
+  std::vector<render::Paint> obstacle_paints_;
   std::vector<Mesh> obstacles_;
   std::vector<render::ScaleBar> bars_;
   std::unique_ptr<render::Renderer> renderer_;

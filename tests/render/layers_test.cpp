@@ -1,6 +1,7 @@
 #include "supple/render/layers.h"
 
 #include <ImfChannelList.h>
+#include <ImfFloatAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
@@ -91,8 +92,9 @@ TEST(Exr, HoldsPictureAndLayers) {
   const Folder folder;
   const Scenery scenery;
   const Layers layers = layers_of(scenery);
-  Image picture{.width = kWidth, .height = kHeight, .pixels = {}};
-  for (int i = 0; i < 3 * kWidth * kHeight; ++i) picture.pixels.push_back(static_cast<std::uint8_t>(i * 7 % 256));
+  LinearImage picture{.width = kWidth, .height = kHeight, .rgba = {}};
+  for (int i = 0; i < 4 * kWidth * kHeight; ++i) picture.rgba.push_back(static_cast<float>(i * 7 % 256) * 0.25F);
+  picture.rgba[1] = 1e9F;  // more than a half can hold
   const std::vector<std::string> names{"ball", "small"};
   write_exr(folder / "a.exr", picture, layers, names, "beef");
   EXPECT_EQ(folder.file_count(), 1U);
@@ -101,7 +103,7 @@ TEST(Exr, HoldsPictureAndLayers) {
 
   Imf::InputFile file((folder / "a.exr").c_str());
   EXPECT_EQ(file.header().findTypedAttribute<Imf::StringAttribute>("objects")->value(), "1 ball, 2 small");
-  std::vector<half> green(kWidth * kHeight), up(kWidth * kHeight);
+  std::vector<half> green(kWidth * kHeight), cover(kWidth * kHeight), up(kWidth * kHeight);
   std::vector<float> depth(kWidth * kHeight);
   std::vector<std::uint32_t> id(kWidth * kHeight);
   Imf::FrameBuffer buffer;
@@ -110,6 +112,7 @@ TEST(Exr, HoldsPictureAndLayers) {
     buffer.insert(name, Imf::Slice(type, reinterpret_cast<char*>(values.data()), sizeof values[0], sizeof values[0] * kWidth));
   };
   add("G", Imf::HALF, green);
+  add("A", Imf::HALF, cover);
   add("N.Z", Imf::HALF, up);
   add("Z", Imf::FLOAT, depth);
   add("id", Imf::UINT, id);
@@ -119,9 +122,10 @@ TEST(Exr, HoldsPictureAndLayers) {
   EXPECT_EQ(id, layers.object);
   for (std::size_t i = 0; i < id.size(); ++i) {
     EXPECT_EQ(up[i], half(layers.normal[3 * i + 2]));
-    const double v = picture.pixels[3 * i + 1] / 255.0;
-    EXPECT_NEAR(green[i], v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4), 5e-4);
+    EXPECT_EQ(green[i], half(i > 0 ? picture.rgba[4 * i + 1] : static_cast<float>(HALF_MAX)));
+    EXPECT_EQ(cover[i], half(picture.rgba[4 * i + 3]));
   }
+  EXPECT_FLOAT_EQ(file.header().findTypedAttribute<Imf::FloatAttribute>("exposure")->value(), 0.42F);
 }
 
 }  // namespace

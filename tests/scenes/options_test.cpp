@@ -491,6 +491,12 @@ void add_pictures(std::vector<Option>& all) {
   lamp("intensity", "at: [0, -1, 1], facing: [0, 1, -1], intensity: $", "5", "2");
   scene("background.top", "background: {top: $}", "[0, 0, 0]", "[1, 0, 0]");
   scene("background.bottom", "background: {bottom: $}", "[0, 0, 0]", "[1, 0, 0]");
+  scene("ground.texture.pattern", "ground: {height: -0.2, collides: false, texture: {pattern: $}}", "checker", "stripes");
+  scene("ground.texture.pattern=picture", "ground: {height: -0.2, collides: false, texture: {$}}", "pattern: checker", "pattern: picture, file: texture.png");
+  scene("ground.texture.colour", "ground: {height: -0.2, collides: false, texture: {colour: $}}", "[1, 1, 1]", "[0, 0, 1]");
+  scene("ground.texture.size", "ground: {height: -0.2, collides: false, texture: {size: $}}", "0.1", "0.25");
+  scene("ground.texture.axis", "ground: {height: -0.2, collides: false, texture: {pattern: stripes, axis: $}}", "[1, 0, 0]", "[0, 1, 0]");
+  scene("ground.texture.file", "ground: {height: -0.2, collides: false, texture: {pattern: picture, file: $}}", "texture.png", "more_texture.png");
   scene("ground.colour", "ground: {height: -0.2, collides: false, colour: $}", "[0.8, 0.8, 0.8]", "[0.1, 0.5, 0.1]");
   scene("ground.visible", "ground: {height: -0.2, collides: false, visible: $}", "true", "false");
   const auto obstacle = [&](const std::string& name, const std::string& keys, const std::string& one, const std::string& other) {
@@ -500,6 +506,12 @@ void add_pictures(std::vector<Option>& all) {
   obstacle("colour", "colour: $", "[0.8, 0.8, 0.8]", "[0.1, 0.5, 0.1]");
   obstacle("roughness", "roughness: $", "0.6", "0.1");
   obstacle("visible", "visible: $", "true", "false");
+  obstacle("texture.pattern=stripes", "texture: {pattern: $, size: 0.07}", "checker", "stripes");
+  obstacle("texture.pattern=picture", "texture: {$}", "pattern: checker", "pattern: picture, file: texture.png");
+  obstacle("texture.colour", "texture: {colour: $}", "[1, 1, 1]", "[0, 0, 1]");
+  obstacle("texture.size", "texture: {size: $}", "0.1", "0.05");
+  obstacle("texture.axis", "texture: {pattern: stripes, axis: $}", "[1, 0, 0]", "[0, 1, 0]");
+  obstacle("texture.file", "texture: {pattern: picture, file: $}", "texture.png", "more_texture.png");
   scene("render.pixel_error", "render: {pixel_error: $}", "1", "0.05");
   if (!render::has_path_tracer()) return;
   const auto traced = [&](const std::string& name, const std::string& text, const std::string& one, const std::string& other) {

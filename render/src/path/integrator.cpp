@@ -91,7 +91,7 @@ Tracer::Met Tracer::meet(const Ray& ray, float time, float choice, Place& place,
   if (met == Met::Ground) {
     const Vec3f p = ray.from + distance * ray.direction;
     place = {p, Vec3f::UnitZ(), Vec3f(p.x(), p.y(), ground_->height + gap_),
-             {.diffuse = ground_->albedo, .normal_reflectance = Vec3f::Zero(), .grazing_reflectance = 0.0F}};
+             {.diffuse = ground_->pattern != nullptr ? ground_->pattern->colour(p.head<2>() + ground_->origin) : ground_->albedo, .normal_reflectance = Vec3f::Zero(), .grazing_reflectance = 0.0F}};
   }
   return met;
 }

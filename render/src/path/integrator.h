@@ -9,6 +9,7 @@
 #include "../draw_list.h"
 #include "geometry.h"
 #include "lights.h"
+#include "paint.h"
 #include "supple/core/executor.h"
 
 namespace supple::render::path {
@@ -17,6 +18,8 @@ struct GroundPlane {
   float height = 0.0F;         ///< relative to the origin [m]
   Vec3f albedo = Vec3f::Zero();
   bool fades = false;          ///< into the background with distance, for the camera
+  const Pattern* pattern = nullptr;  ///< in place of the albedo, by world x and y; null: none
+  Eigen::Vector2f origin = Eigen::Vector2f::Zero();  ///< of positions, in the world [m]
 };
 
 struct TraceSettings {

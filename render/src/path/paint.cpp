@@ -23,7 +23,38 @@ bool even(float x) { return (static_cast<long>(std::floor(x)) & 1) == 0; }
 
 }  // namespace
 
-PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)), second_(linear_colour(item.paint.colour)) {
+Pattern::Pattern(const Paint& paint, const Vec3& colour)
+    : kind_(paint.kind), first_(linear_colour(colour)), second_(linear_colour(paint.colour)),
+      axis_(paint.axis.normalized().cast<float>()), scale_(static_cast<float>(1.0 / paint.size)) {
+  if (kind_ != PaintKind::Picture) return;
+  const Image& image = *paint.picture;
+  width_ = image.width;
+  height_ = image.height;
+  for (int y = height_ - 1; y >= 0; --y)
+    for (int x = 0; x < width_; ++x) {
+      const std::uint8_t* p = &image.pixels[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x))];
+      texels_.push_back(linear_colour(Vec3(p[0], p[1], p[2]) / 255.0));
+    }
+}
+
+Vec3f Pattern::colour(const Vec3f& p, const Vec3f& n) const {
+  const Vec3f at = scale_ * p;
+  if (kind_ == PaintKind::Checker) return (even(at.x()) == even(at.y())) == even(at.z()) ? first_ : second_;
+  if (kind_ == PaintKind::Stripes) return even(at.dot(axis_)) ? first_ : second_;
+  if (kind_ != PaintKind::Picture) return first_;
+  Vec3f share = n.cwiseAbs2().cwiseAbs2();
+  share /= share.sum();
+  const float aspect = static_cast<float>(width_) / static_cast<float>(height_);
+  return share.x() * texel(texels_, width_, height_, at.y(), at.z() * aspect) +
+         share.y() * texel(texels_, width_, height_, at.x(), at.z() * aspect) +
+         share.z() * texel(texels_, width_, height_, at.x(), at.y() * aspect);
+}
+
+Vec3f Pattern::colour(const Eigen::Vector2f& p) const {
+  return colour(Vec3f(p.x(), p.y(), 0.0F), Vec3f::UnitZ());
+}
+
+PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)), pattern_(item.paint, item.colour) {
   const Mesh& mesh = *item.mesh;
   const std::array<const std::vector<double>*, 3> rest = {column(mesh, "rest_x"), column(mesh, "rest_y"), column(mesh, "rest_z")};
   const bool patterned = item.paint.kind == PaintKind::Checker || item.paint.kind == PaintKind::Stripes || item.paint.kind == PaintKind::Picture;
@@ -34,14 +65,6 @@ PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)),
     const std::vector<double>* values = column(mesh, item.paint.column);
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
       values_.push_back(static_cast<float>(values == nullptr ? item.paint.lower : (*values)[v]));
-  }
-  if (item.paint.kind == PaintKind::Picture) {
-    const Image& image = *item.paint.picture;
-    for (int y = image.height - 1; y >= 0; --y)
-      for (int x = 0; x < image.width; ++x) {
-        const std::uint8_t* p = &image.pixels[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x))];
-        texels_.push_back(linear_colour(Vec3(p[0], p[1], p[2]) / 255.0));
-      }
   }
 }
 
@@ -55,19 +78,10 @@ Vec3f PaintSource::colour(const Item& item, const std::uint32_t* corner, const V
     return linear_colour(colour_of(paint.map, (value - paint.lower) / (paint.upper - paint.lower)));
   }
   const bool own = !rest_.empty();
-  const Vec3f at = (own ? Vec3f(weight[0] * rest_[corner[0]] + weight[1] * rest_[corner[1]] + weight[2] * rest_[corner[2]]) : world) /
-                   static_cast<float>(paint.size);
-  if (paint.kind == PaintKind::Checker) return (even(at.x()) == even(at.y())) == even(at.z()) ? first_ : second_;
-  if (paint.kind == PaintKind::Stripes) return even(at.dot(paint.axis.normalized().cast<float>())) ? first_ : second_;
+  const Vec3f at = own ? Vec3f(weight[0] * rest_[corner[0]] + weight[1] * rest_[corner[1]] + weight[2] * rest_[corner[2]]) : world;
   const Vec3f slope = own ? (rest_[corner[1]] - rest_[corner[0]]).cross(rest_[corner[2]] - rest_[corner[0]]).normalized()
                           : (places[1] - places[0]).cross(places[2] - places[0]).normalized();
-  Vec3f share = slope.cwiseAbs2().cwiseAbs2();
-  share /= share.sum();
-  const int width = paint.picture->width, height = paint.picture->height;
-  const float aspect = static_cast<float>(width) / static_cast<float>(height);
-  return share.x() * texel(texels_, width, height, at.y(), at.z() * aspect) +
-         share.y() * texel(texels_, width, height, at.x(), at.z() * aspect) +
-         share.z() * texel(texels_, width, height, at.x(), at.y() * aspect);
+  return pattern_.colour(at, slope);
 }
 
 Bsdf PaintSource::bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,

@@ -10,6 +10,27 @@
 
 namespace supple::render::path {
 
+/// Checker, Stripes or Picture at points.
+class Pattern {
+ public:
+  Pattern() = default;
+  Pattern(const Paint& paint, const Vec3& colour);
+  /// Albedo at p [m] where the surface has the normal n (Picture: which axes it is projected along).
+  [[nodiscard]] Vec3f colour(const Vec3f& p, const Vec3f& n) const;
+  /// Albedo of a level plane: squares in place of cubes.
+  [[nodiscard]] Vec3f colour(const Eigen::Vector2f& p) const;
+
+ private:
+  PaintKind kind_ = PaintKind::Plain;
+  Vec3f first_ = Vec3f::Zero();
+  Vec3f second_ = Vec3f::Zero();
+  Vec3f axis_ = Vec3f::UnitX();
+  float scale_ = 1.0F;           ///< 1 / size
+  std::vector<Vec3f> texels_;    ///< of the picture, from its lowest row up
+  int width_ = 0;
+  int height_ = 0;
+};
+
 class PaintSource {
  public:
   PaintSource() = default;
@@ -23,11 +44,10 @@ class PaintSource {
  private:
   [[nodiscard]] Vec3f colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight,
                              const std::array<Vec3f, 3>& places, const Vec3f& world, const Vec3f& normal) const;
-  Vec3f first_ = Vec3f::Zero();
-  Vec3f second_ = Vec3f::Zero();
-  std::vector<Vec3f> rest_;    ///< object coordinates, shape [vertices]; empty: world positions
-  std::vector<float> values_;  ///< of the column, shape [vertices]
-  std::vector<Vec3f> texels_;  ///< linear, rows from bottom to top
+  Vec3f first_ = Vec3f::Zero();  ///< linear
+  Pattern pattern_;
+  std::vector<Vec3f> rest_;      ///< object coordinates of the vertices; empty: world
+  std::vector<float> values_;    ///< of the vertices
 };
 
 }  // namespace supple::render::path

@@ -17,7 +17,8 @@ using path::Vec3f;
 class PathRenderer final : public Renderer {
  public:
   explicit PathRenderer(const RenderSettings& settings) : settings_(settings), executor_(settings.threads) {}
-  Image render(const View& view, std::span<const Item> items) override;
+  using Renderer::render;
+  Image render(const View& view, std::span<const Item> items, LinearImage* linear) override;
   [[nodiscard]] std::string description() const override { return "path tracer, Embree " + std::string(RTC_VERSION_STRING); }
   [[nodiscard]] RenderTimes times() const override { return times_; }
 
@@ -46,7 +47,7 @@ path::Lights lights_of(const View& view, double softness) {
   return lights;
 }
 
-Image PathRenderer::render(const View& view, std::span<const Item> items) {
+Image PathRenderer::render(const View& view, std::span<const Item> items, LinearImage* linear) {
   SUPPLE_EXPECTS(view.light.direction.norm() > 0.0);
   const Vec3& origin = view.camera.look_at;
   const CameraMatrices camera = camera_matrices(view.camera, static_cast<double>(settings_.width) / settings_.height, {});
@@ -56,8 +57,15 @@ Image PathRenderer::render(const View& view, std::span<const Item> items) {
     geometry_.set(items, origin, settings_.shutter, 0.6F * footprint);
   }
   std::optional<path::GroundPlane> ground;
-  if (view.ground)
+  path::Pattern pattern;
+  if (view.ground) {
     ground = {.height = static_cast<float>(view.ground->height - origin.z()), .albedo = linear_colour(view.ground->colour), .fades = true};
+    if (view.ground->paint.kind != PaintKind::Plain) {
+      pattern = path::Pattern(view.ground->paint, view.ground->colour);
+      ground->pattern = &pattern;
+      ground->origin = origin.head<2>().cast<float>();
+    }
+  }
   path::TraceSettings trace;
   trace.width = settings_.width;
   trace.height = settings_.height;
@@ -72,6 +80,13 @@ Image PathRenderer::render(const View& view, std::span<const Item> items) {
     if (settings_.denoise) path::denoise(settings_.width, settings_.height, camera.eye, footprint, executor_, film_);
   }
   const CpuClock clock(times_.read_back);
+  if (linear != nullptr) {
+    *linear = {.width = settings_.width, .height = settings_.height, .rgba = {}};
+    for (std::size_t i = 0; i < film_.radiance.size(); ++i) {
+      const Vec3f light = film_.cover[i] * film_.radiance[i];
+      linear->rgba.insert(linear->rgba.end(), {light.x(), light.y(), light.z(), film_.cover[i]});
+    }
+  }
   return develop(view, film_);
 }
 

@@ -19,6 +19,16 @@ struct Image {
   std::vector<std::uint8_t> pixels;  ///< shape [height][width][3]
 };
 
+/// Light before exposure and tone curve, for compositing; rows from top to bottom. The background is a display's picture and
+/// not in it.
+struct LinearImage {
+  int width = 0;
+  int height = 0;
+  /// Radiance in Rec. 709 primaries, relative to that of the sky (0.93, 1.00, 1.10), times cover; and cover, in [0, 1].
+  /// Shape [height][width][4].
+  std::vector<float> rgba;
+};
+
 /// Writes a PNG (sRGB chunk, text chunks for `software` and, unless empty, `fingerprint`) by temporary file and rename.
 /// @throws Error{Io}
 void write_png(const std::filesystem::path& path, const Image& image, std::string_view fingerprint = {});

@@ -50,7 +50,9 @@ class Renderer {
   /// software driver reads its own, LP_NUM_THREADS, once in a process).
   /// @pre meshes with one normal a vertex, finite positions and valid indices
   /// @throws Error{Usage} for a camera that looks nowhere, Error{Limit} when the driver is out of memory
-  [[nodiscard]] virtual Image render(const View& view, std::span<const Item> items) = 0;
+  [[nodiscard]] Image render(const View& view, std::span<const Item> items) { return render(view, items, nullptr); }
+  /// The same, and its light before exposure and tone curve unless `linear` is null.
+  [[nodiscard]] virtual Image render(const View& view, std::span<const Item> items, LinearImage* linear) = 0;
   /// e.g. "OSMesa, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   [[nodiscard]] virtual std::string description() const = 0;
   [[nodiscard]] virtual RenderTimes times() const = 0;

@@ -40,11 +40,6 @@ struct AreaLight {
   double radiance = 5.0;                     ///< relative to that of the sky
 };
 
-struct Ground {
-  double height = 0.0;                       ///< z [m]
-  Vec3 colour = Vec3(0.80, 0.80, 0.78);      ///< sRGB, fades to the background with distance
-};
-
 /// Where the colour of an item comes from. Patterns live in object coordinates: the columns "rest_x", "rest_y", "rest_z"
 /// of the mesh [m], or world positions where it has none. They so stick to a body that moves and deforms.
 enum class PaintKind : std::uint8_t {
@@ -66,6 +61,12 @@ struct Paint {
   ColourMap map = ColourMap::Viridis;             ///< Values
   double lower = 0.0;                             ///< Values: what the ends of the map stand for
   double upper = 1.0;
+};
+
+struct Ground {
+  double height = 0.0;                       ///< z [m]
+  Vec3 colour = Vec3(0.80, 0.80, 0.78);      ///< sRGB, fades to the background with distance
+  Paint paint = {};                          ///< Checker, Stripes or Picture, by world x and y; or Plain
 };
 
 /// Values and gradients of a field at points [m]; inside > 0. Called from several threads at once.
@@ -92,7 +93,7 @@ struct View {
   std::optional<Ground> ground;
   Vec3 background_top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
   Vec3 background_bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
-  std::vector<AreaLight> area_lights = {};          ///< OpenGL takes the first four and casts no shadows of theirs
+  std::vector<AreaLight> area_lights = {};          ///< OpenGL takes the first four
 };
 
 }  // namespace supple::render

@@ -12,7 +12,7 @@ namespace supple::scenes {
 
 enum class PatternName : std::uint8_t { Checker, Stripes, Picture };
 
-/// objects[].look.texture
+/// objects[].look.texture, obstacles[].texture, ground.texture
 struct TextureDesc {
   PatternName pattern = PatternName::Checker;
   Vec3 colour = Vec3(0.95, 0.95, 0.93);  ///< checker, stripes: the second one, sRGB

@@ -302,6 +302,7 @@ struct SleepDesc {
 struct GroundDesc {
   double height = 0.0;                ///< [m]
   Vec3 colour = Vec3(0.80, 0.80, 0.78);
+  std::optional<TextureDesc> texture;
   bool visible = true;
   bool collides = true;
   double modulus = 1e6;               ///< P of the half-space [Pa]
@@ -326,6 +327,7 @@ struct ObstacleDesc {
   std::optional<double> voxel;        ///< mesh [m]; absent: a 64th of its longest side
   Vec3 colour = Vec3(0.72, 0.74, 0.78);  ///< sRGB
   double roughness = 0.6;
+  std::optional<TextureDesc> texture;
   bool visible = true;
   double modulus = 1e6;               ///< P [Pa]
   double slope = 1.0;                 ///< |grad F| [1/m]
