@@ -54,6 +54,8 @@ struct Arguments {
   std::string sample_tables;
   std::vector<std::string> words;
   int threads = 0;
+  int at_once = 0;
+  double memory = 0.0;
   int cells = 0;
   double error = 0.0;
   double gain = 8.0;
@@ -117,6 +119,8 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.simulate_only = arguments.simulate_only;
   options.profile = arguments.profile;
   options.context = arguments.context;
+  options.frames_at_once = arguments.at_once;
+  options.memory = 1e9 * arguments.memory;
   options.delaunay = simulation_options(0).delaunay;
   options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
   options.interrupt = &interrupted;
@@ -277,6 +281,9 @@ int parse_and_call(int argc, char** argv) {
   CLI::App* render_verb = app.add_subcommand("render", "draw the frames of a run again from its saved states");
   run_flags(render_verb, a);
   render_verb->add_flag("--overwrite", a.overwrite, "draw pictures that are there and up to date again, too");
+  render_verb->add_option("--at-once", a.at_once, "frames drawn at the same time (default: one a thread, as memory allows; changes no bit)")
+      ->check(CLI::Range(0, 64));
+  render_verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")->check(CLI::PositiveNumber);
   render_verb->add_flag("--sheet", a.sheet, "only the contact sheet, of the frames that are there");
   render_verb->footer("Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
 

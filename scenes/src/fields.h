@@ -733,7 +733,7 @@ void fields(Archive& archive, Scene& d) {
   archive("camera", d.camera, {}, "who looks on");
   archive("cameras", d.cameras, {}, "several onlookers, instead of 'camera': images NAME.CAMERA.0001.png and a film each");
   archive("light", d.light, {}, "the sun");
-  archive("lights", d.lights, {}, "rectangles that shine; OpenGL takes the first four, without shadows");
+  archive("lights", d.lights, {}, "rectangles that shine; OpenGL takes the first four");
   archive("background", d.background, {}, "behind everything, from top to bottom");
   archive("render", d.render, {}, "how pictures are made");
   archive("ground", d.ground, {}, "a horizontal plane; absent: none");

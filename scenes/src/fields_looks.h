@@ -109,7 +109,7 @@ void fields(Archive& archive, RenderDesc& d) {
           "standard error of a pixel over its brightness, before the filter, at which sampling ends; 0: most_samples");
   archive("most_samples", d.most_samples, only(between(1.0, 65536.0, kNumber)), "a pixel, a power of two");
   archive("denoise", d.denoise, only({}), "filter that follows normals, places and colours");
-  archive("exact_surface", d.exact_surface, only({}), "rays meet the field itself where objects touch nothing, so coarse meshes look smooth");
+  archive("exact_surface", d.exact_surface, only({}), "rays meet the field itself, deformed by contact, so coarse meshes look smooth");
   archive("shutter", d.shutter, only(between(0.0, 1.0, kNumber)), "exposure over the time between frames: what moves is blurred");
   archive.check((d.most_samples & (d.most_samples - 1)) == 0, "most_samples", "expected a power of two", std::to_string(d.most_samples), "");
 }

@@ -399,6 +399,30 @@ std::vector<Mesh> divide(const MeshingDesc& d, std::span<const implicit::FieldVi
 
 }  // namespace
 
+Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
+                     std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface) {
+  Division out;
+  for (const auto& s : surface.summary) {
+    for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
+      if (body < bodies.size()) out.body.push_back(body);
+    }
+  }
+  out.placed.assign(placed.begin(), placed.end());
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (!has_surface(bodies[i])) continue;
+    if (out.placed[i].pose.empty()) out.placed[i].field = fields[i];
+    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+      if (!has_surface(bodies[j])) continue;
+      if (fields[i].surface_box().overlaps(fields[j].surface_box())) out.body.insert(out.body.end(), {i, j});
+    }
+  }
+  std::sort(out.body.begin(), out.body.end());
+  out.body.erase(std::unique(out.body.begin(), out.body.end()), out.body.end());
+  out.claim.reserve(out.body.size());
+  for (const std::uint32_t i : out.body) out.claim.emplace_back(out.placed, i, surface, model.bulge);
+  return out;
+}
+
 std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
                                      const core::Interactions& laws, Frame& frame) try {
   const Model& model = context.model;
@@ -411,23 +435,8 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
 
   // Bodies that touch are divided together on one lattice; the ground divides nothing, it is flat and opaque. Pieces of
   // one object are divided where they still overlap.
-  std::vector<std::uint32_t> touching;
-  for (const auto& s : frame.surface.summary) {
-    for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
-      if (body < bodies.size()) touching.push_back(body);
-    }
-  }
-  std::vector<collision::ContactBody> drawn = frame.bodies;
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (!has_surface(bodies[i])) continue;
-    if (drawn[i].pose.empty()) drawn[i].field = frame.field[i];
-    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-      if (!has_surface(bodies[j])) continue;
-      if (frame.field[i].surface_box().overlaps(frame.field[j].surface_box())) touching.insert(touching.end(), {i, j});
-    }
-  }
-  std::sort(touching.begin(), touching.end());
-  touching.erase(std::unique(touching.begin(), touching.end()), touching.end());
+  const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
+  const std::vector<std::uint32_t>& touching = division.body;
 
   const auto add_counts = [&] {
     profile.visited += counts.blocks_visited;
@@ -435,10 +444,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
     counts = {};
   };
   if (!touching.empty()) {
-    std::vector<collision::ClaimField> claims;
-    claims.reserve(touching.size());
-    for (const std::uint32_t i : touching) claims.emplace_back(drawn, i, frame.surface, model.bulge);
-    const std::vector<implicit::FieldView> views(claims.begin(), claims.end());
+    const std::vector<implicit::FieldView> views(division.claim.begin(), division.claim.end());
     std::vector<Mesh> parts = divide(model.meshing, views, lattice, context.executor, counts);
     add_counts();
     for (std::size_t k = 0; k < touching.size(); ++k) surfaces[touching[k]] = std::move(parts[k]);

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "supple/collision/deformed_field.h"
 #include "supple/collision/find_contacts.h"
 #include "supple/collision/react.h"
 #include "supple/collision/sleep.h"
@@ -98,6 +99,19 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
 
 /// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
+
+/// Bodies that contact divides from each other, and pieces of one object that still overlap, with their claims on space.
+struct Division {
+  std::vector<std::uint32_t> body;             ///< ascending
+  std::vector<collision::ContactBody> placed;  ///< all bodies, the fixed ones last; claims view it
+  std::vector<collision::ClaimField> claim;    ///< of each `body`
+  Division() = default;
+  Division(Division&&) = default;
+  Division& operator=(Division&&) = default;
+};
+/// @param placed  all bodies as contact sees them  @param fields, surface  to be kept as long as the result
+[[nodiscard]] Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
+                              std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface);
 
 /// Stage 9 on the deformed fields, one mesh an object, with the columns its look needs; of several pieces the meshes lie
 /// side by side in it. @param laws  those that nothing has broken

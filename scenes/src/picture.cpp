@@ -213,24 +213,58 @@ void ScenePictures::add_objects(Simulation& simulation) {
   }
 }
 
-/// Of objects in one piece that touch nothing: those that touch have been divided by others' fields.
+/// Zero where the mesh of an object should be: of a body that touches, F~ = (p - max(p_j, 0)) / P of the claims p, and of
+/// several pieces the largest.
 void ScenePictures::add_fields(Simulation& simulation) {
   const std::vector<Body>& bodies = simulation.bodies();
-  std::vector<int> pieces(scene_.objects.size(), 0);
-  std::vector<std::size_t> body(scene_.objects.size(), 0);
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    ++pieces[bodies[i].object];
-    body[bodies[i].object] = i;
+  const std::vector<implicit::Field>& fields = simulation.fields();
+  division_ = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  struct Piece {
+    implicit::FieldView own;
+    double scale = 1.0;
+    std::vector<implicit::FieldView> others;
+  };
+  std::vector<std::vector<Piece>> pieces(scene_.objects.size());
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty()) continue;
+    const auto at = std::lower_bound(division_.body.begin(), division_.body.end(), i);
+    if (at == division_.body.end() || *at != i) {
+      pieces[bodies[i].object].push_back({.own = fields[i], .scale = 1.0, .others = {}});
+      continue;
+    }
+    const auto k = static_cast<std::size_t>(at - division_.body.begin());
+    Piece piece{.own = division_.claim[k], .scale = 1.0 / division_.placed[i].material.modulus, .others = {}};
+    for (std::size_t j = 0; j < division_.claim.size(); ++j)
+      if (j != k && division_.claim[j].surface_box().overlaps(division_.claim[k].surface_box())) piece.others.emplace_back(division_.claim[j]);
+    pieces[bodies[i].object].push_back(std::move(piece));
   }
-  for (const auto& contact : simulation.contacts().summary)
-    for (const std::uint32_t i : {contact.bodies.a, contact.bodies.b})
-      if (i < bodies.size()) pieces[bodies[i].object] = 0;
   const std::vector<Mesh>& meshes = simulation.meshes();
   for (render::Item& item : items_) {
     const auto object = static_cast<std::size_t>(item.mesh - meshes.data());
-    if (item.mesh < meshes.data() || object >= meshes.size() || pieces[object] != 1) continue;
-    const implicit::Field* field = &simulation.fields()[body[object]];
-    item.field = [field](std::span<const Vec3> p, std::span<double> f, std::span<Vec3> g) { field->evaluate(p, f, g); };
+    if (item.mesh < meshes.data() || object >= meshes.size() || pieces[object].empty()) continue;
+    item.field = [parts = std::move(pieces[object])](std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const std::span<const Vec3> point = points.subspan(i, 1);
+        values[i] = -std::numeric_limits<double>::infinity();
+        for (const Piece& part : parts) {
+          double value = 0.0, taken = 0.0;
+          Vec3 gradient = Vec3::Zero(), slope = Vec3::Zero();
+          part.own.evaluate(point, std::span(&value, 1), std::span(&gradient, 1));
+          for (const implicit::FieldView& other : part.others) {
+            double claim = 0.0;
+            Vec3 steepness = Vec3::Zero();
+            other.evaluate(point, std::span(&claim, 1), std::span(&steepness, 1));
+            if (claim <= taken) continue;
+            taken = claim;
+            slope = steepness;
+          }
+          value = part.scale * (value - taken);
+          if (value <= values[i]) continue;
+          values[i] = value;
+          gradients[i] = part.scale * (gradient - slope);
+        }
+      }
+    };
     item.field_reach = simulation.cell();
   }
 }

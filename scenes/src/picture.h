@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "camera.h"
+#include "frame.h"
 #include "supple/render/layers.h"
 #include "supple/render/overlay.h"
 #include "supple/render/renderer.h"
@@ -52,6 +53,7 @@ class ScenePictures {
   std::unique_ptr<render::Renderer> renderer_;
   render::RenderSettings settings_;
   std::unique_ptr<render::LayerRenderer> layer_renderer_;  ///< made when layers are first asked for
+  Division division_;  ///< behind the fields of items
   std::vector<render::Item> items_;
   std::vector<std::string> item_names_;
   double cell_ = 0.0;        ///< of the scene

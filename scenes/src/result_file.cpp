@@ -34,7 +34,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["last_good_frame"] = result.frames;
   json["frame_count"] = scene.frame_count();
   json["frame_rate"] = scene.frame_rate;
-  json["pictures"] = {{"drawn", result.pictures_drawn}, {"kept", result.pictures_kept}};
+  json["pictures"] = {{"drawn", result.pictures_drawn}, {"kept", result.pictures_kept}, {"frames_at_once", result.frames_at_once}};
   json["state_hash"] = to_hex(result.state_hash);
   json["warnings"] = result.warnings;
   json["units"] = {{"length", "m"}, {"up_axis", "z"}};

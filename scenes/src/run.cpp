@@ -9,7 +9,10 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <fstream>
+#include <mutex>
 #include <optional>
+#include <thread>
 
 #include "frame_writer.h"
 #include "output_files.h"
@@ -130,6 +133,105 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   return result;
 }
 
+/// Memory of this process, and what the machine has free [byte].
+double resident_bytes() {
+  std::ifstream file("/proc/self/statm");
+  double size = 0.0, resident = 0.0;
+  file >> size >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+double free_bytes() { return static_cast<double>(sysconf(_SC_AVPHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)); }
+
+/// How many frames to draw at once when each needs `share` bytes.
+int crew_size(const RunOptions& options, std::size_t frames, double share) {
+  const int most = std::min<int>(static_cast<int>(std::min<std::size_t>(frames, 64)),
+                                 options.frames_at_once > 0 ? options.frames_at_once : Executor(options.threads).threads());
+  const double memory = options.memory > 0.0 ? options.memory : 0.5 * free_bytes();
+  const double room = share > 0.0 ? memory / share : most;
+  return std::max(1, static_cast<int>(std::min<double>(most, room)));
+}
+
+/// Draws frames at the same time, each by a simulation and a renderer of its own, so that no byte depends on the others.
+class DrawingCrew {
+ public:
+  DrawingCrew(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, std::span<const int> frames, Reporter& report)
+      : scene_(scene), options_(options), outputs_(outputs), frames_(frames), report_(report) {}
+
+  /// @throws what the first of the frames that failed threw
+  void draw(int members, RunResult& result, Simulation& booked) {
+    options_.threads = std::max(1, Executor(options_.threads).threads() / members);
+    options_.progress = [&](const Progress& progress) {
+      const std::lock_guard lock(mutex_);
+      report_(progress.stage, progress.frame, static_cast<double>(progress.frame) / frames_.back());
+    };
+    std::vector<std::thread> threads;
+    for (int i = 0; i < members; ++i) threads.emplace_back([&] { work(members, result, booked); });
+    for (std::thread& thread : threads) thread.join();
+    if (failure_) std::rethrow_exception(failure_);
+    std::sort(result.warnings.begin(), result.warnings.end());
+    result.warnings.erase(std::unique(result.warnings.begin(), result.warnings.end()), result.warnings.end());
+  }
+
+ private:
+  void work(int members, RunResult& result, Simulation& booked) {
+    std::unique_lock lock(mutex_);  // libraries of contexts are opened one after the other
+    int frame = frames_.front();
+    try {
+      Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay});
+      FrameWriter writer(scene_, simulation.model(), options_, outputs_);
+      Reporter report(options_, frames_.back());
+      while (next_ < frames_.size() && !failure_ && (options_.interrupt == nullptr || options_.interrupt->load() == 0)) {
+        frame = frames_[next_++];
+        lock.unlock();
+        State state = load_state(state_path(options_.folder, scene_name(scene_), frame), scene_.content_hash);
+        const bool draws = options_.overwrite || writer.renews(frame, state.hash());
+        if (draws) {
+          simulation.restore(std::move(state));
+          writer.write(simulation, report, 0.0);
+        }
+        lock.lock();
+        if (!draws) ++result.pictures_kept;
+      }
+      book(members, simulation, writer, result, booked);
+    } catch (...) {
+      if (!lock.owns_lock()) lock.lock();
+      if (!failure_ || frame < failed_) failure_ = std::current_exception();
+      failed_ = std::min(failed_, frame);
+    }
+  }
+
+  /// Clocks count the CPU time of the process, so each saw the work of all.
+  void book(int members, Simulation& simulation, const FrameWriter& writer, RunResult& result, Simulation& booked) const {
+    result.pictures_drawn += writer.pictures_drawn();
+    writer.add_warnings(result.warnings);
+    const PictureTimes t = writer.picture_times();
+    const double share = 1.0 / members;
+    result.pictures.images += t.images;
+    result.pictures.encode_s += share * t.encode_s;
+    for (double render::RenderTimes::*part : {&render::RenderTimes::context, &render::RenderTimes::shaders, &render::RenderTimes::upload,
+                                              &render::RenderTimes::draw, &render::RenderTimes::read_back})
+      result.pictures.render.*part += share * t.render.*part;
+    for (const Stage stage : {Stage::Polygonise, Stage::Render, Stage::Export}) {
+      const StageProfile& own = simulation.profile(stage);
+      StageProfile& sum = booked.profile(stage);
+      sum.calls += own.calls;
+      sum.visited += own.visited;
+      sum.present += own.present;
+      sum.cpu_s += share * own.cpu_s;
+    }
+  }
+
+  const Scene& scene_;
+  RunOptions options_;
+  OutputRequest outputs_;
+  std::span<const int> frames_;
+  Reporter& report_;
+  std::mutex mutex_;  // of all below, and of what is booked
+  std::size_t next_ = 0;
+  std::exception_ptr failure_;
+  int failed_ = std::numeric_limits<int>::max();
+};
+
 /// Outputs again of the saved states.
 RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, const char* report_name) {
   const bool pictures_only = outputs.images;
@@ -148,13 +250,29 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
                                        .found = "none",
                                        .hint = "run the scene first: supple run SCENE --out FOLDER"});
     }
+    const double before = resident_bytes();
     simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, *last);
+    std::vector<int> frames;
     for (int frame = 1; frame <= *last; ++frame) {
-      if (was_interrupted(options, result)) return;
       const bool wanted = options.frames.empty() || options.frames.contains(frame);
-      if (!wanted && !(outputs.samples && frame < *options.frames.rbegin())) continue;  // samples depend on all frames before
+      // Samples depend on all frames before.
+      if (wanted || (outputs.samples && frame < *options.frames.rbegin())) frames.push_back(frame);
+    }
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (was_interrupted(options, result)) return;
+      const int frame = frames[i];
+      if (pictures_only && writer.pictures_drawn() > 0) {  // the first one shows what each needs
+        const std::span<const int> rest = std::span<const int>(frames).subspan(i);
+        const int crew = crew_size(options, rest.size(), resident_bytes() - before);
+        if (crew > 1) {
+          result.frames_at_once = crew;
+          DrawingCrew(scene, options, outputs, rest, report).draw(crew, result, *simulation);
+          if (was_interrupted(options, result)) return;
+          break;
+        }
+      }
       State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
       if (pictures_only && !options.overwrite && !writer.renews(frame, state.hash())) {
         ++result.pictures_kept;
@@ -166,9 +284,16 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     if (simulation->frame() != *last) {  // the report is of the run as a whole
       simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
     }
-    result.pictures_drawn = writer.pictures_drawn();
+    result.pictures_drawn += writer.pictures_drawn();
     result.film = writer.finish(*simulation, report, *last);
-    result.pictures = writer.picture_times();
+    const PictureTimes t = writer.picture_times();
+    result.pictures.images += t.images;
+    result.pictures.encode_s += t.encode_s;
+    result.pictures.render.context += t.render.context;
+    result.pictures.render.shaders += t.render.shaders;
+    result.pictures.render.upload += t.render.upload;
+    result.pictures.render.draw += t.render.draw;
+    result.pictures.render.read_back += t.render.read_back;
     writer.add_warnings(result.warnings);
   });
 }

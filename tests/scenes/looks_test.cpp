@@ -249,5 +249,28 @@ TEST_F(Looks, AnAbsentTextureIsNamed) {
   EXPECT_NE(result.reason.find("absent.png"), std::string::npos) << result.reason;
 }
 
+TEST_F(Looks, CoarseMeshesOfBallsThatTouchLookLikeFineOnesWhenRaysMeetTheField) {
+  if (!render::has_path_tracer()) GTEST_SKIP();
+  // Pressed together by a quarter of a radius, a third one beside them; one sample without a filter, so that shapes alone differ.
+  const auto picture = [&](const char* cell, const char* exact) {
+    return first_picture(parse_scene(std::string(R"(
+schema: 1
+duration: 0.1 s
+frame_rate: 10
+gravity: [0, 0, 0]
+objects:
+  - {name: a, particles: {arrange: single, at: [-0.3, 0, 0]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 1000}}
+  - {name: b, particles: {arrange: single, at: [0.05, 0, 0.05]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 2000}}
+light: {direction: [-0.2, 1, -0.4], softness_deg: 0}
+camera: {from: [0, -2, 0.4], look_at: [-0.1, 0, 0], field_of_view_deg: 30}
+render: {renderer: path, noise: 0, most_samples: 16, denoise: false, exact_surface: )") + exact + "}\noutput: {images: {size: [96, 72]}, cell: " + cell + "}\n",
+                                     "looks.yaml", "."));
+  };
+  const render::Image fine = picture("0.01", "false");
+  const double plain = render::compare(picture("0.08", "false"), fine, 1.0).psnr;
+  const double met = render::compare(picture("0.08", "true"), fine, 1.0).psnr;
+  EXPECT_GT(met, plain + 3.0);  // outlines stay those of the mesh
+}
+
 }  // namespace
 }  // namespace supple::scenes

@@ -491,7 +491,7 @@ void add_pictures(std::vector<Option>& all) {
   lamp("intensity", "at: [0, -1, 1], facing: [0, 1, -1], intensity: $", "5", "2");
   scene("background.top", "background: {top: $}", "[0, 0, 0]", "[1, 0, 0]");
   scene("background.bottom", "background: {bottom: $}", "[0, 0, 0]", "[1, 0, 0]");
-  scene("ground.texture.pattern", "ground: {height: -0.2, collides: false, texture: {pattern: $}}", "checker", "stripes");
+  scene("ground.texture.pattern=stripes", "ground: {height: -0.2, collides: false, texture: {pattern: $}}", "checker", "stripes");
   scene("ground.texture.pattern=picture", "ground: {height: -0.2, collides: false, texture: {$}}", "pattern: checker", "pattern: picture, file: texture.png");
   scene("ground.texture.colour", "ground: {height: -0.2, collides: false, texture: {colour: $}}", "[1, 1, 1]", "[0, 0, 1]");
   scene("ground.texture.size", "ground: {height: -0.2, collides: false, texture: {size: $}}", "0.1", "0.25");

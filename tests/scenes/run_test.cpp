@@ -258,6 +258,41 @@ TEST_F(Run, KeepsPicturesThatShowTheSameSceneAndState) {
   EXPECT_NE(bytes_of(folder_ / "frames/drops.0003.png"), before);
 }
 
+TEST_F(Run, DrawsFramesAtTheSameTimeWithTheSameBytes) {
+  scene_.output.film = false;
+  ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
+  std::vector<std::vector<std::byte>> before;
+  for (int frame = 1; frame <= 5; ++frame) before.push_back(bytes_of(folder_ / ("frames/drops.000" + std::to_string(frame) + ".png")));
+  RunOptions o = options();
+  o.overwrite = true;
+  o.frames_at_once = 3;
+  RunResult result = render_run(scene_, o);
+  EXPECT_EQ(result.outcome, "done") << result.reason;
+  EXPECT_EQ(result.frames_at_once, 3);
+  EXPECT_EQ(result.pictures_drawn, 5);
+  EXPECT_EQ(result.pictures.images, 5);
+  for (int frame = 1; frame <= 5; ++frame) {
+    EXPECT_EQ(bytes_of(folder_ / ("frames/drops.000" + std::to_string(frame) + ".png")), before[static_cast<std::size_t>(frame - 1)]) << frame;
+  }
+  o.memory = 1.0;  // a byte has room for none beside the first
+  result = render_run(scene_, o);
+  EXPECT_EQ(result.frames_at_once, 1);
+  EXPECT_EQ(result.pictures_drawn, 5);
+  // What is current stays, and a state that cannot be read is told of.
+  o.memory = 0.0;
+  o.overwrite = false;
+  fs::remove(folder_ / "frames/drops.0002.png");
+  fs::remove(folder_ / "frames/drops.0004.png");
+  result = render_run(scene_, o);
+  EXPECT_EQ(result.pictures_drawn, 2);
+  EXPECT_EQ(result.pictures_kept, 3);
+  o.overwrite = true;
+  fs::resize_file(folder_ / "states/drops.0003.state", 100);
+  result = render_run(scene_, o);
+  EXPECT_EQ(result.outcome, "io");
+  EXPECT_NE(result.reason.find("drops.0003.state"), std::string::npos) << result.reason;
+}
+
 TEST_F(Run, DrawsMissingPicturesOnResuming) {
   scene_.output.film = false;
   ASSERT_EQ(run_scene(scene_, options()).outcome, "done");

@@ -18,10 +18,10 @@ struct Sun {
   [[nodiscard]] bool is_point() const { return cosine >= 1.0F; }
   /// Uniform in the cone.
   [[nodiscard]] Vec3f sample(const Eigen::Vector2f& u) const {
-    const float c = 1.0F - u.x() * (1.0F - cosine);
-    const float s = std::sqrt(std::max(0.0F, 1.0F - c * c));
-    const float angle = 2.0F * kPi * u.y();
-    return Axes(to_light).to_world({s * std::cos(angle), s * std::sin(angle), c});
+    const Eigen::Vector2f d = on_disc(u);
+    const float fall = d.squaredNorm() * (1.0F - cosine);
+    const Eigen::Vector2f across = d * std::sqrt((1.0F - cosine) * (2.0F - fall));
+    return Axes(to_light).to_world({across.x(), across.y(), 1.0F - fall});
   }
   /// Radiance such that a face towards the sun gets its irradiance: E / (pi sin^2).
   [[nodiscard]] Vec3f radiance() const { return irradiance / (kPi * (1.0F - cosine * cosine)); }

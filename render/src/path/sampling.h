@@ -29,20 +29,19 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
   return ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
 }
 
-/// Owen's scrambling by a hash (Laine & Karras 2011; constants of Vegdahl 2021).
-[[nodiscard]] inline std::uint32_t scramble(std::uint32_t x, std::uint32_t seed) {
-  x = reverse_bits(x);
+/// Owen's scrambling by a hash (Laine & Karras 2011; constants of Vegdahl 2021), of numbers whose bits are reversed.
+[[nodiscard]] inline std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
   x *= (seed >> 16) | 1u;
   x ^= x * 0x05526c56u;
-  x ^= x * 0x53a22864u;
-  return reverse_bits(x);
+  return x ^ (x * 0x53a22864u);
 }
 
-/// Second dimension of Sobol's sequence: Pascal's matrix mod 2 is a Kronecker power, so bits meet as in a fast transform.
-[[nodiscard]] inline std::uint32_t sobol_second(std::uint32_t index) {
-  std::uint32_t x = reverse_bits(index);
+/// Second dimension of Sobol's sequence, of an index whose bits are reversed: Pascal's matrix mod 2 is a Kronecker power, so
+/// bits meet as in a fast transform. The first dimension is the reversed index itself.
+[[nodiscard]] inline std::uint32_t sobol_second(std::uint32_t reversed) {
+  std::uint32_t x = reversed;
   x ^= (x & 0x55555555u) << 1;
   x ^= (x & 0x33333333u) << 2;
   x ^= (x & 0x0f0f0f0fu) << 4;
@@ -50,26 +49,28 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
   return x ^ (x << 16);
 }
 
-/// The first two dimensions of Sobol's sequence, scrambled and shuffled anew for every pair of dimensions (Burley 2020).
+/// The first two dimensions of Sobol's sequence, shuffled anew for every pair of dimensions (Burley 2020); digits are
+/// exchanged at random (Kollig & Keller 2002), which costs less than nested scrambling and keeps every net.
 class Sampler {
  public:
   Sampler(int x, int y, std::uint32_t sample)
-      : pixel_(hash(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y))), sample_(sample) {}
+      : pixel_(hash(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y))), reversed_(reverse_bits(sample)) {}
 
   [[nodiscard]] Eigen::Vector2f pair() {
-    const std::uint32_t seed = hash(pixel_, dimension_++);
-    const std::uint32_t index = scramble(sample_, seed);
-    return {unit(scramble(reverse_bits(index), hash(seed, 1))), unit(scramble(sobol_second(index), hash(seed, 2)))};
+    const std::uint32_t seed = next_seed();
+    const std::uint32_t index = scramble_reversed(reversed_, seed);
+    return {unit(index ^ (seed * 0x9e3779b1u)), unit(sobol_second(index) ^ ((seed ^ (seed >> 15)) * 0x85ebca6bu))};
   }
   [[nodiscard]] float number() {
-    const std::uint32_t seed = hash(pixel_, dimension_++);
-    return unit(scramble(reverse_bits(scramble(sample_, seed)), hash(seed, 1)));
+    const std::uint32_t seed = next_seed();
+    return unit(scramble_reversed(reversed_, seed) ^ (seed * 0x9e3779b1u));
   }
 
  private:
+  std::uint32_t next_seed() { return hash(pixel_ + 0x9e3779b9u * ++dimension_); }
   static float unit(std::uint32_t x) { return static_cast<float>(x >> 8) * 0x1p-24F; }
   std::uint32_t pixel_;
-  std::uint32_t sample_;
+  std::uint32_t reversed_;
   std::uint32_t dimension_ = 0;
 };
 
@@ -93,8 +94,12 @@ struct Axes {
   if (v.x() == 0.0F && v.y() == 0.0F) return v;
   const bool wide = std::abs(v.x()) > std::abs(v.y());
   const float r = wide ? v.x() : v.y();
-  const float angle = wide ? kPi / 4.0F * (v.y() / v.x()) : kPi / 2.0F - kPi / 4.0F * (v.x() / v.y());
-  return r * Eigen::Vector2f(std::cos(angle), std::sin(angle));
+  // Sine and cosine of at most pi / 4 by their series: 3e-7.
+  const float angle = kPi / 4.0F * (wide ? v.y() / v.x() : v.x() / v.y());
+  const float a2 = angle * angle;
+  const float sine = angle * (1.0F - a2 * (1.0F / 6.0F - a2 * (1.0F / 120.0F - a2 * (1.0F / 5040.0F))));
+  const float cosine = 1.0F - a2 * (0.5F - a2 * (1.0F / 24.0F - a2 * (1.0F / 720.0F - a2 * (1.0F / 40320.0F))));
+  return r * (wide ? Eigen::Vector2f(cosine, sine) : Eigen::Vector2f(sine, cosine));
 }
 
 /// About +z with density cos / pi.
