@@ -297,6 +297,27 @@ TEST(PathTracer, TakesSamplesUntilTheStatedNoise) {
   }
 }
 
+TEST(PathTracer, TakesMoreSamplesWhereSurfacesMeetInThePicture) {
+  const Mesh ball = sphere(Vec3::Zero(), 0.4, 48);
+  const Item item = matt(ball, 0.5);
+  Studio studio;
+  studio.settings.noise = 1.0;
+  studio.settings.width = studio.settings.height = 64;
+  studio.lights.above = studio.lights.below = Vec3f::Ones();
+  const Film film = studio.trace(std::span(&item, 1));
+  const double radius = 32.0 * std::tan(std::asin(0.4 / 5.0)) / std::tan(0.15);
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double off = std::hypot(x - 31.5, y - 31.5) - radius;
+      const std::uint32_t samples = film.samples[static_cast<std::size_t>(64 * y + x)];
+      if (std::abs(off) < 0.5) {
+        EXPECT_EQ(samples, 16u) << x << ' ' << y;
+      } else if (off > 3.0 || off < -8.0) {
+        EXPECT_EQ(samples, 4u) << x << ' ' << y;
+      }
+    }
+}
+
 TEST(PathTracer, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   const std::array meshes = {sphere(Vec3(-0.5, 0, 0.5), 0.5, 24), sphere(Vec3(0.45, 0, 0.45), 0.45, 24)};
   const std::array items = {Item{.mesh = &meshes[0], .colour = Vec3(0.9, 0.3, 0.1)},

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kLevels = 4;
 constexpr float kAlbedoFloor = 0.02F;
-constexpr float kNoiseScale = 0.8F;  // standard errors that count as the same
+constexpr float kNoiseScale = 2.0F;  // standard errors that count as the same
 constexpr std::array<float, 3> kKernel = {3.0F / 8.0F, 1.0F / 4.0F, 1.0F / 16.0F};
 
 /// exp(-t) for t >= 0, to 2e-4, without a call, so that loops become vector loops.

@@ -1,11 +1,15 @@
 #include "integrator.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace supple::render::path {
 namespace {
 
 constexpr int kTile = 8;
+constexpr std::uint32_t kEdgeSamples = 4;  // times those of the tile
+constexpr float kOneSurface = 0.98F;       // square of the mean of unit normals that are nearly parallel
+constexpr float kSameNormal = 0.95F, kSameCover = 0.1F, kSameAlbedo = 0.03F;
 
 struct Ray {
   Vec3f from;
@@ -245,18 +249,23 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
   const Tracer tracer(geometry, lights, ground, camera, settings);
   const int across = (settings.width + kTile - 1) / kTile;
   const int down = (settings.height + kTile - 1) / kTile;
-  executor.for_blocks(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), 1, [&](std::size_t tile, std::size_t) {
-    const int left = static_cast<int>(tile % static_cast<std::size_t>(across)) * kTile;
-    const int top = static_cast<int>(tile / static_cast<std::size_t>(across)) * kTile;
-    const int right = std::min(left + kTile, settings.width), bottom = std::min(top + kTile, settings.height);
-    std::array<Sums, kTile * kTile> sums{};
-    const auto taken = [&](int x, int y) -> Sums& { return sums[static_cast<std::size_t>((y - top) * kTile + x - left)]; };
+  const auto index = [&](int x, int y) { return static_cast<std::size_t>(y) * static_cast<std::size_t>(settings.width) + static_cast<std::size_t>(x); };
+  const auto for_tiles = [&](const auto& body) {
+    executor.for_blocks(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), 1, [&](std::size_t tile, std::size_t) {
+      const int left = static_cast<int>(tile % static_cast<std::size_t>(across)) * kTile;
+      const int top = static_cast<int>(tile / static_cast<std::size_t>(across)) * kTile;
+      body(left, top, std::min(left + kTile, settings.width), std::min(top + kTile, settings.height));
+    });
+  };
+  std::vector<Sums> sums(pixels);
+  const auto most = static_cast<std::uint32_t>(settings.most_samples);
+  for_tiles([&](int left, int top, int right, int bottom) {
     std::uint32_t n = 0;
-    for (auto next = static_cast<std::uint32_t>(std::min(settings.least_samples, settings.most_samples));;) {
+    for (auto next = std::min(static_cast<std::uint32_t>(settings.least_samples), most);;) {
       float error2 = 0.0F;
       for (int y = top; y < bottom; ++y)
         for (int x = left; x < right; ++x) {
-          Sums& sum = taken(x, y);
+          Sums& sum = sums[index(x, y)];
           for (std::uint32_t s = n; s < next; ++s) sum.add(tracer.sample(x, y, s));
           const float scale = sum.bright / static_cast<float>(next) + 0.1F;
           error2 += sum.variance(next) / (scale * scale);
@@ -264,21 +273,50 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
       n = next;
       error2 /= static_cast<float>((right - left) * (bottom - top));
       const bool quiet = settings.noise > 0.0 && error2 <= static_cast<float>(settings.noise * settings.noise);
-      if (quiet || n >= static_cast<std::uint32_t>(settings.most_samples)) break;
-      next = std::min(2 * n, static_cast<std::uint32_t>(settings.most_samples));
+      if (quiet || n >= most) break;
+      next = std::min(2 * n, most);
     }
     for (int y = top; y < bottom; ++y)
       for (int x = left; x < right; ++x) {
-        const Sums& sum = taken(x, y);
-        const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(settings.width) + static_cast<std::size_t>(x);
+        const std::size_t i = index(x, y);
         film.samples[i] = n;
-        film.cover[i] = sum.cover / static_cast<float>(n);
+        film.cover[i] = sums[i].cover / static_cast<float>(n);
+        film.normal[i] = sums[i].normal / static_cast<float>(n);
+        film.albedo[i] = sums[i].albedo / static_cast<float>(n);
+      }
+  });
+  // Where surfaces meet in the picture a filter cannot help: what a pixel shows of each takes more samples.
+  std::vector<std::uint8_t> edge(pixels, 0);
+  for_tiles([&](int left, int top, int right, int bottom) {
+    for (int y = top; y < bottom; ++y)
+      for (int x = left; x < right; ++x) {
+        const std::size_t i = index(x, y);
+        bool differs = film.cover[i] > 0.0F && film.normal[i].squaredNorm() < kOneSurface * film.cover[i] * film.cover[i];
+        for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+          if (x + dx < 0 || y + dy < 0 || x + dx >= settings.width || y + dy >= settings.height) continue;
+          const std::size_t j = index(x + dx, y + dy);
+          differs |= std::abs(film.cover[i] - film.cover[j]) > kSameCover;
+          differs |= (film.albedo[i] - film.albedo[j]).cwiseAbs().maxCoeff() > kSameAlbedo;
+          differs |= film.normal[i].dot(film.normal[j]) < kSameNormal * film.cover[i] * film.cover[j];
+        }
+        edge[i] = differs ? 1 : 0;
+      }
+  });
+  for_tiles([&](int left, int top, int right, int bottom) {
+    for (int y = top; y < bottom; ++y)
+      for (int x = left; x < right; ++x) {
+        const std::size_t i = index(x, y);
+        Sums& sum = sums[i];
+        const std::uint32_t first = film.samples[i];
+        if (edge[i] != 0) film.samples[i] = std::min(kEdgeSamples * first, most);
+        for (std::uint32_t s = first; s < film.samples[i]; ++s) sum.add(tracer.sample(x, y, s));
+        film.cover[i] = sum.cover / static_cast<float>(film.samples[i]);
         if (sum.cover <= 0.0F) continue;
         film.radiance[i] = sum.radiance / sum.cover;
         film.albedo[i] = sum.albedo / sum.cover;
         film.normal[i] = sum.normal / sum.cover;
         film.position[i] = sum.position / sum.cover;
-        film.variance[i] = sum.variance(n) / (film.cover[i] * film.cover[i]);
+        film.variance[i] = sum.variance(film.samples[i]) / (film.cover[i] * film.cover[i]);
       }
   });
 }

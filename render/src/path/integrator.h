@@ -46,7 +46,8 @@ struct Film {
   std::vector<std::uint32_t> samples;
 };
 
-/// The same bits for any number of threads: a tile of 8 x 8 pixels decides about its samples alone.
+/// The same bits for any number of threads: a tile of 8 x 8 pixels decides about its samples alone, and then each pixel by its
+/// neighbours whether it lies on an edge, which takes more.
 void trace(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
            const TraceSettings& settings, const Executor& executor, Film& film);
 

@@ -1,12 +1,14 @@
 """Time against PSNR and FLIP beside Mitsuba 3, on the studio of render_bench at 640 x 360.
 
     pip install mitsuba numpy flip-evaluator pillow
-    python3 render_mitsuba.py path/to/render_bench [SAMPLES OF THE REFERENCE]
+    python3 render_mitsuba.py path/to/render_bench [SAMPLES OF THE REFERENCE] [--work FOLDER]
 
-The reference is Mitsuba's (scalar variant, 1024 samples a pixel). Both go through the same tone curve to 8 bits; PSNR and
+The reference is Mitsuba's (scalar variant, 1024 samples a pixel, multi-jittered: independent ones leave a noise of FLIP .02
+themselves), kept in the work folder for the next time. Both go through the same tone curve to 8 bits; PSNR and
 FLIP are of those. CPU seconds are of the whole picture, hierarchies included, files and start of the programs not.
 """
 import json
+import pathlib
 import subprocess
 import sys
 import tempfile
@@ -34,14 +36,14 @@ def developed(radiance):
     return np.round(255 * np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)).astype(np.uint8)
 
 
-def scene(folder):
+def scene(folder, sampler):
     to_light = -DIRECTION / np.linalg.norm(DIRECTION)
     distance, centre = 1000.0, np.array(AT)
     t = mi.ScalarTransform4f
     parts = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 8, "hide_emitters": True},
-        "sensor": {"type": "perspective", "fov": float(np.degrees(0.6)), "fov_axis": "y",
+        "sensor": {"type": "perspective", "sampler": sampler, "fov": float(np.degrees(0.6)), "fov_axis": "y",
                    "to_world": t().look_at(origin=FROM, target=AT, up=[0, 0, 1]),
                    "film": {"type": "hdrfilm", "width": 640, "height": 360, "rfilter": {"type": "box"}, "pixel_format": "rgb"}},
         "sky": {"type": "constant", "radiance": {"type": "rgb", "value": SKY}},
@@ -62,6 +64,13 @@ def render(world, samples, seed):
     return image, time.process_time() - begin
 
 
+def reference(folder, work, samples):
+    path = work / f"reference_{samples}.npy"
+    if not path.exists():
+        np.save(path, render(scene(folder, {"type": "multijitter", "sample_count": samples}), samples, 1)[0])
+    return developed(np.load(path))
+
+
 def compare(reference, image):
     error = np.mean((reference.astype(float) - image.astype(float)) ** 2)
     _, flip, _ = flip_evaluator.evaluate(reference.astype(np.float32) / 255, image.astype(np.float32) / 255, "LDR")
@@ -71,20 +80,22 @@ def compare(reference, image):
 def main():
     bench = sys.argv[1]
     samples = int(sys.argv[2]) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 1024
+    work = pathlib.Path(sys.argv[sys.argv.index("--work") + 1] if "--work" in sys.argv else "render_mitsuba_work")
+    work.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([bench, "studio", folder], check=True)
-        world = scene(folder)
-        reference = developed(render(world, samples, 1)[0])
-        Image.fromarray(reference).save("reference.png")
+        truth = reference(folder, work, samples)
+        Image.fromarray(truth).save(work / "reference.png")
         for noise in ["0.4", "0.2", "0.1", "0.05", "0.02"]:
-            out = f"{folder}/ours.png"
+            out = work / f"ours_{noise}.png"
             line = json.loads(subprocess.run([bench, "path", noise, out], check=True, capture_output=True, text=True).stdout)
             print(json.dumps({"renderer": "supple", "noise": noise, "cpu_s": round(line["cpu_ms"] / 1e3, 3),
-                              **compare(reference, np.array(Image.open(out)))}), flush=True)
+                              **compare(truth, np.array(Image.open(out)))}), flush=True)
+        world = scene(folder, {"type": "independent"})
         for count in [1, 4, 16, 64]:
             image, seconds = render(world, count, 2)
             print(json.dumps({"renderer": "mitsuba " + mi.__version__, "samples": count, "cpu_s": round(seconds, 3),
-                              **compare(reference, developed(image))}), flush=True)
+                              **compare(truth, developed(image))}), flush=True)
 
 
 main()
