@@ -8,13 +8,6 @@
 namespace supple::collision {
 namespace {
 
-PairMaterial material_of(std::span<const ContactBody> bodies, const ContactRules& rules, const BodyPair& pair) {
-  const auto found = std::lower_bound(rules.overrides.begin(), rules.overrides.end(), pair,
-                                      [](const ContactRules::Override& o, const BodyPair& p) { return o.pair < p; });
-  if (found != rules.overrides.end() && found->pair == pair) return found->material;
-  return combine(bodies[pair.a].material, bodies[pair.b].material);
-}
-
 /// Half-open range of the entries of `pair` that equal k; `pair` is sorted.
 struct Range {
   std::size_t begin, end;
@@ -64,6 +57,12 @@ class Side {
   void add_whole(const Vec3& f, const Vec3& moment, const Vec3& centre) {
     force_[0] += f;
     torque_[0] += moment + (centre - body_->pose[0].position).cross(f);
+  }
+
+  /// A force at x and a couple, to one part.
+  void add_to_part(std::size_t k, const Vec3& x, const Vec3& f, const Vec3& couple) {
+    force_[k] += f;
+    torque_[k] += (x - body_->pose[k].position).cross(f) + couple;
   }
 
   void add_by_contribution(std::size_t i, const Vec3& x, const Vec3& f) {
@@ -159,6 +158,43 @@ class Side {
   std::vector<double> share_;  // mean contribution of each part over Sigma, weighted with p dA
 };
 
+/// What a spring does to A; B gets the opposite at the same point.
+struct SpringLoad {
+  Vec3 point, force, couple;
+  double power = 0.0;  ///< that it takes from the motion [W]
+};
+
+Vec3 velocity_of(const ContactBody& body, std::size_t part, const Vec3& x) {
+  Vec3 v = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[part];
+  if (!body.angular_velocity.empty()) v += body.angular_velocity[part].cross(x - body.pose[part].position);
+  return v;
+}
+
+/// @param push  integral of p N dA   @param x, area, pressure  of Sigma
+SpringLoad hold_by_spring(const StickSpring& spring, const ContactBody& a, const ContactBody& b, const ReactionSettings& settings,
+                          double friction, const Vec3& push, const Vec3& centre, std::span<const Vec3> x,
+                          std::span<const double> area, std::span<const double> pressure) {
+  const double most = friction * push.norm();
+  if (!(most > 0.0)) return {centre, Vec3::Zero(), Vec3::Zero()};
+  const Vec3 normal = push.normalized();
+  const StickTrial trial = stretch(spring, a, b, normal);
+  Vec3 slide = velocity_of(a, spring.part[0], trial.point) - velocity_of(b, spring.part[1], trial.point);
+  slide -= slide.dot(normal) * normal;
+  Vec3 force = -settings.stick.stiffness * (trial.displacement + settings.stick.damping * slide);
+  const double size = force.norm();
+  if (size > most) force *= most / size;
+
+  const auto spin_of = [](const ContactBody& body, std::size_t part) {
+    return body.angular_velocity.empty() ? Vec3::Zero().eval() : body.angular_velocity[part];
+  };
+  const double spin = (spin_of(a, spring.part[0]) - spin_of(b, spring.part[1])).dot(normal);
+  const double arm = spring.arm;
+  const double most_couple = most * arms_of(x, area, pressure, centre, normal).mean;
+  const double couple =
+      std::clamp(-settings.stick.stiffness * arm * (trial.twist + settings.stick.damping * arm * spin), -most_couple, most_couple);
+  return {trial.point, force, couple * normal, -force.dot(slide) - couple * spin};
+}
+
 }  // namespace
 
 double friction_mollifier(double speed, double regularisation) noexcept {
@@ -170,7 +206,7 @@ double friction_mollifier(double speed, double regularisation) noexcept {
 ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
                      const ReactionSettings& settings, std::span<PartLoads> loads,
                      std::vector<Vec3>* traction_force, std::span<PartLoads> dissipative_loads,
-                     std::vector<double>* pair_power) {
+                     std::vector<double>* pair_power, const StickState* sticks) {
   SUPPLE_EXPECTS(loads.size() == bodies.size());
   SUPPLE_EXPECTS(dissipative_loads.empty() || dissipative_loads.size() == bodies.size());
   SUPPLE_EXPECTS(settings.friction_speed > 0.0);
@@ -223,17 +259,18 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
 
     for (const int s : {0, 1}) sides[s].move_to(loads[body_of[s]]);
     const PairMaterial material = material_of(bodies, rules, pair);
-    Vec3 dissipative = Vec3::Zero(), dissipative_twist = Vec3::Zero();
+    Vec3 dissipative = Vec3::Zero(), dissipative_twist = Vec3::Zero(), spring_force = Vec3::Zero();
     const double power_before = report.dissipated_power;
+    const bool springs = settings.stick.stiffness > 0.0;
     if (material.friction > 0.0 || material.dissipation > 0.0) {
-      for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t i = 0; i < n && (!springs || material.dissipation > 0.0); ++i) {
         const Vec3 v = sides[0].velocity(i, x[i]) - sides[1].velocity(i, x[i]);
         const double approach = v.dot(normal[i]);
         const Vec3 slide = v - approach * normal[i];
         const double speed = slide.norm();
         const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
         Vec3 f = -load[i] * (factor - 1.0) * normal[i];
-        if (speed > 0.0) {
+        if (speed > 0.0 && !springs) {
           const double grip = friction_mollifier(speed, settings.friction_speed) / speed;
           f -= (material.friction * load[i] * factor * grip) * slide;
         }
@@ -243,6 +280,15 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
         dissipative += f;
         dissipative_twist += (x[i] - centre).cross(f);
       }
+      const StickSpring* spring = springs && sticks != nullptr && material.friction > 0.0 ? sticks->find(pair) : nullptr;
+      if (spring != nullptr) {
+        const SpringLoad hold = hold_by_spring(*spring, bodies[pair.a], bodies[pair.b], settings, material.friction, push, centre, x,
+                                               std::span(surface.area).subspan(points.begin, n),
+                                               std::span(surface.pressure).subspan(points.begin, n));
+        for (const int s : {0, 1}) sides[s].add_to_part(spring->part[s], hold.point, -sides[s].sign() * hold.force, -sides[s].sign() * hold.couple);
+        report.dissipated_power += hold.power;
+        spring_force = hold.force;
+      }
       for (const int s : {0, 1}) {
         const double sign = -sides[s].sign();
         if (sides[s].single()) sides[s].add_whole(sign * dissipative, sign * dissipative_twist, centre);
@@ -251,7 +297,7 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
       }
     }
     if (pair_power != nullptr) (*pair_power)[k] = report.dissipated_power - power_before;
-    if (traction_force != nullptr) (*traction_force)[k] = dissipative - push;
+    if (traction_force != nullptr) (*traction_force)[k] = dissipative + spring_force - push;
     report.energy += summary.energy;
   }
   return report;

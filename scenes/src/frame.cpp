@@ -361,8 +361,9 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
     }
   }
   frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, frame.loads,
-                                    &frame.traction_force, frame.dissipative, &frame.pair_power);
-  if (frame.reaction.dissipated_power != 0.0) out.dissipative.reset(model.particles.size());
+                                    &frame.traction_force, frame.dissipative, &frame.pair_power, context.sticks);
+  const bool dissipates = frame.reaction.dissipated_power != 0.0 || model.reaction.stick.stiffness > 0.0;
+  if (dissipates) out.dissipative.reset(model.particles.size());
   for (const std::uint32_t i : frame.pressed) {
     if (i >= context.bodies.size()) {
       out.force_on_fixed += frame.loads[i].force[0];
@@ -370,7 +371,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
       continue;
     }
     const std::vector<std::uint32_t>& particle = context.bodies[i].particle;
-    if (frame.reaction.dissipated_power != 0.0) {
+    if (dissipates) {
       core::add_part_loads(frame.dissipative[i].force, frame.dissipative[i].torque, particle, out.dissipative);
     }
     core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, particle, out.internal);

@@ -84,6 +84,7 @@ struct StageContext {
   bool every_call = false;
   const implicit::DelaunayMesher* delaunay = nullptr;
   const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all
+  const collision::StickState* sticks = nullptr;
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
 };
 

@@ -71,6 +71,19 @@ double contact_frequency(const ObjectModel& object, const core::ParticleSet& par
   return std::sqrt(largest);
 }
 
+/// The same of the springs of friction: half a dozen at a particle, at arms of its iso radius. Their damping counts as the
+/// frequency at which a step would overshoot as far.
+double stick_frequency(const ObjectModel& object, const core::ParticleSet& particles, const collision::StickRule& stick) {
+  constexpr double kSprings = 6.0;
+  double lightest = 0.0;  // inverse mass at the end of such an arm [1/kg]
+  for (std::uint32_t i = object.first; i < object.last; ++i) {
+    const double arm = object.iso_radius;
+    lightest = std::max(lightest, 1.0 / particles.mass[i] + arm * arm / particles.inertia[i].minCoeff());
+  }
+  const double square = kSprings * stick.stiffness * lightest;
+  return std::hypot(std::sqrt(square), square * stick.damping);
+}
+
 /// Heights at the points of a regular grid, in any order.
 implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults) {
   std::vector<Vec3> points = io::read_points_csv(scene.source.parent_path() / d.file);
@@ -269,6 +282,9 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy
                                                                   : collision::SplitRule::Contribution;
   model.reaction.friction_speed = scene.contact.friction_speed;
+  if (scene.contact.stick) {
+    model.reaction.stick = {.stiffness = scene.contact.stick->stiffness, .damping = scene.contact.stick->damping};
+  }
   model.bulge = {.attenuation = scene.contact.bulge, .width = scene.contact.bulge_width, .keep_volume = scene.contact.bulge_volume};
 
   std::vector<BodyPair> forbidden;
@@ -297,7 +313,9 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
       needs_samples = needs_samples || convex[j] == 0;
     }
     if (!touches) continue;
-    model.contact_frequency = std::max(model.contact_frequency, contact_frequency(object, model.particles));
+    model.contact_frequency = std::max(model.contact_frequency,
+                                       std::hypot(contact_frequency(object, model.particles),
+                                                  stick_frequency(object, model.particles, model.reaction.stick)));
     if (!needs_samples) continue;
     const double spacing = scene.contact.sample_spacing.value_or(2.0 * object.iso_radius / kSamplesAcross);
     object.samples = implicit::make_sample_layout(object.skeleton, spacing);

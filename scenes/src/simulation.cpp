@@ -106,7 +106,8 @@ struct Simulation::Impl {
             .skip = options.skip,
             .every_call = options.profile,
             .delaunay = &options.delaunay,
-            .awake = awake.size() < bodies.size() ? &awake : nullptr};
+            .awake = awake.size() < bodies.size() ? &awake : nullptr,
+            .sticks = &state.sticks};
   }
 
   /// Bodies, rules and frames for the present pieces.
@@ -180,6 +181,9 @@ struct Simulation::Impl {
     if (scene.sleep) state.sleep.reset(bodies.size());
     form_awake();
     if (bodies.size() == before.size()) return;
+    state.ledger.dissipated += collision::stick_energy(model.reaction.stick, state.sticks);  // bodies have other numbers now
+    state.sticks = {};
+    state.kick.valid = false;
     inherit_apart(before);
     std::vector<implicit::SampleState> samples;
     for (const Body& body : bodies) {
@@ -544,6 +548,7 @@ struct Simulation::Impl {
       if (last_frame.record.valid) take(last_frame);
       throw_diverged(divergence, step, at);
     }
+    commit_friction();
     wake_touched();
     watch_pressing();
     update_links();
@@ -553,6 +558,26 @@ struct Simulation::Impl {
       state.substep = 0;
       ++state.frame;
     }
+  }
+
+  /// After a step: springs of friction yield and follow their contacts. What the dissipative loads put into them is not lost.
+  void commit_friction() {
+    const collision::StickRule& rule = model.reaction.stick;
+    if (!(rule.stiffness > 0.0) || awake.empty() || !contact_on()) return;
+    if (integrator.settings.method != core::Integrator::Symplectic) {
+      // The last trial of other methods need not be the state they end with.
+      std::vector<implicit::SampleState> trial = state.samples;
+      find_contact_surface(context(), state.particles, trial, frame, false);
+    }
+    std::vector<std::uint8_t> resting;
+    if (awake.size() < bodies.size()) {
+      resting.assign(bodies.size(), 1);
+      for (const std::uint32_t i : awake) resting[i] = 0;
+      resting.resize(frame.bodies.size(), 1);
+    }
+    const double before = collision::stick_energy(rule, state.sticks);
+    collision::commit_sticks(frame.bodies, rules, frame.surface, rule, resting, state.sticks);
+    state.ledger.dissipated -= collision::stick_energy(rule, state.sticks) - before;
   }
 
   /// At the end of a step: pairs that press harder than they can hold are noted, and turned back by hard cores.
@@ -618,7 +643,8 @@ struct Simulation::Impl {
     if (contact_on()) {
       std::vector<implicit::SampleState> trial = state.samples;
       Profile unused{};
-      const StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
+      StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
+      quiet.sticks = &state.sticks;
       find_contact_surface(quiet, state.particles, trial, pulled, true);
       pulled_sample.internal.reset(model.particles.size());
       apply_reactions(quiet, pulled, pulled_sample);
@@ -651,6 +677,7 @@ struct Simulation::Impl {
     e.kinetic = core::measure_motion(model.particles, state.particles).kinetic_energy;
     e.interaction = core::potential_energy(model.particles, state.particles, laws);
     for (const auto& s : pulled.surface.summary) e.contact += s.energy;
+    e.contact += collision::stick_energy(model.reaction.stick, state.sticks);
     return e;
   }
 

@@ -9,7 +9,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 5;
+constexpr std::uint64_t kVersion = 6;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -106,6 +106,7 @@ std::uint64_t State::hash() const {
   }
   for (const auto& s : samples) s.hash(hasher);
   sleep.hash(hasher);
+  sticks.hash(hasher);
   return hasher.value();
 }
 
@@ -133,6 +134,7 @@ void save_state(const std::filesystem::path& path, const State& state, std::uint
   out.write(std::uint64_t{state.samples.size()});
   for (const auto& s : state.samples) s.save(out);
   state.sleep.save(out);
+  state.sticks.save(out);
   save_record(out, state.record);
   const std::uint64_t check = hash_bytes(out.bytes());
   out.write(check);
@@ -190,6 +192,7 @@ State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
     state.samples.push_back(std::move(samples));
   }
   state.sleep.load(in);
+  state.sticks.load(in);
   load_record(in, state.record);
   if (!in.at_end()) corrupt(path, "bytes after the end");
   return state;

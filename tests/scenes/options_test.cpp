@@ -368,6 +368,8 @@ void add_contact(std::vector<Option>& all) {
   on_ground("contact.rule=polar", rubs, ground + "contact: {error: 1e-2, rule: $}", "march", "polar");
   on_ground("contact.rule=march", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "march");
   on_ground("contact.friction_speed", rubs, ground + "contact: {friction_speed: $}", "0.001", "0.5");
+  on_ground("contact.stick.stiffness", rubs, ground + "contact: {stick: {stiffness: $}}", "10", "20");
+  on_ground("contact.stick.damping", rubs, ground + "contact: {stick: {stiffness: 10, damping: $}}", "0", "0.05");
   on_ground("ground.height", rubs, "ground: {height: $, modulus: 1e4}", "-0.1", "-0.08");
   on_ground("ground.collides", rubs, "ground: {height: -0.1, collides: $}", "true", "false");
   on_ground("ground.modulus", rubs, "ground: {height: -0.1, modulus: $}", "1e4", "2e4");

@@ -66,4 +66,7 @@ struct ContactRules {
   std::function<bool(std::uint32_t, std::uint32_t)> allowed;  ///< empty: every pair
 };
 
+/// The override of a pair, or what its materials combine to.
+[[nodiscard]] PairMaterial material_of(std::span<const ContactBody> bodies, const ContactRules& rules, const BodyPair& pair);
+
 }  // namespace supple::collision

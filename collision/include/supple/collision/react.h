@@ -5,10 +5,13 @@
 /// the parts as a rigid-consistent load by their mean contribution, weighted with p dA, so that momentum is exact.
 /// Dissipative part: t = -p [(1 + d v_n)_+ - 1] N - mu p_d f1(|v_t|) v_t/|v_t| on A, distributed by the contributions
 /// lambda_k = f_k / f that also interpolate the velocity, so that its power is never positive.
+/// With springs (stick.h) friction is the force -k_t (displacement + damping rate) of a pair's spring on its two parts, at
+/// most mu N with N = |integral of p N dA|, and a couple about the normal against their twist.
 #pragma once
 
 #include "supple/collision/bodies.h"
 #include "supple/collision/contact_surface.h"
+#include "supple/collision/stick.h"
 
 namespace supple::collision {
 
@@ -20,6 +23,7 @@ enum class SplitRule : std::uint8_t {
 struct ReactionSettings {
   SplitRule split = SplitRule::Energy;
   double friction_speed = 1e-3;  ///< regularisation speed of Coulomb friction [m/s], > 0
+  StickRule stick{};             ///< with a stiffness: friction by springs in place of `friction_speed`
 };
 
 /// f1(y) = 2 y/e - y^2/e^2 for y < e, 1 beyond.
@@ -27,16 +31,17 @@ struct ReactionSettings {
 
 struct ReactionReport {
   double energy = 0.0;              ///< contact energy [J]
-  double dissipated_power = 0.0;    ///< of damping and friction [W], >= 0
+  double dissipated_power = 0.0;    ///< of damping and friction [W], >= 0; with springs also what goes into them
 };
 
 /// Adds to loads[i] (sized to the parts of body i) what contact does to body i. Forces and moments of a pair sum to zero.
 /// @param dissipative  if not empty: receives the dissipative part of the same loads, by body, sized like `loads`
+/// @param sticks  the springs that `ReactionSettings::stick` speaks of; pairs without one have no friction yet
 /// @param traction_force  if not null: total force on A of each pair, dissipative part included, shape [pairs]
 /// @param pair_power  if not null: what damping and friction take of each pair [W], shape [pairs]
 ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
                      const ReactionSettings& settings, std::span<PartLoads> loads,
                      std::vector<Vec3>* traction_force = nullptr, std::span<PartLoads> dissipative = {},
-                     std::vector<double>* pair_power = nullptr);
+                     std::vector<double>* pair_power = nullptr, const StickState* sticks = nullptr);
 
 }  // namespace supple::collision

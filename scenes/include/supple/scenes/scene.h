@@ -280,6 +280,12 @@ enum class SplitName : std::uint8_t { Energy, Contribution };
 enum class RuleName : std::uint8_t { Auto, Samples, Polar, March };
 enum class CoreName : std::uint8_t { Soft, Barrier };
 
+/// contact.stick: friction that holds
+struct StickDesc {
+  double stiffness = 0.0;             ///< of a pair's spring [N/m]
+  double damping = 0.0;               ///< [s]
+};
+
 /// contact: of the scene
 struct ContactDesc {
   double error = 1e-4;
@@ -287,6 +293,7 @@ struct ContactDesc {
   SplitName split = SplitName::Energy;
   CoreName core = CoreName::Soft;
   double friction_speed = 1e-3;       ///< [m/s]
+  std::optional<StickDesc> stick;     ///< absent: friction is viscous below `friction_speed`
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
   bool bulge_volume = false;          ///< bulges that hold what the contact displaces
   double bulge_width = 0.15;          ///< share of the other body's feature size

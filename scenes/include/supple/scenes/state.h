@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "supple/collision/sleep.h"
+#include "supple/collision/stick.h"
 #include "supple/core/integrate.h"
 #include "supple/core/links.h"
 #include "supple/core/particles.h"
@@ -60,6 +61,7 @@ struct State {
   ApartPairs apart;                    ///< pieces of one object that touch each other by now
   std::vector<implicit::SampleState> samples;  ///< by body
   collision::SleepState sleep;         ///< which bodies rest; empty where the scene has no `sleep`
+  collision::StickState sticks;        ///< springs of friction; empty where the scene has no `contact.stick`
   RunRecord record;
 
   [[nodiscard]] std::uint64_t hash() const;    ///< of everything but the record
