@@ -159,8 +159,8 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
     }
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
-    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) continue;
-    if (batch_.a[i] <= 1e-3 * peak) continue;
+    if (std::min(batch_.a[i], batch_.b[i]) <= 1e-3 * peak) continue;
+    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return false;  // it found no place on Sigma
     bool inside = false;
     for (std::size_t c = 0; c < cover_count_ && !inside; ++c) inside = covers_[c].contains(batch_.point[i], kSlack);
     if (!inside) return false;
@@ -295,7 +295,13 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
     finder_.start_from_seeds(pressure, seeds, spacing, starts_);
   }
   const bool any = settings.only == ContactRule::None;
-  bool fits = (any || settings.only == ContactRule::Polar) && polar(pressure, settings, extent, out);
+  const bool polar_first = any || settings.only == ContactRule::Polar;
+  bool fits = polar_first && polar(pressure, settings, extent, out);
+  if (convex && polar_first && fits && cover_count_ == 0) {
+    // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
+    finder_.start_from_scan(pressure, overlap, starts_);
+    fits = polar(pressure, settings, extent, out);
+  }
   RuleReason reason = any ? RuleReason::Fits : RuleReason::Asked;
   if (any && !fits) reason = RuleReason::NoGraph;
   if (fits && cover_count_ > 0) {

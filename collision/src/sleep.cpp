@@ -8,8 +8,11 @@
 
 namespace supple::collision {
 
+constexpr double kGivesWay = 0.5;  // share of a load that nothing carries
+
 void SleepState::reset(std::size_t bodies) {
   quiet_for.assign(bodies, 0.0);
+  quiet_from.assign(bodies, Vec3::Zero());
   island.assign(bodies, kAwake);
 }
 
@@ -19,30 +22,44 @@ bool SleepState::any_asleep() const {
 
 void SleepState::save(StateWriter& out) const {
   out.write(std::span<const double>(quiet_for));
+  out.write(std::span<const Vec3>(quiet_from));
   out.write(std::span<const std::uint32_t>(island));
 }
 
 void SleepState::load(StateReader& in) {
   in.read(quiet_for);
+  in.read(quiet_from);
   in.read(island);
 }
 
 void SleepState::hash(Hasher& hasher) const {
   if (island.empty()) return;
   hasher.add(std::span<const double>(quiet_for));
+  hasher.add(std::span<const Vec3>(quiet_from));
   for (const std::uint32_t i : island) hasher.add(std::uint64_t{i});
 }
 
-std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::span<const double> specific_energy,
+std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::span<const BodyMotion> motion,
                                        std::span<const BodyPair> joined, SleepState& state) {
   const auto count = static_cast<std::uint32_t>(state.island.size());
-  SUPPLE_EXPECTS(specific_energy.size() == count && rule.speed > 0.0 && rule.time > 0.0);
+  SUPPLE_EXPECTS(motion.size() == count && rule.speed > 0.0 && rule.time > 0.0);
   bool any = false;
   for (std::uint32_t i = 0; i < count; ++i) {
     if (state.asleep(i)) continue;
-    const bool quiet = specific_energy[i] < 0.5 * rule.speed * rule.speed;
-    state.quiet_for[i] = quiet ? std::min(state.quiet_for[i] + dt, rule.time) : 0.0;
-    any = any || state.quiet_for[i] >= rule.time;
+    const BodyMotion& now = motion[i];
+    if (!(now.energy < 0.5 * rule.speed * rule.speed)) {
+      state.quiet_for[i] = 0.0;
+      continue;
+    }
+    if (state.quiet_for[i] == 0.0) state.quiet_from[i] = now.velocity;
+    state.quiet_for[i] = std::min(state.quiet_for[i] + dt, rule.time);
+    if (state.quiet_for[i] < rule.time) continue;
+    const double watched = std::max(rule.time - dt, 0.0);
+    if ((now.velocity - state.quiet_from[i]).dot(now.load) > kGivesWay * now.load.squaredNorm() * watched) {
+      state.quiet_for[i] = 0.0;
+    } else {
+      any = true;
+    }
   }
   if (!any) return {};
 

@@ -257,6 +257,8 @@ void finish(const ParticleSet& set, const ParticleState& start, double dt, const
   }
   ledger.external_impulse -= dt * sample.force_on_fixed;
   ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
+  ledger.external_work += dt * sample.power_of_fixed;
+  ledger.dissipated += dt * sample.dissipated_at_fixed;
 }
 
 void book_external_work(const ParticleSet& set, const ParticleState& start, const ParticleState& state,

@@ -91,6 +91,8 @@ void kick(const ParticleSet& set, const ForceSample& sample, double dt, Particle
   }
   ledger.external_impulse -= dt * sample.force_on_fixed;
   ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
+  ledger.external_work += dt * sample.power_of_fixed;
+  ledger.dissipated += dt * sample.dissipated_at_fixed;
 }
 
 void turn_free(RotationUpdate rotation, Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia,
@@ -184,13 +186,18 @@ void stop_pinned(const ParticleSet& set, ParticleState& state) {
   }
 }
 
+void ForceSample::reset(std::size_t n) {
+  internal.reset(n);
+  external.reset(n);
+  force_on_fixed.setZero();
+  moment_on_fixed.setZero();
+  power_of_fixed = dissipated_at_fixed = 0.0;
+  dissipative.reset(0);
+}
+
 void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample) {
   const std::size_t n = state.size();
-  sample.internal.reset(n);
-  sample.external.reset(n);
-  sample.force_on_fixed.setZero();
-  sample.moment_on_fixed.setZero();
-  sample.dissipative.reset(0);
+  sample.reset(n);
   forces(state, time, sample);
   SUPPLE_EXPECTS(sample.internal.force.size() == n && sample.external.force.size() == n);
 }
@@ -226,6 +233,8 @@ void KickState::save(StateWriter& out) const {
   save_loads(sample.external, out);
   save_vector(sample.force_on_fixed, out);
   save_vector(sample.moment_on_fixed, out);
+  out.write(sample.power_of_fixed);
+  out.write(sample.dissipated_at_fixed);
   save_loads(sample.dissipative, out);
 }
 
@@ -238,6 +247,8 @@ void KickState::load(StateReader& in) {
   load_loads(sample.external, in);
   load_vector(sample.force_on_fixed, in);
   load_vector(sample.moment_on_fixed, in);
+  in.read(sample.power_of_fixed);
+  in.read(sample.dissipated_at_fixed);
   load_loads(sample.dissipative, in);
 }
 
@@ -251,6 +262,8 @@ void KickState::hash(Hasher& hasher) const {
   }
   hash_vector(sample.force_on_fixed, hasher);
   hash_vector(sample.moment_on_fixed, hasher);
+  hasher.add(sample.power_of_fixed);
+  hasher.add(sample.dissipated_at_fixed);
 }
 
 void advance(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time, double dt,
@@ -260,16 +273,27 @@ void advance(const ParticleSet& set, const Interactions& interactions, const For
   stop_pinned(set, state);
   if (!kick_state.valid) evaluate(forces, state, time, sample);
 
+  // Each kick takes what the loads from outside are in its half of the step, however short they are.
+  const auto changes = [&](double from, double to) {
+    return std::any_of(interactions.external.begin(), interactions.external.end(),
+                       [&](const ExternalLoad& load) { return load.changes(from, to); });
+  };
+  const double middle = time + 0.5 * dt, end = time + dt;
+  if (changes(time, middle)) external_loads(set, interactions, time, middle, sample.external);
+
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Forward, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
   kick(set, sample, 0.5 * dt, state, ledger);
   drift(set, rotation, dt, state);
   ledger.external_work += half_work(set, rotation, sample.external, state, dt);
-  evaluate(forces, state, time + dt, sample);
+  evaluate(forces, state, end, sample);
   kick_state.valid = true;
+  const bool changing = changes(middle, end);
+  if (changing) external_loads(set, interactions, middle, end, sample.external);
   ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   kick(set, sample, 0.5 * dt, state, ledger);
+  if (changing) external_loads(set, interactions, end, end, sample.external);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);

@@ -403,6 +403,47 @@ double ExternalLoad::factor(double time) const {
   return std::min(1.0, std::min((time - begin) / ramp, (end - time) / ramp));
 }
 
+bool ExternalLoad::changes(double from, double to) const {
+  const double steady = end - begin > 2.0 * ramp ? ramp : 0.5 * (end - begin);
+  return (from <= begin + steady && to >= begin) || (from <= end && to >= end - steady);
+}
+
+double ExternalLoad::mean(double from, double to) const {
+  SUPPLE_EXPECTS(from < to);
+  if (!changes(from, to)) return factor(from);
+  const double rise = ramp > 0.0 ? std::min(ramp, 0.5 * (end - begin)) : 0.0;
+  const double height = ramp > 0.0 ? rise / ramp : 1.0;
+  const auto impulse = [&](double t) {  // integral of the factor up to t
+    if (t <= begin) return 0.0;
+    const double risen = std::min(t - begin, rise);
+    double sum = rise > 0.0 ? 0.5 * height * risen * (risen / rise) : 0.0;
+    if (t > begin + rise) sum += height * (std::min(t, end - rise) - begin - rise);
+    if (t > end - rise && rise > 0.0) {
+      const double left = std::max(end - t, 0.0);
+      sum += 0.5 * height * (rise - left * (left / rise));
+    }
+    return sum;
+  };
+  return (impulse(to) - impulse(from)) / (to - from);
+}
+
+namespace {
+
+void add_external(const ParticleSet& set, const Interactions& interactions, double from, double to, Loads& external) {
+  if (interactions.gravity != Vec3::Zero()) {
+    for (std::size_t i = 0; i < set.size(); ++i) external.force[i] += set.mass[i] * interactions.gravity;
+  }
+  for (const ExternalLoad& load : interactions.external) {
+    SUPPLE_EXPECTS(load.particle < set.size());
+    const double factor = from < to ? load.mean(from, to) : load.factor(from);
+    if (factor == 0.0) continue;
+    external.force[load.particle] += factor * load.force;
+    external.torque[load.particle] += factor * load.torque;
+  }
+}
+
+}  // namespace
+
 InteractionWorkspace::InteractionWorkspace(const ParticleSet& set, const Interactions& interactions)
     : impl_(std::make_unique<Impl>()) {
   const std::size_t n = set.size();
@@ -464,17 +505,18 @@ InteractionCounts accumulate_interactions(const ParticleSet& set, const Particle
   }
   unstage_loads(executor, work, internal);
 
-  if (interactions.gravity != Vec3::Zero()) {
-    for (std::size_t i = 0; i < n; ++i) external.force[i] += set.mass[i] * interactions.gravity;
-  }
-  for (const ExternalLoad& load : interactions.external) {
-    SUPPLE_EXPECTS(load.particle < n);
-    const double factor = load.factor(time);
-    if (factor == 0.0) continue;
-    external.force[load.particle] += factor * load.force;
-    external.torque[load.particle] += factor * load.torque;
+  const auto [from, to] = interactions.load_span;
+  if (from < to) {
+    add_external(set, interactions, from, to, external);
+  } else {
+    add_external(set, interactions, time, time, external);
   }
   return counts;
+}
+
+void external_loads(const ParticleSet& set, const Interactions& interactions, double from, double to, Loads& external) {
+  external.reset(set.size());
+  add_external(set, interactions, from, to, external);
 }
 
 }  // namespace supple::core

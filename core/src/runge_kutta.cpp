@@ -113,6 +113,8 @@ void evaluate_rates(const ParticleSet& set, const Interactions& interactions, co
   }
   books.external_impulse -= sample.force_on_fixed;
   books.external_angular_impulse -= sample.moment_on_fixed;
+  books.external_work += sample.power_of_fixed;
+  books.dissipated += sample.dissipated_at_fixed;
 }
 
 /// state + dt sum_s weight[s] stage[s], orientations brought back to unit length.

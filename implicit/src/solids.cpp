@@ -265,4 +265,53 @@ Mesh HeightField::mesh(int finer) const {
   return mesh;
 }
 
+MovedField::MovedField(const FieldView& field, const Pose& pose)
+    : field_(field), position_(pose.position), rotation_(pose.orientation.toRotationMatrix()) {}
+
+std::vector<Vec3> MovedField::local(std::span<const Vec3> points) const {
+  std::vector<Vec3> moved;
+  moved.reserve(points.size());
+  for (const Vec3& x : points) moved.emplace_back(rotation_.transpose() * (x - position_));
+  return moved;
+}
+
+Box MovedField::local(const Box& box) const {
+  const Vec3 centre = rotation_.transpose() * (box.centre() - position_);
+  const Vec3 half = 0.5 * rotation_.cwiseAbs().transpose() * box.extent();
+  return {centre - half, centre + half};
+}
+
+void MovedField::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+  field_.evaluate(local(points), values);
+}
+
+void MovedField::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+  field_.evaluate(local(points), values, gradients);
+  for (Vec3& g : gradients) g = rotation_ * g;
+}
+
+void MovedField::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
+  field_.evaluate_parts(local(points), parts);
+  for (Vec3& g : parts.gradient) g = rotation_ * g;
+}
+
+Box MovedField::surface_box() const {
+  const Box box = field_.surface_box();
+  if (box.empty()) return box;
+  if (rotation_ == Mat3::Identity()) return {box.lower + position_, box.upper + position_};
+  if (!box.lower.allFinite() || !box.upper.allFinite()) {
+    const Vec3 infinite = Vec3::Constant(std::numeric_limits<double>::infinity());
+    return {-infinite, infinite};
+  }
+  const Vec3 centre = rotation_ * box.centre() + position_;
+  const Vec3 half = 0.5 * rotation_.cwiseAbs() * box.extent();
+  return {centre - half, centre + half};
+}
+
+std::optional<CorePoint> MovedField::core_point(const Vec3& place) const {
+  std::optional<CorePoint> core = field_.core_point(rotation_.transpose() * (place - position_));
+  if (core) core->point = rotation_ * core->point + position_;
+  return core;
+}
+
 }  // namespace supple::implicit

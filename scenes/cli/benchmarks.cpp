@@ -46,7 +46,7 @@ std::string list_benchmarks() {
   std::string text;
   for (const Group& group : kGroups) {
     std::string line(group.name);
-    line.resize(20, ' ');
+    line.resize(26, ' ');
     line += fs::exists(program_path(group)) ? "built      " : "not built  ";
     text += line.append(group.measures) + '\n';
   }

@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <new>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,13 +35,17 @@ constexpr int kInternal = 1;
 
 std::atomic<int> interrupted{0};
 
-void on_signal(int number) { interrupted = number; }
+/// The first one is seen between two steps, a second one ends the program.
+void on_signal(int number) {
+  interrupted = number;
+  std::signal(number, SIG_DFL);
+}
 
 struct Arguments {
   std::string scene;
   std::vector<std::string> set;
   std::string out;
-  std::string frames;
+  std::optional<std::string> frames;
   std::string progress = "auto";
   std::string context = "auto";
   std::string points;
@@ -112,7 +118,7 @@ scenes::SimulationOptions simulation_options(int threads) {
 scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folder, tool::ProgressBar& bar) {
   scenes::RunOptions options;
   options.folder = folder;
-  if (!arguments.frames.empty()) options.frames = scenes::parse_frames(arguments.frames);
+  if (arguments.frames) options.frames = scenes::parse_frames(*arguments.frames);
   options.threads = arguments.threads;
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
@@ -124,6 +130,8 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.delaunay = simulation_options(0).delaunay;
   options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
   options.interrupt = &interrupted;
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
   return options;
 }
 
@@ -197,6 +205,7 @@ int compare(const Arguments& arguments) {
 int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   const scenes::Simulation simulation(scene, simulation_options(1));
+  for (const std::string& warning : simulation.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
     std::printf("%s: no fault found (%zu objects, %zu particles, %d frames)\n", arguments.scene.c_str(),
                 scene.objects.size(), simulation.model().particles.size(), scene.frame_count());
@@ -373,14 +382,15 @@ int parse_and_call(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
   try {
     return parse_and_call(argc, argv);
   } catch (const supple::Error& error) {
     std::cout.flush();
     std::fprintf(stderr, "%s\n", error.what());
     return static_cast<int>(error.kind());
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "%s\n", supple::scenes::kOutOfMemory);
+    return static_cast<int>(supple::ErrorKind::Limit);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "internal fault: %s\n", error.what());
     return kInternal;

@@ -12,26 +12,30 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "camera.h"
 #include "fields_looks.h"
 #include "fields_rules.h"
 #include "read_scene_faults.h"
 #include "supple/core/gay_berne.h"
 #include "supple/core/lennard_jones.h"
+#include "supple/core/math.h"
 #include "supple/implicit/kernel.h"
 
 namespace supple::scenes {
 
 inline constexpr double kMostCount = 1e6;
+inline constexpr double kMostSubsteps = 1048576.0;
 
 template <class Archive>
 void fields(Archive& archive, TimeStepDesc& d) {
   archive("size", d.size, above(0.0, kTime).or_auto(), "largest step; a step is always frame / 2^k");
-  archive("substeps", d.substeps, between(1.0, 1048576.0, kNumber).or_auto(), "steps a frame, a power of two");
-  archive("max_substeps", d.max_substeps, between(1.0, 1048576.0, kNumber), "automatic steps finer than this are refused");
+  archive("substeps", d.substeps, between(1.0, kMostSubsteps, kNumber).or_auto(), "steps a frame, a power of two");
+  archive("max_substeps", d.max_substeps, between(1.0, kMostSubsteps, kNumber), "automatic steps finer than this are refused");
   if (d.substeps) {
     const int n = *d.substeps;
     archive.check((n & (n - 1)) == 0, "substeps", "expected a power of two", std::to_string(n), "");
@@ -78,7 +82,7 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive("spin", d.spin, any(kSpin), "at the start, of the whole about its centre of mass");
   archive("mass", d.mass, above(0.0, kMass), "of one particle");
   archive("inertia_radius", d.inertia_radius, above(0.0, kLength).or_auto(),
-          "a in the inertia 2/5 m a^2; auto: half the distance of the nearest neighbour, or the iso radius when alone");
+          "a in the inertia 2/5 m a^2; auto: half the distance of the nearest neighbour; of single and `separate` particles, the moments of the solid that each carries");
   archive("inertia_axes", d.inertia_axes, at_least(0.0, kLength),
           "instead: semi-axes of a solid ellipsoid in each particle's frame; zero: not given");
   if (archive.given("inertia_axes")) {
@@ -98,8 +102,8 @@ void fields(Archive& archive, ParticlesDesc& d) {
                   '\'' + shown(d.file) + '\'', "");
   }
   if (d.arrange == Grid) {
-    archive.check(double(d.columns) * d.rows <= kMostCount, "rows", "expected at most 1000000 particles",
-                  number_text(double(d.columns) * d.rows), "");
+    const double all = double(d.columns) * d.rows * d.layers;
+    archive.check(all <= kMostCount, d.layers > 1 ? "layers" : "rows", "expected at most 1000000 particles", number_text(all), "");
   }
 }
 
@@ -284,6 +288,7 @@ void check_points(Archive& archive, const SkeletonDesc& d) {
   archive.check(spans, "points", "expected corners that span an area", number_text(area.norm()) + " m^2", "");
   if (!spans || d.shape == Triangle) return;
   const Vec3 normal = area.normalized();
+  double turned = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3& here = p[i];
     const Vec3 ahead = p[(i + 1) % n] - here, next = p[(i + 2) % n] - p[(i + 1) % n];
@@ -292,7 +297,9 @@ void check_points(Archive& archive, const SkeletonDesc& d) {
     archive.check(off <= 1e-9 * largest, key, "expected a corner in the plane of the others", short_text(off) + " m off it", "");
     archive.check(normal.dot(ahead.cross(next)) >= -1e-12 * largest * largest && ahead.norm() > 0.0, key,
                   "expected corners of a convex polygon, in order", "a turn to the other side", "");
+    turned += math::atan2(normal.dot(ahead.cross(next)), ahead.dot(next));
   }
+  archive.check(turned < 3.0 * std::numbers::pi, "points", "expected corners of a convex polygon, in order", "edges that cross", "");
 }
 
 template <class Archive>
@@ -304,7 +311,7 @@ void fields(Archive& archive, SkeletonDesc& d) {
   archive.required("shape", d.shape, {}, "what is thickened by the kernel; flat shapes lie in their x-y plane");
   archive.required("half_size", d.half_size, only(above(0.0, kLength), {Square}), "half an edge");
   archive.required("half_length", d.half_length, only(above(0.0, kLength), {Segment}), "along x");
-  archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength).items(d.shape == Rectangle ? 2 : 3, 3), {Rectangle, Box}),
+  archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength).items(d.shape == Box ? 3 : 2, d.shape == Rectangle ? 2 : 3), {Rectangle, Box}),
                    "along x, y (and z for a box)");
   archive.required("radius", d.radius, only(above(0.0, kLength), {Disc, Ring, Arc}), "of the disc or circle");
   archive.required("half_angle_deg", d.half_angle, only(degrees(0.1, 180.0), {Arc}), "the arc goes as far to either side of the x axis");
@@ -447,7 +454,9 @@ void fields(Archive& archive, LoadDesc& d) {
     case ArrangeKind::Line:
     case ArrangeKind::Ring:
     case ArrangeKind::Spiral: return d.count;
-    case ArrangeKind::Grid: return d.columns * d.rows * d.layers;
+    case ArrangeKind::Grid:
+      if (double(d.columns) * d.rows * d.layers > kMostCount) break;
+      return d.columns * d.rows * d.layers;
     case ArrangeKind::Geodesic: return 10 * d.frequency * d.frequency + 2;
     case ArrangeKind::File: break;
   }
@@ -648,6 +657,13 @@ void fields(Archive& archive, OutputDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, ObstacleKeyDesc& d) {
+  archive.required("time", d.time, at_least(0.0, kTime), "when it is there");
+  archive("at", d.at, any(kLength), "as of the obstacle");
+  archive("turn_deg", d.turn, degrees(-36000.0, 36000.0), "of boxes and meshes, about turn_axis");
+}
+
+template <class Archive>
 void fields(Archive& archive, ObstacleDesc& d) {
   using enum ObstacleName;
   const auto only = [&d](const Rule& rule, std::initializer_list<ObstacleName> shapes) { return rule.only("shape", d.shape, shapes); };
@@ -660,6 +676,8 @@ void fields(Archive& archive, ObstacleDesc& d) {
   archive("rounding", d.rounding, only(at_least(0.0, kLength), {Box}), "radius of its edges in contact");
   archive("turn_axis", d.turn_axis, only(direction(), {Box, ObstacleName::Mesh}), "with turn_deg");
   archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh}), "rotation");
+  archive("keys", d.keys, {}, "places at times; before the first and after the last it stands still; absent: always");
+  archive("between", d.between, {}, "how keys are joined; smooth: at rest wherever it turns back, so that it never goes beyond a key");
   archive.required("file", d.file, only({}, {Heights, ObstacleName::Mesh}), "CSV of x, y, z [m] on a regular grid; a mesh as OBJ or PLY [m]; relative to the scene's folder");
   archive("voxel", d.voxel, only(above(0.0, kLength).or_auto(), {ObstacleName::Mesh}), "cell of the lattice that keeps its distances, about which edges are rounded; auto: a 64th of its longest side");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
@@ -669,6 +687,15 @@ void fields(Archive& archive, ObstacleDesc& d) {
   archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is modulus times slope times depth");
   archive("slope", d.slope, above(0.0, kSlope), "of its field");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
+  for (std::size_t k = 0; k < d.keys.size(); ++k) {
+    const std::string key = "keys[" + std::to_string(k) + ']';
+    archive.check(k == 0 || d.keys[k - 1].time < d.keys[k].time, key + ".time", "expected a later time than the key before",
+                  number_text(d.keys[k].time), "");
+    archive.check(d.keys[k].turn == 0.0 || d.shape == Box || d.shape == ObstacleName::Mesh, key + ".turn_deg",
+                  "expected a box or a mesh that turns", std::string(name_of(d.shape)), "");
+  }
+  archive.check(d.keys.empty() || !(archive.given("at") || archive.given("turn_deg")), "keys", "expected either keys or at and turn_deg",
+                "both", "");
   archive.check(d.shape != Box || d.rounding <= d.half_sizes.minCoeff(), "rounding", "expected at most the least half size",
                 number_text(d.rounding), "");
 }
@@ -713,6 +740,20 @@ void check_cameras(Archive& archive, const Scene& d) {
   archive.check(d.cameras.empty() || !archive.given("camera"), "cameras", "expected either camera or cameras", "both", "");
   archive.check(d.camera.name.empty(), "camera.name", "expected no name for the only camera", '\'' + shown(d.camera.name) + '\'',
                 "use 'cameras' for several");
+  for (std::size_t i = 0; i < std::max<std::size_t>(d.cameras.size(), 1); ++i) {
+    const CameraDesc& camera = d.cameras.empty() ? d.camera : d.cameras[i];
+    const std::string key = (d.cameras.empty() ? "camera" : "cameras[" + std::to_string(i) + ']') + ".keys";
+    for (int frame = 1; !camera.keys.empty() && frame <= d.frame_count(); ++frame) {
+      const render::Camera at = camera_at(camera, (frame - 1) / d.frame_rate, d.duration);
+      const Vec3 sight = at.look_at - at.from;
+      const std::string when = " in frame " + std::to_string(frame);
+      const bool apart = sight.norm() > 0.0;
+      archive.check(apart, key, "expected 'from' apart from 'look_at' at all times", "one point" + when, "add a key beside it");
+      const bool across = sight.cross(at.up).norm() > 1e-6 * sight.norm() * at.up.norm();
+      archive.check(!apart || across, key, "expected a line of sight across 'up' at all times", "one along it" + when, "choose another 'up'");
+      if (!apart || !across) break;
+    }
+  }
   for (std::size_t i = 0; i < d.cameras.size(); ++i) {
     const std::string key = "cameras[" + std::to_string(i) + "].name";
     archive.check(!d.cameras[i].name.empty(), key, "expected a name", "nothing", "this key is required");
@@ -733,7 +774,7 @@ void fields(Archive& archive, Scene& d) {
   archive("time_step", d.time_step, {}, "how finely time is cut");
   archive("integrator", d.integrator, {}, "how a step is made");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
-  archive("obstacles", d.obstacles, {}, "solids that stand still");
+  archive("obstacles", d.obstacles, {}, "solids that stand still or are led along");
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
   archive("contact", d.contact, {}, "how contact is computed");
   archive("sleep", d.sleep, {}, "bodies that rest are not moved until something touches them or a load on them changes; absent: never");
@@ -747,6 +788,9 @@ void fields(Archive& archive, Scene& d) {
   archive("output", d.output, {}, "what is written");
   archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",
                 number_text(std::floor(d.duration * d.frame_rate)), "");
+  archive.check(!d.time_step.size || *d.time_step.size * d.frame_rate * kMostSubsteps >= 1.0, "time_step.size",
+                "expected at least " + short_text(1.0 / (d.frame_rate * kMostSubsteps)) + " s, a frame's time over 2^20",
+                d.time_step.size ? number_text(*d.time_step.size) : "", "");
   for (std::size_t i = 0; i < d.objects.size(); ++i) {
     const Vec3& axes = d.objects[i].particles.inertia_axes;
     archive.check(!d.planar || (axes.x() == axes.y() && axes.y() == axes.z()),
@@ -759,7 +803,7 @@ void fields(Archive& archive, Scene& d) {
                 "expected an explicit method beside a law with paper_literal, which has no energy",
                 std::string(name_of(d.integrator.method)), "use 'symplectic' or 'rk4'");
   check_names(archive, d);
-  check_cameras(archive, d);
+  if (d.duration * d.frame_rate <= 1e6) check_cameras(archive, d);
 }
 
 }  // namespace supple::scenes

@@ -48,6 +48,9 @@ template <> struct EnumNames<ShapeName> {
 template <> struct EnumNames<ObstacleName> {
   static constexpr std::array<std::string_view, 4> names{"plane", "box", "heights", "mesh"};
 };
+template <> struct EnumNames<LeadName> {
+  static constexpr std::array<std::string_view, 2> names{"smooth", "linear"};
+};
 template <> struct EnumNames<KernelName> {
   static constexpr std::array<std::string_view, 8> names{"wyvill",    "gascuel", "soft_object", "murakami",
                                                          "nishimura", "blinn",   "cauchy",      "blanc_schlick"};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <type_traits>
 
 #include "look_columns.h"
 #include "supple/collision/deformed_field.h"
@@ -100,20 +101,49 @@ void view_body(const StageContext& context, const core::ParticleState& particles
   }
 }
 
-/// The bodies that do not move, after the others.
-void view_fixed_bodies(const Model& model, std::size_t first, Frame& frame) {
-  static const Pose kStill{};
-  static const Vec3 kZero = Vec3::Zero();
+/// A solid that is led along, at its place; its field.
+implicit::FieldView lead(const FixedBody& body, double time, LedSolid& led) {
+  const SolidPlace place = place_at(body.motion, time);
+  led.pose = place.pose;
+  led.velocity = place.velocity;
+  led.spin = place.spin;
+  led.moves = place.moves;
+  if (const auto* plane = std::get_if<implicit::HalfSpace>(&body.solid)) {
+    led.solid = implicit::HalfSpace{place.pose.position, plane->normal, plane->slope};
+  } else if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) {
+    led.solid = box->placed(place.pose);
+  } else {
+    led.solid = implicit::MovedField(body.field(), place.pose);
+  }
+  return std::visit(
+      [](const auto& s) -> implicit::FieldView {
+        if constexpr (std::is_same_v<std::decay_t<decltype(s)>, std::monostate>) {
+          return {};
+        } else {
+          return s;
+        }
+      },
+      led.solid);
+}
+
+/// Fixed bodies, after the others: all of them when `first_time`, then those that are led along.
+void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& frame) {
+  const std::size_t first = frame.reach.size() - model.fixed.size();
   for (std::size_t k = 0; k < model.fixed.size(); ++k) {
+    const FixedBody& fixed = model.fixed[k];
+    if (!first_time && !fixed.led()) continue;
+    LedSolid& led = frame.led[k];
     collision::ContactBody& body = frame.bodies[first + k];
-    body.field = model.fixed[k].field();
-    body.material = model.fixed[k].material;
-    body.pose = {&kStill, 1};
-    body.velocity = {&kZero, 1};
-    body.angular_velocity = {&kZero, 1};
+    body.field = fixed.led() ? lead(fixed, time, led) : fixed.field();
+    body.material = fixed.material;
+    body.pose = {&led.pose, 1};
+    body.velocity = {&led.velocity, 1};
+    body.angular_velocity = {&led.spin, 1};
     body.fixed = true;
     const Box box = body.field.surface_box();
     if (box.lower.allFinite() && box.upper.allFinite()) body.core_value = body.field.value(box.centre());
+    frame.reach[first + k] = box;
+    frame.convex[first + k] = body.field.core_point(Vec3::Zero()) ? 1 : 0;
   }
 }
 
@@ -222,6 +252,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
       near(all.size(), 0),
       active(all.size()),
       samples(all.size()),
+      led(model.fixed.size()),
       bodies(reach.size()),
       loads(reach.size()),
       dissipative(reach.size()) {
@@ -232,26 +263,20 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
     ++bodies_present;
     samples_present += all[i].samples.size();
   }
-  view_fixed_bodies(model, all.size(), *this);
-  for (std::size_t k = 0; k < model.fixed.size(); ++k) {
-    const implicit::FieldView solid = model.fixed[k].field();
-    reach[all.size() + k] = solid.surface_box();
-    convex[all.size() + k] = solid.core_point(Vec3::Zero()) ? 1 : 0;
-  }
+  view_fixed_bodies(model, 0.0, true, *this);
 }
 
-StageTimer::StageTimer(StageProfile& profile, bool every_call) : profile_(profile) {
-  if (every_call) {
-    weight_ = 1.0;
-  } else if (profile.calls % kTimedEvery == 0) {
-    weight_ = static_cast<double>(kTimedEvery);
-  }
+StageTimer::StageTimer(StageProfile& profile, bool every_call)
+    : profile_(profile), timed_(every_call || profile.calls == 0 || profile.calls % kTimedEvery == 1) {
   ++profile.calls;
-  if (weight_ > 0.0) begin_ = process_cpu_seconds();
+  if (timed_) begin_ = process_cpu_seconds();
 }
 
 StageTimer::~StageTimer() {
-  if (weight_ > 0.0) profile_.cpu_s += weight_ * (process_cpu_seconds() - begin_);
+  StageProfile& p = profile_;
+  if (timed_) (p.timed++ == 0 ? p.first_s : p.later_s) += process_cpu_seconds() - begin_;
+  p.cpu_s = p.first_s;
+  if (p.timed > 1) p.cpu_s += p.later_s * static_cast<double>(p.calls - 1) / static_cast<double>(p.timed - 1);
 }
 
 void place_and_index(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame) {
@@ -265,6 +290,17 @@ void place_and_index_all(const StageContext& context, const core::ParticleState&
   }
 }
 
+std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+  std::vector<std::uint32_t> stirred;
+  view_fixed_bodies(context.model, context.time, false, frame);
+  for (std::size_t k = 0; k < frame.led.size(); ++k) {
+    if (!frame.led[k].moves) continue;
+    place_resting(context, particles, frame);
+    frame.resting_boxes.find(frame.reach[context.bodies.size() + k], stirred);
+  }
+  return stirred;
+}
+
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
                           std::vector<implicit::SampleState>& samples, Frame& frame, bool energy) {
   const Model& model = context.model;
@@ -276,6 +312,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   frame.pressed.clear();
   {
     StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
+    view_fixed_bodies(model, context.time, false, frame);
     place_resting(context, particles, frame);
     for_awake(context, [&](std::size_t i) {
       place(context, particles, i, frame);
@@ -366,8 +403,13 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   if (dissipates) out.dissipative.reset(model.particles.size());
   for (const std::uint32_t i : frame.pressed) {
     if (i >= context.bodies.size()) {
-      out.force_on_fixed += frame.loads[i].force[0];
-      out.moment_on_fixed += frame.loads[i].torque[0];
+      const Vec3 &force = frame.loads[i].force[0], &torque = frame.loads[i].torque[0];
+      const LedSolid& led = frame.led[i - context.bodies.size()];
+      out.force_on_fixed += force;
+      out.moment_on_fixed += led.pose.position.cross(force) + torque;
+      out.power_of_fixed -= force.dot(led.velocity) + torque.dot(led.spin);
+      const collision::PartLoads& taken = frame.dissipative[i];
+      out.dissipated_at_fixed -= taken.force[0].dot(led.velocity) + taken.torque[0].dot(led.spin);
       continue;
     }
     const std::vector<std::uint32_t>& particle = context.bodies[i].particle;

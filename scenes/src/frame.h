@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <functional>
+#include <variant>
 #include <vector>
 
 #include "supple/collision/deformed_field.h"
@@ -14,10 +15,20 @@
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/march_cubes.h"
+#include "supple/implicit/solids.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
+
+/// Where a fixed body is in this frame, and how it moves.
+struct LedSolid {
+  std::variant<std::monostate, implicit::HalfSpace, implicit::SolidBox, implicit::MovedField> solid;  ///< none: it stands still
+  Pose pose;
+  Vec3 velocity = Vec3::Zero();
+  Vec3 spin = Vec3::Zero();
+  bool moves = false;
+};
 
 struct Frame {
   // place_skeleton and index_field, by body
@@ -39,6 +50,7 @@ struct Frame {
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;
+  std::vector<LedSolid> led;                          ///< shape [fixed bodies]
   // find_contacts, solve_contact_surface, react
   std::vector<collision::ContactBody> bodies;         ///< and the fixed ones after them
   std::vector<collision::BodyPair> pairs;
@@ -60,7 +72,7 @@ struct Frame {
   Frame(const Model& model, const std::vector<Body>& all);
 };
 
-/// Measures one call of a stage; every 64th call is timed and counted 64-fold, or every call when profiling.
+/// Measures one call of a stage: the first and every 64th after it, which stand for the others, or every call when profiling.
 class StageTimer {
  public:
   StageTimer(StageProfile& profile, bool every_call);
@@ -70,7 +82,7 @@ class StageTimer {
 
  private:
   StageProfile& profile_;
-  double weight_ = 0.0;
+  bool timed_;
   double begin_ = 0.0;
 };
 
@@ -83,6 +95,7 @@ struct StageContext {
   bool skip = true;
   bool every_call = false;
   const implicit::DelaunayMesher* delaunay = nullptr;
+  double time = 0.0;                                  ///< that obstacles are led by [s]
   const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all
   const collision::StickState* sticks = nullptr;
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
@@ -93,6 +106,10 @@ void place_and_index(const StageContext& context, const core::ParticleState& par
 
 /// The same for every body with a surface.
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
+
+/// Bodies that rest whose supports reach a fixed body that moves, at context.time.
+[[nodiscard]] std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles,
+                                                      Frame& frame);
 
 /// Stages 2 to 6: from particles to the contact surface, with its energy if asked for. Warm starts are read from and written to `samples`.
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,

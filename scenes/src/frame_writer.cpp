@@ -75,7 +75,6 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
   for (const ObjectDesc& o : scene.objects) objects.push_back({o.name, o.colour, o.roughness});
   for (const ObstacleDesc& o : scene.obstacles) objects.push_back({o.name, o.colour, o.roughness});
   animation_ = std::make_unique<io::UsdAnimation>(options.folder / (name_ + ".usda"), scene.frame_rate, objects);
-  obstacles_ = obstacle_meshes(scene, model);
 }
 
 void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
@@ -119,6 +118,8 @@ bool FrameWriter::pictures_are_current(int frame, std::uint64_t state_hash) cons
   }
   return true;
 }
+
+bool FrameWriter::renews_frames() const { return samples_ || animation_ || outputs_.images; }
 
 bool FrameWriter::renews(int frame, std::uint64_t state_hash) const {
   return samples_ || (wanted(frame) && (animation_ || (outputs_.images && !pictures_are_current(frame, state_hash))));
@@ -172,6 +173,7 @@ PictureTimes FrameWriter::picture_times() const {
 }
 
 void FrameWriter::add_warnings(std::vector<std::string>& warnings) const {
+  warnings.insert(warnings.end(), warnings_.begin(), warnings_.end());
   if (pictures_) warnings.insert(warnings.end(), pictures_->warnings().begin(), pictures_->warnings().end());
 }
 
@@ -190,7 +192,8 @@ void FrameWriter::write_meshes(const Simulation& simulation, const std::vector<M
 void FrameWriter::add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes) {
   std::vector<const Mesh*> all;
   for (const Mesh& mesh : meshes) all.push_back(&mesh);
-  for (const Mesh& mesh : obstacles_) all.push_back(&mesh);
+  const std::vector<Mesh> obstacles = obstacle_meshes(scene_, simulation.model(), simulation.time());
+  for (const Mesh& mesh : obstacles) all.push_back(&mesh);
   const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
   std::vector<io::UsdCamera> cameras;
   for (const CameraDesc& desc : cameras_of(scene_)) {
@@ -247,9 +250,11 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
 }
 
 /// Of one camera, if all its frames are there.
-fs::path FrameWriter::make_film(const std::string& name, int last) const {
+fs::path FrameWriter::make_film(const std::string& name, int last) {
   for (int frame = 1; frame <= last; ++frame) {
-    if (!fs::exists(frame_path(options_.folder, name, frame))) return {};
+    if (fs::exists(frame_path(options_.folder, name, frame))) continue;
+    warnings_.push_back("no film: frame " + std::to_string(frame) + " of " + name + " has no picture");
+    return {};
   }
   const fs::path film = options_.folder / (name + ".mp4");
   render::encode_film(options_.folder / "frames", name, 1, last, scene_.frame_rate, film);

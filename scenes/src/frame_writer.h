@@ -40,6 +40,8 @@ class FrameWriter {
   /// Films, contact sheets and lists over all frames 1 .. last that are there. Returns the film, if there is one.
   std::filesystem::path finish(Simulation& simulation, Reporter& report, int last);
 
+  /// Whether anything that it writes may have to be written again, so that earlier states are needed.
+  [[nodiscard]] bool renews_frames() const;
   /// Whether a frame that was written before must be seen again: for a file over all frames or for samples, or because its picture is
   /// absent or one of another scene or state.
   [[nodiscard]] bool renews(int frame, std::uint64_t state_hash) const;
@@ -60,7 +62,7 @@ class FrameWriter {
   void write_meshes(const Simulation& simulation, const std::vector<Mesh>& meshes);
   void write_tables(Simulation& simulation);
   void add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes);
-  std::filesystem::path make_film(const std::string& name, int last) const;
+  std::filesystem::path make_film(const std::string& name, int last);
   /// @param what  of several tables in one folder: the part of their names after the scene's
   void write_time_list(const std::string& part, int last, const std::string& what = {});
 
@@ -73,11 +75,11 @@ class FrameWriter {
   std::unique_ptr<ScenePictures> pictures_;
   std::unique_ptr<io::UsdAnimation> animation_;
   std::unique_ptr<SceneSamples> samples_;
-  std::vector<Mesh> obstacles_;  // of the animation
   std::vector<implicit::GridUpdater> grids_;  // by body
   int pictures_drawn_ = 0;
   int images_ = 0;
   double encode_s_ = 0.0;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace supple::scenes

@@ -13,7 +13,6 @@
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
-#include "supple/core/math.h"
 
 namespace supple::scenes {
 namespace {
@@ -22,16 +21,11 @@ namespace {
 constexpr double kCellsAcross = 8.0;   // lattice cells across the smallest surface thickness
 constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
 
+constexpr double kBelievable = 1e4;     // ways of a particle over the size of everything, and over that in a frame
 constexpr double kVolumeCell = 0.125;   // of the iso radius: cells that measure a held volume
 
 core::NormalDirection direction_of(NormalKind normal) {
   return normal == NormalKind::Radial ? core::NormalDirection::Radial : core::NormalDirection::Axis;
-}
-
-/// Rotation about a unit axis, from exact parts: a zero angle is the identity to the bit.
-Quat turned(const Vec3& axis, double angle) {
-  const auto [sin, cos] = math::sin_cos(0.5 * angle);
-  return Quat(cos, sin * axis.x(), sin * axis.y(), sin * axis.z());
 }
 
 /// The shortest rotation from z to a direction.
@@ -58,7 +52,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
       break;
   }
   if (d.disorder > 0.0) core::disorder(out, d.disorder);
-  core::place(out, Pose{d.at, from_z_to(d.axis) * turned(Vec3::UnitZ(), d.angle)});
+  core::place(out, Pose{d.at, from_z_to(d.axis) * core::rotation_exp(d.angle * Vec3::UnitZ())});
   return out;
 }
 
@@ -206,7 +200,7 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
     primitive.stretch = s.stretch;
     primitive.convolved = s.convolve;
     if (s.end_radius > 0.0) primitive.taper = s.end_radius / radius;
-    primitive.offset = {s.at, turned(s.turn_axis.normalized(), s.turn)};
+    primitive.offset = {s.at, core::rotation_exp(s.turn * s.turn_axis.normalized())};
     try {
       primitive.kernel = kernel_of(s.kernel, radius, d.iso);
     } catch (const Error& error) {
@@ -222,10 +216,14 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
     }
     std::vector<std::uint32_t> carriers;
     for (std::size_t j = 0; j < s.particles.size(); ++j) {
-      if (const auto index = particle_index(s.particles[j], n)) {
-        carriers.push_back(*index);
+      const std::string place = key + ".particles[" + std::to_string(j) + ']';
+      const auto index = particle_index(s.particles[j], n);
+      if (!index) {
+        fail_index(faults, place, s.particles[j], n);
+      } else if (std::find(carriers.begin(), carriers.end(), *index) != carriers.end()) {
+        faults.add(place, "expected each particle once", std::to_string(s.particles[j]), "");
       } else {
-        fail_index(faults, key + ".particles[" + std::to_string(j) + ']', s.particles[j], n);
+        carriers.push_back(*index);
       }
     }
     if (s.particles.empty()) {
@@ -612,10 +610,53 @@ class LawBuilder {
   std::map<std::pair<double, double>, std::shared_ptr<const core::CohesionTable>> tables_;  ///< by a and error
 };
 
-/// Principal moments: of a solid ellipsoid, m/5 (b^2 + c^2, ...), or of a ball of radius a.
-Vec3 principal_moments(const ParticlesDesc& d, double a) {
-  const Vec3 squares = (d.inertia_axes.isZero() ? Vec3::Constant(a) : d.inertia_axes).cwiseAbs2();
-  return 0.2 * d.mass * (Vec3::Constant(squares.sum()) - squares);
+/// Principal moments of a solid ellipsoid of these semi-axes, m/5 (b^2 + c^2, ...).
+Vec3 principal_moments(double mass, const Vec3& axes) {
+  const Vec3 squares = axes.cwiseAbs2();
+  return 0.2 * mass * (Vec3::Constant(squares.sum()) - squares);
+}
+
+/// Semi-axes of the ellipsoid whose second moments along a particle's axes are those of the solid that it carries alone;
+/// exact for a ball, within a hundredth otherwise. Zero without a surface.
+Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool planar) {
+  implicit::Skeleton own{.primitive = {}, .part_count = 1, .iso = object.iso, .blend = {}};
+  for (const implicit::Primitive& primitive : object.primitive) {
+    if (primitive.part == part) own.primitive.push_back(primitive);
+    if (primitive.part == part) own.primitive.back().part = 0;
+  }
+  if (own.primitive.empty()) return Vec3::Zero();
+  const implicit::Primitive& first = own.primitive.front();
+  const bool ball = own.primitive.size() == 1 && first.shape == implicit::ShapeKind::Point && !first.convolved &&
+                    first.stretch == Vec3::Ones() && first.offset.position.isZero();
+  if (ball) return Vec3::Constant(iso_radius(first, own.iso));
+  const Pose still;
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  implicit::place_skeleton(own, {&still, 1}, placed);
+  implicit::index_field(own, placed, field);
+  const Box box = field.surface_box();
+  if (box.empty()) return Vec3::Zero();
+  constexpr int kCells = 32;
+  const Vec3 cell = box.extent() / kCells;
+  std::vector<Vec3> point;
+  for (int k = 0; k < kCells; ++k) {
+    for (int j = 0; j < kCells; ++j) {
+      for (int i = 0; i < kCells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
+    }
+  }
+  std::vector<double> value(point.size());
+  implicit::FieldView(field).evaluate(point, value);
+  Vec3 squares = Vec3::Zero();
+  double inside = 0.0;
+  for (std::size_t s = 0; s < point.size(); ++s) {
+    if (!(value[s] > 0.0)) continue;
+    squares += point[s].cwiseAbs2();
+    inside += 1.0;
+  }
+  if (inside == 0.0) return Vec3::Zero();
+  Vec3 axes2 = 5.0 / inside * squares;
+  if (planar) axes2.setConstant(0.5 * (axes2.x() + axes2.y()));  // it turns about z alone
+  return axes2.cwiseSqrt();
 }
 
 /// Of a ball around the primitive's origin that holds its support.
@@ -662,13 +703,23 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
   Vec3 centre = Vec3::Zero();
   for (const Vec3& p : arrangement.position) centre += p;
   centre /= n;  // all masses of an object are equal
+  const bool all_alike = std::all_of(d.skeleton.begin(), d.skeleton.end(), [](const SkeletonDesc& s) { return s.particles.empty(); });
+  Vec3 lone = Vec3::Zero();
   for (std::uint32_t i = 0; i < n; ++i) {
-    const double a = d.particles.inertia_radius.value_or(n > 1 ? 0.5 * nearest[i] : object.iso_radius);
-    if (!(a > 0.0) && d.particles.inertia_axes.isZero()) {
+    Vec3 axes = d.particles.inertia_axes;
+    if (d.particles.inertia_radius) {
+      axes.setConstant(*d.particles.inertia_radius);
+    } else if (axes.isZero() && (n == 1 || d.separate)) {
+      if (i == 0 || !all_alike) lone = enclosed_axes(object.skeleton, i, scene.planar);
+      axes = lone;
+    } else if (axes.isZero()) {
+      axes.setConstant(0.5 * nearest[i]);
+    }
+    if (!(axes.maxCoeff() > 0.0)) {
       faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
                       n > 1 ? "two particles lie at one place, so give it" : "a single particle without a surface needs it");
     }
-    const Vec3 inertia = principal_moments(d.particles, a);
+    const Vec3 inertia = principal_moments(d.particles.mass, axes);
     const Quat& q = arrangement.orientation[i];
     model.particles.mass.push_back(d.particles.mass);
     model.particles.inertia.push_back(inertia);
@@ -680,7 +731,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     model.initial.orientation.push_back(arrangement.orientation[i]);
     model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
     model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
-    if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : a);
+    if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
     model.smallest_length = std::min({model.smallest_length, nearest[i], n == 1 ? 0.5 * object.rest_diameter : nearest[i]});
   }
   if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);
@@ -746,6 +797,25 @@ void stop_pinned(Model& model) {
     model.initial.velocity[i] = core::free_translation(pinned, model.initial.velocity[i]);
     model.initial.angular_momentum[i] = core::free_rotation(pinned, model.initial.angular_momentum[i]);
   }
+}
+
+/// Limits of what is no divergence: where particles start and how fast, free flight through the film, and far more than
+/// the size of the objects on top.
+void set_believable(const Scene& scene, const Box& everything, Model& model) {
+  double size = everything.extent().norm();
+  if (!(size > 0.0)) size = model.smallest_length;
+  double start = 0.0, speed = 0.0;
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    start = std::max(start, model.initial.position[i].norm());
+    speed = std::max(speed, model.initial.velocity[i].norm());
+  }
+  for (const FixedBody& body : model.fixed) {
+    for (const ObstacleKeyDesc& key : body.motion.keys) start = std::max(start, key.at.norm());
+  }
+  speed = std::max(speed, model.solid_speed);
+  const double gravity = scene.gravity.norm(), time = scene.duration;
+  model.believable_distance = kBelievable * size + start + (speed + 0.5 * gravity * time) * time;
+  model.believable_speed = kBelievable * size * scene.frame_rate + speed + gravity * time;
 }
 
 }  // namespace
@@ -823,8 +893,7 @@ Model build_model(const Scene& scene) {
   if (scene.render.shutter > 0.0) model.meshing.motion = true;
   for (std::size_t i = 0; i < model.objects.size(); ++i) model.objects[i].look = scene.objects[i].look;
   if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
-  model.scene_length = everything.extent().norm();
-  if (!(model.scene_length > 0.0)) model.scene_length = model.smallest_length;
+  set_believable(scene, everything, model);
   return model;
 }
 

@@ -13,6 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::array kParts = {"states", "frames", "meshes", "grids", "contacts", "particles", "samples"};
 constexpr int kSheetColumns = 4;
 constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
@@ -37,9 +38,26 @@ fs::path frame_path(const fs::path& folder, const std::string& name, int frame) 
   return folder / "frames" / numbered(name, frame, ".png");
 }
 
+void remove_temporaries(const fs::path& folder, const std::string& name) {
+  std::vector<fs::path> left;
+  const auto look = [&](const fs::path& in) {
+    std::error_code absent;
+    for (const auto& entry : fs::directory_iterator(in, absent)) {
+      const std::string file = entry.path().filename().string();
+      const bool ours = file.starts_with('.' + name + '.') || file.starts_with('.' + name + '_') ||
+                        file.starts_with(".result.json.") || file.starts_with(".render.json.") || file.starts_with(".export.json.");
+      if (ours && file.ends_with(".tmp")) left.push_back(entry.path());
+    }
+  };
+  look(folder);
+  for (const char* part : kParts) look(folder / part);
+  std::error_code ignored;
+  for (const fs::path& path : left) fs::remove(path, ignored);
+}
+
 void remove_outputs(const fs::path& folder, const std::string& name) {
   std::error_code ignored;
-  for (const char* part : {"states", "frames", "meshes", "grids", "contacts", "particles", "samples"}) {
+  for (const char* part : kParts) {
     if (!fs::is_directory(folder / part)) continue;
     for (const auto& entry : fs::directory_iterator(folder / part)) {
       if (entry.path().filename().string().starts_with(name + ".")) fs::remove(entry.path(), ignored);

@@ -19,6 +19,9 @@ namespace supple::scenes {
 /// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result).
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
+/// Removes files of an interrupted run of this scene that never got their names.
+void remove_temporaries(const std::filesystem::path& folder, const std::string& name);
+
 /// @param updaters  by body, kept from frame to frame: only what moved is made anew
 void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation,
                      std::vector<implicit::GridUpdater>& updaters);

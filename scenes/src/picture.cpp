@@ -17,7 +17,7 @@ Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
   if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) return box->mesh();
   if (const auto* heights = std::get_if<implicit::HeightField>(&body.solid)) return heights->mesh(kFiner);
   if (const auto* solid = std::get_if<implicit::MeshSolid>(&body.solid)) return solid->mesh();
-  const Vec3 u = d.extent * d.normal.unitOrthogonal(), v = d.normal.cross(u);
+  const Vec3 normal = d.normal.normalized(), u = d.extent * normal.unitOrthogonal(), v = normal.cross(u);
   Mesh mesh;
   add_quadrangle(mesh, d.at - u - v, d.at + u - v, d.at + u + v, d.at - u + v);
   return mesh;
@@ -34,6 +34,18 @@ void add_own_places(const ObstacleDesc& d, Mesh& mesh) {
   }
   constexpr std::array kNames = {"rest_x", "rest_y", "rest_z"};
   for (std::size_t k = 0; k < 3; ++k) mesh.columns.push_back({.name = kNames[k], .values = std::move(places[k])});
+}
+
+/// A mesh about the origin to its place.
+void lead(const SolidPlace& place, Mesh& mesh) {
+  for (const char axis : {'x', 'y', 'z'}) mesh.columns.push_back({std::string("velocity_") + axis, {}});
+  for (Vec3& x : mesh.position) {
+    const Vec3 arm = place.pose.orientation * x;
+    const Vec3 velocity = place.velocity + place.spin.cross(arm);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) mesh.columns[mesh.columns.size() - 3 + static_cast<std::size_t>(axis)].values.push_back(velocity[axis]);
+    x = place.pose.position + arm;
+  }
+  for (Vec3& n : mesh.normal) n = place.pose.orientation * n;
 }
 
 render::RenderSettings settings_of(const Scene& scene, render::ContextKind context, int threads) {
@@ -129,12 +141,13 @@ std::vector<render::ScaleBar> bars_of(const Scene& scene) {
 
 }  // namespace
 
-std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model) {
+std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double time) {
   std::vector<Mesh> meshes;
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
     const FixedBody& body = model.fixed[model.fixed.size() - scene.obstacles.size() + i];
     meshes.push_back(scene.obstacles[i].visible ? obstacle_mesh(scene.obstacles[i], body) : Mesh());
     if (scene.obstacles[i].texture) add_own_places(scene.obstacles[i], meshes.back());
+    if (body.led()) lead(place_at(body.motion, time), meshes.back());
   }
   return meshes;
 }
@@ -144,7 +157,7 @@ ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::Con
   const std::filesystem::path folder = scene.source.parent_path();
   for (const ObjectDesc& object : scene.objects) paints_.push_back(paint_of(object.look, folder));
   for (const ObstacleDesc& obstacle : scene.obstacles) obstacle_paints_.push_back(paint_of(obstacle.texture, folder));
-  obstacles_ = obstacle_meshes(scene, model);
+  obstacles_ = obstacle_meshes(scene, model, 0.0);
   renderer_ = render::make_renderer(settings_);
 }
 
@@ -298,6 +311,9 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
 render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera, render::LinearImage* linear) {
   view_.camera = camera_at(cameras_of(scene_)[camera], simulation.time(), scene_.duration);
   warn_inside(simulation, camera);
+  const std::vector<FixedBody>& fixed = simulation.model().fixed;
+  const bool led = std::any_of(fixed.begin(), fixed.end(), [](const FixedBody& body) { return body.led(); });
+  if (led) obstacles_ = obstacle_meshes(scene_, simulation.model(), simulation.time());
   items_.clear();
   item_names_.clear();
   add_objects(simulation);

@@ -15,8 +15,8 @@
 
 namespace supple::scenes {
 
-/// What is drawn of each obstacle; empty where it is not visible.
-[[nodiscard]] std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model);
+/// What is drawn of each obstacle at a time, with its velocity where it is led along; empty where it is not visible.
+[[nodiscard]] std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double time);
 
 class ScenePictures {
  public:

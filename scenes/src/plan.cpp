@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "fields_rules.h"
 #include "read_scene_faults.h"
@@ -189,7 +190,7 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
 core::StepLimits step_limits(const Scene& scene, const Model& model, double frequency, const core::Speeds& speeds) {
   return {.frequency = frequency,
           .length = model.smallest_length,
-          .speed = speeds.linear + scene.gravity.norm() / scene.frame_rate,
+          .speed = std::max(speeds.linear, model.solid_speed) + scene.gravity.norm() / scene.frame_rate,
           .angular_speed = speeds.angular};
 }
 
@@ -202,6 +203,7 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
   const auto steps_a_frame = [&](double frequency) {
     const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
+    if (!(step > 0.0)) return std::numeric_limits<double>::infinity();
     return step < frame ? std::ldexp(1.0, core::halvings(frame, step)) : 1.0;
   };
   const double explicit_steps = steps_a_frame(all);
@@ -218,7 +220,9 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
       const bool refused = explicit_steps > scene.time_step.max_substeps;
       const bool dearer = explicit_steps > kImplicitCost * implicit_steps;
       const bool energies = model.interactions.literal_form.empty();  // implicit methods minimise one
-      const bool implicit = plan.chosen && energies && (refused || dearer);
+      // The motion of fluids is what they are simulated for: an implicit step would damp it.
+      const bool fluid = !model.interactions.geometric_lennard_jones.empty() || !model.interactions.gay_berne.empty();
+      const bool implicit = plan.chosen && energies && !fluid && (refused || dearer);
       plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
       const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet a frame";
       if (fixed) {

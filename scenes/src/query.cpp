@@ -54,7 +54,7 @@ ordered_json loads_json(const core::Loads& loads) {
   return particles;
 }
 
-std::string text(const ordered_json& json) { return json.dump(2) + "\n"; }
+std::string text(const ordered_json& json) { return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"; }
 
 }  // namespace
 

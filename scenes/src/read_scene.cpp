@@ -9,6 +9,7 @@
 #include <iterator>
 #include <optional>
 
+#include "camera.h"
 #include "read_scene_archive.h"
 #include "supple/core/hash.h"
 
@@ -33,9 +34,10 @@ class Override {
         node = tree_.copy(*node);
       }
       *slot = node;
-      slot = node->kind == Node::Kind::List ? item(*node, done) : node->kind == Node::Kind::Mapping ? key(*node) : nullptr;
+      const bool mapping = node->kind == Node::Kind::Mapping;
+      slot = node->kind == Node::Kind::List ? item(*node, done) : mapping ? key(*node, done) : nullptr;
       if (slot == nullptr) {
-        if (node->kind != Node::Kind::List) fail(done, "expected a mapping or a list", node->described());
+        if (node->kind == Node::Kind::Scalar) fail(done, "expected a mapping or a list", node->described());
         return;
       }
     }
@@ -48,9 +50,13 @@ class Override {
     faults_.add(mark_, shown(key), std::move(expected), std::move(found), "");
   }
 
-  Node** key(Node& mapping) {
+  Node** key(Node& mapping, const std::string& done) {
     const std::size_t length = std::min(rest_.find_first_of(".["), rest_.size());
     const std::string_view word = rest_.substr(0, length);
+    if (word.empty()) {
+      fail(done, "expected a key", '\'' + shown(rest_) + '\'');
+      return nullptr;
+    }
     rest_.remove_prefix(length);
     for (Node::Entry& entry : mapping.entries) {
       if (entry.key == word) return &entry.value;
@@ -153,9 +159,12 @@ std::uint64_t content_hash(const Node& root, const std::filesystem::path& folder
 }
 
 /// Of everything that decides a picture of a given state.
-std::uint64_t picture_hash(const Node& root, const std::filesystem::path& folder) {
+std::uint64_t picture_hash(const Scene& scene, const Node& root, const std::filesystem::path& folder) {
   const auto all = [](std::string_view /*key*/) { return true; };
   Hasher hasher;
+  const std::span<const CameraDesc> cameras = cameras_of(scene);
+  const bool turns = std::any_of(cameras.begin(), cameras.end(), [](const CameraDesc& c) { return c.turntable != 0.0; });
+  if (turns) hasher.add(scene.duration);
   std::vector<const Node::Entry*> seen;
   for (const Node::Entry& entry : root.entries) {
     if (entry.key != "output" && !among(kUnseen, entry.key)) seen.push_back(&entry);
@@ -217,7 +226,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
   scene.content_hash = content_hash(*root, folder);
-  scene.picture_hash = picture_hash(*root, folder);
+  scene.picture_hash = picture_hash(scene, *root, folder);
   return scene;
 }
 

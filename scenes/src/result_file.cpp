@@ -34,7 +34,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["last_good_frame"] = result.frames;
   json["frame_count"] = scene.frame_count();
   json["frame_rate"] = scene.frame_rate;
-  json["pictures"] = {{"drawn", result.pictures_drawn}, {"kept", result.pictures_kept}, {"frames_at_once", result.frames_at_once}};
+  ordered_json pictures = {{"drawn", result.pictures_drawn}, {"kept", result.pictures_kept}, {"frames_at_once", result.frames_at_once}};
   json["state_hash"] = to_hex(result.state_hash);
   json["warnings"] = result.warnings;
   json["units"] = {{"length", "m"}, {"up_axis", "z"}};
@@ -93,14 +93,15 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
     }
     json["stages"] = stages;
     const render::RenderTimes& t = result.pictures.render;
-    json["pictures"] = {{"images", result.pictures.images}, {"context_cpu_s", t.context}, {"shaders_cpu_s", t.shaders},
-                        {"upload_cpu_s", t.upload},         {"draw_cpu_s", t.draw},       {"read_back_cpu_s", t.read_back},
-                        {"encode_cpu_s", result.pictures.encode_s}};
+    pictures.update({{"images", result.pictures.images}, {"context_cpu_s", t.context}, {"shaders_cpu_s", t.shaders},
+                     {"upload_cpu_s", t.upload},         {"draw_cpu_s", t.draw},       {"read_back_cpu_s", t.read_back},
+                     {"encode_cpu_s", result.pictures.encode_s}});
   }
+  json["pictures"] = pictures;
   json["film"] = result.film.empty() ? ordered_json(nullptr) : ordered_json(result.film.filename().string());
   json["peak_memory_mb"] = peak_memory_mb();
   json["wall_s"] = wall_s;
-  io::write_atomically(result.report, std::string_view(json.dump(2) + "\n"));
+  io::write_atomically(result.report, std::string_view(json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"));
 }
 
 }  // namespace supple::scenes

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <fstream>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <thread>
 
@@ -51,16 +52,6 @@ class FolderLock {
   int file_ = -1;
 };
 
-/// Files of an earlier, interrupted run of ours that never got their names.
-void remove_temporaries(const fs::path& folder) {
-  for (const auto& entry : fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied)) {
-    if (entry.is_regular_file() && entry.path().extension() == ".tmp") {
-      std::error_code ignored;
-      fs::remove(entry.path(), ignored);
-    }
-  }
-}
-
 std::optional<int> last_saved_frame(const fs::path& folder, const std::string& name, int frame_count) {
   for (int frame = frame_count; frame >= 1; --frame) {
     if (fs::exists(state_path(folder, name, frame))) return frame;
@@ -88,6 +79,7 @@ std::string outcome_of(ErrorKind kind) {
 }
 
 constexpr int kSignalExit = 128;
+constexpr std::size_t kMostOverloads = 10;  // that are told; the report has all
 constexpr const char* kResultFile = "result.json";
 
 std::string overload_text(const RunRecord::Overload& o) {
@@ -119,17 +111,27 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
     result.outcome = outcome_of(error.kind());
     result.reason = error.what();
     result.exit_code = static_cast<int>(error.kind());
+  } catch (const std::bad_alloc&) {
+    result.outcome = outcome_of(ErrorKind::Limit);
+    result.reason = kOutOfMemory;
+    result.exit_code = static_cast<int>(ErrorKind::Limit);
   } catch (const std::exception& error) {
     result.outcome = outcome_of(ErrorKind::Internal);
     result.reason = error.what();
     result.exit_code = static_cast<int>(ErrorKind::Internal);
   }
   if (simulation) {
-    result.frames = simulation->frame();
     result.state_hash = simulation->state_hash();
-    for (const auto& o : simulation->state().record.overloads) result.warnings.push_back(overload_text(o));
+    result.warnings.insert(result.warnings.begin(), simulation->warnings().begin(), simulation->warnings().end());
+    const auto& overloads = simulation->state().record.overloads;
+    for (std::size_t k = 0; k < std::min(overloads.size(), kMostOverloads); ++k) result.warnings.push_back(overload_text(overloads[k]));
+    if (overloads.size() > kMostOverloads) {
+      result.warnings.push_back(std::to_string(overloads.size() - kMostOverloads) + " more pairs were overloaded ('overloads' in the report)");
+    }
   }
-  write_result_file(scene, result, simulation ? &*simulation : nullptr, seconds_since(begin));
+  // Where nothing was done, the report of an earlier run stays.
+  const bool refused = result.exit_code != 0 && result.frames == 0 && fs::exists(result.report);
+  if (!refused) write_result_file(scene, result, simulation ? &*simulation : nullptr, seconds_since(begin));
   return result;
 }
 
@@ -238,7 +240,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
   const std::string name = scene_name(scene);
   io::make_writable_folder(options.folder);
   const FolderLock lock(options.folder);
-  remove_temporaries(options.folder);
+  remove_temporaries(options.folder, name);
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, report_name, simulation, [&](RunResult& result) {
@@ -284,6 +286,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     if (simulation->frame() != *last) {  // the report is of the run as a whole
       simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
     }
+    result.frames = *last;
     result.pictures_drawn += writer.pictures_drawn();
     result.film = writer.finish(*simulation, report, *last);
     const PictureTimes t = writer.picture_times();
@@ -357,8 +360,9 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
   const std::string name = scene_name(scene);
   io::make_writable_folder(options.folder / "states");
   const FolderLock lock(options.folder);
-  remove_temporaries(options.folder);
-  if (!options.overwrite && !options.resume && fs::exists(options.folder / kResultFile)) {
+  remove_temporaries(options.folder, name);
+  const bool began = fs::exists(options.folder / kResultFile) && !fs::is_empty(options.folder / "states");
+  if (!options.overwrite && !options.resume && began) {
     throw Error(ErrorKind::Io, Fault{.place = options.folder.string(),
                                      .key = {},
                                      .expected = "expected an output folder without an earlier result",
@@ -376,13 +380,14 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         bool fresh = true;
         if (options.resume) {
           if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
-            for (int frame = 1; frame <= *last; ++frame) {
+            for (int frame = 1; writer.renews_frames() && frame <= *last; ++frame) {
               State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
               if (!writer.renews(frame, state.hash())) continue;
               simulation->restore(std::move(state));
               writer.renew(*simulation, report, static_cast<double>(frame) / frame_count);
             }
             simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
+            result.frames = *last;
             fresh = false;
           }
         }
@@ -390,12 +395,17 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
           const double done = static_cast<double>(simulation->frame()) / frame_count;
           writer.write(*simulation, report, done);
           save_state(state_path(options.folder, name, simulation->frame()), simulation->state(), scene.content_hash);
+          result.frames = simulation->frame();
         };
         if (fresh) finish_frame();
         while (simulation->frame() < frame_count) {
           if (was_interrupted(options, result)) return;
           report("simulate", simulation->frame() + 1, static_cast<double>(simulation->frame()) / frame_count);
-          simulation->step_frame();
+          const int shown = simulation->frame();
+          while (simulation->frame() == shown) {
+            if (was_interrupted(options, result)) return;
+            simulation->step();
+          }
           finish_frame();
         }
         result.pictures_drawn = writer.pictures_drawn();

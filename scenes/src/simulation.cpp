@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fields_rules.h"
 #include "frame.h"
 #include "model_faults.h"
 #include "overload.h"
@@ -13,14 +14,24 @@
 namespace supple::scenes {
 namespace {
 
-/// Beyond this many scene lengths from the start, or this many scene lengths in a frame, numbers have left the scene.
-constexpr double kBelievable = 1e4;
 constexpr std::uint64_t kStepsPerRefinement = 4;
+constexpr double kDampedShare = 0.4;  // of the inverse of d v: what a step may take of a speed by damping
 
 int log2_of(int n) {
   int k = 0;
   while ((1 << k) < n) ++k;
   return k;
+}
+
+/// How to mend what asks for the smallest step.
+std::string what_needs(const core::StepLimits& limits, double damping) {
+  const double step = core::stable_step(limits);
+  if (step == core::stable_step({.length = limits.length, .speed = limits.speed})) {
+    return "slow down what moves " + number_text(limits.speed) + " m/s past lengths of " + number_text(limits.length) + " m";
+  }
+  if (step == core::stable_step({.angular_speed = limits.angular_speed})) return "slow down what turns " + number_text(limits.angular_speed) + " rad/s";
+  if (damping > 2.0) return "lower the dissipation of contact (or ask for a higher restitution)";
+  return "soften the stiffest interaction or contact, or make the lightest particle heavier";
 }
 
 double share(double value, double scale) { return scale > 0.0 ? value / scale : value; }
@@ -60,6 +71,7 @@ struct Simulation::Impl {
   std::vector<Mesh> meshes;
   bool pulled_meshes = false;
   std::function<bool(const Box&)> shown;
+  std::vector<std::string> warnings;
 
   Impl(Scene s, SimulationOptions o)
       : scene(std::move(s)),
@@ -95,6 +107,46 @@ struct Simulation::Impl {
     form_awake();
     choose_step();
     book_audits();
+    look_inside();
+    for (const ObjectModel& object : model.objects) {
+      const double thickness = 2.0 * object.iso_radius;
+      if (!(model.cell > thickness && thickness > 0.0)) continue;
+      warnings.push_back("output.cell: cells of " + number_text(model.cell) + " m may miss '" + object.name + "', which is " +
+                         number_text(thickness) + " m thick");
+    }
+  }
+
+  /// Contacts that the only rule allowed does not fit: they push nobody.
+  void look_unresolved() {
+    if (scene.contact.rule == RuleName::Auto) return;
+    for (const auto& s : frame.surface.summary) {
+      if (s.error_estimate < 1.0 || s.force.norm() > 0.0) continue;
+      const std::string pair = '\'' + body_name(model, bodies, s.bodies.a) + "' and '" + body_name(model, bodies, s.bodies.b) + '\'';
+      const std::string text = "contact.rule: " + std::string(name_of(scene.contact.rule)) + " does not fit the contact of " + pair +
+                               ", which has no force where this is so; 'auto' fits all";
+      if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
+    }
+  }
+
+  /// Bodies that begin so deep in another that contact need not push them out.
+  void look_inside() {
+    const auto seen = [this](std::uint32_t i) {
+      return i >= bodies.size() || std::binary_search(pulled.reached.begin(), pulled.reached.end(), i);
+    };
+    for (const collision::BodyPair& pair : pulled.reaching) {
+      bool deep = false;
+      for (const auto& [inner, outer] : {std::pair{pair.a, pair.b}, std::pair{pair.b, pair.a}}) {
+        if (inner >= bodies.size() || !seen(inner) || !seen(outer)) continue;
+        for (const implicit::Primitive& primitive : bodies[inner].skeleton.primitive) {
+          const Pose& pose = pulled.pose[inner][primitive.part];
+          const Vec3 middle = pose.position + pose.orientation * primitive.offset.position;
+          deep = deep || pulled.bodies[outer].field.value(middle) > 0.0;
+        }
+      }
+      if (!deep) continue;
+      warnings.push_back('\'' + body_name(model, bodies, pair.a) + "' and '" + body_name(model, bodies, pair.b) +
+                         "' begin so deep in one another that contact may not part them");
+    }
   }
 
   StageContext context() {
@@ -106,6 +158,7 @@ struct Simulation::Impl {
             .skip = options.skip,
             .every_call = options.profile,
             .delaunay = &options.delaunay,
+            .time = time(),
             .awake = awake.size() < bodies.size() ? &awake : nullptr,
             .sticks = &state.sticks};
   }
@@ -162,7 +215,7 @@ struct Simulation::Impl {
     SUPPLE_EXPECTS(state.sleep.island.size() == (scene.sleep ? bodies.size() : 0));
     std::vector<std::uint32_t> pushed;  // a state may have been given an impulse
     for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-      if (state.sleep.asleep(i) && specific_energy(bodies[i]) > 0.0) pushed.push_back(i);
+      if (state.sleep.asleep(i) && motion_of(bodies[i]).energy > 0.0) pushed.push_back(i);
     }
     wake(pushed);
   }
@@ -366,35 +419,33 @@ struct Simulation::Impl {
   [[nodiscard]] int needed_halvings() const {
     const TimeStepDesc& desc = scene.time_step;
     const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
-    double frequency = integrator.limiting_frequency;
+    double frequency = integrator.limiting_frequency, damping = 1.0;
     const core::Integrator method = integrator.settings.method;
     if (method == core::Integrator::Symplectic || method == core::Integrator::RungeKutta4) {
+      // Damping d v p takes at most d v w of its speed in a second, w the contact's frequency: fast where d v is large.
+      damping = std::max(1.0, kDampedShare * model.largest_dissipation * (speeds.linear + model.solid_speed));
       frequency = std::max(frequency, std::hypot(core::largest_frequency(model.particles, state.particles, laws),
-                                                 model.contact_frequency));
+                                                 model.contact_frequency * damping));
     }
-    const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
-    const int k = step < frame_time() ? core::halvings(frame_time(), step) : 0;
-    if (k > log2_of(desc.max_substeps)) {
+    const core::StepLimits limits = step_limits(scene, model, frequency, speeds);
+    const double step = core::stable_step(limits);
+    const bool possible = step > 0.0;
+    const int k = possible && step < frame_time() ? core::halvings(frame_time(), step) : 0;
+    if (!possible || k > log2_of(desc.max_substeps)) {
       throw Error(ErrorKind::Limit,
                   Fault{.place = scene.source.string(),
                         .key = "time_step.max_substeps",
                         .expected = "expected a stable step with at most " + std::to_string(desc.max_substeps) +
                                     " substeps a frame",
-                        .found = "one of " + number_text(step) + " s (" + std::to_string(1LL << k) + " substeps) at frame " +
+                        .found = "one of " + number_text(step) + " s (" + (possible ? number_text(std::ldexp(1.0, k)) : "no number of") + " substeps) at frame " +
                                  std::to_string(state.frame),
-                        .hint = "soften the stiffest interaction or contact, make the lightest particle heavier, or "
-                                "raise time_step.max_substeps"});
+                        .hint = "raise time_step.max_substeps, or " + what_needs(limits, damping)});
     }
     return k;
   }
 
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out) {
-    const std::size_t n = particles.size();
-    out.internal.reset(n);
-    out.external.reset(n);
-    out.force_on_fixed.setZero();
-    out.moment_on_fixed.setZero();
-    out.dissipative.reset(0);
+    out.reset(particles.size());
     if (!options.skip || plan.on(Stage::Interact)) {
       StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
       StageTimer timer(p, options.profile);
@@ -404,8 +455,10 @@ struct Simulation::Impl {
       p.present += counts.pairs_present;
     }
     if (contact_on()) {
-      find_contact_surface(context(), at_state, state.samples, frame, false);
-      apply_reactions(context(), frame, out);
+      StageContext now = context();
+      now.time = at;
+      find_contact_surface(now, at_state, state.samples, frame, false);
+      apply_reactions(now, frame, out);
     }
   }
 
@@ -430,12 +483,13 @@ struct Simulation::Impl {
     return rose;
   }
 
-  /// Before a step: bodies under a load that changes in it are awake and not quiet.
+  /// Before a step: bodies under a load that changes in it, or near an obstacle that moves, are awake and not quiet.
   void wake_loaded() {
     if (!scene.sleep) return;
     std::vector<std::uint32_t> loaded;
+    if (awake.size() < bodies.size()) loaded = find_stirred(context(), state.particles, frame);
     for (const core::ExternalLoad& load : laws.external) {
-      if (load.factor(time()) == load.factor(time() + dt())) continue;
+      if (!load.changes(time(), time() + dt())) continue;
       for (std::uint32_t i = 0; i < bodies.size(); ++i) {
         if (std::binary_search(bodies[i].particle.begin(), bodies[i].particle.end(), load.particle)) loaded.push_back(i);
       }
@@ -469,32 +523,45 @@ struct Simulation::Impl {
     }
   }
 
-  /// Kinetic energy over mass [J/kg].
-  [[nodiscard]] double specific_energy(const Body& body) const {
-    double energy = 0.0, mass = 0.0;
+  /// What sleep asks about a body.
+  [[nodiscard]] collision::BodyMotion motion_of(const Body& body) const {
+    collision::BodyMotion motion;
+    double mass = 0.0;
     for (const std::uint32_t p : body.particle) {
       const Vec3& momentum = state.particles.angular_momentum[p];
-      energy += 0.5 * particles.mass[p] * state.particles.velocity[p].squaredNorm() +
-                0.5 * momentum.dot(core::angular_velocity(particles, state.particles, p));
+      motion.energy += 0.5 * particles.mass[p] * state.particles.velocity[p].squaredNorm() +
+                       0.5 * momentum.dot(core::angular_velocity(particles, state.particles, p));
+      motion.velocity += particles.mass[p] * state.particles.velocity[p];
+      motion.load += particles.mass[p] * core::free_translation(particles.pinned[p], laws.gravity);
       mass += particles.mass[p];
     }
-    return energy / mass;
+    for (const core::ExternalLoad& load : laws.external) {
+      if (!std::binary_search(body.particle.begin(), body.particle.end(), load.particle)) continue;
+      motion.load += load.factor(time()) * core::free_translation(particles.pinned[load.particle], load.force);
+    }
+    return {motion.energy / mass, motion.velocity / mass, motion.load / mass};
+  }
+
+  /// By body, of those that are awake.
+  [[nodiscard]] std::vector<collision::BodyMotion> awake_motion() const {
+    std::vector<collision::BodyMotion> motion(bodies.size());
+    for (const std::uint32_t i : awake) {
+      motion[i] = motion_of(bodies[i]);
+      // What still grows or shrinks does not rest.
+      if (model.objects[bodies[i].object].holds_volume) motion[i].energy = std::numeric_limits<double>::infinity();
+    }
+    return motion;
   }
 
   /// After a step: islands that have been quiet for long enough stop, and what they had is booked as held and dissipated.
   void lay_to_sleep() {
     if (!scene.sleep || awake.empty()) return;
-    std::vector<double> energy(bodies.size(), 0.0);
-    for (const std::uint32_t i : awake) {
-      // What still grows or shrinks does not rest.
-      energy[i] = model.objects[bodies[i].object].holds_volume ? std::numeric_limits<double>::infinity() : specific_energy(bodies[i]);
-    }
     std::vector<collision::BodyPair> joined = tied;
     for (const auto& s : frame.surface.summary) {
       if (s.force.norm() > 0.0) joined.push_back(s.bodies);
     }
     const std::vector<std::uint32_t> slept =
-        collision::fall_asleep({scene.sleep->speed, scene.sleep->time}, dt(), energy, joined, state.sleep);
+        collision::fall_asleep({scene.sleep->speed, scene.sleep->time}, dt(), awake_motion(), joined, state.sleep);
     if (slept.empty()) return;
     for (const std::uint32_t i : slept) {
       for (const std::uint32_t p : bodies[i].particle) {
@@ -521,6 +588,10 @@ struct Simulation::Impl {
     }
     note_apart();
     wake_loaded();
+    // Velocity Verlet sees to it by itself; an adaptive integrator chooses steps of its own inside this one.
+    const core::Integrator method = integrator.settings.method;
+    const bool whole = method != core::Integrator::Symplectic && method != core::Integrator::Adaptive;
+    awake_laws.load_span = whole ? std::array{time(), time() + dt()} : std::array<double, 2>{};
     const core::ForceModel forces = [this](const core::ParticleState& at_state, double at, core::ForceSample& out) {
       evaluate_forces(at_state, at, out);
     };
@@ -540,8 +611,7 @@ struct Simulation::Impl {
     ++state.steps;
     ++state.substep;
     const core::Divergence divergence =
-        core::find_divergence(model.particles, state.particles, kBelievable * model.scene_length,
-                              kBelievable * model.scene_length * scene.frame_rate);
+        core::find_divergence(model.particles, state.particles, model.believable_distance, model.believable_speed);
     if (divergence.found) {
       const std::uint64_t step = state.steps;
       const double at = time();
@@ -557,6 +627,7 @@ struct Simulation::Impl {
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
       ++state.frame;
+      book_audits();
     }
   }
 
@@ -583,6 +654,7 @@ struct Simulation::Impl {
   /// At the end of a step: pairs that press harder than they can hold are noted, and turned back by hard cores.
   void watch_pressing() {
     if (!contact_on()) return;
+    look_unresolved();
     const bool barrier = scene.contact.core == CoreName::Barrier;
     if (barrier && integrator.settings.method != core::Integrator::Symplectic) {
       // The last trial of other methods need not be the state they end with.
@@ -645,6 +717,7 @@ struct Simulation::Impl {
       Profile unused{};
       StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
       quiet.sticks = &state.sticks;
+      quiet.time = time();
       find_contact_surface(quiet, state.particles, trial, pulled, true);
       pulled_sample.internal.reset(model.particles.size());
       apply_reactions(quiet, pulled, pulled_sample);
@@ -744,7 +817,6 @@ void Simulation::step() { impl_->step(); }
 void Simulation::step_frame() {
   const int target = impl_->state.frame + 1;
   while (impl_->state.frame < target) impl_->step();
-  impl_->book_audits();
 }
 
 void Simulation::restore(State state) {
@@ -819,6 +891,8 @@ void Simulation::set_shown(std::function<bool(const Box&)> shown) {
 }
 
 Energies Simulation::energies() { return impl_->energies(); }
+
+const std::vector<std::string>& Simulation::warnings() const { return impl_->warnings; }
 
 Audits Simulation::audits() const {
   const RunRecord& r = impl_->state.record;

@@ -155,7 +155,13 @@ State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
   in.read(version);
   in.read(scene);
   if (magic != kMagic) corrupt(path, "another kind of file");
-  if (version != kVersion) corrupt(path, "version " + std::to_string(version));
+  if (version != kVersion) {
+    throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
+                                          .key = {},
+                                          .expected = "expected a saved state of version " + std::to_string(kVersion),
+                                          .found = "version " + std::to_string(version) + ", of another version of supple",
+                                          .hint = "use --overwrite to run the scene again"});
+  }
   if (scene != fingerprint) {
     throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
                                           .key = {},

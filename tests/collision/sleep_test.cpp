@@ -9,7 +9,7 @@
 namespace supple::collision {
 namespace {
 
-constexpr double kStill = 0.0, kFast = 1.0;  // [J/kg]; quiet is below 0.5 * 0.1^2
+const BodyMotion kStill{}, kFast{.energy = 1.0};  // [J/kg]; quiet is below 0.5 * 0.1^2
 const SleepRule kRule{.speed = 0.1, .time = 0.25};
 
 SleepState awake(std::size_t bodies) {
@@ -23,10 +23,10 @@ using Bodies = std::vector<std::uint32_t>;
 TEST(Islands, FallAsleepWhenAllOfThemHaveBeenQuietLongEnough) {
   SleepState state = awake(5);  // 0-2-4 touch in a row, 1 and 3 are alone
   const std::vector<BodyPair> joined{{0, 2}, {2, 4}};
-  const std::vector<double> late{kStill, kStill, kStill, kStill, kFast};
+  const std::vector<BodyMotion> late{kStill, kStill, kStill, kStill, kFast};
   EXPECT_TRUE(fall_asleep(kRule, 0.125, late, joined, state).empty());
   EXPECT_EQ(fall_asleep(kRule, 0.125, late, joined, state), (Bodies{1, 3}));
-  const std::vector<double> still(5, kStill);
+  const std::vector<BodyMotion> still(5, kStill);
   EXPECT_TRUE(fall_asleep(kRule, 0.125, still, joined, state).empty());
   EXPECT_EQ(fall_asleep(kRule, 0.125, still, joined, state), (Bodies{0, 2, 4}));
   EXPECT_EQ(state.island, (Bodies{0, 1, 0, 3, 0}));
@@ -35,18 +35,32 @@ TEST(Islands, FallAsleepWhenAllOfThemHaveBeenQuietLongEnough) {
 TEST(Islands, AreNotQuietAtOrAboveTheSpeed) {
   SleepState state = awake(2);
   const double limit = 0.5 * kRule.speed * kRule.speed;
-  EXPECT_EQ(fall_asleep(kRule, 0.25, std::vector<double>{0.99 * limit, limit}, {}, state), (Bodies{0}));
+  EXPECT_EQ(fall_asleep(kRule, 0.25, std::vector<BodyMotion>{{.energy = 0.99 * limit}, {.energy = limit}}, {}, state), (Bodies{0}));
+}
+
+TEST(Islands, DoNotRestWhileTheyGiveWayToTheirLoad) {
+  // Both are slow all the time; the first falls from rest, the second turns back at the top, the third is carried but swings.
+  const double dt = 0.025, weight = 0.2;
+  SleepState state = awake(3);
+  Bodies slept;
+  for (int step = 1; step <= 12; ++step) {
+    const Vec3 load(0.0, 0.0, -weight);
+    const auto moving = [&](double v) { return BodyMotion{.energy = 0.5 * v * v, .velocity = Vec3(0.0, 0.0, v), .load = load}; };
+    const std::vector<BodyMotion> motion{moving(-weight * dt * step), moving(0.03 - weight * dt * step), moving(step % 2 == 0 ? 0.02 : -0.02)};
+    for (const std::uint32_t i : fall_asleep(kRule, dt, motion, {}, state)) slept.push_back(i);
+  }
+  EXPECT_EQ(slept, (Bodies{2}));
 }
 
 TEST(Islands, AreNotJoinedByWhatIsFixed) {
   SleepState state = awake(2);
   const std::vector<BodyPair> joined{{0, 2}, {1, 2}};  // 2: the ground
-  EXPECT_EQ(fall_asleep(kRule, 1.0, std::vector<double>{kStill, kFast}, joined, state), (Bodies{0}));
+  EXPECT_EQ(fall_asleep(kRule, 1.0, std::vector<BodyMotion>{kStill, kFast}, joined, state), (Bodies{0}));
 }
 
 TEST(Islands, WakeWhole) {
   SleepState state = awake(4);
-  fall_asleep(kRule, 1.0, std::vector<double>(4, kStill), std::vector<BodyPair>{{1, 3}}, state);
+  fall_asleep(kRule, 1.0, std::vector<BodyMotion>(4, kStill), std::vector<BodyPair>{{1, 3}}, state);
   EXPECT_EQ(wake(Bodies{3}, state), (Bodies{1, 3}));
   EXPECT_FALSE(state.asleep(1));
   EXPECT_TRUE(state.asleep(0));
@@ -57,8 +71,8 @@ TEST(Islands, WakeWhole) {
 
 TEST(SleepState, IsSavedLoadedAndHashed) {
   SleepState state = awake(3);
-  fall_asleep(kRule, 0.125, std::vector<double>{kStill, kFast, kStill}, {}, state);
-  fall_asleep(kRule, 0.125, std::vector<double>{kStill, kStill, kFast}, {}, state);
+  fall_asleep(kRule, 0.125, std::vector<BodyMotion>{kStill, kFast, kStill}, {}, state);
+  fall_asleep(kRule, 0.125, std::vector<BodyMotion>{kStill, kStill, kFast}, {}, state);
   StateWriter out;
   state.save(out);
   SleepState copy;

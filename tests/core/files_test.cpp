@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -236,6 +237,30 @@ TEST_F(Files, OfSequencesNameTimesAndFiles) {
   const std::string text = text_of(path("a.pvd"));
   EXPECT_NE(text.find("<DataSet timestep=\"0\" part=\"0\" file=\"particles/a.0001.vtp\"/>"), std::string::npos);
   EXPECT_NE(text.find("<DataSet timestep=\"0.125\" part=\"0\" file=\"particles/a &amp; b.vtp\"/>"), std::string::npos);
+}
+
+TEST_F(Files, OfAnimationsOfManyObjectsNeedFewAtATime) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit few = before;
+  few.rlim_cur = 64;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+  Mesh mesh;
+  mesh.position = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
+  mesh.normal.assign(3, Vec3::UnitZ());
+  mesh.triangle = {{0, 1, 2}};
+  std::vector<io::UsdObject> objects(100, {.name = "leaf"});
+  const std::vector<const Mesh*> meshes(objects.size(), &mesh);
+  EXPECT_NO_THROW({
+    io::UsdAnimation animation(path("many.usda"), 24.0, objects);
+    animation.add_frame(1, meshes, {});
+    animation.finish();
+  });
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  const std::string text = text_of(path("many.usda"));
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find("def Mesh", at)) != std::string::npos; ++at) ++count;
+  EXPECT_EQ(count, objects.size());
 }
 
 TEST_F(Files, OfAnimationsKeepWhatStaysByItsFirstAndLastFrame) {

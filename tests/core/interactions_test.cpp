@@ -381,6 +381,28 @@ TEST(ExternalLoads, ActInTheirWindowAndRampAtBothEnds) {
   EXPECT_EQ(lasting.factor(1e12), 1.0);
 }
 
+TEST(ExternalLoads, MeansOverStepsHoldTheWholeImpulse) {
+  const double inf = std::numeric_limits<double>::infinity();
+  const ExternalLoad blow{.begin = 0.512, .end = 0.523}, window{.begin = 0.23, .end = 0.61}, early{.end = 0.37},
+      ramped{.begin = 0.11, .end = 0.83, .ramp = 0.21}, peak{.begin = 0.31, .end = 0.45, .ramp = 0.3};
+  for (const auto& [load, impulse] : {std::pair{blow, 0.011}, {window, 0.38}, {early, 0.37}, {ramped, 0.72 - 0.21}, {peak, 0.14 * 0.14 / 4 / 0.3}}) {
+    double sum = 0.0, from = 0.0;
+    for (const double to : {0.1, 0.2, 0.25, 0.3, 0.4, 0.515, 0.52, 0.7, 0.8, 1.0}) {
+      sum += (to - from) * load.mean(from, to);
+      from = to;
+    }
+    EXPECT_NEAR(sum, impulse, 1e-15);
+  }
+  const ExternalLoad lasting{.begin = 0.0, .end = inf};
+  for (const double t : {0.0, 0.05, 1e6}) EXPECT_EQ(lasting.mean(t, t + 0.1), 1.0);
+  EXPECT_EQ(ramped.mean(0.4, 0.6), 1.0);
+  EXPECT_TRUE(blow.changes(0.4, 0.52));
+  EXPECT_TRUE(blow.changes(0.4, 0.6));
+  EXPECT_FALSE(blow.changes(0.53, 0.6));
+  EXPECT_FALSE(lasting.changes(0.1, 1e9));
+  EXPECT_FALSE(ramped.changes(0.33, 0.61));
+}
+
 TEST(ExternalLoads, AndGravityAreKeptApartFromInternalLoads) {
   Crowd crowd = make_crowd(10, 38);
   const Evaluated inside = evaluate_loads(crowd.p, crowd.interactions, Executor(1), 0.5);

@@ -57,12 +57,64 @@ TEST(Obstacles, CarryABallAsTheGroundDoes) {
     }
   }
   const double on_ground = rest_height(make(ball_over("ground: {height: 0, modulus: 1e6}")));
-  EXPECT_NEAR(rest_height(make(ball_over("obstacles: [{name: floor, shape: plane, modulus: 1e6}]"))), on_ground, 1e-9);
+  EXPECT_NEAR(rest_height(make(ball_over("obstacles: [{name: floor, shape: plane, normal: [0, 0, 3], modulus: 1e6}]"))), on_ground, 1e-9);
   EXPECT_NEAR(rest_height(make(ball_over(
-                  "obstacles: [{name: floor, shape: box, at: [0, 0, -0.5], half_sizes: [2, 2, 0.5], modulus: 1e6}]"))),
+                  "obstacles: [{name: floor, shape: box, at: [0, 0, -0.5], half_sizes: [0.5, 2, 2], turn_axis: [0, 3, 0], turn_deg: 90, modulus: 1e6}]"))),
               on_ground, 1e-7);
   EXPECT_NEAR(rest_height(make(ball_over("obstacles: [{name: floor, shape: heights, file: flat.csv, modulus: 1e6}]"), folder)),
               on_ground, 1e-7);
+}
+
+TEST(Obstacles, CarryFlatAndStraightBodiesAtRest) {
+  // Faces nearly parallel to the ground: nowhere nearest, so a rule that asks where they are must not lose the contact.
+  for (const char* shape : {"{shape: box, half_sizes: [0.15, 0.15, 0.1], kernel: {radius: 0.1}}",
+                            "{shape: disc, radius: 0.15, kernel: {radius: 0.1}}",
+                            "{shape: segment, half_length: 0.2, kernel: {radius: 0.1}}"}) {
+    Simulation simulation = make(std::string(R"(
+schema: 1
+duration: 2 s
+frame_rate: 20
+gravity: [0, 0, -9.81]
+contact: {error: 0.01}
+objects:
+  - name: a
+    particles: {at: [0, 0, 0.2], mass: 1}
+    skeleton: [)") + shape + R"(]
+    contact: {modulus: 1e5, friction: 0.5, dissipation: 2}
+    medium: {linear: 2, angular: 2}
+ground: {}
+)");
+    while (simulation.frame() < 40) simulation.step_frame();
+    EXPECT_LT(simulation.state().particles.velocity[0].norm(), 2e-3) << shape;
+    ASSERT_EQ(simulation.contacts().summary.size(), 1u) << shape;
+    EXPECT_NEAR(simulation.contact_forces()[0].norm(), 9.81, 0.05 * 9.81) << shape;
+    EXPECT_LT(simulation.audits().energy_error, 2e-2) << shape;
+  }
+}
+
+TEST(Obstacles, GiveATurningBoxNoEnergy) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 0.6 s
+frame_rate: 100
+gravity: [0, 0, -9.81]
+objects:
+  - name: box
+    particles: {at: [0.3, 0, 0.6], spin: [0, 4, 0], velocity: [0, 0, 1]}
+    skeleton: [{shape: box, half_sizes: [0.2, 0.2, 0.2], kernel: {radius: 0.1}}]
+    contact: {dissipation: 1}
+ground: {}
+)");
+  // Of a cube of half side h with rounded edges, about 2/3 m h^2.
+  EXPECT_NEAR(simulation.model().particles.inertia[0].x(), 2.0 / 3.0 * 0.24 * 0.24, 0.06 * 2.0 / 3.0 * 0.24 * 0.24);
+  double before = 0.0;
+  while (simulation.frame() < 61) {
+    simulation.step_frame();
+    EXPECT_GE(simulation.state().ledger.dissipated, before - 1e-9);
+    before = simulation.state().ledger.dissipated;
+  }
+  EXPECT_GT(before, 0.1);
+  EXPECT_LT(simulation.audits().energy_error, 2e-2);
 }
 
 /// A cuboid of half sizes (2, 2, 0.5) with its upper face at z = 0, as squares; `open` leaves one side out.

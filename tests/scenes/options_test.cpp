@@ -396,6 +396,12 @@ void add_contact(std::vector<Option>& all) {
   obstacle("rounding", "shape: box, at: [0.1, 0, -0.2], turn_deg: 20, turn_axis: [0, 1, 0], half_sizes: [0.2, 0.3, 0.1], rounding: $", "0", "0.05");
   obstacle("turn_axis", "shape: box, at: [0, 0, -0.2], half_sizes: [0.3, 0.3, 0.1], turn_deg: 10, turn_axis: $", "[0, 0, 1]", "[0, 1, 0]");
   obstacle("turn_deg", "shape: box, at: [0, 0, -0.2], half_sizes: [0.3, 0.3, 0.1], turn_axis: [0, 1, 0], turn_deg: $", "0", "10");
+  const std::string lift = "shape: box, half_sizes: [0.3, 0.3, 0.1], turn_axis: [0, 1, 0], between: smooth, keys: [{time: 0, at: [0, 0, -0.22]}, ";
+  obstacle("keys", "shape: plane, $", "at: [0, 0, -0.12]", "keys: [{time: 0, at: [0, 0, -0.12]}, {time: 0.2, at: [0, 0, -0.1]}]");
+  obstacle("keys.time", lift + "{time: $, at: [0, 0, -0.17]}]", "0.1", "0.2");
+  obstacle("keys.at", lift + "{time: 0.2, at: $}]", "[0, 0, -0.2]", "[0, 0, -0.15]");
+  obstacle("keys.turn_deg", lift + "{time: 0.2, at: [0, 0, -0.2], turn_deg: $}]", "0", "20");
+  obstacle("between=linear", "shape: plane, between: $, keys: [{time: 0, at: [0, 0, -0.13]}, {time: 0.2, at: [0, 0, -0.1]}]", "smooth", "linear");
   obstacle("file", "shape: heights, at: [0, 0, -0.12], file: $", "heights.csv", "more_heights.csv");
   obstacle("shape=mesh", "at: [0, 0, -0.2], $", "shape: box, half_sizes: [0.5, 0.5, 0.1]", "shape: mesh, file: block.obj");
   obstacle("voxel", "at: [0, 0, -0.2], shape: mesh, file: block.obj, voxel: $", "0.05", "0.04");

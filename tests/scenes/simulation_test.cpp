@@ -280,6 +280,40 @@ objects:
   }
 }
 
+TEST(Simulation, FeelsAWholeBlowHoweverShort) {
+  for (const char* method : {"symplectic", "rk4", "backward_euler"}) {
+    Simulation simulation = make(std::string(R"(
+schema: 1
+duration: 1 s
+frame_rate: 20
+integrator: {method: )") + method + R"(}
+objects:
+  - name: puck
+    particles: {mass: 2, inertia_radius: 0.1}
+    loads: [{particle: 0, force: [1000, 0, 0], from: 0.2571 s, until: 0.2671 s}]
+)");
+    while (simulation.time() < 0.5) simulation.step_frame();
+    EXPECT_NEAR(simulation.state().particles.velocity[0].x(), 5.0, 1e-12) << method;
+    EXPECT_LT(simulation.audits().momentum_error, 1e-14) << method;
+  }
+}
+
+TEST(Simulation, TakesASmallBodyFarFromTheOriginForWhatItIs) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 3 s
+frame_rate: 20
+time_step: {size: 1 ms}
+gravity: [0, 0, -9.81]
+objects:
+  - name: bead
+    particles: {at: [3 km, 0, 40], mass: 1 mg}
+    skeleton: [{shape: point, kernel: {radius: 1 mm}}]
+)");
+  for (int k = 0; k < 40; ++k) simulation.step_frame();
+  EXPECT_NEAR(simulation.state().particles.position[0].z(), 40.0 - 0.5 * 9.81 * 4.0, 1e-9);
+}
+
 TEST(Simulation, RefusesAStepFinerThanAllowedAndNamesTheKey) {
   try {
     (void)make(R"(

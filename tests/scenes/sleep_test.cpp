@@ -63,6 +63,14 @@ std::uint64_t visited(const Simulation& simulation, Stage stage) {
   return simulation.profile()[static_cast<std::size_t>(stage)].visited;
 }
 
+TEST(Sleep, DoesNotCatchWhatFallsSlowly) {
+  // Slower than sleep.speed for a second, five times sleep.time.
+  Simulation simulation = make(sleeping("gravity: [0, 0, -0.01]\n", "  - {name: a, particles: {arrange: single, mass: 0.2, inertia_radius: 0.1}}\n"));
+  while (simulation.time() < 4.0) simulation.step_frame();
+  EXPECT_FALSE(asleep(simulation, "a"));
+  EXPECT_NEAR(simulation.state().particles.position[0].z(), -0.5 * 0.01 * 16.0, 1e-12);
+}
+
 TEST(Sleep, OfEverythingCostsNoForceEvaluation) {
   Simulation simulation = make(sleeping(kGround, pairs()));
   run_until(simulation, [&] { return all_asleep(simulation); });

@@ -31,7 +31,13 @@ constexpr std::string_view kIndent = "            ";
                                    .hint = {}});
 }
 
-/// Text without a name in the file system, to be read again from its begin.
+/// A stretch of text in a Scratch.
+struct Piece {
+  off_t at = 0;
+  std::size_t size = 0;
+};
+
+/// Text without a name in the file system, that of all attributes in the order in which it came.
 class Scratch {
  public:
   explicit Scratch(const std::filesystem::path& beside) : path_(beside) {
@@ -50,28 +56,29 @@ class Scratch {
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;
 
-  void append(std::string_view text) {
-    if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail(path_, errno);
+  [[nodiscard]] Piece append(std::string_view text) {
+    if (::fseeko(file_, size_, SEEK_SET) != 0 || std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail(path_, errno);
+    const Piece piece{size_, text.size()};
+    size_ += static_cast<off_t>(text.size());
+    return piece;
   }
-  void copy_to(AtomicFile& out) {
-    if (std::fflush(file_) != 0) fail(path_, errno);
-    std::rewind(file_);
-    std::vector<char> buffer(std::size_t{1} << 16);
-    while (const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), file_)) {
-      out.append(std::string_view(buffer.data(), n));
-    }
-    if (std::ferror(file_) != 0) fail(path_, EIO);
+  void copy_to(AtomicFile& out, const Piece& piece) {
+    std::string text(piece.size, '\0');
+    if (::fseeko(file_, piece.at, SEEK_SET) != 0) fail(path_, errno);
+    if (std::fread(text.data(), 1, text.size(), file_) != text.size()) fail(path_, EIO);
+    out.append(text);
   }
 
  private:
   std::filesystem::path path_;
   std::FILE* file_ = nullptr;
+  off_t size_ = 0;
 };
 
 /// The time samples of one attribute. A value that stays is kept by its first and its last frame.
 class Track {
  public:
-  explicit Track(const std::filesystem::path& beside) : scratch_(beside) {}
+  explicit Track(Scratch& scratch) : scratch_(scratch) {}
 
   void add(int frame, std::string value) {
     if (last_ && value == *last_) {
@@ -87,20 +94,21 @@ class Track {
     out.append("        ");
     out.append(attribute);
     out.append(".timeSamples = {\n");
-    scratch_.copy_to(out);
+    for (const Piece& piece : pieces_) scratch_.copy_to(out, piece);
     out.append("        }\n");
   }
 
  private:
   void write(int frame, std::string_view value) {
-    scratch_.append(kIndent);
-    scratch_.append(std::to_string(frame));
-    scratch_.append(": ");
-    scratch_.append(value);
-    scratch_.append(",\n");
+    std::string line(kIndent);
+    line += std::to_string(frame) + ": ";
+    line += value;
+    line += ",\n";
+    pieces_.push_back(scratch_.append(line));
   }
 
-  Scratch scratch_;
+  Scratch& scratch_;
+  std::vector<Piece> pieces_;
   std::optional<std::string> last_;
   std::optional<int> repeated_;
 };
@@ -159,9 +167,9 @@ constexpr std::array<std::string_view, 3> kVelocity = {"velocity_x", "velocity_y
 /// One object over all frames.
 class Tracks {
  public:
-  explicit Tracks(std::filesystem::path beside)
-      : beside_(std::move(beside)), points_(beside_), normals_(beside_), extent_(beside_), counts_(beside_), indices_(beside_),
-        visibility_(beside_) {}
+  explicit Tracks(Scratch& scratch)
+      : scratch_(scratch), points_(scratch), normals_(scratch), extent_(scratch), counts_(scratch), indices_(scratch),
+        visibility_(scratch) {}
 
   void add(int frame, const Mesh& mesh) {
     SUPPLE_EXPECTS(mesh.normal.size() == mesh.vertex_count());
@@ -206,7 +214,7 @@ class Tracks {
   void add_columns(int frame, const Mesh& mesh) {
     for (const Mesh::Column& column : mesh.columns) {
       if (std::find(kVelocity.begin(), kVelocity.end(), column.name) != kVelocity.end()) continue;
-      const auto [at, fresh] = columns_.try_emplace(column.name, beside_);
+      const auto [at, fresh] = columns_.try_emplace(column.name, scratch_);
       if (!fresh) continue;
       for (const Seen& earlier : seen_) at->second.add(earlier.frame, zeros(earlier.vertices));
     }
@@ -222,7 +230,7 @@ class Tracks {
     std::array<const Mesh::Column*, 3> v{};
     for (std::size_t k = 0; k < 3; ++k) v[k] = find_column(mesh, kVelocity[k]);
     if (v[0] == nullptr || v[1] == nullptr || v[2] == nullptr) return;
-    if (!velocities_) velocities_.emplace(beside_);
+    if (!velocities_) velocities_.emplace(scratch_);
     std::vector<Vec3> velocity(mesh.vertex_count());
     for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] = Vec3(v[0]->values[i], v[1]->values[i], v[2]->values[i]);
     velocities_->add(frame, listed(velocity, append_tuple));
@@ -233,7 +241,7 @@ class Tracks {
     std::size_t vertices;
   };
 
-  std::filesystem::path beside_;
+  Scratch& scratch_;
   std::vector<Seen> seen_;
   Track points_, normals_, extent_, counts_, indices_, visibility_;
   std::optional<Track> velocities_;
@@ -253,8 +261,8 @@ std::string material_text(const std::string& name, const UsdObject& object) {
 /// One camera over all frames.
 class CameraTracks {
  public:
-  CameraTracks(const std::filesystem::path& beside, std::string name, double aspect)
-      : name_(std::move(name)), aspect_(aspect), transform_(beside), focal_length_(beside) {}
+  CameraTracks(Scratch& scratch, std::string name, double aspect)
+      : name_(std::move(name)), aspect_(aspect), transform_(scratch), focal_length_(scratch) {}
 
   void add(int frame, const UsdCamera& camera) {
     const Vec3 back = (camera.from - camera.look_at).normalized();
@@ -294,6 +302,7 @@ struct UsdAnimation::Impl {
   double frame_rate = 24.0;
   std::vector<UsdObject> objects;
   std::vector<std::string> names;          // unique USD names
+  std::optional<Scratch> scratch;
   std::vector<std::unique_ptr<Tracks>> tracks;
   std::vector<std::unique_ptr<CameraTracks>> cameras;
   std::set<std::string> taken = {"materials"};
@@ -310,11 +319,12 @@ UsdAnimation::UsdAnimation(std::filesystem::path path, double frame_rate, std::s
     : impl_(std::make_unique<Impl>()) {
   SUPPLE_EXPECTS(frame_rate > 0.0);
   impl_->path = std::move(path);
+  impl_->scratch.emplace(impl_->path);
   impl_->frame_rate = frame_rate;
   impl_->objects.assign(objects.begin(), objects.end());
   for (const UsdObject& object : objects) {
     impl_->names.push_back(impl_->unique_name(object.name));
-    impl_->tracks.push_back(std::make_unique<Tracks>(impl_->path));
+    impl_->tracks.push_back(std::make_unique<Tracks>(*impl_->scratch));
   }
 }
 
@@ -328,7 +338,7 @@ void UsdAnimation::add_frame(int frame, std::span<const Mesh* const> meshes, std
   for (std::size_t i = 0; i < meshes.size(); ++i) impl_->tracks[i]->add(frame, *meshes[i]);
   for (std::size_t i = impl_->cameras.size(); i < cameras.size(); ++i) {
     impl_->cameras.push_back(
-        std::make_unique<CameraTracks>(impl_->path, impl_->unique_name(cameras[i].name), cameras[i].aspect));
+        std::make_unique<CameraTracks>(*impl_->scratch, impl_->unique_name(cameras[i].name), cameras[i].aspect));
   }
   SUPPLE_EXPECTS(cameras.size() == impl_->cameras.size());
   for (std::size_t i = 0; i < cameras.size(); ++i) impl_->cameras[i]->add(frame, cameras[i]);

@@ -1,7 +1,8 @@
 /// @file supple/collision/sleep.h
-/// Bodies that rest need not be moved. A body is quiet while its kinetic energy over its mass is below speed^2 / 2; what
-/// touches, directly or through others, is an island. An island all of whose bodies have been quiet for long enough falls
-/// asleep, and wakes as a whole when one of them is woken. Solids that stand still join nothing.
+/// Bodies that rest need not be moved. A body is quiet while its kinetic energy over its mass is below speed^2 / 2; it rests
+/// when it has been quiet for long enough and something carried its load meanwhile. What touches, directly or through others,
+/// is an island. An island all of whose bodies rest falls asleep, and wakes as a whole when one of them is woken. Solids that
+/// stand still join nothing.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +23,7 @@ struct SleepRule {
 struct SleepState {
   static constexpr std::uint32_t kAwake = 0xffffffff;
   std::vector<double> quiet_for;      ///< how long the body has been quiet [s], up to the rule's time; shape [bodies]
+  std::vector<Vec3> quiet_from;       ///< its velocity when that began [m/s]; shape [bodies]
   std::vector<std::uint32_t> island;  ///< smallest body of those that it fell asleep with, or kAwake; shape [bodies]
 
   void reset(std::size_t bodies);     ///< all awake
@@ -32,11 +34,19 @@ struct SleepState {
   void hash(Hasher& hasher) const;
 };
 
-/// At the end of a step of `dt` [s]: bodies that are awake grow quieter, and islands that rest fall asleep.
-/// @param specific_energy  kinetic energy over mass [J/kg] of bodies that are awake, shape [bodies]
-/// @param joined           bodies that touch or act on each other; pairs with a number beyond the bodies (fixed ones) count not
+/// What a body does at the end of a step, all over its mass.
+struct BodyMotion {
+  double energy = 0.0;            ///< kinetic [J/kg]
+  Vec3 velocity = Vec3::Zero();   ///< of its centre [m/s]
+  Vec3 load = Vec3::Zero();       ///< gravity and other loads from outside [m/s^2]
+};
+
+/// At the end of a step of `dt` [s]: bodies that are awake grow quieter, and islands that rest fall asleep. A body that gave way
+/// to more than half of its load while it was quiet, v - v_then > load time / 2 along the load, falls and begins anew.
+/// @param motion  of bodies that are awake, shape [bodies]
+/// @param joined  bodies that touch or act on each other; pairs with a number beyond the bodies (fixed ones) count not
 /// @return bodies that fell asleep, ascending
-std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::span<const double> specific_energy,
+std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::span<const BodyMotion> motion,
                                        std::span<const BodyPair> joined, SleepState& state);
 
 /// Wakes whole islands. @return bodies that were asleep, ascending

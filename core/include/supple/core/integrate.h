@@ -47,7 +47,12 @@ struct ForceSample {
   Loads external;   ///< gravity and external loads
   Vec3 force_on_fixed = Vec3::Zero();   ///< what contact does to fixed bodies [N]: the moving ones lose its impulse
   Vec3 moment_on_fixed = Vec3::Zero();  ///< about the world origin [N m]
+  double power_of_fixed = 0.0;          ///< what fixed bodies that are led along do to the others [W]
+  double dissipated_at_fixed = 0.0;     ///< what damping and friction take of it [W]
   Loads dissipative;  ///< the part of `internal` that takes energy (contact damping, friction); empty: there is none
+
+  /// Zero loads on n particles, none dissipative.
+  void reset(std::size_t n);
 };
 
 /// The ordered stages 1 to 7 as one call: loads at a state and a time. Velocities are those of the half step.

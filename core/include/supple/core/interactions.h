@@ -96,6 +96,10 @@ struct ExternalLoad {
   double end = 0.0;             ///< [s], the first time without load; may be infinite
   double ramp = 0.0;            ///< rise and fall time inside the window [s]
   [[nodiscard]] double factor(double time) const;  ///< in [0, 1]
+  /// Mean of the factor over [from, to], from < to: a step that is given it holds the whole impulse, however short the load.
+  [[nodiscard]] double mean(double from, double to) const;
+  /// Whether the factor is another one somewhere in [from, to].
+  [[nodiscard]] bool changes(double from, double to) const;
 };
 
 struct Interactions {
@@ -128,6 +132,8 @@ struct Interactions {
   std::vector<StiffnessDamping> stiffness_damping;
   std::vector<ExternalLoad> external;
   Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
+  /// External loads are means over this span of time [s], that of a step; without extent, they are those of the moment.
+  std::array<double, 2> load_span{};
 
   /// True when no law needs the neighbour search.
   [[nodiscard]] bool bonded_only() const;
@@ -171,6 +177,9 @@ class InteractionWorkspace {
 InteractionCounts accumulate_interactions(const ParticleSet& set, const ParticleState& state,
                                           const Interactions& interactions, double time, const Executor& executor,
                                           InteractionWorkspace& workspace, Loads& internal, Loads& external);
+
+/// Gravity and the external loads, as means over [from, to] or, where both are one, of that moment; replaces the loads.
+void external_loads(const ParticleSet& set, const Interactions& interactions, double from, double to, Loads& external);
 
 /// Potential energy of all pair laws [J] (gravity and external loads are counted as external work). A geometric law is
 /// counted from the end of its range, so that a pair that comes or goes there changes nothing.

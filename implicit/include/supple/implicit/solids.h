@@ -1,9 +1,10 @@
 /// @file supple/implicit/solids.h
-/// Solids that stand still: walls, blocks and terrain for bodies to meet. Each is a ScalarField of one part whose value is
+/// Solids that do not give way: walls, blocks and terrain for bodies to meet. Each is a ScalarField of one part whose value is
 /// `slope` times a depth, so that with a modulus P its pressure rises by P slope a metre. HalfSpace is in field.h.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,8 @@ class SolidBox {
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
   /// Its surface with sharp edges, one quadrangle a face.
   [[nodiscard]] Mesh mesh() const;
+  /// The same box elsewhere.
+  [[nodiscard]] SolidBox placed(const Pose& pose) const { return {pose, half_, rounding_, slope_}; }
 
  private:
   double evaluate(const Vec3& point, Vec3* gradient) const;
@@ -71,6 +74,29 @@ class HeightField {
   std::vector<double> coefficient_;  // of the cubic B-spline, with one more on each border, shape [rows + 2][columns + 2]
   double slope_;
   double steepest_;                  // bound of |grad h|
+};
+
+/// Another field, which must outlive it, moved rigidly: F(x) = F_0(q^-1 (x - p)).
+class MovedField {
+ public:
+  MovedField(const FieldView& field, const Pose& pose);
+
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const;
+  [[nodiscard]] Interval bound(const Box& box) const { return field_.bound(local(box)); }
+  [[nodiscard]] double gradient_bound(const Box& box) const { return field_.gradient_bound(local(box)); }
+  [[nodiscard]] Box surface_box() const;
+  [[nodiscard]] double feature_size() const { return field_.feature_size(); }
+  [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
+
+ private:
+  [[nodiscard]] Box local(const Box& box) const;
+  [[nodiscard]] std::vector<Vec3> local(std::span<const Vec3> points) const;
+
+  FieldView field_;
+  Vec3 position_;
+  Mat3 rotation_;
 };
 
 }  // namespace supple::implicit

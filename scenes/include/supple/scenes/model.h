@@ -17,6 +17,7 @@
 #include "supple/implicit/surface_samples.h"
 #include "supple/implicit/volume.h"
 #include "supple/scenes/scene.h"
+#include "supple/scenes/solid_motion.h"
 
 namespace supple::scenes {
 
@@ -44,11 +45,14 @@ struct ObjectModel {
   LookDesc look;                          ///< decides which columns its meshes carry
 };
 
-/// A solid that stands still and touches every object that has contact.
+/// A solid that nothing moves, and that touches every object that has contact. Without keys it stands where it is; with
+/// keys they lead it, and `solid` is where its place is the origin.
 struct FixedBody {
   std::string name;
   std::variant<implicit::HalfSpace, implicit::SolidBox, implicit::HeightField, implicit::MeshSolid> solid;
   collision::ContactMaterial material;
+  SolidMotion motion{};
+  [[nodiscard]] bool led() const { return !motion.keys.empty(); }
   [[nodiscard]] implicit::FieldView field() const {
     return std::visit([](const auto& s) { return implicit::FieldView(s); }, solid);
   }
@@ -69,8 +73,11 @@ struct Model {
   MeshingDesc meshing;                    ///< how surfaces become meshes
   double cell = 0.0;                      ///< lattice cell for meshes and grids [m]; 0 when nothing has a surface
   double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
+  double largest_dissipation = 0.0;       ///< d of all pairs that touch [s/m]
   double smallest_length = 0.0;           ///< what a step must resolve: nearest rest distance or iso radius [m]
-  double scene_length = 0.0;              ///< diagonal of everything, for the divergence limits [m]
+  double solid_speed = 0.0;               ///< bound of the speed of obstacles that are led along [m/s]
+  double believable_distance = 0.0;       ///< farther from the origin no particle can have come but by divergence [m]
+  double believable_speed = 0.0;          ///< nor can it be faster [m/s]
 };
 
 /// @throws Error{Scene} for what only the whole scene shows (a pair naming an absent object, an iso value that no kernel

@@ -41,8 +41,11 @@ struct RunOptions {
   int frames_at_once = 0;                       ///< render_run: that are drawn at the same time; 0: one a thread, as memory allows
   double memory = 0.0;                          ///< for that, beyond the first one [byte]; 0: half of what the machine has free
   std::function<void(const Progress&)> progress{}; ///< called from the running thread; may be empty
-  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current frame (the signal's number)
+  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step (the signal's number)
 };
+
+inline constexpr const char* kOutOfMemory =
+    "memory: expected enough for the scene, found none left; fewer particles, bonds, samples or cells need less";
 
 /// CPU time of all pictures of a run, by their parts.
 struct PictureTimes {

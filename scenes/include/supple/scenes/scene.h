@@ -57,7 +57,7 @@ struct ParticlesDesc {
   Vec3 velocity = Vec3::Zero();       ///< initial [m/s]
   Vec3 spin = Vec3::Zero();           ///< initial, rigid, about the centre of mass [rad/s]
   double mass = 1.0;                  ///< of one particle [kg]
-  std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance, or the iso radius
+  std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance; of single particles, the moments of their solid
   Vec3 inertia_axes = Vec3::Zero();   ///< instead: semi-axes of a solid ellipsoid in the particle's frame [m]; zero: absent
 };
 
@@ -319,7 +319,16 @@ struct GroundDesc {
 
 enum class ObstacleName : std::uint8_t { Plane, Box, Heights, Mesh };
 
-/// obstacles[]: solids that stand still and touch every object that has contact
+enum class LeadName : std::uint8_t { Smooth, Linear };
+
+/// obstacles[].keys[]
+struct ObstacleKeyDesc {
+  double time = 0.0;                  ///< [s]
+  Vec3 at = Vec3::Zero();             ///< as of the obstacle [m]
+  double turn = 0.0;                  ///< box, mesh [rad] (key turn_deg)
+};
+
+/// obstacles[]: solids that stand still or are led along, and touch every object that has contact
 struct ObstacleDesc {
   std::string name;
   ObstacleName shape = ObstacleName::Box;
@@ -330,6 +339,8 @@ struct ObstacleDesc {
   double rounding = 0.0;              ///< box: radius of its edges [m]
   Vec3 turn_axis = Vec3::UnitZ();     ///< box, mesh, with turn
   double turn = 0.0;                  ///< box, mesh [rad] (key turn_deg)
+  std::vector<ObstacleKeyDesc> keys;  ///< instead of `at` and `turn`, rising in time
+  LeadName between = LeadName::Smooth;
   std::string file;                   ///< heights: CSV of x, y, z on a regular grid; mesh: OBJ or PLY; beside the scene
   std::optional<double> voxel;        ///< mesh [m]; absent: a 64th of its longest side
   Vec3 colour = Vec3(0.72, 0.74, 0.78);  ///< sRGB

@@ -34,7 +34,10 @@ struct SimulationOptions {
 /// Work of one stage so far.
 struct StageProfile {
   std::uint64_t calls = 0;
-  double cpu_s = 0.0;          ///< measured on every 64th call and scaled, unless profiling
+  double cpu_s = 0.0;          ///< unless profiling, measured on the first and every 64th call after it, and scaled
+  double first_s = 0.0;        ///< measured of the first call: what that sets up is not scaled
+  double later_s = 0.0;        ///< measured of later calls
+  std::uint64_t timed = 0;     ///< calls that were measured
   std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... looked at
   std::uint64_t present = 0;   ///< of so many
 };
@@ -80,10 +83,10 @@ class Simulation {
   /// What the steps of this object needed so far: sums, the largest last correction, and whether all met the tolerance.
   [[nodiscard]] const core::StepReport& integration() const;
 
-  /// One time step, frame time / 2^halvings. @throws Error{Diverged} naming particle, cause and value; the state is then
+  /// One time step, frame time / 2^halvings; one that ends a frame books its audits. @throws Error{Diverged} naming particle, cause and value; the state is then
   /// that of the last frame.
   void step();
-  /// Steps to the next frame and books its audits.
+  /// Steps to the next frame.
   void step_frame();
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
@@ -114,6 +117,8 @@ class Simulation {
 
   [[nodiscard]] Energies energies();
   [[nodiscard]] Audits audits() const;
+  /// What is odd about the start of the scene, as sentences.
+  [[nodiscard]] const std::vector<std::string>& warnings() const;
   /// Work by stage; the time of `advance` is without the force evaluations inside it.
   [[nodiscard]] Profile profile() const;
   /// Where a stage outside the simulation (render, export) books its work.
