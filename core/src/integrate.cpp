@@ -154,6 +154,18 @@ double half_work(const ParticleSet& set, RotationUpdate rotation, const Loads& e
   return work;
 }
 
+/// Half a step's kick with loads from outside that change in it: their work is their impulse times the mean velocity.
+void kick_changing(const ParticleSet& set, const ForceSample& sample, double dt, ParticleState& state, Ledger& ledger) {
+  const ParticleState before = state;
+  kick(set, sample, dt, state, ledger);
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    const Vec3 &force = sample.external.force[i], &torque = sample.external.torque[i];
+    if (!holds_position(set, i)) ledger.external_work += 0.5 * dt * force.dot(before.velocity[i] + state.velocity[i]);
+    if (holds_orientation(set, i) || torque == Vec3::Zero()) continue;
+    ledger.external_work += 0.5 * dt * torque.dot(angular_velocity(set, before, i) + angular_velocity(set, state, i));
+  }
+}
+
 void save_loads(const Loads& loads, StateWriter& out) {
   out.write(loads.force);
   out.write(loads.torque);
@@ -279,21 +291,22 @@ void advance(const ParticleSet& set, const Interactions& interactions, const For
                        [&](const ExternalLoad& load) { return load.changes(from, to); });
   };
   const double middle = time + 0.5 * dt, end = time + dt;
-  if (changes(time, middle)) external_loads(set, interactions, time, middle, sample.external);
+  const bool starts = changes(time, middle);
+  if (starts) external_loads(set, interactions, time, middle, sample.external);
 
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Forward, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
-  kick(set, sample, 0.5 * dt, state, ledger);
+  (starts ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
   drift(set, rotation, dt, state);
-  ledger.external_work += half_work(set, rotation, sample.external, state, dt);
+  if (!starts) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   evaluate(forces, state, end, sample);
   kick_state.valid = true;
-  const bool changing = changes(middle, end);
-  if (changing) external_loads(set, interactions, middle, end, sample.external);
-  ledger.external_work += half_work(set, rotation, sample.external, state, dt);
-  kick(set, sample, 0.5 * dt, state, ledger);
-  if (changing) external_loads(set, interactions, end, end, sample.external);
+  const bool ends = changes(middle, end);
+  if (ends) external_loads(set, interactions, middle, end, sample.external);
+  if (!ends) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
+  (ends ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
+  if (ends) external_loads(set, interactions, end, end, sample.external);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);

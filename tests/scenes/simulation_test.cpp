@@ -295,6 +295,9 @@ objects:
     while (simulation.time() < 0.5) simulation.step_frame();
     EXPECT_NEAR(simulation.state().particles.velocity[0].x(), 5.0, 1e-12) << method;
     EXPECT_LT(simulation.audits().momentum_error, 1e-14) << method;
+    if (std::string(method) == "symplectic") {
+      EXPECT_NEAR(simulation.state().ledger.external_work, 25.0, 1e-12);
+    }
   }
 }
 
