@@ -156,14 +156,18 @@ double half_work(const ParticleSet& set, RotationUpdate rotation, const Loads& e
 
 /// Half a step's kick with loads from outside that change in it: their work is their impulse times the mean velocity.
 void kick_changing(const ParticleSet& set, const ForceSample& sample, double dt, ParticleState& state, Ledger& ledger) {
-  const ParticleState before = state;
+  const auto half_of_work = [&] {
+    double work = 0.0;
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      const Vec3 &force = sample.external.force[i], &torque = sample.external.torque[i];
+      if (!holds_position(set, i)) work += 0.5 * dt * force.dot(state.velocity[i]);
+      if (!holds_orientation(set, i) && torque != Vec3::Zero()) work += 0.5 * dt * torque.dot(angular_velocity(set, state, i));
+    }
+    return work;
+  };
+  ledger.external_work += half_of_work();
   kick(set, sample, dt, state, ledger);
-  for (std::size_t i = 0; i < set.size(); ++i) {
-    const Vec3 &force = sample.external.force[i], &torque = sample.external.torque[i];
-    if (!holds_position(set, i)) ledger.external_work += 0.5 * dt * force.dot(before.velocity[i] + state.velocity[i]);
-    if (holds_orientation(set, i) || torque == Vec3::Zero()) continue;
-    ledger.external_work += 0.5 * dt * torque.dot(angular_velocity(set, before, i) + angular_velocity(set, state, i));
-  }
+  ledger.external_work += half_of_work();
 }
 
 void save_loads(const Loads& loads, StateWriter& out) {

@@ -405,7 +405,7 @@ double ExternalLoad::factor(double time) const {
 
 bool ExternalLoad::changes(double from, double to) const {
   const double steady = end - begin > 2.0 * ramp ? ramp : 0.5 * (end - begin);
-  return (from < begin + steady && to > begin) || (from < end && to > end - steady);
+  return (from < begin + steady && to >= begin) || (from < end && to >= end - steady);
 }
 
 double ExternalLoad::mean(double from, double to) const {

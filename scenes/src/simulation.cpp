@@ -489,7 +489,7 @@ struct Simulation::Impl {
     std::vector<std::uint32_t> loaded;
     if (awake.size() < bodies.size()) loaded = find_stirred(context(), state.particles, frame);
     for (const core::ExternalLoad& load : laws.external) {
-      if (!load.changes(time() - dt(), time() + dt())) continue;
+      if (!load.changes(time(), time() + dt())) continue;
       for (std::uint32_t i = 0; i < bodies.size(); ++i) {
         if (std::binary_search(bodies[i].particle.begin(), bodies[i].particle.end(), load.particle)) loaded.push_back(i);
       }

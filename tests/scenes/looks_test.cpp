@@ -251,7 +251,7 @@ TEST_F(Looks, AnAbsentTextureIsNamed) {
 
 TEST_F(Looks, CoarseMeshesOfBallsThatTouchLookLikeFineOnesWhenRaysMeetTheField) {
   if (!render::has_path_tracer()) GTEST_SKIP();
-  // Pressed together by a quarter of a radius, a third one beside them; one sample without a filter, so that shapes alone differ.
+  // Pressed together by a quarter of a radius, a third one beside them; many samples and no filter, so that shapes alone differ.
   const auto picture = [&](const char* cell, const char* exact) {
     return first_picture(parse_scene(std::string(R"(
 schema: 1
@@ -263,7 +263,7 @@ objects:
   - {name: b, particles: {arrange: single, at: [0.05, 0, 0.05]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 2000}}
 light: {direction: [-0.2, 1, -0.4], softness_deg: 0}
 camera: {from: [0, -2, 0.4], look_at: [-0.1, 0, 0], field_of_view_deg: 30}
-render: {renderer: path, noise: 0, most_samples: 16, denoise: false, exact_surface: )") + exact + "}\noutput: {images: {size: [96, 72]}, cell: " + cell + "}\n",
+render: {renderer: path, noise: 0, most_samples: 64, denoise: false, exact_surface: )") + exact + "}\noutput: {images: {size: [96, 72]}, cell: " + cell + "}\n",
                                      "looks.yaml", "."));
   };
   const render::Image fine = picture("0.01", "false");

@@ -98,7 +98,7 @@ struct ExternalLoad {
   [[nodiscard]] double factor(double time) const;  ///< in [0, 1]
   /// Mean of the factor over [from, to], from < to: a step that is given it holds the whole impulse, however short the load.
   [[nodiscard]] double mean(double from, double to) const;
-  /// Whether the factor changes between these times; not by what begins or ends at one of them.
+  /// Whether the factor changes after `from`, up to and at `to`.
   [[nodiscard]] bool changes(double from, double to) const;
 };
 
