@@ -275,6 +275,7 @@ void run_flags(CLI::App* verb, Arguments& a) {
 int parse_and_call(int argc, char** argv) {
   Arguments a;
   CLI::App app("supple: oriented particles, implicit surfaces, exact contact");
+  app.set_version_flag("--version", SUPPLE_VERSION);
   app.require_subcommand(1);
   app.footer("Exit codes: 0 done, 1 internal fault, 2 usage, 3 scene invalid, 4 input/output, 5 diverged, 6 limit,\n"
              "7 corrupt checkpoint, 130/143 interrupted.");

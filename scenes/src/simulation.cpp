@@ -108,11 +108,33 @@ struct Simulation::Impl {
     choose_step();
     book_audits();
     look_inside();
+    look_for_surfaces();
     for (const ObjectModel& object : model.objects) {
       const double thickness = 2.0 * object.iso_radius;
       if (!(model.cell > thickness && thickness > 0.0)) continue;
       warnings.push_back("output.cell: cells of " + number_text(model.cell) + " m may miss '" + object.name + "', which is " +
                          number_text(thickness) + " m thick");
+    }
+  }
+
+  /// Convolved primitives add up to less than their kernel, perhaps nowhere to the iso value.
+  void look_for_surfaces() {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const auto& primitives = bodies[i].skeleton.primitive;
+      if (std::none_of(primitives.begin(), primitives.end(), [](const implicit::Primitive& p) { return p.convolved; })) continue;
+      place_and_index(context(), state.particles, i, pulled);
+      const double iso = bodies[i].skeleton.iso;
+      double most = 0.0;
+      for (const implicit::Primitive& primitive : primitives) {
+        Vec3 middle = Vec3::Zero();
+        for (const Vec3& corner : primitive.control) middle += corner / static_cast<double>(primitive.control.size());
+        const Pose& pose = pulled.pose[i][primitive.part];
+        const Vec3 at = primitive.offset.position + primitive.offset.orientation * middle.cwiseProduct(primitive.stretch);
+        most = std::max(most, implicit::FieldView(pulled.field[i]).value(pose.position + pose.orientation * at) + iso);
+      }
+      if (most > iso) continue;
+      warnings.push_back("'" + bodies[i].name + "' may have no surface: in the middle of its primitives its field reaches " +
+                         number_text(most) + ", its iso value is " + number_text(iso));
     }
   }
 

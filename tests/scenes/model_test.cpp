@@ -10,6 +10,7 @@
 #include "supple/core/error.h"
 #include "supple/core/interactions.h"
 #include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
 namespace {
@@ -148,6 +149,25 @@ TEST(Model, ChoosesCellAndContactFrequencyFromTheSurfaces) {
 }
 
 // Hunt & Crossley: y - ln(1 + y) + e y + ln(1 - e y) = 0 with y = d v; table of the theory (7.7).
+TEST(Warnings, TellWhatIsOddAtTheStart) {
+  const auto warnings_of = [](const std::string& objects) {
+    return Simulation(parse_scene("schema: 1\nduration: 1 s\nground: {}\n" + objects, "test.yaml", ".")).warnings();
+  };
+  const std::string ball = "kernel: {radius: 0.3}}], contact: {}}\n";
+  EXPECT_TRUE(warnings_of("objects:\n  - {name: a, particles: {at: [0, 0, 0.2]}, skeleton: [{shape: point, " + ball).empty());
+  const auto sunk = warnings_of("objects:\n  - {name: a, particles: {at: [0, 0, -0.1]}, skeleton: [{shape: point, " + ball);
+  ASSERT_EQ(sunk.size(), 1u);
+  EXPECT_NE(sunk[0].find("'a' and 'ground' begin so deep"), std::string::npos) << sunk[0];
+  const auto coarse = warnings_of("output: {cell: 5}\nobjects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: [{shape: point, " + ball);
+  ASSERT_EQ(coarse.size(), 1u);
+  EXPECT_NE(coarse[0].find("cells of 5 m may miss 'a'"), std::string::npos) << coarse[0];
+  const auto thin = warnings_of(
+      "objects:\n  - {name: a, particles: {at: [0, 0, 1], inertia_radius: 0.1}, skeleton: [{shape: triangle, convolve: true, "
+      "points: [[0.2, 0, 0], [-0.1, 0.17, 0], [-0.1, -0.17, 0]], kernel: {type: cauchy, radius: 0.35}}]}\n");
+  ASSERT_EQ(thin.size(), 1u);
+  EXPECT_NE(thin[0].find("'a' may have no surface"), std::string::npos) << thin[0];
+}
+
 TEST(Planar, HoldsEveryParticleInOnePlane) {
   const Model model = model_of("planar: true\n" + std::string(kHead) + kSpiral);
   EXPECT_EQ(model.particles.pinned[0], core::kPinPosition | core::kPlanar);
