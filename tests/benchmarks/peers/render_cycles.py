@@ -7,8 +7,8 @@ Meshes, camera, sky, sun and matt colours are those of render_mitsuba.py, and so
 scene-linear EXR files; PSNR and FLIP are of the 8 bits. The reference is Cycles' own (1024 samples a pixel, not denoised, other
 seeds), kept in the work folder for the next time: the pictures of two renderers differ in systematic ways too, so each is measured
 against its own kind. The pictures of render_bench are compared with that reference as well, to show that the scene is the same.
-CPU seconds are of a scene that Cycles keeps, the least of two renderings below 16 samples; what the first one takes more (meshes handed over,
-hierarchies) is printed apart, and files and the start of the program are not part of either.
+CPU seconds are of a scene that Cycles keeps, the least of two renderings below 16 samples; what the first one takes
+more (meshes handed over, hierarchies) is printed apart, and files and the start of the program are not part of either.
 """
 import json
 import pathlib
