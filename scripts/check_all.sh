@@ -22,9 +22,8 @@ build_clang() {
 }
 test_clang() { ctest --test-dir "$clang_build" -j "$supple_jobs" --output-on-failure --no-tests=error; }
 
-# TBB is not built with the sanitizer, so races are looked for in our own code only.
 test_tsan() {
-  cd "$supple_root" && TSAN_OPTIONS="ignore_noninstrumented_modules=1 halt_on_error=1" \
+  cd "$supple_root" && TSAN_OPTIONS="suppressions=$here/tsan_suppressions.txt ignore_noninstrumented_modules=1 halt_on_error=1" \
     ctest --preset tsan -j "$supple_jobs" --no-tests=error
 }
 
