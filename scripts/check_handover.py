@@ -126,8 +126,10 @@ def vtk_table(path):
     return points, arrays, data.GetNumberOfVerts(), data.GetNumberOfLines()
 
 
-def check_vtk(folder, name, part):
-    files = frames_of(folder / part, f"{name}.*.vtp")
+def check_vtk(folder, name, part, of=None):
+    """Tables of a folder; `of` names the second kind that lies in it."""
+    files = frames_of(folder / part, f"{name}.{of + '.' if of else ''}[0-9]*.vtp")
+    part = of or part
     same, rows, lines = True, 0, 0
     for frame, path in files.items():
         points, arrays, verts, line_count = vtk_table(path)
@@ -219,6 +221,7 @@ def main():
     check_obj(folder, name, objects)
     check_vtk(folder, name, "particles")
     check_vtk(folder, name, "contacts")
+    check_vtk(folder, name, "contacts", "pairs")
     if list((folder / "frames").glob("*.exr")):
         check_exr(folder, name)
     check_blender(folder, name, objects)
