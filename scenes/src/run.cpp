@@ -206,13 +206,8 @@ class DrawingCrew {
   void book(int members, Simulation& simulation, const FrameWriter& writer, RunResult& result, Simulation& booked) const {
     result.pictures_drawn += writer.pictures_drawn();
     writer.add_warnings(result.warnings);
-    const PictureTimes t = writer.picture_times();
     const double share = 1.0 / members;
-    result.pictures.images += t.images;
-    result.pictures.encode_s += share * t.encode_s;
-    for (double render::RenderTimes::*part : {&render::RenderTimes::context, &render::RenderTimes::shaders, &render::RenderTimes::upload,
-                                              &render::RenderTimes::draw, &render::RenderTimes::read_back})
-      result.pictures.render.*part += share * t.render.*part;
+    result.pictures.add(writer.picture_times(), share);
     for (const Stage stage : {Stage::Polygonise, Stage::Render, Stage::Export}) {
       const StageProfile& own = simulation.profile(stage);
       StageProfile& sum = booked.profile(stage);
@@ -289,14 +284,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     result.frames = *last;
     result.pictures_drawn += writer.pictures_drawn();
     result.film = writer.finish(*simulation, report, *last);
-    const PictureTimes t = writer.picture_times();
-    result.pictures.images += t.images;
-    result.pictures.encode_s += t.encode_s;
-    result.pictures.render.context += t.render.context;
-    result.pictures.render.shaders += t.render.shaders;
-    result.pictures.render.upload += t.render.upload;
-    result.pictures.render.draw += t.render.draw;
-    result.pictures.render.read_back += t.render.read_back;
+    result.pictures.add(writer.picture_times(), 1.0);
     writer.add_warnings(result.warnings);
   });
 }

@@ -41,6 +41,14 @@ struct RenderTimes {
   double upload = 0.0;     ///< packing and handing over vertices, hierarchies of boxes
   double draw = 0.0;
   double read_back = 0.0;
+  /// Adds a share of other times.
+  void add(const RenderTimes& other, double share) {
+    context += share * other.context;
+    shaders += share * other.shaders;
+    upload += share * other.upload;
+    draw += share * other.draw;
+    read_back += share * other.read_back;
+  }
 };
 
 class Renderer {

@@ -52,6 +52,12 @@ struct PictureTimes {
   int images = 0;
   render::RenderTimes render;
   double encode_s = 0.0;    ///< PNG
+  /// Adds the images of another, and a share of its times.
+  void add(const PictureTimes& other, double share) {
+    images += other.images;
+    render.add(other.render, share);
+    encode_s += share * other.encode_s;
+  }
 };
 
 struct RunResult {
