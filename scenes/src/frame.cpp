@@ -147,10 +147,6 @@ void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& 
   }
 }
 
-bool rests(const StageContext& context, std::uint32_t i) {
-  return context.awake != nullptr && !std::binary_search(context.awake->begin(), context.awake->end(), i);
-}
-
 /// Calls use(i) for every body that is awake and collides.
 template <class Use>
 void for_awake(const StageContext& context, const Use& use) {
@@ -277,6 +273,10 @@ StageTimer::~StageTimer() {
   if (timed_) (p.timed++ == 0 ? p.first_s : p.later_s) += process_cpu_seconds() - begin_;
   p.cpu_s = p.first_s;
   if (p.timed > 1) p.cpu_s += p.later_s * static_cast<double>(p.calls - 1) / static_cast<double>(p.timed - 1);
+}
+
+bool rests(const StageContext& context, std::size_t body) {
+  return context.awake != nullptr && !std::binary_search(context.awake->begin(), context.awake->end(), static_cast<std::uint32_t>(body));
 }
 
 void place_and_index(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame) {

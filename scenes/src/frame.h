@@ -101,6 +101,9 @@ struct StageContext {
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
 };
 
+/// Whether a body is none of those that move.
+[[nodiscard]] bool rests(const StageContext& context, std::size_t body);
+
 /// Stages 2 and 3 for one body.
 void place_and_index(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame);
 

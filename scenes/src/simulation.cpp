@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fields_rules.h"
 #include "frame.h"
+#include "held_volumes.h"
 #include "model_faults.h"
 #include "overload.h"
 #include "read_scene_faults.h"
+#include "rest.h"
+#include "warnings.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 
@@ -101,74 +103,13 @@ struct Simulation::Impl {
     }
     state.volumes.resize(volumes);
     form_bodies();
-    measure_volumes();
+    measure_targets(context(), state.particles, pulled, model);
     for (const Body& body : bodies) state.samples.push_back({.distance = std::vector<double>(body.samples.size(), -1.0)});
     if (scene.sleep) state.sleep.reset(bodies.size());
     form_awake();
     choose_step();
     book_audits();
-    look_inside();
-    look_for_surfaces();
-    for (const ObjectModel& object : model.objects) {
-      const double thickness = 2.0 * object.iso_radius;
-      if (!(model.cell > thickness && thickness > 0.0)) continue;
-      warnings.push_back("output.cell: cells of " + number_text(model.cell) + " m may miss '" + object.name + "', which is " +
-                         number_text(thickness) + " m thick");
-    }
-  }
-
-  /// Convolved primitives add up to less than their kernel, perhaps nowhere to the iso value.
-  void look_for_surfaces() {
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const auto& primitives = bodies[i].skeleton.primitive;
-      if (std::none_of(primitives.begin(), primitives.end(), [](const implicit::Primitive& p) { return p.convolved; })) continue;
-      place_and_index(context(), state.particles, i, pulled);
-      const double iso = bodies[i].skeleton.iso;
-      double most = 0.0;
-      for (const implicit::Primitive& primitive : primitives) {
-        Vec3 middle = Vec3::Zero();
-        for (const Vec3& corner : primitive.control) middle += corner / static_cast<double>(primitive.control.size());
-        const Pose& pose = pulled.pose[i][primitive.part];
-        const Vec3 at = primitive.offset.position + primitive.offset.orientation * middle.cwiseProduct(primitive.stretch);
-        most = std::max(most, implicit::FieldView(pulled.field[i]).value(pose.position + pose.orientation * at) + iso);
-      }
-      if (most > iso) continue;
-      warnings.push_back("'" + bodies[i].name + "' may have no surface: in the middle of its primitives its field reaches " +
-                         number_text(most) + ", its iso value is " + number_text(iso));
-    }
-  }
-
-  /// Contacts that the only rule allowed does not fit: they push nobody.
-  void look_unresolved() {
-    if (scene.contact.rule == RuleName::Auto) return;
-    for (const auto& s : frame.surface.summary) {
-      if (s.error_estimate < 1.0 || s.force.norm() > 0.0) continue;
-      const std::string pair = '\'' + body_name(model, bodies, s.bodies.a) + "' and '" + body_name(model, bodies, s.bodies.b) + '\'';
-      const std::string text = "contact.rule: " + std::string(name_of(scene.contact.rule)) + " does not fit the contact of " + pair +
-                               ", which has no force where this is so; 'auto' fits all";
-      if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
-    }
-  }
-
-  /// Bodies that begin so deep in another that contact need not push them out.
-  void look_inside() {
-    const auto seen = [this](std::uint32_t i) {
-      return i >= bodies.size() || std::binary_search(pulled.reached.begin(), pulled.reached.end(), i);
-    };
-    for (const collision::BodyPair& pair : pulled.reaching) {
-      bool deep = false;
-      for (const auto& [inner, outer] : {std::pair{pair.a, pair.b}, std::pair{pair.b, pair.a}}) {
-        if (inner >= bodies.size() || !seen(inner) || !seen(outer)) continue;
-        for (const implicit::Primitive& primitive : bodies[inner].skeleton.primitive) {
-          const Pose& pose = pulled.pose[inner][primitive.part];
-          const Vec3 middle = pose.position + pose.orientation * primitive.offset.position;
-          deep = deep || pulled.bodies[outer].field.value(middle) > 0.0;
-        }
-      }
-      if (!deep) continue;
-      warnings.push_back('\'' + body_name(model, bodies, pair.a) + "' and '" + body_name(model, bodies, pair.b) +
-                         "' begin so deep in one another that contact may not part them");
-    }
+    warnings = find_odd_start(context(), state.particles, pulled);
   }
 
   StageContext context() {
@@ -189,7 +130,7 @@ struct Simulation::Impl {
   void form_bodies() {
     bodies = make_bodies(model, parted_links(model, state.links, state.broken_for));
     fade_blends(model, state.links, state.broken_for, bodies);
-    scale_kernels();
+    scale_kernels(model, state.volumes, bodies);
     watch.forget();
     rules = make_body_rules(model, bodies, state.apart);
     frame = Frame(model, bodies);
@@ -237,7 +178,7 @@ struct Simulation::Impl {
     SUPPLE_EXPECTS(state.sleep.island.size() == (scene.sleep ? bodies.size() : 0));
     std::vector<std::uint32_t> pushed;  // a state may have been given an impulse
     for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-      if (state.sleep.asleep(i) && motion_of(bodies[i]).energy > 0.0) pushed.push_back(i);
+      if (state.sleep.asleep(i) && motion_of(bodies[i], particles, state.particles, laws).energy > 0.0) pushed.push_back(i);
     }
     wake(pushed);
   }
@@ -283,83 +224,6 @@ struct Simulation::Impl {
       any = true;
     }
     return any;
-  }
-
-  /// Kernels of the bodies as the controllers of volume have them now.
-  void scale_kernels() {
-    for (Body& body : bodies) {
-      const ObjectModel& object = model.objects[body.object];
-      if (!object.holds_volume) continue;
-      const auto scale_of = [&](std::size_t primitive) {
-        switch (object.volume_of) {
-          case VolumeOfName::Object: return state.volumes[object.first_volume].scale;
-          case VolumeOfName::Particle: return state.volumes[object.first_volume + object.skeleton.primitive[primitive].part].scale;
-          case VolumeOfName::Primitive: break;
-        }
-        return state.volumes[object.first_volume + primitive].scale;
-      };
-      for (std::size_t k = 0; k < body.skeleton.primitive.size(); ++k) {
-        body.skeleton.primitive[k] = implicit::scaled(object.skeleton.primitive[k], scale_of(k));
-      }
-      for (std::size_t k = 0; k < body.samples.size(); ++k) {
-        body.samples.reach[k] = scale_of(body.samples.primitive[k]) * object.samples.reach[k];
-      }
-    }
-  }
-
-  /// Volumes of a body that its object holds [m^3]: its own, or those of its particles or primitives.
-  std::vector<double> volumes_of(std::size_t body) {
-    const ObjectModel& object = model.objects[bodies[body].object];
-    if (object.volume_of == VolumeOfName::Primitive) return primitive_volumes(bodies[body], object.volume_cell);
-    place_and_index(context(), state.particles, body, pulled);
-    if (object.volume_of == VolumeOfName::Particle) {
-      return implicit::part_volumes(pulled.field[body], object.volume_cell, object.target.size());
-    }
-    return {implicit::enclosed_volume(pulled.field[body], object.volume_cell)};
-  }
-
-  std::vector<double> primitive_volumes(const Body& body, double cell) const {
-    std::vector<Pose> poses;
-    for (const implicit::Primitive& primitive : body.skeleton.primitive) {
-      const std::uint32_t particle = body.particle[primitive.part];
-      poses.push_back({state.particles.position[particle], state.particles.orientation[particle]});
-    }
-    const implicit::Skeleton skeleton = implicit::by_primitive(body.skeleton);
-    implicit::PlacedSkeleton placed;
-    implicit::Field field;
-    implicit::place_skeleton(skeleton, poses, placed);
-    implicit::index_field(skeleton, placed, field);
-    return implicit::part_volumes(field, cell, poses.size());
-  }
-
-  /// Targets that the scene leaves to the start.
-  void measure_volumes() {
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      ObjectModel& object = model.objects[bodies[i].object];
-      if (!object.holds_volume) continue;
-      if (std::all_of(object.target.begin(), object.target.end(), [](double v) { return v > 0.0; })) continue;
-      const std::vector<double> volumes = volumes_of(i);
-      for (std::size_t k = 0; k < volumes.size(); ++k) {
-        if (!(object.target[k] > 0.0)) object.target[k] = volumes[k];
-      }
-    }
-  }
-
-  /// Between two steps: kernels grow or shrink towards the volume that their object, particle or primitive holds.
-  void control_volumes() {
-    bool any = false;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const ObjectModel& object = model.objects[bodies[i].object];
-      if (!object.holds_volume || state.sleep.asleep(i)) continue;
-      const std::vector<double> volumes = volumes_of(i);
-      for (std::size_t k = 0; k < volumes.size(); ++k) {
-        implicit::VolumeControl control = object.volume;
-        control.target = object.target[k];
-        if (control.target > 0.0) implicit::control_volume(control, volumes[k], dt(), state.volumes[object.first_volume + k]);
-      }
-      any = true;
-    }
-    if (any) scale_kernels();
   }
 
   /// Two pieces are apart when those that they broke from were.
@@ -545,36 +409,6 @@ struct Simulation::Impl {
     }
   }
 
-  /// What sleep asks about a body.
-  [[nodiscard]] collision::BodyMotion motion_of(const Body& body) const {
-    collision::BodyMotion motion;
-    double mass = 0.0;
-    for (const std::uint32_t p : body.particle) {
-      const Vec3& momentum = state.particles.angular_momentum[p];
-      motion.energy += 0.5 * particles.mass[p] * state.particles.velocity[p].squaredNorm() +
-                       0.5 * momentum.dot(core::angular_velocity(particles, state.particles, p));
-      motion.velocity += particles.mass[p] * state.particles.velocity[p];
-      motion.load += particles.mass[p] * core::free_translation(particles.pinned[p], laws.gravity);
-      mass += particles.mass[p];
-    }
-    for (const core::ExternalLoad& load : laws.external) {
-      if (!std::binary_search(body.particle.begin(), body.particle.end(), load.particle)) continue;
-      motion.load += load.factor(time()) * core::free_translation(particles.pinned[load.particle], load.force);
-    }
-    return {motion.energy / mass, motion.velocity / mass, motion.load / mass};
-  }
-
-  /// By body, of those that are awake.
-  [[nodiscard]] std::vector<collision::BodyMotion> awake_motion() const {
-    std::vector<collision::BodyMotion> motion(bodies.size());
-    for (const std::uint32_t i : awake) {
-      motion[i] = motion_of(bodies[i]);
-      // What still grows or shrinks does not rest.
-      if (model.objects[bodies[i].object].holds_volume) motion[i].energy = std::numeric_limits<double>::infinity();
-    }
-    return motion;
-  }
-
   /// After a step: islands that have been quiet for long enough stop, and what they had is booked as held and dissipated.
   void lay_to_sleep() {
     if (!scene.sleep || awake.empty()) return;
@@ -582,8 +416,13 @@ struct Simulation::Impl {
     for (const auto& s : frame.surface.summary) {
       if (s.force.norm() > 0.0) joined.push_back(s.bodies);
     }
+    std::vector<collision::BodyMotion> motion = motions_of(bodies, awake, particles, state.particles, laws, time());
+    for (const std::uint32_t i : awake) {
+      // What still grows or shrinks does not rest.
+      if (model.objects[bodies[i].object].holds_volume) motion[i].energy = std::numeric_limits<double>::infinity();
+    }
     const std::vector<std::uint32_t> slept =
-        collision::fall_asleep({scene.sleep->speed, scene.sleep->time}, dt(), awake_motion(), joined, state.sleep);
+        collision::fall_asleep({scene.sleep->speed, scene.sleep->time}, dt(), motion, joined, state.sleep);
     if (slept.empty()) return;
     for (const std::uint32_t i : slept) {
       for (const std::uint32_t p : bodies[i].particle) {
@@ -644,7 +483,7 @@ struct Simulation::Impl {
     wake_touched();
     watch_pressing();
     update_links();
-    control_volumes();
+    if (control_volumes(context(), state.particles, dt(), pulled, state.volumes)) scale_kernels(model, state.volumes, bodies);
     lay_to_sleep();
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
@@ -676,7 +515,7 @@ struct Simulation::Impl {
   /// At the end of a step: pairs that press harder than they can hold are noted, and turned back by hard cores.
   void watch_pressing() {
     if (!contact_on()) return;
-    look_unresolved();
+    add_unresolved(context(), scene.contact.rule, frame.surface, warnings);
     const bool barrier = scene.contact.core == CoreName::Barrier;
     if (barrier && integrator.settings.method != core::Integrator::Symplectic) {
       // The last trial of other methods need not be the state they end with.

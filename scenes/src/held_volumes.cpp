@@ -1,0 +1,85 @@
+#include "held_volumes.h"
+
+#include <algorithm>
+
+namespace supple::scenes {
+namespace {
+
+std::vector<double> primitive_volumes(const Body& body, const core::ParticleState& particles, double cell) {
+  std::vector<Pose> poses;
+  for (const implicit::Primitive& primitive : body.skeleton.primitive) {
+    const std::uint32_t particle = body.particle[primitive.part];
+    poses.push_back({particles.position[particle], particles.orientation[particle]});
+  }
+  const implicit::Skeleton skeleton = implicit::by_primitive(body.skeleton);
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  implicit::place_skeleton(skeleton, poses, placed);
+  implicit::index_field(skeleton, placed, field);
+  return implicit::part_volumes(field, cell, poses.size());
+}
+
+/// Volumes of a body that its object holds [m^3]: its own, or those of its particles or primitives.
+std::vector<double> volumes_of(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame) {
+  const ObjectModel& object = context.model.objects[context.bodies[body].object];
+  if (object.volume_of == VolumeOfName::Primitive) return primitive_volumes(context.bodies[body], particles, object.volume_cell);
+  place_and_index(context, particles, body, frame);
+  if (object.volume_of == VolumeOfName::Particle) {
+    return implicit::part_volumes(frame.field[body], object.volume_cell, object.target.size());
+  }
+  return {implicit::enclosed_volume(frame.field[body], object.volume_cell)};
+}
+
+}  // namespace
+
+void scale_kernels(const Model& model, const std::vector<implicit::VolumeState>& volumes, std::vector<Body>& bodies) {
+  for (Body& body : bodies) {
+    const ObjectModel& object = model.objects[body.object];
+    if (!object.holds_volume) continue;
+    const auto scale_of = [&](std::size_t primitive) {
+      switch (object.volume_of) {
+        case VolumeOfName::Object: return volumes[object.first_volume].scale;
+        case VolumeOfName::Particle: return volumes[object.first_volume + object.skeleton.primitive[primitive].part].scale;
+        case VolumeOfName::Primitive: break;
+      }
+      return volumes[object.first_volume + primitive].scale;
+    };
+    for (std::size_t k = 0; k < body.skeleton.primitive.size(); ++k) {
+      body.skeleton.primitive[k] = implicit::scaled(object.skeleton.primitive[k], scale_of(k));
+    }
+    for (std::size_t k = 0; k < body.samples.size(); ++k) {
+      body.samples.reach[k] = scale_of(body.samples.primitive[k]) * object.samples.reach[k];
+    }
+  }
+}
+
+void measure_targets(const StageContext& context, const core::ParticleState& particles, Frame& frame, Model& model) {
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    ObjectModel& object = model.objects[context.bodies[i].object];
+    if (!object.holds_volume) continue;
+    if (std::all_of(object.target.begin(), object.target.end(), [](double v) { return v > 0.0; })) continue;
+    const std::vector<double> volumes = volumes_of(context, particles, i, frame);
+    for (std::size_t k = 0; k < volumes.size(); ++k) {
+      if (!(object.target[k] > 0.0)) object.target[k] = volumes[k];
+    }
+  }
+}
+
+bool control_volumes(const StageContext& context, const core::ParticleState& particles, double dt, Frame& frame,
+                     std::vector<implicit::VolumeState>& volumes) {
+  bool any = false;
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    const ObjectModel& object = context.model.objects[context.bodies[i].object];
+    if (!object.holds_volume || rests(context, i)) continue;
+    const std::vector<double> found = volumes_of(context, particles, i, frame);
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      implicit::VolumeControl control = object.volume;
+      control.target = object.target[k];
+      if (control.target > 0.0) implicit::control_volume(control, found[k], dt, volumes[object.first_volume + k]);
+    }
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,91 @@
+#include "warnings.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "fields_rules.h"
+#include "read_scene_faults.h"
+
+namespace supple::scenes {
+namespace {
+
+std::string names_of(const StageContext& context, const collision::BodyPair& pair) {
+  return '\'' + body_name(context.model, context.bodies, pair.a) + "' and '" + body_name(context.model, context.bodies, pair.b) + '\'';
+}
+
+/// The middle of a primitive in the world: of its corners where it has some.
+Vec3 middle_of(const implicit::Primitive& primitive, const Pose& carrier) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& corner : primitive.control) middle += corner / static_cast<double>(primitive.control.size());
+  const Vec3 at = primitive.offset.position + primitive.offset.orientation * middle.cwiseProduct(primitive.stretch);
+  return carrier.position + carrier.orientation * at;
+}
+
+/// Bodies so deep in another that contact need not push them out: the middle of a primitive lies in the other.
+void add_deep(const StageContext& context, const Frame& frame, std::vector<std::string>& warnings) {
+  const auto seen = [&](std::uint32_t i) {
+    return i >= context.bodies.size() || std::binary_search(frame.reached.begin(), frame.reached.end(), i);
+  };
+  const auto lies_in = [&](std::uint32_t inner, std::uint32_t outer) {
+    if (inner >= context.bodies.size()) return false;
+    const auto& primitives = context.bodies[inner].skeleton.primitive;
+    return std::any_of(primitives.begin(), primitives.end(), [&](const implicit::Primitive& primitive) {
+      return frame.bodies[outer].field.value(middle_of(primitive, frame.pose[inner][primitive.part])) > 0.0;
+    });
+  };
+  for (const collision::BodyPair& pair : frame.reaching) {
+    if (!seen(pair.a) || !seen(pair.b) || !(lies_in(pair.a, pair.b) || lies_in(pair.b, pair.a))) continue;
+    warnings.push_back(names_of(context, pair) + " begin so deep in one another that contact may not part them");
+  }
+}
+
+/// Convolved primitives add up to less than their kernel, perhaps nowhere to the iso value.
+void add_without_surface(const StageContext& context, const core::ParticleState& particles, Frame& frame,
+                         std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+    const implicit::Skeleton& skeleton = context.bodies[i].skeleton;
+    const auto convolved = [](const implicit::Primitive& p) { return p.convolved; };
+    if (std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), convolved)) continue;
+    place_and_index(context, particles, i, frame);
+    double most = 0.0;
+    for (const implicit::Primitive& primitive : skeleton.primitive) {
+      const Vec3 middle = middle_of(primitive, frame.pose[i][primitive.part]);
+      most = std::max(most, implicit::FieldView(frame.field[i]).value(middle) + skeleton.iso);
+    }
+    if (most > skeleton.iso) continue;
+    warnings.push_back('\'' + context.bodies[i].name + "' may have no surface: in the middle of its primitives its field reaches " +
+                       number_text(most) + ", its iso value is " + number_text(skeleton.iso));
+  }
+}
+
+void add_missed(const Model& model, std::vector<std::string>& warnings) {
+  for (const ObjectModel& object : model.objects) {
+    const double thickness = 2.0 * object.iso_radius;
+    if (!(model.cell > thickness && thickness > 0.0)) continue;
+    warnings.push_back("output.cell: cells of " + number_text(model.cell) + " m may miss '" + object.name + "', which is " +
+                       number_text(thickness) + " m thick");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> find_odd_start(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+  std::vector<std::string> warnings;
+  add_deep(context, frame, warnings);
+  add_without_surface(context, particles, frame, warnings);
+  add_missed(context.model, warnings);
+  return warnings;
+}
+
+void add_unresolved(const StageContext& context, RuleName only, const collision::ContactSurface& surface,
+                    std::vector<std::string>& warnings) {
+  if (only == RuleName::Auto) return;
+  for (const auto& s : surface.summary) {
+    if (s.error_estimate < 1.0 || s.force.norm() > 0.0) continue;
+    const std::string text = "contact.rule: " + std::string(name_of(only)) + " does not fit the contact of " + names_of(context, s.bodies) +
+                             ", which has no force where this is so; 'auto' fits all";
+    if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
+  }
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,19 @@
+/// What a user may want to know of a scene that runs all the same, as sentences.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "frame.h"
+
+namespace supple::scenes {
+
+/// What is odd about the start: bodies deep in one another, objects without a surface, cells that miss objects.
+/// @param frame  of the contacts at the start
+[[nodiscard]] std::vector<std::string> find_odd_start(const StageContext& context, const core::ParticleState& particles, Frame& frame);
+
+/// Adds, once each, contacts that the only rule allowed does not fit: they push nobody.
+void add_unresolved(const StageContext& context, RuleName only, const collision::ContactSurface& surface,
+                    std::vector<std::string>& warnings);
+
+}  // namespace supple::scenes
