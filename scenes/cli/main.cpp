@@ -336,7 +336,7 @@ int parse_and_call(int argc, char** argv) {
   query_verb->add_option("--state", a.state, "a saved state instead of the initial one");
   query_verb->add_option("--points", a.points, "field: CSV of points");
   query_verb->add_option("--cells", a.cells, "mesh: cells along the longest side")->check(CLI::Range(4, 4096));
-  query_verb->add_option("--out", a.out, "mesh: .ply file or folder to write");
+  query_verb->add_option("--out", a.out, "mesh: .ply or .obj file, or folder, to write");
   query_verb->add_option("--error", a.error, "contact: relative error asked for")->check(CLI::Range(1e-10, 0.1));
   query_verb->add_option("--threads", a.threads, "threads")->check(CLI::Range(0, 1024));
   query_verb->add_flag("--samples", a.samples, "contact: every point of the contact surface too");

@@ -35,7 +35,7 @@ Quat from_z_to(const Vec3& direction) {
   return Quat(1.0 + a.z(), -a.y(), a.x(), 0.0).normalized();
 }
 
-core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
+core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std::string& key) {
   core::Arrangement out;
   switch (d.arrange) {
     case ArrangeKind::Single: out = core::arrange_single(); break;
@@ -47,7 +47,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d) {
       break;
     case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
     case ArrangeKind::File:
-      out.position = io::read_points_csv(scene.source.parent_path() / d.file);
+      out.position = read_for(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); });
       out.orientation.assign(out.position.size(), Quat::Identity());
       break;
   }
@@ -670,7 +670,7 @@ double largest_radius(const implicit::Primitive& p) {
 /// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
-  const core::Arrangement arrangement = arrange(scene, d.particles);
+  const core::Arrangement arrangement = arrange(scene, d.particles, key + ".particles");
   const auto n = static_cast<std::uint32_t>(arrangement.size());
   object.first = static_cast<std::uint32_t>(model.particles.size());
   object.last = object.first + n;

@@ -92,7 +92,7 @@ double stick_frequency(const ObjectModel& object, const core::ParticleSet& parti
 
 /// Heights at the points of a regular grid, in any order.
 implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults) {
-  std::vector<Vec3> points = io::read_points_csv(scene.source.parent_path() / d.file);
+  std::vector<Vec3> points = read_for(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); });
   std::sort(points.begin(), points.end(), [](const Vec3& a, const Vec3& b) {
     return a.y() != b.y() ? a.y() < b.y() : a.x() < b.x();
   });
@@ -119,7 +119,7 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
 
 /// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
 void add_mesh(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults, FixedBody& body) try {
-  Mesh mesh = io::read_mesh(scene.source.parent_path() / d.file);
+  Mesh mesh = read_for(key + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
   for (Vec3& x : mesh.position) x = d.at + turn * x;
   body.solid = implicit::MeshSolid(mesh, {.voxel = d.voxel.value_or(0.0), .slope = d.slope});

@@ -8,15 +8,18 @@
 #include <vector>
 
 #include "read_scene_faults.h"
+#include "scene_places.h"
 #include "supple/scenes/scene.h"
 
 namespace supple::scenes {
 
 class ModelFaults {
  public:
-  explicit ModelFaults(const Scene& scene) : place_(scene.source.string()) {}
+  explicit ModelFaults(const Scene& scene) : scene_(scene) {}
   void add(std::string key, std::string expected, std::string found, std::string hint) {
-    if (faults_.size() < 20) faults_.push_back({place_, std::move(key), std::move(expected), std::move(found), std::move(hint)});
+    if (faults_.size() == 20) return;
+    std::string place = place_of(scene_, key);
+    faults_.push_back({std::move(place), std::move(key), std::move(expected), std::move(found), std::move(hint)});
   }
   /// As `add`, but only the first of a key.
   void add_once(const std::string& key, std::string expected, std::string found, std::string hint) {
@@ -29,7 +32,7 @@ class ModelFaults {
   }
 
  private:
-  std::string place_;
+  const Scene& scene_;
   std::vector<Fault> faults_;
 };
 

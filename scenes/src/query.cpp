@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "supple/collision/approach.h"
@@ -79,15 +80,20 @@ std::string query_forces(Simulation& simulation) {
 }
 
 std::string query_contact(Simulation& simulation, bool samples) {
-  const double begin = process_cpu_seconds();
+  double cpu_s = std::numeric_limits<double>::infinity();
+  for (int time = 0; time < 3; ++time) {  // the first one finds caches empty
+    simulation.restore(State(simulation.state()));
+    const double begin = process_cpu_seconds();
+    (void)simulation.contacts();
+    cpu_s = std::min(cpu_s, process_cpu_seconds() - begin);
+  }
   const collision::ContactSurface& surface = simulation.contacts();
-  const double cpu_us = 1e6 * (process_cpu_seconds() - begin);
   const auto capacity = [bodies = simulation.contact_bodies()](const collision::ContactSurface::Summary& s) {
     return collision::contact_capacity(bodies[s.bodies.a], bodies[s.bodies.b], -s.force.normalized());
   };
   ordered_json json;
   json["time_s"] = simulation.time();
-  json["cpu_us"] = cpu_us;
+  json["cpu_us"] = 1e6 * cpu_s;
   ordered_json pairs = ordered_json::array();
   for (std::size_t k = 0; k < surface.summary.size(); ++k) {
     const auto& s = surface.summary[k];
@@ -150,6 +156,16 @@ std::string query_field(Simulation& simulation, const fs::path& points) {
 
 std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   if (query.cells > 0) simulation.set_cells(query.cells);
+  const fs::path extension = query.out.extension();
+  const bool is_file = extension == ".ply" || extension == ".obj";
+  if (!is_file && !extension.empty() && !fs::is_directory(query.out)) {
+    throw Error(ErrorKind::Usage, Fault{.place = "--out",
+                                        .key = {},
+                                        .expected = "expected a .ply or .obj file, or a folder",
+                                        .found = '\'' + query.out.string() + '\'',
+                                        .hint = "supple export writes usd"});
+  }
+  const auto write = extension == ".obj" ? io::write_obj : io::write_ply;
   const Model& model = simulation.model();
   const double begin = process_cpu_seconds();
   const std::vector<Mesh>& meshes = simulation.meshes();
@@ -173,13 +189,13 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
                        {"area_m2", report.area},
                        {"volume_m3", report.volume}});
     if (query.out.empty()) continue;
-    if (query.out.extension() == ".ply" && surfaces == 1) {
-      io::write_ply(query.out, meshes[i]);
+    if (is_file && surfaces == 1) {
+      write(query.out, meshes[i]);
     } else {
-      const fs::path folder = query.out.extension() == ".ply" ? query.out.parent_path() : query.out;
-      const std::string stem = query.out.extension() == ".ply" ? query.out.stem().string() + "." : std::string();
+      const fs::path folder = is_file ? query.out.parent_path() : query.out;
+      const std::string stem = is_file ? query.out.stem().string() + "." : std::string();
       if (!folder.empty()) io::make_writable_folder(folder);
-      io::write_ply(folder / (stem + model.objects[i].name + ".ply"), meshes[i]);
+      write(folder / (stem + model.objects[i].name + (is_file ? extension.string() : ".ply")), meshes[i]);
     }
   }
   json["objects"] = objects;

@@ -11,6 +11,7 @@
 
 #include "camera.h"
 #include "read_scene_archive.h"
+#include "scene_places.h"
 #include "supple/core/hash.h"
 
 namespace supple::scenes {
@@ -187,27 +188,27 @@ int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration
 
 Scene parse_scene(const std::string& text, const std::string& name, const std::filesystem::path& folder,
                   std::span<const std::string> overrides) {
-  FaultList faults;
-  Tree tree;
-  const std::uint32_t source = faults.add_source(name, text, false);
-  Node* root = parse_yaml(text, source, tree, faults);
+  const auto places = std::make_shared<ScenePlaces>();
+  SourceTexts& texts = places->texts;
+  Tree& tree = places->tree;
+  FaultList faults(texts);
+  const std::uint32_t source = texts.add(name, text, false);
+  Node* root = parse_yaml(texts.text(source), source, tree, faults);
   if (root == nullptr) {
     if (faults.count() == 0) faults.add({source, 1, 1}, "", "expected a scene", "an empty file", "begin with 'schema: 1'");
     faults.raise();
   }
-  std::vector<std::string> values;  // faults view them
-  values.reserve(overrides.size());
   for (const std::string& text_set : overrides) {
     const std::size_t equals = std::min(text_set.find('='), text_set.size());
-    values.push_back(equals < text_set.size() ? text_set.substr(equals + 1) : "");
-    const std::uint32_t set = faults.add_source("--set " + shown(text_set), values.back(), true);
+    const std::uint32_t set =
+        texts.add("--set " + shown(text_set), equals < text_set.size() ? text_set.substr(equals + 1) : "", true);
     const std::string_view path = std::string_view(text_set).substr(0, equals);
     if (equals == text_set.size() || path.empty() || path.front() == '.' || path.back() == '.' ||
         path.find("..") != std::string_view::npos) {
       faults.add({set, 1, 1}, "", "expected path.to.key=value", '\'' + shown(text_set) + '\'', "");
       continue;
     }
-    Node* value = parse_yaml(values.back(), set, tree, faults);
+    Node* value = parse_yaml(texts.text(set), set, tree, faults);
     if (value == nullptr) value = tree.make(Node::Kind::Null, {set, 1, 1});
     Override(tree, faults, set, path).apply(root, value);
   }
@@ -225,6 +226,8 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   std::sort(scene.objects.begin(), scene.objects.end(), by_name);
   std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
+  places->root = root;
+  scene.places = places;
   scene.content_hash = content_hash(*root, folder);
   scene.picture_hash = picture_hash(scene, *root, folder);
   return scene;

@@ -1,7 +1,6 @@
 #include "read_scene_archive.h"
 
 #include <algorithm>
-#include <charconv>
 #include <numbers>
 
 namespace supple::scenes {
@@ -51,29 +50,7 @@ void ReadArchive::check(bool holds, const std::string& key, std::string expected
   if (holds) return;
   const std::string path = path_.empty() ? key : key.empty() ? path_ : path_ + '.' + key;
   if (!key.empty() && faults_.has(path)) return;
-  const Node* node = &mapping_;
-  Mark mark = mapping_.mark;
-  for (std::string_view rest = key; !rest.empty();) {
-    if (rest[0] == '.') rest.remove_prefix(1);
-    if (rest[0] == '[') {
-      std::size_t index = 0;
-      const auto [end, error] = std::from_chars(rest.data() + 1, rest.data() + rest.size(), index);
-      if (error != std::errc() || node->kind != Node::Kind::List || index >= node->items.size()) break;
-      node = node->items[index];
-      rest.remove_prefix(static_cast<std::size_t>(end - rest.data()) + 1);
-    } else {
-      const std::size_t length = std::min(rest.find_first_of(".["), rest.size());
-      const Node::Entry* entry = node->find(rest.substr(0, length));
-      if (entry == nullptr) {
-        mark = node->mark;
-        break;
-      }
-      node = entry->value;
-      rest.remove_prefix(length);
-    }
-    mark = node->mark;
-  }
-  faults_.add(mark, path, std::move(expected), std::move(found), std::move(hint));
+  faults_.add(mark_of(mapping_, key), path, std::move(expected), std::move(found), std::move(hint));
 }
 
 void ReadArchive::finish() {
@@ -94,7 +71,11 @@ void ReadArchive::finish() {
                   "it belongs to " + selector + ": " + joined(users));
       continue;
     }
-    std::string hint = "known: " + joined(known_);
+    std::vector<std::string_view> names;  // kinds share keys
+    for (const std::string_view name : known_) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+    std::string hint = "known: " + joined(names);
     const std::string_view ours = our_word(key);
     std::string near = std::find(known_.begin(), known_.end(), ours) != known_.end() ? std::string(ours) : "";
     if (near.empty()) near = nearest_word(key, known_);

@@ -33,9 +33,24 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::uint32_t FaultList::add_source(std::string name, std::string_view text, bool whole) {
-  sources_.push_back({std::move(name), text, whole});
+std::uint32_t SourceTexts::add(std::string name, std::string text, bool whole) {
+  sources_.push_back({std::move(name), std::move(text), whole});
   return static_cast<std::uint32_t>(sources_.size() - 1);
+}
+
+std::string SourceTexts::place(Mark mark) const {
+  const Source& source = sources_[mark.source];
+  if (source.whole) return source.name;
+  std::size_t start = 0;
+  for (int line = 1; line < mark.line && start < source.text.size(); ++line) {
+    const std::size_t end = source.text.find('\n', start);
+    if (end == std::string::npos) break;
+    start = end + 1;
+  }
+  int column = 1;
+  const std::string_view before = std::string_view(source.text).substr(start, static_cast<std::size_t>(mark.column - 1));
+  for (const char c : before) column += continues_character(c) ? 0 : 1;
+  return source.name + ':' + std::to_string(mark.line) + ':' + std::to_string(column);
 }
 
 void FaultList::add(Mark mark, std::string key, std::string expected, std::string found, std::string hint) {
@@ -54,21 +69,6 @@ bool FaultList::has(std::string_view key) const {
   });
 }
 
-std::string FaultList::place(Mark mark) const {
-  const Source& source = sources_[mark.source];
-  if (source.whole) return source.name;
-  std::size_t start = 0;
-  for (int line = 1; line < mark.line && start < source.text.size(); ++line) {
-    const std::size_t end = source.text.find('\n', start);
-    if (end == std::string_view::npos) break;
-    start = end + 1;
-  }
-  int column = 1;
-  const std::string_view before = source.text.substr(start, static_cast<std::size_t>(mark.column - 1));
-  for (const char c : before) column += continues_character(c) ? 0 : 1;
-  return source.name + ':' + std::to_string(mark.line) + ':' + std::to_string(column);
-}
-
 void FaultList::raise() const {
   if (faults_.empty()) return;
   std::vector<Placed> sorted = faults_;
@@ -76,7 +76,7 @@ void FaultList::raise() const {
   std::vector<Fault> out;
   for (Placed& placed : sorted) {
     if (out.size() == kMostShown) break;
-    placed.fault.place = place(placed.mark);
+    placed.fault.place = texts_.place(placed.mark);
     out.push_back(std::move(placed.fault));
   }
   if (count_ > kMostShown) {

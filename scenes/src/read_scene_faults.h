@@ -5,6 +5,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <string>
 #include <string_view>
@@ -22,10 +23,28 @@ struct Mark {
   friend auto operator<=>(const Mark&, const Mark&) = default;
 };
 
+/// The texts that marks point into.
+class SourceTexts {
+ public:
+  /// @param whole  shown without line and column   @return Mark::source
+  std::uint32_t add(std::string name, std::string text, bool whole);
+  [[nodiscard]] const std::string& text(std::uint32_t source) const { return sources_[source].text; }
+  /// "file:line:column", or the name of a text that is shown whole.
+  [[nodiscard]] std::string place(Mark mark) const;
+
+ private:
+  struct Source {
+    std::string name;
+    std::string text;
+    bool whole = false;
+  };
+  std::deque<Source> sources_;
+};
+
 class FaultList {
  public:
-  /// A text that faults may point into; its views must outlive the list. @param whole  shown without line and column
-  std::uint32_t add_source(std::string name, std::string_view text, bool whole);
+  /// @param texts  outlives the list
+  explicit FaultList(const SourceTexts& texts) : texts_(texts) {}
   void add(Mark mark, std::string key, std::string expected, std::string found, std::string hint);
   [[nodiscard]] std::size_t count() const { return count_; }
   /// A fault at this key, above it or below it is listed.
@@ -34,18 +53,12 @@ class FaultList {
   void raise() const;
 
  private:
-  struct Source {
-    std::string name;
-    std::string_view text;
-    bool whole = false;
-  };
   struct Placed {
     Mark mark;
     Fault fault;
   };
-  [[nodiscard]] std::string place(Mark mark) const;
 
-  std::vector<Source> sources_;
+  const SourceTexts& texts_;
   std::vector<Placed> faults_;
   std::size_t count_ = 0;
 };

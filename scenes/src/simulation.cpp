@@ -319,7 +319,7 @@ struct Simulation::Impl {
     const int k = possible && step < frame_time() ? core::halvings(frame_time(), step) : 0;
     if (!possible || k > log2_of(desc.max_substeps)) {
       throw Error(ErrorKind::Limit,
-                  Fault{.place = scene.source.string(),
+                  Fault{.place = place_of(scene, "time_step.max_substeps"),
                         .key = "time_step.max_substeps",
                         .expected = "expected a stable step with at most " + std::to_string(desc.max_substeps) +
                                     " substeps a frame",

@@ -5,6 +5,7 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 #include <set>
 #include <sstream>
@@ -231,6 +232,35 @@ class Builder : public YAML::EventHandler {
   int documents_ = 0;
 };
 
+/// `rest` without `word` where it begins with it and the word ends there, or nothing.
+bool take(std::string_view& rest, std::string_view word) {
+  if (!rest.starts_with(word) || (rest.size() > word.size() && rest[word.size()] != '.' && rest[word.size()] != '[')) return false;
+  rest.remove_prefix(word.size());
+  return true;
+}
+
+/// The node below `list` that `rest` begins with, by index or by its longest fitting name, or null.
+const Node* item_of(const Node& list, std::string_view& rest) {
+  std::size_t index = 0;
+  if (rest.starts_with('[')) {
+    const auto [end, error] = std::from_chars(rest.data() + 1, rest.data() + rest.size(), index);
+    if (error != std::errc() || index >= list.items.size()) return nullptr;
+    rest.remove_prefix(std::min(rest.size(), static_cast<std::size_t>(end - rest.data()) + 1));
+    return list.items[index];
+  }
+  const Node* best = nullptr;
+  std::string_view after = rest;
+  for (const Node* node : list.items) {
+    const Node::Entry* name = node->kind == Node::Kind::Mapping ? node->find("name") : nullptr;
+    std::string_view left = rest;
+    if (name == nullptr || !take(left, name->value->text) || left.size() >= after.size()) continue;
+    best = node;
+    after = left;
+  }
+  rest = after;
+  return best;
+}
+
 }  // namespace
 
 const Node::Entry* Node::find(std::string_view key) const {
@@ -256,6 +286,20 @@ Node* Tree::make(Node::Kind kind, Mark mark) {
 }
 
 Node* Tree::copy(const Node& node) { return &nodes_.emplace_back(node); }
+
+Mark mark_of(const Node& node, std::string_view key) {
+  const Node* at = &node;
+  while (!key.empty()) {
+    if (key.front() == '.') key.remove_prefix(1);
+    const Node* below = at->kind == Node::Kind::List ? item_of(*at, key) : nullptr;
+    for (const Node::Entry& entry : at->entries) {
+      if (below == nullptr && take(key, entry.key)) below = entry.value;
+    }
+    if (below == nullptr) break;
+    at = below;
+  }
+  return at->mark;
+}
 
 Node* parse_yaml(const std::string& text, std::uint32_t source, Tree& tree, FaultList& faults) {
   if (!fit_to_parse(text, source, faults)) return nullptr;

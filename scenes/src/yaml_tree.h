@@ -39,6 +39,10 @@ struct Node {
   [[nodiscard]] std::string described() const;
 };
 
+/// Where a key below a node stands, or the nearest one above it that is given.
+/// @param key  "objects.ball.skeleton[0].radius", "" for the node; items of a list by index or by their `name`
+[[nodiscard]] Mark mark_of(const Node& node, std::string_view key);
+
 /// Owner of nodes; addresses stay valid. Nodes may be shared by aliases.
 class Tree {
  public:

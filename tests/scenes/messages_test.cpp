@@ -68,6 +68,25 @@ TEST_P(Message, ReadsAsAgreed) {
 
 INSTANTIATE_TEST_SUITE_P(Golden, Message, testing::ValuesIn(names()), [](const auto& instance) { return instance.param; });
 
+TEST(Messages, OfFilesThatAreAbsentNameTheirKey) {
+  const Scene scene = parse_scene(R"(
+schema: 1
+duration: 1 s
+frame_rate: 24
+objects:
+  - {name: ball, particles: {arrange: file, file: absent.csv, mass: 1}, skeleton: [{shape: point, kernel: {radius: 0.1}}]}
+)", "scene.yaml", "");
+  try {
+    (void)build_model(scene);
+    FAIL() << "a file that is absent was read";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Io);
+    ASSERT_EQ(error.faults().size(), 1u);
+    EXPECT_EQ(error.faults()[0].place, "absent.csv");
+    EXPECT_EQ(error.faults()[0].key, "objects.ball.particles.file");
+  }
+}
+
 TEST(Messages, AreAtLeastForty) { EXPECT_GE(names().size(), 40u); }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/read_mesh.h"
 #include "supple/implicit/surface_grid.h"
 #include "supple/render/image.h"
 #include "supple/render/layers.h"
@@ -487,6 +488,17 @@ TEST(Query, AnswersForcesContactFieldAndMeshAsJson) {
   const json mesh = json::parse(query_mesh(simulation, {.cells = 24, .out = {}}));
   EXPECT_TRUE(mesh.at("objects")[0].at("closed").get<bool>());
   EXPECT_EQ(mesh.at("objects")[0].at("euler_characteristic"), 2);
+  const fs::path file = fs::path(testing::TempDir()) / "queried.obj";
+  (void)query_mesh(simulation, {.cells = 24, .out = file});
+  std::size_t vertices = 0;
+  for (const auto& object : mesh.at("objects")) {
+    const std::string name = object.at("name");
+    const Mesh written = io::read_mesh(mesh.at("objects").size() == 1 ? file : file.parent_path() / ("queried." + name + ".obj"));
+    EXPECT_EQ(written.vertex_count(), object.at("vertices").get<std::size_t>());
+    vertices += written.vertex_count();
+  }
+  EXPECT_GT(vertices, 0u);
+  EXPECT_THROW((void)query_mesh(simulation, {.cells = 24, .out = "mesh.stl"}), Error);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -401,6 +402,8 @@ struct OutputDesc {
   std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
 };
 
+struct ScenePlaces;
+
 struct Scene {
   int schema = 1;
   std::string title;
@@ -424,6 +427,7 @@ struct Scene {
   std::optional<GroundDesc> ground;
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key
+  std::shared_ptr<const ScenePlaces> places;  ///< where its keys stand in that file, for messages; not a key
   std::uint64_t content_hash = 0;     ///< of all keys but those of looks, output and duration, and of files they name; not a key
   std::uint64_t picture_hash = 0;     ///< of all keys that decide a picture of a state, and of files they name; not a key
 

@@ -1,0 +1,37 @@
+/// @file scene_places.h
+/// Where the keys of a scene stand in its file, for faults that only the whole scene shows.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "supple/scenes/scene.h"
+#include "yaml_tree.h"
+
+namespace supple::scenes {
+
+struct ScenePlaces {
+  SourceTexts texts;
+  Tree tree;
+  const Node* root = nullptr;
+};
+
+/// "file:line:column" of a key, or of the nearest one above it that is given; the file alone of a scene that was not read.
+/// @param key  as in messages and overrides: "objects.ball.skeleton[0].radius"
+[[nodiscard]] std::string place_of(const Scene& scene, std::string_view key);
+
+/// Reads what a key names, so that faults of that file name the key too. @param read  called with nothing
+template <class Read>
+auto read_for(const std::string& key, Read&& read) try {
+  return std::forward<Read>(read)();
+} catch (const Error& error) {
+  std::vector<Fault> faults = error.faults();
+  for (Fault& fault : faults) {
+    if (fault.key.empty()) fault.key = key;
+  }
+  throw Error(error.kind(), std::move(faults));
+}
+
+}  // namespace supple::scenes
