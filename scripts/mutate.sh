@@ -8,9 +8,15 @@ source "$here/dependencies.sh"
 source "$here/parts.sh"
 
 if [[ ${1:-} == -h || ${1:-} == --help ]]; then
-  echo "usage: scripts/mutate.sh [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
+  echo "usage: scripts/mutate.sh [--check] [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
+  echo "--check builds nothing: it says whether every defect still has its place in the sources."
   echo "A module all of whose defects are killed gets its report, docs/reports/mutations/MODULE.md."
   exit 0
+fi
+check=0
+if [[ ${1:-} == --check ]]; then
+  check=1
+  shift
 fi
 modules=("$@")
 if ((${#modules[@]} == 0)); then
@@ -23,6 +29,32 @@ for module in "${modules[@]}"; do
   [[ -f $supple_root/tests/$module/mutations.txt ]] ||
     { echo "error: tests/$module/mutations.txt: not found" >&2; exit 2; }
 done
+
+# split_line LINE: the four fields in `field`, with \| turned into |.
+split_line() {
+  mapfile -t field < <(perl -e 'print map { s/\\\|/|/gr . "\n" } split /(?<!\\)\|/, $ARGV[0], -1' -- "$1")
+}
+
+# has_once FILE TEXT
+has_once() { perl -0777 -e '
+  my ($name, $text) = @ARGV;
+  open my $in, "<", $name or die "$name: $!\n";
+  my $count = () = <$in> =~ /\Q$text\E/g;
+  die "$name: expected the source text once, found it $count times: $text\n" unless $count == 1;' -- "$1" "$2"; }
+
+if ((check)); then
+  lost=0
+  for module in "${modules[@]}"; do
+    while IFS= read -r line || [[ -n $line ]]; do
+      [[ -z $line || $line == \#* ]] && continue
+      split_line "$line"
+      ((${#field[@]} == 4)) && (cd "$supple_root" && has_once "${field[0]}" "${field[1]}") && continue
+      echo "tests/$module/mutations.txt: $line"
+      lost=1
+    done <"$supple_root/tests/$module/mutations.txt"
+  done
+  exit $lost
+fi
 install_packages build test
 
 work=$(mktemp -d "${TMPDIR:-/tmp}/supple_mutate.XXXXXX")
@@ -33,26 +65,11 @@ tar -C "$supple_root" --exclude=./build --exclude=./out --exclude=./.git -cf - .
 # The copy lies elsewhere each time; relative paths let the cache know it again.
 export CCACHE_BASEDIR=$tree CCACHE_NOHASHDIR=1
 
+# plant FILE FROM TO: replaces what it has once.
+plant() { perl -0777 -pi -e 'BEGIN { ($from, $to) = splice @ARGV, 0, 2 } s/\Q$from\E/$to/' -- "$2" "$3" "$1"; }
+
 # build TARGET: to a log, quietly.
 build() { cmake --build "$work/build" --target "$1" >"$work/build.log" 2>&1; }
-
-# fields LINE: the four fields in `field`, with \| turned into |.
-split_line() {
-  mapfile -t field < <(perl -e 'print map { s/\\\|/|/gr . "\n" } split /(?<!\\)\|/, $ARGV[0], -1' -- "$1")
-}
-
-# replace_once FILE FROM TO: fails unless FROM occurs exactly once.
-replace_once() {
-  perl -0777 -e '
-    my ($name, $from, $to) = @ARGV;
-    open my $in, "<", $name or die "$name: $!\n";
-    my $text = <$in>;
-    my $count = () = $text =~ /\Q$from\E/g;
-    die "$name: expected the source text once, found it $count times: $from\n" unless $count == 1;
-    $text =~ s/\Q$from\E/$to/;
-    open my $out, ">", $name or die "$name: $!\n";
-    print $out $text;' -- "$1" "$2" "$3"
-}
 
 echo "configuring a copy of the tree"
 cmake -S "$tree" -B "$work/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPPLE_BUILD_TOOL=OFF >"$work/configure.log" 2>&1 ||
@@ -101,9 +118,9 @@ for module in "${modules[@]}"; do
       verdict="the tests fail without the defect"
     elif ! grep -Eq '\[  PASSED  \] [1-9][0-9]* test' "$work/test.log"; then
       verdict="the filter names no test"
-    elif ! replace_once "$tree/$file" "$from" "$to" 2>"$work/error"; then
+    elif ! has_once "$tree/$file" "$from" 2>"$work/error"; then
       verdict=$(sed "s|$tree/||" "$work/error")
-    elif ! build "$target"; then
+    elif ! plant "$tree/$file" "$from" "$to" || ! build "$target"; then
       verdict="does not compile"
     elif timeout 120 "$program" --gtest_brief=1 --gtest_filter="$filter" >"$work/test.log" 2>&1; then
       verdict=survived

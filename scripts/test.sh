@@ -29,6 +29,7 @@ small_film() {
 logs=$supple_root/build/logs
 install_packages build run test
 
+part "planted defects have places" "$logs/mutate_check.log" "$here/mutate.sh" --check || true
 if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON; then
   part "tests (release)" "$logs/tests_release.log" run_tests release || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true

@@ -396,6 +396,8 @@ TEST(ExternalLoads, MeansOverStepsHoldTheWholeImpulse) {
   const ExternalLoad lasting{.begin = 0.0, .end = inf};
   for (const double t : {0.0, 0.05, 1e6}) EXPECT_EQ(lasting.mean(t, t + 0.1), 1.0);
   EXPECT_EQ(ramped.mean(0.4, 0.6), 1.0);
+  EXPECT_NEAR(ramped.mean(0.15, 0.25), 0.09 / 0.21, 1e-15);  // the factor is linear in either ramp
+  EXPECT_NEAR(ramped.mean(0.7, 0.8), 0.08 / 0.21, 1e-15);
   EXPECT_TRUE(blow.changes(0.4, 0.52));
   EXPECT_TRUE(blow.changes(0.4, 0.6));
   EXPECT_FALSE(blow.changes(0.53, 0.6));

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "rest.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
 
@@ -168,6 +169,21 @@ TEST(Sleep, KeepsTheMomentumOfACollision) {
   Simulation awake = make("schema: 1\nduration: 20 s\nframe_rate: 20\ncontact: {error: 1e-2}\nobjects:\n" + objects);
   while (awake.time() < simulation.time()) awake.step();
   EXPECT_NEAR(simulation.state().particles.velocity[2].x(), awake.state().particles.velocity[2].x(), 1e-9);
+}
+
+TEST(Rest, IsMeasuredOverTheMassOfABody) {
+  const Simulation simulation = make(
+      "schema: 1\nduration: 1 s\nframe_rate: 20\ngravity: [0, 0, -9.8]\nobjects:\n"
+      "  - name: pair\n    particles: {arrange: line, count: 2, spacing: 0.4, mass: 0.25, velocity: [0, 2, 0]}\n"
+      "    skeleton: [{shape: point, kernel: {radius: 0.2}}]\n"
+      "    loads: [{particle: 1, force: [3, 0, 0], from: 0 s, until: 0.5 s}]\n");
+  const auto motion = [&](double time) {
+    return motions_of(simulation.bodies(), {0}, simulation.model().particles, simulation.state().particles, simulation.laws(), time)[0];
+  };
+  EXPECT_DOUBLE_EQ(motion(0.2).energy, 2.0);
+  EXPECT_TRUE(motion(0.2).velocity.isApprox(Vec3(0, 2, 0), 1e-15));
+  EXPECT_TRUE(motion(0.2).load.isApprox(Vec3(6, 0, -9.8), 1e-15));
+  EXPECT_TRUE(motion(0.7).load.isApprox(Vec3(0, 0, -9.8), 1e-15));
 }
 
 TEST(Sleep, EndsWhenALoadChanges) {
