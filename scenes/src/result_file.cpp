@@ -55,6 +55,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
     json["audits"] = {{"momentum_error", audits.momentum_error},
                       {"angular_momentum_error", audits.angular_momentum_error},
                       {"energy_error", audits.energy_error},
+                      {"energy_returned", audits.energy_returned},
                       {"contact_residual", audits.contact_residual},
                       {"largest_overlap", audits.largest_overlap},
                       {"largest_overlap_share", audits.largest_overlap_share},

@@ -638,6 +638,8 @@ struct Simulation::Impl {
     r.largest_energy = std::max(r.largest_energy, energy);
     r.energy_error =
         std::max(r.energy_error, std::abs(energy - r.initial_energy - ledger.external_work + ledger.dissipated));
+    r.most_dissipated = std::max(r.most_dissipated, ledger.dissipated);
+    r.energy_returned = std::max(r.energy_returned, r.most_dissipated - ledger.dissipated);
     for (const auto& s : pulled.surface.summary) {
       r.contact_residual = std::max(r.contact_residual, s.residual);
       r.largest_overlap = std::max(r.largest_overlap, s.largest_overlap);
@@ -760,6 +762,7 @@ Audits Simulation::audits() const {
   return {.momentum_error = share(r.momentum_error, r.momentum_scale),
           .angular_momentum_error = share(r.angular_momentum_error, r.angular_momentum_scale),
           .energy_error = share(r.energy_error, r.largest_energy),
+          .energy_returned = share(r.energy_returned, r.largest_energy),
           .contact_residual = r.contact_residual,
           .largest_overlap = r.largest_overlap,
           .largest_overlap_share = r.largest_overlap_share};

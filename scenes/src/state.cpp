@@ -9,7 +9,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 6;
+constexpr std::uint64_t kVersion = 7;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -27,8 +27,8 @@ void save_record(StateWriter& out, const RunRecord& r) {
   write(out, r.initial.angular_momentum);
   out.write(r.initial.kinetic_energy);
   for (const double value : {r.initial_energy, r.largest_energy, r.momentum_scale, r.angular_momentum_scale,
-                             r.momentum_error, r.angular_momentum_error, r.energy_error, r.contact_residual,
-                             r.largest_overlap, r.largest_overlap_share}) {
+                             r.momentum_error, r.angular_momentum_error, r.energy_error, r.most_dissipated, r.energy_returned,
+                             r.contact_residual, r.largest_overlap, r.largest_overlap_share}) {
     out.write(value);
   }
   out.write(std::uint64_t{r.objects.size()});
@@ -53,8 +53,8 @@ void load_record(StateReader& in, RunRecord& r) {
   read(in, r.initial.angular_momentum);
   in.read(r.initial.kinetic_energy);
   for (double* value : {&r.initial_energy, &r.largest_energy, &r.momentum_scale, &r.angular_momentum_scale,
-                        &r.momentum_error, &r.angular_momentum_error, &r.energy_error, &r.contact_residual,
-                        &r.largest_overlap, &r.largest_overlap_share}) {
+                        &r.momentum_error, &r.angular_momentum_error, &r.energy_error, &r.most_dissipated, &r.energy_returned,
+                        &r.contact_residual, &r.largest_overlap, &r.largest_overlap_share}) {
     in.read(*value);
   }
   std::uint64_t n = 0;

@@ -79,7 +79,7 @@ TEST_F(Run, LeavesFramesFilmTablesStatesAndAResult) {
   EXPECT_EQ(r.at("outcome"), "done");
   EXPECT_EQ(r.at("frames"), 5);
   EXPECT_EQ(r.at("state_hash").get<std::string>().size(), 16u);
-  for (const char* key : {"momentum_error", "angular_momentum_error", "energy_error", "contact_residual", "largest_overlap"}) {
+  for (const char* key : {"momentum_error", "angular_momentum_error", "energy_error", "energy_returned", "contact_residual", "largest_overlap"}) {
     EXPECT_TRUE(r.at("audits").at(key).is_number()) << key;
   }
   EXPECT_LT(r.at("audits").at("momentum_error").get<double>(), 1e-12);

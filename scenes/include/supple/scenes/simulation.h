@@ -56,6 +56,7 @@ struct Audits {
   double momentum_error = 0.0;          ///< over the largest sum of m |v| [1]
   double angular_momentum_error = 0.0;  ///< over the largest sum of |x - c| m |v| + |L| [1]
   double energy_error = 0.0;            ///< over the largest kinetic + interaction + contact energy [1]
+  double energy_returned = 0.0;         ///< what damping and friction gave back, over the same [1]
   double contact_residual = 0.0;        ///< |p_A - p_B| / max(P_A, P_B) on contact samples, the largest [1]
   double largest_overlap = 0.0;         ///< of the undeformed fields [m]
   double largest_overlap_share = 0.0;   ///< over the thickness of the thinner body [1]

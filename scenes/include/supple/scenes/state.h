@@ -31,6 +31,8 @@ struct RunRecord {
   double momentum_error = 0.0;         ///< largest |P - P0 - impulses| [N s]
   double angular_momentum_error = 0.0; ///< [N m s]
   double energy_error = 0.0;           ///< largest |E - E0 - W + D| [J]
+  double most_dissipated = 0.0;        ///< largest D at a frame so far [J]
+  double energy_returned = 0.0;        ///< by how much D fell below that at worst [J]; what damps never gives back
   double contact_residual = 0.0;       ///< largest |p_A - p_B| / max(P_A, P_B) on a contact sample [1]
   double largest_overlap = 0.0;        ///< thickness of the overlap of undeformed fields [m]
   double largest_overlap_share = 0.0;  ///< the same over twice the smaller iso radius [1]
