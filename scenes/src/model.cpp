@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <memory>
 #include <numeric>
-#include <optional>
 
-#include "fields_rules.h"
 #include "model_contact.h"
 #include "model_faults.h"
+#include "model_laws.h"
+#include "model_skeleton.h"
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
@@ -101,562 +99,24 @@ double largest_distance(std::span<const Vec3> points) {
   return largest;
 }
 
-/// Index of a particle of an object of n, negative from the end.
-std::optional<std::uint32_t> particle_index(int given, std::uint32_t n) {
-  const std::int64_t index = given < 0 ? std::int64_t{given} + n : given;
-  if (index < 0 || index >= n) return std::nullopt;
-  return static_cast<std::uint32_t>(index);
-}
-
-void fail_index(ModelFaults& faults, const std::string& key, int given, std::uint32_t n) {
-  faults.add(key, particle_range(n), std::to_string(given), "");
-}
-
-implicit::ShapeKind shape_of(ShapeName name) {
-  switch (name) {
-    case ShapeName::Point: return implicit::ShapeKind::Point;
-    case ShapeName::Segment: return implicit::ShapeKind::Segment;
-    case ShapeName::Square:
-    case ShapeName::Rectangle: return implicit::ShapeKind::Rectangle;
-    case ShapeName::Disc: return implicit::ShapeKind::Disc;
-    case ShapeName::Box: return implicit::ShapeKind::Box;
-    case ShapeName::Ellipsoid: break;
-    case ShapeName::Triangle: return implicit::ShapeKind::Triangle;
-    case ShapeName::Polygon: return implicit::ShapeKind::Polygon;
-    case ShapeName::Ring: return implicit::ShapeKind::Ring;
-    case ShapeName::Arc: return implicit::ShapeKind::Arc;
-    case ShapeName::Curve: return implicit::ShapeKind::Curve;
-    case ShapeName::Superquadric: return implicit::ShapeKind::Superquadric;
-    case ShapeName::Directed: return implicit::ShapeKind::Directed;
-  }
-  return implicit::ShapeKind::Ellipsoid;
-}
-
-Vec3 size_of(const SkeletonDesc& d) {
-  switch (d.shape) {
-    case ShapeName::Point: return Vec3::Zero();
-    case ShapeName::Segment: return {d.half_length, 0.0, 0.0};
-    case ShapeName::Square: return {d.half_size, d.half_size, 0.0};
-    case ShapeName::Rectangle: return {d.half_sizes.x(), d.half_sizes.y(), 0.0};
-    case ShapeName::Disc:
-    case ShapeName::Ring: return {d.radius, 0.0, 0.0};
-    case ShapeName::Arc: return {d.radius, d.half_angle, 0.0};
-    case ShapeName::Box: return d.half_sizes;
-    case ShapeName::Triangle:
-    case ShapeName::Polygon:
-    case ShapeName::Curve: return Vec3::Zero();
-    case ShapeName::Directed: return d.radii;
-    case ShapeName::Ellipsoid:
-    case ShapeName::Superquadric: break;
-  }
-  return d.semi_axes;
-}
-
-/// Smallest radius or semi-axis of a support that its shape gives; 0 for the others.
-double own_radius(const SkeletonDesc& d) {
-  switch (d.shape) {
-    case ShapeName::Ellipsoid:
-    case ShapeName::Superquadric: return d.semi_axes.minCoeff();
-    case ShapeName::Directed:
-      return d.radii_behind.isZero() ? d.radii.minCoeff() : std::min(d.radii.minCoeff(), d.radii_behind.minCoeff());
-    default: return 0.0;
-  }
-}
-
-/// @throws Error where the kernel's numbers do not fit together
-implicit::Kernel kernel_of(const KernelDesc& d, double radius, double iso) {
-  using implicit::Kernel;
-  switch (d.type) {
-    case KernelName::Wyvill: break;
-    case KernelName::Gascuel: return Kernel::gascuel(d.thickness.value_or(0.0), radius, d.slope.value_or(0.0), iso);
-    case KernelName::SoftObject: return Kernel::soft_object(radius);
-    case KernelName::Murakami: return Kernel::murakami(radius);
-    case KernelName::Nishimura: return Kernel::nishimura(radius);
-    case KernelName::Blinn: return Kernel::blinn(radius, d.sharpness);
-    case KernelName::Cauchy: return Kernel::cauchy(radius, d.sharpness);
-    case KernelName::BlancSchlick: return Kernel::blanc_schlick(radius, d.hardness);
-  }
-  return Kernel::wyvill(radius);
-}
-
-/// @param volume  receives what the scene says each primitive holds, or 0 [m^3]
-implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object, std::uint32_t n, std::vector<double>& volume,
-                                  ModelFaults& faults) {
-  implicit::Skeleton skeleton;
-  std::vector<std::pair<implicit::Primitive, double>> all;
-  skeleton.part_count = n;
-  skeleton.iso = d.iso;
-  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
-    const SkeletonDesc& s = d.skeleton[k];
-    const std::string key = object + ".skeleton[" + std::to_string(k) + ']';
-    // For an ellipsoid and its like the radius is but the scale of the kernel.
-    const double radius = s.kernel.radius == 0.0 ? own_radius(s) : s.kernel.radius;
-    implicit::Primitive primitive;
-    primitive.shape = shape_of(s.shape);
-    primitive.size = size_of(s);
-    primitive.control = s.points;
-    if (s.shape == ShapeName::Directed) primitive.control = {s.radii_behind.isZero() ? s.radii : s.radii_behind};
-    primitive.exponent = {s.exponents.x(), s.exponents.y()};
-    primitive.stretch = s.stretch;
-    primitive.convolved = s.convolve;
-    if (s.end_radius > 0.0) primitive.taper = s.end_radius / radius;
-    primitive.offset = {s.at, core::rotation_exp(s.turn * s.turn_axis.normalized())};
-    try {
-      primitive.kernel = kernel_of(s.kernel, radius, d.iso);
-    } catch (const Error& error) {
-      const Fault& fault = error.faults().front();
-      faults.add(key + '.' + fault.key, fault.expected, fault.found, fault.hint);
-      continue;
-    }
-    if (!(d.iso > 0.0 && d.iso < implicit::peak(primitive.kernel))) {
-      faults.add(object + ".iso",
-                 "expected an iso value in (0, " + number_text(implicit::peak(primitive.kernel)) + "), which a kernel reaches",
-                 number_text(d.iso), "");
-      continue;
-    }
-    std::vector<std::uint32_t> carriers;
-    for (std::size_t j = 0; j < s.particles.size(); ++j) {
-      const std::string place = key + ".particles[" + std::to_string(j) + ']';
-      const auto index = particle_index(s.particles[j], n);
-      if (!index) {
-        fail_index(faults, place, s.particles[j], n);
-      } else if (std::find(carriers.begin(), carriers.end(), *index) != carriers.end()) {
-        faults.add(place, "expected each particle once", std::to_string(s.particles[j]), "");
-      } else {
-        carriers.push_back(*index);
-      }
-    }
-    if (s.particles.empty()) {
-      carriers.resize(n);
-      std::iota(carriers.begin(), carriers.end(), 0U);
-    }
-    for (const std::uint32_t part : carriers) {
-      primitive.part = part;
-      all.emplace_back(primitive, s.volume.value_or(0.0));
-    }
-  }
-  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first.part < b.first.part; });
-  for (const auto& [primitive, held] : all) {
-    skeleton.primitive.push_back(primitive);
-    volume.push_back(held);
-  }
-  return skeleton;
-}
-
-/// How the particles of an object blend. @param rest  their places
-implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<const Vec3> rest, ModelFaults& faults) {
-  constexpr std::array kRules{implicit::BlendRule::Sum, implicit::BlendRule::Graph, implicit::BlendRule::Ricci,
-                              implicit::BlendRule::Gradient};
-  implicit::Blend blend;
-  blend.rule = kRules[static_cast<std::size_t>(d.rule)];
-  blend.exponent = d.exponent;
-  blend.opening = d.opening;
-  const auto n = static_cast<std::uint32_t>(rest.size());
-  constexpr std::uint32_t kNone = 0xffffffff;
-  blend.node.assign(n, kNone);
-  std::uint32_t nodes = 0;
-  for (std::size_t k = 0; k < d.groups.size(); ++k, ++nodes) {
-    for (std::size_t j = 0; j < d.groups[k].particles.size(); ++j) {
-      const std::string place = key + ".groups[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']';
-      const auto index = particle_index(d.groups[k].particles[j], n);
-      if (!index) {
-        fail_index(faults, place, d.groups[k].particles[j], n);
-      } else if (blend.node[*index] != kNone) {
-        faults.add(place, "expected a particle of no other group", std::to_string(d.groups[k].particles[j]), "");
-      } else {
-        blend.node[*index] = nodes;
-      }
-    }
-  }
-  for (std::uint32_t& node : blend.node) {
-    if (node == kNone) node = nodes++;
-  }
-  if (blend.rule != implicit::BlendRule::Graph) return blend;
-  const auto join = [&](const core::Bonds& bonds) {
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      const auto [low, high] = std::minmax(blend.node[bonds.first[b]], blend.node[bonds.second[b]]);
-      if (low != high) blend.edge.push_back({low, high, 1.0});
-    }
-  };
-  if (d.neighbours) join(core::bonds_along(0, n, *d.neighbours));
-  if (d.within) join(core::bonds_within(rest, 0, n, *d.within));
-  const auto before = [](const implicit::BlendEdge& a, const implicit::BlendEdge& b) {
-    return std::pair(a.a, a.b) < std::pair(b.a, b.b);
-  };
-  const auto same = [](const implicit::BlendEdge& a, const implicit::BlendEdge& b) { return a.a == b.a && a.b == b.b; };
-  std::sort(blend.edge.begin(), blend.edge.end(), before);
-  blend.edge.erase(std::unique(blend.edge.begin(), blend.edge.end(), same), blend.edge.end());
-  return blend;
-}
-
 /// Which particles are hinges, and the types of the others.
 void set_kinds(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model, ModelFaults& faults) {
   const std::uint32_t n = object.last - object.first;
   for (std::size_t k = 0; k < d.kinds.size(); ++k) {
     for (std::size_t j = 0; j < d.kinds[k].particles.size(); ++j) {
-      if (const auto index = particle_index(d.kinds[k].particles[j], n)) {
+      const std::string place = key + ".kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']';
+      if (const auto index = particle_index(d.kinds[k].particles[j], n, place, faults)) {
         model.particles.kind[object.first + *index] =
             d.kinds[k].hinge ? core::kHinge : static_cast<std::uint32_t>(d.kinds[k].type);
-      } else {
-        fail_index(faults, key + ".kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']',
-                   d.kinds[k].particles[j], n);
       }
     }
   }
 }
-
-/// Those bonds whose particles interact completely.
-core::Bonds complete_bonds(const core::Bonds& bonds, const core::ParticleSet& set, bool hinges_join) {
-  core::Bonds complete;
-  for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-    if (!core::interact_completely(set.kind[bonds.first[b]], set.kind[bonds.second[b]], hinges_join)) continue;
-    complete.first.push_back(bonds.first[b]);
-    complete.second.push_back(bonds.second[b]);
-  }
-  return complete;
-}
-
-/// Adds the laws of one object.
-class LawBuilder {
- public:
-  LawBuilder(Model& model, ModelFaults& faults, const ObjectModel& object, std::string key)
-      : model_(model), faults_(faults), object_(object), key_(std::move(key)) {}
-
-  void add(const InteractionDesc& d, std::size_t index) {
-    const std::string key = key_ + ".interactions[" + std::to_string(index) + ']';
-    if (d.geometric) {
-      add_geometric(d, key);
-      return;
-    }
-    const core::Bonds near = d.within ? core::bonds_within(model_.rest.position, object_.first, object_.last, *d.within)
-                                      : core::bonds_along(object_.first, object_.last, d.neighbours);
-    const core::Bonds bonds = complete_bonds(near, model_.particles, object_.hinges_join);
-    if (bonds.first.empty()) {
-      faults_.add(key, "expected a bond", "none",
-                  !near.first.empty() ? "'kinds' keeps all neighbours apart"
-                  : d.within ? "no two particles are nearer than " + number_text(*d.within) + " m"
-                           : "the object has a single particle");
-      return;
-    }
-    if (d.law == LawKind::Friction) {
-      model_.interactions.friction.push_back({name(d), bonds.first, bonds.second, d.linear, d.angular});
-      return;
-    }
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      if (model_.rest.position[bonds.first[b]] == model_.rest.position[bonds.second[b]]) {
-        faults_.add(key, "expected bonded particles at different places",
-                    "particles " + std::to_string(bonds.first[b] - object_.first) + " and " +
-                        std::to_string(bonds.second[b] - object_.first) + " at one place",
-                    "");
-        return;
-      }
-    }
-    add_bonded(d, bonds, key);
-  }
-
- private:
-  void add_bonded(const InteractionDesc& d, const core::Bonds& bonds, const std::string& key) {
-    const core::Weight weight{.range = d.range.value_or(0.0)};
-    core::Interactions& laws = model_.interactions;
-    const auto fill_same = [&](auto& list, const auto& law) {
-      fill(list, d, bonds, [&](const core::PairPose&) { return law; });
-    };
-    switch (d.law) {
-      case LawKind::Cohesion:
-        if (d.table_error) {
-          fill(laws.tabulated_cohesion, d, bonds,
-               [&](const core::PairPose& rest) { return tabulated(d, cohesion(d, rest.r.norm(), key)); });
-        } else {
-          fill(laws.cohesion, d, bonds, [&](const core::PairPose& rest) { return cohesion(d, rest.r.norm(), key); });
-        }
-        break;
-      case LawKind::LinearCohesion:
-        fill(laws.linear_cohesion, d, bonds, [&](const core::PairPose& rest) { return linear_cohesion(d, rest.r.norm()); });
-        break;
-      case LawKind::DirectedCohesion:
-        fill(laws.directed_cohesion, d, bonds, [&](const core::PairPose& rest) {
-          core::DirectedCohesion law{
-              .scale = 0.0, .a = d.shape, .semi_axes_a = d.semi_axes, .semi_axes_b = d.semi_axes};
-          law.scale = d.scale_force.value_or(0.0) * law.rest_distance(rest);
-          return law;
-        });
-        break;
-      case LawKind::LennardJones:
-        fill(laws.lennard_jones, d, bonds, [&](const core::PairPose& rest) { return lennard_jones(d, rest.r.norm()); });
-        break;
-      case LawKind::GayBerne: break;  // geometric only
-      case LawKind::Form:
-        fill(laws.form, d, bonds, [&](const core::PairPose& rest) {
-          return core::Form{d.strength, core::Form::fit_curvature(rest.r, rest.normal_a, rest.normal_b), weight};
-        });
-        break;
-      case LawKind::FormRadius:
-        if (d.paper_literal) {
-          add_literal_form(d, bonds, weight, key);
-        } else {
-          fill(laws.form_radius, d, bonds,
-               [&](const core::PairPose& rest) { return core::FormRadius{d.strength, radius(rest, key), weight}; });
-        }
-        break;
-      case LawKind::DirectedForm: add_directed_form(d, bonds, weight); break;
-      case LawKind::BondFrame:
-        fill(laws.bond_frame, d, bonds,
-             [&](const core::PairPose& rest) { return core::BondFrame::from_rest(d.stretch, d.rotation, rest); });
-        break;
-      case LawKind::Coplanarity:
-        if (d.normalised) {
-          fill_same(laws.normalised_coplanarity, core::NormalisedCoplanarity{d.strength, weight});
-        } else {
-          fill_same(laws.coplanarity, core::Coplanarity{d.strength, weight});
-        }
-        break;
-      case LawKind::CoNormality: fill_same(laws.co_normality, core::CoNormality{d.strength, weight}); break;
-      case LawKind::CoCircularity:
-        if (d.normalised) {
-          fill_same(laws.normalised_co_circularity, core::NormalisedCoCircularity{d.strength, weight});
-        } else {
-          fill_same(laws.co_circularity, core::CoCircularity{d.strength, weight});
-        }
-        break;
-      case LawKind::Friction: break;
-    }
-  }
-
-  /// Between all particles of the object within the range of the law, as their kinds allow.
-  void add_geometric(const InteractionDesc& d, const std::string& key) {
-    const std::uint32_t object = model_.particles.object[object_.first];
-    const auto begin = model_.particles.kind.begin();
-    const bool kinds = std::any_of(begin + object_.first, begin + object_.last, [](std::uint32_t k) { return k != 0; });
-    const core::PairKinds taken = !kinds                ? core::PairKinds::Any
-                                  : object_.hinges_join ? core::PairKinds::CompleteWithHinges
-                                                        : core::PairKinds::Complete;
-    const auto add_list = [&](auto& lists, double range, const auto& law) {
-      lists.push_back(
-          {.name = name(d), .object_a = object, .object_b = object, .range = range, .law = law, .kinds = taken});
-    };
-    core::Interactions& laws = model_.interactions;
-    const double r0 = d.rest_distance.value_or(0.0);
-    const core::Weight weight{.range = d.range.value_or(0.0)};
-    if (d.law == LawKind::GayBerne) {
-      const core::SwitchedGayBerne law = gay_berne(d);
-      add_list(laws.gay_berne, law.cut_off, law);
-    } else if (d.law == LawKind::Coplanarity) {
-      add_list(laws.geometric_coplanarity, weight.range, core::Coplanarity{d.strength, weight});
-    } else if (d.law == LawKind::CoNormality) {
-      add_list(laws.geometric_co_normality, weight.range, core::CoNormality{d.strength, weight});
-    } else if (d.law == LawKind::CoCircularity) {
-      add_list(laws.geometric_co_circularity, weight.range, core::CoCircularity{d.strength, weight});
-    } else if (d.law == LawKind::LennardJones) {
-      add_list(laws.geometric_lennard_jones, d.cut_off.value_or(0.0), lennard_jones(d, r0));
-    } else if (d.law == LawKind::LinearCohesion) {
-      const core::LinearCohesion law = linear_cohesion(d, r0);
-      add_list(laws.geometric_linear_cohesion, d.within.value_or(law.influence_radius(kGeometricTail)), law);
-    } else {
-      const core::Cohesion law = cohesion(d, r0, key);
-      const double range = d.within.value_or(law.influence_radius(kGeometricTail));
-      if (d.table_error) {
-        add_list(laws.geometric_tabulated_cohesion, range, tabulated(d, law));
-      } else {
-        add_list(laws.geometric_cohesion, range, law);
-      }
-    }
-  }
-
-  core::LinearCohesion linear_cohesion(const InteractionDesc& d, double rest_distance) {
-    return {.r0 = d.rest_distance.value_or(rest_distance), .f0 = d.scale_force.value_or(0.0), .a = d.shape, .eta = d.eta};
-  }
-
-  core::LennardJones lennard_jones(const InteractionDesc& d, double rest_distance) {
-    const double r0 = d.rest_distance.value_or(rest_distance);
-    const double n = d.repulsive, m = d.attractive;
-    return {.r0 = r0,
-            .depth = d.depth.value_or(d.scale_force.value_or(0.0) * r0 * (n - m) / (n * m)),
-            .repulsive = d.repulsive,
-            .attractive = d.attractive,
-            .cut_off = d.cut_off.value_or(0.0),
-            .switch_from = d.switch_from.value_or(0.0)};
-  }
-
-  static core::SwitchedGayBerne gay_berne(const InteractionDesc& d) {
-    const double cut_off = d.cut_off.value_or(0.0);
-    return {.ellipsoid = {.epsilon = d.depth.value_or(0.0),
-                          .sigma = d.sigma.value_or(2.0 * d.semi_axes.minCoeff()),
-                          .gamma = d.gamma,
-                          .radii = d.semi_axes,
-                          .well = d.wells,
-                          .upsilon = d.upsilon,
-                          .mu = d.mu},
-            .switch_from = d.switch_from.value_or(kGayBerneSwitch * cut_off),
-            .cut_off = cut_off};
-  }
-
-  /// The table of the law's shape: one for all bonds of that shape.
-  core::TabulatedCohesion tabulated(const InteractionDesc& d, const core::Cohesion& law) {
-    std::shared_ptr<const core::CohesionTable>& table = tables_[{law.a, *d.table_error}];
-    if (!table) {
-      table = std::make_shared<const core::CohesionTable>(core::CohesionTable::with_error(law.a, *d.table_error));
-    }
-    return {.r0 = law.r0, .f0 = law.f0, .table = table};
-  }
-
-  /// Each particle's own radius, by least squares over its bonds: R = sum r . dn / sum |dn|^2.
-  void add_literal_form(const InteractionDesc& d, const core::Bonds& bonds, const core::Weight& weight,
-                        const std::string& key) {
-    std::vector<double> along(object_.last - object_.first), squares(object_.last - object_.first);
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      const core::PairPose rest = rest_pose(bonds.first[b], bonds.second[b]);
-      const Vec3 change = rest.normal_b - rest.normal_a;
-      for (const std::uint32_t i : {bonds.first[b], bonds.second[b]}) {
-        along[i - object_.first] += rest.r.dot(change);
-        squares[i - object_.first] += change.squaredNorm();
-      }
-    }
-    const auto radius_of = [&](std::uint32_t i) {
-      if (squares[i - object_.first] > 1e-18) return along[i - object_.first] / squares[i - object_.first];
-      fail_flat(key);
-      return 0.0;
-    };
-    core::BondedLaw<core::LiteralForm> list{name(d), bonds.first, bonds.second, {}};
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      list.law.push_back({d.strength, radius_of(bonds.first[b]), radius_of(bonds.second[b]), weight});
-    }
-    model_.interactions.literal_form.push_back(std::move(list));
-  }
-
-  /// Each particle's shape operator, by least squares over its bonds.
-  void add_directed_form(const InteractionDesc& d, const core::Bonds& bonds, const core::Weight& weight) {
-    const std::size_t n = object_.last - object_.first;
-    std::vector<std::vector<Vec3>> offsets(n), changes(n);
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      const core::PairPose rest = rest_pose(bonds.first[b], bonds.second[b]);
-      const Vec3 change = rest.normal_b - rest.normal_a;
-      offsets[bonds.first[b] - object_.first].push_back(rest.r);
-      changes[bonds.first[b] - object_.first].push_back(change);
-      offsets[bonds.second[b] - object_.first].push_back(-rest.r);
-      changes[bonds.second[b] - object_.first].push_back(-change);
-    }
-    std::vector<Mat3> shape;
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::uint32_t i = object_.first + static_cast<std::uint32_t>(k);
-      const Mat3 q = model_.rest.orientation[i].toRotationMatrix();
-      shape.push_back(q.transpose() *
-                      core::fit_shape_operator(q * model_.particles.normal[i], offsets[k], changes[k]) * q);
-    }
-    core::BondedLaw<core::DirectedForm> list{name(d), bonds.first, bonds.second, {}};
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      list.law.push_back(
-          {d.strength, shape[bonds.first[b] - object_.first], shape[bonds.second[b] - object_.first], weight});
-    }
-    model_.interactions.directed_form.push_back(std::move(list));
-  }
-
-  /// "spiral/bond_frame"; a second law of the same kind is "spiral/bond_frame.2".
-  std::string name(const InteractionDesc& d) {
-    const int count = ++counts_[static_cast<std::size_t>(d.law)];
-    return object_.name + '/' + std::string(name_of(d.law)) + (count > 1 ? '.' + std::to_string(count) : "");
-  }
-
-  [[nodiscard]] core::PairPose rest_pose(std::uint32_t a, std::uint32_t b) const {
-    return core::pair_pose(model_.particles, model_.rest, a, b);
-  }
-
-  template <class Law, class Make>
-  void fill(std::vector<core::BondedLaw<Law>>& list, const InteractionDesc& d, const core::Bonds& bonds, const Make& make) {
-    core::BondedLaw<Law> law{name(d), bonds.first, bonds.second, {}};
-    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
-      law.law.push_back(make(rest_pose(bonds.first[b], bonds.second[b])));
-    }
-    list.push_back(std::move(law));
-  }
-
-  core::Cohesion cohesion(const InteractionDesc& d, double rest_distance, const std::string& key) {
-    const double r0 = d.rest_distance.value_or(rest_distance);
-    if (d.gain && d.alpha) return core::Cohesion::from_gain(r0, *d.gain, *d.alpha);
-    const double r_m = d.maximum_ratio ? *d.maximum_ratio * r0 : d.maximum_distance.value_or(0.0);
-    if (!(r_m > r0) || !(d.maximum_force || d.scale_force)) {
-      faults_.add_once(key + ".maximum_distance",
-                       "expected more than the rest distance of every bond, " + number_text(r0) + " m here",
-                       number_text(r_m), "");
-      return {.r0 = r0, .f0 = 1.0};
-    }
-    if (d.scale_force) return core::Cohesion::from_ratio(r0, r_m / r0, *d.scale_force);
-    return core::Cohesion::from_maximum(r0, r_m, *d.maximum_force);
-  }
-
-  /// Least squares over the pair: R = r . (n_B - n_A) / |n_B - n_A|^2 (the inverse problem of Form::fit_curvature).
-  double radius(const core::PairPose& rest, const std::string& key) {
-    const Vec3 change = rest.normal_b - rest.normal_a;
-    if (change.norm() < 1e-9) {
-      fail_flat(key);
-      return 0.0;
-    }
-    return rest.r.dot(change) / change.squaredNorm();
-  }
-
-  void fail_flat(const std::string& key) {
-    faults_.add_once(key, "expected normals that differ along every bond for form_radius", "parallel ones",
-                     "use 'law: form', which knows flat shapes");
-  }
-
-  static constexpr double kGayBerneSwitch = 0.9;  // of the cut-off
-  /// |f| at the range of a geometric cohesion over the largest attraction.
-  static constexpr double kGeometricTail = 1e-3;
-
-  Model& model_;
-  ModelFaults& faults_;
-  const ObjectModel& object_;
-  std::string key_;
-  std::array<int, EnumNames<LawKind>::names.size()> counts_{};
-  std::map<std::pair<double, double>, std::shared_ptr<const core::CohesionTable>> tables_;  ///< by a and error
-};
 
 /// Principal moments of a solid ellipsoid of these semi-axes, m/5 (b^2 + c^2, ...).
 Vec3 principal_moments(double mass, const Vec3& axes) {
   const Vec3 squares = axes.cwiseAbs2();
   return 0.2 * mass * (Vec3::Constant(squares.sum()) - squares);
-}
-
-/// Semi-axes of the ellipsoid whose second moments along a particle's axes are those of the solid that it carries alone;
-/// exact for a ball, within a hundredth otherwise. Zero without a surface.
-Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool planar) {
-  implicit::Skeleton own{.primitive = {}, .part_count = 1, .iso = object.iso, .blend = {}};
-  for (const implicit::Primitive& primitive : object.primitive) {
-    if (primitive.part == part) own.primitive.push_back(primitive);
-    if (primitive.part == part) own.primitive.back().part = 0;
-  }
-  if (own.primitive.empty()) return Vec3::Zero();
-  const implicit::Primitive& first = own.primitive.front();
-  const bool ball = own.primitive.size() == 1 && first.shape == implicit::ShapeKind::Point && !first.convolved &&
-                    first.stretch == Vec3::Ones() && first.offset.position.isZero();
-  if (ball) return Vec3::Constant(iso_radius(first, own.iso));
-  const Pose still;
-  implicit::PlacedSkeleton placed;
-  implicit::Field field;
-  implicit::place_skeleton(own, {&still, 1}, placed);
-  implicit::index_field(own, placed, field);
-  const Box box = field.surface_box();
-  if (box.empty()) return Vec3::Zero();
-  constexpr int kCells = 32;
-  const Vec3 cell = box.extent() / kCells;
-  std::vector<Vec3> point;
-  for (int k = 0; k < kCells; ++k) {
-    for (int j = 0; j < kCells; ++j) {
-      for (int i = 0; i < kCells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
-    }
-  }
-  std::vector<double> value(point.size());
-  implicit::FieldView(field).evaluate(point, value);
-  Vec3 squares = Vec3::Zero();
-  double inside = 0.0;
-  for (std::size_t s = 0; s < point.size(); ++s) {
-    if (!(value[s] > 0.0)) continue;
-    squares += point[s].cwiseAbs2();
-    inside += 1.0;
-  }
-  if (inside == 0.0) return Vec3::Zero();
-  Vec3 axes2 = 5.0 / inside * squares;
-  if (planar) axes2.setConstant(0.5 * (axes2.x() + axes2.y()));  // it turns about z alone
-  return axes2.cwiseSqrt();
 }
 
 /// Of a ball around the primitive's origin that holds its support.
@@ -742,22 +202,16 @@ void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const Objec
                         ModelFaults& faults) {
   const std::uint32_t n = object.last - object.first;
   for (std::size_t k = 0; k < d.pins.size(); ++k) {
-    const auto index = particle_index(d.pins[k].particle, n);
-    if (!index) {
-      fail_index(faults, key + ".pins[" + std::to_string(k) + "].particle", d.pins[k].particle, n);
-      continue;
-    }
+    const auto index = particle_index(d.pins[k].particle, n, key + ".pins[" + std::to_string(k) + "].particle", faults);
+    if (!index) continue;
     std::uint8_t& pinned = model.particles.pinned[object.first + *index];
     if (d.pins[k].position) pinned |= core::kPinPosition;
     if (d.pins[k].orientation) pinned |= core::kPinOrientation;
   }
   for (std::size_t k = 0; k < d.loads.size(); ++k) {
     const LoadDesc& load = d.loads[k];
-    const auto index = particle_index(load.particle, n);
-    if (!index) {
-      fail_index(faults, key + ".loads[" + std::to_string(k) + "].particle", load.particle, n);
-      continue;
-    }
+    const auto index = particle_index(load.particle, n, key + ".loads[" + std::to_string(k) + "].particle", faults);
+    if (!index) continue;
     model.interactions.external.push_back(
         {object.first + *index, load.force, load.torque, load.from, load.until, load.ramp});
   }
@@ -853,8 +307,7 @@ Model build_model(const Scene& scene) {
   std::vector<core::LinkRule> link_rules;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const ObjectDesc& d = scene.objects[i];
-    LawBuilder laws(model, faults, model.objects[i], "objects." + d.name);
-    for (std::size_t k = 0; k < d.interactions.size(); ++k) laws.add(d.interactions[k], k);
+    add_laws(d.interactions, model.objects[i], "objects." + d.name, model, faults);
     if (d.breaking || d.yielding) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
     if (d.rayleigh) {
       const auto object = static_cast<std::uint32_t>(i);

@@ -108,7 +108,7 @@ TEST(Meshes, ByAComponentThatIsAbsentAreRefusedByItsName) {
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::Scene);
     EXPECT_EQ(std::string(error.what()),
-              "./test.yaml: output.meshing.method: expected a program with the component supple_cgal for delaunay, found one "
+              "test.yaml:5:39: output.meshing.method: expected a program with the component supple_cgal for delaunay, found one "
               "without it; install libcgal-dev and build again, or use method: cubes");
   }
 }

@@ -1,0 +1,17 @@
+/// @file model_laws.h
+/// The part of a model that ties particles: pair laws and their bonds.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model_faults.h"
+#include "supple/scenes/model.h"
+
+namespace supple::scenes {
+
+/// Adds the laws between particles of one object to the model. @param key  of the object
+void add_laws(const std::vector<InteractionDesc>& interactions, const ObjectModel& object, const std::string& key, Model& model,
+              ModelFaults& faults);
+
+}  // namespace supple::scenes

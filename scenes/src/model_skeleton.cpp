@@ -1,0 +1,238 @@
+#include "model_skeleton.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <utility>
+
+#include "model_contact.h"
+#include "supple/core/arrange.h"
+#include "supple/core/error.h"
+
+namespace supple::scenes {
+namespace {
+
+implicit::ShapeKind shape_of(ShapeName name) {
+  switch (name) {
+    case ShapeName::Point: return implicit::ShapeKind::Point;
+    case ShapeName::Segment: return implicit::ShapeKind::Segment;
+    case ShapeName::Square:
+    case ShapeName::Rectangle: return implicit::ShapeKind::Rectangle;
+    case ShapeName::Disc: return implicit::ShapeKind::Disc;
+    case ShapeName::Box: return implicit::ShapeKind::Box;
+    case ShapeName::Ellipsoid: break;
+    case ShapeName::Triangle: return implicit::ShapeKind::Triangle;
+    case ShapeName::Polygon: return implicit::ShapeKind::Polygon;
+    case ShapeName::Ring: return implicit::ShapeKind::Ring;
+    case ShapeName::Arc: return implicit::ShapeKind::Arc;
+    case ShapeName::Curve: return implicit::ShapeKind::Curve;
+    case ShapeName::Superquadric: return implicit::ShapeKind::Superquadric;
+    case ShapeName::Directed: return implicit::ShapeKind::Directed;
+  }
+  return implicit::ShapeKind::Ellipsoid;
+}
+
+Vec3 size_of(const SkeletonDesc& d) {
+  switch (d.shape) {
+    case ShapeName::Point: return Vec3::Zero();
+    case ShapeName::Segment: return {d.half_length, 0.0, 0.0};
+    case ShapeName::Square: return {d.half_size, d.half_size, 0.0};
+    case ShapeName::Rectangle: return {d.half_sizes.x(), d.half_sizes.y(), 0.0};
+    case ShapeName::Disc:
+    case ShapeName::Ring: return {d.radius, 0.0, 0.0};
+    case ShapeName::Arc: return {d.radius, d.half_angle, 0.0};
+    case ShapeName::Box: return d.half_sizes;
+    case ShapeName::Triangle:
+    case ShapeName::Polygon:
+    case ShapeName::Curve: return Vec3::Zero();
+    case ShapeName::Directed: return d.radii;
+    case ShapeName::Ellipsoid:
+    case ShapeName::Superquadric: break;
+  }
+  return d.semi_axes;
+}
+
+/// Smallest radius or semi-axis of a support that its shape gives; 0 for the others.
+double own_radius(const SkeletonDesc& d) {
+  switch (d.shape) {
+    case ShapeName::Ellipsoid:
+    case ShapeName::Superquadric: return d.semi_axes.minCoeff();
+    case ShapeName::Directed:
+      return d.radii_behind.isZero() ? d.radii.minCoeff() : std::min(d.radii.minCoeff(), d.radii_behind.minCoeff());
+    default: return 0.0;
+  }
+}
+
+/// @throws Error where the kernel's numbers do not fit together
+implicit::Kernel kernel_of(const KernelDesc& d, double radius, double iso) {
+  using implicit::Kernel;
+  switch (d.type) {
+    case KernelName::Wyvill: break;
+    case KernelName::Gascuel: return Kernel::gascuel(d.thickness.value_or(0.0), radius, d.slope.value_or(0.0), iso);
+    case KernelName::SoftObject: return Kernel::soft_object(radius);
+    case KernelName::Murakami: return Kernel::murakami(radius);
+    case KernelName::Nishimura: return Kernel::nishimura(radius);
+    case KernelName::Blinn: return Kernel::blinn(radius, d.sharpness);
+    case KernelName::Cauchy: return Kernel::cauchy(radius, d.sharpness);
+    case KernelName::BlancSchlick: return Kernel::blanc_schlick(radius, d.hardness);
+  }
+  return Kernel::wyvill(radius);
+}
+
+}  // namespace
+
+std::optional<std::uint32_t> particle_index(int given, std::uint32_t n, const std::string& key, ModelFaults& faults) {
+  const std::int64_t index = given < 0 ? std::int64_t{given} + n : given;
+  if (index >= 0 && index < n) return static_cast<std::uint32_t>(index);
+  faults.add(key, particle_range(n), std::to_string(given), "");
+  return std::nullopt;
+}
+
+implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object, std::uint32_t n, std::vector<double>& volume,
+                                  ModelFaults& faults) {
+  implicit::Skeleton skeleton;
+  std::vector<std::pair<implicit::Primitive, double>> all;
+  skeleton.part_count = n;
+  skeleton.iso = d.iso;
+  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
+    const SkeletonDesc& s = d.skeleton[k];
+    const std::string key = object + ".skeleton[" + std::to_string(k) + ']';
+    // For an ellipsoid and its like the radius is but the scale of the kernel.
+    const double radius = s.kernel.radius == 0.0 ? own_radius(s) : s.kernel.radius;
+    implicit::Primitive primitive;
+    primitive.shape = shape_of(s.shape);
+    primitive.size = size_of(s);
+    primitive.control = s.points;
+    if (s.shape == ShapeName::Directed) primitive.control = {s.radii_behind.isZero() ? s.radii : s.radii_behind};
+    primitive.exponent = {s.exponents.x(), s.exponents.y()};
+    primitive.stretch = s.stretch;
+    primitive.convolved = s.convolve;
+    if (s.end_radius > 0.0) primitive.taper = s.end_radius / radius;
+    primitive.offset = {s.at, core::rotation_exp(s.turn * s.turn_axis.normalized())};
+    try {
+      primitive.kernel = kernel_of(s.kernel, radius, d.iso);
+    } catch (const Error& error) {
+      const Fault& fault = error.faults().front();
+      faults.add(key + '.' + fault.key, fault.expected, fault.found, fault.hint);
+      continue;
+    }
+    if (!(d.iso > 0.0 && d.iso < implicit::peak(primitive.kernel))) {
+      faults.add(object + ".iso",
+                 "expected an iso value in (0, " + number_text(implicit::peak(primitive.kernel)) + "), which a kernel reaches",
+                 number_text(d.iso), "");
+      continue;
+    }
+    std::vector<std::uint32_t> carriers;
+    for (std::size_t j = 0; j < s.particles.size(); ++j) {
+      const std::string place = key + ".particles[" + std::to_string(j) + ']';
+      const auto index = particle_index(s.particles[j], n, place, faults);
+      if (!index) continue;
+      if (std::find(carriers.begin(), carriers.end(), *index) != carriers.end()) {
+        faults.add(place, "expected each particle once", std::to_string(s.particles[j]), "");
+      } else {
+        carriers.push_back(*index);
+      }
+    }
+    if (s.particles.empty()) {
+      carriers.resize(n);
+      std::iota(carriers.begin(), carriers.end(), 0U);
+    }
+    for (const std::uint32_t part : carriers) {
+      primitive.part = part;
+      all.emplace_back(primitive, s.volume.value_or(0.0));
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first.part < b.first.part; });
+  for (const auto& [primitive, held] : all) {
+    skeleton.primitive.push_back(primitive);
+    volume.push_back(held);
+  }
+  return skeleton;
+}
+
+implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<const Vec3> rest, ModelFaults& faults) {
+  constexpr std::array kRules{implicit::BlendRule::Sum, implicit::BlendRule::Graph, implicit::BlendRule::Ricci,
+                              implicit::BlendRule::Gradient};
+  implicit::Blend blend;
+  blend.rule = kRules[static_cast<std::size_t>(d.rule)];
+  blend.exponent = d.exponent;
+  blend.opening = d.opening;
+  const auto n = static_cast<std::uint32_t>(rest.size());
+  constexpr std::uint32_t kNone = 0xffffffff;
+  blend.node.assign(n, kNone);
+  std::uint32_t nodes = 0;
+  for (std::size_t k = 0; k < d.groups.size(); ++k, ++nodes) {
+    for (std::size_t j = 0; j < d.groups[k].particles.size(); ++j) {
+      const std::string place = key + ".groups[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']';
+      const auto index = particle_index(d.groups[k].particles[j], n, place, faults);
+      if (!index) continue;
+      if (blend.node[*index] != kNone) {
+        faults.add(place, "expected a particle of no other group", std::to_string(d.groups[k].particles[j]), "");
+      } else {
+        blend.node[*index] = nodes;
+      }
+    }
+  }
+  for (std::uint32_t& node : blend.node) {
+    if (node == kNone) node = nodes++;
+  }
+  if (blend.rule != implicit::BlendRule::Graph) return blend;
+  const auto join = [&](const core::Bonds& bonds) {
+    for (std::size_t b = 0; b < bonds.first.size(); ++b) {
+      const auto [low, high] = std::minmax(blend.node[bonds.first[b]], blend.node[bonds.second[b]]);
+      if (low != high) blend.edge.push_back({low, high, 1.0});
+    }
+  };
+  if (d.neighbours) join(core::bonds_along(0, n, *d.neighbours));
+  if (d.within) join(core::bonds_within(rest, 0, n, *d.within));
+  const auto before = [](const implicit::BlendEdge& a, const implicit::BlendEdge& b) {
+    return std::pair(a.a, a.b) < std::pair(b.a, b.b);
+  };
+  const auto same = [](const implicit::BlendEdge& a, const implicit::BlendEdge& b) { return a.a == b.a && a.b == b.b; };
+  std::sort(blend.edge.begin(), blend.edge.end(), before);
+  blend.edge.erase(std::unique(blend.edge.begin(), blend.edge.end(), same), blend.edge.end());
+  return blend;
+}
+
+Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool planar) {
+  implicit::Skeleton own{.primitive = {}, .part_count = 1, .iso = object.iso, .blend = {}};
+  for (const implicit::Primitive& primitive : object.primitive) {
+    if (primitive.part == part) own.primitive.push_back(primitive);
+    if (primitive.part == part) own.primitive.back().part = 0;
+  }
+  if (own.primitive.empty()) return Vec3::Zero();
+  const implicit::Primitive& first = own.primitive.front();
+  const bool ball = own.primitive.size() == 1 && first.shape == implicit::ShapeKind::Point && !first.convolved &&
+                    first.stretch == Vec3::Ones() && first.offset.position.isZero();
+  if (ball) return Vec3::Constant(iso_radius(first, own.iso));
+  const Pose still;
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  implicit::place_skeleton(own, {&still, 1}, placed);
+  implicit::index_field(own, placed, field);
+  const Box box = field.surface_box();
+  if (box.empty()) return Vec3::Zero();
+  constexpr int kCells = 32;
+  const Vec3 cell = box.extent() / kCells;
+  std::vector<Vec3> point;
+  for (int k = 0; k < kCells; ++k) {
+    for (int j = 0; j < kCells; ++j) {
+      for (int i = 0; i < kCells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
+    }
+  }
+  std::vector<double> value(point.size());
+  implicit::FieldView(field).evaluate(point, value);
+  Vec3 squares = Vec3::Zero();
+  double inside = 0.0;
+  for (std::size_t s = 0; s < point.size(); ++s) {
+    if (!(value[s] > 0.0)) continue;
+    squares += point[s].cwiseAbs2();
+    inside += 1.0;
+  }
+  if (inside == 0.0) return Vec3::Zero();
+  Vec3 axes2 = 5.0 / inside * squares;
+  if (planar) axes2.setConstant(0.5 * (axes2.x() + axes2.y()));  // it turns about z alone
+  return axes2.cwiseSqrt();
+}
+
+}  // namespace supple::scenes
