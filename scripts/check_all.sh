@@ -18,9 +18,15 @@ clang_build=$supple_root/build/clang
 
 build_clang() {
   cmake -S "$supple_root" -B "$clang_build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=clang++ \
-    -DSUPPLE_WARNINGS_AS_ERRORS=ON -DSUPPLE_BUILD_TESTS=ON && cmake --build "$clang_build"
+    -DSUPPLE_WARNINGS_AS_ERRORS=ON -DSUPPLE_BUILD_TESTS=ON \
+    -DCMAKE_EXPORT_COMPILE_COMMANDS=ON && cmake --build "$clang_build"
 }
 test_clang() { ctest --test-dir "$clang_build" -j "$supple_jobs" --output-on-failure --no-tests=error; }
+
+analyse() {
+  sed -n 's/^ *"file": "\(.*\)",*$/\1/p' "$clang_build/compile_commands.json" | grep -E '/(src|cli)/' | sort -u |
+    xargs -P "$supple_jobs" -n 2 clang-tidy --quiet -p "$clang_build"
+}
 
 test_tsan() {
   cd "$supple_root" && TSAN_OPTIONS="suppressions=$here/tsan_suppressions.txt ignore_noninstrumented_modules=1 halt_on_error=1" \
@@ -31,8 +37,9 @@ install_packages build run test check
 
 if part "build (clang)" "$logs/build_clang.log" build_clang; then
   part "tests (clang)" "$logs/tests_clang.log" test_clang || true
+  part "static analysis" "$logs/analysis.log" analyse || true
 else
-  skip_part "tests (clang)" "no build"
+  for name in "tests (clang)" "static analysis"; do skip_part "$name" "no build"; done
 fi
 if part "build (thread sanitizer)" "$logs/build_tsan.log" configure_and_build tsan all; then
   part "tests (thread sanitizer)" "$logs/tests_tsan.log" test_tsan || true

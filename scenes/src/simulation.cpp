@@ -362,7 +362,7 @@ struct Simulation::Impl {
 
   /// Wakes the islands of bodies. @return those that were asleep
   std::vector<std::uint32_t> wake(const std::vector<std::uint32_t>& which) {
-    const std::vector<std::uint32_t> rose = collision::wake(which, state.sleep);
+    std::vector<std::uint32_t> rose = collision::wake(which, state.sleep);
     if (rose.empty()) return rose;
     form_awake();
     state.kick.valid = false;
@@ -661,7 +661,7 @@ struct Simulation::Impl {
 };
 
 Simulation::Simulation(Scene scene, SimulationOptions options)
-    : impl_(std::make_unique<Impl>(std::move(scene), options)) {}
+    : impl_(std::make_unique<Impl>(std::move(scene), std::move(options))) {}
 Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
 Simulation& Simulation::operator=(Simulation&&) noexcept = default;
