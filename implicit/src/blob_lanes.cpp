@@ -401,7 +401,7 @@ void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges) {
   }
 }
 
-void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals) {
+void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals, float* points) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> df;
   using VD = hn::Vec<decltype(d)>;
@@ -425,12 +425,20 @@ void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* p
     along(0, load(edges.x), gx);
     along(1, load(edges.y), gy);
     along(2, load(edges.z), gz);
+    const auto single = [&](VD value) HWY_ATTR { return hn::DemoteTo(df, value); };
+    const auto store_points = [&](float* to) HWY_ATTR {
+      hn::StoreInterleaved4(hn::Load(df, edges.t.data() + v), single(normal[0]), single(normal[1]), single(normal[2]), df, to);
+    };
     if (edges.count - v >= kWide) {
+      store_points(points + 4 * v);
       hn::StoreInterleaved3(position[0], position[1], position[2], d, positions + 3 * v);
       hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, normals + 3 * v);
       continue;
     }
     alignas(64) double last[2][3 * kWide];
+    alignas(64) float last_points[4 * kWide];
+    store_points(last_points);
+    std::copy_n(last_points, 4 * (edges.count - v), points + 4 * v);
     hn::StoreInterleaved3(position[0], position[1], position[2], d, last[0]);
     hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, last[1]);
     std::copy_n(last[0], 3 * (edges.count - v), positions + 3 * v);
@@ -599,8 +607,8 @@ void solve_edges(const BlobList& list, float iso, EdgeBatch& edges) {
   HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges);
 }
 
-void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals) {
-  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, placement, positions, normals);
+void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals, float* points) {
+  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, placement, positions, normals, points);
 }
 
 void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,

@@ -108,9 +108,9 @@ struct Placement {
   double cell;                   ///< [m]
 };
 
-/// World positions and unit normals of the solved edges, three numbers each. Where F has no gradient the normal is the
-/// direction of the edge. @param positions, normals  room for count vectors
-void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals);
+/// World positions and unit normals of the solved edges, three numbers each, and t and the normal, four numbers each. Where F
+/// has no gradient the normal is the direction of the edge. @param positions, normals, points  room for count of them
+void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals, float* points);
 
 /// Moves points [m] that lie near the surface to it, by Newton's method along the gradient, and gives their unit normals;
 /// three numbers each. Steps are at most half a cell.

@@ -22,74 +22,46 @@ namespace {
 
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// A block and the seven above it, by the steps along x, y, z in bits; null where there is none.
-using BlocksAbove = std::array<const Block*, 8>;
-BlocksAbove blocks_above(const BlockTable& table, const Block& block) {
-  BlocksAbove above{&block};
-  for (unsigned step = 1; step < 8; ++step) {
-    above[step] = table.find({block.coord[0] + static_cast<std::int32_t>(step & 1u),
-                              block.coord[1] + static_cast<std::int32_t>(step >> 1 & 1u),
-                              block.coord[2] + static_cast<std::int32_t>(step >> 2)});
-  }
-  return above;
-}
-
-/// A leaf and its upper neighbours as the marching of its cells sees them.
-class Neighbourhood {
+/// Words of the tiles of a block and of those one step above it.
+class TileFrame {
  public:
-  Neighbourhood(const BlocksAbove& above, unsigned slot) {
-    for (unsigned step = 0; step < 8; ++step) {
-      const Block* owner = above[slot & step];
-      const unsigned there = slot ^ step;
-      const std::int8_t index = owner == nullptr ? kOutside : owner->leaf_of[there];
-      if (owner != nullptr && (owner->changed >> there & 1u) != 0) changed_ = true;
-      leaf_[step] = index >= 0 ? &owner->leaf[static_cast<std::size_t>(index)] : nullptr;
-      whole_[step] = index == kInside ? ~Plane{0} : Plane{0};
-    }
-  }
-  [[nodiscard]] const Leaf* leaf(unsigned step) const { return leaf_[step]; }
-  /// Whether any of them was sampled anew.
-  [[nodiscard]] bool changed() const { return changed_; }
+  static constexpr unsigned kSide = 5;
+  static constexpr std::array<unsigned, 8> kStep{0, 1, 5, 6, 25, 26, 30, 31};
+  [[nodiscard]] static constexpr unsigned at(unsigned x, unsigned y, unsigned z) { return (z * kSide + y) * kSide + x; }
+  [[nodiscard]] static constexpr unsigned at(unsigned place) { return at(place & 3u, place >> 2 & 3u, place >> 4); }
 
-  /// Signs of the 8 x 8 nodes that lie `step` (bits x, y) away from those of this leaf in plane z, 0..8.
-  [[nodiscard]] Plane plane(unsigned step, int z) const {
-    const unsigned up = z == kLeafNodes ? 4u : 0u;
-    const int at = z % kLeafNodes;
-    const auto signs = [&](unsigned s) {
-      return leaf_[s | up] != nullptr ? leaf_[s | up]->inside[static_cast<std::size_t>(at)] : whole_[s | up];
-    };
-    constexpr Plane kFirstX = 0x0101010101010101, kFirstY = 0xff;
-    const auto shifted_x = [&](Plane own, Plane next) { return (own >> 1 & ~(kFirstX << 7)) | (next & kFirstX) << 7; };
-    const auto shifted_y = [&](Plane own, Plane next) { return own >> 8 | (next & kFirstY) << 56; };
-    switch (step) {
-      case 0: return signs(0);
-      case 1: return shifted_x(signs(0), signs(1));
-      case 2: return shifted_y(signs(0), signs(2));
-      default: return shifted_y(shifted_x(signs(0), signs(1)), shifted_x(signs(2), signs(3)));
-    }
-  }
-
- private:
-  std::array<const Leaf*, 8> leaf_{};
-  std::array<Plane, 8> whole_{};
-  bool changed_ = false;
-};
-
-/// Four bits for each node of a plane: its own sign and those one step along x, y and both; 16 nodes a word.
-struct SquareSigns {
-  std::array<std::uint64_t, 4> word;
-  explicit SquareSigns(const std::array<Plane, 4>& step) {
-    for (unsigned w = 0; w < 4; ++w) {
-      word[w] = 0;
-      for (unsigned s = 0; s < 4; ++s) {
-        word[w] |= _pdep_u64(step[s] >> (16 * w) & 0xffffu, std::uint64_t{0x1111111111111111} << s);
+  /// The nodes inside.
+  explicit TileFrame(const BlocksAbove& above) {
+    for (unsigned z = 0; z < kSide; ++z) {
+      for (unsigned y = 0; y < kSide; ++y) {
+        for (unsigned x = 0; x < kSide; ++x) {
+          const Block* block = above[x >> 2 | y >> 2 << 1 | z >> 2 << 2];
+          word_[at(x, y, z)] = block == nullptr ? Bits{0} : block->inside((x & 3u) | (y & 3u) << 2 | (z & 3u) << 4);
+        }
       }
     }
   }
-  [[nodiscard]] unsigned operator[](int bit) const {
-    return static_cast<unsigned>(word[static_cast<std::size_t>(bit >> 4)] >> (4 * (bit & 15)) & 0xfu);
+  [[nodiscard]] Bits operator[](unsigned at) const { return word_[at]; }
+  [[nodiscard]] Steps around(unsigned at) const {
+    std::array<Bits, 8> words;
+    for (std::size_t step = 0; step < 8; ++step) words[step] = word_[at + kStep[step]];
+    return Steps(words);
   }
+
+ private:
+  std::array<Bits, kSide * kSide * kSide> word_;
 };
+
+/// A tile without values owns no crossed edge, or a bound was wrong.
+void expect_owned(const TileFrame& frame, const Block& block) {
+  for_bits(~block.held, [&](unsigned place) {
+    const unsigned at = TileFrame::at(place);
+    const Bits own = frame[at];
+    if (own == frame[at + 1] && own == frame[at + 5] && own == frame[at + 25]) return;
+    const Steps around = frame.around(at);
+    if (((own ^ around.step[1]) | (own ^ around.step[2]) | (own ^ around.step[4])) != 0) lattice::throw_missing_block(block.coord);
+  });
+}
 
 constexpr auto kTriangles = [] {
   std::array<std::uint8_t, 256> count{};
@@ -101,145 +73,116 @@ constexpr auto kTriangles = [] {
   return count;
 }();
 
-/// Marks the edges and cells that the surface crosses and counts what a leaf will hold.
-void count_leaf(const Neighbourhood& around, Leaf& leaf, std::vector<std::uint8_t>& corners) {
-  const auto planes_at = [&](int z) {
-    return std::array{around.plane(0, z), around.plane(1, z), around.plane(2, z), around.plane(3, z)};
-  };
-  std::array<Plane, 4> here, above = planes_at(0);
-  SquareSigns low(above), high = low;
-  std::array<std::uint8_t, 64 * kLeafNodes> inside;
-  for (int z = 0; z < kLeafNodes; ++z) {
-    here = above;
-    low = high;
-    above = planes_at(z + 1);
-    high = SquareSigns(above);
-    const auto at = static_cast<std::size_t>(z);
-    leaf.edges[3 * at] = here[0] ^ here[1];
-    leaf.edges[3 * at + 1] = here[0] ^ here[2];
-    leaf.edges[3 * at + 2] = here[0] ^ above[0];
-    const Plane any = here[0] | here[1] | here[2] | here[3] | above[0] | above[1] | above[2] | above[3];
-    const Plane all = here[0] & here[1] & here[2] & here[3] & above[0] & above[1] & above[2] & above[3];
-    leaf.cells[at] = any & ~all;
-    for (Plane cells = leaf.cells[at]; cells != 0; cells &= cells - 1) {
-      const int bit = std::countr_zero(cells);
-      inside[64 * at + static_cast<std::size_t>(bit)] = static_cast<std::uint8_t>(low[bit] | high[bit] << 4);
+/// The corners inside of each cell: eight bits at a time from those of the nodes one step up the axes.
+/// @param out  room for eight more than there are cells
+void write_corners(const Steps& inside, Bits cells, std::uint8_t* out) {
+  std::array<Bits, 8> bits;
+  for (std::size_t step = 0; step < 8; ++step) bits[step] = _pext_u64(inside.step[step], cells);
+  const int count = std::popcount(cells);
+  for (int first = 0; first < count; first += 8) {
+    std::uint64_t eight = 0;
+    for (std::size_t step = 0; step < 8; ++step) {
+      eight |= _pdep_u64(bits[step] >> first & 0xffu, std::uint64_t{0x0101010101010101} << step);
     }
+    std::memcpy(out + first, &eight, sizeof eight);
   }
-  const std::size_t before = corners.size();
-  corners.resize(before + inside.size());
-  std::uint8_t* out = corners.data() + before;
-  for (unsigned tile = 0; tile < 8; ++tile) {
-    const Plane own = tile_plane(tile);
-    const auto first = static_cast<std::size_t>(3 * blobs::kTile) * (tile >> 2);
-    leaf.tile_vertex[tile] = static_cast<std::uint16_t>(leaf.vertices);
-    for (std::size_t plane = first; plane < first + 3 * blobs::kTile; ++plane) {
-      leaf.vertices += static_cast<std::uint32_t>(std::popcount(leaf.edges[plane] & own));
-    }
-    leaf.tile_triangle[tile] = static_cast<std::uint16_t>(leaf.triangles);
-    for_tile_cells(leaf, tile, [&](int bit, int z) {
-      *out = inside[static_cast<std::size_t>(64 * z + bit)];
-      leaf.triangles += kTriangles[*out++];
-    });
-  }
-  leaf.tile_vertex[8] = static_cast<std::uint16_t>(leaf.vertices);
-  leaf.tile_triangle[8] = static_cast<std::uint16_t>(leaf.triangles);
-  corners.resize(static_cast<std::size_t>(out - corners.data()));
 }
 
-/// Counts the leaves of a block and finds those whose vertices change.
+/// The words of a mask of tiles, of a block and those above it, moved down and joined: tiles that it or one step up holds.
+template <class Mask>
+Bits reached(const BlocksAbove& above, const Mask& mask) {
+  std::array<Bits, 8> words;
+  for (std::size_t step = 0; step < 8; ++step) words[step] = above[step] == nullptr ? Bits{0} : mask(*above[step]);
+  return Steps(words).any();
+}
+
+/// Marks the edges and cells that the surface crosses, and counts what the tiles will hold.
 void count_block(const BlockTable& table, Block& block) {
   const BlocksAbove above = blocks_above(table, block);
-  block.touched = std::any_of(above.begin(), above.end(), [](const Block* b) { return b != nullptr && b->changed != 0; });
-  if (!block.touched) {
-    for (Leaf& leaf : block.leaf) leaf.solve = leaf.emit = false;
-    return;
-  }
-  thread_local std::vector<std::uint8_t> last;
-  last.swap(block.corners);
-  block.corners.clear();
-  for (Leaf& leaf : block.leaf) {
-    const Neighbourhood around(above, leaf.slot);
-    leaf.solve = around.changed();
-    const auto first = last.begin() + leaf.first_cell;
-    leaf.first_cell = static_cast<std::uint32_t>(block.corners.size());
-    if (!leaf.solve) {
-      std::ptrdiff_t cells = 0;
-      for (const Plane plane : leaf.cells) cells += std::popcount(plane);
-      block.corners.insert(block.corners.end(), first, first + cells);
-      continue;
+  block.solve = reached(above, [](const Block& b) { return b.changed; });
+  if (block.solve == 0) return;
+  const TileFrame frame(above);
+  expect_owned(frame, block);
+  thread_local std::array<std::uint8_t, blobs::kTileNodes * blobs::kTileNodes + 8> corners;
+  std::size_t cells = 0;
+  block.triangles = 0;
+  for (Tile& tile : block.tile) {
+    const std::size_t before = std::exchange(tile.first_cell, static_cast<std::uint16_t>(cells));
+    if ((block.solve >> tile.place & 1u) != 0) {
+      const Steps inside = frame.around(TileFrame::at(tile.place));
+      for (std::size_t axis = 0; axis < 3; ++axis) tile.edges[axis] = inside.step[0] ^ inside.step[std::size_t{1} << axis];
+      tile.cells = inside.any() & ~inside.all();
+      tile.vertices = static_cast<std::uint8_t>(std::popcount(tile.edges[0]) + std::popcount(tile.edges[1]) +
+                                                std::popcount(tile.edges[2]));
+      write_corners(inside, tile.cells, corners.data() + cells);
+      tile.triangles = 0;
+      for (int k = 0; k < std::popcount(tile.cells); ++k) {
+        tile.triangles = static_cast<std::uint16_t>(tile.triangles + kTriangles[corners[cells + static_cast<std::size_t>(k)]]);
+      }
+    } else {
+      std::copy_n(block.corners.data() + before, std::popcount(tile.cells), corners.data() + cells);
     }
-    leaf.vertices = leaf.triangles = 0;
-    count_leaf(around, leaf, block.corners);
+    cells += static_cast<std::size_t>(std::popcount(tile.cells));
+    tile.first_triangle = static_cast<std::uint16_t>(block.triangles);
+    block.triangles += tile.triangles;
   }
+  block.corners.assign(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(cells));
 }
 
-/// Triangles follow the vertices of a leaf and its upper neighbours.
-void mark_triangles(const BlockTable& table, Block& block) {
-  if (!block.touched) return;
-  const BlocksAbove above = blocks_above(table, block);
-  for (Leaf& leaf : block.leaf) {
-    const Neighbourhood around(above, leaf.slot);
-    leaf.emit = around.changed();
-    for (unsigned step = 0; step < 8; ++step) {
-      leaf.emit = leaf.emit || (around.leaf(step) != nullptr && around.leaf(step)->solve);
-    }
+/// Where the nodes of a block and of its upper faces (0..16) stand in a table with four entries for each.
+constexpr int kTableSide = kBlockNodes + 1;
+constexpr int node_place(int x, int y, int z) { return 4 * ((z * kTableSide + y) * kTableSide + x); }
+/// Those of a word of bits that are `edge` nodes apart.
+template <int edge>
+constexpr auto kPlaces = [] {
+  std::array<int, 64> places{};
+  for (unsigned bit = 0; bit < 64; ++bit) {
+    const auto [x, y, z] = coordinates(bit);
+    places[bit] = node_place(edge * x, edge * y, edge * z);
   }
-}
+  return places;
+}();
+constexpr auto kTilePlace = kPlaces<blobs::kTile>, kNodePlace = kPlaces<1>;
 
-/// Vertices on the edges of a leaf's cells, by the edge's lower node within the leaf (0..8) and its axis.
+/// Vertices on the edges of a block's cells, by the edge's lower node and its axis.
 class VertexTable {
  public:
-  static constexpr int kSide = kLeafNodes + 1;
-  static constexpr int kAxis = kSide * kSide * kSide;
-  [[nodiscard]] static constexpr int place(int x, int y, int z) { return (z * kSide + y) * kSide + x; }
-
-  void fill(const Neighbourhood& around) {
-    const Leaf& own = *around.leaf(0);
-    std::uint32_t vertex = first_of(around, 0);
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      for_tile_edges(own, tile, [&](int bit, int z, int axis) { set(bit & 7, bit >> 3, z, axis, vertex++); });
+  void fill(const BlocksAbove& above) {
+    for (const Tile& tile : above[0]->tile) add(tile, kTilePlace[tile.place], kAll, 0);
+    for (unsigned step = 1; step < 7; ++step) {
+      if (above[step] == nullptr) continue;
+      // Those that lie on the block's upper faces.
+      const Bits face = ((step & 1u) != 0 ? kFirstX : kAll) & ((step & 2u) != 0 ? kFirstY : kAll) & ((step & 4u) != 0 ? kFirstZ : kAll);
+      const int from = node_place(kBlockNodes * static_cast<int>(step & 1u), kBlockNodes * static_cast<int>(step >> 1 & 1u),
+                                  kBlockNodes * static_cast<int>(step >> 2));
+      for_bits(above[step]->held & face, [&](unsigned at) {
+        add(above[step]->tile[above[step]->rank(at)], from + kTilePlace[at], face, step);
+      });
     }
-    for (unsigned step = 1; step < 7; ++step) add_beyond(around, step);
   }
   [[nodiscard]] std::uint32_t operator[](int at) const { return vertex_[static_cast<std::size_t>(at)]; }
 
  private:
-  static std::uint32_t first_of(const Neighbourhood& around, unsigned step) {
-    return static_cast<std::uint32_t>(around.leaf(step)->first_vertex);
-  }
-  void set(int x, int y, int z, int axis, std::uint32_t vertex) {
-    vertex_[static_cast<std::size_t>(axis * kAxis + place(x, y, z))] = vertex;
-  }
-  /// Those of the leaf one step up that lie on this leaf's upper faces.
-  void add_beyond(const Neighbourhood& around, unsigned step) {
-    const Leaf* leaf = around.leaf(step);
-    if (leaf == nullptr) return;
-    constexpr Plane kFirstX = 0x0101010101010101, kFirstY = 0xff;
-    const Plane face = ((step & 1u) != 0 ? kFirstX : ~Plane{0}) & ((step & 2u) != 0 ? kFirstY : ~Plane{0});
-    const int x0 = kLeafNodes * static_cast<int>(step & 1u), y0 = kLeafNodes * static_cast<int>(step >> 1 & 1u),
-              z0 = kLeafNodes * static_cast<int>(step >> 2);
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      if ((tile & step) != 0) continue;
-      std::uint32_t vertex = first_of(around, step) + leaf->tile_vertex[tile];
-      const Plane own = tile_plane(tile);
-      const int low = blobs::kTile * static_cast<int>(tile >> 2);
-      for (int z = low; z < ((step & 4u) != 0 ? 1 : low + blobs::kTile); ++z) {
-        for (int axis = 0; axis < 3; ++axis) {
-          const Plane edges = leaf->edges[static_cast<std::size_t>(3 * z + axis)] & own;
-          if ((step >> axis & 1u) == 0) {
-            for (Plane left = edges & face; left != 0; left &= left - 1) {
-              const int bit = std::countr_zero(left);
-              set(x0 + (bit & 7), y0 + (bit >> 3), z0 + z, axis,
-                  vertex + static_cast<std::uint32_t>(std::popcount(edges & ((Plane{1} << bit) - 1))));
-            }
-          }
-          vertex += static_cast<std::uint32_t>(std::popcount(edges));
-        }
+  /// Edges that start at `nodes` and run along other axes than `without`.
+  void add(const Tile& tile, int from, Bits nodes, unsigned without) {
+    std::uint32_t vertex = tile.first_vertex;
+    std::uint32_t* table = vertex_.data() + from;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const Bits edges = tile.edges[axis];
+      if (nodes == kAll) {
+        for_bits(edges, [&](unsigned node) { table[static_cast<unsigned>(kNodePlace[node]) + axis] = vertex++; });
+        continue;
       }
+      if ((without >> axis & 1u) == 0) {
+        for_bits(edges & nodes, [&](unsigned node) {
+          table[static_cast<unsigned>(kNodePlace[node]) + axis] =
+              vertex + static_cast<std::uint32_t>(std::popcount(edges & ((Bits{1} << node) - 1)));
+        });
+      }
+      vertex += static_cast<std::uint32_t>(std::popcount(edges));
     }
   }
-  std::array<std::uint32_t, 3 * kAxis> vertex_;
+  std::array<std::uint32_t, 4 * kTableSide * kTableSide * kTableSide> vertex_;
 };
 
 /// From the place of a cell to that of its edges.
@@ -247,19 +190,29 @@ constexpr auto kEdgePlace = [] {
   std::array<int, kCellEdges> places{};
   for (std::size_t e = 0; e < kCellEdges; ++e) {
     const auto [corner, axis] = kCellEdge[e];
-    places[e] = axis * VertexTable::kAxis + VertexTable::place(corner & 1, corner >> 1 & 1, corner >> 2);
+    places[e] = node_place(corner & 1, corner >> 1 & 1, corner >> 2) + axis;
   }
   return places;
 }();
 
+/// A point on an edge of a cell is start + t along, behind an unused number [cells].
+struct EdgeLine {
+  alignas(16) std::array<float, 4> start{}, along{};
+};
+constexpr auto kEdgeLine = [] {
+  std::array<EdgeLine, kCellEdges> lines{};
+  for (std::size_t e = 0; e < kCellEdges; ++e) {
+    for (unsigned k = 0; k < 3; ++k) lines[e].start[k + 1] = static_cast<float>(kCellEdge[e].corner >> k & 1);
+    lines[e].along[kCellEdge[e].axis + std::size_t{1}] = 1.0F;
+  }
+  return lines;
+}();
+
 /// The triangles of a cell as places of their edges. A cell whose only loop has four vertices has a choice of diagonals.
 struct CellTriangles {
-  std::uint8_t count = 0;
-  bool choice = false;
   std::array<std::array<std::uint16_t, 3 * kMostTriangles>, 2> place{};  ///< with both diagonals
-  std::array<std::uint16_t, 4> corner{};                                 ///< the four vertices
-  std::array<float, 4> start{}, sense{};  ///< t from the same end on all four: start + sense t
-  float product = 0.0F;                   ///< 1: the four edges are parallel
+  std::array<std::uint8_t, 4> edge{};  ///< of the loop; of any other cell the choice does not matter
+  std::uint8_t count = 0;
 };
 
 constexpr CellTriangles make_triangles(const CellLoops& loops) {
@@ -269,7 +222,7 @@ constexpr CellTriangles make_triangles(const CellLoops& loops) {
     for (std::size_t l = 0; l < loops.loops; ++l) {
       const Loop& loop = loops.loop[l];
       std::size_t apex = static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(loop.apices)));
-      if (loop.size == 4) apex = variant;
+      if (loops.loops == 1 && loop.size == 4) apex = variant;
       for (std::size_t d = 1; d + 1 < loop.size; ++d) {
         for (const std::size_t k : {apex, apex + d, apex + d + 1}) {
           result.place[variant][n++] = static_cast<std::uint16_t>(kEdgePlace[loop.edge[k % loop.size]]);
@@ -278,27 +231,7 @@ constexpr CellTriangles make_triangles(const CellLoops& loops) {
     }
     result.count = static_cast<std::uint8_t>(n / 3);
   }
-  if (loops.loops != 1 || loops.loop[0].size != 4) return result;
-  result.choice = true;
-  const Loop& loop = loops.loop[0];
-  // The vertices lie on four parallel edges, or on two pairs that leave one edge of the cell at its ends.
-  const bool parallel = kCellEdge[loop.edge[0]].axis == kCellEdge[loop.edge[1]].axis &&
-                        kCellEdge[loop.edge[1]].axis == kCellEdge[loop.edge[2]].axis;
-  result.product = parallel ? 1.0F : 0.0F;
-  for (std::size_t k = 0; k < 4; ++k) {
-    const CellEdge edge = kCellEdge[loop.edge[k]];
-    // The other axis of the two pairs: the common edge lies at the end that both axes share.
-    bool far = false;
-    if (!parallel) {
-      for (std::size_t m = 0; m < 4; ++m) {
-        const CellEdge other = kCellEdge[loop.edge[m]];
-        if (other.axis != edge.axis) far = (other.corner >> edge.axis & 1u) != 0;
-      }
-    }
-    result.corner[k] = static_cast<std::uint16_t>(kEdgePlace[loop.edge[k]]);
-    result.start[k] = far ? 1.0F : 0.0F;
-    result.sense[k] = far ? -1.0F : 1.0F;
-  }
+  for (std::size_t k = 0; k < 4; ++k) result.edge[k] = loops.loop[0].edge[k % std::max<std::size_t>(loops.loop[0].size, 1)];
   return result;
 }
 
@@ -308,41 +241,51 @@ constexpr auto kCellTriangles = [] {
   return cases;
 }();
 
-/// Whether the second diagonal of a cell's only loop is the shorter one.
-bool second_diagonal(const CellTriangles& c, const VertexTable& table, int cell, const float* along) {
-  std::array<float, 4> t;
-  for (std::size_t k = 0; k < 4; ++k) t[k] = c.start[k] + c.sense[k] * along[table[cell + c.corner[k]]];
-  // Squared lengths up to what both have in common.
-  const float first = t[0] * t[0] + t[2] * t[2] - 2.0F * c.product * t[0] * t[2];
-  const float second = t[1] * t[1] + t[3] * t[3] - 2.0F * c.product * t[1] * t[3];
-  return second < first;
-}
-
-/// The edges of a leaf's cells that belong to leaves without values are free of surface, or a bound was wrong.
-void expect_owned(const Neighbourhood& around, const BlockCoord& block) {
-  constexpr Plane kLastX = 0x8080808080808080, kLastY = Plane{0xff} << 56;
-  for (unsigned step = 1; step < 8; ++step) {
-    if (around.leaf(step) != nullptr) continue;
-    const Plane cells = ((step & 1u) != 0 ? kLastX : ~Plane{0}) & ((step & 2u) != 0 ? kLastY : ~Plane{0});
-    for (int z = (step & 4u) != 0 ? kLeafNodes - 1 : 0; z < kLeafNodes; ++z) {
-      for (unsigned axis = 0; axis < 3; ++axis) {
-        if ((step >> axis & 1u) != 0) continue;
-        const auto plane = [&](unsigned corner) { return around.plane(corner & 3u, z + static_cast<int>(corner >> 2)); };
-        if (((plane(step) ^ plane(step | 1u << axis)) & cells) != 0) lattice::throw_missing_block(block);
-      }
-    }
+/// Whether the second diagonal of a cell's only loop lies closer to the surface. Between two points of it a chord d lies
+/// |d . (n1 - n0)| / 8 off, by the normals n; where the surface is flat the shorter diagonal is taken.
+bool second_diagonal(const CellTriangles& c, const VertexTable& table, int cell, const EdgePoint* points) {
+  constexpr float kFlat = 1e-3F;  // curvature [1 / cell]
+  __m128 place[4], normal[4];
+  for (std::size_t k = 0; k < 4; ++k) {
+    const std::size_t edge = c.edge[k];
+    normal[k] = _mm_load_ps(&points[table[cell + kEdgePlace[edge]]].t);
+    const __m128 t = _mm_permute_ps(normal[k], 0);
+    place[k] = _mm_add_ps(_mm_load_ps(kEdgeLine[edge].start.data()), _mm_mul_ps(t, _mm_load_ps(kEdgeLine[edge].along.data())));
   }
+  const __m128 first = _mm_sub_ps(place[2], place[0]), second = _mm_sub_ps(place[3], place[1]);
+  const __m128 bends = _mm_hadd_ps(_mm_mul_ps(first, _mm_sub_ps(normal[2], normal[0])),
+                                   _mm_mul_ps(second, _mm_sub_ps(normal[3], normal[1])));
+  const __m128 lengths = _mm_hadd_ps(_mm_mul_ps(first, first), _mm_mul_ps(second, second));
+  alignas(16) std::array<float, 4> sum;  // bends and squared lengths of both
+  _mm_store_ps(sum.data(), _mm_hadd_ps(bends, lengths));
+  return std::abs(sum[1]) + kFlat * sum[3] < std::abs(sum[0]) + kFlat * sum[2];
 }
 
-std::uint32_t shift_of(const Leaf& leaf) { return static_cast<std::uint32_t>(leaf.first_vertex - leaf.old_vertex); }
-
-/// Vertices of the last call that move by `more` further than those of the triangles' own leaf.
+/// Vertices of the last call that move by `more` further than those of the triangles' own block.
 struct Further {
   std::uint32_t first, count, more;
 };
 
-/// Triangles that stay: only the numbers of their vertices move, by their own leaf's shift or as `further` says.
-void renumber(std::span<std::uint32_t> vertex, std::uint32_t own, std::span<const Further> further) {
+/// The triangles of a block stay: only the numbers of their vertices move.
+void renumber_block(const BlockTable& table, const Block& block, Mesh& mesh) {
+  const auto shift_of = [](const Tile& tile) { return tile.first_vertex - tile.old_vertex; };
+  const auto owner = std::find_if(block.tile.begin(), block.tile.end(), [](const Tile& tile) { return tile.vertices > 0; });
+  const std::uint32_t own = owner != block.tile.end() ? shift_of(*owner) : 0;
+  thread_local std::vector<Further> further;
+  further.clear();
+  for (const Block* above : blocks_above(table, block)) {
+    if (above == nullptr || above == &block) continue;
+    for (const Tile& tile : above->tile) {
+      if ((above->solve >> tile.place & 1u) != 0 || tile.vertices == 0 || shift_of(tile) == own) continue;
+      const std::uint32_t more = shift_of(tile) - own;
+      if (!further.empty() && further.back().first + further.back().count == tile.old_vertex && further.back().more == more) {
+        further.back().count += tile.vertices;
+      } else {
+        further.push_back({tile.old_vertex, tile.vertices, more});
+      }
+    }
+  }
+  const std::span vertex(mesh.triangle.data()->data() + 3 * block.first_triangle, 3 * block.triangles);
   if (further.empty()) {
     if (own == 0) return;
     for (std::uint32_t& v : vertex) v += own;
@@ -356,83 +299,35 @@ void renumber(std::span<std::uint32_t> vertex, std::uint32_t own, std::span<cons
   for (std::size_t i = 0; i < vertex.size(); ++i) vertex[i] += shift[i];
 }
 
-/// A leaf's, or those of leaves that follow each other.
-std::span<std::uint32_t> vertices_of(const Leaf& first, const Leaf& last, Mesh& mesh) {
-  const std::size_t count = last.first_triangle + last.triangles - first.first_triangle;
-  if (count == 0) return {};
-  return {mesh.triangle.data()->data() + 3 * first.first_triangle, 3 * count};
-}
-
-void renumber_leaf(const Neighbourhood& around, const Leaf& leaf, Mesh& mesh) {
-  std::array<Further, 7> further;
-  std::size_t n = 0;
-  for (unsigned step = 1; step < 8; ++step) {
-    const Leaf* other = around.leaf(step);
-    if (other == nullptr || other->vertices == 0 || shift_of(*other) == shift_of(leaf)) continue;
-    further[n++] = {static_cast<std::uint32_t>(other->old_vertex), other->vertices, shift_of(*other) - shift_of(leaf)};
-  }
-  renumber(vertices_of(leaf, leaf, mesh), shift_of(leaf), std::span(further).first(n));
-}
-
-/// The same for a block where all leaves stay; they move alike.
-void renumber_block(const BlockTable& table, const Block& block, Mesh& mesh) {
-  const std::uint32_t own = shift_of(block.leaf.front());
-  std::array<Further, 7 * 8> further;
-  std::size_t n = 0;
-  for (const Block* above : blocks_above(table, block)) {
-    if (above == nullptr || above == &block) continue;
-    for (const Leaf& leaf : above->leaf) {
-      if (leaf.solve || leaf.vertices == 0 || shift_of(leaf) == own) continue;
-      const auto first = static_cast<std::uint32_t>(leaf.old_vertex);
-      const std::uint32_t more = shift_of(leaf) - own;
-      if (n > 0 && further[n - 1].first + further[n - 1].count == first && further[n - 1].more == more) {
-        further[n - 1].count += leaf.vertices;
-      } else {
-        further[n++] = {first, leaf.vertices, more};
-      }
-    }
-  }
-  renumber(vertices_of(block.leaf.front(), block.leaf.back(), mesh), own, std::span(further).first(n));
-}
-
-void emit_triangles(const BlockTable& table, const Block& block, const std::vector<float>& along, Mesh& mesh) {
-  if (!block.touched) {
+void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint* points, Mesh& mesh) {
+  if (block.triangles == 0) return;
+  if (block.emit == 0) {
     renumber_block(table, block, mesh);
     return;
   }
-  thread_local VertexTable vertices;
-  thread_local std::array<std::array<std::uint32_t, 3>, (512 + 1) * kMostTriangles> found;
-  const BlocksAbove above = blocks_above(table, block);
-  for (const Leaf& leaf : block.leaf) {
-    if (leaf.triangles == 0) continue;
-    const Neighbourhood around(above, leaf.slot);
-    if (!leaf.emit) {
-      renumber_leaf(around, leaf, mesh);
-      continue;
-    }
-    expect_owned(around, block.coord);
-    vertices.fill(around);
-    std::array<std::uint32_t, 3>* out = found.data();
-    const std::uint8_t* corners = block.corners.data() + leaf.first_cell;
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      for_tile_cells(leaf, tile, [&](int bit, int z) {
-        const CellTriangles& c = kCellTriangles[*corners++];
-        const int cell = VertexTable::place(bit & 7, bit >> 3, z);
-        const auto& place = c.place[c.choice && second_diagonal(c, vertices, cell, along.data()) ? 1 : 0];
-        // All that a cell can have, whatever it has: cheaper than a branch that cannot be foreseen.
-        for (std::size_t k = 0; k < kMostTriangles; ++k) {
-          out[k] = {vertices[cell + place[3 * k]], vertices[cell + place[3 * k + 1]], vertices[cell + place[3 * k + 2]]};
-        }
-        out += c.count;
-      });
-    }
-    std::copy(found.data(), out, mesh.triangle.data() + leaf.first_triangle);
+  using Triangle = std::array<std::uint32_t, 3>;
+  thread_local VertexTable thread_vertices;
+  thread_local std::vector<Triangle> thread_found;
+  VertexTable& vertices = thread_vertices;
+  vertices.fill(blocks_above(table, block));
+  thread_found.resize(block.triangles + kMostTriangles);
+  Triangle* out = thread_found.data();
+  const std::uint8_t* corners = block.corners.data();
+  for (const Tile& tile : block.tile) {
+    const int from = kTilePlace[tile.place];
+    for_bits(tile.cells, [&](unsigned node) {
+      const CellTriangles& c = kCellTriangles[*corners++];
+      const int cell = from + kNodePlace[node];
+      const auto& place = c.place[second_diagonal(c, vertices, cell, points) ? 1 : 0];
+      // All that a cell can have, whatever it has: cheaper than a branch that cannot be foreseen.
+      for (std::size_t k = 0; k < kMostTriangles; ++k) {
+        out[k] = {vertices[cell + place[3 * k]], vertices[cell + place[3 * k + 1]], vertices[cell + place[3 * k + 2]]};
+      }
+      out += c.count;
+    });
   }
+  std::copy(thread_found.data(), out, mesh.triangle.data() + block.first_triangle);
 }
-
-}  // namespace
-
-namespace {
 
 /// A run of numbers that moves as a whole.
 struct Run {
@@ -440,6 +335,7 @@ struct Run {
 };
 
 void add_run(std::vector<Run>& runs, std::size_t from, std::size_t to, std::size_t count) {
+  if (count == 0) return;
   if (!runs.empty()) {
     Run& last = runs.back();
     if (last.from + last.count == from && last.to + last.count == to) {
@@ -473,7 +369,9 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
               MeshScratch& scratch, Mesh& mesh) {
   std::vector<std::uint32_t> blocks;
   for (std::size_t b = 0; b < table.block.size(); ++b) {
-    if (!table.block[b].uniform()) blocks.push_back(static_cast<std::uint32_t>(b));
+    Block& block = table.block[b];
+    block.solve = 0;
+    if (!block.uniform()) blocks.push_back(static_cast<std::uint32_t>(b));
   }
   const auto for_each_block = [&](const auto& use) {
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
@@ -481,39 +379,38 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
     });
   };
   for_each_block([&](Block& block) { count_block(table, block); });
-  for_each_block([&](Block& block) { mark_triangles(table, block); });
+  // Triangles follow the vertices of a tile and its upper neighbours.
+  for_each_block([&](Block& block) {
+    block.emit = block.held & reached(blocks_above(table, block), [](const Block& b) { return b.solve; });
+  });
   std::size_t vertices = 0, triangles = 0;
   std::vector<Run> same_vertices, same_triangles;
   for (const std::uint32_t b : blocks) {
-    for (Leaf& leaf : table.block[b].leaf) {
-      leaf.old_vertex = std::exchange(leaf.first_vertex, vertices);
-      leaf.old_triangle = std::exchange(leaf.first_triangle, triangles);
-      vertices += leaf.vertices;
-      triangles += leaf.triangles;
-      if (!leaf.solve) add_run(same_vertices, leaf.old_vertex, leaf.first_vertex, leaf.vertices);
-      if (!leaf.emit) add_run(same_triangles, leaf.old_triangle, leaf.first_triangle, leaf.triangles);
+    Block& block = table.block[b];
+    for (Tile& tile : block.tile) {
+      tile.old_vertex = std::exchange(tile.first_vertex, static_cast<std::uint32_t>(vertices));
+      if ((block.solve >> tile.place & 1u) == 0) add_run(same_vertices, tile.old_vertex, vertices, tile.vertices);
+      vertices += tile.vertices;
     }
+    block.old_triangle = std::exchange(block.first_triangle, triangles);
+    if (block.emit == 0) add_run(same_triangles, block.old_triangle, triangles, block.triangles);
+    triangles += block.triangles;
   }
   lattice::expect_indexable(vertices, lattice);
   mesh.columns.clear();
   move_runs(same_vertices, vertices, mesh.position);
   move_runs(same_vertices, vertices, mesh.normal);
-  move_runs(same_vertices, vertices, scratch.along);
+  move_runs(same_vertices, vertices, scratch.point);
   move_runs(same_triangles, triangles, mesh.triangle);
-  for_each_block([&](Block& block) {
-    if (block.touched) sampler.solve(table, block, mesh, scratch.along);
-  });
-  for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.along, mesh); });
+  for_each_block([&](Block& block) { sampler.solve(table, block, mesh, scratch.point); });
+  for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });
 }
 
 void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles) {
   tiles.clear();
   for (const Block& block : table.block) {
-    for (const Leaf& leaf : block.leaf) {
-      for (unsigned tile = 0; tile < 8; ++tile) {
-        const std::size_t count = leaf.tile_triangle[tile + 1] - std::size_t{leaf.tile_triangle[tile]};
-        if (count > 0) tiles.push_back({&block, &leaf, tile, leaf.first_triangle + leaf.tile_triangle[tile], count});
-      }
+    for (const Tile& tile : block.tile) {
+      if (tile.triangles > 0) tiles.push_back({&block, tile.place, block.first_triangle + tile.first_triangle, tile.triangles});
     }
   }
 }
@@ -581,7 +478,7 @@ void refine(const Sampler& sampler, const Lattice& lattice, const Executor& exec
         scratch.triangle[4 * n + 3] = middle;
       }
       normals.resize(points.size());
-      sampler.project(*tile.block, *tile.leaf, tile.tile, points, normals);
+      sampler.project(*tile.block, tile.tile, points, normals);
       std::copy(points.begin(), points.end(), mesh.position.begin() + static_cast<std::ptrdiff_t>(first));
       std::copy(normals.begin(), normals.end(), mesh.normal.begin() + static_cast<std::ptrdiff_t>(first));
     }
@@ -690,11 +587,11 @@ const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& latti
   counts.single_precision = sampler->single_precision();
   counts.cell = lattice.cell;
   for (const march::Block& block : table.block) {
-    counts.leaves += block.leaf.size();
-    counts.leaves_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
+    counts.tiles += block.tile.size();
+    counts.tiles_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
     counts.nodes += block.values.size();
     counts.kernel_values += block.kernel_values;
-    counts.bytes += sizeof(march::Block) + block.leaf.capacity() * sizeof(march::Leaf) +
+    counts.bytes += sizeof(march::Block) + block.tile.capacity() * sizeof(march::Tile) +
                     block.values.capacity() * sizeof(float) + block.corners.capacity();
   }
   counts.bytes += scratch.bytes() + grid.bytes();

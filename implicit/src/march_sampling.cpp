@@ -26,37 +26,71 @@ constexpr std::size_t kBlocksPerTask = 8;
 /// Vertices stay this far from the nodes [cells].
 constexpr double kLeast = 0x1p-17;
 
-std::array<int, 3> corner_of(unsigned mask, int edge) {
-  return {edge * static_cast<int>(mask & 1u), edge * static_cast<int>(mask >> 1 & 1u), edge * static_cast<int>(mask >> 2)};
+/// The lowest node of a tile, and of a leaf, in its block.
+std::array<int, 3> corner_of(unsigned tile) {
+  const auto [x, y, z] = coordinates(tile);
+  return {kTile * x, kTile * y, kTile * z};
+}
+std::array<int, 3> leaf_corner(unsigned leaf) {
+  return {kLeafNodes * static_cast<int>(leaf & 1u), kLeafNodes * static_cast<int>(leaf >> 1 & 1u), kLeafNodes * static_cast<int>(leaf >> 2)};
 }
 
-/// The 16 signs of a plane of a tile as bits of the plane of its leaf.
-Plane spread(std::uint64_t tile_plane, int tx, int ty) {
-  const std::uint64_t m = tile_plane & 0xffffu;
-  const Plane rows = (m & 0xfu) | (m & 0xf0u) << 4 | (m & 0xf00u) << 8 | (m & 0xf000u) << 12;
-  return rows << tx << (8 * ty);
-}
-
-/// Of a tile in a leaf.
-std::array<int, 3> corner_in(const std::array<int, 3>& leaf_corner, unsigned tile) {
-  const auto at = corner_of(tile, kTile);
-  return {leaf_corner[0] + at[0], leaf_corner[1] + at[1], leaf_corner[2] + at[2]};
-}
-
-/// The signs of a tile, bit x + 4 y + 16 z.
-std::uint64_t tile_inside(const Leaf& leaf, unsigned tile) {
-  std::uint64_t inside = 0;
-  for (std::size_t k = 0; k < kTile; ++k) {
-    inside |= _pext_u64(leaf.inside[kTile * (tile >> 2) + k], tile_plane(tile)) << (16 * k);
+/// Gives a block tiles with values and takes them from it, all at once.
+class TileChanges {
+ public:
+  void begin() {
+    made_ = dropped_ = 0;
+    values_.clear();
   }
-  return inside;
-}
-
-void set_tile(Leaf& leaf, unsigned tile, std::uint64_t inside) {
-  const auto at = corner_of(tile, kTile);
-  for (int k = 0; k < kTile; ++k) {
-    leaf.inside[static_cast<std::size_t>(at[2] + k)] |= spread(inside >> (16 * k), at[0], at[1]);
+  /// Room for the values of a tile that follows the one made last. @pre until then no other is asked for
+  [[nodiscard]] float* room() {
+    values_.resize(kTileNodes * (static_cast<std::size_t>(std::popcount(made_)) + 1));
+    return values_.data() + values_.size() - kTileNodes;
   }
+  /// The values there are those of a tile.
+  void make(unsigned place, Bits inside) {
+    from_[place] = static_cast<std::uint8_t>(std::popcount(made_));
+    inside_[place] = inside;
+    made_ |= Bits{1} << place;
+  }
+  void drop(Bits tiles) { dropped_ |= tiles; }
+
+  void apply(Block& block) {
+    const Bits kept = block.held & ~dropped_ & ~made_, held = kept | made_;
+    if (made_ == 0 && kept == block.held) return;
+    if (kept != 0) {
+      old_tiles_.assign(block.tile.begin(), block.tile.end());
+      old_values_.assign(block.values.begin(), block.values.end());
+    }
+    block.tile.resize(static_cast<std::size_t>(std::popcount(held)));
+    block.values.resize(kTileNodes * block.tile.size());
+    Tile* tile = block.tile.data();
+    float* values = block.values.data();
+    for_bits(held, [&](unsigned place) {
+      const bool made = (made_ >> place & 1u) != 0;
+      const std::size_t from = made ? from_[place] : block.rank(place);
+      *tile = made ? Tile{} : old_tiles_[from];
+      if (made) {
+        tile->inside = inside_[place];
+        tile->place = static_cast<std::uint8_t>(place);
+      }
+      ++tile;
+      values = std::copy_n((made ? values_ : old_values_).data() + kTileNodes * from, kTileNodes, values);
+    });
+    block.held = held;
+  }
+
+ private:
+  Bits made_ = 0, dropped_ = 0;
+  std::array<std::uint8_t, 64> from_{};
+  std::array<Bits, 64> inside_{};
+  std::vector<float> values_, old_values_;
+  std::vector<Tile> old_tiles_;
+};
+
+/// Without values: all nodes on one side.
+void set_sign(Block& block, Bits tiles, bool inside) {
+  block.outside = inside ? block.outside & ~tiles : block.outside | tiles;
 }
 
 Vec3 position_of(const Lattice& lattice, const Block& block, int x, int y, int z, int axis, double t) {
@@ -131,10 +165,7 @@ class TileSurroundings {
     const auto step = [](int tile) { return static_cast<std::size_t>((tile + 4) >> 2); };
     const Block* block = around_[step(x) + 3 * step(y) + 9 * step(z)];
     if (block == nullptr) return ~std::uint64_t{0};
-    const auto bits = [](int a, int b, int c) { return static_cast<unsigned>((a & 1) | (b & 1) << 1 | (c & 1) << 2); };
-    const std::int8_t index = block->leaf_of[bits(x >> 1, y >> 1, z >> 1)];
-    if (index < 0) return index == kInside ? 0 : ~std::uint64_t{0};
-    return ~tile_inside(block->leaf[static_cast<std::size_t>(index)], bits(x, y, z));
+    return ~block->inside(static_cast<unsigned>((x & 3) | (y & 3) << 2 | (z & 3) << 4));
   }
 
   std::array<const Block*, 27> around_{};
@@ -167,39 +198,34 @@ class BlobSampler final : public Sampler {
     if (skip_) evaluate_needed(executor, blocks, table);
   }
 
-  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const override {
-    const auto wanted = [](const Leaf& leaf) { return leaf.solve && leaf.vertices > 0; };
-    if (std::none_of(block.leaf.begin(), block.leaf.end(), wanted)) return;
+  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const override {
+    Bits wanted = 0;
+    for (const Tile& tile : block.tile) wanted |= Bits{tile.vertices > 0} << tile.place;
+    wanted &= block.solve;
+    if (wanted == 0) return;
     Workspace& work = Workspace::of_thread();
+    const BlocksAbove above = blocks_above(table, block);
     const blobs::Placement placement = placement_of(block);
     grid_.gather(block.base(), kBlockNodes, 0, work.block);
-    for (const Leaf& leaf : block.leaf) {
-      if (!wanted(leaf)) continue;
-      const auto corner = corner_of(leaf.slot, kLeafNodes);
-      (void)blobs::select(work.block, centre_of(corner, kLeafNodes), 0.5F * kLeafNodes, work.leaf);
-      for (unsigned tile = 0; tile < 8; ++tile) {
-        if ((leaf.active >> tile & 1u) == 0) continue;
-        const std::uint32_t count = leaf.tile_vertex[tile + 1] - leaf.tile_vertex[tile];
-        if (count == 0) continue;
-        const auto tile_corner = corner_in(corner, tile);
-        collect_edges(table, block, leaf, tile, corner, work.edges);
-        (void)blobs::select(work.leaf, centre_of(tile_corner, kTile), 0.5F * kTile, work.tile);
+    for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
+      if ((wanted & tiles_of(leaf)) == 0) continue;
+      (void)blobs::select(work.block, centre_of(leaf_corner(leaf), kLeafNodes), 0.5F * kLeafNodes, work.leaf);
+      for_bits(wanted & tiles_of(leaf), [&](unsigned place) {
+        const std::size_t rank = block.rank(place), first = block.tile[rank].first_vertex;
+        collect_edges(above, block.tile[rank], block.values.data() + kTileNodes * rank, work.edges);
+        (void)blobs::select(work.leaf, centre_of(corner_of(place), kTile), 0.5F * kTile, work.tile);
         blobs::solve_edges(work.tile, iso_, work.edges);
-        const std::size_t first = leaf.first_vertex + leaf.tile_vertex[tile];
-        blobs::place_vertices(work.edges, placement, mesh.position[first].data(), mesh.normal[first].data());
-        std::copy_n(work.edges.t.begin(), count, along.begin() + static_cast<std::ptrdiff_t>(first));
-      }
+        blobs::place_vertices(work.edges, placement, mesh.position[first].data(), mesh.normal[first].data(), &points[first].t);
+      });
     }
   }
 
   void begin_projection() const override {
     Workspace& work = Workspace::of_thread();
     work.near_block = nullptr;
-    work.near_leaf = nullptr;
   }
 
-  void project(const Block& block, const Leaf& leaf, unsigned tile, std::span<Vec3> points,
-               std::span<Vec3> normals) const override {
+  void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals) const override {
     if (points.empty()) return;
     // Points may lie this far beyond the tile's cells; leaves and blocks are cut to it too.
     constexpr int kAround = 1;
@@ -207,15 +233,14 @@ class BlobSampler final : public Sampler {
     if (work.near_block != &block) {
       grid_.gather(block.base(), kBlockNodes, kAround, work.around_block);
       work.near_block = &block;
-      work.near_leaf = nullptr;
+      work.near_leaf = kLeaves;
     }
-    const auto corner = corner_of(leaf.slot, kLeafNodes);
-    if (work.near_leaf != &leaf) {
-      (void)blobs::select(work.around_block, centre_of(corner, kLeafNodes), 0.5F * kLeafNodes + static_cast<float>(kAround),
-                          work.around_leaf);
-      work.near_leaf = &leaf;
+    if (const unsigned leaf = leaf_of(tile); work.near_leaf != leaf) {
+      (void)blobs::select(work.around_block, centre_of(leaf_corner(leaf), kLeafNodes),
+                          0.5F * kLeafNodes + static_cast<float>(kAround), work.around_leaf);
+      work.near_leaf = leaf;
     }
-    (void)blobs::select(work.around_leaf, centre_of(corner_in(corner, tile), kTile),
+    (void)blobs::select(work.around_leaf, centre_of(corner_of(tile), kTile),
                         0.5F * kTile + static_cast<float>(kAround), work.tile);
     blobs::project_points(work.tile, iso_, placement_of(block), points.data()->data(), normals.data()->data(),
                           points.size(), work.near);
@@ -227,14 +252,12 @@ class BlobSampler final : public Sampler {
   struct Workspace {
     blobs::TileBlobs tile_blobs;
     BlobList gathered, block, leaf, tile, near, far;
-    std::uint64_t sure = 0;                // tiles of the block at work that are sure to be inside
+    Bits sure = 0;                         // tiles of the block at work that are sure to be inside
     BlobList around_block, around_leaf;    // of the block and leaf that points were last projected near
     const Block* near_block = nullptr;
-    const Leaf* near_leaf = nullptr;
+    unsigned near_leaf = kLeaves;
     blobs::EdgeBatch edges;
-    // Of the block at work; copied into it at the end, so that blocks hold no more than they need.
-    std::vector<Leaf> leaves;
-    std::vector<float> values;
+    TileChanges changes;
     static Workspace& of_thread() {
       thread_local Workspace work;
       return work;
@@ -254,30 +277,38 @@ class BlobSampler final : public Sampler {
             .cell = lattice_.cell};
   }
 
-  static void collect_edges(const BlockTable& table, const Block& block, const Leaf& leaf, unsigned tile,
-                            const std::array<int, 3>& corner, blobs::EdgeBatch& edges) {
-    const float* values = tile_values(block, leaf, tile);
-    std::array<const float*, 3> next{};  // of the tiles above
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      std::array<int, 3> above = corner_in(corner, tile);
-      above[axis] += kTile;
-      next[axis] = tile_at(table, block, above[0], above[1], above[2]);
-    }
+  static void collect_edges(const BlocksAbove& above, const Tile& tile, const float* values, blobs::EdgeBatch& edges) {
+    static constexpr std::array<float, kTileNodes> kUnknown{};
+    static constexpr auto kNode = [] {
+      std::array<std::array<float, kTileNodes>, 3> at{};
+      for (unsigned node = 0; node < kTileNodes; ++node) {
+        for (std::size_t k = 0; k < 3; ++k) at[k][node] = static_cast<float>(coordinates(node)[k]);
+      }
+      return at;
+    }();
+    const auto corner = point(corner_of(tile.place));
     std::size_t n = 0;
-    for_tile_edges(leaf, tile, [&](int bit, int z, int axis) {
-      const int x = bit & 7, y = bit >> 3;
-      const int node = (x & 3) | (y & 3) << 2 | (z & 3) << 4, shift = 2 * axis;
-      edges.x[n] = static_cast<float>(corner[0] + x);
-      edges.y[n] = static_cast<float>(corner[1] + y);
-      edges.z[n] = static_cast<float>(corner[2] + z);
-      edges.axis[n] = static_cast<float>(axis);
-      edges.low[n] = values[node];
-      const float* above = next[static_cast<std::size_t>(axis)];
-      edges.high[n] = (node >> shift & 3) != 3 ? values[node + (1 << shift)]
-                      : above != nullptr       ? above[node - (3 << shift)]
-                                               : 0.0F;
-      ++n;
-    });
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const unsigned shift = 2 * axis;
+      const Bits last = std::array{kFirstX << 3, kFirstY << 12, kFirstZ << 48}[axis];
+      // The tile above holds the upper ends of the last edges.
+      const bool beyond = (tile.place >> shift & 3u) == 3u;
+      const unsigned next = beyond ? tile.place - (3u << shift) : tile.place + (1u << shift);
+      const Block* owner = above[beyond ? std::size_t{1} << axis : 0];
+      const float* further = owner != nullptr && (owner->held >> next & 1u) != 0
+                                 ? owner->values.data() + kTileNodes * owner->rank(next)
+                                 : kUnknown.data();
+      const std::array<const float*, 2> high{values + (1u << shift), further - (3u << shift)};
+      for_bits(tile.edges[axis], [&](unsigned node) {
+        edges.x[n] = corner[0] + kNode[0][node];
+        edges.y[n] = corner[1] + kNode[1][node];
+        edges.z[n] = corner[2] + kNode[2][node];
+        edges.axis[n] = static_cast<float>(axis);
+        edges.low[n] = values[node];
+        edges.high[n] = high[last >> node & 1u][node];
+        ++n;
+      });
+    }
     edges.count = n;
   }
 
@@ -296,7 +327,7 @@ class BlobSampler final : public Sampler {
     }
   }
 
-  /// Empties the table; @return the blocks that a support may enter, all leaves marked.
+  /// Empties the table; @return the blocks that a support may enter, all tiles marked.
   [[nodiscard]] std::vector<std::uint32_t> all_blocks(BlockTable& table) const {
     for (Block& block : table.block) block.clear();
     const auto reach = static_cast<std::int64_t>(std::ceil(grid_.reach())) + 1;
@@ -306,12 +337,12 @@ class BlobSampler final : public Sampler {
         around.lower[k] -= reach;
         around.upper[k] += reach + 1;
       }
-      for_blocks_in(table, around, [&](std::size_t b) { table.block[b].changed = 0xff; });
+      for_blocks_in(table, around, [&](std::size_t b) { table.block[b].changed = kAll; });
     });
     return marked_blocks(table);
   }
 
-  /// Marks the leaves whose closed boxes meet what has changed; a leaf's box ends at the next leaf's first node.
+  /// Marks the tiles whose closed boxes meet what has changed; a tile's box ends at the next tile's first node.
   [[nodiscard]] std::vector<std::uint32_t> changed_blocks(BlockTable& table) const {
     for (Block& block : table.block) {
       block.changed = 0;
@@ -326,15 +357,17 @@ class BlobSampler final : public Sampler {
       for_blocks_in(table, cells, [&](std::size_t b) {
         Block& block = table.block[b];
         const Cells base = block.base();
-        for (unsigned slot = 0; slot < 8; ++slot) {
-          const auto corner = corner_of(slot, kLeafNodes);
-          double distance2 = 0.0;
-          for (std::size_t k = 0; k < 3; ++k) {
-            const double low = static_cast<double>(base[k] + corner[k]);
-            const double off = std::max({low - ball.centre[k], ball.centre[k] - low - kLeafNodes, 0.0});
-            distance2 += off * off;
+        std::array<std::array<double, 4>, 3> distance2;  // along the axes, of the four tiles
+        for (std::size_t k = 0; k < 3; ++k) {
+          for (int tile = 0; tile < 4; ++tile) {
+            const double low = static_cast<double>(base[k] + kTile * tile);
+            const double off = std::max({low - ball.centre[k], ball.centre[k] - low - kTile, 0.0});
+            distance2[k][static_cast<std::size_t>(tile)] = off * off;
           }
-          if (distance2 <= ball.radius * ball.radius) block.changed = static_cast<std::uint8_t>(block.changed | 1u << slot);
+        }
+        for (unsigned place = 0; place < 64; ++place) {
+          const double sum = distance2[0][place & 3u] + distance2[1][place >> 2 & 3u] + distance2[2][place >> 4];
+          block.changed |= Bits{sum <= ball.radius * ball.radius} << place;
         }
       });
     }
@@ -355,7 +388,7 @@ class BlobSampler final : public Sampler {
     return bounds.lower > iso_ ? Verdict::Inside : Verdict::Unknown;
   }
 
-  /// Samples the marked leaves; the others are kept.
+  /// Samples the marked tiles; the others are kept.
   void sample_block(Block& block, Workspace& work) const {
     gather(block, work);
     work.sure = 0;
@@ -364,16 +397,11 @@ class BlobSampler final : public Sampler {
       block.kernel_values += kTileNodes * sure.added;
       work.sure = sure.inside;
     }
-    rebuild(block, work, [&](unsigned slot, const Leaf* old) {
-      if ((block.changed >> slot & 1u) == 0) {
-        if (old != nullptr) keep_leaf(block, *old, 0, work);
-        return;
-      }
-      block.leaf_of[slot] = kOutside;
-      block.outside |= block_tiles(slot);
-      block.early &= ~block_tiles(slot);
-      if (work.block.count > 0) sample_leaf(block, slot, work);
-    });
+    work.changes.begin();
+    for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
+      if ((block.changed & tiles_of(leaf)) != 0) sample_leaf(block, leaf, work);
+    }
+    work.changes.apply(block);
   }
 
   void gather(const Block& block, Workspace& work) const {
@@ -385,132 +413,82 @@ class BlobSampler final : public Sampler {
     blobs::select_near_first(work.gathered, centre_of({0, 0, 0}, kBlockNodes), 0.5F * kBlockNodes, work.block, work.far);
   }
 
-  [[nodiscard]] Verdict select_leaf(const std::array<int, 3>& corner, Workspace& work) const {
-    const auto centre = centre_of(corner, kLeafNodes);
+  [[nodiscard]] Verdict select_leaf(unsigned leaf, Workspace& work) const {
+    const auto centre = centre_of(leaf_corner(leaf), kLeafNodes);
     return verdict(!has_sure(kSureCubes)
                        ? blobs::select(work.block, centre, 0.5F * kLeafNodes, work.leaf)
                        : blobs::select_near_first(work.block, centre, 0.5F * kLeafNodes, work.leaf, work.far));
   }
-  [[nodiscard]] Verdict select_tile(const std::array<int, 3>& corner, Workspace& work) const {
-    return verdict(blobs::select_tile(work.leaf, centre_of(corner, kTile), work.tile_blobs));
-  }
-
-  /// Calls make(slot, leaf of the last call or null), which may add a leaf to those at work.
-  template <class Make>
-  void rebuild(Block& block, Workspace& work, const Make& make) const {
-    const auto old_leaf_of = block.leaf_of;
-    work.leaves.clear();
-    work.values.clear();
-    for (unsigned slot = 0; slot < 8; ++slot) {
-      make(slot, old_leaf_of[slot] >= 0 ? &block.leaf[static_cast<std::size_t>(old_leaf_of[slot])] : nullptr);
-    }
-    block.leaf.resize(work.leaves.size());
-    std::copy(work.leaves.begin(), work.leaves.end(), block.leaf.begin());
-    block.values.assign(work.values.begin(), work.values.end());
-  }
-
-  /// Adds a leaf as it was, with values for `more` of its tiles where bounds do not decide them.
-  void keep_leaf(Block& block, const Leaf& old, unsigned more, Workspace& work) const {
-    const auto corner = corner_of(old.slot, kLeafNodes);
-    if (more != 0 && select_leaf(corner, work) != Verdict::Unknown) more = 0;
-    Leaf& leaf = work.leaves.emplace_back(old);
-    leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      const std::size_t first = work.values.size();
-      if ((old.active >> tile & 1u) != 0) {
-        const float* values = tile_values(block, old, tile);
-        work.values.insert(work.values.end(), values, values + kTileNodes);
-      } else if ((more >> tile & 1u) != 0) {
-        const auto tile_corner = corner_in(corner, tile);
-        if (select_tile(tile_corner, work) != Verdict::Unknown) continue;
-        work.values.resize(first + kTileNodes);
-        block.kernel_values += kTileNodes * work.tile_blobs.count();
-        blobs::evaluate_tile(work.leaf, work.tile_blobs, point(tile_corner), iso_, std::numeric_limits<float>::infinity(),
-                             work.values.data() + first);
-        leaf.active = static_cast<std::uint8_t>(leaf.active | 1u << tile);
-      }
-    }
-    finish_leaf(block, work);
-  }
-
-  /// The leaf made last stays when something in it is needed.
-  static void finish_leaf(Block& block, Workspace& work) {
-    const Leaf& leaf = work.leaves.back();
-    if (leaf.active == 0 && is_uniform(leaf)) {
-      block.leaf_of[leaf.slot] = leaf.inside[0] != 0 ? kInside : kOutside;
-      work.leaves.pop_back();
-    } else {
-      block.leaf_of[leaf.slot] = static_cast<std::int8_t>(work.leaves.size() - 1);
-    }
+  [[nodiscard]] Verdict select_tile(unsigned tile, Workspace& work) const {
+    return verdict(blobs::select_tile(work.leaf, centre_of(corner_of(tile), kTile), work.tile_blobs));
   }
 
   static std::array<float, 3> point(const std::array<int, 3>& node) {
     return {static_cast<float>(node[0]), static_cast<float>(node[1]), static_cast<float>(node[2])};
   }
 
-  static void set_inside(Block& block, unsigned slot) {
-    block.leaf_of[slot] = kInside;
-    block.outside &= ~block_tiles(slot);
+  /// Leaves none of these tiles with values.
+  static void empty(Block& block, Bits tiles, bool inside, Workspace& work) {
+    work.changes.drop(tiles);
+    block.changed |= tiles;
+    block.early &= ~tiles;
+    set_sign(block, tiles, inside);
   }
 
-  void sample_leaf(Block& block, unsigned slot, Workspace& work) const {
-    const std::uint64_t own = block_tiles(slot);
+  void sample_leaf(Block& block, unsigned leaf, Workspace& work) const {
+    const Bits own = tiles_of(leaf);
+    const auto bit = static_cast<std::uint8_t>(1u << leaf);
+    const bool was_decided = (block.decided & bit) != 0;
+    block.decided = static_cast<std::uint8_t>(block.decided & ~bit);
     if ((work.sure & own) == own) {
+      empty(block, own, true, work);
       block.early |= own;
-      set_inside(block, slot);
       return;
     }
-    const auto corner = corner_of(slot, kLeafNodes);
-    const Verdict whole = select_leaf(corner, work);
+    const Verdict whole = work.block.count > 0 ? select_leaf(leaf, work) : Verdict::Outside;
     if (whole != Verdict::Unknown) {
-      block.leaf_of[slot] = kOutside;
-      if (whole == Verdict::Inside) set_inside(block, slot);
+      empty(block, own, whole == Verdict::Inside, work);
+      block.decided |= bit;
       return;
     }
-    std::uint64_t sure = 0;  // of its cubes of 2^3 nodes
+    // Tiles of a leaf that bounds decided have not been looked at one by one.
+    const Bits tiles = was_decided ? own : own & block.changed;
+    empty(block, tiles, false, work);
+    Bits sure = 0;  // of its cubes of 2^3 nodes
     if (skip_ && has_sure(kSureCubes)) {
-      const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(corner), kTile / 2, iso_);
+      const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(leaf_corner(leaf)), kTile / 2, iso_);
       block.kernel_values += kTileNodes * cubes.added;
       sure = cubes.inside;
     }
-    Leaf& leaf = work.leaves.emplace_back();
-    leaf.slot = static_cast<std::uint8_t>(slot);
-    leaf.first_tile = static_cast<std::uint32_t>(work.values.size() / kTileNodes);
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      const std::uint64_t bit = block_tile(slot, tile);
-      std::uint64_t inside = ~std::uint64_t{0};
-      if ((work.sure & bit) != 0 || (~sure & block_tiles(tile)) == 0) {
-        block.early |= bit;
+    for_bits(tiles, [&](unsigned tile) {
+      const Bits at = Bits{1} << tile;
+      const auto [x, y, z] = coordinates(tile);
+      const Bits cubes = tiles_of(static_cast<unsigned>((x & 1) | (y & 1) << 1 | (z & 1) << 2));
+      if ((work.sure & at) != 0 || (~sure & cubes) == 0) {
+        block.early |= at;
+        set_sign(block, at, true);
       } else {
-        inside = sample_tile(block, leaf, tile, work);
+        sample_tile(block, tile, work);
       }
-      set_tile(leaf, tile, inside);
-      if (inside == ~std::uint64_t{0}) block.outside &= ~bit;
-    }
-    finish_leaf(block, work);
+    });
   }
 
-  /// @return bit per node: F > 0
-  std::uint64_t sample_tile(Block& block, Leaf& leaf, unsigned tile, Workspace& work) const {
-    const auto corner = corner_in(corner_of(leaf.slot, kLeafNodes), tile);
-    const Verdict here = select_tile(corner, work);
-    if (here != Verdict::Unknown) return here == Verdict::Inside ? ~std::uint64_t{0} : 0;
-    const std::size_t first = work.values.size();
-    work.values.resize(first + kTileNodes);
-    const blobs::TileSums sums = blobs::evaluate_tile(work.leaf, work.tile_blobs, point(corner), iso_, sure_, work.values.data() + first);
+  void sample_tile(Block& block, unsigned tile, Workspace& work) const {
+    const Bits at = Bits{1} << tile;
+    const Verdict here = select_tile(tile, work);
+    if (here != Verdict::Unknown) {
+      set_sign(block, at, here == Verdict::Inside);
+      return;
+    }
+    const blobs::TileSums sums =
+        blobs::evaluate_tile(work.leaf, work.tile_blobs, point(corner_of(tile)), iso_, sure_, work.changes.room());
     block.kernel_values += kTileNodes * sums.added;
+    set_sign(block, at, sums.inside == kAll);
     if (sums.added < work.tile_blobs.count()) {
-      work.values.resize(first);
-      block.early |= block_tile(leaf.slot, tile);
+      block.early |= at;
     } else {
-      leaf.active = static_cast<std::uint8_t>(leaf.active | 1u << tile);
+      work.changes.make(tile, sums.inside);
     }
-    return sums.inside;
-  }
-
-  static bool is_uniform(const Leaf& leaf) {
-    return (leaf.inside[0] == 0 || leaf.inside[0] == ~Plane{0}) &&
-           std::all_of(leaf.inside.begin(), leaf.inside.end(), [&](Plane plane) { return plane == leaf.inside[0]; });
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
@@ -544,32 +522,20 @@ class BlobSampler final : public Sampler {
 
   void evaluate_needed(Block& block, Workspace& work) const {
     gather(block, work);
-    rebuild(block, work, [&](unsigned slot, const Leaf* old) {
-      unsigned more = 0;
-      for (unsigned tile = 0; tile < 8; ++tile) more |= (block.needed & block_tile(slot, tile)) != 0 ? 1u << tile : 0u;
-      if (old != nullptr) {
-        keep_leaf(block, *old, more, work);
-      } else if (more != 0) {
-        keep_leaf(block, whole_leaf(block, slot, work), more, work);
-      }
-    });
-    block.early &= ~block.needed;
-  }
-
-  /// A leaf inside, numbered as if it had been in the last mesh: without vertices, behind the leaf before it.
-  static Leaf whole_leaf(const Block& block, unsigned slot, const Workspace& work) {
-    Leaf leaf;
-    leaf.slot = static_cast<std::uint8_t>(slot);
-    leaf.inside.fill(~Plane{0});
-    const auto after = std::find_if(block.leaf.begin(), block.leaf.end(), [&](const Leaf& l) { return l.slot > slot; });
-    if (!work.leaves.empty()) {
-      leaf.first_vertex = work.leaves.back().first_vertex + work.leaves.back().vertices;
-      leaf.first_triangle = work.leaves.back().first_triangle + work.leaves.back().triangles;
-    } else if (after != block.leaf.end()) {
-      leaf.first_vertex = after->first_vertex;
-      leaf.first_triangle = after->first_triangle;
+    work.changes.begin();
+    for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
+      const Bits tiles = block.needed & tiles_of(leaf);
+      if (tiles == 0 || select_leaf(leaf, work) != Verdict::Unknown) continue;
+      for_bits(tiles, [&](unsigned tile) {
+        if (select_tile(tile, work) != Verdict::Unknown) return;
+        block.kernel_values += kTileNodes * work.tile_blobs.count();
+        const blobs::TileSums sums = blobs::evaluate_tile(work.leaf, work.tile_blobs, point(corner_of(tile)), iso_,
+                                                          std::numeric_limits<float>::infinity(), work.changes.room());
+        work.changes.make(tile, sums.inside);
+      });
     }
-    return leaf;
+    work.changes.apply(block);
+    block.early &= ~block.needed;
   }
 
   /// Largest slope of a sum of Wyvill points next to its surface, times their radius.
@@ -613,46 +579,35 @@ class ViewSampler final : public Sampler {
   void sample(const Executor& executor, BlockTable& table) override {
     for (Block& block : table.block) {
       block.clear();
-      block.changed = 0xff;
+      block.changed = kAll;
     }
     // By block, so that a block is written by one task.
-    struct Place {
-      std::size_t block;
-      unsigned slot;
-    };
-    std::vector<Place> place;
-    for (const auto& leaf : leaves_) {
-      const auto slot = static_cast<unsigned>((leaf[0] & 1) | (leaf[1] & 1) << 1 | (leaf[2] & 1) << 2);
-      place.push_back({table.index({leaf[0] >> 1, leaf[1] >> 1, leaf[2] >> 1}), slot});
-    }
-    std::sort(place.begin(), place.end(),
-              [](const Place& a, const Place& b) { return a.block != b.block ? a.block < b.block : a.slot < b.slot; });
-    std::vector<std::size_t> first;
-    for (std::size_t i = 0; i < place.size(); ++i) {
-      if (i == 0 || place[i].block != place[i - 1].block) first.push_back(i);
-    }
-    executor.for_blocks(first.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint8_t> leaves(table.block.size());
+    for (const auto& leaf : leaves_) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
+    executor.for_blocks(table.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      thread_local TileChanges changes;
       for (std::size_t b = begin; b < end; ++b) {
-        const std::size_t last = b + 1 < first.size() ? first[b + 1] : place.size();
-        for (std::size_t i = first[b]; i < last; ++i) sample_leaf(table.block[place[i].block], place[i].slot);
+        if (leaves[b] == 0) continue;
+        changes.begin();
+        for_bits(leaves[b], [&](unsigned leaf) { sample_leaf(table.block[b], leaf, changes); });
+        changes.apply(table.block[b]);
       }
     });
-    sign_neighbours(table);
+    sign_neighbours(table, leaves);
   }
 
-  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const override {
+  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const override {
     thread_local lattice::EdgeRoots roots;
-    for (const Leaf& leaf : block.leaf) {
-      if (leaf.vertices == 0) continue;
+    for (const Tile& tile : block.tile) {
+      if (tile.vertices == 0) continue;
       roots.clear();
       double scale = 0.0;
-      const auto corner = corner_of(leaf.slot, kLeafNodes);
+      const auto corner = corner_of(tile.place);
       const auto for_edges = [&](const auto& use) {
-        for (unsigned tile = 0; tile < 8; ++tile) {
-          for_tile_edges(leaf, tile, [&](int bit, int z, int axis) {
-            use(corner[0] + (bit & 7), corner[1] + (bit >> 3), corner[2] + z, axis);
-          });
-        }
+        for_tile_edges(tile, [&](unsigned node, unsigned axis) {
+          const auto [x, y, z] = coordinates(node);
+          use(corner[0] + x, corner[1] + y, corner[2] + z, static_cast<int>(axis));
+        });
       };
       for_edges([&](int x, int y, int z, int axis) {
         const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
@@ -665,26 +620,29 @@ class ViewSampler final : public Sampler {
         roots.add(start, end, f0, f1, lattice::guess_root(kMissing, f0, f1, kMissing));
       });
       roots.solve(field_, {}, scale);
-      std::size_t i = 0, vertex = leaf.first_vertex;
+      std::size_t i = 0, vertex = tile.first_vertex;
       for_edges([&](int x, int y, int z, int axis) {
         const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
         const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);
-        Vec3 point = roots.point(i);
-        const double t = (point[axis] - start[axis]) / (end[axis] - start[axis]);
+        Vec3 place = roots.point(i);
+        double t = (place[axis] - start[axis]) / (end[axis] - start[axis]);
         if (!(t >= kLeast && t <= 1.0 - kLeast)) {
-          point = position_of(lattice_, block, x, y, z, axis, std::clamp(t, kLeast, 1.0 - kLeast));
+          t = std::clamp(t, kLeast, 1.0 - kLeast);
+          place = position_of(lattice_, block, x, y, z, axis, t);
         }
         const bool inside = value_at(table, block, x, y, z) > 0.0F;
-        mesh.position[vertex] = point;
-        along[vertex] = static_cast<float>(std::clamp(t, kLeast, 1.0 - kLeast));
-        mesh.normal[vertex] = lattice::outward(roots.gradient(i), inside ? Vec3(end - start) : Vec3(start - end));
+        const Vec3 normal = lattice::outward(roots.gradient(i), inside ? Vec3(end - start) : Vec3(start - end));
+        mesh.position[vertex] = place;
+        mesh.normal[vertex] = normal;
+        points[vertex] = {static_cast<float>(t), static_cast<float>(normal.x()), static_cast<float>(normal.y()),
+                          static_cast<float>(normal.z())};
         ++i;
         ++vertex;
       });
     }
   }
 
-  void project(const Block&, const Leaf&, unsigned, std::span<Vec3> points, std::span<Vec3> normals) const override {
+  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals) const override {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Projection found = project_to_surface(field_, points[i]);
       if (!found.converged) {  // left where it is, in the middle between two vertices
@@ -703,59 +661,54 @@ class ViewSampler final : public Sampler {
  private:
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-  void sample_leaf(Block& block, unsigned slot) const {
-    Leaf leaf;
-    leaf.slot = static_cast<std::uint8_t>(slot);
-    leaf.active = 0xff;
-    leaf.first_tile = static_cast<std::uint32_t>(block.values.size() / kTileNodes);
-    const auto corner = corner_of(slot, kLeafNodes);
+  static BlockCoord block_of(const BlockCoord& leaf) { return {leaf[0] >> 1, leaf[1] >> 1, leaf[2] >> 1}; }
+  static unsigned slot_of(const BlockCoord& leaf) {
+    return static_cast<unsigned>((leaf[0] & 1) | (leaf[1] & 1) << 1 | (leaf[2] & 1) << 2);
+  }
+
+  void sample_leaf(Block& block, unsigned leaf, TileChanges& changes) const {
     const Cells base = block.base();
     std::array<Vec3, 8 * kTileNodes> nodes;
     std::array<double, 8 * kTileNodes> values;
     std::size_t n = 0;
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      const auto at = corner_of(tile, kTile);
-      for (int z = 0; z < kTile; ++z) {
-        for (int y = 0; y < kTile; ++y) {
-          for (int x = 0; x < kTile; ++x) {
-            nodes[n++] = lattice::node_position(lattice_, base[0] + corner[0] + at[0] + x, base[1] + corner[1] + at[1] + y,
-                                                base[2] + corner[2] + at[2] + z);
-          }
-        }
+    for_bits(tiles_of(leaf), [&](unsigned tile) {
+      const auto corner = corner_of(tile);
+      for (unsigned node = 0; node < kTileNodes; ++node) {
+        const auto [x, y, z] = coordinates(node);
+        nodes[n++] = lattice::node_position(lattice_, base[0] + corner[0] + x, base[1] + corner[1] + y, base[2] + corner[2] + z);
       }
-    }
+    });
     field_.evaluate(nodes, values);
-    for (unsigned tile = 0; tile < 8; ++tile) {
-      std::uint64_t inside = 0;
+    const double* value = values.data();
+    for_bits(tiles_of(leaf), [&](unsigned tile) {
+      Bits inside = 0;
+      float* out = changes.room();
       for (std::size_t i = 0; i < kTileNodes; ++i) {
-        const auto f = static_cast<float>(values[tile * kTileNodes + i]);
-        block.values.push_back(f);
-        inside |= std::uint64_t{f > 0.0F} << i;
+        out[i] = static_cast<float>(*value++);
+        inside |= Bits{out[i] > 0.0F} << i;
       }
-      set_tile(leaf, tile, inside);
-    }
-    block.leaf_of[slot] = static_cast<std::int8_t>(block.leaf.size());
-    block.leaf.push_back(leaf);
+      changes.make(tile, inside);
+      set_sign(block, Bits{1} << tile, inside == kAll);
+    });
   }
 
   /// Leaves without surface next to those with it: the sign at one node.
-  void sign_neighbours(BlockTable& table) const {
+  void sign_neighbours(BlockTable& table, std::span<const std::uint8_t> sampled) const {
     std::vector<Vec3> points;
-    std::vector<std::int8_t*> slots;
+    std::vector<std::pair<std::size_t, unsigned>> places;
     for (const auto& leaf : leaves_) {
       for (int step = 1; step < 8; ++step) {
         const BlockCoord at{leaf[0] + (step & 1), leaf[1] + (step >> 1 & 1), leaf[2] + (step >> 2)};
-        Block& block = table.block[table.index({at[0] >> 1, at[1] >> 1, at[2] >> 1})];
-        std::int8_t& slot = block.leaf_of[static_cast<std::size_t>((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2)];
-        if (slot >= 0) continue;
-        slots.push_back(&slot);
+        const std::size_t b = table.index(block_of(at));
+        if ((sampled[b] >> slot_of(at) & 1u) != 0) continue;
+        places.emplace_back(b, slot_of(at));
         points.push_back(lattice::node_position(lattice_, std::int64_t{kLeafNodes} * at[0],
                                                 std::int64_t{kLeafNodes} * at[1], std::int64_t{kLeafNodes} * at[2]));
       }
     }
     std::vector<double> values(points.size());
     field_.evaluate(points, values);
-    for (std::size_t i = 0; i < slots.size(); ++i) *slots[i] = values[i] > 0.0 ? kInside : kOutside;
+    for (std::size_t i = 0; i < places.size(); ++i) set_sign(table.block[places[i].first], tiles_of(places[i].second), values[i] > 0.0);
   }
 
   FieldView field_;
@@ -776,23 +729,15 @@ std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lat
   return std::make_unique<ViewSampler>(field, lattice);
 }
 
-const float* tile_at(const BlockTable& table, const Block& block, int x, int y, int z) {
+float value_at(const BlockTable& table, const Block& block, int x, int y, int z) {
   const Block* owner = &block;
   if (((x | y | z) & kBlockNodes) != 0) {
     owner = table.find({block.coord[0] + (x >> 4), block.coord[1] + (y >> 4), block.coord[2] + (z >> 4)});
-    if (owner == nullptr) return nullptr;
+    if (owner == nullptr) return 0.0F;
   }
-  const auto slot = static_cast<std::size_t>((x >> 3 & 1) | (y >> 3 & 1) << 1 | (z >> 3 & 1) << 2);
-  const std::int8_t index = owner->leaf_of[slot];
-  if (index < 0) return nullptr;
-  const Leaf& leaf = owner->leaf[static_cast<std::size_t>(index)];
-  const auto tile = static_cast<unsigned>((x >> 2 & 1) | (y >> 2 & 1) << 1 | (z >> 2 & 1) << 2);
-  return (leaf.active >> tile & 1u) != 0 ? tile_values(*owner, leaf, tile) : nullptr;
-}
-
-float value_at(const BlockTable& table, const Block& block, int x, int y, int z) {
-  const float* values = tile_at(table, block, x, y, z);
-  return values != nullptr ? values[(x & 3) | (y & 3) << 2 | (z & 3) << 4] : 0.0F;
+  const auto tile = static_cast<unsigned>((x >> 2 & 3) | (y & 12) | (z & 12) << 2);
+  if ((owner->held >> tile & 1u) == 0) return 0.0F;
+  return owner->values[kTileNodes * owner->rank(tile) + static_cast<std::size_t>((x & 3) | (y & 3) << 2 | (z & 3) << 4)];
 }
 
 void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const Lattice& lattice) {

@@ -7,28 +7,31 @@
 #include <span>
 #include <vector>
 
-#include "march_leaves.h"
+#include "march_tiles.h"
 #include "supple/core/executor.h"
 #include "supple/implicit/field_view.h"
 #include "supple/implicit/polygonise.h"
 
 namespace supple::implicit::march {
 
+/// A vertex where it lies on its edge, 0 < t < 1, and its normal.
+struct alignas(16) EdgePoint {
+  float t, x, y, z;
+};
+
 class Sampler {
  public:
   virtual ~Sampler() = default;
   /// Lays out the table: every block that the surface may enter. @throws Error{Limit} before taking memory
   virtual void prepare(const Executor& executor, BlockTable& table) = 0;
-  /// Fills leaves with signs and values, those that are not as in the last call, and marks them as changed.
+  /// Fills tiles with signs and values, those that are not as in the last call, and marks them as changed.
   virtual void sample(const Executor& executor, BlockTable& table) = 0;
-  /// Vertices of the leaves marked `solve` at their place in the mesh: positions, normals, and `along`, where they lie
-  /// on their edges.
-  virtual void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<float>& along) const = 0;
+  /// Vertices of the tiles marked `solve` at their place in the mesh: positions, normals, and both as seen from the edge.
+  virtual void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const = 0;
   /// Called on a thread before it projects points.
   virtual void begin_projection() const {}
   /// Moves points near a tile to the surface.
-  virtual void project(const Block& block, const Leaf& leaf, unsigned tile, std::span<Vec3> points,
-                       std::span<Vec3> normals) const = 0;
+  virtual void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals) const = 0;
   [[nodiscard]] virtual bool single_precision() const = 0;
 };
 
@@ -37,9 +40,6 @@ class Sampler {
 /// @param skip  whether sums may end early where they are sure to be inside
 [[nodiscard]] std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip,
                                                     blobs::BlobGrid& grid);
-
-/// Values of the tile that holds a node of the block or beyond its upper faces, null where there are none.
-[[nodiscard]] const float* tile_at(const BlockTable& table, const Block& block, int x, int y, int z);
 
 /// F at a node of the block or of one beyond its upper faces, 0 where only the sign is known. @pre 0 <= x, y, z <= 16
 [[nodiscard]] float value_at(const BlockTable& table, const Block& block, int x, int y, int z);
@@ -50,19 +50,18 @@ void lay_out(BlockTable& table, const blobs::Cells& lower, const blobs::Cells& u
 /// The triangles of one tile, a range of the mesh.
 struct TileTriangles {
   const Block* block;
-  const Leaf* leaf;
   unsigned tile;
   std::size_t first, count;
 };
 
 /// What building a mesh needs besides the mesh; kept for its memory.
 struct MeshScratch {
-  std::vector<float> along;          ///< where vertices lie on their edges
+  std::vector<EdgePoint> point;      ///< of each vertex
   std::vector<TileTriangles> tiles;
   std::vector<std::array<std::uint32_t, 3>> triangle, middle;
   std::vector<std::uint32_t> start, target, edge;
   [[nodiscard]] std::size_t bytes() const {
-    return along.capacity() * sizeof(float) + tiles.capacity() * sizeof(TileTriangles) +
+    return point.capacity() * sizeof(EdgePoint) + tiles.capacity() * sizeof(TileTriangles) +
            (triangle.capacity() + middle.capacity()) * sizeof(triangle[0]) +
            (start.capacity() + target.capacity() + edge.capacity()) * sizeof(std::uint32_t);
   }

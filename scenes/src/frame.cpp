@@ -525,14 +525,14 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
     }
     if (automatic && implicit::has_creases(frame.field[i])) {
       surfaces[i] = implicit::march_creases(frame.field[i], lattice, context.executor, &marched);
-      profile.visited += marched.leaves;
-      profile.present += 8 * marched.blocks;
+      profile.visited += marched.tiles;
+      profile.present += 64 * marched.blocks;
       continue;
     }
     surfaces[i] = frame.mesher[i].make(frame.field[i], {.lattice = lattice, .error = model.meshing.error.value_or(0.0), .skip = context.skip},
                                        context.executor, &marched);
-    profile.visited += marched.leaves;
-    profile.present += 8 * marched.blocks;
+    profile.visited += marched.tiles;
+    profile.present += 64 * marched.blocks;
   }
   for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {
     if (surfaces[i].position.empty()) continue;

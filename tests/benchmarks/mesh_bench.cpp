@@ -220,9 +220,9 @@ void measure_moved(const std::string& name, Body& body, const Lattice& lattice) 
     total += all;
   }
   std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"whole_cpu_ms\": %.5g, "
-              "\"share\": %.3g, \"leaves_sampled\": %llu, \"items\": %zu, \"hash\": \"%s\"}\n",
+              "\"share\": %.3g, \"tiles_sampled\": %llu, \"items\": %zu, \"hash\": \"%s\"}\n",
               name.c_str(), 1e3 * moved, 1e3 * whole, moved / whole,
-              static_cast<unsigned long long>(counts.leaves_sampled), mesh.triangle_count(), hash_of(mesh).c_str());
+              static_cast<unsigned long long>(counts.tiles_sampled), mesh.triangle_count(), hash_of(mesh).c_str());
   std::fflush(stdout);
 }
 
@@ -358,12 +358,12 @@ void measure_field(const std::string& name, const Body& body, const Lattice& lat
     if (repeat > 0) continue;
     blobs::BlobList near, leaf_list;
     for (const march::Block& block : table.block) {
-      if (block.leaf.empty()) continue;
+      if (block.uniform()) continue;
       kept.gather(block.base(), march::kBlockNodes, 0, near);
-      for (const march::Leaf& leaf : block.leaf) {
-        const unsigned bits = leaf.slot;
-        const std::array centre{8.0F * static_cast<float>(bits & 1u) + 4.0F, 8.0F * static_cast<float>(bits >> 1 & 1u) + 4.0F,
-                                8.0F * static_cast<float>(bits >> 2) + 4.0F};
+      for (unsigned leaf = 0; leaf < march::kLeaves; ++leaf) {
+        if ((block.held & march::tiles_of(leaf)) == 0) continue;
+        const std::array centre{8.0F * static_cast<float>(leaf & 1u) + 4.0F, 8.0F * static_cast<float>(leaf >> 1 & 1u) + 4.0F,
+                                8.0F * static_cast<float>(leaf >> 2) + 4.0F};
         (void)blobs::select(near, centre, 4.0F, leaf_list);
         values += static_cast<double>(leaf_list.count) * 8 * blobs::kTileNodes;
       }

@@ -123,6 +123,31 @@ TEST(MarchCubes, FindsOneBodyBelowTheMergingDistanceAndTwoAbove) {
   EXPECT_EQ(components(1.22), 2u);
 }
 
+// Cells that the surface cuts in four points are two triangles: their common edge is the diagonal whose middle lies closer to
+// the surface, but for pairs that are alike up to terms of third order.
+TEST(MarchCubes, TakesTheDiagonalThatLiesCloserToTheSurface) {
+  const Body body = blobs(3, 60);
+  const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.03)}, Executor(2));
+  const auto away = [&](std::uint32_t a, std::uint32_t b) {
+    Vec3 gradient;
+    const double f = FieldView(body.field).value(0.5 * (mesh.position[a] + mesh.position[b]), gradient);
+    return std::abs(f) / gradient.norm();
+  };
+  const auto in_fan = [&](std::size_t t) {  // with the triangle after it
+    const auto &one = mesh.triangle[t], &next = mesh.triangle[t + 1];
+    return one[0] == next[0] && one[2] == next[1];
+  };
+  std::size_t quads = 0, worse = 0;
+  for (std::size_t t = 1; t + 2 < mesh.triangle_count(); ++t) {
+    if (!in_fan(t) || in_fan(t - 1) || in_fan(t + 1)) continue;
+    const auto &one = mesh.triangle[t], &next = mesh.triangle[t + 1];
+    ++quads;
+    worse += away(one[0], one[2]) > 1.2 * away(one[1], next[2]) + 1e-3 * 0.03 ? 1u : 0u;
+  }
+  EXPECT_GT(quads, mesh.triangle_count() / 10);
+  EXPECT_LT(worse, quads / 100);
+}
+
 // Blobs of very different size, some of two cells only, some alone: none may be missed by bounds.
 TEST(MarchCubes, FindsEveryComponentOfScatteredBlobs) {
   constexpr double kCell = 0.05;
@@ -167,10 +192,11 @@ TEST_P(MarchedBody, AgreesWithThePathInDoublePrecision) {
     ASSERT_LT((mesh.normal[v] - expected.normal[v]).norm(), 5e-3);
   }
   EXPECT_LT(std::sqrt(sum / static_cast<double>(mesh.vertex_count())), 1e-4);
-  // Diagonals may differ where both are as long.
+  // Diagonals may differ where both bend alike: normals are taken within 4e-3 of a cell of the vertices, which turns the
+  // surface by less than a hundredth of what it turns along a diagonal.
   std::size_t differ = 0;
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) differ += mesh.triangle[t] != expected.triangle[t] ? 1u : 0u;
-  EXPECT_LT(differ, 20u);
+  EXPECT_LT(differ, mesh.triangle_count() / 100);
 }
 
 TEST_P(MarchedBody, IsClosedOnAllShapesAndKernels) {
@@ -394,13 +420,13 @@ TEST_P(MovedBody, GivesTheMeshOfAFreshMesherAndSamplesOnlyWhatMoved) {
   };
   MarchCounts counts;
   expect_same("nothing moved", counts);
-  EXPECT_EQ(counts.leaves_sampled, 0u);
+  EXPECT_EQ(counts.tiles_sampled, 0u);
   for (int round = 0; round < 6; ++round) {
     const std::uint32_t moved = random.below(400);
     body.parts[moved].position += random.in_box(round < 3 ? 0.02 : 0.3);
     expect_same("one moved", counts);
-    EXPECT_GT(counts.leaves_sampled, 0u);
-    EXPECT_LT(counts.leaves_sampled, all.leaves_sampled / 10);
+    EXPECT_GT(counts.tiles_sampled, 0u);
+    EXPECT_LT(counts.tiles_sampled, all.tiles_sampled / 10);
   }
   for (int round = 0; round < 3; ++round) {  // beyond the box that holds all, and back
     body.parts[7].position = round == 1 ? Vec3(0.1, 0.2, -0.1) : Vec3(-3.0 - round, 2.5, 4.0);
@@ -453,7 +479,7 @@ TEST(MarchCubes, GivesTheSameMeshWhenSumsEndEarly) {
         expect_closed(fast);
         if (round == 0) share = static_cast<double>(skipped.kernel_values) / static_cast<double>(whole.kernel_values);
         if (round > 0) {
-          EXPECT_LT(skipped.leaves_sampled, whole.leaves_sampled / 2) << "all was made anew";
+          EXPECT_LT(skipped.tiles_sampled, whole.tiles_sampled / 2) << "all was made anew";
         }
         const Vec3 cave = Vec3(0.7 - 0.6 * round, 0.1, 0.0);
         for (std::size_t i = 0; i < body.parts.size(); ++i) {

@@ -18,8 +18,8 @@ namespace supple::implicit {
 
 struct MarchCounts {
   std::uint64_t blocks = 0;         ///< blocks of 16^3 cells within reach of the body
-  std::uint64_t leaves = 0;         ///< leaves of 8^3 nodes that hold values
-  std::uint64_t leaves_sampled = 0; ///< places of leaves that were looked at in this call
+  std::uint64_t tiles = 0;          ///< tiles of 4^3 nodes that hold values
+  std::uint64_t tiles_sampled = 0;  ///< places of tiles that were looked at in this call
   std::uint64_t nodes = 0;          ///< values held
   std::uint64_t kernel_values = 0;  ///< terms of the sums on nodes that this call took, in single precision
   std::uint64_t bytes = 0;          ///< held besides the mesh
