@@ -341,7 +341,7 @@ void add_surfaces(std::vector<Option>& all) {
   meshed("meshing.error", "cell: 0.1, meshing: {method: cubes, error: $}", "auto", "1e-4");
 #ifdef SUPPLE_HAS_CGAL
   meshed("meshing.method=delaunay", "cell: 0.1, meshing: {method: $}", "cubes", "delaunay");
-  meshed("meshing.angle_deg", "cell: 0.1, meshing: {method: delaunay, size: 0.5, distance: 0.05, angle_deg: $}", "5", "30");
+  meshed("meshing.angle_deg", "cell: 0.1, meshing: {method: delaunay, size: 0.2, distance: 0.02, angle_deg: $}", "5", "30");
   meshed("meshing.size", "cell: 0.1, meshing: {method: delaunay, size: $}", "auto", "0.06");
   meshed("meshing.distance", "cell: 0.1, meshing: {method: delaunay, size: 0.2, distance: $}", "0.02", "0.002");
 #endif
