@@ -334,15 +334,15 @@ HWY_INLINE PointSums sum_at(const BlobList& list, V x, V y, V z) {
 
 constexpr float kClose = 4e-3F;  ///< a Newton step this short leaves an error below 1e-5 of a cell
 
-void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges) {
+void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin) {
   const D d;
   constexpr float kLeast = 0x1p-17F;     // roots stay this far from the nodes, so that no two vertices coincide
   constexpr float kResolution = 0x1p-18F;
   constexpr int kMaxRounds = 60;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F), level = hn::Set(d, iso);
   const V least = hn::Set(d, kLeast), most = hn::Set(d, 1.0F - kLeast);
-  for (std::size_t v = 0; v < edges.count; v += kWidth) {
-    const auto load = [&](const EdgeBatch::Row& from) HWY_ATTR { return hn::Load(d, from.data() + v); };
+  for (std::size_t v = begin; v < edges.count; v += kWidth) {
+    const auto load = [&](const EdgeBatch::Row& from) HWY_ATTR { return hn::LoadU(d, from.data() + v); };
     const V x0 = load(edges.x), y0 = load(edges.y), z0 = load(edges.z);
     const V axis = load(edges.axis);
     const auto unit = [&](float k) HWY_ATTR { return hn::IfThenElseZero(hn::Eq(axis, hn::Set(d, k)), one); };
@@ -393,7 +393,7 @@ void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges) {
       if (hn::AllFalse(d, open)) break;
       t = found;
     }
-    const auto store = [&](V value, EdgeBatch::Row& to) HWY_ATTR { hn::Store(value, d, to.data() + v); };
+    const auto store = [&](V value, EdgeBatch::Row& to) HWY_ATTR { hn::StoreU(value, d, to.data() + v); };
     store(hn::Min(hn::Max(found, least), most), edges.t);
     store(gx, edges.nx);
     store(gy, edges.ny);
@@ -401,14 +401,16 @@ void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges) {
   }
 }
 
-void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals, float* points) {
+void PlaceVertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,
+                   double* normals, float* points) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> df;
   using VD = hn::Vec<decltype(d)>;
   constexpr std::size_t kWide = hn::MaxLanes(decltype(d)());
   const VD zero = hn::Zero(d), one = hn::Set(d, 1.0), cell = hn::Set(d, placement.cell);
-  for (std::size_t v = 0; v < edges.count; v += kWide) {
-    const auto load = [&](const EdgeBatch::Row& from) HWY_ATTR { return hn::PromoteTo(d, hn::Load(df, from.data() + v)); };
+  for (std::size_t v = begin; v < end; v += kWide) {
+    const std::size_t n = v - begin;
+    const auto load = [&](const EdgeBatch::Row& from) HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(df, from.data() + v)); };
     const VD t = load(edges.t), axis = load(edges.axis);
     const VD gx = load(edges.nx), gy = load(edges.ny), gz = load(edges.nz);
     const VD norm2 = hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx)));
@@ -427,22 +429,22 @@ void PlaceVertices(const EdgeBatch& edges, const Placement& placement, double* p
     along(2, load(edges.z), gz);
     const auto single = [&](VD value) HWY_ATTR { return hn::DemoteTo(df, value); };
     const auto store_points = [&](float* to) HWY_ATTR {
-      hn::StoreInterleaved4(hn::Load(df, edges.t.data() + v), single(normal[0]), single(normal[1]), single(normal[2]), df, to);
+      hn::StoreInterleaved4(hn::LoadU(df, edges.t.data() + v), single(normal[0]), single(normal[1]), single(normal[2]), df, to);
     };
-    if (edges.count - v >= kWide) {
-      store_points(points + 4 * v);
-      hn::StoreInterleaved3(position[0], position[1], position[2], d, positions + 3 * v);
-      hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, normals + 3 * v);
+    if (end - v >= kWide) {
+      store_points(points + 4 * n);
+      hn::StoreInterleaved3(position[0], position[1], position[2], d, positions + 3 * n);
+      hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, normals + 3 * n);
       continue;
     }
     alignas(64) double last[2][3 * kWide];
     alignas(64) float last_points[4 * kWide];
     store_points(last_points);
-    std::copy_n(last_points, 4 * (edges.count - v), points + 4 * v);
+    std::copy_n(last_points, 4 * (end - v), points + 4 * n);
     hn::StoreInterleaved3(position[0], position[1], position[2], d, last[0]);
     hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, last[1]);
-    std::copy_n(last[0], 3 * (edges.count - v), positions + 3 * v);
-    std::copy_n(last[1], 3 * (edges.count - v), normals + 3 * v);
+    std::copy_n(last[0], 3 * (end - v), positions + 3 * n);
+    std::copy_n(last[1], 3 * (end - v), normals + 3 * n);
   }
 }
 
@@ -603,12 +605,13 @@ SureCubes find_sure_cubes(const BlobList& list, const std::array<float, 3>& corn
   return HWY_DYNAMIC_DISPATCH(FindSureCubes)(list, corner, edge, iso);
 }
 
-void solve_edges(const BlobList& list, float iso, EdgeBatch& edges) {
-  HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges);
+void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin) {
+  HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges, begin);
 }
 
-void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals, float* points) {
-  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, placement, positions, normals, points);
+void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,
+                    double* normals, float* points) {
+  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, begin, end, placement, positions, normals, points);
 }
 
 void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,

@@ -86,9 +86,9 @@ struct SureCubes {
 /// evaluate_tile. None where after half of the blobs some cube has no part in any. @param corner  lowest node
 SureCubes find_sure_cubes(const BlobList& list, const std::array<float, 3>& corner, int edge, float iso);
 
-/// Edges of one tile that the surface crosses.
+/// Edges of the tiles of a block that the surface crosses, tile after tile.
 struct EdgeBatch {
-  static constexpr std::size_t kRoom = 3 * kTileNodes + kLanes;
+  static constexpr std::size_t kRoom = 64 * 3 * kTileNodes + kLanes;
   using Row = std::array<float, kRoom>;
   alignas(64) Row x, y, z;     ///< lower end [cells]
   alignas(64) Row axis;        ///< 0, 1 or 2
@@ -98,8 +98,8 @@ struct EdgeBatch {
   std::size_t count = 0;
 };
 
-/// Newton's method in brackets, first step by the cubic through both ends.
-void solve_edges(const BlobList& list, float iso, EdgeBatch& edges);
+/// Newton's method in brackets for the edges from `begin` on, first step by the cubic through both ends.
+void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin);
 
 /// Where the frame of a block lies in the world.
 struct Placement {
@@ -108,9 +108,10 @@ struct Placement {
   double cell;                   ///< [m]
 };
 
-/// World positions and unit normals of the solved edges, three numbers each, and t and the normal, four numbers each. Where F
-/// has no gradient the normal is the direction of the edge. @param positions, normals, points  room for count of them
-void place_vertices(const EdgeBatch& edges, const Placement& placement, double* positions, double* normals, float* points);
+/// World positions and unit normals of the edges [begin, end), three numbers each, and t and the normal, four numbers each. Where F
+/// has no gradient the normal is the direction of the edge. @param positions, normals, points  room for so many
+void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,
+                    double* normals, float* points);
 
 /// Moves points [m] that lie near the surface to it, by Newton's method along the gradient, and gives their unit normals;
 /// three numbers each. Steps are at most half a cell.

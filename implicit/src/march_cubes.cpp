@@ -160,7 +160,8 @@ class VertexTable {
       });
     }
   }
-  [[nodiscard]] std::uint32_t operator[](int at) const { return vertex_[static_cast<std::size_t>(at)]; }
+  /// From a node on, by kEdgePlace.
+  [[nodiscard]] const std::uint32_t* from(int node) const { return vertex_.data() + node; }
 
  private:
   /// Edges that start at `nodes` and run along other axes than `without`.
@@ -211,7 +212,8 @@ constexpr auto kEdgeLine = [] {
 /// The triangles of a cell as places of their edges. A cell whose only loop has four vertices has a choice of diagonals.
 struct CellTriangles {
   std::array<std::array<std::uint16_t, 3 * kMostTriangles>, 2> place{};  ///< with both diagonals
-  std::array<std::uint8_t, 4> edge{};  ///< of the loop; of any other cell the choice does not matter
+  std::array<std::uint16_t, 4> corner{};  ///< of the loop; of any other cell the choice does not matter
+  std::array<std::uint8_t, 4> edge{};     ///< on which they lie
   std::uint8_t count = 0;
 };
 
@@ -231,7 +233,10 @@ constexpr CellTriangles make_triangles(const CellLoops& loops) {
     }
     result.count = static_cast<std::uint8_t>(n / 3);
   }
-  for (std::size_t k = 0; k < 4; ++k) result.edge[k] = loops.loop[0].edge[k % std::max<std::size_t>(loops.loop[0].size, 1)];
+  for (std::size_t k = 0; k < 4; ++k) {
+    result.edge[k] = loops.loop[0].edge[k % std::max<std::size_t>(loops.loop[0].size, 1)];
+    result.corner[k] = static_cast<std::uint16_t>(kEdgePlace[result.edge[k]]);
+  }
   return result;
 }
 
@@ -243,22 +248,23 @@ constexpr auto kCellTriangles = [] {
 
 /// Whether the second diagonal of a cell's only loop lies closer to the surface. Between two points of it a chord d lies
 /// |d . (n1 - n0)| / 8 off, by the normals n; where the surface is flat the shorter diagonal is taken.
-bool second_diagonal(const CellTriangles& c, const VertexTable& table, int cell, const EdgePoint* points) {
+bool second_diagonal(const CellTriangles& c, const std::uint32_t* vertex, const EdgePoint* points) {
   constexpr float kFlat = 1e-3F;  // curvature [1 / cell]
   __m128 place[4], normal[4];
   for (std::size_t k = 0; k < 4; ++k) {
-    const std::size_t edge = c.edge[k];
-    normal[k] = _mm_load_ps(&points[table[cell + kEdgePlace[edge]]].t);
+    const EdgeLine& line = kEdgeLine[c.edge[k]];
+    normal[k] = _mm_load_ps(&points[vertex[c.corner[k]]].t);
     const __m128 t = _mm_permute_ps(normal[k], 0);
-    place[k] = _mm_add_ps(_mm_load_ps(kEdgeLine[edge].start.data()), _mm_mul_ps(t, _mm_load_ps(kEdgeLine[edge].along.data())));
+    place[k] = _mm_add_ps(_mm_load_ps(line.start.data()), _mm_mul_ps(t, _mm_load_ps(line.along.data())));
   }
   const __m128 first = _mm_sub_ps(place[2], place[0]), second = _mm_sub_ps(place[3], place[1]);
   const __m128 bends = _mm_hadd_ps(_mm_mul_ps(first, _mm_sub_ps(normal[2], normal[0])),
                                    _mm_mul_ps(second, _mm_sub_ps(normal[3], normal[1])));
   const __m128 lengths = _mm_hadd_ps(_mm_mul_ps(first, first), _mm_mul_ps(second, second));
-  alignas(16) std::array<float, 4> sum;  // bends and squared lengths of both
-  _mm_store_ps(sum.data(), _mm_hadd_ps(bends, lengths));
-  return std::abs(sum[1]) + kFlat * sum[3] < std::abs(sum[0]) + kFlat * sum[2];
+  // Of both, twice: the bend and the squared length.
+  const __m128 bend = _mm_andnot_ps(_mm_set1_ps(-0.0F), _mm_hadd_ps(bends, bends));
+  const __m128 sum = _mm_add_ps(bend, _mm_mul_ps(_mm_set1_ps(kFlat), _mm_hadd_ps(lengths, lengths)));
+  return _mm_comilt_ss(_mm_movehdup_ps(sum), sum) != 0;
 }
 
 /// Vertices of the last call that move by `more` further than those of the triangles' own block.
@@ -306,25 +312,28 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
     return;
   }
   using Triangle = std::array<std::uint32_t, 3>;
-  thread_local VertexTable thread_vertices;
   thread_local std::vector<Triangle> thread_found;
-  VertexTable& vertices = thread_vertices;
+  VertexTable vertices;
   vertices.fill(blocks_above(table, block));
   thread_found.resize(block.triangles + kMostTriangles);
   Triangle* out = thread_found.data();
   const std::uint8_t* corners = block.corners.data();
   for (const Tile& tile : block.tile) {
-    const int from = kTilePlace[tile.place];
-    for_bits(tile.cells, [&](unsigned node) {
+    const std::uint32_t* first = vertices.from(kTilePlace[tile.place]);
+    for (Bits cells = tile.cells; cells != 0; cells &= cells - 1) {
       const CellTriangles& c = kCellTriangles[*corners++];
-      const int cell = from + kNodePlace[node];
-      const auto& place = c.place[second_diagonal(c, vertices, cell, points) ? 1 : 0];
-      // All that a cell can have, whatever it has: cheaper than a branch that cannot be foreseen.
-      for (std::size_t k = 0; k < kMostTriangles; ++k) {
-        out[k] = {vertices[cell + place[3 * k]], vertices[cell + place[3 * k + 1]], vertices[cell + place[3 * k + 2]]};
+      const std::uint32_t* vertex = first + kNodePlace[static_cast<std::size_t>(std::countr_zero(cells))];
+      const std::uint16_t* place = c.place[second_diagonal(c, vertex, points) ? 1 : 0].data();
+      // As many as most cells have or more: cheaper than a branch that cannot be foreseen.
+      constexpr std::size_t kOften = 3;
+      for (std::size_t k = 0; k < kOften; ++k, place += 3) out[k] = {vertex[place[0]], vertex[place[1]], vertex[place[2]]};
+      if (c.count > kOften) {
+        for (std::size_t k = kOften; k < kMostTriangles; ++k, place += 3) {
+          out[k] = {vertex[place[0]], vertex[place[1]], vertex[place[2]]};
+        }
       }
       out += c.count;
-    });
+    }
   }
   std::copy(thread_found.data(), out, mesh.triangle.data() + block.first_triangle);
 }

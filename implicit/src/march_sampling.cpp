@@ -132,9 +132,13 @@ class TileSurroundings {
       const int bit = std::countr_zero(tiles), x = bit & 3, y = bit >> 2 & 3, z = bit >> 4;
       const auto above = static_cast<std::size_t>(z);
       if (((near[above] | near[above + 1] | near[above + 2]) >> (x + 1 + kSide * (y + 1)) & 1u) == 0) continue;
-      for (std::size_t n = 0; n < 27; ++n) {
-        const auto [dx, dy, dz] = step_of(n);
-        if ((outside_[static_cast<std::size_t>(z + dz + 1)] >> (x + dx + 1 + kSide * (y + dy + 1)) & 1u) == 0) continue;
+      std::uint32_t steps = 0;  // to tiles around that have nodes outside
+      for (int row = 0; row < 9; ++row) {
+        const std::uint64_t plane = outside_[above + static_cast<std::size_t>(row / 3)];
+        steps |= static_cast<std::uint32_t>(plane >> (x + kSide * (y + row % 3)) & 7u) << (3 * row);
+      }
+      for (; steps != 0; steps &= steps - 1) {
+        const auto [dx, dy, dz] = step_of(static_cast<std::size_t>(std::countr_zero(steps)));
         if ((outside_nodes(x + dx, y + dy, z + dz) & facing(dx, dy, dz)) == 0) continue;
         found |= std::uint64_t{1} << bit;
         break;
@@ -205,19 +209,32 @@ class BlobSampler final : public Sampler {
     if (wanted == 0) return;
     Workspace& work = Workspace::of_thread();
     const BlocksAbove above = blocks_above(table, block);
-    const blobs::Placement placement = placement_of(block);
     grid_.gather(block.base(), kBlockNodes, 0, work.block);
+    blobs::EdgeBatch& edges = work.edges;
+    edges.count = 0;
     for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
       if ((wanted & tiles_of(leaf)) == 0) continue;
-      (void)blobs::select(work.block, centre_of(leaf_corner(leaf), kLeafNodes), 0.5F * kLeafNodes, work.leaf);
-      for_bits(wanted & tiles_of(leaf), [&](unsigned place) {
-        const std::size_t rank = block.rank(place), first = block.tile[rank].first_vertex;
-        collect_edges(above, block.tile[rank], block.values.data() + kTileNodes * rank, work.edges);
-        (void)blobs::select(work.leaf, centre_of(corner_of(place), kTile), 0.5F * kTile, work.tile);
-        blobs::solve_edges(work.tile, iso_, work.edges);
-        blobs::place_vertices(work.edges, placement, mesh.position[first].data(), mesh.normal[first].data(), &points[first].t);
-      });
+      (void)blobs::select(work.block, centre_of(leaf_corner(leaf), kLeafNodes), 0.5F * kLeafNodes, work.leaf_of_block[leaf]);
     }
+    const blobs::Placement placement = placement_of(block);
+    std::size_t begin = 0, to = 0;  // of the vertices that follow each other without a gap
+    const auto place_run = [&] {
+      if (edges.count == begin) return;
+      blobs::place_vertices(edges, begin, edges.count, placement, mesh.position[to].data(), mesh.normal[to].data(), &points[to].t);
+    };
+    for_bits(wanted, [&](unsigned place) {
+      const std::size_t rank = block.rank(place), first = edges.count;
+      const Tile& tile = block.tile[rank];
+      if (tile.first_vertex != to + (first - begin)) {
+        place_run();
+        begin = first;
+        to = tile.first_vertex;
+      }
+      collect_edges(above, tile, block.values.data() + kTileNodes * rank, edges);
+      (void)blobs::select(work.leaf_of_block[leaf_of(place)], centre_of(corner_of(place), kTile), 0.5F * kTile, work.tile);
+      blobs::solve_edges(work.tile, iso_, edges, first);
+    });
+    place_run();
   }
 
   void begin_projection() const override {
@@ -252,6 +269,7 @@ class BlobSampler final : public Sampler {
   struct Workspace {
     blobs::TileBlobs tile_blobs;
     BlobList gathered, block, leaf, tile, near, far;
+    std::array<BlobList, kLeaves> leaf_of_block;
     Bits sure = 0;                         // tiles of the block at work that are sure to be inside
     BlobList around_block, around_leaf;    // of the block and leaf that points were last projected near
     const Block* near_block = nullptr;
@@ -277,6 +295,7 @@ class BlobSampler final : public Sampler {
             .cell = lattice_.cell};
   }
 
+  /// Appends those of a tile.
   static void collect_edges(const BlocksAbove& above, const Tile& tile, const float* values, blobs::EdgeBatch& edges) {
     static constexpr std::array<float, kTileNodes> kUnknown{};
     static constexpr auto kNode = [] {
@@ -287,7 +306,7 @@ class BlobSampler final : public Sampler {
       return at;
     }();
     const auto corner = point(corner_of(tile.place));
-    std::size_t n = 0;
+    std::size_t n = edges.count;
     for (unsigned axis = 0; axis < 3; ++axis) {
       const unsigned shift = 2 * axis;
       const Bits last = std::array{kFirstX << 3, kFirstY << 12, kFirstZ << 48}[axis];
