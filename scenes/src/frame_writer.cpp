@@ -34,10 +34,23 @@ render::ContextKind context_kind(const std::string& name) {
                                       .hint = {}});
 }
 
+/// Of the file that a frame has in this format; none where all frames share one.
+std::string extension_of(TableName format) { return format == TableName::Csv ? ".csv" : ".vtp"; }
+std::string extension_of(MeshName format) {
+  switch (format) {
+    case MeshName::Ply: return ".ply";
+    case MeshName::Obj: return ".obj";
+    case MeshName::Usd: break;
+  }
+  return {};
+}
+
 void write_points(const fs::path& folder, const std::string& name, int frame, const std::vector<TableName>& formats,
                   const io::PointSet& points) {
-  if (has(formats, TableName::Csv)) io::write_points_csv(folder / numbered(name, frame, ".csv"), points);
-  if (has(formats, TableName::Vtk)) io::write_vtp(folder / numbered(name, frame, ".vtp"), points);
+  for (const TableName format : formats) {
+    const fs::path path = folder / numbered(name, frame, extension_of(format));
+    format == TableName::Csv ? io::write_points_csv(path, points) : io::write_vtp(path, points);
+  }
 }
 
 }  // namespace
@@ -78,19 +91,29 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
 }
 
 void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
+  write(simulation, report, done, outputs_.images, true);
+}
+
+void FrameWriter::renew(Simulation& simulation, Reporter& report, double done) {
+  const bool draws = outputs_.images && !pictures_are_current(simulation.frame(), simulation.state_hash());
+  write(simulation, report, done, draws, !files_are_there(simulation.frame()));
+}
+
+void FrameWriter::write(Simulation& simulation, Reporter& report, double done, bool draws, bool files) {
   const int frame = simulation.frame();
   if (samples_) follow(simulation, report, done);
   if (!wanted(frame)) return;
   const std::vector<Mesh>* meshes = nullptr;
-  if (outputs_.images && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
-  if (outputs_.images || outputs_.meshes) {
+  if (draws && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
+  if (draws || animation_ || (files && outputs_.meshes)) {
     report("surface", frame, done);
     meshes = &simulation.meshes();
   }
-  if (outputs_.images) draw(simulation, report, done);
+  if (draws) draw(simulation, report, done);
   const StageClock clock(simulation.profile(Stage::Export));
-  if (outputs_.meshes) write_meshes(simulation, *meshes);
   if (animation_) add_to_animation(simulation, *meshes);
+  if (!files) return;
+  if (outputs_.meshes) write_meshes(simulation, *meshes);
   if (outputs_.grids) write_grid_file(options_.folder, name_, frame, simulation, grids_);
   write_tables(simulation);
 }
@@ -119,29 +142,35 @@ bool FrameWriter::pictures_are_current(int frame, std::uint64_t state_hash) cons
   return true;
 }
 
-bool FrameWriter::renews_frames() const { return samples_ || animation_ || outputs_.images; }
+bool FrameWriter::writes_frames() const {
+  return outputs_.images || outputs_.meshes || outputs_.grids || outputs_.contacts || outputs_.particles || outputs_.samples;
+}
+
+bool FrameWriter::files_are_there(int frame) const {
+  const auto there = [&](const char* part, const std::string& stem, const auto& formats) {
+    return std::all_of(formats.begin(), formats.end(), [&](const auto format) {
+      const std::string extension = extension_of(format);
+      return extension.empty() || fs::exists(options_.folder / part / numbered(stem, frame, extension));
+    });
+  };
+  const OutputDesc& output = scene_.output;
+  if (outputs_.contacts && !(there("contacts", name_, output.contacts) && there("contacts", name_ + ".pairs", output.contacts))) return false;
+  if (outputs_.particles && !there("particles", name_, output.particles)) return false;
+  if (outputs_.grids && !fs::exists(options_.folder / "grids" / numbered(name_, frame, ".vdb"))) return false;
+  // An object without a surface has no mesh.
+  return !outputs_.meshes || std::any_of(scene_.objects.begin(), scene_.objects.end(),
+                                         [&](const ObjectDesc& object) { return there("meshes", name_ + "." + object.name, output.mesh); });
+}
 
 bool FrameWriter::renews(int frame, std::uint64_t state_hash) const {
-  return samples_ || (wanted(frame) && (animation_ || (outputs_.images && !pictures_are_current(frame, state_hash))));
+  return samples_ || (wanted(frame) && (animation_ || !files_are_there(frame) ||
+                                        (outputs_.images && !pictures_are_current(frame, state_hash))));
 }
 
 void FrameWriter::follow(Simulation& simulation, Reporter& report, double done) {
   report("samples", simulation.frame(), done);
   const StageClock clock(simulation.profile(Stage::Export));
   samples_->follow(simulation, Executor(options_.threads));
-}
-
-void FrameWriter::renew(Simulation& simulation, Reporter& report, double done) {
-  const int frame = simulation.frame();
-  if (samples_) follow(simulation, report, done);
-  const bool draws = outputs_.images && !pictures_are_current(frame, simulation.state_hash());
-  if (!wanted(frame) || !(animation_ || draws)) return;
-  report("surface", frame, done);
-  if (outputs_.images && !outputs_.meshes && options_.skip) pictures_->limit_meshes(simulation);
-  const std::vector<Mesh>& meshes = simulation.meshes();
-  if (draws) draw(simulation, report, done);
-  const StageClock clock(simulation.profile(Stage::Export));
-  if (animation_) add_to_animation(simulation, meshes);
 }
 
 void FrameWriter::draw(Simulation& simulation, Reporter& report, double done) {

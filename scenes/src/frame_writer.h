@@ -40,10 +40,10 @@ class FrameWriter {
   /// Films, contact sheets and lists over all frames 1 .. last that are there. Returns the film, if there is one.
   std::filesystem::path finish(Simulation& simulation, Reporter& report, int last);
 
-  /// Whether anything that it writes may have to be written again, so that earlier states are needed.
-  [[nodiscard]] bool renews_frames() const;
-  /// Whether a frame that was written before must be seen again: for a file over all frames or for samples, or because its picture is
-  /// absent or one of another scene or state.
+  /// Whether frames have files of their own or share one.
+  [[nodiscard]] bool writes_frames() const;
+  /// Whether a frame that was written before must be seen again: for a file over all frames or for samples, or because a file of its
+  /// own is absent or its picture one of another scene or state.
   [[nodiscard]] bool renews(int frame, std::uint64_t state_hash) const;
   /// Writes again what `renews` found.
   void renew(Simulation& simulation, Reporter& report, double done);
@@ -56,6 +56,8 @@ class FrameWriter {
   [[nodiscard]] bool wanted(int frame) const { return options_.frames.empty() || options_.frames.contains(frame); }
   [[nodiscard]] std::filesystem::path picture_path(std::size_t camera, int frame, ImageName format) const;
   [[nodiscard]] std::string fingerprint(std::uint64_t state_hash) const;
+  [[nodiscard]] bool files_are_there(int frame) const;
+  void write(Simulation& simulation, Reporter& report, double done, bool draws, bool files);
   [[nodiscard]] bool pictures_are_current(int frame, std::uint64_t state_hash) const;
   void draw(Simulation& simulation, Reporter& report, double done);
   void follow(Simulation& simulation, Reporter& report, double done);

@@ -368,7 +368,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         bool fresh = true;
         if (options.resume) {
           if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
-            for (int frame = 1; writer.renews_frames() && frame <= *last; ++frame) {
+            for (int frame = 1; writer.writes_frames() && frame <= *last; ++frame) {
               State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
               if (!writer.renews(frame, state.hash())) continue;
               simulation->restore(std::move(state));

@@ -366,6 +366,36 @@ TEST_F(Run, GathersTheFramesBeforeARestartToo) {
   EXPECT_EQ(bytes_of(folder_ / "drops.usda"), bytes_of(o.folder / "drops.usda"));
 }
 
+TEST_F(Run, WritesForEarlierFramesTooWhatARestartAsksForFirst) {
+  scene_.output = {};
+  std::atomic<int> signal{0};
+  RunOptions stopped = options();
+  stopped.interrupt = &signal;
+  stopped.progress = [&](const Progress& p) { signal = p.frame >= 3 ? 15 : 0; };
+  ASSERT_EQ(run_scene(scene_, stopped).outcome, "interrupted");
+  scene_.output.mesh = {MeshName::Ply, MeshName::Obj};
+  scene_.output.particles = {TableName::Csv, TableName::Vtk};
+  scene_.output.contacts = {TableName::Csv};
+  scene_.output.grid = {GridName::Vdb};
+  RunOptions o = options();
+  o.folder = folder_ / "whole";
+  const RunResult whole = run_scene(scene_, o);
+  ASSERT_EQ(whole.outcome, "done");
+  o.folder = folder_;
+  o.resume = true;
+  EXPECT_EQ(run_scene(scene_, o).state_hash, whole.state_hash);
+  std::size_t files = 0;
+  for (const char* part : {"meshes", "particles", "contacts", "grids"}) {
+    for (const auto& entry : fs::directory_iterator(folder_ / "whole" / part)) {
+      const fs::path here = folder_ / part / entry.path().filename();
+      EXPECT_TRUE(fs::exists(here)) << here;
+      EXPECT_TRUE(std::string(part) == "grids" || bytes_of(here) == bytes_of(entry.path())) << here;
+      ++files;
+    }
+  }
+  EXPECT_EQ(files, 5u * (2 * 2 + 2 + 2 + 1));
+}
+
 TEST_F(Run, WritesGridsOfObjectsOfTheSceneOrBoth) {
   scene_.output.images.reset();
   scene_.output.film = false;
