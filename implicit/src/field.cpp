@@ -400,9 +400,10 @@ double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed
   Vec3 slope = Vec3::Zero();
   for (std::size_t k = 0; k < skeleton.primitive.size(); ++k) {
     const Primitive& p = skeleton.primitive[k];
-    const Vec3 y = placed.rotation[k].transpose() * (point - placed.position[k]);
+    const Mat3 rotation = placed.rotation.empty() ? Mat3(Mat3::Identity()) : placed.rotation[k];
+    const Vec3 y = rotation.transpose() * (point - placed.position[k]);
     const Potential f = potential(p, y);
-    const Vec3 own = placed.rotation[k] * f.gradient;
+    const Vec3 own = rotation * f.gradient;
     sum += f.value;
     slope += own;
     NodeSample& node = nodes[skeleton.blend.node.empty() ? p.part : skeleton.blend.node[p.part]];

@@ -231,7 +231,9 @@ void Field::Index::build_levels() {
 
 void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& field) {
   const std::size_t n = skeleton.primitive.size();
-  SUPPLE_EXPECTS(placed.position.size() == n && placed.rotation.size() == n && placed.support.size() == n);
+  const bool balls = placed.rotation.empty() && n > 0;
+  SUPPLE_EXPECTS(placed.position.size() == n && placed.support.size() == n &&
+                 (balls ? placed.radius.size() == n && placed.part.size() == n : placed.rotation.size() == n));
   if (!field.index_) field.index_ = std::make_unique<Field::Index>();
   Field::Index& index = *field.index_;
   index.iso = skeleton.iso;
@@ -245,7 +247,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   index.control.clear();
   index.ball_radius.clear();
   index.built.store(false, std::memory_order_release);
-  if (placed.radius.size() == n && n > Field::Index::kScanLimit && !index.blend.active()) {
+  if (balls && n > Field::Index::kScanLimit && !index.blend.active()) {
     index.ball_radius = placed.radius;
     double last = 0.0, inverse_r2 = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -257,7 +259,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
       }
       const Vec3& at = placed.position[i];
       index.primitive[i] = {.position = {at.x(), at.y(), at.z()}, .inverse_r2 = inverse_r2, .gradient_factor = -6.0 / (R * R),
-                            .kind = PackedKind::PointWyvill, .part = skeleton.primitive[i].part};
+                            .kind = PackedKind::PointWyvill, .part = placed.part[i]};
     }
     return;
   }
@@ -268,8 +270,8 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   for (const Primitive& p : skeleton.primitive) index.control.insert(index.control.end(), p.control.begin(), p.control.end());
   const Vec3* control = index.control.data();
   for (std::size_t i = 0; i < n; ++i) {
-    pack(skeleton.primitive[i], control, placed.position[i], placed.rotation[i], index.primitive[i], index.shape[i],
-         index.rounded[i]);
+    pack(skeleton.primitive[i], control, placed.position[i], balls ? Mat3(Mat3::Identity()) : placed.rotation[i],
+         index.primitive[i], index.shape[i], index.rounded[i]);
     control += skeleton.primitive[i].control.size();
     index.feature_size = std::min(index.feature_size, feature_of(skeleton.primitive[i]));
     index.uniform = index.uniform && index.primitive[i].kind == index.primitive[0].kind;

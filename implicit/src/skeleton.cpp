@@ -227,47 +227,66 @@ bool is_wyvill_ball(const Primitive& p) noexcept {
   return p.shape == ShapeKind::Point && p.kernel.kind == KernelKind::Wyvill && p.stretch == Vec3::Ones() && !p.convolved;
 }
 
-Box with_slack(const Box& own, const Vec3& position) noexcept {
-  const double reach = std::max(-own.lower.minCoeff(), own.upper.maxCoeff());
-  const Vec3 slack = Vec3::Constant(1e-12 * reach) + 1e-15 * position.cwiseAbs();
-  return {position + own.lower - slack, position + own.upper + slack};
-}
+/// Round-off of a support that reaches this far, and of its place.
+double slack_of(double reach) noexcept { return 1e-12 * reach; }
+Vec3 slack_at(const Vec3& position) noexcept { return 1e-15 * position.cwiseAbs(); }
 
 }  // namespace
 
 Box placed_support(const Primitive& primitive, const Vec3& position, const Mat3& rotation) noexcept {
-  return with_slack(support_of(primitive, rotation).whole, position);
+  const Box own = support_of(primitive, rotation).whole;
+  const double reach = std::max(-own.lower.minCoeff(), own.upper.maxCoeff());
+  const Vec3 slack = Vec3::Constant(slack_of(reach)) + slack_at(position);
+  return {position + own.lower - slack, position + own.upper + slack};
 }
+
+namespace {
+
+/// Bodies of more primitives than this have a way of their own where all are balls: reading and writing is then what costs.
+constexpr std::size_t kManyPrimitives = 64;
+
+/// @return whether all are balls, and placed
+bool place_balls(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out) {
+  const std::size_t n = skeleton.primitive.size();
+  out.rotation.clear();
+  out.radius.resize(n);
+  out.part.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Primitive& primitive = skeleton.primitive[i];
+    if (!is_wyvill_ball(primitive)) return false;
+    const double R = primitive.kernel.radius;
+    SUPPLE_EXPECTS(primitive.part < parts.size() && R > 0.0 && primitive.taper > 0.0);
+    const Vec3 position = parts[primitive.part].to_world(primitive.offset.position);
+    const Vec3 reach = Vec3::Constant(R + slack_of(R)) + slack_at(position);
+    out.position[i] = position;
+    out.support[i] = {position - reach, position + reach};
+    out.radius[i] = R;
+    out.part[i] = primitive.part;
+  }
+  return true;
+}
+
+}  // namespace
 
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out) {
   SUPPLE_EXPECTS(parts.size() == skeleton.part_count);
   const std::size_t n = skeleton.primitive.size();
   out.position.resize(n);
-  out.rotation.resize(n);
   out.support.resize(n);
-  out.radius.resize(n);
-  bool balls = true;
+  if (n > kManyPrimitives && place_balls(skeleton, parts, out)) return;
+  out.radius.clear();
+  out.part.clear();
+  out.rotation.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const Primitive& primitive = skeleton.primitive[i];
-    SUPPLE_EXPECTS(primitive.part < parts.size());
+    SUPPLE_EXPECTS(primitive.part < parts.size() && well_formed(primitive));
     const Pose& part = parts[primitive.part];
-    const Vec3 position = part.to_world(primitive.offset.position);
-    const Mat3 rotation = primitive.offset.orientation.coeffs() == Quat::Identity().coeffs()
-                              ? part.orientation.toRotationMatrix()
-                              : Mat3(part.orientation.toRotationMatrix() * primitive.offset.orientation.toRotationMatrix());
-    out.position[i] = position;
-    out.rotation[i] = rotation;
-    const double R = out.radius[i] = primitive.kernel.radius;
-    if (is_wyvill_ball(primitive)) {
-      SUPPLE_EXPECTS(R > 0.0 && primitive.taper > 0.0);
-      out.support[i] = with_slack({Vec3::Constant(-R), Vec3::Constant(R)}, position);
-      continue;
-    }
-    balls = false;
-    SUPPLE_EXPECTS(well_formed(primitive));
-    out.support[i] = placed_support(primitive, position, rotation);
+    out.position[i] = part.to_world(primitive.offset.position);
+    out.rotation[i] = primitive.offset.orientation.coeffs() == Quat::Identity().coeffs()
+                          ? part.orientation.toRotationMatrix()
+                          : Mat3(part.orientation.toRotationMatrix() * primitive.offset.orientation.toRotationMatrix());
+    out.support[i] = placed_support(primitive, out.position[i], out.rotation[i]);
   }
-  if (!balls) out.radius.clear();
 }
 
 bool well_formed(const Primitive& p) noexcept {

@@ -149,7 +149,8 @@ class SampledBody : public ::testing::TestWithParam<testing::BodyOptions> {
 
 double contribution(const Body& body, std::size_t k, const Vec3& x) {
   const Primitive& p = body.skeleton.primitive[k];
-  const Vec3 y = body.placed.rotation[k].transpose() * (x - body.placed.position[k]);
+  const Vec3 away = x - body.placed.position[k];
+  const Vec3 y = body.placed.rotation.empty() ? away : Vec3(body.placed.rotation[k].transpose() * away);
   return evaluate(p.kernel, evaluate(p, y).q).value;
 }
 

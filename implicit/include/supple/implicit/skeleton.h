@@ -95,9 +95,11 @@ struct Skeleton {
 /// Primitives in world axes; Frame data.
 struct PlacedSkeleton {
   std::vector<Vec3> position;  ///< origin of the primitive [m], shape [primitives]
-  std::vector<Mat3> rotation;  ///< primitive frame -> world, shape [primitives]
+  std::vector<Mat3> rotation;  ///< primitive frame -> world, shape [primitives]; empty where `radius` is not
   std::vector<Box> support;    ///< box of {f_k > 0} [m], shape [primitives]
-  std::vector<double> radius;  ///< R where all are unstretched points with Wyvill's kernel, else empty [m]
+  // Of more than 64 unstretched points with Wyvill's kernel and nothing else, which need no rotation; else empty.
+  std::vector<double> radius;       ///< R [m]
+  std::vector<std::uint32_t> part;  ///< that carries it
 };
 
 /// Box of {f > 0} of a primitive placed in the world, wider than the round-off of f: what lies outside is exactly zero.
