@@ -103,16 +103,39 @@ TEST(PathTracer, LosesNoLightBetweenWhiteBodies) {
   EXPECT_NEAR(sum / count, 1.0, 0.01);
 }
 
+/// Whether each box of 2^-a x 2^-(4-a) holds one of 16 points, for every a: a (0, 4, 2)-net in base 2.
+bool is_net(const std::vector<Eigen::Vector2f>& points) {
+  for (int a = 0; a <= 4; ++a) {
+    std::set<int> boxes;
+    for (const Eigen::Vector2f& u : points)
+      boxes.insert(static_cast<int>(u.x() * static_cast<float>(1 << a)) * 16 + static_cast<int>(u.y() * static_cast<float>(1 << (4 - a))));
+    if (boxes.size() != 16) return false;
+  }
+  return true;
+}
+
 TEST(Sampler, FillsEveryElementaryIntervalOnceByPairs) {
-  // A (0, 4, 2)-net in base 2: of 16 points each box of 2^-a x 2^-(4-a) holds one.
   for (int pixel = 0; pixel < 20; ++pixel)
-    for (int a = 0; a <= 4; ++a) {
-      std::set<int> boxes;
-      for (std::uint32_t s = 16; s < 32; ++s) {
-        const Eigen::Vector2f u = Sampler(pixel, 7, s).pair();
-        boxes.insert(static_cast<int>(u.x() * static_cast<float>(1 << a)) * 16 + static_cast<int>(u.y() * static_cast<float>(1 << (4 - a))));
+    for (const int dimension : {0, 1, 5}) {
+      std::vector<Eigen::Vector2f> points;
+      for (std::uint32_t s = 0; s < 16; ++s) {
+        Sampler random(pixel, 7, 3, 16, s);
+        for (int d = 0; d < dimension; ++d) static_cast<void>(random.pair());
+        points.push_back(random.pair());
       }
-      EXPECT_EQ(boxes.size(), 16u) << pixel << ' ' << a;
+      EXPECT_TRUE(is_net(points)) << pixel << ' ' << dimension;
+    }
+}
+
+TEST(Sampler, FillsThemByTheSamplesOfSquareBlocksOfPixelsToo) {
+  for (const int across : {1, 2, 4})
+    for (const int left : {0, 4, 252, 256, 700}) {
+      std::vector<Eigen::Vector2f> points;
+      const auto each = static_cast<std::uint32_t>(16 / (across * across));
+      for (int y = 8; y < 8 + across; ++y)
+        for (int x = left; x < left + across; ++x)
+          for (std::uint32_t s = 0; s < each; ++s) points.push_back(Sampler(x, y, 0, each, s).pair());
+      EXPECT_TRUE(is_net(points)) << across << ' ' << left;
     }
 }
 
@@ -126,7 +149,7 @@ TEST(Bsdf, ReflectsNoMoreThanComesInFromAnyAngle) {
         double sum = 0.0;
         constexpr std::uint32_t kSamples = 4096;
         for (std::uint32_t s = 0; s < kSamples; ++s) {
-          Sampler random(1, 2, s);
+          Sampler random(1, 2, 0, kSamples, s);
           const float which = random.number();
           const Vec3f in = bsdf.sample(out, which, random.pair());
           const float density = bsdf.density(out, in);
@@ -155,7 +178,7 @@ TEST(Bsdf, DensitiesIntegrateToTheShareAboveTheHorizonAndAgreeWithValues) {
     double above = 0.0, sampled = 0.0;
     constexpr std::uint32_t kSamples = 16384;
     for (std::uint32_t s = 0; s < kSamples; ++s) {
-      Sampler random(3, 4, s);
+      Sampler random(3, 4, 0, kSamples, s);
       const float which = random.number();
       const Vec3f in = bsdf.sample(out, which, random.pair());
       if (in.z() <= 0.0F) continue;
@@ -398,7 +421,7 @@ TEST(PathTracer, BlursWhatMovesAndWhatIsOutOfFocus) {
     ball.columns.push_back({name, std::vector<double>(ball.vertex_count(), name[9] == 'x' ? 10.0 : 0.0)});
   const Item item = matt(ball, 0.5);
   Studio studio;
-  studio.settings.most_samples = 64;
+  studio.settings.most_samples = 256;  // the outermost pixels show the ball a hundredth of the time
   const auto width_of = [&](const Film& film) {
     int width = 0;
     for (int x = 0; x < 32; ++x) width += film.cover[static_cast<std::size_t>(16 * 32 + x)] > 0.0F ? 1 : 0;
@@ -436,6 +459,80 @@ TEST(PathTracer, FilterBringsAFewSamplesNearerToMany) {
   const double before = rms_difference(film, reference);
   path::denoise(64, 64, Vec3f(0, -5, 0), static_cast<float>(2.0 * std::tan(0.15) / 64.0), Executor(1), film);
   EXPECT_LT(rms_difference(film, reference), 0.7 * before);  // much of the picture is outlines at this size
+}
+
+TEST(PathTracer, FilterLeavesTheEdgesOfReflections) {
+  // A mirror lies under a plate that ends over its middle: half of it shows sky, half the plate.
+  const Mesh mirror = plate(1.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  Mesh cover;
+  add_quadrangle(cover, Vec3(0, -9, 1), Vec3(9, -9, 1), Vec3(9, 9, 1), Vec3(0, 9, 1));
+  std::array items = {Item{.mesh = &mirror, .colour = Vec3::Ones(), .roughness = 0.02, .metallic = 1.0}, matt(cover, 0.0)};
+  items[1].two_sided = true;
+  Studio studio;
+  studio.view.camera = {.from = Vec3(0, -5, 0.9), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.1};
+  studio.settings.width = studio.settings.height = 64;
+  studio.settings.most_samples = 8;
+  studio.lights.above = Vec3f::Ones();
+  Film film = studio.trace(items);
+  path::denoise(64, 64, Vec3f(0, -5, 0.9F), static_cast<float>(2.0 * std::tan(0.05) / 64.0), Executor(1), film);
+  for (int x = 0; x < 64; ++x) {
+    const float light = film.radiance[static_cast<std::size_t>(32 * 64 + x)].y();
+    if (x < 27) { EXPECT_GT(light, 0.97F) << x; }
+    if (x > 36) { EXPECT_LT(light, 0.03F) << x; }
+  }
+}
+
+TEST(PathTracer, FilterKeepsTheDarkOfNarrowGaps) {
+  // Under a plate that hangs low over a floor in even light, light falls off over about the width of the gap.
+  const Mesh floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  Mesh shade;
+  add_quadrangle(shade, Vec3(0, -9, 0.05), Vec3(9, -9, 0.05), Vec3(9, 9, 0.05), Vec3(0, 9, 0.05));
+  std::array items = {matt(floor, 0.5), matt(shade, 0.0)};
+  items[1].two_sided = true;
+  Studio studio;
+  studio.view.camera = {.from = Vec3(-1.2, 0, 0.1), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.06};
+  studio.settings.width = studio.settings.height = 64;
+  studio.lights.above = Vec3f::Ones();
+  studio.settings.most_samples = 1024;
+  const Film reference = studio.trace(items);
+  studio.settings.most_samples = 8;
+  Film film = studio.trace(items);
+  const double before = rms_difference(film, reference);
+  path::denoise(64, 64, Vec3f(-1.2F, 0, 0.1F), static_cast<float>(2.0 * std::tan(0.03) / 64.0), Executor(1), film);
+  EXPECT_LT(rms_difference(film, reference), 0.6 * before);
+}
+
+TEST(PathTracer, FollowsBundlesAsItFollowsRays) {
+  const std::array meshes = {sphere(Vec3(-0.3, 0, 0), 0.4, 12), sphere(Vec3(0.3, 0.2, 0), 0.4, 12)};
+  std::array items = {matt(meshes[0], 0.5), matt(meshes[1], 0.5)};
+  items[0].opacity = 0.5;
+  path::Geometry geometry;
+  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  std::size_t hits_found = 0, shadows = 0;
+  for (int row = 0; row < 40; ++row) {
+    path::RayBundle rays;
+    std::array<float, path::RayBundle::kSize> choice{};
+    for (std::size_t i = 0; i < 1 + static_cast<std::size_t>(row) % path::RayBundle::kSize; ++i) {
+      choice[i] = 0.1F + 0.11F * static_cast<float>(i);
+      rays.add(Vec3f(-0.8F + 0.04F * static_cast<float>(row) + 0.003F * static_cast<float>(i), -3, 0.1F), Vec3f::UnitY(), 0.0F);
+    }
+    std::array<path::Hit, path::RayBundle::kSize> together;
+    const auto met = geometry.meet(rays, choice, false, together);
+    const auto blocked = geometry.blocked(rays);
+    for (std::size_t i = 0; i < rays.count; ++i) {
+      path::Hit alone;
+      EXPECT_EQ(met[i], geometry.meet(rays.from[i], rays.direction[i], 0.0F, choice[i], false, alone));
+      EXPECT_EQ(blocked[i], geometry.blocked(rays.from[i], rays.direction[i], INFINITY, 0.0F));
+      shadows += blocked[i] ? 1 : 0;
+      if (!met[i]) continue;
+      ++hits_found;
+      EXPECT_EQ(together[i].item, alone.item);
+      EXPECT_NEAR(together[i].distance, alone.distance, 1e-5);
+    }
+    for (std::size_t i = rays.count; i < path::RayBundle::kSize; ++i) EXPECT_FALSE(met[i] || blocked[i]);
+  }
+  EXPECT_GT(hits_found, 60u);
+  EXPECT_GT(shadows, 60u);
 }
 
 TEST(PathTracer, KeepsAndRefitsHierarchies) {

@@ -162,30 +162,45 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
   check(device_);
 }
 
-bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
-  float near_end = kNear;
-  for (int layer = 0; layer < 32; ++layer) {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    RTCRayHit ray{};
-    ray.ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = near_end,
-               .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
-               .tfar = std::numeric_limits<float>::infinity(), .mask = 1u, .id = 0, .flags = 0};
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene_, &context, &ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+/// Of a ray and a triangle.
+struct Geometry::Crossing {
+  float distance = 0.0F;
+  unsigned item = RTC_INVALID_GEOMETRY_ID;
+  unsigned triangle = 0;
+  float u = 0.0F, v = 0.0F;
+};
 
-    const Part& part = *parts_[ray.hit.geomID];
-    const Item& item = items_[ray.hit.geomID];
-    const std::uint32_t* corner = &part.index[3 * std::size_t{ray.hit.primID}];
-    const Vec3f weight(1.0F - ray.hit.u - ray.hit.v, ray.hit.u, ray.hit.v);
+Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit ray{};
+  ray.ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = near_end,
+             .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
+             .tfar = std::numeric_limits<float>::infinity(), .mask = 1u, .id = 0, .flags = 0};
+  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(scene_, &context, &ray);
+  return {.distance = ray.ray.tfar, .item = ray.hit.geomID, .triangle = ray.hit.primID, .u = ray.hit.u, .v = ray.hit.v};
+}
+
+bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
+  return first_visible(crossed(from, direction, time, kNear), from, direction, time, choice, exact, hit);
+}
+
+/// Of what a ray crosses from this crossing on.
+bool Geometry::first_visible(Crossing crossing, const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact,
+                             Hit& hit) const {
+  for (int layer = 0; layer < 32 && crossing.item != RTC_INVALID_GEOMETRY_ID; ++layer) {
+    const Part& part = *parts_[crossing.item];
+    const Item& item = items_[crossing.item];
+    const std::uint32_t* corner = &part.index[3 * std::size_t{crossing.triangle}];
+    const Vec3f weight(1.0F - crossing.u - crossing.v, crossing.u, crossing.v);
     std::array<Vec3f, 3> p;
     for (std::size_t k = 0; k < 3; ++k) {
       p[k] = vector(&part.position[4 * std::size_t{corner[k]}]);
       if (part.moving) p[k] += time * (vector(&part.position_end[4 * std::size_t{corner[k]}]) - p[k]);
     }
-    hit.item = ray.hit.geomID;
-    hit.distance = ray.ray.tfar;
+    hit.item = crossing.item;
+    hit.distance = crossing.distance;
     hit.point = weight[0] * p[0] + weight[1] * p[1] + weight[2] * p[2];
     const Vec3f cross = (p[1] - p[0]).cross(p[2] - p[0]);
     const float twice_area = std::max(cross.norm(), 1e-30F);
@@ -199,7 +214,7 @@ bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float
     const bool back = hit.face_normal.dot(direction) > 0.0F;
     const bool visible = on_wire || (item.surface && (!back || item.two_sided) && choice < item.opacity);
     if (!visible) {
-      near_end = hit.distance * (1.0F + 2e-6F) + kNear;
+      crossing = crossed(from, direction, time, hit.distance * (1.0F + 2e-6F) + kNear);
       continue;
     }
     hit.normal = (weight[0] * part.normal[corner[0]] + weight[1] * part.normal[corner[1]] + weight[2] * part.normal[corner[2]]).normalized();
@@ -263,6 +278,64 @@ bool Geometry::blocked(const Vec3f& from, const Vec3f& direction, float distance
                 .tfar = distance, .mask = 2u, .id = 0, .flags = 0};
   rtcOccluded1(scene_, &context, &ray);
   return ray.tfar < 0.0F;
+}
+
+namespace {
+
+/// Rays of a bundle in Embree's layout; lanes without a ray are not looked at.
+void fill(const RayBundle& rays, unsigned mask, RTCRay8& to, std::array<int, RayBundle::kSize>& valid) {
+  for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
+    const std::size_t k = i < rays.count ? i : 0;
+    valid[i] = i < rays.count ? -1 : 0;
+    to.org_x[i] = rays.from[k].x();
+    to.org_y[i] = rays.from[k].y();
+    to.org_z[i] = rays.from[k].z();
+    to.dir_x[i] = rays.direction[k].x();
+    to.dir_y[i] = rays.direction[k].y();
+    to.dir_z[i] = rays.direction[k].z();
+    to.time[i] = rays.time[k];
+    to.tnear[i] = kNear;
+    to.tfar[i] = std::numeric_limits<float>::infinity();
+    to.mask[i] = mask;
+    to.id[i] = to.flags[i] = 0;
+  }
+}
+
+RTCIntersectContext coherent() {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  return context;
+}
+
+}  // namespace
+
+std::array<bool, RayBundle::kSize> Geometry::meet(const RayBundle& rays, const std::array<float, RayBundle::kSize>& choice, bool exact,
+                                                  std::array<Hit, RayBundle::kSize>& hits) const {
+  RTCRayHit8 bundle;
+  alignas(32) std::array<int, RayBundle::kSize> valid;
+  fill(rays, 1u, bundle.ray, valid);
+  std::fill_n(bundle.hit.geomID, RayBundle::kSize, RTC_INVALID_GEOMETRY_ID);
+  RTCIntersectContext context = coherent();
+  rtcIntersect8(valid.data(), scene_, &context, &bundle);
+  std::array<bool, RayBundle::kSize> met{};
+  for (std::size_t i = 0; i < rays.count; ++i) {
+    const Crossing crossing{.distance = bundle.ray.tfar[i], .item = bundle.hit.geomID[i], .triangle = bundle.hit.primID[i],
+                            .u = bundle.hit.u[i], .v = bundle.hit.v[i]};
+    met[i] = first_visible(crossing, rays.from[i], rays.direction[i], rays.time[i], choice[i], exact, hits[i]);
+  }
+  return met;
+}
+
+std::array<bool, RayBundle::kSize> Geometry::blocked(const RayBundle& rays) const {
+  RTCRay8 bundle;
+  alignas(32) std::array<int, RayBundle::kSize> valid;
+  fill(rays, 2u, bundle, valid);
+  RTCIntersectContext context = coherent();
+  rtcOccluded8(valid.data(), scene_, &context, &bundle);
+  std::array<bool, RayBundle::kSize> blocked{};
+  for (std::size_t i = 0; i < rays.count; ++i) blocked[i] = bundle.tfar[i] < 0.0F;
+  return blocked;
 }
 
 }  // namespace supple::render::path

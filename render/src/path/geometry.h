@@ -4,6 +4,7 @@
 
 #include <embree3/rtcore.h>
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -24,6 +25,19 @@ struct Hit {
   std::uint32_t item = 0;
 };
 
+/// Rays that start near each other and go the same way, to be followed together; `time` in [0, 1] of the exposure.
+struct RayBundle {
+  static constexpr std::size_t kSize = 8;
+  std::size_t count = 0;
+  std::array<Vec3f, kSize> from, direction;
+  std::array<float, kSize> time{};
+  void add(const Vec3f& start, const Vec3f& along, float when) {
+    from[count] = start;
+    direction[count] = along;
+    time[count++] = when;
+  }
+};
+
 class Geometry {
  public:
   Geometry();
@@ -41,6 +55,10 @@ class Geometry {
   /// @param exact   move the hit onto the field's surface
   [[nodiscard]] bool meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const;
   [[nodiscard]] bool blocked(const Vec3f& from, const Vec3f& direction, float distance, float time) const;
+  /// The same for every ray of a bundle; the distance to a light is infinite.
+  [[nodiscard]] std::array<bool, RayBundle::kSize> meet(const RayBundle& rays, const std::array<float, RayBundle::kSize>& choice, bool exact,
+                                                        std::array<Hit, RayBundle::kSize>& hits) const;
+  [[nodiscard]] std::array<bool, RayBundle::kSize> blocked(const RayBundle& rays) const;
 
   /// Hierarchies of the last `set`.
   struct Counts {
@@ -50,6 +68,10 @@ class Geometry {
 
  private:
   struct Part;
+  struct Crossing;
+  [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const;
+  [[nodiscard]] bool first_visible(Crossing crossing, const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact,
+                                   Hit& hit) const;
   void refine(const Item& item, const Vec3f& direction, Hit& hit) const;
 
   RTCDevice device_ = nullptr;

@@ -25,7 +25,7 @@ mi.set_variant("llvm_ad_rgb" if "llvm_ad_rgb" in mi.variants() and "--llvm" in s
 
 def scene(folder, sampler):
     to_light = -DIRECTION / np.linalg.norm(DIRECTION)
-    distance, centre = 1000.0, np.array(AT)
+    distance, centre = 1e5, np.array(AT)  # so far that its light is parallel over the floor
     t = mi.ScalarTransform4f
     parts = {
         "type": "scene",
