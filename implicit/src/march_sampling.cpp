@@ -384,9 +384,10 @@ class BlobSampler final : public Sampler {
             distance2[k][static_cast<std::size_t>(tile)] = off * off;
           }
         }
-        for (unsigned place = 0; place < 64; ++place) {
-          const double sum = distance2[0][place & 3u] + distance2[1][place >> 2 & 3u] + distance2[2][place >> 4];
-          block.changed |= Bits{sum <= ball.radius * ball.radius} << place;
+        for (unsigned row = 0; row < 16; ++row) {
+          const double left = ball.radius * ball.radius - distance2[1][row & 3u] - distance2[2][row >> 2];
+          if (left < 0.0) continue;
+          for (unsigned x = 0; x < 4; ++x) block.changed |= Bits{distance2[0][x] <= left} << (4 * row + x);
         }
       });
     }
