@@ -332,9 +332,33 @@ HWY_INLINE PointSums sum_at(const BlobList& list, V x, V y, V z) {
   return sum;
 }
 
+/// Those whose support may meet a box, in its frame.
+HWY_INLINE void cut(const BlobList& from, const float (&centre)[3], const float (&half)[3], BlobList& list) {
+  const D d;
+  list.reserve(from.count);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < from.count; i += kWidth) {
+    const V s = hn::LoadU(d, from.scale.data() + i);
+    V near2 = hn::Zero(d), at[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      at[k] = hn::LoadU(d, (k == 0 ? from.x : k == 1 ? from.y : from.z).data() + i);
+      const V away = hn::Abs(hn::MulSub(s, hn::Set(d, centre[k]), at[k]));
+      const V gap = hn::Max(hn::NegMulAdd(s, hn::Set(d, half[k]), away), hn::Zero(d));
+      near2 = hn::MulAdd(gap, gap, near2);
+    }
+    const auto keep = hn::Lt(near2, hn::Set(d, kReach2));
+    hn::StoreU(hn::Compress(s, keep), d, list.scale.data() + count);
+    hn::StoreU(hn::Compress(at[0], keep), d, list.x.data() + count);
+    hn::StoreU(hn::Compress(at[1], keep), d, list.y.data() + count);
+    hn::StoreU(hn::Compress(at[2], keep), d, list.z.data() + count);
+    count += hn::CountTrue(d, keep);
+  }
+  list.count = count;
+}
+
 constexpr float kClose = 4e-3F;  ///< a Newton step this short leaves an error below 1e-5 of a cell
 
-void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin) {
+void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin, BlobList& near) {
   const D d;
   constexpr float kLeast = 0x1p-17F;     // roots stay this far from the nodes, so that no two vertices coincide
   constexpr float kResolution = 0x1p-18F;
@@ -347,16 +371,27 @@ void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t b
     const V axis = load(edges.axis);
     const auto unit = [&](float k) HWY_ATTR { return hn::IfThenElseZero(hn::Eq(axis, hn::Set(d, k)), one); };
     const V ax = unit(0.0F), ay = unit(1.0F), az = unit(2.0F);
+    auto open = hn::FirstN(d, edges.count - v);
+    float centre[3], half_box[3];  // around the edges
+    const auto extend = [&](std::size_t k, V from, V to) HWY_ATTR {
+      const float lower = hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(open, from, hn::Set(d, 1e30F))));
+      const float upper = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElse(open, to, hn::Set(d, -1e30F))));
+      centre[k] = 0.5F * (lower + upper);
+      half_box[k] = 0.5F * (upper - lower);
+    };
+    extend(0, x0, hn::Add(x0, ax));
+    extend(1, y0, hn::Add(y0, ay));
+    extend(2, z0, hn::Add(z0, az));
+    cut(list, centre, half_box, near);
     const V f0 = load(edges.low), f1 = load(edges.high);
     const auto starts_inside = hn::Gt(f0, zero);
     const auto both_known = hn::Ne(f1, zero);
     V t = hn::IfThenElse(both_known, hn::Div(f0, hn::Sub(f0, f1)), half);
     t = hn::Min(hn::Max(t, least), most);
     V low = zero, high = one, last = one, found = t, gx = zero, gy = zero, gz = zero;
-    auto open = hn::FirstN(d, edges.count - v);
     for (int round = 0; round < kMaxRounds; ++round) {
       const V x = hn::MulAdd(ax, t, x0), y = hn::MulAdd(ay, t, y0), z = hn::MulAdd(az, t, z0);
-      const auto [potential, sx, sy, sz] = sum_at(list, x, y, z);
+      const auto [potential, sx, sy, sz] = sum_at(near, x, y, z);
       const V f = hn::Sub(potential, level);
       gx = hn::IfThenElse(open, sx, gx);
       gy = hn::IfThenElse(open, sy, gy);
@@ -446,30 +481,6 @@ void PlaceVertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, c
     std::copy_n(last[0], 3 * (end - v), positions + 3 * n);
     std::copy_n(last[1], 3 * (end - v), normals + 3 * n);
   }
-}
-
-/// Those whose support may meet a box, in its frame.
-HWY_INLINE void cut(const BlobList& from, const float (&centre)[3], const float (&half)[3], BlobList& list) {
-  const D d;
-  list.reserve(from.count);
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < from.count; i += kWidth) {
-    const V s = hn::LoadU(d, from.scale.data() + i);
-    V near2 = hn::Zero(d), at[3];
-    for (std::size_t k = 0; k < 3; ++k) {
-      at[k] = hn::LoadU(d, (k == 0 ? from.x : k == 1 ? from.y : from.z).data() + i);
-      const V away = hn::Abs(hn::MulSub(s, hn::Set(d, centre[k]), at[k]));
-      const V gap = hn::Max(hn::NegMulAdd(s, hn::Set(d, half[k]), away), hn::Zero(d));
-      near2 = hn::MulAdd(gap, gap, near2);
-    }
-    const auto keep = hn::Lt(near2, hn::Set(d, kReach2));
-    hn::StoreU(hn::Compress(s, keep), d, list.scale.data() + count);
-    hn::StoreU(hn::Compress(at[0], keep), d, list.x.data() + count);
-    hn::StoreU(hn::Compress(at[1], keep), d, list.y.data() + count);
-    hn::StoreU(hn::Compress(at[2], keep), d, list.z.data() + count);
-    count += hn::CountTrue(d, keep);
-  }
-  list.count = count;
 }
 
 /// Newton's method along the gradient for a vector of points. @return whether all stayed within `margin` of their start
@@ -605,8 +616,8 @@ SureCubes find_sure_cubes(const BlobList& list, const std::array<float, 3>& corn
   return HWY_DYNAMIC_DISPATCH(FindSureCubes)(list, corner, edge, iso);
 }
 
-void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin) {
-  HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges, begin);
+void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin, BlobList& near) {
+  HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges, begin, near);
 }
 
 void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,

@@ -98,8 +98,10 @@ struct EdgeBatch {
   std::size_t count = 0;
 };
 
-/// Newton's method in brackets for the edges from `begin` on, first step by the cubic through both ends.
-void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin);
+/// Newton's method in brackets for the edges from `begin` on, first step by the cubic through both ends. Edges that follow
+/// each other should be close: each vector of them has a list of its own.
+/// @param near  scratch
+void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t begin, BlobList& near);
 
 /// Where the frame of a block lies in the world.
 struct Placement {

@@ -22,6 +22,11 @@ namespace {
 
 constexpr std::size_t kBlocksPerTask = 8;
 
+/// The first along the axes in the mask `step`.
+constexpr Bits first_of(unsigned step) {
+  return ((step & 1u) != 0 ? kFirstX : kAll) & ((step & 2u) != 0 ? kFirstY : kAll) & ((step & 4u) != 0 ? kFirstZ : kAll);
+}
+
 /// Words of the tiles of a block and of those one step above it.
 class TileFrame {
  public:
@@ -32,13 +37,16 @@ class TileFrame {
 
   /// The nodes inside.
   explicit TileFrame(const BlocksAbove& above) {
-    for (unsigned z = 0; z < kSide; ++z) {
-      for (unsigned y = 0; y < kSide; ++y) {
-        for (unsigned x = 0; x < kSide; ++x) {
-          const Block* block = above[x >> 2 | y >> 2 << 1 | z >> 2 << 2];
-          word_[at(x, y, z)] = block == nullptr ? Bits{0} : block->inside((x & 3u) | (y & 3u) << 2 | (z & 3u) << 4);
-        }
-      }
+    word_.fill(0);
+    for (unsigned step = 0; step < 8; ++step) {
+      if (above[step] == nullptr) continue;
+      const Block& block = *above[step];
+      const unsigned from = at(4 * (step & 1u), 4 * (step >> 1 & 1u), 4 * (step >> 2));
+      const Bits face = first_of(step);
+      for_bits(face & ~block.outside, [&](unsigned place) { word_[from + at(place)] = kAll; });
+      for_bits(face & block.held & block.outside, [&](unsigned place) {
+        word_[from + at(place)] = block.tile[block.rank(place)].inside;
+      });
     }
   }
   [[nodiscard]] Bits operator[](unsigned at) const { return word_[at]; }
@@ -151,8 +159,7 @@ class VertexTable {
     for (const Tile& tile : above[0]->tile) add(tile, kTilePlace[tile.place], kAll, 0);
     for (unsigned step = 1; step < 7; ++step) {
       if (above[step] == nullptr) continue;
-      // Those that lie on the block's upper faces.
-      const Bits face = ((step & 1u) != 0 ? kFirstX : kAll) & ((step & 2u) != 0 ? kFirstY : kAll) & ((step & 4u) != 0 ? kFirstZ : kAll);
+      const Bits face = first_of(step);  // on the block's upper faces
       const int from = node_place(kBlockNodes * static_cast<int>(step & 1u), kBlockNodes * static_cast<int>(step >> 1 & 1u),
                                   kBlockNodes * static_cast<int>(step >> 2));
       for_bits(above[step]->held & face, [&](unsigned at) {

@@ -231,8 +231,7 @@ class BlobSampler final : public Sampler {
         to = tile.first_vertex;
       }
       collect_edges(above, tile, block.values.data() + kTileNodes * rank, edges);
-      (void)blobs::select(work.leaf_of_block[leaf_of(place)], centre_of(corner_of(place), kTile), 0.5F * kTile, work.tile);
-      blobs::solve_edges(work.tile, iso_, edges, first);
+      blobs::solve_edges(work.leaf_of_block[leaf_of(place)], iso_, edges, first, work.near);
     });
     place_run();
   }
