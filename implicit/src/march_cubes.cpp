@@ -216,22 +216,25 @@ constexpr auto kEdgeLine = [] {
   return lines;
 }();
 
-/// The triangles of a cell as places of their edges. A cell whose only loop has four vertices has a choice of diagonals.
+/// The triangles of a cell as places of their edges. A cell with one loop of four or more vertices has a choice of fans.
 struct CellTriangles {
-  std::array<std::array<std::uint16_t, 3 * kMostTriangles>, 2> place{};  ///< with both diagonals
-  std::array<std::uint16_t, 4> corner{};  ///< of the loop; of any other cell the choice does not matter
-  std::array<std::uint8_t, 4> edge{};     ///< on which they lie
+  static constexpr std::size_t kMostFans = 7;
+  std::array<std::array<std::uint16_t, 3 * kMostTriangles>, kMostFans> place{};  ///< by the apex of the fan
+  std::array<std::uint16_t, kMostFans> corner{};  ///< of the loop
+  std::array<std::uint8_t, kMostFans> edge{};     ///< on which they lie
   std::uint8_t count = 0;
+  std::uint8_t size = 0;    ///< of the only loop
+  std::uint8_t apices = 0;  ///< bit k: its fan around corner k is allowed
 };
 
 constexpr CellTriangles make_triangles(const CellLoops& loops) {
   CellTriangles result;
-  for (std::size_t variant = 0; variant < 2; ++variant) {
+  for (std::size_t variant = 0; variant < CellTriangles::kMostFans; ++variant) {
     std::size_t n = 0;
     for (std::size_t l = 0; l < loops.loops; ++l) {
       const Loop& loop = loops.loop[l];
       std::size_t apex = static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(loop.apices)));
-      if (loops.loops == 1 && loop.size == 4) apex = variant;
+      if (loops.loops == 1 && (loop.apices >> variant & 1) != 0) apex = variant;
       for (std::size_t d = 1; d + 1 < loop.size; ++d) {
         for (const std::size_t k : {apex, apex + d, apex + d + 1}) {
           result.place[variant][n++] = static_cast<std::uint16_t>(kEdgePlace[loop.edge[k % loop.size]]);
@@ -240,9 +243,14 @@ constexpr CellTriangles make_triangles(const CellLoops& loops) {
     }
     result.count = static_cast<std::uint8_t>(n / 3);
   }
-  for (std::size_t k = 0; k < 4; ++k) {
-    result.edge[k] = loops.loop[0].edge[k % std::max<std::size_t>(loops.loop[0].size, 1)];
+  const Loop& loop = loops.loop[0];
+  for (std::size_t k = 0; k < CellTriangles::kMostFans; ++k) {
+    result.edge[k] = loop.edge[k % std::max<std::size_t>(loop.size, 1)];
     result.corner[k] = static_cast<std::uint16_t>(kEdgePlace[result.edge[k]]);
+  }
+  if (loops.loops == 1) {
+    result.size = loop.size;
+    result.apices = loop.apices;
   }
   return result;
 }
@@ -253,25 +261,43 @@ constexpr auto kCellTriangles = [] {
   return cases;
 }();
 
-/// Whether the second diagonal of a cell's only loop lies closer to the surface. Between two points of it a chord d lies
-/// |d . (n1 - n0)| / 8 off, by the normals n; where the surface is flat the shorter diagonal is taken.
-bool second_diagonal(const CellTriangles& c, const std::uint32_t* vertex, const EdgePoint* points) {
-  constexpr float kFlat = 1e-3F;  // curvature [1 / cell]
-  __m128 place[4], normal[4];
-  for (std::size_t k = 0; k < 4; ++k) {
+/// Corners of a cell's loop and their normals, behind an unused number.
+struct LoopCorner {
+  __m128 place, normal;
+  LoopCorner(const CellTriangles& c, std::size_t k, const std::uint32_t* vertex, const EdgePoint* points) {
     const EdgeLine& line = kEdgeLine[c.edge[k]];
-    normal[k] = _mm_load_ps(&points[vertex[c.corner[k]]].t);
-    const __m128 t = _mm_permute_ps(normal[k], 0);
-    place[k] = _mm_add_ps(_mm_load_ps(line.start.data()), _mm_mul_ps(t, _mm_load_ps(line.along.data())));
+    normal = _mm_load_ps(&points[vertex[c.corner[k]]].t);
+    const __m128 t = _mm_permute_ps(normal, 0);
+    place = _mm_add_ps(_mm_load_ps(line.start.data()), _mm_mul_ps(t, _mm_load_ps(line.along.data())));
   }
-  const __m128 first = _mm_sub_ps(place[2], place[0]), second = _mm_sub_ps(place[3], place[1]);
-  const __m128 bends = _mm_hadd_ps(_mm_mul_ps(first, _mm_sub_ps(normal[2], normal[0])),
-                                   _mm_mul_ps(second, _mm_sub_ps(normal[3], normal[1])));
-  const __m128 lengths = _mm_hadd_ps(_mm_mul_ps(first, first), _mm_mul_ps(second, second));
-  // Of both, twice: the bend and the squared length.
-  const __m128 bend = _mm_andnot_ps(_mm_set1_ps(-0.0F), _mm_hadd_ps(bends, bends));
-  const __m128 sum = _mm_add_ps(bend, _mm_mul_ps(_mm_set1_ps(kFlat), _mm_hadd_ps(lengths, lengths)));
-  return _mm_comilt_ss(_mm_movehdup_ps(sum), sum) != 0;
+};
+
+/// How far two chords of the surface lie off it, in the first and second number, times eight: |d . (n1 - n0)| for a chord d with
+/// the normals n at its ends; where the surface is flat, the longer chord is the worse one.
+__m128 bends(const LoopCorner& a0, const LoopCorner& a1, const LoopCorner& b0, const LoopCorner& b1) {
+  constexpr float kFlat = 1e-3F;  // curvature [1 / cell]
+  const __m128 a = _mm_sub_ps(a1.place, a0.place), b = _mm_sub_ps(b1.place, b0.place);
+  const __m128 turns = _mm_hadd_ps(_mm_mul_ps(a, _mm_sub_ps(a1.normal, a0.normal)), _mm_mul_ps(b, _mm_sub_ps(b1.normal, b0.normal)));
+  const __m128 lengths = _mm_hadd_ps(_mm_mul_ps(a, a), _mm_mul_ps(b, b));
+  const __m128 turn = _mm_andnot_ps(_mm_set1_ps(-0.0F), _mm_hadd_ps(turns, turns));
+  return _mm_add_ps(turn, _mm_mul_ps(_mm_set1_ps(kFlat), _mm_hadd_ps(lengths, lengths)));
+}
+
+/// The fan of a cell whose chords lie closest to the surface.
+std::size_t best_fan(const CellTriangles& c, const std::uint32_t* vertex, const EdgePoint* points) {
+  const LoopCorner first(c, 0, vertex, points), second(c, 1, vertex, points), third(c, 2, vertex, points), fourth(c, 3, vertex, points);
+  if (c.size != 5) {
+    const __m128 bend = bends(first, third, second, fourth);
+    return _mm_comilt_ss(_mm_movehdup_ps(bend), bend) != 0 ? 1 : 0;
+  }
+  const LoopCorner fifth(c, 4, vertex, points);
+  alignas(16) std::array<std::array<float, 4>, 3> chord;  // from corner k to k + 2
+  _mm_store_ps(chord[0].data(), bends(first, third, second, fourth));
+  _mm_store_ps(chord[1].data(), bends(third, fifth, fourth, first));
+  _mm_store_ps(chord[2].data(), bends(fifth, second, fifth, second));
+  const std::array<float, 5> b{chord[0][0], chord[0][1], chord[1][0], chord[1][1], chord[2][0]};
+  const std::array<float, 5> sum{b[0] + b[3], b[1] + b[4], b[2] + b[0], b[3] + b[1], b[4] + b[2]};
+  return static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
 }
 
 /// Vertices of the last call that move by `more` further than those of the triangles' own block.
@@ -330,7 +356,7 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
     for (Bits cells = tile.cells; cells != 0; cells &= cells - 1) {
       const CellTriangles& c = kCellTriangles[*corners++];
       const std::uint32_t* vertex = first + kNodePlace[static_cast<std::size_t>(std::countr_zero(cells))];
-      const std::uint16_t* place = c.place[second_diagonal(c, vertex, points) ? 1 : 0].data();
+      const std::uint16_t* place = c.place[best_fan(c, vertex, points)].data();
       // As many as most cells have or more: cheaper than a branch that cannot be foreseen.
       constexpr std::size_t kOften = 3;
       for (std::size_t k = 0; k < kOften; ++k, place += 3) out[k] = {vertex[place[0]], vertex[place[1]], vertex[place[2]]};

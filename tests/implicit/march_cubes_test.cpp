@@ -123,9 +123,9 @@ TEST(MarchCubes, FindsOneBodyBelowTheMergingDistanceAndTwoAbove) {
   EXPECT_EQ(components(1.22), 2u);
 }
 
-// Cells that the surface cuts in four points are two triangles: their common edge is the diagonal whose middle lies closer to
-// the surface, but for pairs that are alike up to terms of third order.
-TEST(MarchCubes, TakesTheDiagonalThatLiesCloserToTheSurface) {
+// Cells that the surface cuts in four or five points are fans of two or three triangles: of all fans theirs is the one whose
+// chords lie closest to the surface in their middles, but for those that are alike up to terms of third order.
+TEST(MarchCubes, TakesTheFanThatLiesClosestToTheSurface) {
   const Body body = blobs(3, 60);
   const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.03)}, Executor(2));
   const auto away = [&](std::uint32_t a, std::uint32_t b) {
@@ -133,19 +133,25 @@ TEST(MarchCubes, TakesTheDiagonalThatLiesCloserToTheSurface) {
     const double f = FieldView(body.field).value(0.5 * (mesh.position[a] + mesh.position[b]), gradient);
     return std::abs(f) / gradient.norm();
   };
-  const auto in_fan = [&](std::size_t t) {  // with the triangle after it
-    const auto &one = mesh.triangle[t], &next = mesh.triangle[t + 1];
-    return one[0] == next[0] && one[2] == next[1];
+  const auto goes_on = [&](std::size_t t) {  // to the triangle after it
+    return t + 1 < mesh.triangle_count() && mesh.triangle[t][0] == mesh.triangle[t + 1][0] && mesh.triangle[t][2] == mesh.triangle[t + 1][1];
   };
-  std::size_t quads = 0, worse = 0;
-  for (std::size_t t = 1; t + 2 < mesh.triangle_count(); ++t) {
-    if (!in_fan(t) || in_fan(t - 1) || in_fan(t + 1)) continue;
-    const auto &one = mesh.triangle[t], &next = mesh.triangle[t + 1];
-    ++quads;
-    worse += away(one[0], one[2]) > 1.2 * away(one[1], next[2]) + 1e-3 * 0.03 ? 1u : 0u;
+  std::map<std::size_t, std::size_t> fans, worse;  // by the size of the loop
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
+    std::vector<std::uint32_t> loop{mesh.triangle[t][0], mesh.triangle[t][1], mesh.triangle[t][2]};
+    for (; goes_on(t); ++t) loop.push_back(mesh.triangle[t + 1][2]);
+    const std::size_t n = loop.size();
+    std::vector<double> sum(n, 0.0);
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t d = 2; d + 1 < n; ++d) sum[k] += away(loop[k], loop[(k + d) % n]);
+    }
+    ++fans[n];
+    worse[n] += sum[0] > 1.2 * *std::min_element(sum.begin(), sum.end()) + 1e-3 * 0.03 ? 1u : 0u;
   }
-  EXPECT_GT(quads, mesh.triangle_count() / 10);
-  EXPECT_LT(worse, quads / 100);
+  for (const std::size_t n : {4u, 5u}) {
+    EXPECT_GT(fans[n], mesh.triangle_count() / 20);
+    EXPECT_LT(worse[n], fans[n] / 50);
+  }
 }
 
 // Blobs of very different size, some of two cells only, some alone: none may be missed by bounds.
