@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <sstream>
 #include <system_error>
 
 #include "supple/core/error.h"
@@ -99,6 +100,20 @@ std::string number_text(double value) {
 }
 
 }  // namespace
+
+void find_film_program() {
+  const std::string program = program_name();
+  if (program.find('/') != std::string::npos) {
+    if (::access(program.c_str(), X_OK) == 0) return;
+  } else {
+    const char* path = std::getenv("PATH");
+    std::istringstream folders(path == nullptr ? "/usr/local/bin:/usr/bin:/bin" : path);
+    for (std::string folder; std::getline(folders, folder, ':');) {
+      if (::access(((folder.empty() ? "." : folder) + '/' + program).c_str(), X_OK) == 0) return;
+    }
+  }
+  fail(program, "cannot be started: " + std::generic_category().message(ENOENT), kInstallHint);
+}
 
 void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
                  const std::filesystem::path& film) {

@@ -141,6 +141,24 @@ std::vector<render::ScaleBar> bars_of(const Scene& scene) {
 
 }  // namespace
 
+void check_textures(const Scene& scene) {
+  std::vector<Fault> faults;
+  const auto check = [&](const std::optional<TextureDesc>& texture, const std::string& key) {
+    try {
+      static_cast<void>(paint_of(texture, scene.source.parent_path()));
+    } catch (const Error& error) {
+      for (Fault fault : error.faults()) {
+        fault.key = key + ".file";
+        faults.push_back(std::move(fault));
+      }
+    }
+  };
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) check(scene.objects[i].look.texture, "objects[" + std::to_string(i) + "].look.texture");
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) check(scene.obstacles[i].texture, "obstacles[" + std::to_string(i) + "].texture");
+  if (scene.ground) check(scene.ground->texture, "ground.texture");
+  if (!faults.empty()) throw Error(ErrorKind::Io, std::move(faults));
+}
+
 std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double time) {
   std::vector<Mesh> meshes;
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {

@@ -78,6 +78,17 @@ std::string outcome_of(ErrorKind kind) {
   return "internal";
 }
 
+/// What pictures need and a scene only names is looked for before hours of work, and before anything is removed.
+/// @throws Error
+void check_needs(const Scene& scene, const RunOptions& options, const OutputRequest& outputs) {
+  if (!outputs.images) return;
+  check_textures(scene);
+  if (scene.render.renderer == RendererName::Path && !render::has_path_tracer()) {
+    static_cast<void>(render::make_renderer({.kind = render::RendererKind::Path}));  // says what is absent
+  }
+  if (outputs.film && options.frames.empty()) render::find_film_program();
+}
+
 constexpr int kSignalExit = 128;
 constexpr std::size_t kMostOverloads = 10;  // that are told; the report has all
 constexpr const char* kResultFile = "result.json";
@@ -239,6 +250,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, report_name, simulation, [&](RunResult& result) {
+    check_needs(scene, options, outputs);
     const auto last = last_saved_frame(options.folder, name, scene.frame_count());
     if (!last) {
       throw Error(ErrorKind::Io, Fault{.place = (options.folder / "states").string(),
@@ -360,6 +372,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {
+        check_needs(scene, options, outputs);
         if (!options.resume) remove_outputs(options.folder, name);
         simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
         const int frame_count = scene.frame_count();

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -68,6 +69,25 @@ TEST(Film, NamesThePackageWhenFfmpegIsAbsentAndKeepsTheFrames) {
   expect_error(ErrorKind::Io, {"/no/such/ffmpeg", "cannot be started", "apt-get install ffmpeg"},
                [&] { encode_film(folder.path(), "ball", 1, 2, 24.0, folder / "film.mp4"); });
   EXPECT_EQ(folder.file_count(), 2U);
+}
+
+TEST(Film, IsLookedForByNameAndByPath) {
+  const Folder folder;
+  std::ofstream(folder / "maker") << "#!/bin/sh\n";
+  const auto absent = [](const std::string& name) {
+    expect_error(ErrorKind::Io, {name, "cannot be started", "apt-get install ffmpeg"}, [] { find_film_program(); });
+  };
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", ("/no/such/folder:" + folder.path().string()).c_str(), 1);
+  for (const std::string& name : {std::string("maker"), (folder / "maker").string()}) {
+    const Environment program("SUPPLE_FFMPEG", name);
+    std::filesystem::permissions(folder / "maker", std::filesystem::perms::owner_read);
+    if (::geteuid() != 0) absent(name);  // root may run what has any right to be run
+    std::filesystem::permissions(folder / "maker", std::filesystem::perms::owner_all);
+    EXPECT_NO_THROW(find_film_program()) << name;
+  }
+  absent("ffmpeg");
+  ::setenv("PATH", path.c_str(), 1);
 }
 
 TEST(Film, TellsTheLastLineOfAProgramThatFailsAndLeavesNothingBehind) {

@@ -242,11 +242,25 @@ TEST_F(Looks, PicturesAreTimedByTheirParts) {
   EXPECT_NE(text.find("\"read_back_cpu_s\""), std::string::npos);
 }
 
-TEST_F(Looks, AnAbsentTextureIsNamed) {
-  const RunResult result = run_scene(scene_with("texture: {pattern: picture, file: absent.png}", kOneCamera),
-                                     {.folder = folder_, .threads = 1});
+TEST_F(Looks, AbsentTexturesAndFilmMakersAreNamedBeforeAnythingIsRemoved) {
+  ASSERT_EQ(run_scene(scene_with("", kOneCamera), {.folder = folder_, .threads = 1}).outcome, "done");
+  const RunOptions again{.folder = folder_, .threads = 1, .overwrite = true};
+  const Scene absent = scene_with("texture: {pattern: picture, file: absent.png}", kOneCamera);
+  RunResult result = run_scene(absent, again);
   EXPECT_EQ(result.outcome, "io");
-  EXPECT_NE(result.reason.find("absent.png"), std::string::npos) << result.reason;
+  for (const char* part : {"absent.png", "objects[0].look.texture.file"}) EXPECT_NE(result.reason.find(part), std::string::npos) << result.reason;
+  EXPECT_THROW(check_textures(absent), Error);
+  EXPECT_NO_THROW(check_textures(scene_with("", kOneCamera)));
+  EXPECT_EQ(render_run(absent, again).outcome, "io");
+
+  Scene film = scene_with("", kOneCamera);
+  film.output.film = true;
+  ::setenv("SUPPLE_FFMPEG", "/no/such/ffmpeg", 1);
+  result = run_scene(film, again);
+  ::unsetenv("SUPPLE_FFMPEG");
+  EXPECT_EQ(result.outcome, "io");
+  EXPECT_NE(result.reason.find("/no/such/ffmpeg"), std::string::npos) << result.reason;
+  EXPECT_TRUE(fs::exists(folder_ / "frames/looks.0001.png"));
 }
 
 TEST_F(Looks, CoarseMeshesOfBallsThatTouchLookLikeFineOnesWhenRaysMeetTheField) {

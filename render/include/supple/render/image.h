@@ -59,4 +59,7 @@ struct ImageDifference {
 void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
                  const std::filesystem::path& film);
 
+/// Looks for the program that `encode_film` starts. @throws Error{Io} when it is absent
+void find_film_program();
+
 }  // namespace supple::render

@@ -76,6 +76,9 @@ struct RunResult {
   PictureTimes pictures;
 };
 
+/// Reads the pictures that textures name, as runs that draw do before they begin. @throws Error{Io} naming key and file
+void check_textures(const Scene& scene);
+
 /// Simulates, surfaces, renders and films a scene into options.folder:
 /// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, NAME.usda, grids/, contacts/,
 /// particles/, samples/, NAME_contacts.pvd, NAME_particles.pvd, NAME_samples.pvd as asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
