@@ -46,6 +46,12 @@ struct Partners {
   }
 };
 
+/// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
+bool clear_of(const ContactBody& body, const Box& box) {
+  const std::optional<implicit::CorePoint> core = body.field.core_point(box.centre());
+  return core && (core->point - box.centre()).norm() > core->radius + 0.5 * box.extent().norm();
+}
+
 /// The solver of one thread; its buffers are reused.
 class PairSolver {
  public:
@@ -55,6 +61,7 @@ class PairSolver {
  private:
   bool polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
   bool parts_are_sound(PairPressure& pressure, double extent);
+  void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
   bool samples(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
                const ContactSettings& settings, PairResult& out);
@@ -112,11 +119,7 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
       out.summary.largest_overlap = polar_.thickness();
     }
     if (covers_.size() == cover_count_) covers_.emplace_back();
-    PolarCover& cover = covers_[cover_count_++];
-    cover.frame = *frame;
-    cover.radius = polar_.rim_radius();
-    cover.height = polar_.rim_height();
-    cover.thickness = polar_.thickness();
+    polar_.cover(covers_[cover_count_++]);
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
   return parts_are_sound(pressure, extent);
@@ -127,8 +130,8 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
   for (std::size_t i = 0; i < cover_count_; ++i) {
     for (std::size_t j = 0; j < cover_count_; ++j) {
       if (i == j) continue;
-      for (std::size_t k = 0; k < covers_[i].radius.size(); ++k) {
-        if (covers_[j].contains(covers_[i].rim_point(k), 0.0)) return false;
+      for (const Vec3& x : covers_[i].rim) {
+        if (covers_[j].contains(x, 0.0)) return false;
       }
     }
   }
@@ -168,12 +171,26 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
   return true;
 }
 
+/// Partners of either body whose surfaces may reach the overlap.
+void PairSolver::find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap) {
+  third_.clear();
+  third_bodies_.clear();
+  for (const std::uint32_t c : partners.of(pair.a)) {
+    if (c != pair.b && boxes[c].overlaps(overlap)) third_.push_back(c);
+  }
+  for (const std::uint32_t c : partners.of(pair.b)) {
+    if (c == pair.a || !boxes[c].overlaps(overlap)) continue;
+    const auto place = std::lower_bound(third_.begin(), third_.end(), c);
+    if (place == third_.end() || *place != c) third_.insert(place, c);
+  }
+}
+
 /// Whether a third body presses on the patches nearly as much as the pair does.
 /// @param boxes  of the bodies' surfaces
 bool PairSolver::thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out) {
   Box patch;
   for (std::size_t i = 0; i < cover_count_; ++i) {
-    for (std::size_t k = 0; k < covers_[i].radius.size(); ++k) patch.include(covers_[i].rim_point(k));
+    for (const Vec3& x : covers_[i].rim) patch.include(x);
     patch.include(covers_[i].frame.origin);
   }
   for (const Vec3& x : out.points.point) patch.include(x);
@@ -181,7 +198,7 @@ bool PairSolver::thirds_press(std::span<const ContactBody> bodies, std::span<con
   value_.resize(out.points.point.size());
   bool press = false;
   for (const std::uint32_t c : third_) {
-    if (!boxes[c].overlaps(patch) || bodies[c].field.bound(patch).upper <= 0.0) continue;
+    if (!boxes[c].overlaps(patch) || clear_of(bodies[c], patch) || bodies[c].field.bound(patch).upper <= 0.0) continue;
     third_bodies_.push_back(&bodies[c]);
     bodies[c].field.evaluate(out.points.point, value_);
     for (std::size_t i = 0; i < value_.size(); ++i) {
@@ -190,9 +207,7 @@ bool PairSolver::thirds_press(std::span<const ContactBody> bodies, std::span<con
     }
     // Beyond the outermost nodes the pressure of the pair falls to zero.
     for (std::size_t i = 0; i < cover_count_ && !press; ++i) {
-      for (std::size_t k = 0; k < covers_[i].radius.size() && !press; ++k) {
-        press = bodies[c].field.value(covers_[i].rim_point(k)) > 0.0;
-      }
+      for (std::size_t k = 0; k < covers_[i].rim.size() && !press; ++k) press = bodies[c].field.value(covers_[i].rim[k]) > 0.0;
     }
   }
   return press;
@@ -276,11 +291,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
   if (!std::isfinite(extent)) return;  // two half-spaces
 
-  third_.clear();
-  third_bodies_.clear();
-  const auto first = partners.of(pair.a), second = partners.of(pair.b);
-  std::set_union(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(third_));
-  std::erase_if(third_, [&](std::uint32_t c) { return c == pair.a || c == pair.b; });
+  find_thirds(pair, partners, boxes, overlap);
 
   if (convex) {
     starts_.hill.assign(seeds.begin(), seeds.end());

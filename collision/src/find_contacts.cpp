@@ -149,53 +149,74 @@ std::optional<Between> between_cores(const ContactBody& a, const ContactBody& b)
 
 }  // namespace
 
-std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes) {
+std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor) {
   const Strips strips(boxes);
   const int axis = strips.sweep;
-  std::vector<std::uint32_t> order;
-  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
-    if (!boxes[i].empty()) order.push_back(i);
-  }
-  std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
-    return boxes[i].lower[axis] != boxes[j].lower[axis] ? boxes[i].lower[axis] < boxes[j].lower[axis] : i < j;
-  });
-  constexpr std::uint32_t kWide = 8;  // strips; wider boxes are few and kept in a list of their own
-  struct Range {
-    std::uint32_t first, last;
+  constexpr std::uint32_t kWide = 8;  // strips; wider boxes are few and meet all others
+  struct Entry {
+    Box box;
+    std::uint32_t id, first, last;  // strips
     [[nodiscard]] bool wide() const { return last - first >= kWide; }
   };
-  const auto range_of = [&](std::uint32_t i) {
-    return Range{strips.of(boxes[i].lower[strips.across]), strips.of(boxes[i].upper[strips.across])};
-  };
-  std::vector<BodyPair> pairs;
-  std::vector<std::vector<std::uint32_t>> open(strips.count);  // boxes that reach the sweep position, by strip
-  std::vector<std::uint32_t> wide;
-  for (const std::uint32_t i : order) {
-    const Range mine = range_of(i);
-    const auto meet = [&](std::vector<std::uint32_t>& others, const auto& here) {
-      std::erase_if(others, [&](std::uint32_t j) { return boxes[j].upper[axis] < boxes[i].lower[axis]; });
-      for (const std::uint32_t j : others) {
-        if (boxes[i].overlaps(boxes[j]) && here(j)) pairs.push_back({std::min(i, j), std::max(i, j)});
-      }
-    };
-    meet(wide, [](std::uint32_t) { return true; });
-    for (std::uint32_t strip = mine.first; strip <= mine.last; ++strip) {
-      // Two that share several strips meet in the first of them.
-      meet(open[strip], [&](std::uint32_t j) { return strip == std::max(mine.first, range_of(j).first); });
-      if (!mine.wide()) open[strip].push_back(i);
-    }
-    if (mine.wide()) wide.push_back(i);
+  std::vector<Entry> entry;
+  entry.reserve(boxes.size());
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
+    if (boxes[i].empty()) continue;
+    entry.push_back({boxes[i], i, strips.of(boxes[i].lower[strips.across]), strips.of(boxes[i].upper[strips.across])});
   }
-  std::sort(pairs.begin(), pairs.end());
+  std::sort(entry.begin(), entry.end(), [axis](const Entry& x, const Entry& y) {
+    return x.box.lower[axis] != y.box.lower[axis] ? x.box.lower[axis] < y.box.lower[axis] : x.id < y.id;
+  });
+  std::vector<std::vector<Entry>> members(strips.count);  // of each strip, in the order of the sweep
+  std::vector<Entry> wide;
+  for (const Entry& e : entry) {
+    if (e.wide()) {
+      wide.push_back(e);
+    } else {
+      for (std::uint32_t strip = e.first; strip <= e.last; ++strip) members[strip].push_back(e);
+    }
+  }
+  const auto join = [](const Entry& x, const Entry& y, std::vector<BodyPair>& out) {
+    if (x.box.overlaps(y.box)) out.push_back({std::min(x.id, y.id), std::max(x.id, y.id)});
+  };
+  std::vector<std::vector<BodyPair>> found(strips.count + 1);  // by strip; those of wide boxes
+  executor.for_blocks(strips.count, 1, [&](std::size_t strip, std::size_t) {
+    const std::vector<Entry>& here = members[strip];
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      for (std::size_t j = i + 1; j < here.size() && here[j].box.lower[axis] <= here[i].box.upper[axis]; ++j) {
+        // Two that share several strips meet in the first of them.
+        if (strip == std::max(here[i].first, here[j].first)) join(here[i], here[j], found[strip]);
+      }
+    }
+  });
+  for (std::size_t i = 0; i < wide.size(); ++i) {
+    for (std::size_t j = i + 1; j < wide.size(); ++j) join(wide[i], wide[j], found.back());
+    for (const Entry& e : entry) {
+      if (!e.wide()) join(wide[i], e, found.back());
+    }
+  }
+  // In order: by the first body through counts, by the second within its few.
+  std::vector<std::uint32_t> offset(boxes.size() + 2, 0);
+  for (const auto& some : found) {
+    for (const BodyPair& pair : some) ++offset[pair.a + 2];
+  }
+  for (std::size_t i = 2; i < offset.size(); ++i) offset[i] += offset[i - 1];
+  std::vector<BodyPair> pairs(offset.back());
+  for (const auto& some : found) {
+    for (const BodyPair& pair : some) pairs[offset[pair.a + 1]++] = pair;
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    std::sort(pairs.begin() + offset[i], pairs.begin() + offset[i + 1]);
+  }
   return pairs;
 }
 
-std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
+std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules, const Executor& executor,
                                   std::uint64_t* present) {
   std::vector<Box> box;
   box.reserve(bodies.size());
   for (const ContactBody& body : bodies) box.push_back(body.field ? body.field.surface_box() : Box{});
-  std::vector<BodyPair> pairs = overlapping_boxes(box);
+  std::vector<BodyPair> pairs = overlapping_boxes(box, executor);
   std::erase_if(pairs, [&](const BodyPair& pair) { return !allowed(bodies, rules, pair.a, pair.b); });
   if (present != nullptr) *present = count_allowed(bodies, rules);
   return pairs;

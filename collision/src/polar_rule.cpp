@@ -61,20 +61,22 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   done_.assign(n, 0);
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
+  const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
+  const double thickness = frame_.thickness;
   std::size_t open = n;
   rim_error_ = 0.0;
   for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
     for (std::size_t k = 0; k < n; ++k) {
-      const Vec3 e = direction(rays.cosine[k], rays.sine[k]);
-      rim_batch_.point[k] = frame_.origin + rays.radius[k] * e + rays.height[k] * frame_.axis;
+      const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
+      rim_batch_.point[k] = origin + rays.radius[k] * e + rays.height[k] * axis;
     }
     pressure.evaluate(rim_batch_);
     for (std::size_t k = 0; k < n; ++k) {
       if (done_[k] != 0) continue;
-      const Vec3 e = direction(rays.cosine[k], rays.sine[k]);
+      const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
       const Vec3 &ga = rim_batch_.slope_a[k], &gb = rim_batch_.slope_b[k];
       const double a = rim_batch_.a[k], b = rim_batch_.b[k];
-      const double ar = ga.dot(e), at = ga.dot(frame_.axis), br = gb.dot(e), bt = gb.dot(frame_.axis);
+      const double ar = ga.dot(e), at = ga.dot(axis), br = gb.dot(e), bt = gb.dot(axis);
       // p where the line along the axis meets Sigma, and its slope along rho on Sigma, to first order.
       const double rate = bt - at;
       if (!(rate > kLeastCosine * (gb - ga).norm())) return false;
@@ -91,7 +93,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       }
       const double step = next - radius;
       const double lift = ((a - b) + (ar - br) * step) / rate;
-      const bool settled = std::abs(lift) <= enough * std::max(frame_.thickness, std::abs(rays.height[k]));
+      const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
       if (near && settled) {
         // Both bodies must fall away from the axis beyond the rim, or their squeezed regions reach over it.
         if (!(-at > kLeastOverhang * ga.norm()) || !(bt > kLeastOverhang * gb.norm())) return false;
@@ -138,8 +140,9 @@ bool PolarRuleSolver::solve_heights(PairPressure& pressure, double error) {
   const std::size_t n = node_.size();
   const double round_off = 4.0 * kEpsilon * pressure.largest_modulus();
   const double enough = std::max(round_off, std::min(1e-11 * pressure.largest_modulus(), 1e-3 * error * frame_.peak));
+  const Vec3 axis = frame_.axis;
   for (int iteration = 0; iteration < kHeightSteps; ++iteration) {
-    for (std::size_t i = 0; i < n; ++i) node_.point[i] = foot_[i] + height_[i] * frame_.axis;
+    for (std::size_t i = 0; i < n; ++i) node_.point[i] = foot_[i] + height_[i] * axis;
     pressure.evaluate(node_);
     residual_ = 0.0;
     bool moved = false;
@@ -147,7 +150,7 @@ bool PolarRuleSolver::solve_heights(PairPressure& pressure, double error) {
       const double gap = node_.a[i] - node_.b[i];
       residual_ = std::max(residual_, std::abs(gap));
       if (std::abs(gap) <= enough) continue;
-      const double rate = (node_.slope_b[i] - node_.slope_a[i]).dot(frame_.axis);
+      const double rate = (node_.slope_b[i] - node_.slope_a[i]).dot(axis);
       if (!(rate > 0.0)) return false;
       const double step = gap / rate;
       // A step below the round-off of the coordinates cannot help.
@@ -166,22 +169,31 @@ bool PolarRuleSolver::integrate() {
   area_.resize(n);
   normal_.resize(n);
   pressure_.resize(n);
-  fine_ = {};
-  lift_ = 0.0;
+  // Copies of what is read and added to, which stay in registers.
+  const Vec3 origin = frame_.origin, axis = frame_.axis;
+  const double residual = residual_;
+  PatchSums sums;
+  double lift = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 across = node_.slope_b[i] - node_.slope_a[i];
-    normal_[i] = across / across.norm();
-    const double cosine = normal_[i].dot(frame_.axis);
+    const Vec3 &slope_a = node_.slope_a[i], &slope_b = node_.slope_b[i];
+    const double a = node_.a[i], b = node_.b[i];
+    const Vec3 across = slope_b - slope_a;
+    const Vec3 normal = across / across.norm();
+    const double cosine = normal.dot(axis);
     // On Sigma to first order: the round-off of a steep body counts little.
-    const double fall = -node_.slope_a[i].dot(frame_.axis), rise = node_.slope_b[i].dot(frame_.axis);
-    const double p = (node_.a[i] * rise + node_.b[i] * fall) / (rise + fall);
-    lift_ = std::max(lift_, std::abs(node_.a[i] - node_.b[i]) / (rise + fall));
-    if (!(cosine > kLeastCosine) || !(p > -residual_)) return false;
-    area_[i] = weight_[i] / cosine;
-    pressure_[i] = std::max(p, 0.0);
-    fine_.add(node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
+    const double fall = -slope_a.dot(axis), rise = slope_b.dot(axis);
+    const double p = (a * rise + b * fall) / (rise + fall);
+    lift = std::max(lift, std::abs(a - b) / (rise + fall));
+    if (!(cosine > kLeastCosine) || !(p > -residual)) return false;
+    const double area = weight_[i] / cosine, pressure = std::max(p, 0.0);
+    normal_[i] = normal;
+    area_[i] = area;
+    pressure_[i] = pressure;
+    sums.add(node_.point[i] - origin, normal, area, pressure);
   }
-  return fine_.load > 0.0;
+  fine_ = sums;
+  lift_ = lift;
+  return sums.load > 0.0;
 }
 
 /// Distance from Sigma, along +axis for A and -axis for B, to where the body's pressure vanishes; the last entry is the
@@ -278,7 +290,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     if (!solve_heights(pressure, error)) return false;
     coarse_ = fine_;
     if (!integrate()) return false;
-    if (r == first) find_kinks(pressure);
+    if (r == first && error < kSplitBelow) find_kinks(pressure);
     if (!parted && error < kSplitBelow && kinks_cross()) {
       parted = true;
       if (solve_split(pressure, settings)) {
@@ -319,6 +331,17 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::arra
   return true;
 }
 
+void PolarRuleSolver::cover(PolarCover& out) const {
+  out.frame = frame_;
+  out.radius = rim_.radius;
+  out.height = rim_.height;
+  out.thickness = thickness_;
+  out.rim.resize(rim_.size());
+  for (std::size_t k = 0; k < rim_.size(); ++k) {
+    out.rim[k] = frame_.origin + rim_.radius[k] * direction(rim_.cosine[k], rim_.sine[k]) + rim_.height[k] * frame_.axis;
+  }
+}
+
 bool PolarCover::contains(const Vec3& x, double slack) const {
   const Vec3 d = x - frame.origin;
   const double c = d.dot(frame.u) / frame.u.squaredNorm(), s = d.dot(frame.v) / frame.v.squaredNorm();
@@ -329,15 +352,10 @@ bool PolarCover::contains(const Vec3& x, double slack) const {
   const double at = turn * n;
   const double below = std::floor(at), share = at - below;
   const std::size_t k = static_cast<std::size_t>(below) % radius.size(), next = (k + 1) % radius.size();
-  const double rim = (1.0 - share) * radius[k] + share * radius[next];
-  if (rho > (1.0 + slack) * rim) return false;
+  const double reach = (1.0 - share) * radius[k] + share * radius[next];
+  if (rho > (1.0 + slack) * reach) return false;
   const double rise = (1.0 - share) * height[k] + share * height[next];
-  return std::abs(d.dot(frame.axis) - rise * (rho / rim) * (rho / rim)) <= 2.0 * thickness + 0.5 * std::abs(rise);
-}
-
-Vec3 PolarCover::rim_point(std::size_t k) const {
-  const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(radius.size()));
-  return frame.origin + radius[k] * (c * frame.u + s * frame.v) + height[k] * frame.axis;
+  return std::abs(d.dot(frame.axis) - rise * (rho / reach) * (rho / reach)) <= 2.0 * thickness + 0.5 * std::abs(rise);
 }
 
 }  // namespace supple::collision

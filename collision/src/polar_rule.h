@@ -17,6 +17,16 @@
 
 namespace supple::collision {
 
+/// The ground that a polar patch covers.
+struct PolarCover {
+  PeakFrame frame;
+  std::vector<double> radius, height;  ///< of the rim, by equally spaced angles
+  std::vector<Vec3> rim;               ///< its points
+  double thickness = 0.0;
+  /// Whether x lies over the patch, near Sigma. @param slack  share of the radius that a point may lie outside
+  [[nodiscard]] bool contains(const Vec3& x, double slack) const;
+};
+
 class PolarRuleSolver {
  public:
   /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
@@ -31,6 +41,7 @@ class PolarRuleSolver {
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] std::uint32_t kinks() const noexcept { return parted_; }  ///< that the patch was parted at
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< of the overlap through the peak [m]
+  void cover(PolarCover& out) const;                                      ///< of the last solve
 
  private:
   /// Directions from the peak, and where the rim is met on them.
@@ -107,21 +118,6 @@ class PolarRuleSolver {
   PressureBatch kept_;
   std::vector<double> kept_weight_, kept_area_, kept_pressure_;
   std::vector<Vec3> kept_normal_;
-
- public:
-  /// The rim of the last solve: its radius by angle (equally spaced), and its world points.
-  [[nodiscard]] const std::vector<double>& rim_radius() const noexcept { return rim_.radius; }
-  [[nodiscard]] const std::vector<double>& rim_height() const noexcept { return rim_.height; }
-};
-
-/// The ground that a polar patch covers.
-struct PolarCover {
-  PeakFrame frame;
-  std::vector<double> radius, height;  ///< of the rim, by angle
-  double thickness = 0.0;
-  /// Whether x lies over the patch, near Sigma. @param slack  share of the radius that a point may lie outside
-  [[nodiscard]] bool contains(const Vec3& x, double slack) const;
-  [[nodiscard]] Vec3 rim_point(std::size_t k) const;
 };
 
 }  // namespace supple::collision

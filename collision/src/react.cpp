@@ -34,15 +34,18 @@ class Side {
       for (std::size_t i = 0; i < points.size(); ++i) normalise_row(i);
       return;
     }
-    velocity_ = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[0];
+    drift_ = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[0];
     spin_ = body.velocity.empty() || body.angular_velocity.empty() ? Vec3::Zero().eval() : body.angular_velocity[0];
-    velocity_ -= spin_.cross(body.pose[0].position);
+    drift_ -= spin_.cross(body.pose[0].position);
   }
   [[nodiscard]] bool single() const { return body_->pose.size() == 1; }
+  /// Of the only part: its velocity as it would be at the world origin, and its spin.
+  [[nodiscard]] const Vec3& drift() const { return drift_; }
+  [[nodiscard]] const Vec3& spin() const { return spin_; }
 
   /// Contribution-weighted velocity sum lambda_k (v_k + omega_k x (x - x_k)).
   [[nodiscard]] Vec3 velocity(std::size_t i, const Vec3& x) const {
-    if (single()) return velocity_ + spin_.cross(x);
+    if (single()) return drift_ + spin_.cross(x);
     if (body_->velocity.empty()) return Vec3::Zero();
     Vec3 sum = Vec3::Zero();
     for_parts(i, [&](std::size_t k, double lambda) {
@@ -119,16 +122,10 @@ class Side {
 
   [[nodiscard]] double sign() const noexcept { return sign_; }
 
-  void add_to(PartLoads& loads) const {
-    for (std::size_t k = 0; k < force_.size(); ++k) {
-      loads.force[k] += force_[k];
-      loads.torque[k] += torque_[k];
-    }
-  }
-
-  /// Adds what was gathered and starts again from zero.
+  /// Hands over what was gathered and starts again from zero.
   void move_to(PartLoads& loads) {
-    add_to(loads);
+    loads.force.assign(force_.begin(), force_.end());
+    loads.torque.assign(torque_.begin(), torque_.end());
     std::fill(force_.begin(), force_.end(), Vec3::Zero());
     std::fill(torque_.begin(), torque_.end(), Vec3::Zero());
   }
@@ -149,7 +146,7 @@ class Side {
 
   const ContactBody* body_ = nullptr;
   double sign_ = 0.0;
-  Vec3 velocity_ = Vec3::Zero();  // of the only part, at the world origin
+  Vec3 drift_ = Vec3::Zero();
   Vec3 spin_ = Vec3::Zero();
   implicit::FieldParts rows_, volume_rows_;
   std::vector<Vec3> own_point_;
@@ -203,102 +200,179 @@ double friction_mollifier(double speed, double regularisation) noexcept {
   return y * (2.0 - y);
 }
 
+namespace {
+
+/// What one pair does to its bodies, A and B; reused.
+struct PairReaction {
+  PartLoads elastic[2], dissipative[2];
+  Vec3 traction = Vec3::Zero();  ///< all of it, as a force on A
+  double power = 0.0;            ///< that damping, friction and springs take [W]
+  bool touches = false;          ///< false: no points, and nothing else here counts
+};
+
+/// Relative velocity of two bodies where one point of both is; bodies of one part move alike everywhere.
+class Slip {
+ public:
+  explicit Slip(const Side (&sides)[2]) : sides_(sides), rigid_(sides[0].single() && sides[1].single()) {
+    if (!rigid_) return;
+    drift_ = sides[0].drift() - sides[1].drift();
+    spin_ = sides[0].spin() - sides[1].spin();
+  }
+  [[nodiscard]] Vec3 at(std::size_t i, const Vec3& x) const {
+    if (rigid_) return drift_ + spin_.cross(x);
+    return sides_[0].velocity(i, x) - sides_[1].velocity(i, x);
+  }
+
+ private:
+  const Side (&sides_)[2];
+  bool rigid_;
+  Vec3 drift_ = Vec3::Zero(), spin_ = Vec3::Zero();
+};
+
+/// The reaction of pair k, whose points and squeezed regions are the given ranges of the surface.
+void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
+                const ReactionSettings& settings, const StickState* sticks, std::uint32_t k, const Range& points,
+                const Range& volume, PairReaction& out) {
+  thread_local Side sides[2];
+  thread_local std::vector<double> load_buffer;
+  const ContactSurface::Summary& summary = surface.summary[k];
+  const std::size_t n = points.end - points.begin;
+  out.touches = n > 0;
+  out.power = 0.0;
+  if (!out.touches) return;
+  const BodyPair pair = summary.bodies;
+  const std::uint32_t body_of[2] = {pair.a, pair.b};
+  const std::span<const Vec3> x = std::span(surface.point).subspan(points.begin, n);
+  const std::span<const Vec3> normal = std::span(surface.normal).subspan(points.begin, n);
+  for (const int s : {0, 1}) sides[s].begin(bodies[body_of[s]], s, x);
+
+  // The elastic force of Sigma: both bodies take it from the same sums, so that they cancel exactly.
+  load_buffer.resize(n);
+  const std::span<double> load = load_buffer;
+  const std::span<const double> area = std::span(surface.area).subspan(points.begin, n);
+  const std::span<const double> pressure = std::span(surface.pressure).subspan(points.begin, n);
+  const Vec3 centre = summary.centre_of_pressure;
+  Vec3 push = Vec3::Zero(), twist = Vec3::Zero();  // integral of p N dA and of (x - centre) x p N dA
+  for (std::size_t i = 0; i < n; ++i) {
+    load[i] = area[i] * pressure[i];
+    const Vec3 f = load[i] * normal[i];
+    push += f;
+    twist += (x[i] - centre).cross(f);
+  }
+  const std::size_t volumes = volume.end - volume.begin;
+  for (Side& side : sides) {
+    if (settings.split == SplitRule::Energy) {
+      side.add_by_energy(std::span(surface.volume_point).subspan(volume.begin, volumes),
+                         std::span(surface.volume_weight).subspan(volume.begin, volumes),
+                         std::span(surface.volume_side).subspan(volume.begin, volumes),
+                         side.sign() < 0.0 ? std::uint8_t{0} : std::uint8_t{1}, load, centre, side.sign() * push,
+                         side.sign() * twist);
+    } else {
+      if (side.single()) {
+        side.add_whole(side.sign() * push, side.sign() * twist, centre);
+        continue;
+      }
+      for (std::size_t i = 0; i < n; ++i) side.add_by_contribution(i, x[i], side.sign() * load[i] * normal[i]);
+    }
+  }
+  for (const int s : {0, 1}) sides[s].move_to(out.elastic[s]);
+
+  const PairMaterial material = material_of(bodies, rules, pair);
+  Vec3 dissipative = Vec3::Zero(), dissipative_twist = Vec3::Zero(), spring_force = Vec3::Zero();
+  const bool springs = settings.stick.stiffness > 0.0;
+  const bool rubs = material.friction > 0.0 && !springs;
+  if (rubs || material.dissipation > 0.0) {
+    const Slip slip(sides);
+    double power = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3 v = slip.at(i, x[i]);
+      const double approach = v.dot(normal[i]);
+      const Vec3 slide = v - approach * normal[i];
+      const double speed = slide.norm();
+      const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
+      Vec3 f = -load[i] * (factor - 1.0) * normal[i];
+      if (speed > 0.0 && rubs) {
+        const double grip = friction_mollifier(speed, settings.friction_speed) / speed;
+        f -= (material.friction * load[i] * factor * grip) * slide;
+      }
+      if (!sides[0].single()) sides[0].add_by_contribution(i, x[i], f);
+      if (!sides[1].single()) sides[1].add_by_contribution(i, x[i], -f);
+      power -= f.dot(v);
+      dissipative += f;
+      dissipative_twist += (x[i] - centre).cross(f);
+    }
+    out.power = power;
+  }
+  const StickSpring* spring = springs && sticks != nullptr && material.friction > 0.0 ? sticks->find(pair) : nullptr;
+  if (spring != nullptr) {
+    const SpringLoad hold = hold_by_spring(*spring, bodies[pair.a], bodies[pair.b], settings, material.friction, push, centre, x,
+                                           area, pressure);
+    for (const int s : {0, 1}) sides[s].add_to_part(spring->part[s], hold.point, -sides[s].sign() * hold.force, -sides[s].sign() * hold.couple);
+    out.power += hold.power;
+    spring_force = hold.force;
+  }
+  for (const int s : {0, 1}) {
+    const double sign = -sides[s].sign();
+    if (sides[s].single()) sides[s].add_whole(sign * dissipative, sign * dissipative_twist, centre);
+    sides[s].move_to(out.dissipative[s]);
+  }
+  out.traction = dissipative + spring_force - push;
+}
+
+void add_loads(const PartLoads& from, PartLoads& to) {
+  for (std::size_t k = 0; k < from.force.size(); ++k) {
+    to.force[k] += from.force[k];
+    to.torque[k] += from.torque[k];
+  }
+}
+
+}  // namespace
+
 ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
-                     const ReactionSettings& settings, std::span<PartLoads> loads,
+                     const ReactionSettings& settings, const Executor& executor, std::span<PartLoads> loads,
                      std::vector<Vec3>* traction_force, std::span<PartLoads> dissipative_loads,
                      std::vector<double>* pair_power, const StickState* sticks) {
   SUPPLE_EXPECTS(loads.size() == bodies.size());
   SUPPLE_EXPECTS(dissipative_loads.empty() || dissipative_loads.size() == bodies.size());
   SUPPLE_EXPECTS(settings.friction_speed > 0.0);
-  thread_local Side sides[2];
-  thread_local std::vector<double> load;
+  const std::size_t pairs = surface.summary.size();
+  if (traction_force != nullptr) traction_force->assign(pairs, Vec3::Zero());
+  if (pair_power != nullptr) pair_power->assign(pairs, 0.0);
+  // In portions, so that what a pair leaves behind is added up while it is still near.
+  constexpr std::size_t kPortion = 1024, kBlock = 16;
+  thread_local std::vector<PairReaction> reactions;
+  if (reactions.size() < std::min(pairs, kPortion)) reactions.resize(std::min(pairs, kPortion));
+  std::vector<PairReaction>& slots = reactions;  // of the calling thread, whoever fills them
   ReactionReport report;
-  if (traction_force != nullptr) traction_force->assign(surface.summary.size(), Vec3::Zero());
-  if (pair_power != nullptr) pair_power->assign(surface.summary.size(), 0.0);
-  std::size_t point_begin = 0, volume_begin = 0;
-  for (std::uint32_t k = 0; k < surface.summary.size(); ++k) {
-    const ContactSurface::Summary& summary = surface.summary[k];
-    const Range points = advance_range(surface.pair, point_begin, k);
-    const Range volume = advance_range(surface.volume_pair, volume_begin, k);
-    point_begin = points.end;
-    volume_begin = volume.end;
-    const std::size_t n = points.end - points.begin;
-    if (n == 0) continue;
-    const BodyPair pair = summary.bodies;
-    const std::uint32_t body_of[2] = {pair.a, pair.b};
-    const std::span<const Vec3> x = std::span(surface.point).subspan(points.begin, n);
-    const std::span<const Vec3> normal = std::span(surface.normal).subspan(points.begin, n);
-    for (const int s : {0, 1}) sides[s].begin(bodies[body_of[s]], s, x);
-
-    // The elastic force of Sigma: both bodies take it from the same sums, so that they cancel exactly.
-    load.resize(n);
-    const Vec3 centre = summary.centre_of_pressure;
-    Vec3 push = Vec3::Zero(), twist = Vec3::Zero();  // integral of p N dA and of (x - centre) x p N dA
-    for (std::size_t i = 0; i < n; ++i) {
-      load[i] = surface.area[points.begin + i] * surface.pressure[points.begin + i];
-      const Vec3 f = load[i] * normal[i];
-      push += f;
-      twist += (x[i] - centre).cross(f);
-    }
-    const std::size_t volumes = volume.end - volume.begin;
-    for (Side& side : sides) {
-      if (settings.split == SplitRule::Energy) {
-        side.add_by_energy(std::span(surface.volume_point).subspan(volume.begin, volumes),
-                           std::span(surface.volume_weight).subspan(volume.begin, volumes),
-                           std::span(surface.volume_side).subspan(volume.begin, volumes),
-                           side.sign() < 0.0 ? std::uint8_t{0} : std::uint8_t{1}, load, centre, side.sign() * push,
-                           side.sign() * twist);
-      } else {
-        if (side.single()) {
-          side.add_whole(side.sign() * push, side.sign() * twist, centre);
-          continue;
-        }
-        for (std::size_t i = 0; i < n; ++i) side.add_by_contribution(i, x[i], side.sign() * load[i] * normal[i]);
+  for (std::size_t first = 0; first < pairs; first += kPortion) {
+    const std::size_t count = std::min(kPortion, pairs - first);
+    executor.for_blocks(count, kBlock, [&, first](std::size_t begin, std::size_t end) {
+      const auto first_of = [&](const std::vector<std::uint32_t>& pair) {
+        return static_cast<std::size_t>(std::lower_bound(pair.begin(), pair.end(), first + begin) - pair.begin());
+      };
+      Range points{0, first_of(surface.pair)}, volume{0, first_of(surface.volume_pair)};
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto k = static_cast<std::uint32_t>(first + i);
+        points = advance_range(surface.pair, points.end, k);
+        volume = advance_range(surface.volume_pair, volume.end, k);
+        react_pair(bodies, rules, surface, settings, sticks, k, points, volume, slots[i]);
       }
-    }
-
-    for (const int s : {0, 1}) sides[s].move_to(loads[body_of[s]]);
-    const PairMaterial material = material_of(bodies, rules, pair);
-    Vec3 dissipative = Vec3::Zero(), dissipative_twist = Vec3::Zero(), spring_force = Vec3::Zero();
-    const double power_before = report.dissipated_power;
-    const bool springs = settings.stick.stiffness > 0.0;
-    if (material.friction > 0.0 || material.dissipation > 0.0) {
-      for (std::size_t i = 0; i < n && (!springs || material.dissipation > 0.0); ++i) {
-        const Vec3 v = sides[0].velocity(i, x[i]) - sides[1].velocity(i, x[i]);
-        const double approach = v.dot(normal[i]);
-        const Vec3 slide = v - approach * normal[i];
-        const double speed = slide.norm();
-        const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
-        Vec3 f = -load[i] * (factor - 1.0) * normal[i];
-        if (speed > 0.0 && !springs) {
-          const double grip = friction_mollifier(speed, settings.friction_speed) / speed;
-          f -= (material.friction * load[i] * factor * grip) * slide;
-        }
-        if (!sides[0].single()) sides[0].add_by_contribution(i, x[i], f);
-        if (!sides[1].single()) sides[1].add_by_contribution(i, x[i], -f);
-        report.dissipated_power -= f.dot(v);
-        dissipative += f;
-        dissipative_twist += (x[i] - centre).cross(f);
-      }
-      const StickSpring* spring = springs && sticks != nullptr && material.friction > 0.0 ? sticks->find(pair) : nullptr;
-      if (spring != nullptr) {
-        const SpringLoad hold = hold_by_spring(*spring, bodies[pair.a], bodies[pair.b], settings, material.friction, push, centre, x,
-                                               std::span(surface.area).subspan(points.begin, n),
-                                               std::span(surface.pressure).subspan(points.begin, n));
-        for (const int s : {0, 1}) sides[s].add_to_part(spring->part[s], hold.point, -sides[s].sign() * hold.force, -sides[s].sign() * hold.couple);
-        report.dissipated_power += hold.power;
-        spring_force = hold.force;
-      }
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      const PairReaction& reaction = slots[i];
+      if (!reaction.touches) continue;
+      const ContactSurface::Summary& summary = surface.summary[first + i];
+      const std::uint32_t body_of[2] = {summary.bodies.a, summary.bodies.b};
       for (const int s : {0, 1}) {
-        const double sign = -sides[s].sign();
-        if (sides[s].single()) sides[s].add_whole(sign * dissipative, sign * dissipative_twist, centre);
-        if (!dissipative_loads.empty()) sides[s].add_to(dissipative_loads[body_of[s]]);
-        sides[s].move_to(loads[body_of[s]]);
+        add_loads(reaction.elastic[s], loads[body_of[s]]);
+        add_loads(reaction.dissipative[s], loads[body_of[s]]);
+        if (!dissipative_loads.empty()) add_loads(reaction.dissipative[s], dissipative_loads[body_of[s]]);
       }
+      report.energy += summary.energy;
+      report.dissipated_power += reaction.power;
+      if (pair_power != nullptr) (*pair_power)[first + i] = reaction.power;
+      if (traction_force != nullptr) (*traction_force)[first + i] = reaction.traction;
     }
-    if (pair_power != nullptr) (*pair_power)[k] = report.dissipated_power - power_before;
-    if (traction_force != nullptr) (*traction_force)[k] = dissipative + spring_force - push;
-    report.energy += summary.energy;
   }
   return report;
 }

@@ -18,6 +18,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kTimedEvery = 64;
+constexpr std::size_t kBodyBlock = 16;
 
 Box box_of(const implicit::PlacedSkeleton& placed) {
   Box box;
@@ -142,7 +143,7 @@ void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& 
     body.fixed = true;
     const Box box = body.field.surface_box();
     if (box.lower.allFinite() && box.upper.allFinite()) body.core_value = body.field.value(box.centre());
-    frame.reach[first + k] = box;
+    frame.reach[first + k] = frame.surface_box[first + k] = box;
     frame.convex[first + k] = body.field.core_point(Vec3::Zero()) ? 1 : 0;
   }
 }
@@ -155,6 +156,18 @@ void for_awake(const StageContext& context, const Use& use) {
     const std::size_t i = context.awake != nullptr ? (*context.awake)[k] : k;
     if (collides(context, context.bodies[i])) use(i);
   }
+}
+
+/// The same from several threads; bodies share nothing there.
+template <class Use>
+void for_awake_at_once(const StageContext& context, const Use& use) {
+  const std::size_t count = context.awake != nullptr ? context.awake->size() : context.bodies.size();
+  context.executor.for_blocks(count, kBodyBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t i = context.awake != nullptr ? (*context.awake)[k] : k;
+      if (collides(context, context.bodies[i])) use(i);
+    }
+  });
 }
 
 /// Bodies that rest are placed when they have fallen asleep, and stay.
@@ -174,7 +187,7 @@ void place_resting(const StageContext& context, const core::ParticleState& parti
 void find_reaching(const StageContext& context, Frame& frame) {
   const std::size_t moving = context.bodies.size();
   if (frame.resting.empty()) {
-    frame.reaching = collision::overlapping_boxes(frame.reach);
+    frame.reaching = collision::overlapping_boxes(frame.reach, context.executor);
   } else {
     std::vector<std::uint32_t> number;  // of the boxes in the sweep
     std::vector<Box> boxes;
@@ -185,7 +198,7 @@ void find_reaching(const StageContext& context, Frame& frame) {
     for_awake(context, add);
     const std::size_t awake = number.size();
     for (std::size_t i = moving; i < frame.reach.size(); ++i) add(i);
-    frame.reaching = collision::overlapping_boxes(boxes);
+    frame.reaching = collision::overlapping_boxes(boxes, context.executor);
     for (collision::BodyPair& pair : frame.reaching) pair = {number[pair.a], number[pair.b]};
     std::vector<std::uint32_t> found;
     for (std::size_t k = 0; k < awake; ++k) {
@@ -241,6 +254,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
       spin(all.size()),
       placed(all.size()),
       reach(all.size() + model.fixed.size()),
+      surface_box(reach.size()),
       field(all.size()),
       indexed(all.size(), 0),
       mesher(all.size()),
@@ -314,10 +328,8 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
     view_fixed_bodies(model, context.time, false, frame);
     place_resting(context, particles, frame);
-    for_awake(context, [&](std::size_t i) {
-      place(context, particles, i, frame);
-      profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size();
-    });
+    for_awake_at_once(context, [&](std::size_t i) { place(context, particles, i, frame); });
+    for_awake(context, [&](std::size_t i) { profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size(); });
     profile(Stage::PlaceSkeleton).present += frame.primitives_present;
     flag_active_parts(context, frame);
   }
@@ -327,14 +339,19 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     StageTimer timer(profile(Stage::IndexField), context.every_call);
     const auto index_one = [&](std::size_t i) {
       index(context, i, frame);
+      frame.surface_box[i] = frame.field[i].surface_box();
       view_body(context, particles, i, frame);
-      ++profile(Stage::IndexField).visited;
     };
+    std::uint64_t& visited = profile(Stage::IndexField).visited;
     profile(Stage::IndexField).present += frame.bodies_present;
     if (!context.skip) {
-      for_awake(context, index_one);
+      for_awake_at_once(context, index_one);
+      for_awake(context, [&](std::size_t) { ++visited; });
     } else {
-      for (const std::uint32_t i : frame.reached) index_one(i);
+      context.executor.for_blocks(frame.reached.size(), kBodyBlock, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) index_one(frame.reached[k]);
+      });
+      visited += frame.reached.size();
       if (energy) for_awake(context, [&](std::size_t i) { view_body(context, particles, i, frame); });
     }
   }
@@ -361,7 +378,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     frame.pairs.clear();
     for (const collision::BodyPair& pair : frame.reaching) {
       if (!usable(pair.a) || !usable(pair.b)) continue;
-      if (frame.bodies[pair.a].field.surface_box().overlaps(frame.bodies[pair.b].field.surface_box())) frame.pairs.push_back(pair);
+      if (frame.surface_box[pair.a].overlaps(frame.surface_box[pair.b])) frame.pairs.push_back(pair);
     }
     if (!frame.pairs_present) frame.pairs_present = count_present_pairs(context);
     profile(Stage::FindContacts).present += *frame.pairs_present;
@@ -397,8 +414,8 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
       loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
     }
   }
-  frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, frame.loads,
-                                    &frame.traction_force, frame.dissipative, &frame.pair_power, context.sticks);
+  frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, context.executor,
+                                    frame.loads, &frame.traction_force, frame.dissipative, &frame.pair_power, context.sticks);
   const bool dissipates = frame.reaction.dissipated_power != 0.0 || model.reaction.stick.stiffness > 0.0;
   if (dissipates) out.dissipative.reset(model.particles.size());
   for (const std::uint32_t i : frame.pressed) {

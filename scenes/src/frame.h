@@ -37,6 +37,7 @@ struct Frame {
   std::vector<std::vector<Vec3>> spin;
   std::vector<implicit::PlacedSkeleton> placed;
   std::vector<Box> reach;                     ///< box of all supports; holds the surface box
+  std::vector<Box> surface_box;               ///< of the bodies that are reached, and of the fixed ones
   std::vector<implicit::Field> field;
   std::vector<std::uint8_t> indexed;          ///< 1: `field` belongs to this frame
   std::uint64_t primitives_present = 0;       ///< of all bodies

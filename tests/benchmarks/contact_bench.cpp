@@ -83,7 +83,7 @@ void measure(const std::string& name, const std::vector<collision::ContactBody>&
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
     const double start = cpu_microseconds();
     for (int i = 0; i < kInner; ++i) {
-      find_contacts(bodies, collision::broad_phase(bodies, {}), executor, candidates);
+      find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
       solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
     }
     best = std::min(best, (cpu_microseconds() - start) / kInner);

@@ -70,12 +70,15 @@ void measure(int count, bool sleeps) {
   const double memory = peak_mb();
   const auto& island = simulation.state().sleep.island;
   const auto asleep = std::count_if(island.begin(), island.end(), [](std::uint32_t i) { return i != collision::SleepState::kAwake; });
-  const std::size_t contacts = simulation.contacts().summary.size();
+  const auto& summary = simulation.contacts().summary;
+  const std::size_t contacts = summary.size();
+  const auto sampled = std::count_if(summary.begin(), summary.end(),
+                                     [](const auto& s) { return s.rule == collision::ContactRule::Samples; });
   double fastest = 0.0;
   for (const Vec3& v : simulation.state().particles.velocity) fastest = std::max(fastest, v.norm());
-  std::printf("{\"name\": \"collision/pile/balls=%zu%s\", \"cpu_ms_step_min\": %.4g, \"cpu_ms_step_mean\": %.4g, \"contacts\": %zu, "
+  std::printf("{\"name\": \"collision/pile/balls=%zu%s\", \"cpu_ms_step_min\": %.4g, \"cpu_ms_step_mean\": %.4g, \"contacts\": %zu, \"by_samples\": %td, "
               "\"cpu_us_contact\": %.3g, \"asleep\": %td, \"largest_speed\": %.2g, \"made_cpu_s\": %.3g, \"peak_mb\": %.0f, \"hash\": \"%s\"}\n",
-              simulation.bodies().size(), sleeps ? ",sleep" : "", 1e3 * least, 1e3 * all / kSteps, contacts,
+              simulation.bodies().size(), sleeps ? ",sleep" : "", 1e3 * least, 1e3 * all / kSteps, contacts, sampled,
               1e6 * least / static_cast<double>(std::max<std::size_t>(contacts, 1)), asleep, fastest, made, memory,
               to_hex(simulation.state_hash()).c_str());
   std::fflush(stdout);

@@ -34,7 +34,7 @@ struct Query {
     cpu_us = std::numeric_limits<double>::infinity();
     for (int i = 0; i < repeats; ++i) {
       const double start = cpu_microseconds();
-      find_contacts(bodies, collision::broad_phase(bodies, {}), executor, candidates);
+      find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
       solve_contact_surface(bodies, candidates, {.error = error, .only = rule}, executor, surface);
       cpu_us = std::min(cpu_us, cpu_microseconds() - start);
     }

@@ -86,7 +86,7 @@ Asked ask(std::span<const collision::ContactBody> bodies, const collision::Conta
   Asked asked;
   for (int i = 0; i < kRepeats; ++i) {
     const double start = cpu_microseconds();
-    find_contacts(bodies, collision::broad_phase(bodies, {}), executor, candidates);
+    find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
     solve_contact_surface(bodies, candidates, settings, executor, surface);
     asked.cpu_us = std::min(asked.cpu_us, cpu_microseconds() - start);
   }

@@ -203,17 +203,17 @@ class Stage {
 
   const ContactSurface& solve(const ContactSettings& settings = {}, int threads = 1) {
     const Executor executor(threads);
-    find_contacts(bodies_, broad_phase(bodies_, rules), executor, candidates);
+    find_contacts(bodies_, broad_phase(bodies_, rules, executor), executor, candidates);
     solve_contact_surface(bodies_, candidates, settings, executor, surface);
     return surface;
   }
-  std::vector<PartLoads> react(const ReactionSettings& settings = {}, ReactionReport* report = nullptr) {
+  std::vector<PartLoads> react(const ReactionSettings& settings = {}, ReactionReport* report = nullptr, int threads = 1) {
     std::vector<PartLoads> loads(bodies_.size());
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       loads[i].force.assign(bodies_[i].pose.size(), Vec3::Zero());
       loads[i].torque.assign(bodies_[i].pose.size(), Vec3::Zero());
     }
-    const ReactionReport result = collision::react(bodies_, rules, surface, settings, loads);
+    const ReactionReport result = collision::react(bodies_, rules, surface, settings, Executor(threads), loads);
     if (report != nullptr) *report = result;
     return loads;
   }

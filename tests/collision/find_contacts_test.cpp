@@ -19,6 +19,7 @@ double uniform(std::mt19937_64& engine, double low, double high) {
 
 TEST(OverlappingBoxes, AreThoseThatBruteForceFinds) {
   std::mt19937_64 engine(11);
+  const Executor one(1), three(3);
   constexpr double kFar = std::numeric_limits<double>::infinity();
   for (const double longest : {0.0, 0.05, 0.4, 3.0}) {     // points, small ones, middling ones, and some across everything
     for (const Vec3& spread : {Vec3(10, 4, 1), Vec3(1, 1, 1), Vec3(0, 0, 5), Vec3(0, 0, 0)}) {
@@ -38,10 +39,11 @@ TEST(OverlappingBoxes, AreThoseThatBruteForceFinds) {
           if (!boxes[a].empty() && !boxes[b].empty() && boxes[a].overlaps(boxes[b])) expected.push_back({a, b});
         }
       }
-      EXPECT_EQ(overlapping_boxes(boxes), expected) << longest << ' ' << spread.transpose();
+      EXPECT_EQ(overlapping_boxes(boxes, one), expected) << longest << ' ' << spread.transpose();
+      EXPECT_EQ(overlapping_boxes(boxes, three), expected) << longest << ' ' << spread.transpose();
     }
   }
-  EXPECT_TRUE(overlapping_boxes({}).empty());
+  EXPECT_TRUE(overlapping_boxes({}, one).empty());
 }
 
 TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
@@ -70,7 +72,7 @@ TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
     }
   }
   std::uint64_t present = 0;
-  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules, &present), expected);
+  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules, Executor(1), &present), expected);
   EXPECT_EQ(present, expected_present);
   EXPECT_GT(expected.size(), 50u);
 }
@@ -100,7 +102,7 @@ TEST(FindContacts, LeavesOutPairsWhoseSamplesAreFarFromTheOtherSurface) {
   stage.add(left).samples = &left_samples;
   stage.add(right).samples = &right_samples;
   stage.solve();
-  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules).size(), 1u);
+  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules, Executor(1)).size(), 1u);
   EXPECT_TRUE(stage.candidates.pair.empty());
 }
 
@@ -210,7 +212,7 @@ TEST(ConvexBodies, AreLeftOutWhenCertainlyApartAndKeptAtTheLeastOverlap) {
     stage.add(a.field, a.centre);
     stage.add(b.field, b.centre);
     stage.solve({.error = 1e-2});
-    ASSERT_EQ(broad_phase(stage.bodies(), {}).size(), 1u);
+    ASSERT_EQ(broad_phase(stage.bodies(), {}, Executor(1)).size(), 1u);
     EXPECT_EQ(stage.candidates.pair.size(), gap < 0.0 ? 1u : 0u) << gap;
     EXPECT_EQ(stage.surface.summary.size(), gap < 0.0 ? 1u : 0u) << gap;
   }

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <random>
 
 #include "bodies.h"
@@ -190,6 +191,40 @@ TEST(React, PressesHarderOnApproachAndNeverPulls) {
   for (const double speed : {-3.0, -1.0, 0.5, 2.0}) {  // > 0: approaching
     stage.velocity(0)[0] = Vec3(0, 0, -speed);
     EXPECT_NEAR(stage.react()[0].force[0].z(), rest * std::max(0.0, 1.0 + 0.5 * speed), 1e-9 * rest);
+  }
+}
+
+TEST(React, AddsUpThePairsOfEveryBodyWithTheSameBitsForAnyThreads) {
+  // A row of bodies of two parts, each on the next: more pairs than one block holds.
+  constexpr std::size_t kBodies = 60;
+  std::vector<std::unique_ptr<Blobs>> row;
+  Stage stage;
+  for (std::size_t i = 0; i < kBodies; ++i) {
+    const double x = 0.9 * static_cast<double>(i), y = 0.05 * static_cast<double>(i % 3);
+    row.push_back(std::make_unique<Blobs>(std::vector<Vec3>{Vec3(x, y, -0.2), Vec3(x, y, 0.2)}, 1.0));
+    stage.add(row.back()->field, row.back()->centre).material.friction = 0.3;
+    for (Vec3& v : stage.velocity(i)) v = Vec3(0.1, i % 2 == 0 ? 0.2 : -0.3, 0.0);
+  }
+  const ContactSurface& surface = stage.solve({.error = 1e-3});
+  ASSERT_EQ(surface.summary.size(), kBodies - 1);
+  ReactionReport one, three;
+  const auto loads = stage.react({}, &one, 1), again = stage.react({}, &three, 3);
+  EXPECT_EQ(one.dissipated_power, three.dissipated_power);
+  EXPECT_GT(one.dissipated_power, 0.0);
+  for (ContactBody& body : stage.bodies()) body.material.friction = 0.0;
+  const auto elastic = stage.react({}, nullptr, 3);
+  std::vector<Vec3> expected(kBodies, Vec3::Zero());
+  for (const auto& s : surface.summary) {
+    expected[s.bodies.a] += s.force;
+    expected[s.bodies.b] -= s.force;
+  }
+  const double size = surface.summary.front().force.norm();
+  for (std::size_t i = 0; i < kBodies; ++i) {
+    EXPECT_LT((elastic[i].force[0] + elastic[i].force[1] - expected[i]).norm(), 1e-13 * size) << i;
+    for (const std::size_t part : {std::size_t{0}, std::size_t{1}}) {
+      EXPECT_EQ(loads[i].force[part], again[i].force[part]) << i;
+      EXPECT_EQ(loads[i].torque[part], again[i].torque[part]) << i;
+    }
   }
 }
 

@@ -21,14 +21,14 @@ struct ContactCandidates {
 
 /// Pairs of boxes that overlap, by sweep and prune along the longest axis in strips across the next; sorted.
 /// Empty boxes overlap nothing.
-[[nodiscard]] std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes);
+[[nodiscard]] std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor);
 
 /// Pairs that the rules allow, touching or not; asks for each of them.
 [[nodiscard]] std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules);
 
 /// Pairs whose surface boxes overlap and that may touch, sorted.
 [[nodiscard]] std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
-                                                std::uint64_t* present = nullptr);
+                                                const Executor& executor, std::uint64_t* present = nullptr);
 
 /// Stage 5. Needs the samples of stage 4 for the bodies of the broad phase, but not of pairs of convex bodies. A sample is a seed when the other surface is,
 /// to first order, at most one sample spacing away. Pairs that have samples but no seed are left out, and convex ones whose

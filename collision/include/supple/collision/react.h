@@ -12,6 +12,7 @@
 #include "supple/collision/bodies.h"
 #include "supple/collision/contact_surface.h"
 #include "supple/collision/stick.h"
+#include "supple/core/executor.h"
 
 namespace supple::collision {
 
@@ -40,7 +41,7 @@ struct ReactionReport {
 /// @param traction_force  if not null: total force on A of each pair, dissipative part included, shape [pairs]
 /// @param pair_power  if not null: what damping and friction take of each pair [W], shape [pairs]
 ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
-                     const ReactionSettings& settings, std::span<PartLoads> loads,
+                     const ReactionSettings& settings, const Executor& executor, std::span<PartLoads> loads,
                      std::vector<Vec3>* traction_force = nullptr, std::span<PartLoads> dissipative = {},
                      std::vector<double>* pair_power = nullptr, const StickState* sticks = nullptr);
 
