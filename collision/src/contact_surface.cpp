@@ -401,7 +401,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   for (std::size_t i = 0; i < bodies.size(); ++i) boxes[i] = bodies[i].field ? bodies[i].field.surface_box() : Box{};
   partners.build(bodies.size(), candidates.pair);
   // In portions, so that what a pair leaves behind is joined while it is still near, and buffers stay small.
-  constexpr std::size_t kPortion = 1024, kBlock = 2;
+  constexpr std::size_t kPortion = 128, kBlock = 2;
   const std::size_t pairs = candidates.pair.size();
   if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
   struct Job {

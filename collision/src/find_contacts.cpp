@@ -8,17 +8,17 @@
 namespace supple::collision {
 namespace {
 
-/// Two axes for a sweep: the finite box centres spread most along `sweep` and second most along `across`, where they are
-/// cut into strips of about two boxes each.
-struct Strips {
+/// Columns for a sweep: the finite box centres spread most along `sweep`; across the other two axes space is cut into columns
+/// of about two boxes each.
+struct Columns {
   int sweep = 0;
-  int across = 1;
-  double begin = 0.0;  ///< of the first strip [m]
-  double width = 1.0;  ///< [m]
-  std::uint32_t count = 1;
+  std::array<int, 2> across = {1, 2};
+  std::array<double, 2> begin{};             ///< of the first column [m]
+  std::array<double, 2> width = {1.0, 1.0};  ///< [m]
+  std::array<std::uint32_t, 2> count = {1, 1};
 
-  explicit Strips(std::span<const Box> boxes) {
-    constexpr double kMostStrips = 65536.0;
+  explicit Columns(std::span<const Box> boxes) {
+    constexpr double kMost = 256.0;  // along one axis
     Box spread;
     Vec3 extent = Vec3::Zero();
     double finite = 0.0;
@@ -32,17 +32,24 @@ struct Strips {
     std::array<int, 3> axis = {0, 1, 2};
     std::stable_sort(axis.begin(), axis.end(), [&](int i, int j) { return spread.extent()[i] > spread.extent()[j]; });
     sweep = axis[0];
-    across = axis[1];
-    begin = spread.lower[across];
-    const double length = spread.extent()[across];
-    if (!(length > 0.0)) return;
-    width = std::max(2.0 * extent[across] / finite, length / kMostStrips);
-    count = static_cast<std::uint32_t>(length / width) + 1;
+    across = {axis[1], axis[2]};
+    for (const std::size_t k : {0u, 1u}) {
+      begin[k] = spread.lower[across[k]];
+      const double length = spread.extent()[across[k]];
+      if (!(length > 0.0)) continue;
+      width[k] = std::max(2.0 * extent[across[k]] / finite, length / kMost);
+      count[k] = static_cast<std::uint32_t>(length / width[k]) + 1;
+    }
   }
+  [[nodiscard]] std::size_t size() const { return std::size_t{count[0]} * count[1]; }
 
-  /// The strip of a coordinate, the outer ones without end.
-  [[nodiscard]] std::uint32_t of(double x) const {
-    return static_cast<std::uint32_t>(std::clamp((x - begin) / width, 0.0, static_cast<double>(count - 1)));
+  /// The columns of a place, the outer ones without end.
+  [[nodiscard]] std::array<std::uint32_t, 2> of(const Vec3& x) const {
+    std::array<std::uint32_t, 2> at;
+    for (const std::size_t k : {0u, 1u}) {
+      at[k] = static_cast<std::uint32_t>(std::clamp((x[across[k]] - begin[k]) / width[k], 0.0, static_cast<double>(count[k] - 1)));
+    }
+    return at;
   }
 };
 
@@ -150,50 +157,51 @@ std::optional<Between> between_cores(const ContactBody& a, const ContactBody& b)
 }  // namespace
 
 std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor) {
-  const Strips strips(boxes);
-  const int axis = strips.sweep;
-  constexpr std::uint32_t kWide = 8;  // strips; wider boxes are few and meet all others
+  const Columns columns(boxes);
+  const int axis = columns.sweep;
   struct Entry {
     Box box;
-    std::uint32_t id, first, last;  // strips
-    [[nodiscard]] bool wide() const { return last - first >= kWide; }
+    std::uint32_t id;
+    std::array<std::uint32_t, 2> first, last;  // columns
+    [[nodiscard]] bool wide() const {
+      constexpr std::uint32_t kWide = 8;  // columns; boxes in more are few and meet all others
+      return (last[0] - first[0] + 1) * (last[1] - first[1] + 1) > kWide;
+    }
   };
-  std::vector<Entry> entry;
-  entry.reserve(boxes.size());
+  std::vector<Entry> narrow, wide;
+  std::vector<std::vector<Entry>> members(columns.size());
   for (std::uint32_t i = 0; i < boxes.size(); ++i) {
     if (boxes[i].empty()) continue;
-    entry.push_back({boxes[i], i, strips.of(boxes[i].lower[strips.across]), strips.of(boxes[i].upper[strips.across])});
-  }
-  std::sort(entry.begin(), entry.end(), [axis](const Entry& x, const Entry& y) {
-    return x.box.lower[axis] != y.box.lower[axis] ? x.box.lower[axis] < y.box.lower[axis] : x.id < y.id;
-  });
-  std::vector<std::vector<Entry>> members(strips.count);  // of each strip, in the order of the sweep
-  std::vector<Entry> wide;
-  for (const Entry& e : entry) {
-    if (e.wide()) {
-      wide.push_back(e);
-    } else {
-      for (std::uint32_t strip = e.first; strip <= e.last; ++strip) members[strip].push_back(e);
+    const Entry e{boxes[i], i, columns.of(boxes[i].lower), columns.of(boxes[i].upper)};
+    (e.wide() ? wide : narrow).push_back(e);
+    if (e.wide()) continue;
+    for (std::uint32_t m = e.first[0]; m <= e.last[0]; ++m) {
+      for (std::uint32_t n = e.first[1]; n <= e.last[1]; ++n) members[m * columns.count[1] + n].push_back(e);
     }
   }
   const auto join = [](const Entry& x, const Entry& y, std::vector<BodyPair>& out) {
     if (x.box.overlaps(y.box)) out.push_back({std::min(x.id, y.id), std::max(x.id, y.id)});
   };
-  std::vector<std::vector<BodyPair>> found(strips.count + 1);  // by strip; those of wide boxes
-  executor.for_blocks(strips.count, 1, [&](std::size_t strip, std::size_t) {
-    const std::vector<Entry>& here = members[strip];
-    for (std::size_t i = 0; i < here.size(); ++i) {
-      for (std::size_t j = i + 1; j < here.size() && here[j].box.lower[axis] <= here[i].box.upper[axis]; ++j) {
-        // Two that share several strips meet in the first of them.
-        if (strip == std::max(here[i].first, here[j].first)) join(here[i], here[j], found[strip]);
+  std::vector<std::vector<BodyPair>> found(columns.size() + 1);  // by column; those of wide boxes
+  constexpr std::size_t kBlock = 4;
+  executor.for_blocks(columns.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t column = begin; column < end; ++column) {
+      std::vector<Entry>& here = members[column];
+      std::sort(here.begin(), here.end(), [axis](const Entry& x, const Entry& y) {
+        return x.box.lower[axis] != y.box.lower[axis] ? x.box.lower[axis] < y.box.lower[axis] : x.id < y.id;
+      });
+      for (std::size_t i = 0; i < here.size(); ++i) {
+        for (std::size_t j = i + 1; j < here.size() && here[j].box.lower[axis] <= here[i].box.upper[axis]; ++j) {
+          // Two that share several columns meet in the first of them.
+          const std::uint32_t m = std::max(here[i].first[0], here[j].first[0]), n = std::max(here[i].first[1], here[j].first[1]);
+          if (column == m * columns.count[1] + n) join(here[i], here[j], found[column]);
+        }
       }
     }
   });
   for (std::size_t i = 0; i < wide.size(); ++i) {
     for (std::size_t j = i + 1; j < wide.size(); ++j) join(wide[i], wide[j], found.back());
-    for (const Entry& e : entry) {
-      if (!e.wide()) join(wide[i], e, found.back());
-    }
+    for (const Entry& e : narrow) join(wide[i], e, found.back());
   }
   // In order: by the first body through counts, by the second within its few.
   std::vector<std::uint32_t> offset(boxes.size() + 2, 0);
@@ -233,18 +241,24 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
   };
   thread_local std::vector<Slot> slots;
   thread_local std::vector<double> spacing;
+  thread_local std::vector<Box> box;
   struct Job {
     std::span<const ContactBody> bodies;
     std::span<const BodyPair> pairs;
     std::vector<Slot>& slots;
     std::vector<double>& spacing;
-  } job{bodies, pairs, slots, spacing};
+    std::vector<Box>& box;
+  } job{bodies, pairs, slots, spacing, box};
 
   if (slots.size() < pairs.size()) slots.resize(pairs.size());
   spacing.resize(bodies.size());
-  constexpr std::size_t kBlock = 4;
+  box.resize(bodies.size());
+  constexpr std::size_t kBlock = 16;
   executor.for_blocks(bodies.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) job.spacing[i] = sample_spacing(job.bodies[i]);
+    for (std::size_t i = begin; i < end; ++i) {
+      job.spacing[i] = sample_spacing(job.bodies[i]);
+      job.box[i] = job.bodies[i].field ? job.bodies[i].field.surface_box() : Box{};
+    }
   });
   executor.for_blocks(pairs.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
     thread_local Scratch scratch;
@@ -252,7 +266,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
       const ContactBody& a = job.bodies[job.pairs[k].a];
       const ContactBody& b = job.bodies[job.pairs[k].b];
       Slot& slot = job.slots[k];
-      slot.overlap = a.field.surface_box().intersection(b.field.surface_box());
+      slot.overlap = job.box[job.pairs[k].a].intersection(job.box[job.pairs[k].b]);
       slot.seed.clear();
       const std::optional<Between> between = between_cores(a, b);
       slot.convex = between.has_value();

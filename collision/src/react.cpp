@@ -339,7 +339,7 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
   if (traction_force != nullptr) traction_force->assign(pairs, Vec3::Zero());
   if (pair_power != nullptr) pair_power->assign(pairs, 0.0);
   // In portions, so that what a pair leaves behind is added up while it is still near.
-  constexpr std::size_t kPortion = 1024, kBlock = 16;
+  constexpr std::size_t kPortion = 256, kBlock = 16;
   thread_local std::vector<PairReaction> reactions;
   if (reactions.size() < std::min(pairs, kPortion)) reactions.resize(std::min(pairs, kPortion));
   std::vector<PairReaction>& slots = reactions;  // of the calling thread, whoever fills them

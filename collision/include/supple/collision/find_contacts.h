@@ -19,7 +19,7 @@ struct ContactCandidates {
   std::uint64_t pairs_present = 0;     ///< pairs that the rules allow, as `broad_phase` counts them
 };
 
-/// Pairs of boxes that overlap, by sweep and prune along the longest axis in strips across the next; sorted.
+/// Pairs of boxes that overlap, by sweep and prune along the longest axis, in columns across the others; sorted.
 /// Empty boxes overlap nothing.
 [[nodiscard]] std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor);
 
