@@ -117,6 +117,7 @@ class MemoryArchive : public openvdb::io::Archive {
 }  // namespace
 
 struct SurfaceGrid::Impl {
+  explicit Impl(FloatGrid::Ptr made) : grid(std::move(made)) {}
   FloatGrid::Ptr grid;
 };
 
@@ -460,7 +461,7 @@ void UnitedField::evaluate(std::span<const Vec3> points, std::span<double> value
   }
 }
 
-void UnitedField::evaluate_parts(std::span<const Vec3>, FieldParts&) const { SUPPLE_EXPECTS(!"parts of one body"); }
+void UnitedField::evaluate_parts(std::span<const Vec3>, FieldParts&) const { SUPPLE_EXPECTS(false && "parts of one body"); }
 
 Interval UnitedField::bound(const Box& box) const {
   Interval result = fields_.front().bound(box);

@@ -4,6 +4,13 @@
 #include <bit>
 #include <cmath>
 
+// Rows that a loop writes are none of those that it reads: they are more than compilers check by themselves.
+#ifdef __clang__
+#define SUPPLE_ROWS_ARE_APART _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define SUPPLE_ROWS_ARE_APART _Pragma("GCC ivdep")
+#endif
+
 namespace supple::render::path {
 namespace {
 
@@ -73,7 +80,7 @@ void compare_features(int width, int y, const Tap& tap, const Features& f, std::
   const float *mx = there(f.nx), *my = there(f.ny), *mz = there(f.nz), *qx = there(f.px), *qy = there(f.py), *qz = there(f.pz);
   const float *plane = here(f.plane), *cover = there(f.cover), *near = here(f.near);
   float *to = alike.data(), *far = off[0].data(), *farther = off[1].data();
-#pragma GCC ivdep
+  SUPPLE_ROWS_ARE_APART
   for (int x = first; x < last; ++x) {
     float facing = std::max(0.0F, nx[x] * mx[x] + ny[x] * my[x] + nz[x] * mz[x]);
     facing *= facing;
@@ -99,7 +106,7 @@ void add_tap(int width, int y, const Tap& tap, const Signal& signal, const std::
   const float *variance = signal.light.variance.data() + there, *same = alike.data(), *far = off.data(), *covered = cover.data() + there;
   float *sum_r = sums.r.data(), *sum_g = sums.g.data(), *sum_b = sums.b.data(), *sum_v = sums.variance.data(), *sum_w = sums.weight.data();
   const float own = tap.dx == 0 && tap.dy == 0 ? tap.kernel : 0.0F;  // a pixel is like itself, whatever its features
-#pragma GCC ivdep
+  SUPPLE_ROWS_ARE_APART
   for (int x = first; x < last; ++x) {
     const float w = std::max(own * covered[x], same[x] * fall(far[x] + std::abs(other[x] - guide[x]) * noise[x]));
     sum_r[x] += w * r[x];
