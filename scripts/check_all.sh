@@ -7,11 +7,16 @@ source "$here/dependencies.sh"
 source "$here/parts.sh"
 source "$here/package_check.sh"
 
-if (($# > 0)); then
-  echo "usage: scripts/check_all.sh    (no options; logs go to build/logs)"
-  [[ $1 == -h || $1 == --help ]] && exit 0
-  exit 2
-fi
+usage="usage: scripts/check_all.sh [clang] [analysis] [threads] [install]    all when none is named; logs go to build/logs"
+for name in "$@"; do
+  case $name in
+    clang | analysis | threads | install) ;;
+    -h | --help) echo "$usage" && exit 0 ;;
+    *) echo "$usage" >&2 && exit 2 ;;
+  esac
+done
+chosen=" ${*:-clang analysis threads install} "
+chose() { [[ $chosen == *" $1 "* ]]; }
 
 logs=$supple_root/build/logs
 clang_build=$supple_root/build/clang
@@ -35,18 +40,24 @@ test_tsan() {
 
 install_packages build run test check
 
-if part "build (clang)" "$logs/build_clang.log" build_clang; then
-  part "tests (clang)" "$logs/tests_clang.log" test_clang || true
-  part "static analysis" "$logs/analysis.log" analyse || true
-else
-  for name in "tests (clang)" "static analysis"; do skip_part "$name" "no build"; done
+if chose clang || chose analysis; then
+  if part "build (clang)" "$logs/build_clang.log" build_clang; then
+    ! chose clang || part "tests (clang)" "$logs/tests_clang.log" test_clang || true
+    ! chose analysis || part "static analysis" "$logs/analysis.log" analyse || true
+  else
+    for name in "tests (clang)" "static analysis"; do skip_part "$name" "no build"; done
+  fi
 fi
-if part "build (thread sanitizer)" "$logs/build_tsan.log" configure_and_build tsan all; then
+if ! chose threads; then
+  :
+elif part "build (thread sanitizer)" "$logs/build_tsan.log" configure_and_build tsan all; then
   part "tests (thread sanitizer)" "$logs/tests_tsan.log" test_tsan || true
 else
   skip_part "tests (thread sanitizer)" "no build"
 fi
-if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON; then
+if ! chose install; then
+  :
+elif part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON; then
   part "headers stand alone" "$logs/headers.log" \
     configure_and_build release all_verify_interface_header_sets || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true
@@ -57,18 +68,32 @@ fi
 
 failed=0
 print_summary || failed=1
-mkdir -p "$supple_root/docs/reports"
+report=$supple_root/docs/reports/checks.md
+mkdir -p "$(dirname "$report")"
+# What was not run this time keeps its last line.
+declare -A rows=()
+declare -a order=()
+remember() {
+  [[ -n ${rows[$1]+known} ]] || order+=("$1")
+  rows[$1]=$2
+}
+while IFS= read -r line; do
+  name=${line#| } name=${name%% | *}
+  [[ $line == "| "*" | "* && $name != check ]] && remember "$name" "$line"
+done < <(cat "$report" 2>/dev/null)
+commit=$(git -C "$supple_root" rev-parse --short HEAD 2>/dev/null || echo unknown)
+for k in "${!part_names[@]}"; do
+  remember "${part_names[k]}" "| ${part_names[k]} | ${part_results[k]} | ${part_seconds[k]} | $commit |"
+done
 {
   echo "# Checks"
   echo
   echo "Written by \`scripts/check_all.sh\` with $(g++ --version | head -n 1), $(clang++ --version | head -n 1)."
   echo "Times are those of $supple_jobs processors; a compiler cache that is warm makes the builds shorter."
   echo
-  echo "| check | result | time [s] |"
-  echo "|---|---|---|"
-  for k in "${!part_names[@]}"; do
-    echo "| ${part_names[k]} | ${part_results[k]} | ${part_seconds[k]} |"
-  done
-} >"$supple_root/docs/reports/checks.md"
+  echo "| check | result | time [s] | at commit |"
+  echo "|---|---|---|---|"
+  for name in "${order[@]}"; do echo "${rows[$name]}"; done
+} >"$report"
 echo "wrote docs/reports/checks.md"
 exit $failed
