@@ -182,6 +182,9 @@ Box find_surface_box(const Field::Index& index, const Field& field) {
     if (!may_hold(field, box, resolution)) return Box{};
     inner = {box.centre(), box.centre()};
   }
+  if (index.size() == 1 && (index.primitive[0].kind == PackedKind::PointWyvill || index.primitive[0].kind == PackedKind::PointGascuel)) {
+    return inner.inflated(1e-9 * size);  // a ball, with what the search for its radius leaves
+  }
   const double tolerance = std::max(index.feature_size / 24.0, size / 256.0);
   for (int axis = 0; axis < 3; ++axis) {
     for (const bool low : {true, false}) {
