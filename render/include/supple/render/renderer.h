@@ -27,7 +27,7 @@ struct RenderSettings {
   RendererKind kind = RendererKind::Gl;
   // Of the path tracer alone:
   int threads = 1;                ///< 0: all the machine has
-  double noise = 0.05;            ///< standard error of a pixel over its brightness, before the filter; 0: most_samples
+  double noise = 0.1;             ///< standard error of a pixel over its brightness, before the filter; 0: most_samples
   int most_samples = 256;         ///< a pixel, a power of two up to 65536
   bool denoise = true;            ///< filter by normals, places and colours
   bool exact = true;              ///< meet Item::field

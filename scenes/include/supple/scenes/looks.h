@@ -82,7 +82,7 @@ enum class RendererName : std::uint8_t { Gl, Path };
 struct RenderDesc {
   RendererName renderer = RendererName::Gl;
   std::optional<double> pixel_error;  ///< largest distance of meshes to surfaces [pixel]; absent: by output.cell
-  double noise = 0.05;                ///< path: standard error of a pixel over its brightness, before the filter
+  double noise = 0.1;                 ///< path: standard error of a pixel over its brightness, before the filter
   int most_samples = 256;             ///< path: a pixel, a power of two
   bool denoise = true;                ///< path
   bool exact_surface = true;          ///< path: rays meet the field, not the triangles
