@@ -201,8 +201,8 @@ TEST(GroundPaint, LiesInWorldCoordinates) {
         EXPECT_NEAR(at(checks, x, y, 1), (i + j) % 2 == 0 ? 0.4 : 0.1, 0.004) << static_cast<int>(kind) << ' ' << i << ' ' << j;
         EXPECT_NEAR(at(stripes, x, y, 1), j % 2 == 0 ? 0.4 : 0.1, 0.004) << static_cast<int>(kind) << ' ' << j;
       }
-    // The left texel is in the middle at x = 1/4, the right one at 3/4.
-    for (const double x : {-0.75, 0.25}) EXPECT_NEAR(at(pictures, x, 0.0, 0), 1.0, 0.1) << static_cast<int>(kind);
+    // The left texel is in the middle at x = 1/4 and 5/4, the right one at -1/4 and 3/4.
+    for (const double x : {0.25, 1.25}) EXPECT_NEAR(at(pictures, x, 0.0, 0), 1.0, 0.1) << static_cast<int>(kind);
     for (const double x : {-0.25, 0.75}) EXPECT_NEAR(at(pictures, x, 0.0, 2), 1.0, 0.1) << static_cast<int>(kind);
   }
 }
