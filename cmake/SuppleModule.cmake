@@ -58,7 +58,9 @@ function(supple_test module)
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
   target_compile_definitions(${module}_tests PRIVATE SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  gtest_discover_tests(${module}_tests PROPERTIES LABELS ${module} DISCOVERY_TIMEOUT 60 TIMEOUT 600)
+  file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/tests-tmp)  # two builds may test at the same time
+  gtest_discover_tests(${module}_tests
+    PROPERTIES LABELS ${module} ENVIRONMENT TEST_TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT 600)
 endfunction()
 
 function(supple_install_package)

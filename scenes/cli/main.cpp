@@ -273,6 +273,12 @@ void run_flags(CLI::App* verb, Arguments& a) {
   verb->add_flag("--quiet", a.quiet, "print faults only");
 }
 
+void drawing_flags(CLI::App* verb, Arguments& a) {
+  verb->add_option("--at-once", a.at_once, "frames in work at the same time (default: one a thread, as memory allows; changes no bit)")
+      ->check(CLI::Range(0, 64));
+  verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")->check(CLI::PositiveNumber);
+}
+
 int parse_and_call(int argc, char** argv) {
   Arguments a;
   CLI::App app("supple: oriented particles, implicit surfaces, exact contact");
@@ -286,15 +292,14 @@ int parse_and_call(int argc, char** argv) {
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder");
   run_verb->add_flag("--resume", a.resume, "continue from the last saved state in the folder");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
+  drawing_flags(run_verb, a);
   run_verb->add_flag("--render-only", a.render_only, "pictures and film from the saved states of an earlier run, as `supple render`");
   run_verb->footer("Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
 
   CLI::App* render_verb = app.add_subcommand("render", "draw the frames of a run again from its saved states");
   run_flags(render_verb, a);
   render_verb->add_flag("--overwrite", a.overwrite, "draw pictures that are there and up to date again, too");
-  render_verb->add_option("--at-once", a.at_once, "frames drawn at the same time (default: one a thread, as memory allows; changes no bit)")
-      ->check(CLI::Range(0, 64));
-  render_verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")->check(CLI::PositiveNumber);
+  drawing_flags(render_verb, a);
   render_verb->add_flag("--sheet", a.sheet, "only the contact sheet, of the frames that are there");
   render_verb->footer("Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
 

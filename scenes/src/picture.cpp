@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "look_columns.h"
+#include "scene_places.h"
 #include "supple/render/glyphs.h"
 
 namespace supple::scenes {
@@ -143,19 +144,16 @@ std::vector<render::ScaleBar> bars_of(const Scene& scene) {
 
 void check_textures(const Scene& scene) {
   std::vector<Fault> faults;
-  const auto check = [&](const std::optional<TextureDesc>& texture, const std::string& key) {
+  const auto check = [&](const std::optional<TextureDesc>& texture, const std::string& owner) {
     try {
-      static_cast<void>(paint_of(texture, scene.source.parent_path()));
+      read_for(owner + "texture.file", [&] { return paint_of(texture, scene.source.parent_path()); });
     } catch (const Error& error) {
-      for (Fault fault : error.faults()) {
-        fault.key = key + ".file";
-        faults.push_back(std::move(fault));
-      }
+      faults.insert(faults.end(), error.faults().begin(), error.faults().end());
     }
   };
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) check(scene.objects[i].look.texture, "objects[" + std::to_string(i) + "].look.texture");
-  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) check(scene.obstacles[i].texture, "obstacles[" + std::to_string(i) + "].texture");
-  if (scene.ground) check(scene.ground->texture, "ground.texture");
+  for (const ObjectDesc& object : scene.objects) check(object.look.texture, "objects." + object.name + ".look.");
+  for (const ObstacleDesc& obstacle : scene.obstacles) check(obstacle.texture, "obstacles." + obstacle.name + '.');
+  if (scene.ground) check(scene.ground->texture, "ground.");
   if (!faults.empty()) throw Error(ErrorKind::Io, std::move(faults));
 }
 

@@ -9,12 +9,12 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
-#include <mutex>
+#include <exception>
 #include <new>
 #include <optional>
-#include <thread>
+#include <vector>
 
+#include "drawing_crew.h"
 #include "frame_writer.h"
 #include "output_files.h"
 #include "result_file.h"
@@ -146,99 +146,29 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   return result;
 }
 
-/// Memory of this process, and what the machine has free [byte].
-double resident_bytes() {
-  std::ifstream file("/proc/self/statm");
-  double size = 0.0, resident = 0.0;
-  file >> size >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
-double free_bytes() { return static_cast<double>(sysconf(_SC_AVPHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)); }
-
-/// How many frames to draw at once when each needs `share` bytes.
-int crew_size(const RunOptions& options, std::size_t frames, double share) {
-  const int most = std::min<int>(static_cast<int>(std::min<std::size_t>(frames, 64)),
-                                 options.frames_at_once > 0 ? options.frames_at_once : Executor(options.threads).threads());
-  const double memory = options.memory > 0.0 ? options.memory : 0.5 * free_bytes();
-  const double room = share > 0.0 ? memory / share : most;
-  return std::max(1, static_cast<int>(std::min<double>(most, room)));
+/// Those from `first` to `last` that are asked for.
+std::vector<int> frames_to_draw(const RunOptions& options, int first, int last) {
+  std::vector<int> frames;
+  for (int frame = first; frame <= last; ++frame) {
+    if (options.frames.empty() || options.frames.contains(frame)) frames.push_back(frame);
+  }
+  return frames;
 }
 
-/// Draws frames at the same time, each by a simulation and a renderer of its own, so that no byte depends on the others.
-class DrawingCrew {
- public:
-  DrawingCrew(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, std::span<const int> frames, Reporter& report)
-      : scene_(scene), options_(options), outputs_(outputs), frames_(frames), report_(report) {}
+/// The report is of the run as a whole.
+void show_last(Simulation& simulation, const RunOptions& options, const std::string& name, int last) {
+  if (simulation.frame() != last) simulation.restore(load_state(state_path(options.folder, name, last), simulation.scene().content_hash));
+}
 
-  /// @throws what the first of the frames that failed threw
-  void draw(int members, RunResult& result, Simulation& booked) {
-    options_.threads = std::max(1, Executor(options_.threads).threads() / members);
-    options_.progress = [&](const Progress& progress) {
-      const std::lock_guard lock(mutex_);
-      report_(progress.stage, progress.frame, static_cast<double>(progress.frame) / frames_.back());
-    };
-    std::vector<std::thread> threads;
-    for (int i = 0; i < members; ++i) threads.emplace_back([&] { work(members, result, booked); });
-    for (std::thread& thread : threads) thread.join();
-    if (failure_) std::rethrow_exception(failure_);
-    std::sort(result.warnings.begin(), result.warnings.end());
-    result.warnings.erase(std::unique(result.warnings.begin(), result.warnings.end()), result.warnings.end());
-  }
-
- private:
-  void work(int members, RunResult& result, Simulation& booked) {
-    std::unique_lock lock(mutex_);  // libraries of contexts are opened one after the other
-    int frame = frames_.front();
-    try {
-      Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay});
-      FrameWriter writer(scene_, simulation.model(), options_, outputs_);
-      Reporter report(options_, frames_.back());
-      while (next_ < frames_.size() && !failure_ && (options_.interrupt == nullptr || options_.interrupt->load() == 0)) {
-        frame = frames_[next_++];
-        lock.unlock();
-        State state = load_state(state_path(options_.folder, scene_name(scene_), frame), scene_.content_hash);
-        const bool draws = options_.overwrite || writer.renews(frame, state.hash());
-        if (draws) {
-          simulation.restore(std::move(state));
-          writer.write(simulation, report, 0.0);
-        }
-        lock.lock();
-        if (!draws) ++result.pictures_kept;
-      }
-      book(members, simulation, writer, result, booked);
-    } catch (...) {
-      if (!lock.owns_lock()) lock.lock();
-      if (!failure_ || frame < failed_) failure_ = std::current_exception();
-      failed_ = std::min(failed_, frame);
-    }
-  }
-
-  /// Clocks count the CPU time of the process, so each saw the work of all.
-  void book(int members, Simulation& simulation, const FrameWriter& writer, RunResult& result, Simulation& booked) const {
-    result.pictures_drawn += writer.pictures_drawn();
-    writer.add_warnings(result.warnings);
-    const double share = 1.0 / members;
-    result.pictures.add(writer.picture_times(), share);
-    for (const Stage stage : {Stage::Polygonise, Stage::Render, Stage::Export}) {
-      const StageProfile& own = simulation.profile(stage);
-      StageProfile& sum = booked.profile(stage);
-      sum.calls += own.calls;
-      sum.visited += own.visited;
-      sum.present += own.present;
-      sum.cpu_s += share * own.cpu_s;
-    }
-  }
-
-  const Scene& scene_;
-  RunOptions options_;
-  OutputRequest outputs_;
-  std::span<const int> frames_;
-  Reporter& report_;
-  std::mutex mutex_;  // of all below, and of what is booked
-  std::size_t next_ = 0;
-  std::exception_ptr failure_;
-  int failed_ = std::numeric_limits<int>::max();
-};
+/// Files over all frames, and what was drawn.
+void finish(FrameWriter& writer, Simulation& simulation, Reporter& report, RunResult& result) {
+  result.film = writer.finish(simulation, report, result.frames);
+  result.pictures_drawn += writer.pictures_drawn();
+  result.pictures.add(writer.picture_times(), 1.0);
+  writer.add_warnings(result.warnings);
+  std::sort(result.warnings.begin(), result.warnings.end());  // of several members
+  result.warnings.erase(std::unique(result.warnings.begin(), result.warnings.end()), result.warnings.end());
+}
 
 /// Outputs again of the saved states.
 RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, const char* report_name) {
@@ -273,11 +203,11 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
       if (was_interrupted(options, result)) return;
       const int frame = frames[i];
       if (pictures_only && writer.pictures_drawn() > 0) {  // the first one shows what each needs
-        const std::span<const int> rest = std::span<const int>(frames).subspan(i);
-        const int crew = crew_size(options, rest.size(), resident_bytes() - before);
-        if (crew > 1) {
-          result.frames_at_once = crew;
-          DrawingCrew(scene, options, outputs, rest, report).draw(crew, result, *simulation);
+        const int members = crew_size(options, frames.size() - i, resident_bytes() - before);
+        if (members > 1) {
+          DrawingCrew crew(scene, options, outputs, {frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end()}, *last, members,
+                           {*simulation, writer, result}, report);
+          crew.join();
           if (was_interrupted(options, result)) return;
           break;
         }
@@ -290,14 +220,9 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
       simulation->restore(std::move(state));
       writer.write(*simulation, report, static_cast<double>(frame) / *last);
     }
-    if (simulation->frame() != *last) {  // the report is of the run as a whole
-      simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
-    }
+    show_last(*simulation, options, name, *last);
     result.frames = *last;
-    result.pictures_drawn += writer.pictures_drawn();
-    result.film = writer.finish(*simulation, report, *last);
-    result.pictures.add(writer.picture_times(), 1.0);
-    writer.add_warnings(result.warnings);
+    finish(writer, *simulation, report, result);
   });
 }
 
@@ -372,48 +297,73 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {
-        check_needs(scene, options, outputs);
-        if (!options.resume) remove_outputs(options.folder, name);
-        simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
-        const int frame_count = scene.frame_count();
-        FrameWriter writer(scene, simulation->model(), options, outputs);
-        Reporter report(options, frame_count);
-        bool fresh = true;
-        if (options.resume) {
-          if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
-            for (int frame = 1; writer.writes_frames() && frame <= *last; ++frame) {
-              State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
-              if (!writer.renews(frame, state.hash())) continue;
-              simulation->restore(std::move(state));
-              writer.renew(*simulation, report, static_cast<double>(frame) / frame_count);
-            }
-            simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
-            result.frames = *last;
-            fresh = false;
-          }
-        }
-        const auto finish_frame = [&] {
-          const double done = static_cast<double>(simulation->frame()) / frame_count;
-          writer.write(*simulation, report, done);
-          save_state(state_path(options.folder, name, simulation->frame()), simulation->state(), scene.content_hash);
-          result.frames = simulation->frame();
-        };
-        if (fresh) finish_frame();
-        while (simulation->frame() < frame_count) {
+    check_needs(scene, options, outputs);
+    if (!options.resume) remove_outputs(options.folder, name);
+    const double before = resident_bytes();
+    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
+    const int frame_count = scene.frame_count();
+    FrameWriter writer(scene, simulation->model(), options, outputs);
+    Reporter report(options, frame_count);
+    if (options.resume) {
+      if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
+        for (int frame = 1; writer.writes_frames() && frame <= *last; ++frame) {
           if (was_interrupted(options, result)) return;
-          report("simulate", simulation->frame() + 1, static_cast<double>(simulation->frame()) / frame_count);
-          const int shown = simulation->frame();
-          while (simulation->frame() == shown) {
-            if (was_interrupted(options, result)) return;
-            simulation->step();
-          }
-          finish_frame();
+          State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
+          if (!writer.renews(frame, state.hash())) continue;
+          simulation->restore(std::move(state));
+          writer.renew(*simulation, report, static_cast<double>(frame) / frame_count);
         }
-        result.pictures_drawn = writer.pictures_drawn();
-        result.film = writer.finish(*simulation, report, frame_count);
-        result.pictures = writer.picture_times();
-        writer.add_warnings(result.warnings);
-      });
+        simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
+        result.frames = *last;
+      }
+    }
+    const auto save = [&] {
+      save_state(state_path(options.folder, name, simulation->frame()), simulation->state(), scene.content_hash);
+      result.frames = simulation->frame();
+    };
+    if (result.frames == 0) {
+      writer.write(*simulation, report, 1.0 / frame_count);
+      save();
+    }
+    RunOptions drawing = options;
+    drawing.overwrite = true;
+    std::optional<DrawingCrew> crew;
+    std::exception_ptr diverged;
+    try {
+      while (result.frames < frame_count && !was_interrupted(options, result)) {
+        // The first picture shows what each needs. Clocks that are to be exact want one work at a time.
+        if (!crew && writer.pictures_drawn() > 0 && !writer.needs_order() && !options.profile) {
+          std::vector<int> frames = frames_to_draw(options, result.frames + 1, frame_count);
+          const int members = crew_size(options, frames.size(), resident_bytes() - before);
+          if (members > 1) {
+            crew.emplace(scene, drawing, outputs, std::move(frames), result.frames, members,
+                         DrawingCrew::Leader{*simulation, writer, result}, report);
+          }
+        }
+        const int next = simulation->frame() + 1;
+        crew ? crew->simulating(next) : report("simulate", next, static_cast<double>(next - 1) / frame_count);
+        while (simulation->frame() < next && !was_interrupted(options, result)) simulation->step();
+        if (simulation->frame() < next) break;
+        if (crew) {
+          save();
+          if (!crew->saved(next)) break;
+        } else {
+          writer.write(*simulation, report, static_cast<double>(next) / frame_count);
+          save();
+        }
+      }
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::Diverged) throw;
+      diverged = std::current_exception();  // what came before is still drawn
+    }
+    if (crew) {
+      crew->join();
+      show_last(*simulation, options, name, result.frames);
+    }
+    if (diverged) std::rethrow_exception(diverged);
+    if (was_interrupted(options, result)) return;
+    finish(writer, *simulation, report, result);
+  });
 }
 
 RunResult render_run(const Scene& scene, const RunOptions& options) {

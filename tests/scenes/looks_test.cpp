@@ -248,7 +248,7 @@ TEST_F(Looks, AbsentTexturesAndFilmMakersAreNamedBeforeAnythingIsRemoved) {
   const Scene absent = scene_with("texture: {pattern: picture, file: absent.png}", kOneCamera);
   RunResult result = run_scene(absent, again);
   EXPECT_EQ(result.outcome, "io");
-  for (const char* part : {"absent.png", "objects[0].look.texture.file"}) EXPECT_NE(result.reason.find(part), std::string::npos) << result.reason;
+  for (const char* part : {"absent.png", "objects.chain.look.texture.file"}) EXPECT_NE(result.reason.find(part), std::string::npos) << result.reason;
   EXPECT_THROW(check_textures(absent), Error);
   EXPECT_NO_THROW(check_textures(scene_with("", kOneCamera)));
   EXPECT_EQ(render_run(absent, again).outcome, "io");

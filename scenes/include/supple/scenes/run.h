@@ -38,9 +38,9 @@ struct RunOptions {
   bool profile = false;
   implicit::DelaunayMesher delaunay{};          ///< see SimulationOptions::delaunay
   std::string context = "auto";                 ///< auto, osmesa or egl
-  int frames_at_once = 0;                       ///< render_run: that are drawn at the same time; 0: one a thread, as memory allows
+  int frames_at_once = 0;                       ///< in work at the same time where pictures are drawn, the one that is simulated too; 0: one a thread, as memory allows
   double memory = 0.0;                          ///< for that, beyond the first one [byte]; 0: half of what the machine has free
-  std::function<void(const Progress&)> progress{}; ///< called from the running thread; may be empty
+  std::function<void(const Progress&)> progress{}; ///< never twice at the same time, but from several threads; may be empty
   const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step (the signal's number)
 };
 
@@ -68,7 +68,7 @@ struct RunResult {
   std::uint64_t state_hash = 0;
   std::filesystem::path folder;
   int pictures_drawn = 0;
-  int frames_at_once = 1;   ///< that `render_run` drew at the same time
+  int frames_at_once = 1;   ///< that were in work at the same time
   int pictures_kept = 0;    ///< those of `render_run` that were there already and show this scene and state
   std::filesystem::path report; ///< result.json, render.json or export.json
   std::filesystem::path film;   ///< empty: none
