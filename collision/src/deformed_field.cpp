@@ -21,7 +21,9 @@ double depth_outside(const ContactBody& body) {
   return slope.isZero(0.0) ? -body.material.modulus * value : kInfinity;
 }
 
-Box bounding_box(const ContactBody& body, double below) {
+/// The box of {p >= -below}. @param certain  false where it was not found
+Box bounding_box(const ContactBody& body, double below, bool& certain) {
+  certain = true;
   // Slabs are put on each side of the surface's box until one lies where p < -below everywhere.
   Box box = body.field.surface_box();
   const double step = 0.25 * body.field.feature_size();
@@ -31,14 +33,15 @@ Box bounding_box(const ContactBody& body, double below) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const bool upper : {false, true}) {
       double& side = upper ? box.upper[axis] : box.lower[axis];
-      for (int i = 0; i < kMostSteps && std::isfinite(side); ++i) {
+      bool outside = !std::isfinite(side);
+      for (int i = 0; i < kMostSteps && !outside; ++i) {
         Box slab = wide;
         slab.lower[axis] = upper ? side : side - step;
         slab.upper[axis] = upper ? side + step : side;
-        const bool outside = body.material.modulus * body.field.bound(slab).upper < -below;
-        if (outside) break;
-        side += upper ? step : -step;
+        outside = body.material.modulus * body.field.bound(slab).upper < -below;
+        if (!outside) side += upper ? step : -step;
       }
+      certain = certain && outside;
     }
   }
   return box;
@@ -48,6 +51,11 @@ Box bounding_box(const ContactBody& body, double below) {
 struct Buffers {
   std::vector<double> value, bulge, limit;
   std::vector<Vec3> slope, bulge_slope, limit_slope;
+  // Ways along a gradient.
+  std::vector<std::uint32_t> open;
+  std::vector<Vec3> start, at, open_at;
+  std::vector<double> open_value, distance, steepness;
+  std::vector<Vec3> open_slope;
 };
 
 class Borrowed {
@@ -57,6 +65,7 @@ class Borrowed {
   Borrowed(const Borrowed&) = delete;
   Borrowed& operator=(const Borrowed&) = delete;
   Buffers* operator->() { return &buffers_; }
+  Buffers& operator*() { return buffers_; }
 
  private:
   static Buffers& kept() {
@@ -66,24 +75,122 @@ class Borrowed {
   Buffers buffers_;
 };
 
+/// From each point of `start` along the body's gradient to its surface: how far that is [m] (< 0 from inside, infinite where the
+/// surface is farther than `reach` or the way is lost), and |grad p| there [Pa/m].
+void follow_gradient(const ContactBody& body, double reach, Buffers& way) {
+  constexpr int kSteps = 24;
+  constexpr double kEnough = 1e-13;  // of the reach
+  const std::size_t n = way.start.size();
+  way.at = way.start;
+  way.distance.assign(n, kInfinity);
+  way.steepness.assign(n, 0.0);
+  way.open.resize(n);
+  for (std::uint32_t i = 0; i < n; ++i) way.open[i] = i;
+  for (int step = 0; step < kSteps && !way.open.empty(); ++step) {
+    const std::size_t count = way.open.size();
+    way.open_at.resize(count);
+    way.open_value.resize(count);
+    way.open_slope.resize(count);
+    for (std::size_t k = 0; k < count; ++k) way.open_at[k] = way.at[way.open[k]];
+    body.field.evaluate(way.open_at, way.open_value, way.open_slope);
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t i = way.open[k];
+      const double slope = way.open_slope[k].norm();
+      if (!(slope > 0.0)) continue;
+      const double length = -way.open_value[k] / slope;  // up the slope
+      const double gone = (way.at[i] - way.start[i]).norm();
+      if (gone > reach) continue;
+      way.at[i] += (std::clamp(length, -0.5 * reach, 0.5 * reach) / slope) * way.open_slope[k];
+      const double round_off = 4.0 * std::numeric_limits<double>::epsilon() * way.at[i].lpNorm<Eigen::Infinity>();
+      if (std::abs(length) > std::max(kEnough * reach, round_off)) {
+        way.open[left++] = i;
+        continue;
+      }
+      const Vec3 whole = way.at[i] - way.start[i];
+      way.distance[i] = std::copysign(whole.norm(), whole.dot(way.open_slope[k]));
+      way.steepness[i] = body.material.modulus * slope;
+    }
+    way.open.resize(left);
+  }
+}
+
+/// A width [m], or less, so that the kernels of a body end beyond it. @param place  near its surface
+double width_within(const ContactBody& body, const Vec3& place, double width) {
+  const double lowest = -0.9 * depth_outside(body) / body.material.modulus;
+  Vec3 slope;
+  const double value = body.field.value(place, slope);
+  const double steepness = slope.norm();
+  if (!std::isfinite(lowest) || !(steepness > 0.0)) return width;
+  const Vec3 out = -slope / steepness;
+  const double inside = std::max(value, 0.0) / steepness;  // how deep the place lies, to first order
+  const auto ends_at = [&](double x) { return body.field.value(place + (inside + x) * out) < lowest; };
+  double low = 0.0, high = width;
+  if (!ends_at(high)) return width;
+  constexpr int kHalvings = 30;
+  for (int k = 0; k < kHalvings; ++k) (ends_at(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
+  return low;
+}
+
+/// Adds the literal bulge around a body to `bulge`, at most `highest`, and to `bulge_slope` where that is wanted.
+void add_literal(const ContactBody& body, BulgeProfile h, double highest, std::span<const Vec3> points, bool with_gradients,
+                 Buffers& out) {
+  const double step = 1e-5 * h.width;
+  const std::size_t n = points.size();
+  out.start.assign(points.begin(), points.end());
+  if (with_gradients) {
+    for (const Vec3& x : points) {
+      for (int k = 0; k < 3; ++k) {
+        out.start.push_back(x + step * Vec3::Unit(k));
+        out.start.push_back(x - step * Vec3::Unit(k));
+      }
+    }
+  }
+  follow_gradient(body, h.width + 2.0 * step, out);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double x = out.distance[i];
+    if (!(x > 0.0) || !(x < h.width)) continue;
+    h.stiffness = out.steepness[i];
+    const double lift = h.value(x);
+    out.bulge[i] += std::min(lift, highest);
+    if (!with_gradients || lift >= highest) continue;
+    const double rest = 1.0 - 2.0 * x / h.width, by_stiffness = rest > 0.0 ? x * rest * rest : 0.0;  // dh/dk
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t ahead = n + 6 * i + 2 * static_cast<std::size_t>(k), behind = ahead + 1;
+      const double moved = out.distance[ahead] - out.distance[behind];
+      if (!std::isfinite(moved)) continue;
+      const double change = h.slope(x) * moved + by_stiffness * (out.steepness[ahead] - out.steepness[behind]);
+      out.bulge_slope[i][k] += change / (2.0 * step);
+    }
+  }
+}
+
 }  // namespace
 
 ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
                        const BulgeSettings& settings)
-    : bodies_(bodies), body_(body) {
+    : bodies_(bodies), body_(body), literal_(settings.literal) {
   SUPPLE_EXPECTS(body < bodies.size());
   SUPPLE_EXPECTS(settings.attenuation >= 0.0 && settings.width > 0.0);
+  SUPPLE_EXPECTS(!settings.literal || !settings.keep_volume);
   const auto is_own = [&](const ContactSurface::Summary& s) {
     return (s.bodies.a == body || s.bodies.b == body) && s.largest_pressure > 0.0;
   };
   if (settings.attenuation > 0.0 || settings.keep_volume) {
     // All bulges together stay below half of what would lift the empty space around the body onto its surface.
     const auto touching = static_cast<double>(std::count_if(surface.summary.begin(), surface.summary.end(), is_own));
-    const double highest = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
+    highest_ = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
     for (const ContactSurface::Summary& s : surface.summary) {
       if (!is_own(s)) continue;
       const std::uint32_t other = s.bodies.a == body ? s.bodies.b : s.bodies.a;
       const ContactBody& b = bodies[other];
+      if (literal_) {
+        const double size = std::isfinite(b.field.feature_size()) ? b.field.feature_size() : bodies[body].field.feature_size();
+        const double width = width_within(b, s.centre_of_pressure, settings.width * size);
+        neighbours_.push_back({other, {.height = settings.attenuation * s.largest_pressure, .width = width}});
+        rise_ += literal_rise(neighbours_.back(), b.field.surface_box());
+        continue;
+      }
       Vec3 slope;
       static_cast<void>(b.field.value(s.centre_of_pressure, slope));
       const double steepness = b.material.modulus * slope.norm();
@@ -99,7 +206,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
         const double displaced = s.bodies.a == body ? s.displaced_a : s.displaced_b;
         height = volume_keeping_height(displaced, s.area, s.load, across, width);
       }
-      height = std::min(height, highest);
+      height = std::min(height, highest_);
       width = effective_width(width, height, 1.0);
       // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
       height = std::min(height, width / 3.0);
@@ -108,12 +215,27 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       rise_ += height;
     }
   }
-  box_ = bounding_box(bodies[body], rise_);
-  if (neighbours_.empty()) return;
+  bool certain;
+  box_ = bounding_box(bodies[body], rise_, certain);
+  if (literal_ && !certain) {
+    box_ = bodies[body].field.surface_box();
+    for (const Neighbour& n : neighbours_) box_ = box_.united(bodies[n.body].field.surface_box().inflated(n.profile.width));
+  }
+  if (neighbours_.empty() || literal_) return;
   for (std::uint32_t j = 0; j < bodies.size(); ++j) {
     if (j == body || bodies[j].material.modulus * bodies[j].field.bound(box_).upper < -rise_) continue;
     limiting_.push_back(j);
   }
+}
+
+double ClaimField::literal_rise(const Neighbour& neighbour, const Box& box) const {
+  // h = k x (1 - 2 u)^2 + a0 (12 u^2 - 16 u^3) up to u = x / w = 1/2; the first is 2 k w / 27 at most, the second a0, as is all beyond.
+  const ContactBody& other = bodies_[neighbour.body];
+  const double width = (1.0 + 1e-9) * neighbour.profile.width;
+  const Box near = box.inflated(width);  // the ways of its points end there
+  if (other.field.bound(near).upper < 0.0 || other.field.bound(box).lower >= 0.0) return 0.0;
+  const double steepness = other.material.modulus * other.field.gradient_bound(near);
+  return std::min(highest_, 2.0 / 27.0 * steepness * width + neighbour.profile.height);
 }
 
 void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double> values,
@@ -146,6 +268,12 @@ void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double>
   bool any = false;
   for (const Neighbour& neighbour : neighbours_) {
     const ContactBody& other = bodies_[neighbour.body];
+    if (literal_) {
+      if (!(literal_rise(neighbour, box) > 0.0)) continue;
+      any = true;
+      add_literal(other, neighbour.profile, highest_, points, with_gradients, *scratch);
+      continue;
+    }
     const Interval p = other.field.bound(box);
     if (other.material.modulus * p.upper <= -neighbour.profile.width || p.lower >= 0.0) continue;  // no bulge here
     any = true;
@@ -198,6 +326,10 @@ Interval ClaimField::bound(const Box& box) const {
   claim.lower *= own.material.modulus;
   claim.upper *= own.material.modulus;
   for (const Neighbour& neighbour : neighbours_) {
+    if (literal_) {
+      claim.upper += literal_rise(neighbour, box);
+      continue;
+    }
     const ContactBody& other = bodies_[neighbour.body];
     const Interval p = other.field.bound(box);
     if (p.lower >= 0.0 || other.material.modulus * p.upper <= -neighbour.profile.width) continue;
@@ -210,7 +342,16 @@ Interval ClaimField::bound(const Box& box) const {
 double ClaimField::gradient_bound(const Box& box) const {
   const auto steepness = [&](const ContactBody& body) { return body.material.modulus * body.field.gradient_bound(box); };
   double bulge = 0.0;  // |h'| <= 1
-  for (const Neighbour& neighbour : neighbours_) bulge += steepness(bodies_[neighbour.body]);
+  for (const Neighbour& neighbour : neighbours_) {
+    if (!literal_) {
+      bulge += steepness(bodies_[neighbour.body]);
+    } else if (literal_rise(neighbour, box) > 0.0) {
+      // Around a convex body whose level sets lie at equal distances |h'| <= k + 3 a0 / w; elsewhere k changes with p0.
+      const ContactBody& other = bodies_[neighbour.body];
+      const double k = other.material.modulus * other.field.gradient_bound(box.inflated((1.0 + 1e-9) * neighbour.profile.width));
+      bulge += other.field.core_point(box.centre()) ? k + 3.0 * neighbour.profile.height / neighbour.profile.width : kInfinity;
+    }
+  }
   for (const std::uint32_t j : limiting_) bulge = std::max(bulge, steepness(bodies_[j]));
   return steepness(bodies_[body_]) + bulge;
 }

@@ -578,8 +578,10 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
   archive("bulge_volume", d.bulge_volume, {}, "in place of 'bulge': as high as holds the volume that the contact displaces");
   archive("bulge_width", d.bulge_width, up_to(1.0, kNumber), "share of the other body's feature size");
+  archive("bulge_literal", d.bulge_literal, {}, "as published: by distance instead of pressure, of one width; it pops up at first touch and bulges may cross");
   archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "of the surface samples; auto: a sixth of the smallest feature");
   archive.check(!d.bulge_volume || d.bulge == 0.0, "bulge", "expected no height beside 'bulge_volume'", number_text(d.bulge), "leave out one of the two");
+  archive.check(!d.bulge_volume || !d.bulge_literal, "bulge_literal", "expected false beside 'bulge_volume'", "true", "leave out one of the two");
 }
 
 template <class Archive>

@@ -300,7 +300,8 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   if (scene.contact.stick) {
     model.reaction.stick = {.stiffness = scene.contact.stick->stiffness, .damping = scene.contact.stick->damping};
   }
-  model.bulge = {.attenuation = scene.contact.bulge, .width = scene.contact.bulge_width, .keep_volume = scene.contact.bulge_volume};
+  model.bulge = {.attenuation = scene.contact.bulge, .width = scene.contact.bulge_width, .keep_volume = scene.contact.bulge_volume,
+                 .literal = scene.contact.bulge_literal};
 
   std::vector<BodyPair> forbidden;
   add_pairs(scene, model, faults, forbidden);

@@ -12,6 +12,7 @@ namespace supple::collision {
 namespace {
 
 using testing::Blobs;
+using testing::LinearSphere;
 using testing::Stage;
 
 TEST(BulgeProfile, TakesTheValuesOfTheTheoryAndIsSmooth) {
@@ -148,10 +149,17 @@ TEST(DeformedField, NeverGivesOnePointToTwoBodies) {
   EXPECT_GT(in_both, 20);
 }
 
-TEST(DeformedField, JoinsCompressionAndBulgeWithOneSlope) {
+/// As the default and as published.
+class EitherBulge : public ::testing::TestWithParam<bool> {
+ protected:
+  BulgeSettings settings{.literal = GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(DeformedField, EitherBulge, ::testing::Bool());
+
+TEST_P(EitherBulge, JoinsTheCompressionWithOneSlope) {
   // At p_j = 0 inside body i, both sides have the gradient grad(p_i - p_j) / P_i.
   Touching scene;
-  const DeformedField field(scene.stage.bodies(), 0, scene.stage.surface, {});
+  const DeformedField field(scene.stage.bodies(), 0, scene.stage.surface, settings);
   int tried = 0;
   for (const Vec3& start : random_points(6, 3000)) {
     Vec3 x = start, gb;
@@ -175,9 +183,9 @@ TEST(DeformedField, JoinsCompressionAndBulgeWithOneSlope) {
   EXPECT_GT(tried, 10);
 }
 
-TEST(DeformedField, HasTheGradientOfItsValues) {
+TEST_P(EitherBulge, HasTheGradientOfItsValues) {
   Touching scene;
-  const DeformedField field(scene.stage.bodies(), 0, scene.stage.surface, {});
+  const DeformedField field(scene.stage.bodies(), 0, scene.stage.surface, settings);
   const double h = 1e-6;
   int rough = 0;
   const std::vector<Vec3> points = random_points(7, 400);
@@ -194,11 +202,11 @@ TEST(DeformedField, HasTheGradientOfItsValues) {
   EXPECT_LE(rough, 2);  // a point may lie on a crease
 }
 
-TEST(DeformedField, LiesWithinItsBounds) {
+TEST_P(EitherBulge, LiesWithinItsBounds) {
   Touching scene;
   for (const std::uint32_t body : {0u, 1u}) {
-    const DeformedField field(scene.stage.bodies(), body, scene.stage.surface, {});
-    const ClaimField claim(scene.stage.bodies(), body, scene.stage.surface, {});
+    const DeformedField field(scene.stage.bodies(), body, scene.stage.surface, settings);
+    const ClaimField claim(scene.stage.bodies(), body, scene.stage.surface, settings);
     std::mt19937_64 engine(9);
     for (const Vec3& corner : random_points(10 + body, 300)) {
       const double size = 0.3 * static_cast<double>(engine() >> 11) * 0x1p-53;
@@ -223,6 +231,87 @@ TEST(DeformedField, LiesWithinItsBounds) {
       }
     }
   }
+}
+
+/// Two spheres p = P (1 - rho) whose surfaces overlap by `overlap`; the second lies along +x.
+struct LinearPair {
+  LinearSphere left{Vec3::Zero(), {1.0, 1.0}}, right;
+  Stage stage;
+  implicit::SurfaceSamples samples[2];
+  LinearPair(double overlap, double modulus) : right{Vec3(2.0 - overlap, 0, 0), {1.0, 1.0}} {
+    samples[0] = testing::sphere_samples(left.centre, 1.0, 4000);
+    samples[1] = testing::sphere_samples(right.centre, 1.0, 4000);
+    stage.add(left).samples = &samples[0];
+    stage.add(right, {right.centre}, modulus).samples = &samples[1];
+    stage.solve();
+  }
+  /// What the left claim has beyond its pressure at the distance x outside the right sphere, in a direction off the contact.
+  [[nodiscard]] double lift(double x, const BulgeSettings& settings) {
+    const ClaimField claim(stage.bodies(), 0, stage.surface, settings);
+    const Vec3 at = right.centre + (1.0 + x) * Vec3(-0.6, 0.8, 0.0);
+    const double value = implicit::FieldView(claim).value(at);
+    EXPECT_LE(value, claim.bound(Box{at, at}).upper + 1e-12);
+    return value - stage.bodies()[0].field.value(at);
+  }
+};
+
+TEST(LiteralBulge, PopsUpAtFirstTouch) {
+  // An overlap of 1e-9 has a0 = 0 within 1e-9: h = k x (1 - 2 x / w)^2 has 2 k w / 27 at w / 6. The default has nothing.
+  LinearPair pair(1e-9, 1.0);
+  ASSERT_EQ(pair.stage.surface.summary.size(), 1u);
+  const double w = 0.3;
+  EXPECT_NEAR(pair.lift(w / 6.0, {.width = w, .literal = true}), 2.0 * w / 27.0, 1e-8);
+  EXPECT_NEAR(pair.lift(w / 3.0, {.width = w, .literal = true}), w / 27.0, 1e-8);
+  EXPECT_EQ(pair.lift(1.001 * w, {.width = w, .literal = true}), 0.0);
+  for (const double share : {1.0 / 6.0, 1.0 / 3.0}) EXPECT_LE(pair.lift(share * w, {.width = w}), 1e-9);
+}
+
+TEST(LiteralBulge, OvershootsAndGrowsWithTheStiffnessOfTheOther) {
+  // a0 = .5 p with p = delta k / (1 + k), and k w > 6 a0: h rises above a0 before w / 2, the more the stiffer the other body.
+  const double delta = 0.1, w = 0.4;
+  double before = 0.0;
+  for (const double k : {1.0, 10.0, 100.0}) {
+    LinearPair pair(delta, k);
+    const BulgeSettings literal{.attenuation = 0.5, .width = w, .literal = true};
+    const double a0 = 0.5 * delta * k / (1.0 + k), u = 0.2;
+    const double expected = k * w * u * (1.0 - 2.0 * u) * (1.0 - 2.0 * u) + a0 * u * u * (12.0 - 16.0 * u);
+    EXPECT_NEAR(pair.lift(u * w, literal), expected, 1e-9 * k);
+    EXPECT_NEAR(pair.lift(0.5 * w, literal), a0, 1e-9 * k);
+    EXPECT_GT(expected, a0);
+    EXPECT_GT(expected, 2.0 * before);
+    before = expected;
+    EXPECT_LE(pair.lift(u * w, {.attenuation = 0.5, .width = w}), a0 * (1.0 + 1e-9));
+  }
+}
+
+TEST(LiteralBulge, EndsBelowHalfOfWhatWouldFillTheSpaceAround) {
+  // A partner a thousand times as stiff would lift space far from the body; compact kernels have -c there.
+  const Blobs left({Vec3(-0.42, 0, 0)}, 1.0), right({Vec3(0.42, 0, 0)}, 1.0);
+  Stage stage;
+  stage.add(left.field, left.centre, 1e4);
+  stage.add(right.field, right.centre, 1e7);
+  stage.solve();
+  ASSERT_EQ(stage.surface.summary.size(), 1u);
+  const ClaimField claim(stage.bodies(), 0, stage.surface, {.width = 1.0, .literal = true});
+  const Vec3 behind(0.42 + 0.454202019 + 0.05, 0, 0);
+  EXPECT_NEAR(implicit::FieldView(claim).value(behind), -0.25 * 1e4, 1e-9 * 1e4);
+}
+
+TEST(LiteralBulge, MayClaimAPointForTwoBodies) {
+  // Between equal spheres both pressures are -x where both claims are h(x) - x, which is positive near 0 for a0 > w / 3.
+  LinearPair pair(0.4, 1.0);
+  const auto both = [&](const BulgeSettings& settings) {
+    const double x = 0.01, y = std::sqrt((1.0 + x) * (1.0 + x) - 0.8 * 0.8);
+    const Vec3 at(0.8, y, 0.0);
+    double least = 1.0;
+    for (const std::uint32_t i : {0u, 1u}) {
+      const ClaimField claim(pair.stage.bodies(), i, pair.stage.surface, settings);
+      least = std::min(least, implicit::FieldView(claim).value(at));
+    }
+    return least;
+  };
+  EXPECT_GT(both({.attenuation = 0.8, .width = 0.1, .literal = true}), 0.0);
+  EXPECT_LE(both({.attenuation = 0.8, .width = 0.1}), 1e-12);
 }
 
 TEST(ClaimField, IsContinuousWhereBulgesOfSeveralBodiesMeet) {

@@ -423,6 +423,7 @@ void add_contact(std::vector<Option>& all) {
   beside("bulge", "bulge: $", "0", "0.5");
   beside("bulge_volume", "bulge_volume: $", "false", "true");
   beside("bulge_width", "bulge: 0.5, bulge_width: $", "0.05", "0.5");
+  beside("bulge_literal", "bulge: 0.5, bulge_literal: $", "false", "true");
   // Samples only say where to look for a contact: its points, and so the last digits, depend on them.
   all.push_back(differs("contact.sample_spacing", In::State,
                         {.object = "contact: {modulus: 1000}", .scene = "ground: {height: -0.1, modulus: 1000}\ncontact: {sample_spacing: $}"},

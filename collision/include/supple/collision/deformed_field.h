@@ -24,6 +24,12 @@ struct BulgeSettings {
   double attenuation = 0.4;  ///< alpha: a0 = alpha times the largest contact pressure; 0 switches bulges off
   double width = 0.15;       ///< w: zone width as a share of the other body's feature size [1], > 0
   bool keep_volume = false;  ///< a0 in place of `attenuation` such that the bulge holds what the contact displaces, to first order
+  /// The term as published, for comparison; not beside `keep_volume`. x [m] is the distance to the surface of the other body j
+  /// along grad p_j, k = |grad p_j| where that path ends, and w is `width` times the feature size of j, or of the body
+  /// itself where j has none, whatever a0. Its defects: the bulge pops up at first touch (2 k w / 27 for a0 = 0), rises
+  /// above a0 where w k > 6 a0, and grows with the stiffness of j, at most to half of what would fill the empty space
+  /// around the body; the bulges of two bodies may claim the same point, and those of several add up, in a third body too.
+  bool literal = false;
 };
 
 /// Height a0 [Pa] of a bulge of k = 1 that holds the volume `displaced` [m^3]. The rim of Sigma holds
@@ -38,7 +44,7 @@ struct BulgeSettings {
 /// {p^_i > 0, p^_i >= p^_j}: claims are what polygonise_partition takes. The bulge uses -p_j as its coordinate (k = 1):
 /// h <= -p_j there, so two bulges can never claim the same point, and the C^1 join with the compression is exact. Where
 /// several bodies are near, the sum of the bulges is limited to the smallest -p_m of all of them: claims stay continuous
-/// across every surface and no bulge enters a third body.
+/// across every surface and no bulge enters a third body. `BulgeSettings::literal` has neither.
 class ClaimField {
  public:
   /// @param body  index of the claimant in `bodies`; views are kept, so everything must outlive this
@@ -55,15 +61,19 @@ class ClaimField {
  private:
   struct Neighbour {
     std::uint32_t body;
-    BulgeProfile profile;  ///< in pressure units, k = 1
+    BulgeProfile profile;  ///< in pressure units, k = 1; literal: w [m], k of each point its own
   };
   /// Values, and gradients where `gradients` is not empty.
   void evaluate_claims(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  /// What the literal bulge around a neighbour adds in a box at most [Pa]
+  [[nodiscard]] double literal_rise(const Neighbour& neighbour, const Box& box) const;
 
   std::span<const ContactBody> bodies_;
   std::uint32_t body_;
   std::vector<Neighbour> neighbours_;
   std::vector<std::uint32_t> limiting_;  ///< other bodies that a bulge could reach
+  bool literal_ = false;
+  double highest_ = 0.0;                 ///< of one bulge [Pa]
   double rise_ = 0.0;                    ///< largest possible sum of the bulges [Pa]
   Box box_;                              ///< of {claim >= 0}
 };

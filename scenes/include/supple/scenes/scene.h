@@ -298,6 +298,7 @@ struct ContactDesc {
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
   bool bulge_volume = false;          ///< bulges that hold what the contact displaces
   double bulge_width = 0.15;          ///< share of the other body's feature size
+  bool bulge_literal = false;         ///< the published term, with its defects
   std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
 };
 
