@@ -59,7 +59,8 @@ class PairSolver {
              std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out);
 
  private:
-  bool polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
+  bool polar(PairPressure& pressure, const ContactSettings& settings, double extent,
+             std::span<const ContactBody* const> third, PairResult& out);
   bool parts_are_sound(PairPressure& pressure, double extent);
   void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
@@ -67,6 +68,8 @@ class PairSolver {
                const ContactSettings& settings, PairResult& out);
   void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
              const ContactSettings& settings, PairResult& out);
+  bool polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
+  void clear(PairResult& out);
   void begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out);
   template <class Rule>
   void keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out);
@@ -96,8 +99,9 @@ void PairSolver::add_sums(const PatchSums& sums, const Vec3& reference, ContactS
   load_ += sums.load;
 }
 
-/// One polar patch for each hill. @return false where the rule does not fit
-bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out) {
+/// One polar patch for each hill. @param third  that patches are cut at   @return false where the rule does not fit
+bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent,
+                       std::span<const ContactBody* const> third, PairResult& out) {
   cover_count_ = 0;
   const auto covered = [this](const Vec3& x, double slack) {
     return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
@@ -108,7 +112,7 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
     const std::optional<PeakFrame> frame = finder_.climb(pressure, hill, extent);
     if (!frame || covered(frame->origin, 0.0)) continue;
     const double largest_before = out.summary.largest_pressure;
-    if (!polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, out.points)) {
+    if (!polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, third, out.points)) {
       return false;
     }
     add_sums(polar_.sums(), frame->origin, out.summary);
@@ -213,18 +217,33 @@ bool PairSolver::thirds_press(std::span<const ContactBody> bodies, std::span<con
   return press;
 }
 
-/// Forgets what a rule that did not fit has left, and finds the third bodies that reach the overlap.
-void PairSolver::begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out) {
+/// Forgets what a rule has left.
+void PairSolver::clear(PairResult& out) {
   const BodyPair pair = out.summary.bodies;
   out.summary = {};
   out.summary.bodies = pair;
   out.points.clear();
   first_ = Vec3::Zero();
   load_ = 0.0;
+}
+
+/// After a rule that did not fit; finds the third bodies that reach the overlap.
+void PairSolver::begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out) {
+  clear(out);
   third_bodies_.clear();
   for (const std::uint32_t c : third_) {
     if (bodies[c].field.bound(overlap).upper > 0.0) third_bodies_.push_back(&bodies[c]);
   }
+}
+
+/// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit
+bool PairSolver::polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out) {
+  clear(out);
+  if (!polar(pressure, settings, extent, third_bodies_, out)) return false;
+  if (out.points.point.empty()) return true;  // all of it lies in a third body
+  out.summary.rule = ContactRule::Polar;
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  return true;
 }
 
 /// The summary of a rule that sees all patches at once.
@@ -272,11 +291,8 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
   PairPressure pressure(a, b);
   columns_ = {settings.energy || a.pose.size() > 1, settings.energy || b.pose.size() > 1};
-  out.summary = {};
   out.summary.bodies = pair;
-  out.points.clear();
-  first_ = Vec3::Zero();
-  load_ = 0.0;
+  clear(out);
   cover_count_ = 0;
 
   const Box& overlap = candidates.overlap[k];
@@ -307,18 +323,21 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   }
   const bool any = settings.only == ContactRule::None;
   const bool polar_first = any || settings.only == ContactRule::Polar;
-  bool fits = polar_first && polar(pressure, settings, extent, out);
+  bool fits = polar_first && polar(pressure, settings, extent, {}, out);
   if (convex && polar_first && fits && cover_count_ == 0) {
     // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
     finder_.start_from_scan(pressure, overlap, starts_);
-    fits = polar(pressure, settings, extent, out);
+    fits = polar(pressure, settings, extent, {}, out);
   }
   RuleReason reason = any ? RuleReason::Fits : RuleReason::Asked;
   if (any && !fits) reason = RuleReason::NoGraph;
   if (fits && cover_count_ > 0) {
     out.summary.rule = ContactRule::Polar;
-    if (any && !third_.empty()) fits = !thirds_press(bodies, boxes, out);
-    if (!fits) reason = RuleReason::ThirdBody;
+    if (any && !third_.empty() && thirds_press(bodies, boxes, out)) {
+      // The squeezed regions of bodies with several parts are not cut that exactly.
+      fits = a.pose.size() == 1 && b.pose.size() == 1 && polar_cut(pressure, settings, extent, out);
+      if (!fits) reason = RuleReason::ThirdBody;
+    }
   }
   if (!fits && settings.only == ContactRule::Polar) {
     begin_anew(bodies, overlap, out);

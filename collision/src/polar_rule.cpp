@@ -174,6 +174,8 @@ bool PolarRuleSolver::integrate() {
   const double residual = residual_;
   PatchSums sums;
   double lift = 0.0;
+  const std::size_t thirds = cut_ ? third_.size() : 0;
+  if (cut_) evaluate_thirds(node_.point);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 &slope_a = node_.slope_a[i], &slope_b = node_.slope_b[i];
     const double a = node_.a[i], b = node_.b[i];
@@ -185,6 +187,9 @@ bool PolarRuleSolver::integrate() {
     const double p = (a * rise + b * fall) / (rise + fall);
     lift = std::max(lift, std::abs(a - b) / (rise + fall));
     if (!(cosine > kLeastCosine) || !(p > -residual)) return false;
+    for (std::size_t t = 0; t < thirds; ++t) {
+      if (third_value_[t * n + i] > p) weight_[i] = 0.0;
+    }
     const double area = weight_[i] / cosine, pressure = std::max(p, 0.0);
     normal_[i] = normal;
     area_[i] = area;
@@ -193,7 +198,7 @@ bool PolarRuleSolver::integrate() {
   }
   fine_ = sums;
   lift_ = lift;
-  return sums.load > 0.0;
+  return cut_ || sums.load > 0.0;
 }
 
 /// Distance from Sigma, along +axis for A and -axis for B, to where the body's pressure vanishes; the last entry is the
@@ -255,7 +260,12 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, 
   }
   const std::size_t count = points.volume_point.size() - begin;
   line_value_.resize(count);
-  pressure.evaluate(side, std::span(points.volume_point).subspan(begin), line_value_);
+  const auto added = std::span(points.volume_point).subspan(begin);
+  pressure.evaluate(side, added, line_value_);
+  if (cut_) evaluate_thirds(added);
+  for (std::size_t i = 0; cut_ && i < third_value_.size(); ++i) {
+    if (third_value_[i] > line_value_[i % count]) points.volume_weight[begin + i % count] = 0.0;
+  }
   for (std::size_t i = 0; i < count; ++i) {
     points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
   }
@@ -270,8 +280,11 @@ double PolarRuleSolver::algebraic_error() const {
 }
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                            const std::array<bool, 2>& columns, double extent, PatchPoints& points) {
+                            const std::array<bool, 2>& columns, double extent,
+                            std::span<const ContactBody* const> third, PatchPoints& points) {
   const double error = settings.error;
+  third_ = third;
+  cut_ = false;
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   extent_ = extent;
@@ -281,8 +294,10 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
   const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
+  const bool parts = error < kSplitBelow || !third.empty();
   bool parted = false;
   parted_ = 0;
+  kinks_.clear();
   for (std::size_t r = first; r <= last; ++r) {
     start_rim(rules[r], r == first);
     if (!solve_rim(pressure, rim_, error)) return false;
@@ -291,12 +306,19 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     coarse_ = fine_;
     if (!integrate()) return false;
     if (r == first && error < kSplitBelow) find_kinks(pressure);
-    if (!parted && error < kSplitBelow && kinks_cross()) {
+    if (!third.empty() && taken_by_thirds()) {
+      fine_ = {};
+      estimate_ = 0.0;
+      thickness_ = frame.thickness;
+      return true;
+    }
+    if (!parted && parts && kinks_cross()) {
       parted = true;
       if (solve_split(pressure, settings)) {
         parted_ = static_cast<std::uint32_t>(crossing_.size());
         return finish(pressure, rules[last].column, columns, error, points);
       }
+      if (crossing_.back() >= kinks_.size()) return false;
       r = first - 1;  // begins again as if there were no kinks
       continue;
     }
@@ -322,6 +344,7 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::arra
     }
   }
   for (std::size_t i = 0; i < node_.size(); ++i) {
+    if (cut_ && area_[i] == 0.0) continue;
     points.point.push_back(node_.point[i]);
     points.normal.push_back(normal_[i]);
     points.area.push_back(area_[i]);

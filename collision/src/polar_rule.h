@@ -32,10 +32,12 @@ class PolarRuleSolver {
   /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
   /// @param columns  whether the squeezed region of A, of B is wanted
   /// @param extent  rims farther away are not believed [m]
+  /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
   [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                           const std::array<bool, 2>& columns, double extent, PatchPoints& points);
+                           const std::array<bool, 2>& columns, double extent, std::span<const ContactBody* const> third,
+                           PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about the frame's origin
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
@@ -77,6 +79,10 @@ class PolarRuleSolver {
   };
   void find_kinks(PairPressure& pressure);
   bool kinks_cross();
+  [[nodiscard]] bool taken_by_thirds();
+  void evaluate_thirds(std::span<const Vec3> points);
+  [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
+  [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
@@ -105,9 +111,14 @@ class PolarRuleSolver {
   double estimate_ = 1.0;
   double thickness_ = 0.0;
 
+  std::span<const ContactBody* const> third_;
+  bool cut_ = false;                   // nodes where a third body presses harder do not count
+  std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other
+  std::vector<Vec3> third_slope_;
+  std::vector<int> thirds_seen_;        // 1: pressing harder than the pair somewhere, 2: not so somewhere
   std::uint32_t parted_ = 0;
   std::vector<implicit::Kink> kinks_;
-  std::vector<std::size_t> crossing_;  // kinks that cross the patch
+  std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
   std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
   std::vector<Vec3> fine_rim_;

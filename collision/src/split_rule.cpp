@@ -70,10 +70,64 @@ void PolarRuleSolver::find_kinks(PairPressure& pressure) {
   std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
 }
 
+/// Pressures of the third bodies at points, and their slopes.
+void PolarRuleSolver::evaluate_thirds(std::span<const Vec3> points) {
+  const std::size_t n = points.size();
+  third_value_.resize(third_.size() * n);
+  third_slope_.resize(third_.size() * n);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    const auto value = std::span(third_value_).subspan(t * n, n);
+    const auto slope = std::span(third_slope_).subspan(t * n, n);
+    third_[t]->field.evaluate(points, value, slope);
+    for (double& v : value) v *= third_[t]->material.modulus;
+    for (Vec3& g : slope) g *= third_[t]->material.modulus;
+  }
+}
+
+/// s of a kink; of a third body, how much harder than the pair it presses where the axis through x meets Sigma, to first order.
+double PolarRuleSolver::side_of(std::size_t kink, PairPressure& pressure, const Vec3& x) {
+  if (kink < kinks_.size()) return kinks_[kink].value(x);
+  const ContactBody& body = *third_[kink - kinks_.size()];
+  const double share = frame_.depth[0] / frame_.thickness;
+  double a, b;
+  pressure.evaluate(0, {&x, 1}, {&a, 1});
+  pressure.evaluate(1, {&x, 1}, {&b, 1});
+  return body.material.modulus * body.field.value(x) - (share * a + (1.0 - share) * b);
+}
+
+/// The same with its slope at point i of a batch, for which the third bodies have been evaluated.
+double PolarRuleSolver::side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const {
+  if (kink < kinks_.size()) return kinks_[kink].value(at.point[i], slope);
+  const std::size_t k = (kink - kinks_.size()) * at.size() + i;
+  const double share = frame_.depth[0] / frame_.thickness;
+  slope = third_slope_[k] - (share * at.slope_a[i] + (1.0 - share) * at.slope_b[i]);
+  return third_value_[k] - (share * at.a[i] + (1.0 - share) * at.b[i]);
+}
+
+/// Whether third bodies press harder than the pair all over the patch, as far as its nodes and the rim show.
+bool PolarRuleSolver::taken_by_thirds() {
+  const auto taken = [this](std::size_t n, std::size_t i, double p) {
+    for (std::size_t t = 0; t < third_.size(); ++t) {
+      if (third_value_[t * n + i] > p) return true;
+    }
+    return false;
+  };
+  evaluate_thirds(node_.point);
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    if (!taken(node_.size(), i, pressure_[i])) return false;
+  }
+  follow_rim();
+  evaluate_thirds(fine_rim_);
+  for (std::size_t i = 0; i < fine_rim_.size(); ++i) {
+    if (!taken(fine_rim_.size(), i, 0.0)) return false;
+  }
+  return true;
+}
+
 /// Whether some change their side on the patch, as far as its nodes show and the rim as they give it; keeps which.
 bool PolarRuleSolver::kinks_cross() {
   crossing_.clear();
-  if (kinks_.empty()) return false;
+  if (kinks_.empty() && third_.empty()) return false;
   follow_rim();
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
@@ -82,6 +136,18 @@ bool PolarRuleSolver::kinks_cross() {
         std::any_of(node_.point.begin(), node_.point.end(), other)) {
       crossing_.push_back(k);
     }
+  }
+  if (third_.empty()) return !crossing_.empty();
+  thirds_seen_.assign(third_.size(), 0);
+  const auto look = [this](std::size_t n, std::size_t i, double p) {
+    for (std::size_t t = 0; t < third_.size(); ++t) thirds_seen_[t] |= third_value_[t * n + i] > p ? 1 : 2;
+  };
+  evaluate_thirds(node_.point);
+  for (std::size_t i = 0; i < node_.size(); ++i) look(node_.size(), i, pressure_[i]);
+  evaluate_thirds(fine_rim_);
+  for (std::size_t i = 0; i < fine_rim_.size(); ++i) look(fine_rim_.size(), i, 0.0);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    if (thirds_seen_[t] == 3) crossing_.push_back(kinks_.size() + t);
   }
   return !crossing_.empty();
 }
@@ -134,9 +200,9 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<double>& 
   PressureBatch& batch = rim_batch_;
   batch.point.clear();
   for (const std::size_t k : crossing_) {
-    double before = kinks_[k].value(rim[n - 1]);
+    double before = side_of(k, pressure, rim[n - 1]);
     for (std::size_t i = 0; i < n; ++i) {
-      const double here = kinks_[k].value(rim[i]);
+      const double here = side_of(k, pressure, rim[i]);
       if ((before > 0.0) != (here > 0.0)) {
         batch.point.push_back(rim[i] + here / (here - before) * (rim[(i + n - 1) % n] - rim[i]));
         kink.push_back(k);
@@ -149,10 +215,11 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<double>& 
   std::vector<double> last(kink.size(), 0.0);
   for (int step = 0; step < kCornerSteps; ++step) {
     pressure.evaluate(batch);
+    evaluate_thirds(batch.point);
     bool moved = false;
     for (std::size_t i = 0; i < kink.size(); ++i) {
       Vec3 slope;
-      const double s = kinks_[kink[i]].value(batch.point[i], slope);
+      const double s = side_of(kink[i], batch, i, slope);
       Mat3 rows;
       rows.row(0) = batch.slope_a[i];
       rows.row(1) = batch.slope_b[i];
@@ -191,11 +258,10 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
     std::array<Vec3, kSamples + 1> at;
     for (int j = 0; j <= kSamples; ++j) at[static_cast<std::size_t>(j)] = place(static_cast<double>(j) / kSamples);
     for (const std::size_t k : crossing_) {
-      const implicit::Kink& kink = kinks_[k];
       const auto between = [&](double left, double s_left, double right, double s_right) {
         double share = left + (right - left) * s_left / (s_left - s_right);
         for (int step = 0; step < 3; ++step) {
-          const double s = kink.value(place(share));
+          const double s = side_of(k, pressure, place(share));
           ((s > 0.0) == (s_left > 0.0) ? left : right) = share;
           ((s > 0.0) == (s_left > 0.0) ? s_left : s_right) = s;
           share = left + (right - left) * s_left / (s_left - s_right);
@@ -204,7 +270,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
                               share + 0.5 / kSamples, false});
       };
       std::array<double, kSamples + 1> s;
-      for (std::size_t j = 0; j < s.size(); ++j) s[j] = kink.value(at[j]);
+      for (std::size_t j = 0; j < s.size(); ++j) s[j] = side_of(k, pressure, at[j]);
       for (std::size_t j = 0; j < kSamples; ++j) {
         const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;
         if ((s[j] > 0.0) != (s[j + 1] > 0.0)) {
@@ -216,7 +282,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
         const double bend = s[j - 1] - 2.0 * s[j] + s[j + 1], slope = 0.5 * (s[j + 1] - s[j - 1]);
         if (!(bend * s[j] > 0.0) || !(std::abs(slope) < std::abs(bend))) continue;
         const double vertex = left - slope / bend / kSamples;
-        const double dip = kink.value(place(vertex));
+        const double dip = side_of(k, pressure, place(vertex));
         if ((dip > 0.0) == (s[j] > 0.0)) continue;
         const double before = vertex < left ? left - 1.0 / kSamples : left, after = vertex < left ? left : right;
         between(before, vertex < left ? s[j - 1] : s[j], vertex, dip);
@@ -234,12 +300,13 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
                        x.height * frame_.axis;
     }
     pressure.evaluate(batch);
+    evaluate_thirds(batch.point);
     for (std::size_t c = 0; c < crossings_.size(); ++c) {
       Crossing& x = crossings_[c];
       if (x.good) continue;
       const Vec3 e = rays_.radius[x.ray] * direction(rays_.cosine[x.ray], rays_.sine[x.ray]);
       Vec3 slope;
-      const double s = kinks_[x.kink].value(batch.point[c], slope), gap = batch.a[c] - batch.b[c];
+      const double s = side_of(x.kink, batch, c, slope), gap = batch.a[c] - batch.b[c];
       const Vec3 across = batch.slope_a[c] - batch.slope_b[c];
       const double gr = across.dot(e), gt = across.dot(frame_.axis), sr = slope.dot(e), st = slope.dot(frame_.axis);
       const double determinant = gr * st - gt * sr;
@@ -360,6 +427,7 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
 
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
   const double error = settings.error;
+  cut_ = crossing_.back() >= kinks_.size();
   const bool fine = error < 1e-4;
   const KronrodRule& rule = kronrod_rule(fine);
   const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;

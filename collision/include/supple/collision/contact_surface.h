@@ -25,7 +25,7 @@ enum class RuleReason : std::uint8_t {
   Asked,       ///< `ContactSettings::only`
   Fits,        ///< polar: every patch is seen whole from its peak
   NoGraph,     ///< not polar: a patch is no graph over a disc, or has no peak
-  ThirdBody,   ///< not polar: a third body presses on a patch
+  ThirdBody,   ///< not polar: a third body presses on a patch of bodies with several parts, or cuts it badly
   NoSkeleton,  ///< neither polar nor samples: neither body has a skeleton
 };
 
@@ -70,7 +70,7 @@ struct ContactSurface {
     double residual = 0.0;                 ///< largest |p_A - p_B| / max(P_A, P_B) at the points [1]
     double error_estimate = 0.0;           ///< relative, of force, area and centre of pressure (the largest)
     std::uint32_t patches = 0;             ///< connected components found
-    std::uint32_t kinks = 0;               ///< kinks of the fields (implicit/kinks.h) that polar patches were parted at
+    std::uint32_t kinks = 0;               ///< kinks of the fields (implicit/kinks.h) and third bodies that polar patches were parted at
     std::uint64_t points = 0;              ///< quadrature points on Sigma
     std::uint64_t evaluations = 0;         ///< field evaluations spent
   };
