@@ -336,7 +336,7 @@ TEST(PathTracer, TakesMoreSamplesWhereSurfacesMeetInThePicture) {
       if (std::abs(off) < 0.5) {
         EXPECT_EQ(samples, 16u) << x << ' ' << y;
       } else if (off > 3.0 || off < -8.0) {
-        EXPECT_EQ(samples, 4u) << x << ' ' << y;
+        EXPECT_EQ(samples, 2u) << x << ' ' << y;
       }
     }
 }

@@ -64,13 +64,15 @@ struct Bsdf {
   /// Reciprocal, and dark where the lobe reflects (Ashikhmin & Shirley 2000, eq. 5, for any grazing reflectance g: the
   /// factor is 1 / (1 - 5/28 g), 28/23 for theirs).
   [[nodiscard]] Vec3f base(float cos_out, float cos_in) const {
+    const Vec3f flat = diffuse.cwiseProduct(Vec3f::Ones() - normal_reflectance) * (1.0F / kPi);
+    if (!has_lobe()) return flat;
     const auto fall = [](float c) {
       const float s = 1.0F - 0.5F * c;
       return s * s * s * s * s;
     };
     const float g = grazing_reflectance;
     const float both = (1.0F - g * fall(cos_out)) * (1.0F - g * fall(cos_in)) / (1.0F - g * 5.0F / 28.0F);
-    return diffuse.cwiseProduct(Vec3f::Ones() - normal_reflectance) * (both / kPi);
+    return flat * both;
   }
   [[nodiscard]] float distribution(const Vec3f& h) const {  // Trowbridge & Reitz 1975
     const float a2 = alpha * alpha;

@@ -34,6 +34,7 @@ inline float fall(float t) {
 /// Numbers of all pixels, one array a channel.
 struct Planes {
   std::vector<float> r, g, b, variance;
+  Planes() = default;
   explicit Planes(std::size_t pixels) : r(pixels), g(pixels), b(pixels), variance(pixels) {}
 };
 
@@ -51,6 +52,7 @@ struct Signal {
   std::vector<float> bright;
   std::vector<float> guide;  ///< brightness, a little smoothed
   std::vector<float> scale;  ///< standard errors that count as the same
+  Signal() = default;
   explicit Signal(std::size_t pixels) : light(pixels), next(pixels), noise(pixels), bright(pixels), guide(pixels), scale(pixels) {}
 };
 
@@ -170,7 +172,7 @@ class Filter {
   int height_;
   const Executor& executor_;
   Features f_;
-  std::vector<Signal> signals_;      ///< direct, indirect
+  std::array<Signal, 2> signals_;    ///< direct, indirect
   std::vector<std::uint8_t> mixed_;  ///< whether surfaces meet in a pixel
 };
 
@@ -180,7 +182,7 @@ void Filter::fill(const Film& film, const Vec3f& eye, float footprint) {
   f_.cover = film.cover;
   mixed_.assign(pixels, 0);
   for (const MixedPixel& mixed : film.mixed) mixed_[mixed.pixel] = 1;
-  signals_.assign(2, Signal(pixels));
+  for (Signal& signal : signals_) signal = Signal(pixels);
   rows([&](int y) {
     thread_local std::vector<float> near, cover;
     const Means means(width_, height_, 2);

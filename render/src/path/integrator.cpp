@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kTile = 8;
 constexpr std::uint32_t kEdgeSamples = 8;  // times those of the tile
-constexpr std::uint32_t kRaysAPath = 4;    // camera rays of which one goes on beyond its first surface
+constexpr std::uint32_t kRaysAPath = 2;    // camera rays of which one goes on beyond its first surface
 constexpr std::uint32_t kEdgeStream = 0xfffffff0u;  // those of tiles begin at 0
 constexpr float kWideLobe = 0.2F;          // from this alpha on, reflections are about as smooth as diffuse light
 constexpr float kSharp = 0.5F;             // mirrors whose every camera ray goes on
@@ -46,7 +46,8 @@ class Tracer {
   Tracer(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
          const TraceSettings& settings)
       : geometry_(geometry), lights_(lights), ground_(ground), camera_(camera), settings_(settings),
-        gap_(2e-5F * static_cast<float>(camera.distance)) {}
+        to_world_(camera.view.block<3, 3>(0, 0).transpose()), sun_axes_(lights.sun.to_light), sun_radiance_(lights.sun.radiance()),
+        sun_density_(1.0F / lights.sun.solid_angle()), gap_(2e-5F * static_cast<float>(camera.distance)) {}
 
   /// Of a bundle of neighbouring picks. @param rays_a_path  camera rays of which one goes on beyond its first surface; 0: none
   void sample(std::span<const Pick> picks, std::uint32_t rays_a_path, std::span<Sample> out) const;
@@ -73,6 +74,10 @@ class Tracer {
   const std::optional<GroundPlane>& ground_;
   const CameraMatrices& camera_;
   const TraceSettings& settings_;
+  Eigen::Matrix3f to_world_;
+  Axes sun_axes_;
+  Vec3f sun_radiance_;   // infinite for a point, as is the density of its directions; neither is asked for then
+  float sun_density_;
   float gap_;  // between a surface and the paths that leave it [m]
 };
 
@@ -81,12 +86,11 @@ Ray Tracer::camera_ray(int x, int y, Sampler& random) const {
   const Eigen::Vector2f at((static_cast<float>(x) + jitter.x()) / static_cast<float>(settings_.width),
                            (static_cast<float>(settings_.height - 1 - y) + jitter.y()) / static_cast<float>(settings_.height));
   Vec3f local((2.0F * at.x() - 1.0F) * camera_.half_extent.x(), (2.0F * at.y() - 1.0F) * camera_.half_extent.y(), -1.0F);
-  const Eigen::Matrix3f to_world = camera_.view.block<3, 3>(0, 0).transpose();
-  if (settings_.aperture <= 0.0) return {camera_.eye, (to_world * local).normalized()};
+  if (settings_.aperture <= 0.0) return {camera_.eye, (to_world_ * local).normalized()};
   const Eigen::Vector2f lens = on_disc(random.pair()) * static_cast<float>(settings_.aperture);
   const Vec3f start(lens.x(), lens.y(), 0.0F);
   local = local * static_cast<float>(settings_.focus) - start;
-  return {camera_.eye + to_world * start, (to_world * local).normalized()};
+  return {camera_.eye + to_world_ * start, (to_world_ * local).normalized()};
 }
 
 Tracer::Met Tracer::meet(const Ray& ray, float time, float choice, Place& place, float& distance, std::size_t& light) const {
@@ -139,13 +143,12 @@ Vec3f Tracer::sunlight(const Place& place, const Axes& axes, const Vec3f& out, S
   const Sun& sun = lights_.sun;
   const Eigen::Vector2f u = random.pair();
   if (!sun.shines()) return Vec3f::Zero();
-  direction = sun.is_point() ? sun.to_light : sun.sample(u);
+  direction = sun.is_point() ? sun.to_light : sun_axes_.to_world(sun.sample(u));
   const Vec3f in = axes.to_local(direction);
   const Vec3f f = place.bsdf.evaluate(out, in);
   if (f.maxCoeff() <= 0.0F) return Vec3f::Zero();
   if (sun.is_point()) return f.cwiseProduct(sun.irradiance);
-  const float density = 1.0F / sun.solid_angle();
-  return f.cwiseProduct(sun.radiance()) * (power_share(density, place.bsdf.density(out, in)) / density);
+  return f.cwiseProduct(sun_radiance_) * (power_share(sun_density_, place.bsdf.density(out, in)) / sun_density_);
 }
 
 /// What comes from one of the rectangles.
@@ -198,7 +201,7 @@ Vec3f Tracer::indirect(Place place, const Ray& camera_ray, float time, Sampler& 
     if (met == Met::Nothing) {
       add(lights_.sky(ray.direction));
       const Sun& sun = lights_.sun;
-      if (sun.shines() && sun.contains(ray.direction)) add(sun.radiance() * power_share(density, 1.0F / sun.solid_angle()));
+      if (sun.shines() && sun.contains(ray.direction)) add(sun_radiance_ * power_share(density, sun_density_));
       return sum;
     }
     if (met == Met::Light) {

@@ -26,7 +26,7 @@ struct GroundPlane {
 struct TraceSettings {
   int width = 0;
   int height = 0;
-  int least_samples = 4;       ///< camera rays a pixel, a power of two: from fewer a tile does not know its noise
+  int least_samples = 2;       ///< camera rays a pixel, a power of two: from fewer a tile does not know its noise
   int most_samples = 256;      ///< a pixel, a power of two
   double noise = 0.05;         ///< standard error of a pixel's luminance over (luminance + 0.1), RMS of a tile; 0: most_samples
   int bounces = 6;             ///< surfaces along a path after the first

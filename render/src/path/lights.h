@@ -16,12 +16,12 @@ struct Sun {
   [[nodiscard]] bool shines() const { return irradiance.maxCoeff() > 0.0F; }
   [[nodiscard]] float solid_angle() const { return 2.0F * kPi * (1.0F - cosine); }
   [[nodiscard]] bool is_point() const { return cosine >= 1.0F; }
-  /// Uniform in the cone.
+  /// Uniform in the cone, in axes whose z points to the light.
   [[nodiscard]] Vec3f sample(const Eigen::Vector2f& u) const {
     const Eigen::Vector2f d = on_disc(u);
     const float fall = d.squaredNorm() * (1.0F - cosine);
     const Eigen::Vector2f across = d * std::sqrt((1.0F - cosine) * (2.0F - fall));
-    return Axes(to_light).to_world({across.x(), across.y(), 1.0F - fall});
+    return {across.x(), across.y(), 1.0F - fall};
   }
   /// Radiance such that a face towards the sun gets its irradiance: E / (pi sin^2).
   [[nodiscard]] Vec3f radiance() const { return irradiance / (kPi * (1.0F - cosine * cosine)); }

@@ -19,6 +19,19 @@ Vec3f texel(const std::vector<Vec3f>& texels, int width, int height, float u, fl
   return (1 - fy) * ((1 - fx) * at(x0, y0) + fx * at(x0 + 1, y0)) + fy * ((1 - fx) * at(x0, y0 + 1) + fx * at(x0 + 1, y0 + 1));
 }
 
+Bsdf material(const Item& item, const Vec3f& base) {
+  const auto metallic = static_cast<float>(std::clamp(item.metallic, 0.0, 1.0));
+  const auto reflectance = static_cast<float>(std::clamp(item.reflectance, 0.0, 1.0));
+  Bsdf bsdf;
+  bsdf.diffuse = (1.0F - metallic) * base;
+  bsdf.normal_reflectance = (1.0F - metallic) * Vec3f::Constant(reflectance) + metallic * base;
+  // What reflects less than any solid does not reflect at grazing angles either (Lagarde & de Rousiers 2014).
+  bsdf.grazing_reflectance = std::min(1.0F, 50.0F * bsdf.normal_reflectance.maxCoeff());
+  const auto roughness = static_cast<float>(std::clamp(item.roughness, 0.02, 1.0));
+  bsdf.alpha = roughness * roughness;
+  return bsdf;
+}
+
 bool even(float x) { return (static_cast<long>(std::floor(x)) & 1) == 0; }
 
 }  // namespace
@@ -54,7 +67,7 @@ Vec3f Pattern::colour(const Eigen::Vector2f& p) const {
   return colour(Vec3f(p.x(), p.y(), 0.0F), Vec3f::UnitZ());
 }
 
-PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)), pattern_(item.paint, item.colour) {
+PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)), plain_(material(item, first_)), pattern_(item.paint, item.colour) {
   const Mesh& mesh = *item.mesh;
   const std::array<const std::vector<double>*, 3> rest = {column(mesh, "rest_x"), column(mesh, "rest_y"), column(mesh, "rest_z")};
   const bool patterned = item.paint.kind == PaintKind::Checker || item.paint.kind == PaintKind::Stripes || item.paint.kind == PaintKind::Picture;
@@ -71,7 +84,6 @@ PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)),
 Vec3f PaintSource::colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,
                           const Vec3f& world, const Vec3f& normal) const {
   const Paint& paint = item.paint;
-  if (paint.kind == PaintKind::Plain) return first_;
   if (paint.kind == PaintKind::Normals) return linear_colour(0.5 * normal.cast<double>() + Vec3::Constant(0.5));
   if (paint.kind == PaintKind::Values) {
     const float value = weight[0] * values_[corner[0]] + weight[1] * values_[corner[1]] + weight[2] * values_[corner[2]];
@@ -86,17 +98,8 @@ Vec3f PaintSource::colour(const Item& item, const std::uint32_t* corner, const V
 
 Bsdf PaintSource::bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,
                        const Vec3f& world, const Vec3f& normal, bool on_wire) const {
-  Vec3f base = on_wire ? Vec3f(first_ * (item.surface ? 0.08F : 1.0F)) : colour(item, corner, weight, places, world, normal);
-  const auto metallic = static_cast<float>(std::clamp(item.metallic, 0.0, 1.0));
-  const auto reflectance = static_cast<float>(std::clamp(item.reflectance, 0.0, 1.0));
-  Bsdf bsdf;
-  bsdf.diffuse = (1.0F - metallic) * base;
-  bsdf.normal_reflectance = (1.0F - metallic) * Vec3f::Constant(reflectance) + metallic * base;
-  // What reflects less than any solid does not reflect at grazing angles either (Lagarde & de Rousiers 2014).
-  bsdf.grazing_reflectance = std::min(1.0F, 50.0F * bsdf.normal_reflectance.maxCoeff());
-  const auto roughness = static_cast<float>(std::clamp(item.roughness, 0.02, 1.0));
-  bsdf.alpha = roughness * roughness;
-  return bsdf;
+  if (on_wire) return material(item, first_ * (item.surface ? 0.08F : 1.0F));
+  return item.paint.kind == PaintKind::Plain ? plain_ : material(item, colour(item, corner, weight, places, world, normal));
 }
 
 }  // namespace supple::render::path

@@ -45,6 +45,7 @@ class PaintSource {
   [[nodiscard]] Vec3f colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight,
                              const std::array<Vec3f, 3>& places, const Vec3f& world, const Vec3f& normal) const;
   Vec3f first_ = Vec3f::Zero();  ///< linear
+  Bsdf plain_;                   ///< where the colour is everywhere the same
   Pattern pattern_;
   std::vector<Vec3f> rest_;      ///< object coordinates of the vertices; empty: world
   std::vector<float> values_;    ///< of the vertices
