@@ -1,7 +1,11 @@
 #include "blob_grid.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 #include "field_index.h"
 #include "supple/core/error.h"
@@ -20,106 +24,132 @@ std::int64_t bin_at(std::int64_t cell, int shift) { return cell >> shift; }
 }  // namespace
 
 void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice& lattice) {
+  static_assert(offsetof(PackedPrimitive, position) == 0 && offsetof(PackedPrimitive, inverse_r2) == offsetof(Source, inverse_r2));
   const std::size_t n = primitives.size();
-  const double per_cell = 1.0 / lattice.cell;
-  const bool same_lattice = lattice.cell == lattice_.cell && lattice.origin == lattice_.origin;
+  const bool comparable = lattice.cell == lattice_.cell && lattice.origin == lattice_.origin && last_.size() == n && !forgotten_;
   const int last_shift = shift_;
+  const Cells last_first = first_, last_count = count_;
   lattice_ = lattice;
-  cells_.swap(last_cells_);
-  radius_.swap(last_radius_);
-  cells_.resize(3 * n);
-  radius_.resize(n);
-  std::array<double, 3> low, high;
-  low.fill(1e300);
-  high.fill(-1e300);
-  double least_inverse = 1e300, inverse_r2 = 0.0, radius = 0.0;
+  forgotten_ = false;
+  per_cell_ = 1.0 / lattice.cell;
+  inverse_r2_ = 0.0;
+  last_.resize(n);
+  moved_.clear();
+  __m256d low = _mm256_set1_pd(1e300), high = _mm256_set1_pd(-1e300);
   for (std::size_t i = 0; i < n; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      const auto axis = static_cast<std::size_t>(k);
-      const double u = (primitives[i].position[axis] - lattice.origin[k]) * per_cell;
-      cells_[3 * i + axis] = u;
-      low[axis] = std::min(low[axis], u);
-      high[axis] = std::max(high[axis], u);
+    const __m256d now = _mm256_loadu_pd(primitives[i].position.data()), last = _mm256_load_pd(last_[i].position.data());
+    low = _mm256_min_pd(now, low);
+    high = _mm256_max_pd(now, high);
+    if (!comparable) {
+      _mm256_store_pd(last_[i].position.data(), now);
+    } else if (_mm256_movemask_pd(_mm256_cmp_pd(now, last, _CMP_NEQ_UQ)) != 0) {
+      moved_.push_back(static_cast<std::uint32_t>(i));
     }
-    if (primitives[i].inverse_r2 != inverse_r2) {  // most often all are alike
-      inverse_r2 = primitives[i].inverse_r2;
-      radius = per_cell / std::sqrt(inverse_r2);
-    }
-    radius_[i] = radius;
-    least_inverse = std::min(least_inverse, primitives[i].inverse_r2);
   }
-  reach_ = n == 0 ? 0.0 : per_cell / std::sqrt(least_inverse);
+  alignas(32) Source least, most;
+  _mm256_store_pd(least.position.data(), low);
+  _mm256_store_pd(most.position.data(), high);
+  reach_ = n == 0 ? 0.0 : per_cell_ / std::sqrt(least.inverse_r2);
   support_ = {};
   count_.fill(0);
   shift_ = 3;
   if (n > 0) {
+    const std::array<double, 3> lower = centre_of(least), upper = centre_of(most);
     while (static_cast<double>(2 * bin()) < reach_) ++shift_;
     for (;; ++shift_) {
       for (std::size_t k = 0; k < 3; ++k) {
-        first_[k] = bin_at(low[k], shift_);
-        count_[k] = bin_at(high[k], shift_) - first_[k] + 1;
+        first_[k] = bin_at(lower[k], shift_);
+        count_[k] = bin_at(upper[k], shift_) - first_[k] + 1;
       }
       const double bins = static_cast<double>(count_[0]) * static_cast<double>(count_[1]) * static_cast<double>(count_[2]);
       if (bins <= static_cast<double>(std::max(kFewBins, kBinsPerBlob * static_cast<std::int64_t>(n)))) break;
     }
     for (std::size_t k = 0; k < 3; ++k) {
-      support_.lower[k] = static_cast<std::int64_t>(std::floor(low[k] - reach_)) - 1;
-      support_.upper[k] = static_cast<std::int64_t>(std::floor(high[k] + reach_)) + 1;
+      support_.lower[k] = static_cast<std::int64_t>(std::floor(lower[k] - reach_)) - 1;
+      support_.upper[k] = static_cast<std::int64_t>(std::floor(upper[k] + reach_)) + 1;
     }
   }
-  compare(same_lattice && last_shift == shift_ && last_radius_.size() == n);
-  const auto bins = static_cast<std::size_t>(count_[0] * count_[1] * count_[2]);
+  // Looking at all is cheaper where many moved.
+  change_.all = !comparable || last_shift != shift_ || 8 * moved_.size() > n + 64;
+  change_.balls.clear();
+  const auto reached = [&](const Source& blob) {
+    look_up_radius(blob.inverse_r2);
+    return Ball{centre_of(blob), 1.001 * radius_ + 0.01};
+  };
+  for (const std::uint32_t i : moved_) {
+    if (!change_.all) change_.balls.push_back(reached(last_[i]));
+    last_[i] = {primitives[i].position, primitives[i].inverse_r2};
+    if (!change_.all) change_.balls.push_back(reached(last_[i]));
+  }
+  if (change_.all || first_ != last_first || count_ != last_count || !sort_moved()) sort_all();
+}
+
+void BlobGrid::sort_all() {
+  const std::size_t n = last_.size(), bins = static_cast<std::size_t>(count_[1] * count_[2]) * row_length();
   start_.assign(bins + 1, 0);
   bin_of_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    std::array<std::int64_t, 3> at{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      at[k] = bin_at(cells_[3 * i + k], shift_) - first_[k];
-    }
-    bin_of_[i] = static_cast<std::uint32_t>((at[2] * count_[1] + at[1]) * count_[0] + at[0]);
+    bin_of_[i] = bin_of(last_[i]);
     ++start_[bin_of_[i] + 1];
   }
-  for (std::size_t b = 0; b < bins; ++b) start_[b + 1] += start_[b];
-  order_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) order_[start_[bin_of_[i]]++] = static_cast<std::uint32_t>(i);
-  for (auto* array : {&x_, &y_, &z_}) array->resize(n + kLanes);
-  scale_.resize(n + kLanes);
-  double last_radius = 0.0;
-  float scale = 0.0F;
-  for (std::size_t to = 0; to < n; ++to) {
-    const std::size_t i = order_[to];
-    x_[to] = cells_[3 * i];
-    y_[to] = cells_[3 * i + 1];
-    z_[to] = cells_[3 * i + 2];
-    if (radius_[i] != last_radius) {
-      last_radius = radius_[i];
-      scale = static_cast<float>(1.0 / last_radius);
-    }
-    scale_[to] = scale;
+  for (std::size_t row = 0; row < bins; row += row_length()) {
+    const std::size_t end = row + row_length();
+    for (std::size_t b = row; b < end; ++b) start_[b + 1] += start_[b];
+    start_[end] += 2 + (start_[end] - start_[row]) / 8;
   }
-  for (std::size_t b = bins; b > 0; --b) start_[b] = start_[b - 1];
-  start_[0] = 0;
+  const std::size_t room = start_[bins];
+  order_.resize(room);
+  for (auto* array : {&x_, &y_, &z_}) array->resize(room + kLanes);
+  scale_.resize(room + kLanes);
+  next_ = start_;
+  for (std::size_t i = 0; i < n; ++i) order_[next_[bin_of_[i]]++] = static_cast<std::uint32_t>(i);
+  for (std::size_t row = 0; row < bins; row += row_length()) {
+    for (std::size_t place = start_[row]; place < start_[row + row_length() - 1]; ++place) put(place, order_[place]);
+  }
 }
 
-void BlobGrid::compare(bool comparable) {
-  change_.balls.clear();
-  change_.all = !comparable;
-  if (!comparable) return;
-  const auto reached = [](const double* centre, double radius) {
-    return Ball{{centre[0], centre[1], centre[2]}, 1.001 * radius + 0.01};
-  };
-  const std::size_t n = radius_.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    const double *now = &cells_[3 * i], *last = &last_cells_[3 * i];
-    if (now[0] == last[0] && now[1] == last[1] && now[2] == last[2] && radius_[i] == last_radius_[i]) continue;
-    change_.balls.push_back(reached(last, last_radius_[i]));
-    change_.balls.push_back(reached(now, radius_[i]));
-    if (4 * change_.balls.size() > n + 64) {  // looking at all is then cheaper
-      change_.all = true;
-      change_.balls.clear();
-      return;
+/// Puts those that moved where they belong. @return false where a row has no room
+bool BlobGrid::sort_moved() {
+  std::vector<std::uint32_t> rows;                                 // those that blobs enter, leave or move in
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> entering;  // row and id
+  for (const std::uint32_t i : moved_) {
+    const std::uint32_t last = bin_of_[i], now = bin_of(last_[i]);
+    if (now == last) {
+      const auto begin = order_.begin() + start_[now], end = order_.begin() + start_[now + 1];
+      put(static_cast<std::size_t>(std::lower_bound(begin, end, i) - order_.begin()), i);
+      continue;
     }
+    bin_of_[i] = now;
+    const std::uint32_t from = last / row_length(), to = now / row_length();
+    rows.push_back(to);
+    if (from == to) continue;
+    rows.push_back(from);
+    entering.emplace_back(to, i);
   }
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  std::sort(entering.begin(), entering.end());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> blobs;  // bin and id
+  auto next = entering.begin();
+  for (const std::uint32_t row : rows) {
+    const std::size_t first = std::size_t{row} * row_length(), last = first + row_length() - 1;
+    blobs.clear();
+    for (std::size_t place = start_[first]; place < start_[last]; ++place) {
+      const std::uint32_t i = order_[place];
+      if (bin_of_[i] / row_length() == row) blobs.emplace_back(bin_of_[i], i);
+    }
+    for (; next != entering.end() && next->first == row; ++next) blobs.emplace_back(bin_of_[next->second], next->second);
+    if (blobs.size() > start_[last + 1] - start_[first]) return false;
+    std::sort(blobs.begin(), blobs.end());
+    std::uint32_t place = start_[first];
+    std::size_t bin = first;
+    for (const auto& [at, i] : blobs) {
+      for (; bin < at; ++bin) start_[bin + 1] = place;
+      put(place++, i);
+    }
+    for (; bin < last; ++bin) start_[bin + 1] = place;
+  }
+  return true;
 }
 
 void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const {
@@ -136,7 +166,7 @@ void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin,
   if (from[0] <= to[0]) {
     for (std::int64_t z = from[2]; z <= to[2]; ++z) {
       for (std::int64_t y = from[1]; y <= to[1]; ++y) {
-        const auto row = static_cast<std::size_t>((z * count_[1] + y) * count_[0]);
+        const auto row = static_cast<std::size_t>(z * count_[1] + y) * row_length();
         const std::size_t begin = start_[row + static_cast<std::size_t>(from[0])];
         const std::size_t end = start_[row + static_cast<std::size_t>(to[0]) + 1];
         if (begin < end) blobs::gather(all, begin, end, corner, static_cast<double>(size),

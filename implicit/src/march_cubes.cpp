@@ -104,6 +104,13 @@ Bits reached(const BlocksAbove& above, const Mask& mask) {
   return Steps(words).any();
 }
 
+/// Tiles and those one step up in the block.
+constexpr Bits with_next(Bits tiles) {
+  tiles |= tiles << 1 & ~kFirstX;
+  tiles |= tiles << 4 & ~kFirstY;
+  return tiles | tiles << 16;
+}
+
 /// Marks the edges and cells that the surface crosses, and counts what the tiles will hold.
 void count_block(const BlockTable& table, Block& block) {
   const BlocksAbove above = blocks_above(table, block);
@@ -113,6 +120,7 @@ void count_block(const BlockTable& table, Block& block) {
   expect_owned(frame, block);
   thread_local std::array<std::uint8_t, blobs::kTileNodes * blobs::kTileNodes + 8> corners;
   std::size_t cells = 0;
+  block.vertices = 0;
   block.triangles = 0;
   for (Tile& tile : block.tile) {
     const std::size_t before = std::exchange(tile.first_cell, static_cast<std::uint16_t>(cells));
@@ -131,7 +139,9 @@ void count_block(const BlockTable& table, Block& block) {
       std::copy_n(block.corners.data() + before, std::popcount(tile.cells), corners.data() + cells);
     }
     cells += static_cast<std::size_t>(std::popcount(tile.cells));
-    tile.first_triangle = static_cast<std::uint16_t>(block.triangles);
+    tile.old_vertex = std::exchange(tile.first_vertex, static_cast<std::uint16_t>(block.vertices));
+    tile.old_triangle = std::exchange(tile.first_triangle, static_cast<std::uint16_t>(block.triangles));
+    block.vertices += tile.vertices;
     block.triangles += tile.triangles;
   }
   block.corners.assign(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(cells));
@@ -155,15 +165,18 @@ constexpr auto kTilePlace = kPlaces<blobs::kTile>, kNodePlace = kPlaces<1>;
 /// Vertices on the edges of a block's cells, by the edge's lower node and its axis.
 class VertexTable {
  public:
-  void fill(const BlocksAbove& above) {
-    for (const Tile& tile : above[0]->tile) add(tile, kTilePlace[tile.place], kAll, 0);
+  /// @param own  tiles of the block that are needed
+  void fill(const BlocksAbove& above, Bits own) {
+    for (const Tile& tile : above[0]->tile) {
+      if ((own >> tile.place & 1u) != 0) add(*above[0], tile, kTilePlace[tile.place], kAll, 0);
+    }
     for (unsigned step = 1; step < 7; ++step) {
       if (above[step] == nullptr) continue;
       const Bits face = first_of(step);  // on the block's upper faces
       const int from = node_place(kBlockNodes * static_cast<int>(step & 1u), kBlockNodes * static_cast<int>(step >> 1 & 1u),
                                   kBlockNodes * static_cast<int>(step >> 2));
       for_bits(above[step]->held & face, [&](unsigned at) {
-        add(above[step]->tile[above[step]->rank(at)], from + kTilePlace[at], face, step);
+        add(*above[step], above[step]->tile[above[step]->rank(at)], from + kTilePlace[at], face, step);
       });
     }
   }
@@ -172,8 +185,8 @@ class VertexTable {
 
  private:
   /// Edges that start at `nodes` and run along other axes than `without`.
-  void add(const Tile& tile, int from, Bits nodes, unsigned without) {
-    std::uint32_t vertex = tile.first_vertex;
+  void add(const Block& block, const Tile& tile, int from, Bits nodes, unsigned without) {
+    std::uint32_t vertex = block.first_vertex + tile.first_vertex;
     std::uint32_t* table = vertex_.data() + from;
     for (unsigned axis = 0; axis < 3; ++axis) {
       const Bits edges = tile.edges[axis];
@@ -300,58 +313,155 @@ std::size_t best_fan(const CellTriangles& c, const std::uint32_t* vertex, const 
   return static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
 }
 
-/// Vertices of the last call that move by `more` further than those of the triangles' own block.
-struct Further {
-  std::uint32_t first, count, more;
+/// From the vertex `first` of the last call on, numbers move by `more` than before it.
+struct Shift {
+  std::uint32_t first, more;
 };
 
-/// The triangles of a block stay: only the numbers of their vertices move.
-void renumber_block(const BlockTable& table, const Block& block, Mesh& mesh) {
-  const auto shift_of = [](const Tile& tile) { return tile.first_vertex - tile.old_vertex; };
-  const auto owner = std::find_if(block.tile.begin(), block.tile.end(), [](const Tile& tile) { return tile.vertices > 0; });
-  const std::uint32_t own = owner != block.tile.end() ? shift_of(*owner) : 0;
-  thread_local std::vector<Further> further;
-  further.clear();
-  for (const Block* above : blocks_above(table, block)) {
-    if (above == nullptr || above == &block) continue;
-    for (const Tile& tile : above->tile) {
-      if ((above->solve >> tile.place & 1u) != 0 || tile.vertices == 0 || shift_of(tile) == own) continue;
-      const std::uint32_t more = shift_of(tile) - own;
-      if (!further.empty() && further.back().first + further.back().count == tile.old_vertex && further.back().more == more) {
-        further.back().count += tile.vertices;
-      } else {
-        further.push_back({tile.old_vertex, tile.vertices, more});
-      }
+/// How the vertices move that stay and that triangles of a block may have, in rising order.
+void find_shifts(const BlockTable& table, const Block& block, std::vector<Shift>& shifts) {
+  shifts.clear();
+  std::uint32_t total = 0;
+  const auto add = [&](std::uint32_t from, std::uint32_t to) {
+    if (to - from == total) return;
+    shifts.push_back({from, to - from - total});
+    total = to - from;
+  };
+  const BlocksAbove above = blocks_above(table, block);
+  for (unsigned step = 0; step < 7; ++step) {
+    if (above[step] == nullptr) continue;
+    const Block& other = *above[step];
+    if (other.solve == 0) {
+      if (other.vertices > 0) add(other.old_vertex, other.first_vertex);
+      continue;
     }
+    for_bits(other.held & ~other.solve & first_of(step), [&](unsigned place) {
+      const Tile& tile = other.tile[other.rank(place)];
+      if (tile.vertices > 0) add(other.old_vertex + tile.old_vertex, other.first_vertex + tile.first_vertex);
+    });
   }
-  const std::span vertex(mesh.triangle.data()->data() + 3 * block.first_triangle, 3 * block.triangles);
-  if (further.empty()) {
-    if (own == 0) return;
-    for (std::uint32_t& v : vertex) v += own;
-    return;
-  }
-  thread_local std::vector<std::uint32_t> shift;
-  shift.assign(vertex.size(), own);
-  for (const Further& f : further) {
-    for (std::size_t i = 0; i < vertex.size(); ++i) shift[i] += vertex[i] - f.first < f.count ? f.more : 0;
-  }
-  for (std::size_t i = 0; i < vertex.size(); ++i) vertex[i] += shift[i];
 }
 
-void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint* points, Mesh& mesh) {
-  if (block.triangles == 0) return;
-  if (block.emit == 0) {
-    renumber_block(table, block, mesh);
-    return;
+/// A run of numbers that moves as a whole.
+struct Run {
+  std::size_t from, to, count;
+  const Block* block = nullptr;  ///< of triangles
+};
+
+/// @param block  runs of different blocks are not joined
+void add_run(std::vector<Run>& runs, std::size_t from, std::size_t to, std::size_t count, const Block* block = nullptr) {
+  if (count == 0) return;
+  if (!runs.empty()) {
+    Run& last = runs.back();
+    if (last.from + last.count == from && last.to + last.count == to && last.block == block) {
+      last.count += count;
+      return;
+    }
   }
+  runs.push_back({from, to, count, block});
+}
+
+/// Calls move(run) for those that move down or stay in rising order, then for those that move up in falling order, so that
+/// nothing is overwritten before it has moved.
+template <class Move>
+void for_runs(const std::vector<Run>& runs, const Move& move) {
+  for (const Run& run : runs) {
+    if (run.to <= run.from) move(run);
+  }
+  for (auto run = runs.rbegin(); run != runs.rend(); ++run) {
+    if (run->to > run->from) move(*run);
+  }
+}
+
+/// Moves items in place, page by page, each with the next one under way from memory: a processor foresees no other page.
+template <class Item>
+void move_run(const Run& run, Item* items) {
+  constexpr std::size_t kPage = 4096, kLine = 64, kItems = kPage / sizeof(Item);
+  const auto move = [&](std::size_t i, std::size_t count, std::ptrdiff_t next) {
+    const char* ahead = reinterpret_cast<const char*>(items + run.from + i) + next;
+    for (std::size_t byte = 0; byte < kPage; byte += kLine) _mm_prefetch(ahead + byte, _MM_HINT_T0);
+    std::memmove(static_cast<void*>(items + run.to + i), items + run.from + i, count * sizeof(Item));
+  };
+  if (run.to < run.from) {
+    for (std::size_t i = 0; i < run.count; i += kItems) move(i, std::min(kItems, run.count - i), kPage);
+  } else if (run.to > run.from) {
+    for (std::size_t left = run.count; left > 0; left -= std::min(kItems, left)) {
+      move(left - std::min(kItems, left), std::min(kItems, left), -static_cast<std::ptrdiff_t>(kPage));
+    }
+  }
+}
+
+template <class Item>
+void move_runs(const std::vector<Run>& runs, std::size_t count, std::vector<Item>& items) {
+  if (items.size() < count) items.resize(count);
+  for_runs(runs, [&](const Run& run) { move_run(run, items.data()); });
+  items.resize(count);
+}
+
+/// Copies numbers of vertices in place, moved by their shifts.
+void move_numbers(std::uint32_t* from, std::uint32_t* to, std::size_t count, std::span<const Shift> shifts) {
+  constexpr std::size_t kWide = 8;
+  const auto move_one = [&](std::size_t i) {
+    std::uint32_t moved = from[i];
+    for (const Shift& shift : shifts) moved += from[i] >= shift.first ? shift.more : 0;
+    to[i] = moved;
+  };
+  const std::ptrdiff_t ahead = to <= from ? 1024 : -1024;  // a page, as in move_run
+  const auto move_eight = [&](std::size_t i) {
+    _mm_prefetch(reinterpret_cast<const char*>(from + i + ahead), _MM_HINT_T0);
+    const __m256i vertex = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from + i));
+    __m256i moved = vertex;
+    for (const Shift& shift : shifts) {
+      const __m256i first = _mm256_set1_epi32(static_cast<int>(shift.first));
+      const __m256i reached = _mm256_cmpeq_epi32(_mm256_max_epu32(vertex, first), vertex);
+      moved = _mm256_add_epi32(moved, _mm256_and_si256(reached, _mm256_set1_epi32(static_cast<int>(shift.more))));
+    }
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + i), moved);
+  };
+  const std::size_t whole = count / kWide * kWide;
+  if (to <= from) {
+    for (std::size_t i = 0; i < whole; i += kWide) move_eight(i);
+    for (std::size_t i = whole; i < count; ++i) move_one(i);
+  } else {
+    for (std::size_t i = count; i > whole; --i) move_one(i - 1);
+    for (std::size_t i = whole; i > 0; i -= kWide) move_eight(i - kWide);
+  }
+}
+
+/// Triangles that stay.
+void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::size_t count, Mesh& mesh) {
+  if (mesh.triangle.size() < count) mesh.triangle.resize(count);
+  std::uint32_t* vertex = mesh.triangle.data()->data();
+  std::vector<Shift> shifts;
+  const Block* block = nullptr;
+  for_runs(runs, [&](const Run& run) {
+    if (run.block != block) find_shifts(table, *run.block, shifts);
+    block = run.block;
+    if (run.to != run.from || !shifts.empty()) move_numbers(vertex + 3 * run.from, vertex + 3 * run.to, 3 * run.count, shifts);
+  });
+  mesh.triangle.resize(count);
+}
+
+/// The triangles of the tiles marked `emit`.
+void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint* points, Mesh& mesh) {
+  if (block.emit == 0 || block.triangles == 0) return;
   using Triangle = std::array<std::uint32_t, 3>;
   thread_local std::vector<Triangle> thread_found;
   VertexTable vertices;
-  vertices.fill(blocks_above(table, block));
+  vertices.fill(blocks_above(table, block), with_next(block.emit));
   thread_found.resize(block.triangles + kMostTriangles);
-  Triangle* out = thread_found.data();
-  const std::uint8_t* corners = block.corners.data();
+  std::size_t begin = 0, end = 0;  // of those that follow each other without a gap
+  const auto place_run = [&] {
+    std::copy(thread_found.data() + begin, thread_found.data() + end, mesh.triangle.data() + block.first_triangle + begin);
+  };
   for (const Tile& tile : block.tile) {
+    if ((block.emit >> tile.place & 1u) == 0) continue;
+    if (tile.first_triangle != end) {
+      place_run();
+      begin = tile.first_triangle;
+    }
+    Triangle* out = thread_found.data() + tile.first_triangle;
+    const std::uint8_t* corners = block.corners.data() + tile.first_cell;
     const std::uint32_t* first = vertices.from(kTilePlace[tile.place]);
     for (Bits cells = tile.cells; cells != 0; cells &= cells - 1) {
       const CellTriangles& c = kCellTriangles[*corners++];
@@ -367,42 +477,9 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
       }
       out += c.count;
     }
+    end = tile.first_triangle + std::size_t{tile.triangles};
   }
-  std::copy(thread_found.data(), out, mesh.triangle.data() + block.first_triangle);
-}
-
-/// A run of numbers that moves as a whole.
-struct Run {
-  std::size_t from, to, count;
-};
-
-void add_run(std::vector<Run>& runs, std::size_t from, std::size_t to, std::size_t count) {
-  if (count == 0) return;
-  if (!runs.empty()) {
-    Run& last = runs.back();
-    if (last.from + last.count == from && last.to + last.count == to) {
-      last.count += count;
-      return;
-    }
-  }
-  runs.push_back({from, to, count});
-}
-
-/// Moves runs in place: those that move down in rising order, then those that move up in falling order, so that nothing
-/// is overwritten before it has moved.
-template <class Item>
-void move_runs(const std::vector<Run>& runs, std::size_t count, std::vector<Item>& items) {
-  if (items.size() < count) items.resize(count);
-  const auto move = [&](const Run& run) {
-    std::memmove(static_cast<void*>(items.data() + run.to), items.data() + run.from, run.count * sizeof(Item));
-  };
-  for (const Run& run : runs) {
-    if (run.to < run.from) move(run);
-  }
-  for (auto run = runs.rbegin(); run != runs.rend(); ++run) {
-    if (run->to > run->from) move(*run);
-  }
-  items.resize(count);
+  place_run();
 }
 
 }  // namespace
@@ -413,7 +490,12 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   for (std::size_t b = 0; b < table.block.size(); ++b) {
     Block& block = table.block[b];
     block.solve = 0;
-    if (!block.uniform()) blocks.push_back(static_cast<std::uint32_t>(b));
+    if (!block.uniform()) {
+      blocks.push_back(static_cast<std::uint32_t>(b));
+    } else {
+      block.vertices = 0;
+      block.triangles = 0;
+    }
   }
   const auto for_each_block = [&](const auto& use) {
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
@@ -429,13 +511,26 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   std::vector<Run> same_vertices, same_triangles;
   for (const std::uint32_t b : blocks) {
     Block& block = table.block[b];
-    for (Tile& tile : block.tile) {
-      tile.old_vertex = std::exchange(tile.first_vertex, static_cast<std::uint32_t>(vertices));
-      if ((block.solve >> tile.place & 1u) == 0) add_run(same_vertices, tile.old_vertex, vertices, tile.vertices);
-      vertices += tile.vertices;
-    }
+    block.old_vertex = std::exchange(block.first_vertex, static_cast<std::uint32_t>(vertices));
     block.old_triangle = std::exchange(block.first_triangle, triangles);
-    if (block.emit == 0) add_run(same_triangles, block.old_triangle, triangles, block.triangles);
+    if (block.solve == 0) {
+      add_run(same_vertices, block.old_vertex, vertices, block.vertices);
+    } else {
+      for_bits(block.held & ~block.solve, [&](unsigned place) {
+        const Tile& tile = block.tile[block.rank(place)];
+        add_run(same_vertices, block.old_vertex + tile.old_vertex, vertices + tile.first_vertex, tile.vertices);
+      });
+    }
+    if (block.solve == 0 && block.emit == 0) {
+      add_run(same_triangles, block.old_triangle, triangles, block.triangles, &block);
+    } else {
+      for_bits(block.held & ~block.emit, [&](unsigned place) {
+        const Tile& tile = block.tile[block.rank(place)];
+        const std::size_t old = block.solve == 0 ? tile.first_triangle : tile.old_triangle;
+        add_run(same_triangles, block.old_triangle + old, triangles + tile.first_triangle, tile.triangles, &block);
+      });
+    }
+    vertices += block.vertices;
     triangles += block.triangles;
   }
   lattice::expect_indexable(vertices, lattice);
@@ -443,7 +538,7 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   move_runs(same_vertices, vertices, mesh.position);
   move_runs(same_vertices, vertices, mesh.normal);
   move_runs(same_vertices, vertices, scratch.point);
-  move_runs(same_triangles, triangles, mesh.triangle);
+  move_triangles(table, same_triangles, triangles, mesh);
   for_each_block([&](Block& block) { sampler.solve(table, block, mesh, scratch.point); });
   for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });
 }

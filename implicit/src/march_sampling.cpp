@@ -225,10 +225,11 @@ class BlobSampler final : public Sampler {
     for_bits(wanted, [&](unsigned place) {
       const std::size_t rank = block.rank(place), first = edges.count;
       const Tile& tile = block.tile[rank];
-      if (tile.first_vertex != to + (first - begin)) {
+      const std::size_t vertex = block.first_vertex + tile.first_vertex;
+      if (vertex != to + (first - begin)) {
         place_run();
         begin = first;
-        to = tile.first_vertex;
+        to = vertex;
       }
       collect_edges(above, tile, block.values.data() + kTileNodes * rank, edges);
       blobs::solve_edges(work.leaf_of_block[leaf_of(place)], iso_, edges, first, work.near);
@@ -374,6 +375,7 @@ class BlobSampler final : public Sampler {
       }
       for_blocks_in(table, cells, [&](std::size_t b) {
         Block& block = table.block[b];
+        if (block.changed == kAll) return;
         const Cells base = block.base();
         std::array<std::array<double, 4>, 3> distance2;  // along the axes, of the four tiles
         for (std::size_t k = 0; k < 3; ++k) {
@@ -383,10 +385,11 @@ class BlobSampler final : public Sampler {
             distance2[k][static_cast<std::size_t>(tile)] = off * off;
           }
         }
+        const __m256d along_x = _mm256_loadu_pd(distance2[0].data());
         for (unsigned row = 0; row < 16; ++row) {
           const double left = ball.radius * ball.radius - distance2[1][row & 3u] - distance2[2][row >> 2];
-          if (left < 0.0) continue;
-          for (unsigned x = 0; x < 4; ++x) block.changed |= Bits{distance2[0][x] <= left} << (4 * row + x);
+          const int met = _mm256_movemask_pd(_mm256_cmp_pd(along_x, _mm256_set1_pd(left), _CMP_LE_OQ));
+          block.changed |= static_cast<Bits>(met) << (4 * row);
         }
       });
     }
@@ -639,7 +642,7 @@ class ViewSampler final : public Sampler {
         roots.add(start, end, f0, f1, lattice::guess_root(kMissing, f0, f1, kMissing));
       });
       roots.solve(field_, {}, scale);
-      std::size_t i = 0, vertex = tile.first_vertex;
+      std::size_t i = 0, vertex = block.first_vertex + tile.first_vertex;
       for_edges([&](int x, int y, int z, int axis) {
         const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
         const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);

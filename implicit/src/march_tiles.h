@@ -62,8 +62,9 @@ struct Tile {
   Bits inside = 0;                ///< F > 0
   Bits cells = 0;                 ///< crossed
   std::array<Bits, 3> edges{};    ///< crossed, by axis
-  std::uint32_t first_vertex = 0, old_vertex = 0;  ///< in the mesh, and in that of the last call
-  std::uint16_t first_triangle = 0, triangles = 0; ///< in those of the block
+  std::uint16_t first_vertex = 0, old_vertex = 0;      ///< in those of the block, and before they were last counted
+  std::uint16_t first_triangle = 0, old_triangle = 0;  ///< the same
+  std::uint16_t triangles = 0;
   std::uint16_t first_cell = 0;   ///< in Block::corners
   std::uint8_t vertices = 0;
   std::uint8_t place = 0;         ///< in the block
@@ -85,18 +86,20 @@ void for_tile_edges(const Tile& tile, const Use& use) {
   return (place >> 1 & 1u) | (place >> 2 & 2u) | (place >> 3 & 4u);
 }
 
-struct Block {
+struct alignas(64) Block {
+  // What blocks are asked for again and again lies in one cache line.
   BlockCoord coord{};         ///< lowest node / 16
-  std::vector<Tile> tile;     ///< those that hold values, by place
-  std::vector<float> values;  ///< of these, F at kTileNodes nodes each, x fastest
-  std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, tile by tile
-  std::size_t first_triangle = 0, old_triangle = 0, triangles = 0;  ///< in the mesh, and in that of the last call
-  std::uint64_t kernel_values = 0;    ///< taken in this call
+  std::uint32_t vertices = 0, first_vertex = 0, old_vertex = 0;  ///< in the mesh, and in that of the last call
   Bits held = 0;              ///< tiles with values
   Bits outside = kAll;        ///< tiles with nodes outside
   Bits changed = 0;           ///< sampled anew in this call
   Bits solve = 0;             ///< those whose vertices are not those of the last call
   Bits emit = 0;              ///< those whose triangles may be others
+  std::vector<Tile> tile;     ///< those that hold values, by place
+  std::vector<float> values;  ///< of these, F at kTileNodes nodes each, x fastest
+  std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, tile by tile
+  std::size_t first_triangle = 0, old_triangle = 0, triangles = 0;  ///< in the mesh, and in that of the last call
+  std::uint64_t kernel_values = 0;    ///< taken in this call
   Bits early = 0;             ///< those inside by partial sums, whose values nobody needs yet
   Bits needed = 0;            ///< of these, those next to a node outside
   std::uint8_t decided = 0;   ///< leaves on which bounds show one sign

@@ -440,6 +440,12 @@ TEST_P(MovedBody, GivesTheMeshOfAFreshMesherAndSamplesOnlyWhatMoved) {
   }
   for (std::size_t i = 0; i < 40; ++i) body.parts[i].position += random.in_box(0.05);
   expect_same("some moved", counts);
+  for (int round = 0; round < 8; ++round) {  // more and more where few are: rows of bins run out of room
+    for (std::size_t i = 0; i < 20; ++i) {
+      body.parts[20 * static_cast<std::size_t>(round) + i].position = Vec3(1.3, 1.3, 1.3) + random.in_box(0.15);
+    }
+    expect_same("a crowd", counts);
+  }
   body.skeleton.primitive[3].kernel = Kernel::wyvill(0.25);
   expect_same("one shrank", counts);
   for (Pose& part : body.parts) part.position += random.in_box(0.01);
