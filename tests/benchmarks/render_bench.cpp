@@ -3,16 +3,19 @@
 /// pixels. The body is a ball of 200,000 triangles whose surface waves, so that every frame uploads new vertices.
 ///
 ///   render_bench [gl]                          1280 x 720, soft shadows, 4 samples, PNG included; the first frame apart
+///   render_bench rate [AT_ONCE]                frames a second of the same, several renderers at a time
 ///   render_bench path [NOISE] [OUT.png]        640 x 360 by the path tracer, on matt bodies in a studio, no coat
 ///   render_bench studio FOLDER                 the same bodies as PLY files, for other renderers: see peers/
 #include <time.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "render/shapes.h"
@@ -49,11 +52,16 @@ Mesh waving_ball(int n, double time) {
   return mesh;
 }
 
-int bench_gl() {
-  const fs::path file = fs::temp_directory_path() / "supple_render_bench.png";
+View view_of_ball() {
   View view;
   view.camera = {.from = Vec3(0.5, -6, 2.6), .look_at = Vec3(0, 0, 0.9)};
   view.ground = Ground{};
+  return view;
+}
+
+int bench_gl() {
+  const fs::path file = fs::temp_directory_path() / "supple_render_bench.png";
+  const View view = view_of_ball();
   Mesh mesh = waving_ball(129, 0.0);
   Item item{.mesh = &mesh, .colour = Vec3(0.85, 0.45, 0.2)};
   const double start = cpu_seconds();
@@ -87,6 +95,36 @@ int bench_gl() {
               mesh.triangle_count(), 1e3 * best.total, 1e3 * lines[lines.size() / 2].total, 1e3 * best.upload, 1e3 * best.draw,
               1e3 * best.read_back, 1e3 * best.encode, static_cast<std::uintmax_t>(fs::file_size(file)), hash_of(image).c_str());
   fs::remove(file);
+  return 0;
+}
+
+/// Time, not CPU time, from meshes to files; every renderer has drawn a frame before.
+int bench_rate(int at_once) {
+  constexpr int kFrames = 12;  // each
+  const View view = view_of_ball();
+  std::vector<Mesh> meshes;
+  for (int frame = 0; frame < kFrames; ++frame) meshes.push_back(waving_ball(129, 0.2 * frame));
+  std::vector<std::unique_ptr<Renderer>> renderers;
+  const auto draw = [&](std::size_t k, const Mesh& mesh) {
+    const fs::path file = fs::temp_directory_path() / ("supple_render_bench_" + std::to_string(k) + ".png");
+    const Item item{.mesh = &mesh, .colour = Vec3(0.85, 0.45, 0.2)};
+    write_png(file, renderers[k]->render(view, std::span(&item, 1)));
+    fs::remove(file);
+  };
+  for (int k = 0; k < at_once; ++k) {
+    renderers.push_back(make_renderer({}));
+    draw(static_cast<std::size_t>(k), meshes.front());
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < renderers.size(); ++k)
+    threads.emplace_back([&, k] {
+      for (const Mesh& mesh : meshes) draw(k, mesh);
+    });
+  for (std::thread& thread : threads) thread.join();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::printf("{\"name\": \"render/gl/rate\", \"width\": 1280, \"height\": 720, \"samples\": 4, \"triangles\": %zu, \"at_once\": %d, \"frames_s\": %.2f}\n",
+              meshes.front().triangle_count(), at_once, at_once * kFrames / seconds);
   return 0;
 }
 
@@ -145,12 +183,13 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "gl";
   try {
     if (what == "gl") return bench_gl();
+    if (what == "rate") return bench_rate(argc > 2 ? std::max(1, std::atoi(argv[2])) : 2);
     if (what == "path") return bench_path(argc > 2 ? std::atof(argv[2]) : 0.05, argc > 3 ? argv[3] : "");
     if (what == "studio" && argc > 2) return write_studio(argv[2]);
   } catch (const supple::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return static_cast<int>(error.kind());
   }
-  std::fprintf(stderr, "usage: render_bench [gl] | path [NOISE] [OUT.png] | studio FOLDER\n");
+  std::fprintf(stderr, "usage: render_bench [gl] | rate [AT_ONCE] | path [NOISE] [OUT.png] | studio FOLDER\n");
   return 2;
 }
