@@ -107,7 +107,7 @@ TEST(Paint, ValuesRunThroughTheMap) {
   }
 }
 
-TEST(Paint, MetalsReflectTheirOwnColourAndHaveNoBase) {
+TEST(Paint, MetalsReflectTheirOwnColour) {
   const Mesh ball = sphere(Vec3::Zero(), 0.8, 32);
   Item item{.mesh = &ball, .colour = Vec3(0.9, 0.3, 0.1), .roughness = 0.3};
   View view = front_view();
@@ -126,6 +126,27 @@ TEST(Paint, MetalsReflectTheirOwnColourAndHaveNoBase) {
   const double plastic = whiteness();
   item.metallic = 1.0;
   EXPECT_GT(plastic, 1.5 * whiteness());
+}
+
+TEST(Paint, TheSunShowsInMetalsInItsReflectionOnly) {
+  const Mesh ball = sphere(Vec3::Zero(), 0.8, 32);
+  Item item{.mesh = &ball, .colour = Vec3(0.9, 0.3, 0.1), .roughness = 0.1};
+  View view = front_view();
+  const std::unique_ptr<Renderer> renderer = make_renderer(front_settings());
+  // Share of the face that faces the sun which is another with it than without.
+  const auto changed = [&] {
+    view.light.intensity = 0.0;
+    const Image dark = renderer->render(view, std::span(&item, 1));
+    view.light.intensity = 1.0;
+    const Image lit = renderer->render(view, std::span(&item, 1));
+    int pixels = 0, count = 0;
+    for (double x = -0.5; x <= 0.5; x += 0.05)
+      for (double z = -0.5; z <= 0.5; z += 0.05, ++count) pixels += red(lit, x, z) > red(dark, x, z) + 4 ? 1 : 0;
+    return static_cast<double>(pixels) / count;
+  };
+  EXPECT_GT(changed(), 0.95);
+  item.metallic = 1.0;
+  EXPECT_LT(changed(), 0.25);
 }
 
 TEST(Paint, HalfOpaqueItemsShowHalfOfWhatIsBehind) {
@@ -178,6 +199,26 @@ TEST(Paint, AreaLightsBrightenWhatTheyFace) {
   EXPECT_GT(red(lit, -0.7, 0), red(lit, 0.7, 0) + 20);
   EXPECT_GT(red(lit, 0.7, 0), red(dark, 0.7, 0));
   EXPECT_EQ(away.pixels, dark.pixels);
+}
+
+TEST(Paint, AreaLightsThrowShadowsOfItemsOnItems) {
+  const Mesh mesh = sheet();
+  Mesh screen;  // its umbra on the sheet reaches .19 m to either side of x = 0
+  add_quadrangle(screen, Vec3(-0.52, -0.5, -0.12), Vec3(-0.28, -0.5, -0.12), Vec3(-0.28, -0.5, 0.12), Vec3(-0.52, -0.5, 0.12));
+  const std::array items = {Item{.mesh = &mesh, .colour = Vec3(0.5, 0.5, 0.5), .roughness = 1.0},
+                            Item{.mesh = &screen, .roughness = 1.0, .two_sided = true}};
+  const std::unique_ptr<Renderer> renderer = make_renderer(front_settings());
+  View view = front_view();
+  view.light.intensity = 0.0;
+  const Image dark = renderer->render(view, items);
+  view.area_lights = {{.at = Vec3(-0.8, -1, 0), .facing = Vec3(0.8, 1, 0), .half_sizes = {0.05, 0.05}, .radiance = 300.0}};
+  const Image open = renderer->render(view, std::span(items).first(1));
+  const Image shaded = renderer->render(view, items);
+  for (const double x : {-0.1, 0.0, 0.1}) {
+    EXPECT_GT(red(open, x, 0), red(dark, x, 0) + 20) << x;
+    EXPECT_NEAR(red(shaded, x, 0), red(dark, x, 0), 1) << x;
+    EXPECT_NEAR(red(shaded, x, 0.6), red(open, x, 0.6), 1) << x;
+  }
 }
 
 TEST(ColourMaps, EndWhereTheirTablesEnd) {
