@@ -143,7 +143,7 @@ TEST(Bsdf, ReflectsNoMoreThanComesInFromAnyAngle) {
   for (const float alpha : {0.02F, 0.2F, 0.6F, 1.0F})
     for (const float reflectance : {0.0F, 0.04F, 0.5F})
       for (const float cosine : {0.05F, 0.3F, 0.7F, 1.0F}) {
-        const Bsdf bsdf{.diffuse = Vec3f::Ones() * (1.0F - reflectance), .normal_reflectance = Vec3f::Constant(reflectance),
+        const Bsdf bsdf{.diffuse = Vec3f::Ones(), .normal_reflectance = Vec3f::Constant(reflectance),
                         .grazing_reflectance = reflectance > 0.0F ? 1.0F : 0.0F, .alpha = alpha};
         const Vec3f out(std::sqrt(1.0F - cosine * cosine), 0.0F, cosine);
         double sum = 0.0;
@@ -157,6 +157,26 @@ TEST(Bsdf, ReflectsNoMoreThanComesInFromAnyAngle) {
         }
         EXPECT_LT(sum / kSamples, 1.0 + 0.02) << alpha << ' ' << reflectance << ' ' << cosine;  // 4 standard errors
       }
+}
+
+// The integral of the falls over all directions cancels by the factor's design: what is left is (1 - R0)(1 - g fall(cos)).
+TEST(Bsdf, BaseReflectsWhatTheLobeLeaves) {
+  for (const float grazing : {0.0F, 0.5F, 1.0F})
+    for (const float cosine : {0.1F, 0.5F, 1.0F}) {
+      const Bsdf with{.diffuse = Vec3f(0.2F, 0.6F, 1.0F), .normal_reflectance = Vec3f::Constant(0.1F * grazing), .grazing_reflectance = grazing};
+      Bsdf without = with;
+      without.diffuse = Vec3f::Zero();
+      const Vec3f out(std::sqrt(1.0F - cosine * cosine), 0.0F, cosine);
+      Vec3 sum = Vec3::Zero();
+      constexpr int kSteps = 400;
+      for (int i = 0; i < kSteps; ++i) {
+        const float c = (static_cast<float>(i) + 0.5F) / kSteps;
+        const Vec3f in(0.0F, std::sqrt(1.0F - c * c), c);  // the same for every angle about the normal
+        sum += 2.0 * kPi / kSteps * (with.evaluate(out, in) - without.evaluate(out, in)).cast<double>();
+      }
+      const Vec3 expected = (1.0 - 0.1 * grazing) * (1.0 - grazing * std::pow(1.0 - 0.5 * cosine, 5)) * with.diffuse.cast<double>();
+      EXPECT_LT((sum - expected).norm(), 1e-4) << grazing << ' ' << cosine;
+    }
 }
 
 TEST(Bsdf, DensitiesIntegrateToTheShareAboveTheHorizonAndAgreeWithValues) {
