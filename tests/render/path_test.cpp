@@ -1,4 +1,5 @@
 // The path tracer against closed forms: even light, the sky over a tilted plate, rectangles of light and their shadows.
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <set>
@@ -103,28 +104,31 @@ TEST(PathTracer, LosesNoLightBetweenWhiteBodies) {
   EXPECT_NEAR(sum / count, 1.0, 0.01);
 }
 
-/// Whether each box of 2^-a x 2^-(4-a) holds one of 16 points, for every a: a (0, 4, 2)-net in base 2.
+/// Whether each box of 2^-a x 2^-(m-a) holds one of 2^m points, for every a: a (0, m, 2)-net in base 2.
 bool is_net(const std::vector<Eigen::Vector2f>& points) {
-  for (int a = 0; a <= 4; ++a) {
-    std::set<int> boxes;
+  const int m = static_cast<int>(std::bit_width(points.size())) - 1;
+  for (int a = 0; a <= m; ++a) {
+    std::set<std::pair<int, int>> boxes;
     for (const Eigen::Vector2f& u : points)
-      boxes.insert(static_cast<int>(u.x() * static_cast<float>(1 << a)) * 16 + static_cast<int>(u.y() * static_cast<float>(1 << (4 - a))));
-    if (boxes.size() != 16) return false;
+      boxes.emplace(static_cast<int>(u.x() * static_cast<float>(1 << a)), static_cast<int>(u.y() * static_cast<float>(1 << (m - a))));
+    if (boxes.size() != points.size()) return false;
   }
   return true;
 }
 
 TEST(Sampler, FillsEveryElementaryIntervalOnceByPairs) {
-  for (int pixel = 0; pixel < 20; ++pixel)
-    for (const int dimension : {0, 1, 5}) {
-      std::vector<Eigen::Vector2f> points;
-      for (std::uint32_t s = 0; s < 16; ++s) {
-        Sampler random(pixel, 7, 3, 16, s);
-        for (int d = 0; d < dimension; ++d) static_cast<void>(random.pair());
-        points.push_back(random.pair());
-      }
-      EXPECT_TRUE(is_net(points)) << pixel << ' ' << dimension;
+  const auto points = [](int pixel, int dimension, std::uint32_t count) {
+    std::vector<Eigen::Vector2f> all;
+    for (std::uint32_t s = 0; s < count; ++s) {
+      Sampler random(pixel, 7, 3, count, s);
+      for (int d = 0; d < dimension; ++d) static_cast<void>(random.pair());
+      all.push_back(random.pair());
     }
+    return all;
+  };
+  for (int pixel = 0; pixel < 20; ++pixel)
+    for (const int dimension : {0, 1, 5}) EXPECT_TRUE(is_net(points(pixel, dimension, 16))) << pixel << ' ' << dimension;
+  for (const std::uint32_t count : {256u, 4096u}) EXPECT_TRUE(is_net(points(3, 2, count))) << count;
 }
 
 TEST(Sampler, FillsThemByTheSamplesOfSquareBlocksOfPixelsToo) {
