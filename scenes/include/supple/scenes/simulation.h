@@ -34,7 +34,8 @@ struct SimulationOptions {
 /// Work of one stage so far.
 struct StageProfile {
   std::uint64_t calls = 0;
-  double cpu_s = 0.0;          ///< unless profiling, measured on the first and every 64th call after it, and scaled
+  double cpu_s = 0.0;          ///< unless profiling, measured on the first and every 64th call after it, and scaled; where several frames
+                               ///< are in work at the same time, shared out so that all stages add up to what was taken
   double first_s = 0.0;        ///< measured of the first call: what that sets up is not scaled
   double later_s = 0.0;        ///< measured of later calls
   std::uint64_t timed = 0;     ///< calls that were measured
