@@ -204,7 +204,7 @@ int compare(const Arguments& arguments) {
 
 int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
-  scenes::check_textures(scene);
+  scenes::check_pictures(scene);
   const scenes::Simulation simulation(scene, simulation_options(1));
   for (const std::string& warning : simulation.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {

@@ -142,7 +142,7 @@ std::vector<render::ScaleBar> bars_of(const Scene& scene) {
 
 }  // namespace
 
-void check_textures(const Scene& scene) {
+void check_pictures(const Scene& scene) {
   std::vector<Fault> faults;
   const auto check = [&](const std::optional<TextureDesc>& texture, const std::string& owner) {
     try {
@@ -155,6 +155,9 @@ void check_textures(const Scene& scene) {
   for (const ObstacleDesc& obstacle : scene.obstacles) check(obstacle.texture, "obstacles." + obstacle.name + '.');
   if (scene.ground) check(scene.ground->texture, "ground.");
   if (!faults.empty()) throw Error(ErrorKind::Io, std::move(faults));
+  if (scene.render.renderer == RendererName::Path && !render::has_path_tracer()) {
+    static_cast<void>(render::make_renderer({.kind = render::RendererKind::Path}));  // says what is absent
+  }
 }
 
 std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double time) {

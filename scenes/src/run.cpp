@@ -82,10 +82,7 @@ std::string outcome_of(ErrorKind kind) {
 /// @throws Error
 void check_needs(const Scene& scene, const RunOptions& options, const OutputRequest& outputs) {
   if (!outputs.images) return;
-  check_textures(scene);
-  if (scene.render.renderer == RendererName::Path && !render::has_path_tracer()) {
-    static_cast<void>(render::make_renderer({.kind = render::RendererKind::Path}));  // says what is absent
-  }
+  check_pictures(scene);
   if (outputs.film && options.frames.empty()) render::find_film_program();
 }
 

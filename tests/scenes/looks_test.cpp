@@ -249,8 +249,8 @@ TEST_F(Looks, AbsentTexturesAndFilmMakersAreNamedBeforeAnythingIsRemoved) {
   RunResult result = run_scene(absent, again);
   EXPECT_EQ(result.outcome, "io");
   for (const char* part : {"absent.png", "objects.chain.look.texture.file"}) EXPECT_NE(result.reason.find(part), std::string::npos) << result.reason;
-  EXPECT_THROW(check_textures(absent), Error);
-  EXPECT_NO_THROW(check_textures(scene_with("", kOneCamera)));
+  EXPECT_THROW(check_pictures(absent), Error);
+  EXPECT_NO_THROW(check_pictures(scene_with("", kOneCamera)));
   EXPECT_EQ(render_run(absent, again).outcome, "io");
 
   Scene film = scene_with("", kOneCamera);

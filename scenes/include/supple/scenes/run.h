@@ -76,8 +76,9 @@ struct RunResult {
   PictureTimes pictures;
 };
 
-/// Reads the pictures that textures name, as runs that draw do before they begin. @throws Error{Io} naming key and file
-void check_textures(const Scene& scene);
+/// Looks for what pictures need, as runs that draw do before they begin: the files that textures name, and the path tracer.
+/// @throws Error{Io} naming key and file, Error{Usage} in builds without the renderer asked for
+void check_pictures(const Scene& scene);
 
 /// Simulates, surfaces, renders and films a scene into options.folder:
 /// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, NAME.usda, grids/, contacts/,
