@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <system_error>
 
 #include "output_files.h"
 #include "supple/core/cpu_time.h"
@@ -58,7 +59,11 @@ DrawingCrew::DrawingCrew(const Scene& scene, const RunOptions& options, const Ou
     const std::lock_guard lock(mutex_);
     report_(progress.stage, progress.frame, static_cast<double>(progress.frame) / frames_.back());
   };
-  for (Member& member : members_) member.thread = std::thread([this, &member] { begin(member); });
+  try {
+    for (Member& member : members_) member.thread = std::thread([this, &member] { begin(member); });
+  } catch (const std::system_error&) {
+    // The machine has no more threads: those that began, and the leader, draw all.
+  }
 }
 
 DrawingCrew::~DrawingCrew() { dismiss(true); }
