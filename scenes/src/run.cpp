@@ -263,12 +263,13 @@ std::set<int> parse_frames(const std::string& text) {
     const std::string part = text.substr(at, comma - at);
     int first = 0, last = 0, step = 1, used = 0;
     const int size = static_cast<int>(part.size());
-    if (std::sscanf(part.c_str(), "%d-%d:%d%n", &first, &last, &step, &used) == 3 && used == size) {
-    } else if (step = 1; std::sscanf(part.c_str(), "%d-%d%n", &first, &last, &used) == 2 && used == size) {
-    } else if (std::sscanf(part.c_str(), "%d%n", &first, &used) == 1 && used == size) {
-      last = first;
-    } else {
-      fail(part);
+    const auto all = [&](int wanted, int found) { return found == wanted && used == size; };
+    if (!all(3, std::sscanf(part.c_str(), "%d-%d:%d%n", &first, &last, &step, &used))) {
+      step = 1;
+      if (!all(2, std::sscanf(part.c_str(), "%d-%d%n", &first, &last, &used))) {
+        if (!all(1, std::sscanf(part.c_str(), "%d%n", &first, &used))) fail(part);
+        last = first;
+      }
     }
     if (first < 1 || last < first || step < 1 || last > 10'000'000) fail(part);
     for (int frame = first; frame <= last; frame += step) frames.insert(frame);
