@@ -1,5 +1,5 @@
 /// @file contact_poses.cpp
-/// Contact queries in many random poses: eight cases, worst and middle CPU time and error over the poses, one JSON
+/// Contact queries in many random poses: ten cases, worst and middle CPU time and error over the poses, one JSON
 /// object a line. A query is broad phase, candidates and contact surface of two bodies, through the general path, with
 /// no state from another pose. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are measured against the finest rule for the two bodies in the other order, which has other nodes; what it
@@ -164,6 +164,36 @@ int main(int argc, char** argv) {
       return Pair{{ball.body(), slab.body()},
                   true,
                   sphere_on_flat(kRadius, kE, kE / kRounding, h, centre, -(pose.orientation * Vec3::UnitZ()))};
+    });
+  }
+  // Faces on faces: a rounded box lies flat on a plane, and on the face of another one, turned and shifted.
+  const Vec3 half(0.1, 0.08, 0.05);
+  constexpr double kEdge = 0.02;
+  const auto overlap = [&](Draw& draw) { return draw.logarithmic(0.01, kDeep) * kEdge; };
+  if (wanted("face_on_plane")) {
+    Rigid box(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing);
+    implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+    const Pose origin;
+    measure("face_on_plane", poses, [&](Draw& draw) {
+      const Pose pose = random_pose(draw, draw.uniform(0.0, 1.0) * draw.direction());
+      box.put(pose);
+      const Vec3 up = pose.orientation * Vec3::UnitZ();
+      plane = {pose.position - (half.z() + kEdge - overlap(draw)) * up, up, 1.0};
+      collision::ContactBody ground = single_part(plane, 10.0 * kE / kEdge, origin);
+      ground.fixed = true;
+      return Pair{{box.body(), ground}, false, {}};
+    });
+  }
+  if (wanted("face_on_face")) {
+    Rigid a(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing);
+    Rigid b(linear_shape(implicit::ShapeKind::Box, half, kEdge), 2.0 * kLinearModulus * kE, kSpacing);
+    measure("face_on_face", poses, [&](Draw& draw) {
+      const Pose pose = random_pose(draw, draw.uniform(0.0, 1.0) * draw.direction());
+      a.put(pose);
+      const Vec3 at(draw.uniform(-1.0, 1.0) * half.x(), draw.uniform(-1.0, 1.0) * half.y(), 2.0 * (half.z() + kEdge) - overlap(draw));
+      const Quat turn = pose.orientation * Quat(Eigen::AngleAxisd(draw.uniform(0.0, kPi), Vec3::UnitZ()));
+      b.put({pose.position + pose.orientation * at, turn});
+      return Pair{{a.body(), b.body()}, false, {}};
     });
   }
   /// Bodies without a closed form: a surface point of B is pressed into one of A, normal against normal.
