@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <utility>
 
 #include "field_index.h"
@@ -114,7 +115,8 @@ constexpr Bits with_next(Bits tiles) {
 /// Marks the edges and cells that the surface crosses, and counts what the tiles will hold.
 void count_block(const BlockTable& table, Block& block) {
   const BlocksAbove above = blocks_above(table, block);
-  block.solve = reached(above, [](const Block& b) { return b.changed; });
+  // A root depends on whether the value at the upper end is known.
+  block.solve = block.changed | reached(above, [](const Block& b) { return b.flipped; });
   if (block.solve == 0) return;
   const TileFrame frame(above);
   expect_owned(frame, block);
@@ -145,6 +147,18 @@ void count_block(const BlockTable& table, Block& block) {
     block.triangles += tile.triangles;
   }
   block.corners.assign(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(cells));
+}
+
+/// Brings up to date what the table counts of a block.
+void count_held(BlockTable& table, std::size_t index) {
+  Block& block = table.block[index];
+  table.holds[index] = block.uniform() ? 0 : 1;
+  if (block.uniform()) block.vertices = block.triangles = 0;
+  const Held held{block.tile.size(), sizeof(Block) + block.tile.capacity() * sizeof(Tile) +
+                                         block.values.capacity() * sizeof(float) + block.corners.capacity()};
+  table.held.tiles += held.tiles - block.counted.tiles;
+  table.held.bytes += held.bytes - block.counted.bytes;
+  block.counted = held;
 }
 
 /// Where the nodes of a block and of its upper faces (0..16) stand in a table with four entries for each.
@@ -323,7 +337,7 @@ void find_shifts(const BlockTable& table, const Block& block, std::vector<Shift>
   shifts.clear();
   std::uint32_t total = 0;
   const auto add = [&](std::uint32_t from, std::uint32_t to) {
-    if (to - from == total) return;
+    if (!shifts.empty() && to - from == total) return;
     shifts.push_back({from, to - from - total});
     total = to - from;
   };
@@ -345,20 +359,20 @@ void find_shifts(const BlockTable& table, const Block& block, std::vector<Shift>
 /// A run of numbers that moves as a whole.
 struct Run {
   std::size_t from, to, count;
-  const Block* block = nullptr;  ///< of triangles
+  const Block* block = nullptr;  ///< of triangles whose vertices move by different shifts
+  std::uint32_t more = 0;        ///< of all others
 };
 
-/// @param block  runs of different blocks are not joined
-void add_run(std::vector<Run>& runs, std::size_t from, std::size_t to, std::size_t count, const Block* block = nullptr) {
-  if (count == 0) return;
+void add_run(std::vector<Run>& runs, const Run& run) {
+  if (run.count == 0) return;
   if (!runs.empty()) {
     Run& last = runs.back();
-    if (last.from + last.count == from && last.to + last.count == to && last.block == block) {
-      last.count += count;
+    if (last.from + last.count == run.from && last.to + last.count == run.to && last.block == run.block && last.more == run.more) {
+      last.count += run.count;
       return;
     }
   }
-  runs.push_back({from, to, count, block});
+  runs.push_back(run);
 }
 
 /// Calls move(run) for those that move down or stay in rising order, then for those that move up in falling order, so that
@@ -398,35 +412,69 @@ void move_runs(const std::vector<Run>& runs, std::size_t count, std::vector<Item
   items.resize(count);
 }
 
-/// Copies numbers of vertices in place, moved by their shifts.
+/// Copies numbers of vertices in place, moved by their shifts. @pre there is a shift, and none is before the first
 void move_numbers(std::uint32_t* from, std::uint32_t* to, std::size_t count, std::span<const Shift> shifts) {
-  constexpr std::size_t kWide = 8;
+  constexpr std::size_t kWide = 16;
+  const std::uint32_t base = shifts[0].more;
+  const std::span<const Shift> further = shifts.subspan(1);
   const auto move_one = [&](std::size_t i) {
-    std::uint32_t moved = from[i];
-    for (const Shift& shift : shifts) moved += from[i] >= shift.first ? shift.more : 0;
+    std::uint32_t moved = from[i] + base;
+    for (const Shift& shift : further) moved += from[i] >= shift.first ? shift.more : 0;
     to[i] = moved;
   };
   const std::ptrdiff_t ahead = to <= from ? 1024 : -1024;  // a page, as in move_run
-  const auto move_eight = [&](std::size_t i) {
+  const __m256i first_more = _mm256_set1_epi32(static_cast<int>(base));
+  const auto move_line = [&](std::size_t i) {
     _mm_prefetch(reinterpret_cast<const char*>(from + i + ahead), _MM_HINT_T0);
-    const __m256i vertex = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from + i));
-    __m256i moved = vertex;
-    for (const Shift& shift : shifts) {
-      const __m256i first = _mm256_set1_epi32(static_cast<int>(shift.first));
-      const __m256i reached = _mm256_cmpeq_epi32(_mm256_max_epu32(vertex, first), vertex);
-      moved = _mm256_add_epi32(moved, _mm256_and_si256(reached, _mm256_set1_epi32(static_cast<int>(shift.more))));
+    const auto load = [&](std::size_t k) { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from + i + k)); };
+    const auto store = [&](std::size_t k, __m256i v) { _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + i + k), v); };
+    const __m256i low = load(0), high = load(8);
+    __m256i moved_low = _mm256_add_epi32(low, first_more), moved_high = _mm256_add_epi32(high, first_more);
+    for (const Shift& shift : further) {
+      const __m256i first = _mm256_set1_epi32(static_cast<int>(shift.first)), more = _mm256_set1_epi32(static_cast<int>(shift.more));
+      const auto reached = [&](__m256i v) { return _mm256_and_si256(_mm256_cmpeq_epi32(_mm256_max_epu32(v, first), v), more); };
+      moved_low = _mm256_add_epi32(moved_low, reached(low));
+      moved_high = _mm256_add_epi32(moved_high, reached(high));
     }
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + i), moved);
+    store(0, moved_low);
+    store(8, moved_high);
   };
   const std::size_t whole = count / kWide * kWide;
   if (to <= from) {
-    for (std::size_t i = 0; i < whole; i += kWide) move_eight(i);
+    for (std::size_t i = 0; i < whole; i += kWide) move_line(i);
     for (std::size_t i = whole; i < count; ++i) move_one(i);
   } else {
     for (std::size_t i = count; i > whole; --i) move_one(i - 1);
-    for (std::size_t i = whole; i > 0; i -= kWide) move_eight(i - kWide);
+    for (std::size_t i = whole; i > 0; i -= kWide) move_line(i - kWide);
   }
 }
+
+/// By how much the vertices of blocks move, where all of one do by the same.
+class BlockShifts {
+ public:
+  explicit BlockShifts(const BlockTable& table)
+      : row_(static_cast<std::size_t>(table.count[0])), plane_(row_ * static_cast<std::size_t>(table.count[1])),
+        shift_(table.block.size() + plane_ + row_ + 1, kNone) {}
+  void set(std::size_t index, const Block& block) {
+    if (block.vertices > 0) shift_[index] = block.solve == 0 ? std::int64_t{block.first_vertex - block.old_vertex} : kMany;
+  }
+  /// The run with the shift of all vertices that triangles of the block may have, if they have one.
+  [[nodiscard]] Run with_shift(std::size_t index, const Run& run) const {
+    std::int64_t found = kNone;
+    for (const std::size_t step : {std::size_t{0}, std::size_t{1}, row_, row_ + 1, plane_, plane_ + 1, plane_ + row_}) {
+      const std::int64_t other = shift_[index + step];
+      if (other == kNone || other == found) continue;
+      if (other == kMany || found != kNone) return run;
+      found = other;
+    }
+    return {run.from, run.to, run.count, nullptr, found == kNone ? 0 : static_cast<std::uint32_t>(found)};
+  }
+
+ private:
+  static constexpr std::int64_t kNone = -1, kMany = -2;
+  std::size_t row_, plane_;
+  std::vector<std::int64_t> shift_;
+};
 
 /// Triangles that stay.
 void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::size_t count, Mesh& mesh) {
@@ -435,9 +483,13 @@ void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::
   std::vector<Shift> shifts;
   const Block* block = nullptr;
   for_runs(runs, [&](const Run& run) {
-    if (run.block != block) find_shifts(table, *run.block, shifts);
+    if (run.block == nullptr) {
+      shifts.assign(1, {0, run.more});
+    } else if (run.block != block) {
+      find_shifts(table, *run.block, shifts);
+    }
     block = run.block;
-    if (run.to != run.from || !shifts.empty()) move_numbers(vertex + 3 * run.from, vertex + 3 * run.to, 3 * run.count, shifts);
+    if (run.to != run.from || shifts.size() > 1 || shifts[0].more != 0) move_numbers(vertex + 3 * run.from, vertex + 3 * run.to, 3 * run.count, shifts);
   });
   mesh.triangle.resize(count);
 }
@@ -486,61 +538,74 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
 
 void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice, const Executor& executor,
               MeshScratch& scratch, Mesh& mesh) {
-  std::vector<std::uint32_t> blocks;
-  for (std::size_t b = 0; b < table.block.size(); ++b) {
-    Block& block = table.block[b];
-    block.solve = 0;
-    if (!block.uniform()) {
-      blocks.push_back(static_cast<std::uint32_t>(b));
-    } else {
-      block.vertices = 0;
-      block.triangles = 0;
+  // Vertices follow the nodes of a tile and its upper neighbours, triangles the vertices of these.
+  const auto reach_down = [&] {
+    const std::vector<std::uint8_t> from = table.touched;
+    for (std::size_t b = 0; b < from.size(); ++b) {
+      if (from[b] != 0) for_blocks_below(table, table.block[b], [&](std::size_t below) { table.touched[below] = 1; });
     }
-  }
-  const auto for_each_block = [&](const auto& use) {
-    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) use(table.block[blocks[i]]);
+    std::vector<std::uint32_t> list;
+    for (std::size_t b = 0; b < from.size(); ++b) {
+      if (table.touched[b] != 0 && !table.block[b].uniform()) list.push_back(static_cast<std::uint32_t>(b));
+    }
+    return list;
+  };
+  const std::vector<std::uint32_t> counted = reach_down(), emitting = reach_down();
+  const auto for_each = [&](const std::vector<std::uint32_t>& list, const auto& use) {
+    executor.for_blocks(list.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) use(table.block[list[i]]);
     });
   };
-  for_each_block([&](Block& block) { count_block(table, block); });
-  // Triangles follow the vertices of a tile and its upper neighbours.
-  for_each_block([&](Block& block) {
+  for_each(counted, [&](Block& block) { count_block(table, block); });
+  for_each(emitting, [&](Block& block) {
     block.emit = block.held & reached(blocks_above(table, block), [](const Block& b) { return b.solve; });
   });
+  std::vector<std::uint32_t> blocks;
+  for (std::size_t b = 0; b < table.block.size(); ++b) {
+    if (table.touched[b] != 0) count_held(table, b);
+    if (table.holds[b] != 0) blocks.push_back(static_cast<std::uint32_t>(b));
+  }
   std::size_t vertices = 0, triangles = 0;
   std::vector<Run> same_vertices, same_triangles;
+  BlockShifts shifts(table);
   for (const std::uint32_t b : blocks) {
     Block& block = table.block[b];
     block.old_vertex = std::exchange(block.first_vertex, static_cast<std::uint32_t>(vertices));
-    block.old_triangle = std::exchange(block.first_triangle, triangles);
+    block.old_triangle = std::exchange(block.first_triangle, static_cast<std::uint32_t>(triangles));
     if (block.solve == 0) {
-      add_run(same_vertices, block.old_vertex, vertices, block.vertices);
+      add_run(same_vertices, {block.old_vertex, vertices, block.vertices});
     } else {
       for_bits(block.held & ~block.solve, [&](unsigned place) {
         const Tile& tile = block.tile[block.rank(place)];
-        add_run(same_vertices, block.old_vertex + tile.old_vertex, vertices + tile.first_vertex, tile.vertices);
+        add_run(same_vertices, {std::size_t{block.old_vertex} + tile.old_vertex, vertices + tile.first_vertex, tile.vertices});
       });
     }
-    if (block.solve == 0 && block.emit == 0) {
-      add_run(same_triangles, block.old_triangle, triangles, block.triangles, &block);
-    } else {
-      for_bits(block.held & ~block.emit, [&](unsigned place) {
-        const Tile& tile = block.tile[block.rank(place)];
-        const std::size_t old = block.solve == 0 ? tile.first_triangle : tile.old_triangle;
-        add_run(same_triangles, block.old_triangle + old, triangles + tile.first_triangle, tile.triangles, &block);
-      });
-    }
+    shifts.set(b, block);
     vertices += block.vertices;
     triangles += block.triangles;
   }
-  lattice::expect_indexable(vertices, lattice);
+  for (const std::uint32_t b : blocks) {
+    const Block& block = table.block[b];
+    const auto add_same = [&](std::size_t from, std::size_t to, std::size_t count) {
+      add_run(same_triangles, shifts.with_shift(b, {block.old_triangle + from, block.first_triangle + to, count, &block}));
+    };
+    if (block.solve == 0 && block.emit == 0) {
+      add_same(0, 0, block.triangles);
+      continue;
+    }
+    for_bits(block.held & ~block.emit, [&](unsigned place) {
+      const Tile& tile = block.tile[block.rank(place)];
+      add_same(block.solve == 0 ? tile.first_triangle : tile.old_triangle, tile.first_triangle, tile.triangles);
+    });
+  }
+  lattice::expect_indexable(std::max(vertices, triangles), lattice);
   mesh.columns.clear();
   move_runs(same_vertices, vertices, mesh.position);
   move_runs(same_vertices, vertices, mesh.normal);
   move_runs(same_vertices, vertices, scratch.point);
   move_triangles(table, same_triangles, triangles, mesh);
-  for_each_block([&](Block& block) { sampler.solve(table, block, mesh, scratch.point); });
-  for_each_block([&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });
+  for_each(counted, [&](const Block& block) { sampler.solve(table, block, mesh, scratch.point); });
+  for_each(emitting, [&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });
 }
 
 void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles) {
@@ -715,6 +780,7 @@ const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& latti
   iso = level;
   sampler = march::make_sampler(field, lattice, skip, grid);
   sampler->prepare(executor, table);
+  table.begin_call();
   sampler->sample(executor, table);
   march::assemble(table, *sampler, lattice, executor, scratch, mesh);
   kept = sampler->single_precision();
@@ -723,14 +789,14 @@ const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& latti
   counts.blocks = table.block.size();
   counts.single_precision = sampler->single_precision();
   counts.cell = lattice.cell;
-  for (const march::Block& block : table.block) {
-    counts.tiles += block.tile.size();
-    counts.tiles_sampled += static_cast<std::uint64_t>(std::popcount(block.changed));
-    counts.nodes += block.values.size();
-    counts.kernel_values += block.kernel_values;
-    counts.bytes += sizeof(march::Block) + block.tile.capacity() * sizeof(march::Tile) +
-                    block.values.capacity() * sizeof(float) + block.corners.capacity();
+  for (std::size_t b = 0; b < table.block.size(); ++b) {
+    if (table.touched[b] == 0) continue;
+    counts.tiles_sampled += static_cast<std::uint64_t>(std::popcount(table.block[b].changed));
+    counts.kernel_values += table.block[b].kernel_values;
   }
+  counts.tiles = table.held.tiles;
+  counts.nodes = blobs::kTileNodes * counts.tiles;
+  counts.bytes = table.held.bytes;
   counts.bytes += scratch.bytes() + grid.bytes();
   return mesh;
 }

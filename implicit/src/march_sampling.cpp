@@ -77,6 +77,7 @@ class TileChanges {
       ++tile;
       values = std::copy_n((made ? values_ : old_values_).data() + kTileNodes * from, kTileNodes, values);
     });
+    block.flipped |= block.held ^ held;
     block.held = held;
   }
 
@@ -193,6 +194,7 @@ class BlobSampler final : public Sampler {
 
   void sample(const Executor& executor, BlockTable& table) override {
     const std::vector<std::uint32_t> blocks = grid_.change().all ? all_blocks(table) : changed_blocks(table);
+    for (const std::uint32_t b : blocks) table.touched[b] = 1;
     // A node that touches one outside lies a cell's slope above the iso value at most, but for rare places.
     sure_ = skip_ ? iso_ + static_cast<float>(kSteepest / grid_.reach()) : std::numeric_limits<float>::infinity();
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
@@ -358,15 +360,16 @@ class BlobSampler final : public Sampler {
       }
       for_blocks_in(table, around, [&](std::size_t b) { table.block[b].changed = kAll; });
     });
-    return marked_blocks(table);
+    std::vector<std::uint32_t> list;
+    for (std::size_t b = 0; b < table.block.size(); ++b) {
+      if (table.block[b].changed != 0) list.push_back(static_cast<std::uint32_t>(b));
+    }
+    return list;
   }
 
   /// Marks the tiles whose closed boxes meet what has changed; a tile's box ends at the next tile's first node.
   [[nodiscard]] std::vector<std::uint32_t> changed_blocks(BlockTable& table) const {
-    for (Block& block : table.block) {
-      block.changed = 0;
-      block.kernel_values = 0;
-    }
+    std::vector<std::uint32_t> list;
     for (const blobs::BlobGrid::Ball& ball : grid_.change().balls) {
       blobs::CellBox cells;
       for (std::size_t k = 0; k < 3; ++k) {
@@ -377,30 +380,25 @@ class BlobSampler final : public Sampler {
         Block& block = table.block[b];
         if (block.changed == kAll) return;
         const Cells base = block.base();
-        std::array<std::array<double, 4>, 3> distance2;  // along the axes, of the four tiles
+        alignas(32) std::array<std::array<double, 4>, 3> off2;  // squared distances along the axes, of the four tiles
         for (std::size_t k = 0; k < 3; ++k) {
-          for (int tile = 0; tile < 4; ++tile) {
-            const double low = static_cast<double>(base[k] + kTile * tile);
-            const double off = std::max({low - ball.centre[k], ball.centre[k] - low - kTile, 0.0});
-            distance2[k][static_cast<std::size_t>(tile)] = off * off;
-          }
+          const __m256d centre = _mm256_set1_pd(ball.centre[k]);
+          const __m256d low = _mm256_add_pd(_mm256_set1_pd(static_cast<double>(base[k])), _mm256_setr_pd(0, kTile, 2 * kTile, 3 * kTile));
+          const __m256d beyond = _mm256_sub_pd(_mm256_sub_pd(centre, low), _mm256_set1_pd(kTile));
+          const __m256d off = _mm256_max_pd(_mm256_max_pd(_mm256_sub_pd(low, centre), beyond), _mm256_setzero_pd());
+          _mm256_store_pd(off2[k].data(), _mm256_mul_pd(off, off));
         }
-        const __m256d along_x = _mm256_loadu_pd(distance2[0].data());
+        const __m256d along_x = _mm256_load_pd(off2[0].data());
+        const bool marked = block.changed != 0;
         for (unsigned row = 0; row < 16; ++row) {
-          const double left = ball.radius * ball.radius - distance2[1][row & 3u] - distance2[2][row >> 2];
+          const double left = ball.radius * ball.radius - off2[1][row & 3u] - off2[2][row >> 2];
           const int met = _mm256_movemask_pd(_mm256_cmp_pd(along_x, _mm256_set1_pd(left), _CMP_LE_OQ));
           block.changed |= static_cast<Bits>(met) << (4 * row);
         }
+        if (!marked && block.changed != 0) list.push_back(static_cast<std::uint32_t>(b));
       });
     }
-    return marked_blocks(table);
-  }
-
-  static std::vector<std::uint32_t> marked_blocks(const BlockTable& table) {
-    std::vector<std::uint32_t> list;
-    for (std::size_t b = 0; b < table.block.size(); ++b) {
-      if (table.block[b].changed != 0) list.push_back(static_cast<std::uint32_t>(b));
-    }
+    std::sort(list.begin(), list.end());
     return list;
   }
 
@@ -514,14 +512,21 @@ class BlobSampler final : public Sampler {
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
-  /// @param sampled  blocks that were, in this call: only next to them can an outside node be new
+  /// @param sampled  blocks that were, in this call: only next to their tiles can an outside node be new
   void evaluate_needed(const Executor& executor, std::span<const std::uint32_t> sampled, BlockTable& table) const {
     std::vector<std::uint8_t> near(table.block.size());
     for (const std::uint32_t b : sampled) {
-      const Cells low = table.block[b].base();
-      const blobs::CellBox around{{low[0] - 1, low[1] - 1, low[2] - 1},
-                                  {low[0] + kBlockNodes, low[1] + kBlockNodes, low[2] + kBlockNodes}};
-      for_blocks_in(table, around, [&](std::size_t n) { near[n] = 1; });
+      const Block& block = table.block[b];
+      for (int n = 0; n < 27; ++n) {
+        const std::array<int, 3> step{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+        Bits facing = block.changed;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Bits first = std::array{kFirstX, kFirstY, kFirstZ}[k];
+          if (step[k] != 0) facing &= step[k] < 0 ? first : first << std::array{3, 12, 48}[k];
+        }
+        const BlockCoord at{block.coord[0] + step[0], block.coord[1] + step[1], block.coord[2] + step[2]};
+        if (facing != 0 && table.find(at) != nullptr) near[table.index(at)] = 1;
+      }
     }
     std::vector<std::uint32_t> blocks;
     for (std::size_t b = 0; b < table.block.size(); ++b) {
@@ -534,6 +539,7 @@ class BlobSampler final : public Sampler {
         block.needed = TileSurroundings(table, block).next_to_outside(block.early);
       }
     });
+    for (const std::uint32_t b : blocks) table.touched[b] = 1;
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
       Workspace& work = Workspace::of_thread();
       for (std::size_t i = begin; i < end; ++i) {
@@ -603,6 +609,7 @@ class ViewSampler final : public Sampler {
       block.clear();
       block.changed = kAll;
     }
+    std::fill(table.touched.begin(), table.touched.end(), std::uint8_t{1});
     // By block, so that a block is written by one task.
     std::vector<std::uint8_t> leaves(table.block.size());
     for (const auto& leaf : leaves_) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
@@ -799,13 +806,18 @@ void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const La
   table.lower = first;
   table.count = count;
   table.block.assign(blocks, Block{});
+  table.touched.assign(blocks, 1);
+  table.holds.assign(blocks, 0);
   std::size_t b = 0;
   for (std::int32_t z = 0; z < table.count[2]; ++z) {
     for (std::int32_t y = 0; y < table.count[1]; ++y) {
       for (std::int32_t x = 0; x < table.count[0]; ++x) {
         const BlockCoord coord{table.lower[0] + x, table.lower[1] + y, table.lower[2] + z};
         if (old.find(coord) != nullptr) table.block[b] = std::move(old.block[old.index(coord)]);
-        table.block[b++].coord = coord;
+        table.block[b].coord = coord;
+        table.holds[b] = table.block[b].uniform() ? 0 : 1;
+        table.held.tiles += table.block[b].counted.tiles;
+        table.held.bytes += table.block[b++].counted.bytes;
       }
     }
   }

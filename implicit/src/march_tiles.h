@@ -86,23 +86,30 @@ void for_tile_edges(const Tile& tile, const Use& use) {
   return (place >> 1 & 1u) | (place >> 2 & 2u) | (place >> 3 & 4u);
 }
 
+/// What blocks hold.
+struct Held {
+  std::uint64_t tiles = 0, bytes = 0;
+};
+
 struct alignas(64) Block {
   // What blocks are asked for again and again lies in one cache line.
   BlockCoord coord{};         ///< lowest node / 16
-  std::uint32_t vertices = 0, first_vertex = 0, old_vertex = 0;  ///< in the mesh, and in that of the last call
+  std::uint32_t vertices = 0, first_vertex = 0, old_vertex = 0;        ///< in the mesh, and in that of the last call
+  std::uint32_t triangles = 0, first_triangle = 0, old_triangle = 0;  ///< the same
   Bits held = 0;              ///< tiles with values
-  Bits outside = kAll;        ///< tiles with nodes outside
-  Bits changed = 0;           ///< sampled anew in this call
   Bits solve = 0;             ///< those whose vertices are not those of the last call
   Bits emit = 0;              ///< those whose triangles may be others
-  std::vector<Tile> tile;     ///< those that hold values, by place
-  std::vector<float> values;  ///< of these, F at kTileNodes nodes each, x fastest
-  std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, tile by tile
-  std::size_t first_triangle = 0, old_triangle = 0, triangles = 0;  ///< in the mesh, and in that of the last call
-  std::uint64_t kernel_values = 0;    ///< taken in this call
+  Bits outside = kAll;        ///< tiles with nodes outside
+  Bits changed = 0;           ///< sampled anew in this call: what moved may reach their nodes or those next to them
+  Bits flipped = 0;           ///< those that hold values and did not before, or the other way round
   Bits early = 0;             ///< those inside by partial sums, whose values nobody needs yet
   Bits needed = 0;            ///< of these, those next to a node outside
   std::uint8_t decided = 0;   ///< leaves on which bounds show one sign
+  std::vector<Tile> tile;     ///< those that hold values, by place
+  std::vector<float> values;  ///< of these, F at kTileNodes nodes each, x fastest
+  std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, tile by tile
+  std::uint64_t kernel_values = 0;    ///< taken in this call
+  Held counted;                       ///< when it was last counted
 
   /// All outside, memory kept.
   void clear() {
@@ -110,7 +117,7 @@ struct alignas(64) Block {
     values.clear();
     corners.clear();
     kernel_values = 0;
-    held = changed = early = needed = 0;
+    held = changed = flipped = early = needed = 0;
     outside = kAll;
     decided = 0;
   }
@@ -134,7 +141,18 @@ struct alignas(64) Block {
 struct BlockTable {
   BlockCoord lower{}, count{};
   std::vector<Block> block;
+  std::vector<std::uint8_t> touched;  ///< by block: whether something of it was made anew in this call
+  std::vector<std::uint8_t> holds;    ///< by block: whether it held values when it was last counted
+  Held held;                          ///< of all blocks
 
+  /// Forgets what was made anew.
+  void begin_call() {
+    for (std::size_t b = 0; b < block.size(); ++b) {
+      if (touched[b] == 0) continue;
+      touched[b] = 0;
+      block[b].changed = block[b].flipped = block[b].solve = block[b].emit = block[b].kernel_values = 0;
+    }
+  }
   [[nodiscard]] std::size_t index(const BlockCoord& c) const {
     return (static_cast<std::size_t>(c[2] - lower[2]) * static_cast<std::size_t>(count[1]) +
             static_cast<std::size_t>(c[1] - lower[1])) * static_cast<std::size_t>(count[0]) +
@@ -147,6 +165,15 @@ struct BlockTable {
     return &block[index(c)];
   }
 };
+
+/// Calls use(index) for a block and the seven below it, those that there are.
+template <class Use>
+void for_blocks_below(const BlockTable& table, const Block& block, const Use& use) {
+  for (int step = 0; step < 8; ++step) {
+    const BlockCoord at{block.coord[0] - (step & 1), block.coord[1] - (step >> 1 & 1), block.coord[2] - (step >> 2)};
+    if (table.find(at) != nullptr) use(table.index(at));
+  }
+}
 
 /// A block and the seven above it, by the steps along x, y, z in bits; null where there is none.
 using BlocksAbove = std::array<const Block*, 8>;
