@@ -153,7 +153,7 @@ void count_block(const BlockTable& table, Block& block) {
 void count_held(BlockTable& table, std::size_t index) {
   Block& block = table.block[index];
   table.holds[index] = block.uniform() ? 0 : 1;
-  if (block.uniform()) block.vertices = block.triangles = 0;
+  if (block.uniform()) block.vertices = block.triangles = block.point_room = 0;
   const Held held{block.tile.size(), sizeof(Block) + block.tile.capacity() * sizeof(Tile) +
                                          block.values.capacity() * sizeof(float) + block.corners.capacity()};
   table.held.tiles += held.tiles - block.counted.tiles;
@@ -176,8 +176,8 @@ constexpr auto kPlaces = [] {
 }();
 constexpr auto kTilePlace = kPlaces<blobs::kTile>, kNodePlace = kPlaces<1>;
 
-/// Vertices on the edges of a block's cells, by the edge's lower node and its axis.
-class VertexTable {
+/// Points of the vertices on the edges of a block's cells, by the edge's lower node and its axis.
+class PointTable {
  public:
   /// @param own  tiles of the block that are needed
   void fill(const BlocksAbove& above, Bits own) {
@@ -195,29 +195,29 @@ class VertexTable {
     }
   }
   /// From a node on, by kEdgePlace.
-  [[nodiscard]] const std::uint32_t* from(int node) const { return vertex_.data() + node; }
+  [[nodiscard]] const std::uint32_t* from(int node) const { return point_.data() + node; }
 
  private:
   /// Edges that start at `nodes` and run along other axes than `without`.
   void add(const Block& block, const Tile& tile, int from, Bits nodes, unsigned without) {
-    std::uint32_t vertex = block.first_vertex + tile.first_vertex;
-    std::uint32_t* table = vertex_.data() + from;
+    std::uint32_t point = block.first_point + tile.first_vertex;
+    std::uint32_t* table = point_.data() + from;
     for (unsigned axis = 0; axis < 3; ++axis) {
       const Bits edges = tile.edges[axis];
       if (nodes == kAll) {
-        for_bits(edges, [&](unsigned node) { table[static_cast<unsigned>(kNodePlace[node]) + axis] = vertex++; });
+        for_bits(edges, [&](unsigned node) { table[static_cast<unsigned>(kNodePlace[node]) + axis] = point++; });
         continue;
       }
       if ((without >> axis & 1u) == 0) {
         for_bits(edges & nodes, [&](unsigned node) {
           table[static_cast<unsigned>(kNodePlace[node]) + axis] =
-              vertex + static_cast<std::uint32_t>(std::popcount(edges & ((Bits{1} << node) - 1)));
+              point + static_cast<std::uint32_t>(std::popcount(edges & ((Bits{1} << node) - 1)));
         });
       }
-      vertex += static_cast<std::uint32_t>(std::popcount(edges));
+      point += static_cast<std::uint32_t>(std::popcount(edges));
     }
   }
-  std::array<std::uint32_t, 4 * kTableSide * kTableSide * kTableSide> vertex_;
+  std::array<std::uint32_t, 4 * kTableSide * kTableSide * kTableSide> point_;
 };
 
 /// From the place of a cell to that of its edges.
@@ -291,9 +291,9 @@ constexpr auto kCellTriangles = [] {
 /// Corners of a cell's loop and their normals, behind an unused number.
 struct LoopCorner {
   __m128 place, normal;
-  LoopCorner(const CellTriangles& c, std::size_t k, const std::uint32_t* vertex, const EdgePoint* points) {
+  LoopCorner(const CellTriangles& c, std::size_t k, const std::uint32_t* point, const EdgePoint* points) {
     const EdgeLine& line = kEdgeLine[c.edge[k]];
-    normal = _mm_load_ps(&points[vertex[c.corner[k]]].t);
+    normal = _mm_load_ps(&points[point[c.corner[k]]].t);
     const __m128 t = _mm_permute_ps(normal, 0);
     place = _mm_add_ps(_mm_load_ps(line.start.data()), _mm_mul_ps(t, _mm_load_ps(line.along.data())));
   }
@@ -311,13 +311,13 @@ __m128 bends(const LoopCorner& a0, const LoopCorner& a1, const LoopCorner& b0, c
 }
 
 /// The fan of a cell whose chords lie closest to the surface.
-std::size_t best_fan(const CellTriangles& c, const std::uint32_t* vertex, const EdgePoint* points) {
-  const LoopCorner first(c, 0, vertex, points), second(c, 1, vertex, points), third(c, 2, vertex, points), fourth(c, 3, vertex, points);
+std::size_t best_fan(const CellTriangles& c, const std::uint32_t* point, const EdgePoint* points) {
+  const LoopCorner first(c, 0, point, points), second(c, 1, point, points), third(c, 2, point, points), fourth(c, 3, point, points);
   if (c.size != 5) {
     const __m128 bend = bends(first, third, second, fourth);
     return _mm_comilt_ss(_mm_movehdup_ps(bend), bend) != 0 ? 1 : 0;
   }
-  const LoopCorner fifth(c, 4, vertex, points);
+  const LoopCorner fifth(c, 4, point, points);
   alignas(16) std::array<std::array<float, 4>, 3> chord;  // from corner k to k + 2
   _mm_store_ps(chord[0].data(), bends(first, third, second, fourth));
   _mm_store_ps(chord[1].data(), bends(third, fifth, fourth, first));
@@ -327,7 +327,7 @@ std::size_t best_fan(const CellTriangles& c, const std::uint32_t* vertex, const 
   return static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
 }
 
-/// From the vertex `first` of the last call on, numbers move by `more` than before it.
+/// From the number `first` on, numbers move by `more` further than before it.
 struct Shift {
   std::uint32_t first, more;
 };
@@ -412,8 +412,8 @@ void move_runs(const std::vector<Run>& runs, std::size_t count, std::vector<Item
   items.resize(count);
 }
 
-/// Copies numbers of vertices in place, moved by their shifts. @pre there is a shift, and none is before the first
-void move_numbers(std::uint32_t* from, std::uint32_t* to, std::size_t count, std::span<const Shift> shifts) {
+/// Copies numbers of vertices, moved by their shifts; may be in place. @pre there is a shift, and none is before the first
+void move_numbers(const std::uint32_t* from, std::uint32_t* to, std::size_t count, std::span<const Shift> shifts) {
   constexpr std::size_t kWide = 16;
   const std::uint32_t base = shifts[0].more;
   const std::span<const Shift> further = shifts.subspan(1);
@@ -489,9 +489,27 @@ void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::
       find_shifts(table, *run.block, shifts);
     }
     block = run.block;
-    if (run.to != run.from || shifts.size() > 1 || shifts[0].more != 0) move_numbers(vertex + 3 * run.from, vertex + 3 * run.to, 3 * run.count, shifts);
+    if (run.to == run.from && shifts.size() == 1 && shifts[0].more == 0) return;
+    move_numbers(vertex + 3 * run.from, vertex + 3 * run.to, 3 * run.count, shifts);
   });
   mesh.triangle.resize(count);
+}
+
+/// From points of a block and of those above it to the numbers of their vertices.
+void find_numbers(const BlocksAbove& above, std::vector<Shift>& numbers) {
+  numbers.clear();
+  for (const Block* block : above) {
+    if (block != nullptr && block->vertices > 0) numbers.push_back({block->first_point, block->first_vertex - block->first_point});
+  }
+  std::sort(numbers.begin(), numbers.end(), [](const Shift& a, const Shift& b) { return a.first < b.first; });
+  std::size_t kept = 0;
+  std::uint32_t total = 0;
+  for (const Shift number : numbers) {
+    if (kept > 0 && number.more == total) continue;
+    numbers[kept++] = {number.first, number.more - total};
+    total = number.more;
+  }
+  numbers.resize(kept);
 }
 
 /// The triangles of the tiles marked `emit`.
@@ -499,12 +517,22 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
   if (block.emit == 0 || block.triangles == 0) return;
   using Triangle = std::array<std::uint32_t, 3>;
   thread_local std::vector<Triangle> thread_found;
-  VertexTable vertices;
-  vertices.fill(blocks_above(table, block), with_next(block.emit));
+  thread_local std::vector<Shift> numbers;
+  PointTable table_of_points;
+  const BlocksAbove above = blocks_above(table, block);
+  table_of_points.fill(above, with_next(block.emit));
+  find_numbers(above, numbers);
   thread_found.resize(block.triangles + kMostTriangles);
   std::size_t begin = 0, end = 0;  // of those that follow each other without a gap
   const auto place_run = [&] {
-    std::copy(thread_found.data() + begin, thread_found.data() + end, mesh.triangle.data() + block.first_triangle + begin);
+    if (begin == end) return;
+    const Triangle *from = thread_found.data() + begin, *to_end = thread_found.data() + end;
+    Triangle* to = mesh.triangle.data() + block.first_triangle + begin;
+    if (numbers.size() == 1 && numbers[0].more == 0) {
+      std::copy(from, to_end, to);
+    } else {
+      move_numbers(from->data(), to->data(), 3 * (end - begin), numbers);
+    }
   };
   for (const Tile& tile : block.tile) {
     if ((block.emit >> tile.place & 1u) == 0) continue;
@@ -514,17 +542,17 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
     }
     Triangle* out = thread_found.data() + tile.first_triangle;
     const std::uint8_t* corners = block.corners.data() + tile.first_cell;
-    const std::uint32_t* first = vertices.from(kTilePlace[tile.place]);
+    const std::uint32_t* first = table_of_points.from(kTilePlace[tile.place]);
     for (Bits cells = tile.cells; cells != 0; cells &= cells - 1) {
       const CellTriangles& c = kCellTriangles[*corners++];
-      const std::uint32_t* vertex = first + kNodePlace[static_cast<std::size_t>(std::countr_zero(cells))];
-      const std::uint16_t* place = c.place[best_fan(c, vertex, points)].data();
+      const std::uint32_t* point = first + kNodePlace[static_cast<std::size_t>(std::countr_zero(cells))];
+      const std::uint16_t* place = c.place[best_fan(c, point, points)].data();
       // As many as most cells have or more: cheaper than a branch that cannot be foreseen.
       constexpr std::size_t kOften = 3;
-      for (std::size_t k = 0; k < kOften; ++k, place += 3) out[k] = {vertex[place[0]], vertex[place[1]], vertex[place[2]]};
+      for (std::size_t k = 0; k < kOften; ++k, place += 3) out[k] = {point[place[0]], point[place[1]], point[place[2]]};
       if (c.count > kOften) {
         for (std::size_t k = kOften; k < kMostTriangles; ++k, place += 3) {
-          out[k] = {vertex[place[0]], vertex[place[1]], vertex[place[2]]};
+          out[k] = {point[place[0]], point[place[1]], point[place[2]]};
         }
       }
       out += c.count;
@@ -534,6 +562,45 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
   place_run();
 }
 
+/// Room for the points of all vertices. Those that stay are where they are looked for.
+/// @param blocks   that hold vertices
+/// @param counted  of these, those whose vertices may be others
+void place_points(BlockTable& table, std::span<const std::uint32_t> blocks, std::span<const std::uint32_t> counted, std::size_t vertices,
+                  bool none_stays, std::vector<EdgePoint>& points) {
+  const auto for_kept = [](const Block& block, const auto& use) {
+    for_bits(block.held & ~block.solve, [&](unsigned place) { use(block.tile[block.rank(place)]); });
+  };
+  if (none_stays || 2 * points.size() > 3 * vertices) {  // in the order of vertices
+    std::vector<EdgePoint> last;
+    if (!none_stays) last = points;
+    points.resize(vertices);
+    for (const std::uint32_t b : blocks) {
+      Block& block = table.block[b];
+      const std::uint32_t from = std::exchange(block.first_point, block.first_vertex);
+      block.point_room = block.vertices;
+      for_kept(block, [&](const Tile& tile) {
+        const std::uint16_t old = block.solve == 0 ? tile.first_vertex : tile.old_vertex;
+        std::copy_n(last.data() + from + old, tile.vertices, points.data() + block.first_point + tile.first_vertex);
+      });
+    }
+    return;
+  }
+  std::vector<EdgePoint> last;
+  for (const std::uint32_t b : counted) {
+    Block& block = table.block[b];
+    if (block.solve == 0) continue;
+    last.assign(points.data() + block.first_point, points.data() + block.first_point + block.point_room);
+    if (block.vertices > block.point_room) {
+      block.first_point = static_cast<std::uint32_t>(points.size());
+      block.point_room = block.vertices + block.vertices / 8;
+      points.resize(points.size() + block.point_room);
+    }
+    for_kept(block, [&](const Tile& tile) {
+      std::copy_n(last.data() + tile.old_vertex, tile.vertices, points.data() + block.first_point + tile.first_vertex);
+    });
+  }
+}
+
 }  // namespace
 
 void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice, const Executor& executor,
@@ -541,7 +608,8 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   // Vertices follow the nodes of a tile and its upper neighbours, triangles the vertices of these.
   const auto reach_down = [&] {
     const std::vector<std::uint8_t> from = table.touched;
-    for (std::size_t b = 0; b < from.size(); ++b) {
+    const bool all = std::find(from.begin(), from.end(), std::uint8_t{0}) == from.end();
+    for (std::size_t b = 0; b < from.size() && !all; ++b) {
       if (from[b] != 0) for_blocks_below(table, table.block[b], [&](std::size_t below) { table.touched[below] = 1; });
     }
     std::vector<std::uint32_t> list;
@@ -602,7 +670,7 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   mesh.columns.clear();
   move_runs(same_vertices, vertices, mesh.position);
   move_runs(same_vertices, vertices, mesh.normal);
-  move_runs(same_vertices, vertices, scratch.point);
+  place_points(table, blocks, counted, vertices, same_vertices.empty(), scratch.point);
   move_triangles(table, same_triangles, triangles, mesh);
   for_each(counted, [&](const Block& block) { sampler.solve(table, block, mesh, scratch.point); });
   for_each(emitting, [&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });

@@ -222,7 +222,8 @@ class BlobSampler final : public Sampler {
     std::size_t begin = 0, to = 0;  // of the vertices that follow each other without a gap
     const auto place_run = [&] {
       if (edges.count == begin) return;
-      blobs::place_vertices(edges, begin, edges.count, placement, mesh.position[to].data(), mesh.normal[to].data(), &points[to].t);
+      blobs::place_vertices(edges, begin, edges.count, placement, mesh.position[to].data(), mesh.normal[to].data(),
+                            &points[block.first_point + (to - block.first_vertex)].t);
     };
     for_bits(wanted, [&](unsigned place) {
       const std::size_t rank = block.rank(place), first = edges.count;
@@ -351,6 +352,7 @@ class BlobSampler final : public Sampler {
   /// Empties the table; @return the blocks that a support may enter, all tiles marked.
   [[nodiscard]] std::vector<std::uint32_t> all_blocks(BlockTable& table) const {
     for (Block& block : table.block) block.clear();
+    table.touched.assign(table.touched.size(), 1);
     const auto reach = static_cast<std::int64_t>(std::ceil(grid_.reach())) + 1;
     grid_.for_bins([&](const blobs::CellBox& bin) {
       blobs::CellBox around = bin;
@@ -512,21 +514,14 @@ class BlobSampler final : public Sampler {
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
-  /// @param sampled  blocks that were, in this call: only next to their tiles can an outside node be new
+  /// @param sampled  blocks that were, in this call: only next to them can an outside node be new
   void evaluate_needed(const Executor& executor, std::span<const std::uint32_t> sampled, BlockTable& table) const {
     std::vector<std::uint8_t> near(table.block.size());
     for (const std::uint32_t b : sampled) {
-      const Block& block = table.block[b];
-      for (int n = 0; n < 27; ++n) {
-        const std::array<int, 3> step{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
-        Bits facing = block.changed;
-        for (std::size_t k = 0; k < 3; ++k) {
-          const Bits first = std::array{kFirstX, kFirstY, kFirstZ}[k];
-          if (step[k] != 0) facing &= step[k] < 0 ? first : first << std::array{3, 12, 48}[k];
-        }
-        const BlockCoord at{block.coord[0] + step[0], block.coord[1] + step[1], block.coord[2] + step[2]};
-        if (facing != 0 && table.find(at) != nullptr) near[table.index(at)] = 1;
-      }
+      const Cells low = table.block[b].base();
+      const blobs::CellBox around{{low[0] - 1, low[1] - 1, low[2] - 1},
+                                  {low[0] + kBlockNodes, low[1] + kBlockNodes, low[2] + kBlockNodes}};
+      for_blocks_in(table, around, [&](std::size_t n) { near[n] = 1; });
     }
     std::vector<std::uint32_t> blocks;
     for (std::size_t b = 0; b < table.block.size(); ++b) {
@@ -539,7 +534,9 @@ class BlobSampler final : public Sampler {
         block.needed = TileSurroundings(table, block).next_to_outside(block.early);
       }
     });
-    for (const std::uint32_t b : blocks) table.touched[b] = 1;
+    for (const std::uint32_t b : blocks) {
+      if (table.block[b].needed != 0) table.touched[b] = 1;
+    }
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
       Workspace& work = Workspace::of_thread();
       for (std::size_t i = begin; i < end; ++i) {
@@ -649,7 +646,7 @@ class ViewSampler final : public Sampler {
         roots.add(start, end, f0, f1, lattice::guess_root(kMissing, f0, f1, kMissing));
       });
       roots.solve(field_, {}, scale);
-      std::size_t i = 0, vertex = block.first_vertex + tile.first_vertex;
+      std::size_t i = 0, vertex = block.first_vertex + tile.first_vertex, to = block.first_point + tile.first_vertex;
       for_edges([&](int x, int y, int z, int axis) {
         const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
         const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);
@@ -663,8 +660,8 @@ class ViewSampler final : public Sampler {
         const Vec3 normal = lattice::outward(roots.gradient(i), inside ? Vec3(end - start) : Vec3(start - end));
         mesh.position[vertex] = place;
         mesh.normal[vertex] = normal;
-        points[vertex] = {static_cast<float>(t), static_cast<float>(normal.x()), static_cast<float>(normal.y()),
-                          static_cast<float>(normal.z())};
+        points[to++] = {static_cast<float>(t), static_cast<float>(normal.x()), static_cast<float>(normal.y()),
+                        static_cast<float>(normal.z())};
         ++i;
         ++vertex;
       });

@@ -26,7 +26,8 @@ class Sampler {
   virtual void prepare(const Executor& executor, BlockTable& table) = 0;
   /// Fills tiles with signs and values, those that are not as in the last call, and marks them as changed.
   virtual void sample(const Executor& executor, BlockTable& table) = 0;
-  /// Vertices of the tiles marked `solve` at their place in the mesh: positions, normals, and both as seen from the edge.
+  /// Vertices of the tiles marked `solve` at their place in the mesh: positions, normals, and, among the points of the block, both
+  /// as seen from the edge.
   virtual void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const = 0;
   /// Called on a thread before it projects points.
   virtual void begin_projection() const {}
@@ -56,7 +57,7 @@ struct TileTriangles {
 
 /// What building a mesh needs besides the mesh; kept for its memory.
 struct MeshScratch {
-  std::vector<EdgePoint> point;      ///< of each vertex
+  std::vector<EdgePoint> point;      ///< of the vertices, block by block from Block::first_point on
   std::vector<TileTriangles> tiles;
   std::vector<std::array<std::uint32_t, 3>> triangle, middle;
   std::vector<std::uint32_t> start, target, edge;

@@ -96,6 +96,7 @@ struct alignas(64) Block {
   BlockCoord coord{};         ///< lowest node / 16
   std::uint32_t vertices = 0, first_vertex = 0, old_vertex = 0;        ///< in the mesh, and in that of the last call
   std::uint32_t triangles = 0, first_triangle = 0, old_triangle = 0;  ///< the same
+  std::uint32_t first_point = 0;                                       ///< in MeshScratch::point
   Bits held = 0;              ///< tiles with values
   Bits solve = 0;             ///< those whose vertices are not those of the last call
   Bits emit = 0;              ///< those whose triangles may be others
@@ -109,6 +110,7 @@ struct alignas(64) Block {
   std::vector<float> values;  ///< of these, F at kTileNodes nodes each, x fastest
   std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, tile by tile
   std::uint64_t kernel_values = 0;    ///< taken in this call
+  std::uint32_t point_room = 0;       ///< from first_point on
   Held counted;                       ///< when it was last counted
 
   /// All outside, memory kept.

@@ -450,6 +450,13 @@ TEST_P(MovedBody, GivesTheMeshOfAFreshMesherAndSamplesOnlyWhatMoved) {
   expect_same("one shrank", counts);
   for (Pose& part : body.parts) part.position += random.in_box(0.01);
   expect_same("all moved", counts);
+  for (const double side : {-1.0, 1.0}) {  // between two that stay, so that the box does
+    for (std::size_t i = 0; i < body.parts.size(); ++i) {
+      const Vec3& p = body.parts[i].position;
+      body.parts[i].position = i < 2 ? Vec3::Constant(i == 0 ? -3.0 : 3.0) : Vec3(side * std::abs(p.x()), p.y(), p.z());
+    }
+    expect_same("all on one side", counts);
+  }
   body.skeleton.iso = 0.6;
   expect_same("another iso value", counts);
   body.parts.pop_back();
