@@ -358,11 +358,13 @@ void UsdAnimation::finish() {
   out.append("    }\n");
   for (std::size_t i = 0; i < impl_->objects.size(); ++i) {
     const std::string& name = impl_->names[i];
-    out.append("\n    def Mesh \"" + name +
-               "\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {\n"
-               "        uniform token subdivisionScheme = \"none\"\n        rel material:binding = </scene/materials/" +
-               name + ">\n        color3f[] primvars:displayColor = [" +
-               tuple(impl_->objects[i].colour.unaryExpr(&to_linear)) + "]\n");
+    for (const std::string& part :
+         {std::string("\n    def Mesh \""), name,
+          std::string("\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {\n"
+                      "        uniform token subdivisionScheme = \"none\"\n        rel material:binding = </scene/materials/"),
+          name, std::string(">\n        color3f[] primvars:displayColor = ["), tuple(impl_->objects[i].colour.unaryExpr(&to_linear)),
+          std::string("]\n")})
+      out.append(part);
     impl_->tracks[i]->copy_to(out);
     out.append("    }\n");
   }

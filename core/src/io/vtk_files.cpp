@@ -125,6 +125,7 @@ void write_points_csv(const std::filesystem::path& path, const PointSet& points)
     }
   }
   std::vector<TableColumn> table;
+  table.reserve(columns.size());
   for (const Column& column : columns) table.push_back({column.name, column.values});
   write_csv(path, table);
 }
