@@ -104,6 +104,29 @@ TEST(PathTracer, LosesNoLightBetweenWhiteBodies) {
   EXPECT_NEAR(sum / count, 1.0, 0.01);
 }
 
+TEST(PathTracer, LosesNoLightInADeepWhiteBox) {
+  Mesh box;  // open above
+  const std::array<Vec3, 4> corner = {Vec3(-0.3, -0.3, 0), Vec3(0.3, -0.3, 0), Vec3(0.3, 0.3, 0), Vec3(-0.3, 0.3, 0)};
+  const Vec3 down(0, 0, -1.2);
+  add_quadrangle(box, corner[0] + down, corner[1] + down, corner[2] + down, corner[3] + down);
+  for (std::size_t k = 0; k < 4; ++k) add_quadrangle(box, corner[(k + 1) % 4], corner[k], corner[k] + down, corner[(k + 1) % 4] + down);
+  Item item = matt(box, 1.0);
+  item.two_sided = true;
+  Studio studio;
+  studio.view.camera = {.from = Vec3(0, 0, 8), .look_at = Vec3(0, 0, -1), .up = Vec3::UnitY(), .field_of_view = 0.05};
+  studio.settings.bounces = 256;
+  studio.settings.most_samples = 64;
+  studio.lights.above = studio.lights.below = Vec3f::Ones();
+  const Film film = studio.trace(std::span(&item, 1));
+  double sum = 0.0;
+  for (std::size_t i = 0; i < film.radiance.size(); ++i) {
+    ASSERT_EQ(film.cover[i], 1.0F);
+    sum += film.radiance[i].y();
+  }
+  // Paths leave after some four bounces, of which roulette ends 5 % and makes the others heavier: deviation .25 of 32,000 paths.
+  EXPECT_NEAR(sum / static_cast<double>(film.radiance.size()), 1.0, 0.01);
+}
+
 /// Whether each box of 2^-a x 2^-(m-a) holds one of 2^m points, for every a: a (0, m, 2)-net in base 2.
 bool is_net(const std::vector<Eigen::Vector2f>& points) {
   const int m = static_cast<int>(std::bit_width(points.size())) - 1;
