@@ -466,6 +466,30 @@ TEST_P(MovedBody, GivesTheMeshOfAFreshMesherAndSamplesOnlyWhatMoved) {
 }
 INSTANTIATE_TEST_SUITE_P(Threads, MovedBody, ::testing::Values(1, 3));
 
+// Any that move, in any way: a little, far, together, out of the others' reach and back.
+TEST(MovedBodies, GiveTheMeshOfAFreshMesherWhateverMoves) {
+  constexpr std::uint64_t kBodies = 3;
+  for (std::uint64_t seed = 0; seed < kBodies; ++seed) {
+    Random random(100 + seed);
+    const std::uint32_t parts = 20 + random.below(300);
+    const double radius = random.uniform(0.15, 0.5);
+    Body body = random_body({.seed = seed, .parts = parts, .half_width = 1.0, .least_radius = 0.8 * radius, .largest_radius = radius, .only_points = true});
+    const MarchOptions options{.lattice = lattice_of(radius * random.uniform(0.08, 0.4)), .refinements = static_cast<int>(random.below(2))};
+    CubeMesher mesher;
+    for (int round = 0; round < 20; ++round) {
+      const std::uint32_t moving = 1 + random.below(round % 5 == 4 ? parts : 12), first = random.below(parts);
+      const double far = std::array{0.01, 0.1, 1.0, 3.0}[random.below(4)] * radius;
+      const Vec3 together = random.in_box(far);
+      const bool alone = random.below(2) == 0;
+      for (std::uint32_t k = 0; k < moving; ++k) body.parts[(first + k) % parts].position += alone ? random.in_box(far) : together;
+      body.place();
+      const Mesh& kept = mesher.make(body.field, options, Executor(1));
+      ASSERT_EQ(hash_of(kept), hash_of(march_cubes(body.field, options, Executor(1)))) << seed << ' ' << round;
+      expect_closed(kept);
+    }
+  }
+}
+
 /// Dense bodies, whose insides are not seen by bounds: a ball of blobs 40 supports deep.
 Body dense(std::uint64_t seed, std::uint32_t count, double radius) {
   Random random(seed);
