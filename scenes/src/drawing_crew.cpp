@@ -41,6 +41,7 @@ double resident_bytes() {
 }
 
 int crew_size(const RunOptions& options, std::size_t frames, double share) {
+  if (options.profile) return 1;
   const int most = std::min<int>(static_cast<int>(std::min<std::size_t>(frames, 64)),
                                  options.frames_at_once > 0 ? options.frames_at_once : Executor(options.threads).threads());
   const double memory = options.memory > 0.0 ? options.memory : 0.5 * free_bytes();

@@ -17,7 +17,7 @@ namespace supple::scenes {
 
 /// Memory of this process [byte].
 [[nodiscard]] double resident_bytes();
-/// How many frames to draw at once when each needs `share` bytes.
+/// How many frames to have in work at once when each needs `share` bytes; one where clocks are to be exact.
 [[nodiscard]] int crew_size(const RunOptions& options, std::size_t frames, double share);
 
 /// Each member has a simulation and a renderer of its own, so that no byte depends on the others. The thread that made the

@@ -329,8 +329,8 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     std::exception_ptr diverged;
     try {
       while (result.frames < frame_count && !was_interrupted(options, result)) {
-        // The first picture shows what each needs. Clocks that are to be exact want one work at a time.
-        if (!crew && writer.pictures_drawn() > 0 && !writer.needs_order() && !options.profile) {
+        // The first picture shows what each needs.
+        if (!crew && writer.pictures_drawn() > 0 && !writer.needs_order()) {
           std::vector<int> frames = frames_to_draw(options, result.frames + 1, frame_count);
           const int members = crew_size(options, frames.size(), resident_bytes() - before);
           if (members > 1) {

@@ -358,13 +358,14 @@ void UsdAnimation::finish() {
   out.append("    }\n");
   for (std::size_t i = 0; i < impl_->objects.size(); ++i) {
     const std::string& name = impl_->names[i];
-    for (const std::string& part :
-         {std::string("\n    def Mesh \""), name,
-          std::string("\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {\n"
-                      "        uniform token subdivisionScheme = \"none\"\n        rel material:binding = </scene/materials/"),
-          name, std::string(">\n        color3f[] primvars:displayColor = ["), tuple(impl_->objects[i].colour.unaryExpr(&to_linear)),
-          std::string("]\n")})
-      out.append(part);
+    out.append("\n    def Mesh \"");
+    out.append(name);
+    out.append("\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {\n"
+               "        uniform token subdivisionScheme = \"none\"\n        rel material:binding = </scene/materials/");
+    out.append(name);
+    out.append(">\n        color3f[] primvars:displayColor = [");
+    out.append(tuple(impl_->objects[i].colour.unaryExpr(&to_linear)));
+    out.append("]\n");
     impl_->tracks[i]->copy_to(out);
     out.append("    }\n");
   }
