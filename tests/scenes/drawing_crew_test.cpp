@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <filesystem>
+#include <string>
 
+#include "small_scenes.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
@@ -13,34 +15,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kDrops = R"(
-schema: 1
+const std::string kDrops = std::string(small::kTwoDrops) + R"(
 duration: 0.75 s
-frame_rate: 8
-objects:
-  - name: left
-    particles: {arrange: single, at: [-0.3, 0, 0], velocity: [1, 0, 0], mass: 0.5}
-    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
-    contact: {modulus: 2e3}
-  - name: right
-    particles: {arrange: single, at: [0.3, 0, 0], mass: 0.5}
-    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
-    contact: {modulus: 2e3}
-camera: {from: [0, -3, 1], look_at: [0, 0, 0]}
 output: {images: {size: [96, 64], samples: 1}, contacts: csv, particles: csv, mesh: ply}
 )";
 constexpr int kFrames = 7;
 
-// Each step is fifty periods long: no frame after the first few can be reached.
-constexpr const char* kUnstable = R"(
-schema: 1
-duration: 10 s
-frame_rate: 10
-time_step: {size: 0.1 s, substeps: 1}
-objects:
-  - name: chain
-    particles: {arrange: line, count: 3, spacing: 0.2, spin: [0, 0, 3], mass: 0.01}
-    interactions: [{law: bond_frame, stretch: 1e6, rotation: 10}]
+const std::string kUnstable = std::string(small::kUnstable) + R"(
     skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.3}}]
 camera: {from: [0, -3, 1], look_at: [0, 0, 0]}
 output: {images: {size: [96, 64], samples: 1}}
@@ -53,7 +34,7 @@ class DrawingCrew : public testing::Test {
   }
   ~DrawingCrew() override { fs::remove_all(folder_); }
 
-  static Scene scene_of(const char* text) {
+  static Scene scene_of(const std::string& text) {
     Scene scene = parse_scene(text, "drops.yaml", ".");
     scene.source = "drops.yaml";
     return scene;

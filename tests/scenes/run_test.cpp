@@ -8,7 +8,9 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <string>
 
+#include "small_scenes.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/read_mesh.h"
@@ -25,21 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr const char* kTiny = R"(
-schema: 1
+const std::string kTiny = std::string(small::kTwoDrops) + R"(
 title: Two drops
 duration: 0.5 s
-frame_rate: 8
-objects:
-  - name: left
-    particles: {arrange: single, at: [-0.3, 0, 0], velocity: [1, 0, 0], mass: 0.5}
-    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
-    contact: {modulus: 2e3}
-  - name: right
-    particles: {arrange: single, at: [0.3, 0, 0], mass: 0.5}
-    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
-    contact: {modulus: 2e3}
-camera: {from: [0, -3, 1], look_at: [0, 0, 0]}
 output: {images: {size: [96, 64], samples: 1}, film: true, contacts: csv, particles: csv, mesh: ply, grid: vdb}
 )";
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "small_scenes.h"
 #include "supple/core/error.h"
 #include "supple/core/mesh.h"
 #include "supple/scenes/read_scene.h"
@@ -259,16 +260,7 @@ objects:
 }
 
 TEST(Simulation, SaysWhatDivergedAndKeepsTheLastFrame) {
-  Simulation simulation = make(R"(
-schema: 1
-duration: 10 s
-frame_rate: 10
-time_step: {size: 0.1 s, substeps: 1}
-objects:
-  - name: chain
-    particles: {arrange: line, count: 3, spacing: 0.2, spin: [0, 0, 3], mass: 0.01}
-    interactions: [{law: bond_frame, stretch: 1e6, rotation: 10}]
-)");
+  Simulation simulation = make(small::kUnstable);
   try {
     for (int k = 0; k < 100; ++k) simulation.step_frame();
     FAIL() << "a step of fifty periods cannot be stable";
