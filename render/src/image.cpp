@@ -6,27 +6,11 @@
 #include <cstdlib>
 #include <limits>
 
+#include "srgb.h"
 #include "supple/core/error.h"
 
 namespace supple::render {
 namespace {
-
-const std::array<double, 256>& linear_table() {
-  static const std::array<double, 256> table = [] {
-    std::array<double, 256> values{};
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const double v = static_cast<double>(i) / 255.0;
-      values[i] = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-    }
-    return values;
-  }();
-  return table;
-}
-
-std::uint8_t srgb_of_linear(double v) {
-  const double encoded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(encoded, 0.0, 1.0)));
-}
 
 /// Source pixels under one target pixel along an axis, with the share of the target that each covers.
 struct Span {
@@ -67,7 +51,7 @@ Image downscale(const Image& image, int width) {
 
   const std::vector<Span> columns = coverage(image.width, out.width);
   const std::vector<Span> rows = coverage(image.height, out.height);
-  const std::array<double, 256>& linear = linear_table();
+  const std::array<double, 256>& linear = linear_of_srgb();
   for (int y = 0; y < out.height; ++y) {
     const Span& row = rows[static_cast<std::size_t>(y)];
     for (int x = 0; x < out.width; ++x) {

@@ -1,10 +1,12 @@
 #include "supple/render/image.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <iterator>
 
+#include "srgb.h"
 #include "support.h"
 
 namespace supple::render::test {
@@ -128,6 +130,17 @@ TEST(Png, NamesTheFileThatCannotBeReadOrWritten) {
   const Folder folder;
   expect_error(ErrorKind::Io, {"absent.png"}, [&] { static_cast<void>(read_png(folder / "absent.png")); });
   expect_error(ErrorKind::Io, {"no/such"}, [&] { write_png(folder / "no/such/a.png", noise(2, 2)); });
+}
+
+TEST(Srgb, IsTheNearestToTheCurve) {
+  const auto curve = [](double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055; };
+  constexpr int kSteps = 100003;  // prime: no step of the table falls on one of these
+  for (int i = -5; i <= kSteps + 5; ++i) {
+    const double light = static_cast<double>(i) / kSteps;
+    const double exact = 255.0 * curve(std::clamp(light, 0.0, 1.0));
+    EXPECT_NEAR(srgb_of_linear(light), exact, 0.5 + 1e-4) << light;  // the two parts of the curve meet to 4e-7 of 1
+  }
+  for (int value = 0; value < 256; ++value) EXPECT_EQ(srgb_of_linear(linear_of_srgb()[static_cast<std::size_t>(value)]), value);
 }
 
 TEST(Downscale, AveragesInLinearLight) {

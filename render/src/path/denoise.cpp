@@ -146,6 +146,28 @@ class Means {
   int reach_;
 };
 
+/// Pixels around one where surfaces meet that show one surface each; empty places have no weight.
+struct Neighbours {
+  static constexpr int kMost = 32;
+  using Numbers = Eigen::Array<float, kMost, 1>;
+  using Vectors = Eigen::Array<float, kMost, 3>;
+  Vectors normal = Vectors::Zero(), position = Vectors::Zero(), light = Vectors::Zero();
+  Numbers plane = Numbers::Zero();
+  Numbers weight = Numbers::Zero();
+  Vec3f own = Vec3f::Zero();  ///< light of the pixel itself
+
+  /// What falls on a facet of the pixel from the sky and other surfaces, by the neighbours on the same surface.
+  [[nodiscard]] Vec3f light_of(const Facet& facet) const {
+    const Vec3f &n = facet.normal, &p = facet.position;
+    const Numbers facing = (normal.col(0) * n.x() + normal.col(1) * n.y() + normal.col(2) * n.z()).max(0.0F);
+    const Numbers off = ((p.x() - position.col(0)) * n.x() + (p.y() - position.col(1)) * n.y() + (p.z() - position.col(2)) * n.z()).abs();
+    const Numbers w = weight * facing.square().square().square() * (off * plane).unaryExpr([](float t) { return fall(t); });
+    constexpr float kOwn = 1e-4F;  // alone where no neighbour is alike
+    const Vec3f sum = (light.colwise() * w).colwise().sum().matrix().transpose();
+    return (kOwn * own + sum) / (kOwn + w.sum());
+  }
+};
+
 class Filter {
  public:
   Filter(int width, int height, const Executor& executor) : width_(width), height_(height), executor_(executor) {}
@@ -166,7 +188,7 @@ class Filter {
     });
   }
   void guide(int y, Signal& signal) const;
-  [[nodiscard]] Vec3f light_of(const Facet& facet, std::size_t pixel) const;
+  [[nodiscard]] Neighbours around(std::size_t pixel) const;
 
   int width_;
   int height_;
@@ -280,12 +302,13 @@ void Filter::finish(Film& film) const {
   executor_.for_blocks(film.mixed.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const MixedPixel& mixed = film.mixed[k];
+      const Neighbours neighbours = around(mixed.pixel);
       Vec3f sum = Vec3f::Zero();
       float cover = 0.0F;
       for (std::size_t i = mixed.first; i < mixed.last; ++i) {
         const Facet& facet = film.facets[i];
         if (facet.cover <= 0.0F) continue;
-        sum += facet.cover * light_of(facet, mixed.pixel).cwiseProduct(facet.albedo.cwiseMax(kAlbedoFloor));
+        sum += facet.cover * neighbours.light_of(facet).cwiseProduct(facet.albedo.cwiseMax(kAlbedoFloor));
         cover += facet.cover;
       }
       if (cover > 0.0F) film.radiance[mixed.pixel] = film.direct.radiance[mixed.pixel] + sum / cover;
@@ -293,30 +316,25 @@ void Filter::finish(Film& film) const {
   });
 }
 
-/// What falls on a facet of a mixed pixel from the sky and other surfaces, by its neighbours on the same surface.
-Vec3f Filter::light_of(const Facet& facet, std::size_t pixel) const {
+Neighbours Filter::around(std::size_t pixel) const {
   constexpr int kReach = 2;
   const Planes& light = signals_[1].light;
   const int x = static_cast<int>(pixel % static_cast<std::size_t>(width_)), y = static_cast<int>(pixel / static_cast<std::size_t>(width_));
-  Vec3f sum = Vec3f::Zero();
-  float weights = 0.0F;
-  const auto add = [&](std::size_t i, float weight) {
-    sum += weight * Vec3f(light.r[i], light.g[i], light.b[i]);
-    weights += weight;
-  };
-  add(pixel, 1e-4F);  // alone where no neighbour is alike
+  Neighbours out;
+  out.own = Vec3f(light.r[pixel], light.g[pixel], light.b[pixel]);
+  Eigen::Index k = 0;
   for (int py = std::max(0, y - kReach); py <= std::min(height_ - 1, y + kReach); ++py)
     for (int px = std::max(0, x - kReach); px <= std::min(width_ - 1, x + kReach); ++px) {
       const std::size_t i = index(px, py);
       if (f_.cover[i] <= 0.0F || mixed_[i] != 0) continue;
-      const Vec3f normal(f_.nx[i], f_.ny[i], f_.nz[i]), position(f_.px[i], f_.py[i], f_.pz[i]);
-      const float facing = std::max(0.0F, normal.dot(facet.normal));
-      const float off = std::abs((facet.position - position).dot(facet.normal)) * f_.plane[i];
-      const float near = 1.0F / static_cast<float>((px - x) * (px - x) + (py - y) * (py - y));
-      const float facing2 = facing * facing, facing4 = facing2 * facing2;
-      add(i, near * facing4 * facing4 * f_.cover[i] * fall(off));
+      out.normal.row(k) << f_.nx[i], f_.ny[i], f_.nz[i];
+      out.position.row(k) << f_.px[i], f_.py[i], f_.pz[i];
+      out.light.row(k) << light.r[i], light.g[i], light.b[i];
+      out.plane[k] = f_.plane[i];
+      out.weight[k] = f_.cover[i] / static_cast<float>((px - x) * (px - x) + (py - y) * (py - y));
+      ++k;
     }
-  return sum / weights;
+  return out;
 }
 
 }  // namespace

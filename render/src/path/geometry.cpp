@@ -283,7 +283,7 @@ bool Geometry::blocked(const Vec3f& from, const Vec3f& direction, float distance
 namespace {
 
 /// Rays of a bundle in Embree's layout; lanes without a ray are not looked at.
-void fill(const RayBundle& rays, unsigned mask, RTCRay8& to, std::array<int, RayBundle::kSize>& valid) {
+void fill(const RayBundle& rays, unsigned mask, RTCRay16& to, std::array<int, RayBundle::kSize>& valid) {
   for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
     const std::size_t k = i < rays.count ? i : 0;
     valid[i] = i < rays.count ? -1 : 0;
@@ -312,12 +312,12 @@ RTCIntersectContext coherent() {
 
 std::array<bool, RayBundle::kSize> Geometry::meet(const RayBundle& rays, const std::array<float, RayBundle::kSize>& choice, bool exact,
                                                   std::array<Hit, RayBundle::kSize>& hits) const {
-  RTCRayHit8 bundle;
-  alignas(32) std::array<int, RayBundle::kSize> valid;
+  RTCRayHit16 bundle;
+  alignas(64) std::array<int, RayBundle::kSize> valid;
   fill(rays, 1u, bundle.ray, valid);
   std::fill_n(bundle.hit.geomID, RayBundle::kSize, RTC_INVALID_GEOMETRY_ID);
   RTCIntersectContext context = coherent();
-  rtcIntersect8(valid.data(), scene_, &context, &bundle);
+  rtcIntersect16(valid.data(), scene_, &context, &bundle);
   std::array<bool, RayBundle::kSize> met{};
   for (std::size_t i = 0; i < rays.count; ++i) {
     const Crossing crossing{.distance = bundle.ray.tfar[i], .item = bundle.hit.geomID[i], .triangle = bundle.hit.primID[i],
@@ -328,11 +328,11 @@ std::array<bool, RayBundle::kSize> Geometry::meet(const RayBundle& rays, const s
 }
 
 std::array<bool, RayBundle::kSize> Geometry::blocked(const RayBundle& rays) const {
-  RTCRay8 bundle;
-  alignas(32) std::array<int, RayBundle::kSize> valid;
+  RTCRay16 bundle;
+  alignas(64) std::array<int, RayBundle::kSize> valid;
   fill(rays, 2u, bundle, valid);
   RTCIntersectContext context = coherent();
-  rtcOccluded8(valid.data(), scene_, &context, &bundle);
+  rtcOccluded16(valid.data(), scene_, &context, &bundle);
   std::array<bool, RayBundle::kSize> blocked{};
   for (std::size_t i = 0; i < rays.count; ++i) blocked[i] = bundle.tfar[i] < 0.0F;
   return blocked;

@@ -27,7 +27,7 @@ struct Hit {
 
 /// Rays that start near each other and go the same way, to be followed together; `time` in [0, 1] of the exposure.
 struct RayBundle {
-  static constexpr std::size_t kSize = 8;
+  static constexpr std::size_t kSize = 16;
   std::size_t count = 0;
   std::array<Vec3f, kSize> from, direction;
   std::array<float, kSize> time{};

@@ -393,11 +393,26 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
       body(left, top, std::min(left + kTile, settings.width), std::min(top + kTile, settings.height));
     });
   };
-  std::vector<Sums> sums(pixels);
+  // What camera rays alone tell of a pixel.
+  const auto keep_surface = [&](std::size_t i, const Sums& sum, std::uint32_t count) {
+    film.samples[i] = count;
+    film.cover[i] = sum.cover / static_cast<float>(count);
+    if (sum.cover <= 0.0F) return;
+    const float scale = 1.0F / film.cover[i];
+    film.direct.radiance[i] = sum.direct.radiance * (scale / sum.direct.count);
+    film.direct.variance[i] = sum.direct.variance() * scale * scale;
+    film.radiance[i] = film.direct.radiance[i] + film.indirect.radiance[i];
+    film.albedo[i] = sum.albedo / sum.cover;
+    film.normal[i] = sum.normal / sum.cover;
+    film.position[i] = sum.position / sum.cover;
+  };
   const auto most = static_cast<std::uint32_t>(settings.most_samples);
   const std::uint32_t least = std::min(static_cast<std::uint32_t>(settings.least_samples), most);
   for_tiles([&](int left, int top, int right, int bottom) {
-    Bundler bundler(tracer, kRaysAPath, [&](const Pick& pick, const Sample& sample) { sums[index(pick.x, pick.y)].add(sample); });
+    std::array<Sums, kTile * kTile> sums;
+    std::array<float, kTile * kTile> variance{};  // of indirect light
+    const auto inside = [&](int x, int y) { return static_cast<std::size_t>((y - top) * kTile + x - left); };
+    Bundler bundler(tracer, kRaysAPath, [&](const Pick& pick, const Sample& sample) { sums[inside(pick.x, pick.y)].add(sample); });
     std::uint32_t n = 0;
     for (std::uint32_t next = least;;) {
       float error2 = 0.0F;
@@ -409,18 +424,18 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
       LightSum spread;
       for (int y = top; y < bottom; ++y)
         for (int x = left; x < right; ++x) {
-          const Sums& sum = sums[index(x, y)];
+          const Sums& sum = sums[inside(x, y)];
           if (sum.walked_cover > 0.0F) spread.add(sum.indirect.radiance / sum.indirect.weight);
         }
       const float between = spread.variance() * spread.count;
       for (int y = top; y < bottom; ++y)
         for (int x = left; x < right; ++x) {
-          const Sums& sum = sums[index(x, y)];
+          const Sums& sum = sums[inside(x, y)];
           if (sum.cover <= 0.0F) continue;
-          const float variance = sum.indirect.count < 2.0F ? between : sum.indirect.variance();
+          float& of_pixel = variance[inside(x, y)];
+          of_pixel = sum.indirect.count < 2.0F ? between : sum.indirect.variance();
           const float scale = sum.direct.mean() + sum.indirect.mean() + 0.1F;
-          film.indirect.variance[index(x, y)] = variance;
-          error2 += (sum.direct.variance() + variance) / (scale * scale);
+          error2 += (sum.direct.variance() + of_pixel) / (scale * scale);
         }
       n = next;
       error2 /= static_cast<float>((right - left) * (bottom - top));
@@ -430,11 +445,11 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
     }
     // Where only rays without a path met a surface, those go on, too.
     Bundler late(tracer, 1, [&](const Pick& pick, const Sample& sample) {
-      if (sample.facet.cover > 0.0F) sums[index(pick.x, pick.y)].add_indirect(sample);
+      if (sample.facet.cover > 0.0F) sums[inside(pick.x, pick.y)].add_indirect(sample);
     });
     for (int y = top; y < bottom; ++y)
       for (int x = left; x < right; ++x) {
-        const Sums& sum = sums[index(x, y)];
+        const Sums& sum = sums[inside(x, y)];
         if (!(sum.cover > 0.0F) || sum.walked_cover > 0.0F) continue;
         for (std::uint32_t first = 0, count = least; first < n; first += count, count = first)
           for (std::uint32_t s = 0; s < count; ++s) late.add({x, y, 2 * first, count, s});
@@ -443,10 +458,15 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
     for (int y = top; y < bottom; ++y)
       for (int x = left; x < right; ++x) {
         const std::size_t i = index(x, y);
-        film.samples[i] = n;
-        film.cover[i] = sums[i].cover / static_cast<float>(n);
-        film.normal[i] = sums[i].normal / static_cast<float>(n);
-        film.albedo[i] = sums[i].albedo / static_cast<float>(n);
+        const Sums& sum = sums[inside(x, y)];
+        const float cover = sum.cover / static_cast<float>(n);
+        if (sum.walked_cover > 0.0F) {
+          film.indirect.radiance[i] = sum.indirect.radiance / sum.walked_cover;
+          film.indirect.variance[i] = variance[inside(x, y)] / (cover * cover);
+          film.nearness[i] = cover * sum.nearness / sum.walked_cover;
+          film.mirror[i] = sum.mirror / sum.walked_cover;
+        }
+        keep_surface(i, sum, n);
       }
   });
   // Where surfaces meet in the picture a filter cannot help: such pixels take more camera rays, all anew, and have the
@@ -456,13 +476,15 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
     for (int y = top; y < bottom; ++y)
       for (int x = left; x < right; ++x) {
         const std::size_t i = index(x, y);
-        bool differs = film.cover[i] > 0.0F && film.normal[i].squaredNorm() < kOneSurface * film.cover[i] * film.cover[i];
+        const float cover = film.cover[i];
+        bool differs = cover > 0.0F && film.normal[i].squaredNorm() < kOneSurface;
         for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
           if (x + dx < 0 || y + dy < 0 || x + dx >= settings.width || y + dy >= settings.height) continue;
           const std::size_t j = index(x + dx, y + dy);
-          differs |= std::abs(film.cover[i] - film.cover[j]) > kSameCover;
-          differs |= (film.albedo[i] - film.albedo[j]).cwiseAbs().maxCoeff() > kSameAlbedo;
-          differs |= film.normal[i].dot(film.normal[j]) < kSameNormal * film.cover[i] * film.cover[j];
+          const float other = film.cover[j];
+          differs |= std::abs(cover - other) > kSameCover;
+          differs |= (cover * film.albedo[i] - other * film.albedo[j]).cwiseAbs().maxCoeff() > kSameAlbedo;
+          differs |= cover * other > 0.0F && film.normal[i].dot(film.normal[j]) < kSameNormal;
         }
         const std::uint32_t more = std::min(kEdgeSamples * film.samples[i], most);
         if (differs && more > film.samples[i]) camera_rays[i] = more;
@@ -478,45 +500,24 @@ void trace(const Geometry& geometry, const Lights& lights, const std::optional<G
   executor.for_blocks(film.mixed.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const MixedPixel& mixed = film.mixed[k];
+      const std::size_t i = mixed.pixel;
       const auto width = static_cast<std::size_t>(settings.width);
-      const int x = static_cast<int>(mixed.pixel % width), y = static_cast<int>(mixed.pixel / width);
+      const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
       const auto count = static_cast<std::uint32_t>(mixed.last - mixed.first);
       Sums anew;
-      anew.indirect = sums[mixed.pixel].indirect;
-      anew.walked_cover = sums[mixed.pixel].walked_cover;
-      anew.nearness = sums[mixed.pixel].nearness;
-      anew.mirror = sums[mixed.pixel].mirror;
       Bundler bundler(tracer, 0, [&](const Pick& pick, const Sample& sample) {
         anew.add(sample);
         film.facets[mixed.first + pick.number] = sample.facet;
       });
       for (std::uint32_t s = 0; s < count; ++s) bundler.add({x, y, kEdgeStream, count, s});
       bundler.flush();
-      sums[mixed.pixel] = anew;
-      film.samples[mixed.pixel] = count;
+      const float before = film.cover[i];
+      keep_surface(i, anew, count);
+      if (!(before > 0.0F && film.cover[i] > 0.0F)) continue;
+      const float share = film.cover[i] / before;
+      film.nearness[i] *= share;
+      film.indirect.variance[i] /= share * share;
     }
-  });
-  for_tiles([&](int left, int top, int right, int bottom) {
-    for (int y = top; y < bottom; ++y)
-      for (int x = left; x < right; ++x) {
-        const std::size_t i = index(x, y);
-        const Sums& sum = sums[i];
-        film.cover[i] = sum.cover / static_cast<float>(film.samples[i]);
-        if (sum.cover <= 0.0F) continue;
-        const float scale = 1.0F / film.cover[i];
-        film.direct.radiance[i] = sum.direct.radiance * (scale / sum.direct.count);
-        film.direct.variance[i] = sum.direct.variance() * scale * scale;
-        film.indirect.variance[i] *= scale * scale;
-        if (sum.walked_cover > 0.0F) {
-          film.indirect.radiance[i] = sum.indirect.radiance / sum.walked_cover;
-          film.nearness[i] = film.cover[i] * sum.nearness / sum.walked_cover;
-          film.mirror[i] = sum.mirror / sum.walked_cover;
-        }
-        film.radiance[i] = film.direct.radiance[i] + film.indirect.radiance[i];
-        film.albedo[i] = sum.albedo / sum.cover;
-        film.normal[i] = sum.normal / sum.cover;
-        film.position[i] = sum.position / sum.cover;
-      }
   });
 }
 

@@ -5,6 +5,7 @@
 #include "../draw_list.h"
 #include "../lighting.h"
 #include "../process_time.h"
+#include "../srgb.h"
 #include "denoise.h"
 #include "integrator.h"
 #include "supple/core/error.h"
@@ -105,11 +106,7 @@ Image PathRenderer::develop(const View& view, const path::Film& film) const {
     const float t = 1.0F - (static_cast<float>(i / width) + 0.5F) / static_cast<float>(settings_.height);
     const Vec3f behind = bottom + t * t * (3.0F - 2.0F * t) * (top - bottom);
     const Vec3f seen = behind + film.cover[i] * (filmic(film.radiance[i]) - behind);
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      const float v = std::clamp(seen[k], 0.0F, 1.0F);
-      const float encoded = v <= 0.0031308F ? 12.92F * v : 1.055F * std::pow(v, 1.0F / 2.4F) - 0.055F;
-      image.pixels[3 * i + static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(std::lround(255.0F * encoded));
-    }
+    for (Eigen::Index k = 0; k < 3; ++k) image.pixels[3 * i + static_cast<std::size_t>(k)] = srgb_of_linear(static_cast<double>(seen[k]));
   }
   return image;
 }

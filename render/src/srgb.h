@@ -1,0 +1,16 @@
+/// @file srgb.h
+/// The transfer curve of sRGB (IEC 61966-2-1) for pictures of 8 bits.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace supple::render {
+
+/// Light of the values 0 to 255.
+[[nodiscard]] const std::array<double, 256>& linear_of_srgb();
+
+/// The value nearest to the curve at light clamped to [0, 1], by a table.
+[[nodiscard]] std::uint8_t srgb_of_linear(double light);
+
+}  // namespace supple::render
