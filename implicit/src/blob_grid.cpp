@@ -174,6 +174,7 @@ void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin,
       }
     }
   }
+  list.near = list.count;
   list.pad();
 }
 

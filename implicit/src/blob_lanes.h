@@ -22,7 +22,7 @@ inline constexpr std::size_t kLanes = 16;  ///< widest vector; lists may be read
 struct BlobList {
   std::vector<float> scale, x, y, z;
   std::size_t count = 0;
-  std::size_t near = 0;  ///< those that select_near_first has put first
+  std::size_t near = 0;  ///< those that select_near_first has put first, all where it has not
 
   void reserve(std::size_t blobs);
   /// Fills the slots that vectors read beyond the end with blobs that reach nothing.
@@ -82,8 +82,8 @@ struct SureCubes {
   std::uint64_t inside = 0;  ///< bit per cube, x fastest
   std::size_t added = 0;     ///< blobs
 };
-/// Which of 4^3 cubes of `edge`^3 nodes are sure to lie inside, by bounds of the near blobs alone: F > 0 at their nodes in
-/// evaluate_tile. None where after half of the blobs some cube has no part in any. @param corner  lowest node
+/// Which of 4^3 cubes of `edge`^3 nodes are sure to lie inside, by bounds of the near blobs alone, from value, gradient and curvature
+/// at the middles of the cubes: F > 0 at their nodes in evaluate_tile. @param corner  lowest node
 SureCubes find_sure_cubes(const BlobList& list, const std::array<float, 3>& corner, int edge, float iso);
 
 /// Edges of the tiles of a block that the surface crosses, tile after tile.

@@ -102,80 +102,44 @@ Vec3 position_of(const Lattice& lattice, const Block& block, int x, int y, int z
   return p;
 }
 
-/// The tiles around those of a block.
-class TileSurroundings {
- public:
-  TileSurroundings(const BlockTable& table, const Block& block) {
-    for (std::size_t n = 0; n < 27; ++n) {
-      const auto [dx, dy, dz] = step_of(n);
-      around_[n] = table.find({block.coord[0] + dx, block.coord[1] + dy, block.coord[2] + dz});
-      const std::uint64_t outside = around_[n] != nullptr ? around_[n]->outside : ~std::uint64_t{0};
-      if (outside == 0) continue;
-      for (int z = first(dz); z <= last(dz); ++z) {
-        for (int y = first(dy); y <= last(dy); ++y) {
-          const std::uint64_t row = outside >> (4 * y + 16 * z) & 0xfu;
-          const std::uint64_t seen = dx < 0 ? row >> 3 : dx > 0 ? (row & 1u) << 5 : row << 1;
-          outside_[at(z, dz)] |= seen << (kSide * at(y, dy));
-        }
+/// Those of `tiles`, inside and without values, that are asked for more than their sign: a cell that they own has a node outside, or an
+/// edge that starts at one, in the tile below along an axis, ends in them.
+Bits next_to_outside(const BlockTable& table, const Block& block, Bits tiles) {
+  const BlocksAbove above = blocks_above(table, block);
+  BlocksAbove below{&block};
+  std::array<Bits, 8> up{}, down{};
+  for (std::size_t step = 0; step < 8; ++step) up[step] = above[step] != nullptr ? above[step]->outside : kAll;
+  for (const unsigned axis : {0u, 1u, 2u}) {
+    BlockCoord at = block.coord;
+    --at[axis];
+    const Block* other = below[std::size_t{1} << axis] = table.find(at);
+    const unsigned shift = 1u << (2 * axis);
+    const Bits first = std::array{kFirstX, kFirstY, kFirstZ}[axis], next = other != nullptr ? other->outside : kAll;
+    down[std::size_t{1} << axis] = (block.outside << shift & ~first) | (next >> 3 * shift & first);
+  }
+  const Steps steps(up);
+  Bits found = 0;
+  // Whether a node outside faces a tile in the one that lies a step from it, along the axes in the bits of `step`.
+  const auto look = [&](const BlocksAbove& blocks, Bits candidates, unsigned step, bool upwards) {
+    for_bits(candidates & ~found, [&](unsigned place) {
+      unsigned owner = 0, at = place;
+      Bits facing = kAll;
+      for (const unsigned axis : {0u, 1u, 2u}) {
+        if ((step >> axis & 1u) == 0) continue;
+        const unsigned unit = 1u << (2 * axis), last = 3 * unit;
+        const Bits first = std::array{kFirstX, kFirstY, kFirstZ}[axis];
+        const bool leaves = (place & last) == (upwards ? last : 0u);
+        if (leaves) owner |= 1u << axis;
+        at = upwards == leaves ? at - (leaves ? last : unit) : at + (leaves ? last : unit);
+        facing &= upwards ? first : first << last;
       }
-    }
-  }
-
-  /// Those of `tiles` that have a node outside one step away, along the axes or diagonals.
-  [[nodiscard]] std::uint64_t next_to_outside(std::uint64_t tiles) const {
-    std::array<std::uint64_t, kSide> near = outside_;
-    for (std::uint64_t& plane : near) {
-      plane |= plane << 1 | plane >> 1;
-      plane |= plane << kSide | plane >> kSide;
-    }
-    std::uint64_t found = 0;
-    for (; tiles != 0; tiles &= tiles - 1) {
-      const int bit = std::countr_zero(tiles), x = bit & 3, y = bit >> 2 & 3, z = bit >> 4;
-      const auto above = static_cast<std::size_t>(z);
-      if (((near[above] | near[above + 1] | near[above + 2]) >> (x + 1 + kSide * (y + 1)) & 1u) == 0) continue;
-      std::uint32_t steps = 0;  // to tiles around that have nodes outside
-      for (int row = 0; row < 9; ++row) {
-        const std::uint64_t plane = outside_[above + static_cast<std::size_t>(row / 3)];
-        steps |= static_cast<std::uint32_t>(plane >> (x + kSide * (y + row % 3)) & 7u) << (3 * row);
-      }
-      for (; steps != 0; steps &= steps - 1) {
-        const auto [dx, dy, dz] = step_of(static_cast<std::size_t>(std::countr_zero(steps)));
-        if ((outside_nodes(x + dx, y + dy, z + dz) & facing(dx, dy, dz)) == 0) continue;
-        found |= std::uint64_t{1} << bit;
-        break;
-      }
-    }
-    return found;
-  }
-
- private:
-  static constexpr int kSide = 6;  // a block's four tiles and one on each side
-  static std::array<int, 3> step_of(std::size_t n) {
-    const int i = static_cast<int>(n);
-    return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-  }
-  static int first(int step) { return step < 0 ? 3 : 0; }
-  static int last(int step) { return step > 0 ? 0 : 3; }
-  static std::size_t at(int tile, int step) { return static_cast<std::size_t>(tile + 4 * step + 1); }
-
-  /// The nodes of a tile that face the tile from which it lies these steps away.
-  static std::uint64_t facing(int dx, int dy, int dz) {
-    std::uint64_t nodes = ~std::uint64_t{0};
-    if (dx != 0) nodes &= dx > 0 ? 0x1111111111111111u : 0x8888888888888888u;
-    if (dy != 0) nodes &= dy > 0 ? 0x000f000f000f000fu : 0xf000f000f000f000u;
-    if (dz != 0) nodes &= dz > 0 ? 0xffffu : std::uint64_t{0xffff} << 48;
-    return nodes;
-  }
-  [[nodiscard]] std::uint64_t outside_nodes(int x, int y, int z) const {
-    const auto step = [](int tile) { return static_cast<std::size_t>((tile + 4) >> 2); };
-    const Block* block = around_[step(x) + 3 * step(y) + 9 * step(z)];
-    if (block == nullptr) return ~std::uint64_t{0};
-    return ~block->inside(static_cast<unsigned>((x & 3) | (y & 3) << 2 | (z & 3) << 4));
-  }
-
-  std::array<const Block*, 27> around_{};
-  std::array<std::uint64_t, kSide> outside_{};  ///< tiles with nodes outside, bit x + 6 y
-};
+      if (blocks[owner] == nullptr || (~blocks[owner]->inside(at) & facing) != 0) found |= Bits{1} << place;
+    });
+  };
+  for (unsigned step = 1; step < 8; ++step) look(above, tiles & steps.step[step], step, true);
+  for (const unsigned step : {1u, 2u, 4u}) look(below, tiles & down[step], step, false);
+  return found;
+}
 
 /// Bodies of Wyvill points, in single precision.
 class BlobSampler final : public Sampler {
@@ -414,7 +378,7 @@ class BlobSampler final : public Sampler {
   void sample_block(Block& block, Workspace& work) const {
     gather(block, work);
     work.sure = 0;
-    if (skip_ && has_sure(kSureTiles) && work.block.count > 0) {
+    if (sure_by_tiles() && work.block.count > 0) {
       const blobs::SureCubes sure = blobs::find_sure_cubes(work.block, {0.0F, 0.0F, 0.0F}, kTile, iso_);
       block.kernel_values += kTileNodes * sure.added;
       work.sure = sure.inside;
@@ -427,7 +391,7 @@ class BlobSampler final : public Sampler {
   }
 
   void gather(const Block& block, Workspace& work) const {
-    if (!has_sure(kSureTiles)) {
+    if (!near_first(kSureTiles)) {
       grid_.gather(block.base(), kBlockNodes, 0, work.block);
       return;
     }
@@ -437,7 +401,7 @@ class BlobSampler final : public Sampler {
 
   [[nodiscard]] Verdict select_leaf(unsigned leaf, Workspace& work) const {
     const auto centre = centre_of(leaf_corner(leaf), kLeafNodes);
-    return verdict(!has_sure(kSureCubes)
+    return verdict(!near_first(kSureCubes)
                        ? blobs::select(work.block, centre, 0.5F * kLeafNodes, work.leaf)
                        : blobs::select_near_first(work.block, centre, 0.5F * kLeafNodes, work.leaf, work.far));
   }
@@ -477,7 +441,7 @@ class BlobSampler final : public Sampler {
     const Bits tiles = was_decided ? own : own & block.changed;
     empty(block, tiles, false, work);
     Bits sure = 0;  // of its cubes of 2^3 nodes
-    if (skip_ && has_sure(kSureCubes)) {
+    if (sure_by_cubes()) {
       const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(leaf_corner(leaf)), kTile / 2, iso_);
       block.kernel_values += kTileNodes * cubes.added;
       sure = cubes.inside;
@@ -518,6 +482,7 @@ class BlobSampler final : public Sampler {
   void evaluate_needed(const Executor& executor, std::span<const std::uint32_t> sampled, BlockTable& table) const {
     std::vector<std::uint8_t> near(table.block.size());
     for (const std::uint32_t b : sampled) {
+      if (table.block[b].outside == 0) continue;
       const Cells low = table.block[b].base();
       const blobs::CellBox around{{low[0] - 1, low[1] - 1, low[2] - 1},
                                   {low[0] + kBlockNodes, low[1] + kBlockNodes, low[2] + kBlockNodes}};
@@ -531,7 +496,7 @@ class BlobSampler final : public Sampler {
     executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Block& block = table.block[blocks[i]];
-        block.needed = TileSurroundings(table, block).next_to_outside(block.early);
+        block.needed = next_to_outside(table, block, block.early);
       }
     });
     for (const std::uint32_t b : blocks) {
@@ -567,9 +532,11 @@ class BlobSampler final : public Sampler {
   static constexpr double kSteepest = 3.5;
   /// Radii in cells from which bounds show that cubes of 2^3 and of 4^3 nodes lie inside.
   static constexpr double kSureCubes = 5.0, kSureTiles = 9.0;
-  /// Beyond this bounds of tiles and leaves decide nearly as much.
-  static constexpr double kSureMost = 16.0;
-  [[nodiscard]] bool has_sure(double from) const { return grid_.reach() >= from && grid_.reach() <= kSureMost; }
+  [[nodiscard]] bool sure_by_tiles() const { return skip_ && grid_.reach() >= kSureTiles; }
+  [[nodiscard]] bool sure_by_cubes() const { return skip_ && !sure_by_tiles() && grid_.reach() >= kSureCubes; }
+  /// Beyond this blobs are few, and bounds look at all of them.
+  static constexpr double kNearMost = 16.0;
+  [[nodiscard]] bool near_first(double from) const { return grid_.reach() >= from && grid_.reach() <= kNearMost; }
 
   const Field::Index& index_;
   Lattice lattice_;

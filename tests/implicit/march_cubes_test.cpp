@@ -7,6 +7,7 @@
 #include <numbers>
 #include <set>
 
+#include "blob_lanes.h"
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
@@ -501,11 +502,58 @@ Body dense(std::uint64_t seed, std::uint32_t count, double radius) {
   return body_of(blobs);
 }
 
+// A cube is sure only if F is positive at all its nodes, to the last ten thousandth, and nearly always if it is so by a factor of two.
+TEST(SureCubes, HoldNoNodeOutsideAndAreFound) {
+  Random random(5);
+  std::size_t cubes = 0, found = 0;
+  for (int round = 0; round < 12; ++round) {
+    const bool few = round % 2 == 0;
+    const int edge = 2 + round % 3;
+    const double radius = 3.5 * edge, side = 4.0 * edge;
+    blobs::BlobList list;
+    list.count = list.near = few ? 3 : 150;
+    list.pad();
+    for (std::size_t i = 0; i < list.count; ++i) {
+      const Vec3 p = random.in_box(few ? 0.5 * side : side) + Vec3::Constant(0.5 * side);
+      const double scale = 1.0 / (random.uniform(0.8, 1.2) * radius);
+      list.scale[i] = static_cast<float>(scale);
+      list.x[i] = static_cast<float>(scale * p.x());
+      list.y[i] = static_cast<float>(scale * p.y());
+      list.z[i] = static_cast<float>(scale * p.z());
+    }
+    const auto value = [&](int x, int y, int z) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < list.count; ++i) {
+        const auto s = static_cast<double>(list.scale[i]);
+        const Vec3 u(s * x - static_cast<double>(list.x[i]), s * y - static_cast<double>(list.y[i]), s * z - static_cast<double>(list.z[i]));
+        const double t = std::max(1.0 - u.squaredNorm(), 0.0);
+        sum += t * t * t;
+      }
+      return sum;
+    };
+    for (unsigned cube = 0; cube < 64; ++cube) {
+      const int x0 = edge * static_cast<int>(cube & 3u), y0 = edge * static_cast<int>(cube >> 2 & 3u), z0 = edge * static_cast<int>(cube >> 4);
+      double least = 1e300;
+      for (int n = 0; n < edge * edge * edge; ++n) {
+        least = std::min(least, value(x0 + n % edge, y0 + n / edge % edge, z0 + n / (edge * edge)));
+      }
+      const auto sure = [&](double iso) {
+        return (blobs::find_sure_cubes(list, {0.0F, 0.0F, 0.0F}, edge, static_cast<float>(iso)).inside >> cube & 1u) != 0;
+      };
+      EXPECT_FALSE(sure(least + 1e-4)) << round << " " << cube;
+      if (few) continue;
+      ++cubes;
+      found += sure(0.5 * least) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(found, cubes * 9 / 10);
+}
+
 // Sums that end early decide signs alone; what the mesh reads of values is made where the surface is next to them. Radii of
-// 3 to 14 cells take every way to end early: by tiles, by cubes of 2^3 and of 4^3 nodes.
+// 3 to 20 cells take every way to end early: by tiles, by cubes of 2^3 and of 4^3 nodes, of near blobs and of all.
 TEST(MarchCubes, GivesTheSameMeshWhenSumsEndEarly) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
-    for (const double cells : {2.0, 3.0, 6.0, 10.0, 14.0}) {
+    for (const double cells : {2.0, 3.0, 6.0, 10.0, 14.0, 20.0}) {
       const double radius = 0.3;
       Body body = dense(seed, 1500, radius);
       MarchOptions options{.lattice = lattice_of(radius / cells)};
