@@ -253,6 +253,14 @@ TEST(ContactSurface, OfThreeBodiesStopsWhereTheThirdPressesHarder) {
         EXPECT_LE(stage.bodies()[3 - pair.a - pair.b].field.value(s.point[i]), s.pressure[i] + 1e-12);
       }
     }
+    Stage stage;
+    stage.add(a);
+    stage.add(b);
+    stage.add(c);
+    const ContactSurface::Summary& marched = stage.solve({.error = 1e-2, .only = ContactRule::March}).summary.front();
+    EXPECT_EQ(marched.rule, ContactRule::March);
+    EXPECT_LE(marched.error_estimate, 1e-2) << away;
+    EXPECT_LE((marched.force - Vec3(0, 0, force)).norm(), marched.error_estimate * force) << away;
   }
 }
 

@@ -26,7 +26,10 @@ SolidMotion along_x(std::vector<std::pair<double, double>> keys, LeadName betwee
 TEST(SolidMotion, PassesItsKeysAndStandsStillBeyondThem) {
   for (const LeadName between : {LeadName::Smooth, LeadName::Linear}) {
     const SolidMotion motion = along_x({{1, 2}, {2, 5}, {4, 6}, {5, 6}, {6, 0}}, between);
-    for (const ObstacleKeyDesc& key : motion.keys) EXPECT_NEAR((place_at(motion, key.time).pose.position - key.at).norm(), 0, 1e-14);
+    for (const ObstacleKeyDesc& key : motion.keys) {
+      EXPECT_NEAR((place_at(motion, key.time).pose.position - key.at).norm(), 0, 1e-14);
+      EXPECT_NEAR((place_at(motion, key.time - 1e-9).pose.position - key.at).norm(), 0, 1e-9 * largest_speed(motion, 0.0) + 1e-14);
+    }
     for (const double time : {0.0, 0.999, 6.0, 9.0, 4.5}) {
       EXPECT_FALSE(place_at(motion, time).moves) << time;
       EXPECT_EQ(place_at(motion, time).velocity, Vec3::Zero().eval()) << time;

@@ -613,6 +613,24 @@ TEST(Yielding, KeepsPartOfTheDeformation) {
   EXPECT_GT(std::abs(stretch("yielding: {energy: 0.5, time: 0.05 s}")), 0.01);
 }
 
+TEST(Yielding, ChangesForcesAtOnce) {
+  // Forces that a step hands to the next one are those that are found anew.
+  const Scene scene = parse_scene(dumbbell("yielding: {energy: 0.5, time: 0.05 s}"), "test.yaml", ".");
+  Simulation kept(scene), fresh(scene);
+  int yielded = 0;
+  while (kept.frame() < 2) {
+    State state = kept.state();
+    state.kick.valid = false;
+    fresh.restore(std::move(state));
+    const double flowed = kept.state().links.flowed;
+    kept.step();
+    fresh.step();
+    ASSERT_EQ(fresh.state_hash(), kept.state_hash()) << kept.time();
+    yielded += kept.state().links.flowed > flowed;
+  }
+  EXPECT_GT(yielded, 2);
+}
+
 TEST(Meshes, OfTouchingObjectsCoincideOnTheContactAndAreClosed) {
   Simulation simulation = make(two_balls());
   while (simulation.frame() < 11 && simulation.contacts().summary.empty()) simulation.step();
