@@ -296,7 +296,7 @@ void MovedField::evaluate_parts(std::span<const Vec3> points, FieldParts& parts)
 }
 
 Box MovedField::surface_box() const {
-  const Box box = field_.surface_box();
+  Box box = field_.surface_box();
   if (box.empty()) return box;
   if (rotation_ == Mat3::Identity()) return {box.lower + position_, box.upper + position_};
   if (!box.lower.allFinite() || !box.upper.allFinite()) {

@@ -30,11 +30,12 @@ void for_blocks_of(const FieldView& field, double cell, const Whole& whole, cons
   SUPPLE_EXPECTS(box.lower.allFinite() && box.upper.allFinite());
   const double edge = kEdge * cell;
   Block block;
-  const Vec3 first = (box.lower / edge).array().floor(), last = (box.upper / edge).array().floor();
-  for (double z = first.z(); z <= last.z(); ++z) {
-    for (double y = first.y(); y <= last.y(); ++y) {
-      for (double x = first.x(); x <= last.x(); ++x) {
-        const Vec3 corner = edge * Vec3(x, y, z);
+  using Place = Eigen::Matrix<std::int64_t, 3, 1>;
+  const Place first = (box.lower / edge).array().floor().cast<std::int64_t>(), last = (box.upper / edge).array().floor().cast<std::int64_t>();
+  for (std::int64_t z = first.z(); z <= last.z(); ++z) {
+    for (std::int64_t y = first.y(); y <= last.y(); ++y) {
+      for (std::int64_t x = first.x(); x <= last.x(); ++x) {
+        const Vec3 corner = edge * Place(x, y, z).cast<double>();
         const Interval bound = field.bound({corner, corner + Vec3::Constant(edge)});
         if (bound.upper < 0.0) continue;
         for (std::size_t i = 0; i < kCells; ++i) {

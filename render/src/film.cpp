@@ -3,14 +3,18 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <sstream>
 #include <system_error>
 
 #include "supple/core/error.h"
+#include "supple/core/hash.h"
 #include "supple/render/image.h"
 
 namespace supple::render {
@@ -99,6 +103,32 @@ std::string number_text(double value) {
   return text;
 }
 
+/// Of the pictures of a film and of how they are encoded; a part of the film itself.
+std::string identity_of(const std::vector<std::string>& arguments, const std::vector<std::filesystem::path>& pictures) {
+  Hasher hasher;
+  for (const std::string& argument : arguments) hasher.add(std::string_view(argument));
+  for (const std::filesystem::path& picture : pictures) {
+    std::ifstream in(picture, std::ios::binary);
+    hasher.add(std::string_view(std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}));
+  }
+  return "pictures " + to_hex(hasher.value());
+}
+
+/// Whether an MP4 says so in its box of facts, without reading its pictures.
+bool says(const std::filesystem::path& film, const std::string& identity) {
+  std::ifstream in(film, std::ios::binary);
+  for (std::array<unsigned char, 8> head{}; in.read(reinterpret_cast<char*>(head.data()), head.size());) {
+    const std::size_t size = std::size_t{head[0]} << 24 | std::size_t{head[1]} << 16 | std::size_t{head[2]} << 8 | std::size_t{head[3]};
+    if (size < head.size()) return false;
+    const std::string_view kind(reinterpret_cast<const char*>(&head[4]), 4);
+    if (kind == "mdat") return false;  // the facts come first in films of `encode_film`
+    std::string box(size - head.size(), '\0');
+    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) return false;
+    if (kind == "moov") return box.find(identity) != std::string::npos;
+  }
+  return false;
+}
+
 }  // namespace
 
 void find_film_program() {
@@ -120,24 +150,30 @@ void encode_film(const std::filesystem::path& folder, const std::string& stem, i
   SUPPLE_EXPECTS(0 <= first && first <= last);
   SUPPLE_EXPECTS(std::isfinite(frame_rate) && frame_rate > 0.0);
   // ffmpeg ends the film without a word where a number is missing.
+  std::vector<std::filesystem::path> pictures;
   for (int frame = first; frame <= last; ++frame) {
-    const std::filesystem::path path = folder / frame_name(stem, frame);
-    if (!std::filesystem::exists(path)) fail(path.string(), "a frame of the film is missing", "render it first");
+    pictures.push_back(folder / frame_name(stem, frame));
+    if (!std::filesystem::exists(pictures.back())) fail(pictures.back().string(), "a frame of the film is missing", "render it first");
   }
+  const std::vector<std::string> encoding = {
+      "-framerate", number_text(frame_rate), "-frames:v", std::to_string(last - first + 1),
+      // 4:2:0 needs even sizes: an odd edge is stretched by one pixel.
+      "-vf", "scale=ceil(iw/2)*2:ceil(ih/2)*2:flags=lanczos:out_color_matrix=bt709:out_range=tv,format=yuv420p",
+      "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-pix_fmt", "yuv420p",
+      "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv",
+      "-movflags", "+faststart", "-f", "mp4"};
+  const std::string identity = identity_of(encoding, pictures);
+  if (says(film, identity)) return;
 
   const std::filesystem::path temporary =
       std::filesystem::absolute(film).parent_path() /
       ('.' + film.filename().string() + '.' + std::to_string(::getpid()) + ".tmp");
   const std::filesystem::path frames = std::filesystem::absolute(folder);
-  const std::vector<std::string> arguments = {
+  std::vector<std::string> arguments = {
       program_name(), "-hide_banner", "-nostdin", "-loglevel", "error", "-y",
-      "-framerate", number_text(frame_rate), "-start_number", std::to_string(first),
-      "-i", as_pattern((frames / stem).string()) + ".%04d.png", "-frames:v", std::to_string(last - first + 1),
-      // 4:2:0 needs even sizes: an odd edge is stretched by one pixel.
-      "-vf", "scale=ceil(iw/2)*2:ceil(ih/2)*2:flags=lanczos:out_color_matrix=bt709:out_range=tv,format=yuv420p",
-      "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-pix_fmt", "yuv420p",
-      "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv",
-      "-movflags", "+faststart", "-f", "mp4", temporary.string()};
+      encoding[0], encoding[1], "-start_number", std::to_string(first), "-i", as_pattern((frames / stem).string()) + ".%04d.png"};
+  arguments.insert(arguments.end(), encoding.begin() + 2, encoding.end());
+  arguments.insert(arguments.end(), {"-metadata", "comment=" + identity, temporary.string()});
 
   std::error_code ignored;
   Outcome outcome;

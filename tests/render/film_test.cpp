@@ -62,6 +62,27 @@ TEST(Film, HasEveryFrameItsRateAndItsColourTags) {
   EXPECT_LT(bytes.find("moov"), bytes.find("mdat"));
 }
 
+TEST(Film, IsKeptAsLongAsItHoldsTheSamePicturesAtTheSameRate) {
+  const Folder folder;
+  write_frames(folder, "ball", 1, 3, 16, 16);
+  const auto encode = [&](int last, double rate) { encode_film(folder.path(), "ball", 1, last, rate, folder / "film.mp4"); };
+  encode(3, 24.0);
+  {
+    const Environment program("SUPPLE_FFMPEG", "/no/such/ffmpeg");
+    const auto starts = [&](int last, double rate) { expect_error(ErrorKind::Io, {"cannot be started"}, [&] { encode(last, rate); }); };
+    EXPECT_NO_THROW(encode(3, 24.0));
+    starts(2, 24.0);
+    starts(3, 25.0);
+    write_frames(folder, "ball", 4, 4, 16, 16);
+    std::filesystem::rename(folder / "ball.0004.png", folder / "ball.0002.png");
+    starts(3, 24.0);
+    std::ofstream(folder / "film.mp4") << "no film";
+    starts(3, 24.0);
+  }
+  encode(3, 24.0);
+  EXPECT_EQ(folder.file_count(), 4U);
+}
+
 TEST(Film, NamesThePackageWhenFfmpegIsAbsentAndKeepsTheFrames) {
   const Folder folder;
   write_frames(folder, "ball", 1, 2, 16, 16);

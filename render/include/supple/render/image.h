@@ -54,7 +54,8 @@ struct ImageDifference {
 
 /// Encodes frames folder/stem.0001.png ... (first .. last) to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg
 /// program, into a temporary file that is renamed when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names
-/// another program or its path. Odd sizes are stretched to even ones.
+/// another program or its path. Odd sizes are stretched to even ones. A film there that already holds the same pictures at the
+/// same rate (it says so in its comment) is kept.
 /// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line).
 void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
                  const std::filesystem::path& film);
