@@ -16,6 +16,8 @@ namespace {
 /// Bins are made larger until there are at most this many for a blob.
 constexpr std::int64_t kBinsPerBlob = 64;
 constexpr std::int64_t kFewBins = 1 << 16;
+/// Blobs are fetched from memory this many before they are put into their places.
+constexpr std::size_t kAhead = 16;
 
 /// The bin of edge 2^shift that holds a coordinate or cell.
 std::int64_t bin_at(double x, int shift) { return static_cast<std::int64_t>(std::floor(x)) >> shift; }
@@ -104,7 +106,11 @@ void BlobGrid::sort_all() {
   next_ = start_;
   for (std::size_t i = 0; i < n; ++i) order_[next_[bin_of_[i]]++] = static_cast<std::uint32_t>(i);
   for (std::size_t row = 0; row < bins; row += row_length()) {
-    for (std::size_t place = start_[row]; place < start_[row + row_length() - 1]; ++place) put(place, order_[place]);
+    const std::size_t end = start_[row + row_length() - 1];
+    for (std::size_t place = start_[row]; place < end; ++place) {
+      _mm_prefetch(reinterpret_cast<const char*>(&last_[order_[std::min(place + kAhead, end - 1)]]), _MM_HINT_T0);
+      put(place, order_[place]);
+    }
   }
 }
 
@@ -152,30 +158,28 @@ bool BlobGrid::sort_moved() {
   return true;
 }
 
-void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const {
-  list.count = 0;
+void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list, BlobList* far) const {
+  thread_local std::vector<BlobRun> runs;
+  runs.clear();
   const auto reach = static_cast<std::int64_t>(std::ceil(reach_)) + 1 + margin;
   Cells from{}, to{};
   for (std::size_t k = 0; k < 3; ++k) {
     from[k] = std::max<std::int64_t>(bin_at(base[k] - reach, shift_) - first_[k], 0);
     to[k] = std::min<std::int64_t>(bin_at(base[k] + size + reach, shift_) - first_[k], count_[k] - 1);
   }
-  const BlobArrays all{x_.data(), y_.data(), z_.data(), scale_.data()};
-  const std::array<double, 3> corner{static_cast<double>(base[0]), static_cast<double>(base[1]),
-                                     static_cast<double>(base[2])};
   if (from[0] <= to[0]) {
     for (std::int64_t z = from[2]; z <= to[2]; ++z) {
       for (std::int64_t y = from[1]; y <= to[1]; ++y) {
         const auto row = static_cast<std::size_t>(z * count_[1] + y) * row_length();
         const std::size_t begin = start_[row + static_cast<std::size_t>(from[0])];
         const std::size_t end = start_[row + static_cast<std::size_t>(to[0]) + 1];
-        if (begin < end) blobs::gather(all, begin, end, corner, static_cast<double>(size),
-                                         static_cast<double>(margin), list);
+        if (begin < end) runs.push_back({begin, end});
       }
     }
   }
-  list.near = list.count;
-  list.pad();
+  blobs::gather({x_.data(), y_.data(), z_.data(), scale_.data()}, runs,
+                {static_cast<double>(base[0]), static_cast<double>(base[1]), static_cast<double>(base[2])}, static_cast<double>(size),
+                static_cast<double>(margin), list, far);
 }
 
 }  // namespace supple::implicit::blobs

@@ -60,7 +60,8 @@ class BlobGrid {
   [[nodiscard]] std::int64_t bin() const noexcept { return std::int64_t{1} << shift_; }
 
   /// Blobs whose support may meet the cube of `size` cells above `base`, wider by `margin`; in the frame of `base`.
-  void gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list) const;
+  /// @param far  as in blobs::gather
+  void gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list, BlobList* far = nullptr) const;
   /// Calls use(box) for each bin that holds blobs, with the cells that their centres lie in.
   template <class Use>
   void for_bins(const Use& use) const {

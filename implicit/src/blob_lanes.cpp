@@ -33,34 +33,6 @@ HWY_INLINE float sum_of_lanes(const float* lane) {
   return sum[0];
 }
 
-void Gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std::array<double, 3>& base, double size,
-            double margin, BlobList& list) {
-  const hn::CappedTag<double, 8> d;
-  const hn::Rebind<float, decltype(d)> df;
-  using VD = hn::Vec<decltype(d)>;
-  constexpr std::size_t kWide = hn::MaxLanes(decltype(d)());
-  list.reserve(list.count + (end - begin));
-  const VD half = hn::Set(d, 0.5 * size), reach = hn::Set(d, 0.5 * size + margin);
-  const VD bx = hn::Set(d, base[0]), by = hn::Set(d, base[1]), bz = hn::Set(d, base[2]);
-  for (std::size_t i = begin; i < end; i += kWide) {
-    const VD x = hn::Sub(hn::LoadU(d, all.x + i), bx);
-    const VD y = hn::Sub(hn::LoadU(d, all.y + i), by);
-    const VD z = hn::Sub(hn::LoadU(d, all.z + i), bz);
-    const auto s = hn::LoadU(df, all.scale + i);
-    const VD scale = hn::PromoteTo(d, s);
-    const auto gap = [&](VD v) HWY_ATTR { return hn::Max(hn::Sub(hn::Abs(hn::Sub(v, half)), reach), hn::Zero(d)); };
-    const VD gx = gap(x), gy = gap(y), gz = gap(z);
-    const VD q = hn::Mul(hn::MulAdd(gz, gz, hn::MulAdd(gy, gy, hn::Mul(gx, gx))), hn::Mul(scale, scale));
-    auto keep = hn::Lt(hn::DemoteTo(df, q), hn::Set(df, kReach2));
-    if (end - i < kWide) keep = hn::And(keep, hn::FirstN(df, end - i));
-    hn::StoreU(hn::Compress(s, keep), df, list.scale.data() + list.count);
-    hn::StoreU(hn::Compress(hn::DemoteTo(df, hn::Mul(x, scale)), keep), df, list.x.data() + list.count);
-    hn::StoreU(hn::Compress(hn::DemoteTo(df, hn::Mul(y, scale)), keep), df, list.y.data() + list.count);
-    hn::StoreU(hn::Compress(hn::DemoteTo(df, hn::Mul(z, scale)), keep), df, list.z.data() + list.count);
-    list.count += hn::CountTrue(df, keep);
-  }
-}
-
 /// Centres are near a cube within half their radius, squared and relative.
 constexpr float kNear2 = 0.25F;
 
@@ -68,12 +40,8 @@ constexpr float kNear2 = 0.25F;
 struct Distances {
   V near2, far2;
 };
-HWY_INLINE Distances distances(const BlobList& list, std::size_t i, V cx, V cy, V cz, V half, V& s, V& x, V& y, V& z) {
+HWY_INLINE Distances distances(V s, V x, V y, V z, V cx, V cy, V cz, V half) {
   const D d;
-  s = hn::LoadU(d, list.scale.data() + i);
-  x = hn::LoadU(d, list.x.data() + i);
-  y = hn::LoadU(d, list.y.data() + i);
-  z = hn::LoadU(d, list.z.data() + i);
   const V reach = hn::Mul(s, half);
   const V dx = hn::Abs(hn::MulSub(s, cx, x)), dy = hn::Abs(hn::MulSub(s, cy, y)), dz = hn::Abs(hn::MulSub(s, cz, z));
   const auto near = [&](V v) HWY_ATTR { return hn::Max(hn::Sub(v, reach), hn::Zero(d)); };
@@ -100,6 +68,64 @@ HWY_INLINE std::size_t append(V s, V x, V y, V z, hn::Mask<D> keep, BlobList& li
   return count + hn::CountTrue(d, keep);
 }
 
+/// Puts a list behind the first `count` of another.
+HWY_INLINE void append_far(const BlobList& far, std::size_t far_count, BlobList& list, std::size_t count) {
+  const D d;
+  for (std::size_t i = 0; i < far_count; i += kWidth) {
+    const auto move = [&](const std::vector<float>& out, std::vector<float>& in) HWY_ATTR {
+      hn::StoreU(hn::LoadU(d, out.data() + i), d, in.data() + count + i);
+    };
+    move(far.scale, list.scale);
+    move(far.x, list.x);
+    move(far.y, list.y);
+    move(far.z, list.z);
+  }
+  list.near = count;
+  list.count = count + far_count;
+  list.pad();
+}
+
+void Gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
+            BlobList& list, BlobList* far) {
+  const D d;
+  const hn::Half<D> dh;
+  const hn::Rebind<double, decltype(dh)> dd;
+  std::size_t most = 0;
+  for (const BlobRun& run : runs) most += run.end - run.begin;
+  list.reserve(most);
+  if (far != nullptr) far->reserve(most);
+  const V centre = hn::Set(d, static_cast<float>(0.5 * size)), half = hn::Set(d, static_cast<float>(0.5 * size + margin));
+  std::size_t count = 0, far_count = 0;
+  for (const BlobRun& run : runs) {
+    for (std::size_t i = run.begin; i < run.end; i += kWidth) {
+      const V s = hn::LoadU(d, all.scale + i);
+      const auto low_scale = hn::PromoteTo(dd, hn::LowerHalf(dh, s)), high_scale = hn::PromoteTo(dd, hn::UpperHalf(dh, s));
+      const auto load = [&](const double* from, double origin) HWY_ATTR {
+        const auto low = hn::Sub(hn::LoadU(dd, from + i), hn::Set(dd, origin));
+        const auto high = hn::Sub(hn::LoadU(dd, from + i + kWidth / 2), hn::Set(dd, origin));
+        return hn::Combine(d, hn::DemoteTo(dh, hn::Mul(high, high_scale)), hn::DemoteTo(dh, hn::Mul(low, low_scale)));
+      };
+      const V x = load(all.x, base[0]), y = load(all.y, base[1]), z = load(all.z, base[2]);
+      const V near2 = distances(s, x, y, z, centre, centre, centre, half).near2;
+      auto keep = hn::Lt(near2, hn::Set(d, kReach2));
+      if (run.end - i < kWidth) keep = hn::And(keep, hn::FirstN(d, run.end - i));
+      if (far == nullptr) {
+        count = append(s, x, y, z, keep, list, count);
+      } else {
+        const auto near = hn::Lt(near2, hn::Set(d, kNear2));
+        count = append(s, x, y, z, hn::And(near, keep), list, count);
+        far_count = append(s, x, y, z, hn::AndNot(near, keep), *far, far_count);
+      }
+    }
+  }
+  if (far != nullptr) {
+    append_far(*far, far_count, list, count);
+    return;
+  }
+  list.near = list.count = count;
+  list.pad();
+}
+
 /// @param far  null: the order stays
 HWY_INLINE PotentialBounds select_into(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list,
                                        BlobList* far) {
@@ -111,8 +137,9 @@ HWY_INLINE PotentialBounds select_into(const BlobList& from, const std::array<fl
   std::size_t count = 0, far_count = 0;
   alignas(64) float lower[kLanes] = {}, upper[kLanes] = {};
   for (std::size_t i = 0; i < from.count; i += kWidth) {
-    V s, x, y, z;
-    const Distances q = distances(from, i, cx, cy, cz, around, s, x, y, z);
+    const V s = hn::LoadU(d, from.scale.data() + i), x = hn::LoadU(d, from.x.data() + i), y = hn::LoadU(d, from.y.data() + i),
+            z = hn::LoadU(d, from.z.data() + i);
+    const Distances q = distances(s, x, y, z, cx, cy, cz, around);
     const auto keep = hn::Lt(q.near2, hn::Set(d, kReach2));
     const V most = hn::Max(hn::Sub(one, q.near2), hn::Zero(d)), least = hn::Max(hn::Sub(one, q.far2), hn::Zero(d));
     float *low = lower + i % kLanes, *high = upper + i % kLanes;
@@ -126,53 +153,75 @@ HWY_INLINE PotentialBounds select_into(const BlobList& from, const std::array<fl
       far_count = append(s, x, y, z, hn::AndNot(near, keep), *far, far_count);
     }
   }
-  for (std::size_t i = 0; i < far_count; i += kWidth) {
-    const auto move = [&](const std::vector<float>& out, std::vector<float>& in) HWY_ATTR {
-      hn::StoreU(hn::LoadU(d, out.data() + i), d, in.data() + count + i);
-    };
-    move(far->scale, list.scale);
-    move(far->x, list.x);
-    move(far->y, list.y);
-    move(far->z, list.z);
+  if (far != nullptr) {
+    append_far(*far, far_count, list, count);
+  } else {
+    list.near = list.count = count;
+    list.pad();
   }
-  list.near = count;
-  list.count = count + far_count;
-  list.pad();
   const float high = sum_of_lanes(upper);
   const float error = round_off(list.count, high);
   return {sum_of_lanes(lower) - error, high + error};
 }
 
-PotentialBounds SelectTile(const BlobList& from, const std::array<float, 3>& centre, TileBlobs& tile) {
+void SelectTiles(const BlobList& from, const std::array<float, 3>& centre, unsigned wanted, LeafTiles& tiles) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  for (BlobPlaces* places : {&tile.near, &tile.far}) {
-    if (places->place.size() < from.count + kLanes) places->place.resize(2 * from.count + kLanes);
+  constexpr float kHalf = 0.5F * kTile;
+  struct Work {
+    std::size_t tile;
+    std::uint32_t *near, *far;
+    alignas(64) float lower[kLanes], upper[kLanes];
+  };
+  std::array<Work, LeafTiles::kTiles> work;
+  std::size_t n = 0;
+  for (std::size_t t = 0; t < LeafTiles::kTiles; ++t) {
+    if ((wanted >> t & 1u) == 0) continue;
+    TileBlobs& blobs = tiles.blobs[t];
+    for (BlobPlaces* places : {&blobs.near, &blobs.far}) {
+      if (places->place.size() < from.count + kLanes) places->place.resize(2 * from.count + kLanes);
+    }
+    work[n++] = {t, blobs.near.place.data(), blobs.far.place.data(), {}, {}};
   }
-  const V cx = hn::Set(d, centre[0]), cy = hn::Set(d, centre[1]), cz = hn::Set(d, centre[2]);
-  const V around = hn::Set(d, 0.5F * kTile), one = hn::Set(d, 1.0F);
-  std::uint32_t *near = tile.near.place.data(), *far = tile.far.place.data();
-  alignas(64) float lower[kLanes] = {}, upper[kLanes] = {};
+  const V around = hn::Set(d, kHalf), one = hn::Set(d, 1.0F), zero = hn::Zero(d);
   for (std::size_t i = 0; i < from.count; i += kWidth) {
-    V s, x, y, z;
-    const Distances q = distances(from, i, cx, cy, cz, around, s, x, y, z);
-    const auto keep = hn::Lt(q.near2, hn::Set(d, kReach2)), close = hn::Lt(q.near2, hn::Set(d, kNear2));
-    const V most = hn::Max(hn::Sub(one, q.near2), hn::Zero(d)), least = hn::Max(hn::Sub(one, q.far2), hn::Zero(d));
-    float *low = lower + i % kLanes, *high = upper + i % kLanes;
-    hn::Store(hn::Add(hn::Load(d, high), cube(most)), d, high);
-    hn::Store(hn::Add(hn::Load(d, low), cube(least)), d, low);
+    // What `distances` takes along each axis is shared by tiles, lower ones and upper ones.
+    const V s = hn::LoadU(d, from.scale.data() + i), reach = hn::Mul(s, around);
+    V nearest[3][2], farthest[3][2];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const V at = hn::LoadU(d, (k == 0 ? from.x : k == 1 ? from.y : from.z).data() + i);
+      for (std::size_t side = 0; side < 2; ++side) {
+        const V off = hn::Abs(hn::MulSub(s, hn::Set(d, centre[k] + (side == 0 ? -kHalf : kHalf)), at));
+        nearest[k][side] = hn::Max(hn::Sub(off, reach), zero);
+        farthest[k][side] = hn::Add(off, reach);
+      }
+    }
     const auto place = hn::Iota(du, static_cast<std::uint32_t>(i));
-    const auto rest = hn::AndNot(close, keep);
-    hn::StoreU(hn::Compress(place, hn::RebindMask(du, close)), du, near);
-    hn::StoreU(hn::Compress(place, hn::RebindMask(du, rest)), du, far);
-    near += hn::CountTrue(d, close);
-    far += hn::CountTrue(d, rest);
+    for (Work* w = work.data(); w != work.data() + n; ++w) {
+      const auto square = [&](const V (&off)[3][2]) HWY_ATTR {
+        const V x = off[0][w->tile & 1u], y = off[1][w->tile >> 1 & 1u], z = off[2][w->tile >> 2];
+        return hn::MulAdd(z, z, hn::MulAdd(y, y, hn::Mul(x, x)));
+      };
+      const V near2 = square(nearest), far2 = square(farthest);
+      const auto keep = hn::Lt(near2, hn::Set(d, kReach2)), close = hn::Lt(near2, hn::Set(d, kNear2));
+      float *low = w->lower + i % kLanes, *high = w->upper + i % kLanes;
+      hn::Store(hn::Add(hn::Load(d, high), cube(hn::Max(hn::Sub(one, near2), zero))), d, high);
+      hn::Store(hn::Add(hn::Load(d, low), cube(hn::Max(hn::Sub(one, far2), zero))), d, low);
+      const auto rest = hn::AndNot(close, keep);
+      hn::StoreU(hn::Compress(place, hn::RebindMask(du, close)), du, w->near);
+      hn::StoreU(hn::Compress(place, hn::RebindMask(du, rest)), du, w->far);
+      w->near += hn::CountTrue(d, close);
+      w->far += hn::CountTrue(d, rest);
+    }
   }
-  tile.near.count = static_cast<std::size_t>(near - tile.near.place.data());
-  tile.far.count = static_cast<std::size_t>(far - tile.far.place.data());
-  const float high = sum_of_lanes(upper);
-  const float error = round_off(tile.count(), high);
-  return {sum_of_lanes(lower) - error, high + error};
+  for (const Work* w = work.data(); w != work.data() + n; ++w) {
+    TileBlobs& blobs = tiles.blobs[w->tile];
+    blobs.near.count = static_cast<std::size_t>(w->near - blobs.near.place.data());
+    blobs.far.count = static_cast<std::size_t>(w->far - blobs.far.place.data());
+    const float high = sum_of_lanes(w->upper);
+    const float error = round_off(blobs.count(), high);
+    tiles.bounds[w->tile] = {sum_of_lanes(w->lower) - error, high + error};
+  }
 }
 
 PotentialBounds Select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
@@ -582,7 +631,7 @@ namespace supple::implicit::blobs {
 HWY_EXPORT(Gather);
 HWY_EXPORT(Select);
 HWY_EXPORT(SelectNearFirst);
-HWY_EXPORT(SelectTile);
+HWY_EXPORT(SelectTiles);
 HWY_EXPORT(EvaluateTile);
 HWY_EXPORT(FindSureCubes);
 HWY_EXPORT(SolveEdges);
@@ -604,9 +653,9 @@ void BlobList::pad() {
   }
 }
 
-void gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std::array<double, 3>& base, double size,
-            double margin, BlobList& list) {
-  HWY_DYNAMIC_DISPATCH(Gather)(all, begin, end, base, size, margin, list);
+void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
+            BlobList& list, BlobList* far) {
+  HWY_DYNAMIC_DISPATCH(Gather)(all, runs, base, size, margin, list, far);
 }
 
 PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {
@@ -618,8 +667,8 @@ PotentialBounds select_near_first(const BlobList& from, const std::array<float, 
   return HWY_DYNAMIC_DISPATCH(SelectNearFirst)(from, centre, half, list, far);
 }
 
-PotentialBounds select_tile(const BlobList& from, const std::array<float, 3>& centre, TileBlobs& tile) {
-  return HWY_DYNAMIC_DISPATCH(SelectTile)(from, centre, tile);
+void select_tiles(const BlobList& from, const std::array<float, 3>& centre, unsigned wanted, LeafTiles& tiles) {
+  HWY_DYNAMIC_DISPATCH(SelectTiles)(from, centre, wanted, tiles);
 }
 
 TileSums evaluate_tile(const BlobList& list, const TileBlobs& tile, const std::array<float, 3>& corner, float iso, float sure,

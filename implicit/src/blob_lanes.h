@@ -22,7 +22,7 @@ inline constexpr std::size_t kLanes = 16;  ///< widest vector; lists may be read
 struct BlobList {
   std::vector<float> scale, x, y, z;
   std::size_t count = 0;
-  std::size_t near = 0;  ///< those that select_near_first has put first, all where it has not
+  std::size_t near = 0;  ///< those that were put first, all where the order stayed
 
   void reserve(std::size_t blobs);
   /// Fills the slots that vectors read beyond the end with blobs that reach nothing.
@@ -35,10 +35,15 @@ struct BlobArrays {
   const float* scale;
 };
 
-/// Appends those of the blobs [begin, end) whose support may meet the cube that reaches from `margin` cells below `base`
-/// to `size + margin` above it; in the frame of `base`.
-void gather(const BlobArrays& all, std::size_t begin, std::size_t end, const std::array<double, 3>& base, double size,
-            double margin, BlobList& list);
+/// Some of them, one after the other.
+struct BlobRun {
+  std::size_t begin, end;
+};
+
+/// Those whose support may meet the cube that reaches from `margin` cells below `base` to `size + margin` above it; in the frame of
+/// `base`. @param far  null: in their order; otherwise scratch, and those come first whose centre lies within half a radius of the cube
+void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
+            BlobList& list, BlobList* far);
 
 /// Bounds of the potential on a box from the nearest and farthest distance of each blob; round-off included.
 struct PotentialBounds {
@@ -52,7 +57,7 @@ struct PotentialBounds {
 
 /// The same, those first whose centre lies within half a radius of the cube: the most of the sum inside a body.
 /// @param far  scratch
-PotentialBounds select_near_first(const BlobList& from, const std::array<float, 3>& centre, float half,
+[[nodiscard]] PotentialBounds select_near_first(const BlobList& from, const std::array<float, 3>& centre, float half,
                                                 BlobList& list, BlobList& far);
 
 /// Places of blobs in a list.
@@ -65,8 +70,16 @@ struct TileBlobs {
   BlobPlaces near, far;
   [[nodiscard]] std::size_t count() const { return near.count + far.count; }
 };
-/// As select, for the cube of half edge kTile / 2, as places. Near are those whose centre lies within half a radius of it.
-[[nodiscard]] PotentialBounds select_tile(const BlobList& from, const std::array<float, 3>& centre, TileBlobs& tile);
+
+/// What reaches the eight tiles of a leaf, x + 2 y + 4 z.
+struct LeafTiles {
+  static constexpr std::size_t kTiles = 8;
+  std::array<PotentialBounds, kTiles> bounds;
+  std::array<TileBlobs, kTiles> blobs;
+};
+/// As select, for those of the tiles around `centre` whose bits are set, as places. Near are those whose centre lies within half a
+/// radius of a tile.
+void select_tiles(const BlobList& from, const std::array<float, 3>& centre, unsigned wanted, LeafTiles& tiles);
 
 struct TileSums {
   std::uint64_t inside = 0;   ///< bit per node: F > 0

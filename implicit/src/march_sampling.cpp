@@ -234,8 +234,8 @@ class BlobSampler final : public Sampler {
 
  private:
   struct Workspace {
-    blobs::TileBlobs tile_blobs;
-    BlobList gathered, block, leaf, tile, near, far;
+    blobs::LeafTiles tiles;
+    BlobList block, leaf, tile, near, far;
     std::array<BlobList, kLeaves> leaf_of_block;
     Bits sure = 0;                         // tiles of the block at work that are sure to be inside
     BlobList around_block, around_leaf;    // of the block and leaf that points were last projected near
@@ -317,20 +317,36 @@ class BlobSampler final : public Sampler {
   [[nodiscard]] std::vector<std::uint32_t> all_blocks(BlockTable& table) const {
     for (Block& block : table.block) block.clear();
     table.touched.assign(table.touched.size(), 1);
+    std::vector<std::uint8_t> entered(table.block.size());
+    grid_.for_bins([&](const blobs::CellBox& bin) { for_blocks_in(table, bin, [&](std::size_t b) { entered[b] = 1; }); });
     const auto reach = static_cast<std::int64_t>(std::ceil(grid_.reach())) + 1;
-    grid_.for_bins([&](const blobs::CellBox& bin) {
-      blobs::CellBox around = bin;
-      for (std::size_t k = 0; k < 3; ++k) {
-        around.lower[k] -= reach;
-        around.upper[k] += reach + 1;
-      }
-      for_blocks_in(table, around, [&](std::size_t b) { table.block[b].changed = kAll; });
-    });
+    spread(entered, table.count, static_cast<std::size_t>((reach + kBlockNodes - 1) / kBlockNodes));
     std::vector<std::uint32_t> list;
     for (std::size_t b = 0; b < table.block.size(); ++b) {
-      if (table.block[b].changed != 0) list.push_back(static_cast<std::uint32_t>(b));
+      if (entered[b] == 0) continue;
+      table.block[b].changed = kAll;
+      list.push_back(static_cast<std::uint32_t>(b));
     }
     return list;
+  }
+
+  /// Marks what lies up to `steps` from a mark along every axis.
+  static void spread(std::vector<std::uint8_t>& marks, const BlockCoord& count, std::size_t steps) {
+    std::vector<std::uint8_t> line;
+    std::size_t stride = 1;
+    for (const std::int32_t along : count) {
+      const auto n = static_cast<std::size_t>(along);
+      for (std::size_t l = 0; l < marks.size() / n; ++l) {
+        std::uint8_t* mark = &marks[l / stride * stride * n + l % stride];
+        line.assign(n, 0);
+        for (std::size_t i = 0; i < n; ++i) {
+          if (mark[i * stride] == 0) continue;
+          for (std::size_t k = i - std::min(i, steps); k <= std::min(i + steps, n - 1); ++k) line[k] = 1;
+        }
+        for (std::size_t i = 0; i < n; ++i) mark[i * stride] = line[i];
+      }
+      stride *= n;
+    }
   }
 
   /// Marks the tiles whose closed boxes meet what has changed; a tile's box ends at the next tile's first node.
@@ -391,12 +407,7 @@ class BlobSampler final : public Sampler {
   }
 
   void gather(const Block& block, Workspace& work) const {
-    if (!near_first(kSureTiles)) {
-      grid_.gather(block.base(), kBlockNodes, 0, work.block);
-      return;
-    }
-    grid_.gather(block.base(), kBlockNodes, 0, work.gathered);
-    blobs::select_near_first(work.gathered, centre_of({0, 0, 0}, kBlockNodes), 0.5F * kBlockNodes, work.block, work.far);
+    grid_.gather(block.base(), kBlockNodes, 0, work.block, near_first(kSureTiles) ? &work.far : nullptr);
   }
 
   [[nodiscard]] Verdict select_leaf(unsigned leaf, Workspace& work) const {
@@ -405,8 +416,16 @@ class BlobSampler final : public Sampler {
                        ? blobs::select(work.block, centre, 0.5F * kLeafNodes, work.leaf)
                        : blobs::select_near_first(work.block, centre, 0.5F * kLeafNodes, work.leaf, work.far));
   }
-  [[nodiscard]] Verdict select_tile(unsigned tile, Workspace& work) const {
-    return verdict(blobs::select_tile(work.leaf, centre_of(corner_of(tile), kTile), work.tile_blobs));
+  /// Calls use(place, bounds show, blobs) for some tiles of the leaf at work.
+  template <class Use>
+  void select_tiles(unsigned leaf, Bits tiles, Workspace& work, const Use& use) const {
+    const Bits own = tiles_of(leaf);
+    blobs::select_tiles(work.leaf, centre_of(leaf_corner(leaf), kLeafNodes), static_cast<unsigned>(_pext_u64(tiles, own)), work.tiles);
+    std::size_t t = 0;
+    for_bits(own, [&](unsigned place) {
+      if ((tiles >> place & 1u) != 0) use(place, verdict(work.tiles.bounds[t]), work.tiles.blobs[t]);
+      ++t;
+    });
   }
 
   static std::array<float, 3> point(const std::array<int, 3>& node) {
@@ -440,41 +459,35 @@ class BlobSampler final : public Sampler {
     // Tiles of a leaf that bounds decided have not been looked at one by one.
     const Bits tiles = was_decided ? own : own & block.changed;
     empty(block, tiles, false, work);
-    Bits sure = 0;  // of its cubes of 2^3 nodes
+    Bits inside = work.sure & tiles, sure = 0;  // of its cubes of 2^3 nodes
     if (sure_by_cubes()) {
       const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(leaf_corner(leaf)), kTile / 2, iso_);
       block.kernel_values += kTileNodes * cubes.added;
       sure = cubes.inside;
     }
     for_bits(tiles, [&](unsigned tile) {
-      const Bits at = Bits{1} << tile;
       const auto [x, y, z] = coordinates(tile);
       const Bits cubes = tiles_of(static_cast<unsigned>((x & 1) | (y & 1) << 1 | (z & 1) << 2));
-      if ((work.sure & at) != 0 || (~sure & cubes) == 0) {
+      if ((~sure & cubes) == 0) inside |= Bits{1} << tile;
+    });
+    block.early |= inside;
+    set_sign(block, inside, true);
+    select_tiles(leaf, tiles & ~inside, work, [&](unsigned tile, Verdict here, const blobs::TileBlobs& reached) {
+      const Bits at = Bits{1} << tile;
+      if (here != Verdict::Unknown) {
+        set_sign(block, at, here == Verdict::Inside);
+        return;
+      }
+      const blobs::TileSums sums =
+          blobs::evaluate_tile(work.leaf, reached, point(corner_of(tile)), iso_, sure_, work.changes.room());
+      block.kernel_values += kTileNodes * sums.added;
+      set_sign(block, at, sums.inside == kAll);
+      if (sums.added < reached.count()) {
         block.early |= at;
-        set_sign(block, at, true);
       } else {
-        sample_tile(block, tile, work);
+        work.changes.make(tile, sums.inside);
       }
     });
-  }
-
-  void sample_tile(Block& block, unsigned tile, Workspace& work) const {
-    const Bits at = Bits{1} << tile;
-    const Verdict here = select_tile(tile, work);
-    if (here != Verdict::Unknown) {
-      set_sign(block, at, here == Verdict::Inside);
-      return;
-    }
-    const blobs::TileSums sums =
-        blobs::evaluate_tile(work.leaf, work.tile_blobs, point(corner_of(tile)), iso_, sure_, work.changes.room());
-    block.kernel_values += kTileNodes * sums.added;
-    set_sign(block, at, sums.inside == kAll);
-    if (sums.added < work.tile_blobs.count()) {
-      block.early |= at;
-    } else {
-      work.changes.make(tile, sums.inside);
-    }
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
@@ -516,10 +529,10 @@ class BlobSampler final : public Sampler {
     for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
       const Bits tiles = block.needed & tiles_of(leaf);
       if (tiles == 0 || select_leaf(leaf, work) != Verdict::Unknown) continue;
-      for_bits(tiles, [&](unsigned tile) {
-        if (select_tile(tile, work) != Verdict::Unknown) return;
-        block.kernel_values += kTileNodes * work.tile_blobs.count();
-        const blobs::TileSums sums = blobs::evaluate_tile(work.leaf, work.tile_blobs, point(corner_of(tile)), iso_,
+      select_tiles(leaf, tiles, work, [&](unsigned tile, Verdict here, const blobs::TileBlobs& reached) {
+        if (here != Verdict::Unknown) return;
+        block.kernel_values += kTileNodes * reached.count();
+        const blobs::TileSums sums = blobs::evaluate_tile(work.leaf, reached, point(corner_of(tile)), iso_,
                                                           std::numeric_limits<float>::infinity(), work.changes.room());
         work.changes.make(tile, sums.inside);
       });

@@ -302,7 +302,7 @@ void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n
   blobs::BlobGrid grid;
   grid.build(field.packed().primitive, lattice);
   blobs::BlobList block, leaf;
-  blobs::TileBlobs tile;
+  blobs::LeafTiles tiles;
   alignas(64) float tile_values[blobs::kTileNodes];
   const auto for_corners = [](int edge, const auto& at) {
     for (int c = 0; c < 8; ++c) at(edge * (c & 1), edge * (c >> 1 & 1), edge * (c >> 2));
@@ -318,9 +318,10 @@ void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n
         for_corners(8, [&](int lx, int ly, int lz) {
           (void)blobs::select(block, centre(lx, ly, lz, 4.0F), 4.0F, leaf);
           if (leaf.count == 0) return;
+          blobs::select_tiles(leaf, centre(lx, ly, lz, 4.0F), 0xffu, tiles);
           for_corners(4, [&](int tx, int ty, int tz) {
             const int x0 = lx + tx, y0 = ly + ty, z0 = lz + tz;
-            (void)blobs::select_tile(leaf, centre(x0, y0, z0, 2.0F), tile);
+            const blobs::TileBlobs& tile = tiles.blobs[static_cast<std::size_t>(tx >> 2 | ty >> 1 | tz)];
             if (tile.count() == 0) return;
             blobs::evaluate_tile(leaf, tile, centre(x0, y0, z0, 0.0F), iso, std::numeric_limits<float>::infinity(), tile_values);
             use(bx + x0, by + y0, bz + z0, tile_values);
