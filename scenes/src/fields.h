@@ -641,6 +641,12 @@ void fields(Archive& archive, SamplingDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, FilmDesc& d) {
+  archive("frame_rate", d.frame_rate, between(0.1, 1000.0, kRate).or_auto(),
+          "frames a second of the film; auto: the scene's; less is slow motion");
+}
+
+template <class Archive>
 void fields(Archive& archive, OutputDesc& d) {
   archive("images", d.images, {}, "a PNG a frame");
   archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");

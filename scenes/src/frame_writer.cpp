@@ -286,7 +286,8 @@ fs::path FrameWriter::make_film(const std::string& name, int last) {
     return {};
   }
   const fs::path film = options_.folder / (name + ".mp4");
-  render::encode_film(options_.folder / "frames", name, 1, last, scene_.frame_rate, film);
+  const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);
+  render::encode_film(options_.folder / "frames", name, 1, last, frame_rate, film);
   return film;
 }
 

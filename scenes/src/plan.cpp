@@ -118,7 +118,7 @@ const StageInfo& info(Stage stage) { return kTable[static_cast<std::size_t>(stag
 OutputRequest requested_outputs(const Scene& scene) {
   const OutputDesc& o = scene.output;
   return {.images = o.images.has_value(),
-          .film = o.film,
+          .film = o.film.has_value(),
           .meshes = !o.mesh.empty(),
           .grids = !o.grid.empty(),
           .contacts = !o.contacts.empty(),

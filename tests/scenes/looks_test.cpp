@@ -254,7 +254,7 @@ TEST_F(Looks, AbsentTexturesAndFilmMakersAreNamedBeforeAnythingIsRemoved) {
   EXPECT_EQ(render_run(absent, again).outcome, "io");
 
   Scene film = scene_with("", kOneCamera);
-  film.output.film = true;
+  film.output.film.emplace();
   ::setenv("SUPPLE_FFMPEG", "/no/such/ffmpeg", 1);
   result = run_scene(film, again);
   ::unsetenv("SUPPLE_FFMPEG");

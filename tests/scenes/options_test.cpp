@@ -556,6 +556,7 @@ void add_files(std::vector<Option>& all) {
          formats == std::string("exr") ? "png" : "exr", formats);
   }
   file("film", "images: {size: [48, 36], samples: 1}, film: $", "false", "true");
+  file("film.frame_rate", "images: {size: [48, 36], samples: 1}, film: {frame_rate: $}", "auto", "5");
   for (const char* what : {"contacts", "particles", "samples"}) {
     for (const char* format : {"csv", "vtk"}) file(what + std::string("=") + format, std::string(what) + ": $", "none", format);
   }

@@ -149,7 +149,7 @@ TEST_F(Run, ExportsFromSavedStatesWhatTheRunWouldHaveWritten) {
   scene_.output.mesh = {MeshName::Usd, MeshName::Obj, MeshName::Ply};
   scene_.output.particles = scene_.output.contacts = {TableName::Csv, TableName::Vtk};
   scene_.output.images.reset();
-  scene_.output.film = false;
+  scene_.output.film.reset();
   ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
   Scene quiet = scene_;
   quiet.output = {};
@@ -229,7 +229,7 @@ TEST_F(Run, WritesEvenSamplesThatRideOnTheirParticles) {
 }
 
 TEST_F(Run, KeepsPicturesThatShowTheSameSceneAndState) {
-  scene_.output.film = false;
+  scene_.output.film.reset();
   ASSERT_EQ(run_scene(scene_, options()).pictures_drawn, 5);
   EXPECT_EQ(render_run(scene_, options()).pictures_kept, 5);
   fs::remove(folder_ / "frames/drops.0002.png");
@@ -250,7 +250,7 @@ TEST_F(Run, KeepsPicturesThatShowTheSameSceneAndState) {
 }
 
 TEST_F(Run, DrawsFramesAtTheSameTimeWithTheSameBytes) {
-  scene_.output.film = false;
+  scene_.output.film.reset();
   ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
   std::vector<std::vector<std::byte>> before;
   for (int frame = 1; frame <= 5; ++frame) before.push_back(bytes_of(folder_ / ("frames/drops.000" + std::to_string(frame) + ".png")));
@@ -285,7 +285,7 @@ TEST_F(Run, DrawsFramesAtTheSameTimeWithTheSameBytes) {
 }
 
 TEST_F(Run, DrawsMissingPicturesOnResuming) {
-  scene_.output.film = false;
+  scene_.output.film.reset();
   ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
   const auto second = bytes_of(folder_ / "frames/drops.0002.png");
   fs::remove(folder_ / "frames/drops.0002.png");
@@ -398,7 +398,7 @@ TEST_F(Run, WritesForEarlierFramesTooWhatARestartAsksForFirst) {
 
 TEST_F(Run, WritesGridsOfObjectsOfTheSceneOrBoth) {
   scene_.output.images.reset();
-  scene_.output.film = false;
+  scene_.output.film.reset();
   const auto grids_of = [&](GriddedName of, GridContentName content) {
     scene_.output.gridding.of = of;
     scene_.output.gridding.content = content;
@@ -430,7 +430,7 @@ TEST_F(Run, WritesGridsOfObjectsOfTheSceneOrBoth) {
 
 TEST_F(Run, RefusesGridsOfTooManyVoxelsByTheKeyOfTheScene) {
   scene_.output.images.reset();
-  scene_.output.film = false;
+  scene_.output.film.reset();
   scene_.output.mesh.clear();
   scene_.output.cell = 1e-5;
   const RunResult refused = run_scene(scene_, options());

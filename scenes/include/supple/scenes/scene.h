@@ -389,9 +389,13 @@ struct SamplingDesc {
   std::optional<double> density;      ///< instead: samples a square metre [1/m^2]
 };
 
+struct FilmDesc {
+  std::optional<double> frame_rate;   ///< that it is shown at [1/s]; absent: the scene's, so that it runs as fast as what it shows
+};
+
 struct OutputDesc {
   std::optional<ImagesDesc> images;
-  bool film = false;                  ///< needs images
+  std::optional<FilmDesc> film;       ///< needs images
   std::vector<TableName> contacts;    ///< formats; empty: none
   std::vector<TableName> particles;
   std::vector<TableName> samples;     ///< even samples of the surfaces
