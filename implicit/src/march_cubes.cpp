@@ -394,7 +394,7 @@ void move_run(const Run& run, Item* items) {
   const auto move = [&](std::size_t i, std::size_t count, std::ptrdiff_t next) {
     const char* ahead = reinterpret_cast<const char*>(items + run.from + i) + next;
     for (std::size_t byte = 0; byte < kPage; byte += kLine) _mm_prefetch(ahead + byte, _MM_HINT_T0);
-    std::memmove(static_cast<void*>(items + run.to + i), items + run.from + i, count * sizeof(Item));
+    std::memmove(static_cast<void*>(items + run.to + i), static_cast<const void*>(items + run.from + i), count * sizeof(Item));
   };
   if (run.to < run.from) {
     for (std::size_t i = 0; i < run.count; i += kItems) move(i, std::min(kItems, run.count - i), kPage);

@@ -230,7 +230,7 @@ Mesh read_ply(std::string_view text, const std::string& path) {
         const bool faces = element.name == "face" && (property.name == "vertex_indices" || property.name == "vertex_index");
         corner.clear();
         const double length = numbers.next(*property.count);
-        for (double i = 0.0; i < length; i += 1.0) {
+        for (std::uint64_t i = 0; static_cast<double>(i) < length; ++i) {
           const double index = numbers.next(property.type);
           if (!faces) continue;
           if (!(index >= 0.0) || index >= static_cast<double>(mesh.position.size())) {
