@@ -336,7 +336,7 @@ class BlobSampler final : public Sampler {
     std::size_t stride = 1;
     for (const std::int32_t along : count) {
       const auto n = static_cast<std::size_t>(along);
-      for (std::size_t l = 0; l < marks.size() / n; ++l) {
+      for (std::size_t l = 0; l * n < marks.size(); ++l) {
         std::uint8_t* mark = &marks[l / stride * stride * n + l % stride];
         line.assign(n, 0);
         for (std::size_t i = 0; i < n; ++i) {
