@@ -395,7 +395,9 @@ class BlobSampler final : public Sampler {
     gather(block, work);
     work.sure = 0;
     if (sure_by_tiles() && work.block.count > 0) {
-      const blobs::SureCubes sure = blobs::find_sure_cubes(work.block, {0.0F, 0.0F, 0.0F}, kTile, iso_);
+      // Where cells are small, bounds show as much of tiles next to the surface, and those are needed.
+      const float level = grid_.reach() > kNearMost ? sure_ : iso_;
+      const blobs::SureCubes sure = blobs::find_sure_cubes(work.block, {0.0F, 0.0F, 0.0F}, kTile, level);
       block.kernel_values += kTileNodes * sure.added;
       work.sure = sure.inside;
     }
