@@ -7,6 +7,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <exception>
 #include <limits>
@@ -83,6 +84,20 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
   if (impl_->threads == 1 || blocks == 1) {
     for (std::size_t index = 0; index < blocks; ++index) run_block(index);
   } else {
+    // Every thread begins with a share of its own, the same one in every loop of so many blocks, so that it finds what it
+    // wrote before; then it helps the others, a block at a time.
+    struct alignas(64) Share {
+      std::atomic<std::size_t> next{0};
+      std::size_t end = 0;
+    };
+    const std::size_t workers = std::min(static_cast<std::size_t>(impl_->threads), blocks);
+    constexpr std::size_t kMostShares = 32;  // nothing is allocated for them
+    std::array<Share, kMostShares> shares;
+    const std::size_t count = std::min(workers, kMostShares);
+    for (std::size_t k = 0; k < count; ++k) {
+      shares[k].next.store(k * blocks / count, std::memory_order_relaxed);
+      shares[k].end = (k + 1) * blocks / count;
+    }
     // The order of memory, written down: TBB keeps it too, but where the thread sanitizer cannot see. Two of them, so that
     // no block seems to come after another.
     std::atomic<bool> begun{false};
@@ -90,13 +105,17 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
     begun.store(true, std::memory_order_release);
     impl_->arena.execute([&] {
       tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, blocks, 1),
-          [&](const tbb::blocked_range<std::size_t>& range) {
+          tbb::blocked_range<std::size_t>(0, workers, 1),
+          [&](const tbb::blocked_range<std::size_t>&) {
             static_cast<void>(begun.load(std::memory_order_acquire));
-            for (std::size_t index = range.begin(); index != range.end(); ++index) run_block(index);
-            done.fetch_add(range.size(), std::memory_order_release);
+            const auto own = static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
+            for (std::size_t k = 0; k < count; ++k) {
+              Share& share = shares[(own + k) % count];
+              for (std::size_t index; (index = share.next.fetch_add(1, std::memory_order_relaxed)) < share.end;) run_block(index);
+            }
+            done.fetch_add(1, std::memory_order_release);
           },
-          tbb::auto_partitioner());
+          tbb::simple_partitioner());
     });
     static_cast<void>(done.load(std::memory_order_acquire));
   }
