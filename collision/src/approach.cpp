@@ -26,13 +26,13 @@ void contributions_at(const ContactBody& body, const Vec3& x, implicit::FieldPar
 /// One body at a point where it is pushed along a normal.
 struct Handle {
   const ContactBody* body = nullptr;
-  const PartMobility* mobility = nullptr;
+  const PartMobility* mobility = nullptr;  // null: impulses are none of its business
   implicit::FieldParts row;
   Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
 
-  void take(const ContactBody& b, const PartMobility& m, const Vec3& x, const Vec3& n) {
+  void take(const ContactBody& b, const Vec3& x, const Vec3& n, const PartMobility* m = nullptr) {
     body = &b;
-    mobility = &m;
+    mobility = m;
     point = x;
     normal = n;
     contributions_at(b, x, row);
@@ -81,17 +81,14 @@ Box overlap_of(const ContactBody& a, const ContactBody& b, const Vec3& shift) {
 
 }  // namespace
 
-Approach measure_approach(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
-                          const ContactSurface::Summary& summary) {
-  SUPPLE_EXPECTS(mobility.size() == bodies.size());
+Approach measure_approach(std::span<const ContactBody> bodies, const ContactSurface::Summary& summary) {
   Approach approach;
   approach.point = summary.centre_of_pressure;
   approach.normal = -summary.force.normalized();
-  Handle a, b;
-  a.take(bodies[summary.bodies.a], mobility[summary.bodies.a], approach.point, approach.normal);
-  b.take(bodies[summary.bodies.b], mobility[summary.bodies.b], approach.point, approach.normal);
+  thread_local Handle a, b;
+  a.take(bodies[summary.bodies.a], approach.point, approach.normal);
+  b.take(bodies[summary.bodies.b], approach.point, approach.normal);
   approach.speed = a.speed(nullptr) - b.speed(nullptr);
-  approach.inverse_mass = a.inverse_mass() + b.inverse_mass();
   return approach;
 }
 
@@ -203,8 +200,8 @@ CoreImpulses hold_cores(std::span<const ContactBody> bodies, std::span<const Par
     if (!(s.largest_pressure > core_pressure(a, b)) || !(s.force.norm() > 0.0)) continue;
     const Vec3 normal = -s.force.normalized();
     Pair pair{.bodies = s.bodies, .a = {}, .b = {}, .inverse_mass = 0.0};
-    pair.a.take(a, mobility[s.bodies.a], s.centre_of_pressure, normal);
-    pair.b.take(b, mobility[s.bodies.b], s.centre_of_pressure, normal);
+    pair.a.take(a, s.centre_of_pressure, normal, &mobility[s.bodies.a]);
+    pair.b.take(b, s.centre_of_pressure, normal, &mobility[s.bodies.b]);
     pair.inverse_mass = pair.a.inverse_mass() + pair.b.inverse_mass();
     if (pair.inverse_mass > 0.0) pairs.push_back(std::move(pair));
   }

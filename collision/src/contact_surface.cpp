@@ -177,13 +177,22 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
 
 /// Partners of either body whose surfaces may reach the overlap.
 void PairSolver::find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap) {
+  // Most boxes are near and few meet: all comparisons at once, no guess at each of them.
+  const auto reaches = [&](std::uint32_t c) {
+    const Box& box = boxes[c];
+    unsigned meets = 1;
+    for (const Eigen::Index k : {0, 1, 2}) {
+      meets &= static_cast<unsigned>(box.lower[k] <= overlap.upper[k]) & static_cast<unsigned>(overlap.lower[k] <= box.upper[k]);
+    }
+    return meets != 0;
+  };
   third_.clear();
   third_bodies_.clear();
   for (const std::uint32_t c : partners.of(pair.a)) {
-    if (c != pair.b && boxes[c].overlaps(overlap)) third_.push_back(c);
+    if (reaches(c) && c != pair.b) third_.push_back(c);
   }
   for (const std::uint32_t c : partners.of(pair.b)) {
-    if (c == pair.a || !boxes[c].overlaps(overlap)) continue;
+    if (!reaches(c) || c == pair.a) continue;
     const auto place = std::lower_bound(third_.begin(), third_.end(), c);
     if (place == third_.end() || *place != c) third_.insert(place, c);
   }
@@ -366,29 +375,52 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   summary.evaluations = pressure.evaluations();
 }
 
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
+/// Numbers of pairs, points and points of squeezed regions.
+struct Extent {
+  std::size_t pairs = 0, points = 0, volumes = 0;
+  void operator+=(const Extent& other) {
+    pairs += other.pairs;
+    points += other.points;
+    volumes += other.volumes;
+  }
+};
+
+/// What a surface needs of one pair. @param parted  whether A, B have several parts, whose forces need the regions
+Extent extent_of(const PairResult& result, const std::array<bool, 2>& parted) {
+  if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0) return {};
+  Extent extent{1, result.points.point.size(), 0};
+  for (std::size_t i = 0; i < result.points.volume_side.size() && (parted[0] || parted[1]); ++i) {
+    extent.volumes += parted[result.points.volume_side[i]] ? 1 : 0;
+  }
+  return extent;
 }
 
-/// Joins what one pair gave, if it touches. @param parted  whether A, B have several parts, whose forces need the regions
-void add_result(const PairResult& result, std::array<bool, 2> parted, ContactSurface& out) {
-  if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0) return;
-  const auto index = static_cast<std::uint32_t>(out.summary.size());
-  out.summary.push_back(result.summary);
-  out.pair.insert(out.pair.end(), result.points.point.size(), index);
-  append(out.point, result.points.point);
-  append(out.normal, result.points.normal);
-  append(out.area, result.points.area);
-  append(out.pressure, result.points.pressure);
-  if (!parted[0] && !parted[1]) return;
-  for (std::size_t i = 0; i < result.points.volume_point.size(); ++i) {
-    const std::uint8_t side = result.points.volume_side[i];
-    if (!parted[side]) continue;
-    out.volume_pair.push_back(index);
-    out.volume_side.push_back(side);
-    out.volume_point.push_back(result.points.volume_point[i]);
-    out.volume_weight.push_back(result.points.volume_weight[i]);
+/// @param keep  never fewer entries than there are: what lies beyond is not written again when they are wanted
+void resize(ContactSurface& out, const Extent& size, bool keep) {
+  const auto to = [keep](std::size_t n, auto&... arrays) { (arrays.resize(keep ? std::max(n, arrays.size()) : n), ...); };
+  to(size.pairs, out.summary);
+  to(size.points, out.pair, out.point, out.normal, out.area, out.pressure);
+  to(size.volumes, out.volume_pair, out.volume_side, out.volume_point, out.volume_weight);
+}
+
+/// Copies one pair that touches to its place.
+void put(const PairResult& result, const std::array<bool, 2>& parted, const Extent& begin, ContactSurface& out) {
+  const auto at = [](auto& to, std::size_t place) { return to.begin() + static_cast<std::ptrdiff_t>(place); };
+  const auto index = static_cast<std::uint32_t>(begin.pairs);
+  const PatchPoints& points = result.points;
+  out.summary[index] = result.summary;
+  std::fill_n(at(out.pair, begin.points), points.point.size(), index);
+  std::copy(points.point.begin(), points.point.end(), at(out.point, begin.points));
+  std::copy(points.normal.begin(), points.normal.end(), at(out.normal, begin.points));
+  std::copy(points.area.begin(), points.area.end(), at(out.area, begin.points));
+  std::copy(points.pressure.begin(), points.pressure.end(), at(out.pressure, begin.points));
+  std::size_t place = begin.volumes;
+  for (std::size_t i = 0; i < points.volume_side.size() && (parted[0] || parted[1]); ++i) {
+    if (!parted[points.volume_side[i]]) continue;
+    out.volume_pair[place] = index;
+    out.volume_side[place] = points.volume_side[i];
+    out.volume_point[place] = points.volume_point[i];
+    out.volume_weight[place++] = points.volume_weight[i];
   }
 }
 
@@ -411,40 +443,66 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
                            const ContactSettings& settings, const Executor& executor, ContactSurface& out) {
   SUPPLE_EXPECTS(settings.error >= 1e-10 && settings.error <= 0.1);
   SUPPLE_EXPECTS(candidates.offset.size() == candidates.pair.size() + 1);
-  out.clear();
-  if (candidates.pair.empty()) return;
+  if (candidates.pair.empty()) return out.clear();
   thread_local std::vector<PairResult> results;
+  thread_local std::vector<Extent> begins;  // of blocks
   thread_local Partners partners;
   thread_local std::vector<Box> boxes;
   boxes.resize(bodies.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) boxes[i] = bodies[i].field ? bodies[i].field.surface_box() : Box{};
   partners.build(bodies.size(), candidates.pair);
-  // In portions, so that what a pair leaves behind is joined while it is still near, and buffers stay small.
-  constexpr std::size_t kPortion = 128, kBlock = 2;
+  // In portions, so that what pairs leave behind is joined while it is still near, and buffers stay small.
+  constexpr std::size_t kPortion = 512, kBlock = 4;
   const std::size_t pairs = candidates.pair.size();
   if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
+  begins.resize(kPortion / kBlock);
   struct Job {
     std::span<const ContactBody> bodies;
     const ContactCandidates& candidates;
     const ContactSettings& settings;
     const Partners& partners;
-    std::span<const Box> boxes;
+    std::span<Box> boxes;
     std::vector<PairResult>& results;
+    std::vector<Extent>& begins;
+    ContactSurface& out;
     std::size_t first;
-  } job{bodies, candidates, settings, partners, boxes, results, 0};
+    [[nodiscard]] std::array<bool, 2> parted(std::size_t k) const {
+      const BodyPair& pair = candidates.pair[first + k];
+      return {bodies[pair.a].pose.size() > 1, bodies[pair.b].pose.size() > 1};
+    }
+  } job{bodies, candidates, settings, partners, boxes, results, begins, out, 0};
+  constexpr std::size_t kBodies = 64;
+  executor.for_blocks(bodies.size(), kBodies, [&job](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) job.boxes[i] = job.bodies[i].field ? job.bodies[i].field.surface_box() : Box{};
+  });
+  Extent size;
   for (; job.first < pairs; job.first += kPortion) {
     const std::size_t count = std::min(kPortion, pairs - job.first);
     executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
       thread_local PairSolver solver;
+      Extent block;
       for (std::size_t k = begin; k < end; ++k) {
         solver.solve(job.bodies, job.candidates, job.partners, job.boxes, job.first + k, job.settings, job.results[k]);
+        block += extent_of(job.results[k], job.parted(k));
+      }
+      job.begins[begin / kBlock] = block;
+    });
+    for (std::size_t block = 0; block * kBlock < count; ++block) {
+      const Extent extent = begins[block];
+      begins[block] = size;
+      size += extent;
+    }
+    resize(out, size, true);
+    executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
+      Extent at = job.begins[begin / kBlock];
+      for (std::size_t k = begin; k < end; ++k) {
+        const std::array<bool, 2> parted = job.parted(k);
+        const Extent extent = extent_of(job.results[k], parted);
+        if (extent.pairs > 0) put(job.results[k], parted, at, job.out);
+        at += extent;
       }
     });
-    for (std::size_t k = 0; k < count; ++k) {
-      const BodyPair& pair = candidates.pair[job.first + k];
-      add_result(results[k], {bodies[pair.a].pose.size() > 1, bodies[pair.b].pose.size() > 1}, out);
-    }
   }
+  resize(out, size, false);
 }
 
 }  // namespace supple::collision

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 namespace supple::collision {
 namespace {
@@ -219,6 +220,35 @@ std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Execut
   return pairs;
 }
 
+void OverlapList::find(std::span<const Box> boxes, const Executor& executor, std::vector<BodyPair>& out) {
+  constexpr double kMargin = 0.05;  // of the shortest edge
+  bool within = wide_.size() == boxes.size();
+  for (std::size_t i = 0; i < boxes.size() && within; ++i) {
+    within = (wide_[i].lower.array() <= boxes[i].lower.array()).all() && (boxes[i].upper.array() <= wide_[i].upper.array()).all();
+  }
+  if (!within) {
+    wide_.assign(boxes.begin(), boxes.end());
+    for (Box& box : wide_) {
+      const double edge = box.extent().minCoeff();
+      if (edge > 0.0 && std::isfinite(edge)) box = box.inflated(kMargin * edge);
+    }
+    near_ = overlapping_boxes(wide_, executor);
+  }
+  // Half of them overlap, in no order that a processor could guess: no branch asks.
+  out.resize(near_.size());
+  std::size_t count = 0;
+  for (const BodyPair& pair : near_) {
+    const Box &a = boxes[pair.a], &b = boxes[pair.b];
+    std::size_t overlap = 1;
+    for (const Eigen::Index k : {0, 1, 2}) {
+      overlap &= static_cast<std::size_t>(a.lower[k] <= b.upper[k]) & static_cast<std::size_t>(b.lower[k] <= a.upper[k]);
+    }
+    out[count] = pair;
+    count += overlap;
+  }
+  out.resize(count);
+}
+
 std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules, const Executor& executor,
                                   std::uint64_t* present) {
   std::vector<Box> box;
@@ -236,24 +266,31 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
   struct Slot {
     Box overlap;
     double spacing = 0.0;
-    bool convex = false;
+    bool convex = false, kept = false;
     std::vector<Vec3> seed;
+  };
+  struct Place {
+    std::size_t pairs = 0, seeds = 0;
   };
   thread_local std::vector<Slot> slots;
   thread_local std::vector<double> spacing;
   thread_local std::vector<Box> box;
+  thread_local std::vector<Place> places;  // of what blocks keep
   struct Job {
     std::span<const ContactBody> bodies;
     std::span<const BodyPair> pairs;
     std::vector<Slot>& slots;
     std::vector<double>& spacing;
     std::vector<Box>& box;
-  } job{bodies, pairs, slots, spacing, box};
+    std::vector<Place>& places;
+    ContactCandidates& out;
+  } job{bodies, pairs, slots, spacing, box, places, out};
 
+  constexpr std::size_t kBlock = 16;
   if (slots.size() < pairs.size()) slots.resize(pairs.size());
   spacing.resize(bodies.size());
   box.resize(bodies.size());
-  constexpr std::size_t kBlock = 16;
+  places.assign(pairs.size() / kBlock + 1, {});
   executor.for_blocks(bodies.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       job.spacing[i] = sample_spacing(job.bodies[i]);
@@ -262,6 +299,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
   });
   executor.for_blocks(pairs.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
     thread_local Scratch scratch;
+    Place size;
     for (std::size_t k = begin; k < end; ++k) {
       const ContactBody& a = job.bodies[job.pairs[k].a];
       const ContactBody& b = job.bodies[job.pairs[k].b];
@@ -273,31 +311,46 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
       slot.spacing = 0.0;
       if (slot.convex) {
         if (!between->apart) slot.seed.push_back(between->middle);
-        continue;
+      } else {
+        slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
+        const Box near = slot.overlap.inflated(slot.spacing);
+        collect(a, b, near, job.spacing[job.pairs[k].a], scratch, slot.seed);
+        collect(b, a, near, job.spacing[job.pairs[k].b], scratch, slot.seed);
       }
-      slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
-      const Box near = slot.overlap.inflated(slot.spacing);
-      collect(a, b, near, job.spacing[job.pairs[k].a], scratch, slot.seed);
-      collect(b, a, near, job.spacing[job.pairs[k].b], scratch, slot.seed);
+      slot.kept = !slot.seed.empty() || (!slot.convex && !(slot.spacing > 0.0));
+      size.pairs += slot.kept ? 1 : 0;
+      size.seeds += slot.seed.size();
     }
+    job.places[begin / kBlock] = size;
   });
 
-  out.pair.clear();
-  out.overlap.clear();
-  out.spacing.clear();
-  out.convex.clear();
-  out.seed.clear();
-  out.offset.assign(1, 0);
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const Slot& slot = slots[k];
-    if (slot.seed.empty() && (slot.convex || slot.spacing > 0.0)) continue;
-    out.pair.push_back(pairs[k]);
-    out.overlap.push_back(slot.overlap);
-    out.spacing.push_back(slot.spacing);
-    out.convex.push_back(slot.convex ? 1 : 0);
-    out.seed.insert(out.seed.end(), slot.seed.begin(), slot.seed.end());
-    out.offset.push_back(static_cast<std::uint32_t>(out.seed.size()));
+  Place all;
+  for (Place& block : places) {
+    const Place size = std::exchange(block, all);
+    all.pairs += size.pairs;
+    all.seeds += size.seeds;
   }
+  out.pair.resize(all.pairs);
+  out.overlap.resize(all.pairs);
+  out.spacing.resize(all.pairs);
+  out.convex.resize(all.pairs);
+  out.offset.resize(all.pairs + 1);
+  out.seed.resize(all.seeds);
+  out.offset[0] = 0;
+  executor.for_blocks(pairs.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
+    auto [at, seeds] = job.places[begin / kBlock];
+    for (std::size_t k = begin; k < end; ++k) {
+      const Slot& slot = job.slots[k];
+      if (!slot.kept) continue;
+      job.out.pair[at] = job.pairs[k];
+      job.out.overlap[at] = slot.overlap;
+      job.out.spacing[at] = slot.spacing;
+      job.out.convex[at] = slot.convex ? 1 : 0;
+      std::copy(slot.seed.begin(), slot.seed.end(), job.out.seed.begin() + static_cast<std::ptrdiff_t>(seeds));
+      seeds += slot.seed.size();
+      job.out.offset[++at] = static_cast<std::uint32_t>(seeds);
+    }
+  });
 }
 
 }  // namespace supple::collision

@@ -18,6 +18,11 @@ Range advance_range(const std::vector<std::uint32_t>& pair, std::size_t begin, s
   return {begin, end};
 }
 
+/// On one part: force, and torque about the part's centre.
+struct PartLoad {
+  Vec3 force, torque;
+};
+
 /// One body of a pair while its reaction is put together; buffers are reused.
 class Side {
  public:
@@ -123,9 +128,8 @@ class Side {
   [[nodiscard]] double sign() const noexcept { return sign_; }
 
   /// Hands over what was gathered and starts again from zero.
-  void move_to(PartLoads& loads) {
-    loads.force.assign(force_.begin(), force_.end());
-    loads.torque.assign(torque_.begin(), torque_.end());
+  void move_to(std::span<PartLoad> loads) {
+    for (std::size_t k = 0; k < loads.size(); ++k) loads[k] = {force_[k], torque_[k]};
     std::fill(force_.begin(), force_.end(), Vec3::Zero());
     std::fill(torque_.begin(), torque_.end(), Vec3::Zero());
   }
@@ -202,9 +206,9 @@ double friction_mollifier(double speed, double regularisation) noexcept {
 
 namespace {
 
-/// What one pair does to its bodies, A and B; reused.
+/// What one pair does.
 struct PairReaction {
-  PartLoads elastic[2], dissipative[2];
+  std::span<PartLoad> elastic[2], dissipative[2];  ///< on the parts of A, of B
   Vec3 traction = Vec3::Zero();  ///< all of it, as a force on A
   double power = 0.0;            ///< that damping, friction and springs take [W]
   bool touches = false;          ///< false: no points, and nothing else here counts
@@ -319,12 +323,46 @@ void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, 
   out.traction = dissipative + spring_force - push;
 }
 
-void add_loads(const PartLoads& from, PartLoads& to) {
-  for (std::size_t k = 0; k < from.force.size(); ++k) {
-    to.force[k] += from.force[k];
-    to.torque[k] += from.torque[k];
+void add_loads(std::span<const PartLoad> from, PartLoads& to) {
+  for (std::size_t k = 0; k < from.size(); ++k) {
+    to.force[k] += from[k].force;
+    to.torque[k] += from[k].torque;
   }
 }
+
+/// What all pairs do, and which pairs have a body; reused.
+struct Reactions {
+  std::vector<PartLoad> elastic, dissipative;  // by pair, of the parts of A, then of B
+  std::vector<PairReaction> pair;
+  std::vector<std::uint32_t> offset;           // pairs of body i are of_body[offset[i] .. offset[i + 1]), rising
+  std::vector<std::uint32_t> of_body;
+
+  void begin(std::span<const ContactBody> bodies, std::span<const ContactSurface::Summary> summary) {
+    pair.resize(summary.size());
+    offset.assign(bodies.size() + 2, 0);
+    std::size_t parts = 0;
+    for (const ContactSurface::Summary& s : summary) {
+      parts += bodies[s.bodies.a].pose.size() + bodies[s.bodies.b].pose.size();
+      ++offset[s.bodies.a + 2];
+      ++offset[s.bodies.b + 2];
+    }
+    elastic.resize(parts);
+    dissipative.resize(parts);
+    for (std::size_t i = 2; i < offset.size(); ++i) offset[i] += offset[i - 1];
+    of_body.resize(2 * summary.size());
+    std::size_t at = 0;
+    for (std::uint32_t k = 0; k < summary.size(); ++k) {
+      const std::uint32_t body_of[2] = {summary[k].bodies.a, summary[k].bodies.b};
+      for (const int s : {0, 1}) {
+        const std::size_t count = bodies[body_of[s]].pose.size();
+        pair[k].elastic[s] = std::span(elastic).subspan(at, count);
+        pair[k].dissipative[s] = std::span(dissipative).subspan(at, count);
+        at += count;
+        of_body[offset[body_of[s] + 1]++] = k;
+      }
+    }
+  }
+};
 
 }  // namespace
 
@@ -338,41 +376,49 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
   const std::size_t pairs = surface.summary.size();
   if (traction_force != nullptr) traction_force->assign(pairs, Vec3::Zero());
   if (pair_power != nullptr) pair_power->assign(pairs, 0.0);
-  // In portions, so that what a pair leaves behind is added up while it is still near.
-  constexpr std::size_t kPortion = 256, kBlock = 16;
-  thread_local std::vector<PairReaction> reactions;
-  if (reactions.size() < std::min(pairs, kPortion)) reactions.resize(std::min(pairs, kPortion));
-  std::vector<PairReaction>& slots = reactions;  // of the calling thread, whoever fills them
-  ReactionReport report;
-  for (std::size_t first = 0; first < pairs; first += kPortion) {
-    const std::size_t count = std::min(kPortion, pairs - first);
-    executor.for_blocks(count, kBlock, [&, first](std::size_t begin, std::size_t end) {
-      const auto first_of = [&](const std::vector<std::uint32_t>& pair) {
-        return static_cast<std::size_t>(std::lower_bound(pair.begin(), pair.end(), first + begin) - pair.begin());
+  thread_local Reactions kept;
+  Reactions& all = kept;  // of the calling thread, whoever fills it
+  all.begin(bodies, surface.summary);
+  // In the portions of stage 6, so that threads find the points that they made.
+  constexpr std::size_t kPortion = 512, kPairs = 4, kBodies = 32;
+  for (std::size_t portion = 0; portion < pairs; portion += kPortion) {
+    executor.for_blocks(std::min(kPortion, pairs - portion), kPairs, [&, portion](std::size_t begin, std::size_t end) {
+      const std::size_t first = portion + begin, last = portion + end;
+      const auto first_of = [first](const std::vector<std::uint32_t>& pair) {
+        return static_cast<std::size_t>(std::lower_bound(pair.begin(), pair.end(), first) - pair.begin());
       };
       Range points{0, first_of(surface.pair)}, volume{0, first_of(surface.volume_pair)};
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto k = static_cast<std::uint32_t>(first + i);
+      for (std::size_t i = first; i < last; ++i) {
+        const auto k = static_cast<std::uint32_t>(i);
         points = advance_range(surface.pair, points.end, k);
         volume = advance_range(surface.volume_pair, volume.end, k);
-        react_pair(bodies, rules, surface, settings, sticks, k, points, volume, slots[i]);
+        PairReaction& reaction = all.pair[k];
+        react_pair(bodies, rules, surface, settings, sticks, k, points, volume, reaction);
+        if (!reaction.touches) continue;
+        if (pair_power != nullptr) (*pair_power)[k] = reaction.power;
+        if (traction_force != nullptr) (*traction_force)[k] = reaction.traction;
       }
     });
-    for (std::size_t i = 0; i < count; ++i) {
-      const PairReaction& reaction = slots[i];
-      if (!reaction.touches) continue;
-      const ContactSurface::Summary& summary = surface.summary[first + i];
-      const std::uint32_t body_of[2] = {summary.bodies.a, summary.bodies.b};
-      for (const int s : {0, 1}) {
-        add_loads(reaction.elastic[s], loads[body_of[s]]);
-        add_loads(reaction.dissipative[s], loads[body_of[s]]);
-        if (!dissipative_loads.empty()) add_loads(reaction.dissipative[s], dissipative_loads[body_of[s]]);
+  }
+  // Every body adds up its own pairs, in their order.
+  executor.for_blocks(bodies.size(), kBodies, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::uint32_t e = all.offset[i]; e < all.offset[i + 1]; ++e) {
+        const std::uint32_t k = all.of_body[e];
+        const PairReaction& reaction = all.pair[k];
+        if (!reaction.touches) continue;
+        const std::size_t s = surface.summary[k].bodies.a == i ? 0 : 1;
+        add_loads(reaction.elastic[s], loads[i]);
+        add_loads(reaction.dissipative[s], loads[i]);
+        if (!dissipative_loads.empty()) add_loads(reaction.dissipative[s], dissipative_loads[i]);
       }
-      report.energy += summary.energy;
-      report.dissipated_power += reaction.power;
-      if (pair_power != nullptr) (*pair_power)[first + i] = reaction.power;
-      if (traction_force != nullptr) (*traction_force)[first + i] = reaction.traction;
     }
+  });
+  ReactionReport report;
+  for (std::size_t k = 0; k < pairs; ++k) {
+    if (!all.pair[k].touches) continue;
+    report.energy += surface.summary[k].energy;
+    report.dissipated_power += all.pair[k].power;
   }
   return report;
 }

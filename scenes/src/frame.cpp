@@ -187,7 +187,7 @@ void place_resting(const StageContext& context, const core::ParticleState& parti
 void find_reaching(const StageContext& context, Frame& frame) {
   const std::size_t moving = context.bodies.size();
   if (frame.resting.empty()) {
-    frame.reaching = collision::overlapping_boxes(frame.reach, context.executor);
+    frame.reach_list.find(frame.reach, context.executor, frame.reaching);
   } else {
     std::vector<std::uint32_t> number;  // of the boxes in the sweep
     std::vector<Box> boxes;
@@ -198,7 +198,7 @@ void find_reaching(const StageContext& context, Frame& frame) {
     for_awake(context, add);
     const std::size_t awake = number.size();
     for (std::size_t i = moving; i < frame.reach.size(); ++i) add(i);
-    frame.reaching = collision::overlapping_boxes(boxes, context.executor);
+    frame.reach_list.find(boxes, context.executor, frame.reaching);
     for (collision::BodyPair& pair : frame.reaching) pair = {number[pair.a], number[pair.b]};
     std::vector<std::uint32_t> found;
     for (std::size_t k = 0; k < awake; ++k) {
@@ -225,7 +225,7 @@ void flag_active_parts(const StageContext& context, Frame& frame) {
   frame.reached.clear();
   find_reaching(context, frame);
   const auto flag = [&](std::size_t i, const Box& other, bool sampled) {
-    if (i >= moving) return;
+    if (i >= moving || (frame.near[i] != 0 && !sampled)) return;
     if (frame.active[i].empty()) frame.active[i].assign(context.bodies[i].particle.size(), 0);
     for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
       if (!frame.placed[i].support[k].overlaps(other)) continue;
@@ -322,8 +322,10 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   const auto profile = [&](Stage stage) -> StageProfile& {
     return context.profile[static_cast<std::size_t>(stage)];
   };
-  frame.surface.clear();
-  frame.pressed.clear();
+  const auto nothing_touches = [&frame] {
+    frame.surface.clear();
+    frame.pressed.clear();
+  };
   {
     StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
     view_fixed_bodies(model, context.time, false, frame);
@@ -355,7 +357,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
       if (energy) for_awake(context, [&](std::size_t i) { view_body(context, particles, i, frame); });
     }
   }
-  if (context.skip && !near) return;
+  if (context.skip && !near) return nothing_touches();
   {
     StageTimer timer(profile(Stage::SampleSurface), context.every_call);
     profile(Stage::SampleSurface).present += frame.samples_present;
@@ -383,18 +385,21 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     if (!frame.pairs_present) frame.pairs_present = count_present_pairs(context);
     profile(Stage::FindContacts).present += *frame.pairs_present;
     profile(Stage::FindContacts).visited += frame.pairs.size();
-    if (context.skip && frame.pairs.empty()) return;
+    if (context.skip && frame.pairs.empty()) return nothing_touches();
     collision::find_contacts(frame.bodies, frame.pairs, context.executor, frame.candidates);
   }
-  if (context.skip && frame.candidates.pair.empty()) return;
+  if (context.skip && frame.candidates.pair.empty()) return nothing_touches();
   {
     StageTimer timer(profile(Stage::SolveContactSurface), context.every_call);
     collision::ContactSettings settings = model.contact;
     settings.energy = energy;
     collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
-    for (const auto& s : frame.surface.summary) frame.pressed.insert(frame.pressed.end(), {s.bodies.a, s.bodies.b});
-    std::sort(frame.pressed.begin(), frame.pressed.end());
-    frame.pressed.erase(std::unique(frame.pressed.begin(), frame.pressed.end()), frame.pressed.end());
+    std::vector<std::uint8_t> touches(frame.bodies.size(), 0);
+    for (const auto& s : frame.surface.summary) touches[s.bodies.a] = touches[s.bodies.b] = 1;
+    frame.pressed.clear();
+    for (std::uint32_t i = 0; i < touches.size(); ++i) {
+      if (touches[i] != 0) frame.pressed.push_back(i);
+    }
     profile(Stage::SolveContactSurface).present += frame.candidates.pair.size();
     profile(Stage::SolveContactSurface).visited += frame.surface.summary.size();
   }
@@ -408,12 +413,15 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   if (context.skip && frame.surface.summary.empty()) return;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
   StageTimer timer(profile, context.every_call);
-  for (const std::uint32_t i : frame.pressed) {
-    for (collision::PartLoads* loads : {&frame.loads[i], &frame.dissipative[i]}) {
-      loads->force.assign(frame.bodies[i].pose.size(), Vec3::Zero());
-      loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
+  context.executor.for_blocks(frame.pressed.size(), kBodyBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::uint32_t i = frame.pressed[k];
+      for (collision::PartLoads* loads : {&frame.loads[i], &frame.dissipative[i]}) {
+        loads->force.assign(frame.bodies[i].pose.size(), Vec3::Zero());
+        loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
+      }
     }
-  }
+  });
   frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, context.executor,
                                     frame.loads, &frame.traction_force, frame.dissipative, &frame.pair_power, context.sticks);
   const bool dissipates = frame.reaction.dissipated_power != 0.0 || model.reaction.stick.stiffness > 0.0;

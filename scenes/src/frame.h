@@ -48,6 +48,7 @@ struct Frame {
   std::vector<std::uint8_t> near;             ///< 1: its supports reach another body
   std::vector<std::uint32_t> reached;         ///< bodies in `reaching`, ascending; the others have no flags
   std::vector<collision::BodyPair> reaching;  ///< pairs whose supports reach one another, sorted
+  collision::OverlapList reach_list;          ///< what finds them
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<implicit::SurfaceSamples> samples;

@@ -28,8 +28,7 @@ std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
   return kAlike | context.bodies[body].object;
 }
 
-}  // namespace
-
+/// What moves the parts of the bodies that touch, by contact body; fixed ones stay empty.
 void find_mobility(const StageContext& context, const core::ParticleState& particles, const Frame& frame,
                    std::vector<collision::PartMobility>& mobility) {
   const core::ParticleSet& set = context.model.particles;
@@ -50,37 +49,54 @@ void find_mobility(const StageContext& context, const core::ParticleState& parti
   }
 }
 
+}  // namespace
+
 void OverloadWatch::forget() {
   capacity_.clear();
   worst_.clear();
 }
 
-double OverloadWatch::capacity_of(const StageContext& context, const Frame& frame, const collision::Approach& approach,
-                                  const collision::BodyPair& pair) {
-  const std::uint32_t a = kind_of(context, pair.a), b = kind_of(context, pair.b);
-  const auto [place, fresh] = capacity_.try_emplace(collision::BodyPair{std::min(a, b), std::max(a, b)}, 0.0);
-  if (fresh) {
-    place->second = collision::contact_capacity(frame.bodies[pair.a], frame.bodies[pair.b], approach.normal, kCoarseCells);
-  }
-  return place->second;
+collision::BodyPair OverloadWatch::kinds_of(const StageContext& context, const collision::BodyPair& pair) {
+  const auto [a, b] = std::minmax({kind_of(context, pair.a), kind_of(context, pair.b)});
+  return {a, b};
 }
 
-void OverloadWatch::look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
-                         RunRecord& record) {
-  if (frame.surface.summary.empty()) return;
-  find_mobility(context, particles, frame, mobility_);
-  for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
-    if (!(s.force.norm() > 0.0)) continue;
-    const collision::Approach approach = collision::measure_approach(frame.bodies, mobility_, s);
+void OverloadWatch::look(const StageContext& context, const Frame& frame, double time, RunRecord& record) {
+  const auto& summary = frame.surface.summary;
+  const auto kinetic_energy = [&](const collision::ContactSurface::Summary& s, const collision::Approach& approach) {
     const double speed = std::max(approach.speed, 0.0);
     const double inverse = 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b);
-    const double kinetic = inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
+    return inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
+  };
+  constexpr double kSafety = 0.45;  // of a coarse capacity, where half is the bound
+  const auto suspicious = [&](const collision::ContactSurface::Summary& s, double kinetic, double coarse) {
     // A lens whose pressure falls to zero at its faces holds a sixth of largest pressure x area x thickness, a paraboloid's
     // too; a fourth is on the safe side.
-    const double estimate = kinetic + 0.25 * s.largest_pressure * s.area * s.largest_overlap;
-    constexpr double kSafety = 0.45;  // of a coarse capacity, where half is the bound
-    const double coarse = capacity_of(context, frame, approach, s.bodies);
-    if (!(estimate > kSafety * coarse)) continue;
+    return kinetic + 0.25 * s.largest_pressure * s.area * s.largest_overlap > kSafety * coarse;
+  };
+  looked_at_.resize(summary.size());
+  constexpr std::size_t kBlock = 64;
+  context.executor.for_blocks(summary.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const collision::ContactSurface::Summary& s = summary[k];
+      looked_at_[k] = 0;
+      if (!(s.force.norm() > 0.0)) continue;
+      const auto known = capacity_.find(kinds_of(context, s.bodies));
+      looked_at_[k] = known == capacity_.end() ||
+                      suspicious(s, kinetic_energy(s, collision::measure_approach(frame.bodies, s)), known->second);
+    }
+  });
+  for (std::size_t k = 0; k < summary.size(); ++k) {
+    if (looked_at_[k] == 0) continue;
+    const collision::ContactSurface::Summary& s = summary[k];
+    const collision::Approach approach = collision::measure_approach(frame.bodies, s);
+    const double kinetic = kinetic_energy(s, approach);
+    const auto [place, fresh] = capacity_.try_emplace(kinds_of(context, s.bodies), 0.0);
+    if (fresh) {
+      place->second = collision::contact_capacity(frame.bodies[s.bodies.a], frame.bodies[s.bodies.b], approach.normal, kCoarseCells);
+    }
+    const double coarse = place->second;
+    if (!suspicious(s, kinetic, coarse)) continue;
     const collision::ContactBody &a = frame.bodies[s.bodies.a], &b = frame.bodies[s.bodies.b];
     if (!(kinetic + collision::shifted_energy(a, b, Vec3::Zero(), kCoarseCells) > kSafety * coarse)) continue;
     double& worst = worst_[s.bodies];

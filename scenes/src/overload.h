@@ -10,24 +10,19 @@
 
 namespace supple::scenes {
 
-/// What moves the parts of the bodies that touch, by contact body; fixed ones stay empty.
-void find_mobility(const StageContext& context, const core::ParticleState& particles, const Frame& frame,
-                   std::vector<collision::PartMobility>& mobility);
-
 /// Looks at every pair that touches. A pair is overloaded when the kinetic energy of its approach (with the masses of the
 /// whole bodies) and its contact energy are more than half of what it can hold (`collision::contact_capacity`).
 class OverloadWatch {
  public:
-  void look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
-            RunRecord& record);
+  void look(const StageContext& context, const Frame& frame, double time, RunRecord& record);
   /// Bodies have other indices from now on.
   void forget();
 
  private:
-  double capacity_of(const StageContext& context, const Frame& frame, const collision::Approach& approach,
-                     const collision::BodyPair& pair);
+  /// The entry of `capacity_` for a pair.
+  [[nodiscard]] static collision::BodyPair kinds_of(const StageContext& context, const collision::BodyPair& pair);
 
-  std::vector<collision::PartMobility> mobility_;
+  std::vector<std::uint8_t> looked_at_;  // 1: a pair whose energy is near what it can hold, or that is new
   std::map<collision::BodyPair, double> capacity_;  ///< when the pair, or one like it, was first seen [J]
   std::map<collision::BodyPair, double> worst_;     ///< energy when the capacity was last measured [J]
 };

@@ -522,7 +522,7 @@ struct Simulation::Impl {
       std::vector<implicit::SampleState> trial = state.samples;
       find_contact_surface(context(), state.particles, trial, frame, false);
     }
-    watch.look(context(), state.particles, frame, time(), state.record);
+    watch.look(context(), frame, time(), state.record);
     if (barrier && hold_cores(context(), frame, state.particles, state.ledger, state.record)) state.kick.valid = false;
   }
 

@@ -46,6 +46,48 @@ ContactSurface::Summary two_blobs(const Quat& q, const Vec3& shift, double scale
   return s.summary.empty() ? ContactSurface::Summary{} : s.summary.front();
 }
 
+TEST(ContactSurface, OfManyPairsIsThatOfEachPairAlone) {
+  constexpr std::size_t kBodies = 1302;  // in several portions, the last of them short
+  std::vector<LinearSphere> row;
+  for (std::size_t i = 0; i < kBodies; ++i) {
+    row.push_back({Vec3(0.9 * static_cast<double>(i), 0.01 * static_cast<double>(i % 3), 0.0), Linear{0.5 + 0.01 * static_cast<double>(i % 7), 1.0}});
+  }
+  Stage stage;
+  for (const LinearSphere& s : row) stage.add(s);
+  const ContactSettings settings{.error = 1e-2};
+  ContactSurface surface = stage.solve(settings, 3);
+  ASSERT_EQ(surface.summary.size(), kBodies - 1);
+  std::size_t at = 0;
+  for (std::size_t k = 0; k + 1 < kBodies; ++k) {
+    Stage alone;
+    alone.add(row[k]);
+    alone.add(row[k + 1]);
+    const ContactSurface& expected = alone.solve(settings);
+    ASSERT_EQ(expected.summary.size(), 1u);
+    EXPECT_EQ(surface.summary[k].force, expected.summary[0].force);
+    EXPECT_EQ(surface.summary[k].area, expected.summary[0].area);
+    ASSERT_LE(at + expected.point.size(), surface.point.size());
+    for (std::size_t i = 0; i < expected.point.size(); ++i, ++at) {
+      ASSERT_EQ(surface.pair[at], k);
+      ASSERT_EQ(surface.point[at], expected.point[i]);
+      ASSERT_EQ(surface.normal[at], expected.normal[i]);
+      ASSERT_EQ(surface.area[at], expected.area[i]);
+      ASSERT_EQ(surface.pressure[at], expected.pressure[i]);
+    }
+  }
+  EXPECT_EQ(at, surface.point.size());
+  // Of fewer pairs, into the same arrays.
+  Stage few;
+  few.add(row[4]);
+  few.add(row[5]);
+  const ContactSurface fresh = few.solve(settings);
+  solve_contact_surface(few.bodies(), few.candidates, settings, Executor(1), surface);
+  EXPECT_EQ(surface.summary.size(), 1u);
+  EXPECT_EQ(surface.pair, fresh.pair);
+  EXPECT_EQ(surface.point, fresh.point);
+  EXPECT_EQ(surface.pressure, fresh.pressure);
+}
+
 TEST(ContactSurface, HasBothPressuresEqualAtEveryPoint) {
   for (const ContactRule rule : {ContactRule::Polar, ContactRule::March}) {
     TwoBlobs bodies(Quat::Identity(), Vec3::Zero(), 1.0);

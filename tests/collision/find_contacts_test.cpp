@@ -46,6 +46,34 @@ TEST(OverlappingBoxes, AreThoseThatBruteForceFinds) {
   EXPECT_TRUE(overlapping_boxes({}, one).empty());
 }
 
+TEST(OverlapList, GivesTheSamePairsWhileBoxesMoveALittleAndALot) {
+  std::mt19937_64 engine(12);
+  const Executor executor(1);
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  std::vector<Box> boxes;
+  const auto random = [&](double size) { return Vec3(uniform(engine, -size, size), uniform(engine, -size, size), uniform(engine, -size, size)); };
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 centre = random(1.0), half = Vec3::Constant(0.2) + random(0.1);
+    boxes.push_back({centre - half, centre + half});
+  }
+  boxes.push_back({});
+  boxes.push_back({Vec3(-kFar, -kFar, -kFar), Vec3(kFar, kFar, -0.5)});
+  OverlapList list;
+  std::vector<BodyPair> found;
+  for (int step = 0; step < 60; ++step) {
+    list.find(boxes, executor, found);
+    ASSERT_EQ(found, overlapping_boxes(boxes, executor)) << step;
+    // Less than a margin at a time, but far in the end; now and then one jumps, and boxes come and go.
+    for (Box& box : boxes) {
+      const Vec3 move = random(3e-3) + Vec3(2e-3, 0, 0);
+      box = {box.lower + move, box.upper + move};
+    }
+    if (step % 10 == 5) boxes[static_cast<std::size_t>(step)] = {Vec3(-0.3, -0.3, -0.3), Vec3(0.3, 0.3, 0.3)};
+    if (step % 20 == 9) boxes.pop_back();
+    if (step % 20 == 19) boxes.push_back({Vec3(-0.1, -0.1, -2.0), Vec3(0.1, 0.1, 2.0)});
+  }
+}
+
 TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
   std::mt19937_64 engine(3);
   std::vector<LinearSphere> spheres;

@@ -22,11 +22,9 @@ struct Approach {
   Vec3 point = Vec3::Zero();   ///< centre of pressure [m]
   Vec3 normal = Vec3::Zero();  ///< mean, unit, out of A and into B
   double speed = 0.0;          ///< at which they come closer there, by contributions [m/s]; < 0: they part
-  double inverse_mass = 0.0;   ///< change of `speed` by a unit impulse along the normal [1/kg]; 0: nothing can move
 };
 /// @param summary  of a pair with a force that is not zero
-[[nodiscard]] Approach measure_approach(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
-                                        const ContactSurface::Summary& summary);
+[[nodiscard]] Approach measure_approach(std::span<const ContactBody> bodies, const ContactSurface::Summary& summary);
 
 /// Integral of [min(p_A, p_B)]+ dV [J] with A moved by `shift`, by midpoints of `cells` cubed cells of the overlap box.
 [[nodiscard]] double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, int cells);

@@ -23,6 +23,18 @@ struct ContactCandidates {
 /// Empty boxes overlap nothing.
 [[nodiscard]] std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor);
 
+/// The same for boxes that move little from call to call: pairs of boxes with a margin serve until a box has left its own
+/// (Verlet 1967).
+class OverlapList {
+ public:
+  /// @param out  what `overlapping_boxes` gives
+  void find(std::span<const Box> boxes, const Executor& executor, std::vector<BodyPair>& out);
+
+ private:
+  std::vector<Box> wide_;       // boxes with their margins
+  std::vector<BodyPair> near_;  // which of these overlap
+};
+
 /// Pairs that the rules allow, touching or not; asks for each of them.
 [[nodiscard]] std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules);
 
