@@ -234,15 +234,15 @@ class BlobSampler final : public Sampler {
 
  private:
   struct Workspace {
-    blobs::LeafTiles tiles;
-    BlobList block, leaf, tile, near, far;
-    std::array<BlobList, kLeaves> leaf_of_block;
-    Bits sure = 0;                         // tiles of the block at work that are sure to be inside
-    BlobList around_block, around_leaf;    // of the block and leaf that points were last projected near
-    const Block* near_block = nullptr;
-    unsigned near_leaf = kLeaves;
     blobs::EdgeBatch edges;
+    Bits sure = 0;                       // tiles of the block at work that are sure to be inside
+    const Block* near_block = nullptr;   // that points were last projected near
+    BlobList block, leaf, tile, near, far;
+    BlobList around_block, around_leaf;  // of near_block and its leaf near_leaf
+    blobs::LeafTiles tiles;
     TileChanges changes;
+    std::array<BlobList, kLeaves> leaf_of_block;
+    unsigned near_leaf = kLeaves;
     static Workspace& of_thread() {
       thread_local Workspace work;
       return work;
