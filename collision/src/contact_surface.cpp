@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "boxes.h"
 #include "find_peak.h"
 #include "march_rule.h"
 #include "polar_rule.h"
@@ -177,15 +178,7 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
 
 /// Partners of either body whose surfaces may reach the overlap.
 void PairSolver::find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap) {
-  // Most boxes are near and few meet: all comparisons at once, no guess at each of them.
-  const auto reaches = [&](std::uint32_t c) {
-    const Box& box = boxes[c];
-    unsigned meets = 1;
-    for (const Eigen::Index k : {0, 1, 2}) {
-      meets &= static_cast<unsigned>(box.lower[k] <= overlap.upper[k]) & static_cast<unsigned>(overlap.lower[k] <= box.upper[k]);
-    }
-    return meets != 0;
-  };
+  const auto reaches = [&](std::uint32_t c) { return overlap_at_once(boxes[c], overlap); };
   third_.clear();
   third_bodies_.clear();
   for (const std::uint32_t c : partners.of(pair.a)) {

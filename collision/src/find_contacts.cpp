@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "boxes.h"
+
 namespace supple::collision {
 namespace {
 
@@ -234,17 +236,11 @@ void OverlapList::find(std::span<const Box> boxes, const Executor& executor, std
     }
     near_ = overlapping_boxes(wide_, executor);
   }
-  // Half of them overlap, in no order that a processor could guess: no branch asks.
   out.resize(near_.size());
   std::size_t count = 0;
   for (const BodyPair& pair : near_) {
-    const Box &a = boxes[pair.a], &b = boxes[pair.b];
-    std::size_t overlap = 1;
-    for (const Eigen::Index k : {0, 1, 2}) {
-      overlap &= static_cast<std::size_t>(a.lower[k] <= b.upper[k]) & static_cast<std::size_t>(b.lower[k] <= a.upper[k]);
-    }
     out[count] = pair;
-    count += overlap;
+    count += overlap_at_once(boxes[pair.a], boxes[pair.b]) ? 1 : 0;
   }
   out.resize(count);
 }
