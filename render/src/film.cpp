@@ -116,10 +116,13 @@ std::string identity_of(const std::vector<std::string>& arguments, const std::ve
 
 /// Whether an MP4 says so in its box of facts, without reading its pictures.
 bool says(const std::filesystem::path& film, const std::string& identity) {
+  std::error_code absent;
+  const std::uintmax_t length = std::filesystem::file_size(film, absent);
+  if (absent) return false;
   std::ifstream in(film, std::ios::binary);
   for (std::array<unsigned char, 8> head{}; in.read(reinterpret_cast<char*>(head.data()), head.size());) {
     const std::size_t size = std::size_t{head[0]} << 24 | std::size_t{head[1]} << 16 | std::size_t{head[2]} << 8 | std::size_t{head[3]};
-    if (size < head.size()) return false;
+    if (size < head.size() || size > length) return false;
     const std::string_view kind(reinterpret_cast<const char*>(&head[4]), 4);
     if (kind == "mdat") return false;  // the facts come first in films of `encode_film`
     std::string box(size - head.size(), '\0');

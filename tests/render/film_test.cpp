@@ -76,8 +76,10 @@ TEST(Film, IsKeptAsLongAsItHoldsTheSamePicturesAtTheSameRate) {
     write_frames(folder, "ball", 4, 4, 16, 16);
     std::filesystem::rename(folder / "ball.0004.png", folder / "ball.0002.png");
     starts(3, 24.0);
-    std::ofstream(folder / "film.mp4") << "no film";
-    starts(3, 24.0);
+    for (const char* damaged : {"no film", "", "\xff\xff\xff\xffmoov"}) {
+      std::ofstream(folder / "film.mp4") << damaged;
+      starts(3, 24.0);
+    }
   }
   encode(3, 24.0);
   EXPECT_EQ(folder.file_count(), 4U);
