@@ -3,7 +3,8 @@
 /// pixels. The body is a ball of 200,000 triangles whose surface waves, so that every frame uploads new vertices.
 ///
 ///   render_bench [gl]                          1280 x 720, soft shadows, 4 samples, PNG included; the first frame apart
-///   render_bench rate [AT_ONCE]                frames a second of the same, several renderers at a time
+///   render_bench rate [AT_ONCE] [NOISE]        frames a second of the same, several renderers at a time; with a noise by the
+///                                              path tracer
 ///   render_bench path [NOISE] [OUT.png]        640 x 360 by the path tracer, on matt bodies in a studio, no coat
 ///   render_bench studio FOLDER                 the same bodies as PLY files, for other renderers: see peers/
 #include <time.h>
@@ -99,8 +100,9 @@ int bench_gl() {
 }
 
 /// Time, not CPU time, from meshes to files; every renderer has drawn a frame before.
-int bench_rate(int at_once) {
+int bench_rate(int at_once, const RenderSettings& settings) {
   constexpr int kFrames = 12;  // each
+  const bool path = settings.kind == RendererKind::Path;
   const View view = view_of_ball();
   std::vector<Mesh> meshes;
   for (int frame = 0; frame < kFrames; ++frame) meshes.push_back(waving_ball(129, 0.2 * frame));
@@ -112,7 +114,7 @@ int bench_rate(int at_once) {
     fs::remove(file);
   };
   for (int k = 0; k < at_once; ++k) {
-    renderers.push_back(make_renderer({}));
+    renderers.push_back(make_renderer(settings));
     draw(static_cast<std::size_t>(k), meshes.front());
   }
   const auto begin = std::chrono::steady_clock::now();
@@ -123,8 +125,9 @@ int bench_rate(int at_once) {
     });
   for (std::thread& thread : threads) thread.join();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  std::printf("{\"name\": \"render/gl/rate\", \"width\": 1280, \"height\": 720, \"samples\": 4, \"triangles\": %zu, \"at_once\": %d, \"frames_s\": %.2f}\n",
-              meshes.front().triangle_count(), at_once, at_once * kFrames / seconds);
+  const std::string quality = path ? "\"noise\": " + std::to_string(settings.noise) : "\"samples\": " + std::to_string(settings.samples);
+  std::printf("{\"name\": \"render/%s/rate\", \"width\": %d, \"height\": %d, %s, \"triangles\": %zu, \"at_once\": %d, \"frames_s\": %.2f}\n",
+              path ? "path" : "gl", settings.width, settings.height, quality.c_str(), meshes.front().triangle_count(), at_once, at_once * kFrames / seconds);
   return 0;
 }
 
@@ -183,13 +186,21 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "gl";
   try {
     if (what == "gl") return bench_gl();
-    if (what == "rate") return bench_rate(argc > 2 ? std::max(1, std::atoi(argv[2])) : 2);
+    if (what == "rate") {
+      RenderSettings settings;
+      if (argc > 3) {
+        settings.kind = RendererKind::Path;
+        settings.noise = std::atof(argv[3]);
+        settings.threads = 1;
+      }
+      return bench_rate(argc > 2 ? std::max(1, std::atoi(argv[2])) : 2, settings);
+    }
     if (what == "path") return bench_path(argc > 2 ? std::atof(argv[2]) : 0.05, argc > 3 ? argv[3] : "");
     if (what == "studio" && argc > 2) return write_studio(argv[2]);
   } catch (const supple::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return static_cast<int>(error.kind());
   }
-  std::fprintf(stderr, "usage: render_bench [gl] | rate [AT_ONCE] | path [NOISE] [OUT.png] | studio FOLDER\n");
+  std::fprintf(stderr, "usage: render_bench [gl] | rate [AT_ONCE] [NOISE] | path [NOISE] [OUT.png] | studio FOLDER\n");
   return 2;
 }

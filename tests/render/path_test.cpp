@@ -372,6 +372,7 @@ TEST(PathTracer, TakesMoreSamplesWhereSurfacesMeetInThePicture) {
   const Item item = matt(ball, 0.5);
   Studio studio;
   studio.settings.noise = 1.0;
+  studio.settings.most_samples = 64;
   studio.settings.width = studio.settings.height = 64;
   studio.lights.above = studio.lights.below = Vec3f::Ones();
   const Film film = studio.trace(std::span(&item, 1));
@@ -381,11 +382,106 @@ TEST(PathTracer, TakesMoreSamplesWhereSurfacesMeetInThePicture) {
       const double off = std::hypot(x - 31.5, y - 31.5) - radius;
       const std::uint32_t samples = film.samples[static_cast<std::size_t>(64 * y + x)];
       if (std::abs(off) < 0.5) {
-        EXPECT_EQ(samples, 16u) << x << ' ' << y;
+        EXPECT_EQ(samples, 32u) << x << ' ' << y;
       } else if (off > 3.0 || off < -8.0) {
-        EXPECT_EQ(samples, 2u) << x << ' ' << y;
+        EXPECT_EQ(samples, 1u) << x << ' ' << y;
       }
     }
+}
+
+/// A floor seen from above, 64 pixels of 0.02 m across, under a black half-plane x > 0 at some height.
+struct HalfShaded : Studio {
+  Mesh floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  Mesh shade;
+  std::array<Item, 2> items;
+  explicit HalfShaded(double height) {
+    add_quadrangle(shade, Vec3(0, -90, height), Vec3(90, -90, height), Vec3(90, 90, height), Vec3(0, 90, height));
+    items = {matt(floor, 0.5), matt(shade, 0.0)};
+    items[1].two_sided = true;
+    settings.width = settings.height = 64;
+    settings.noise = 1.0;
+    settings.most_samples = 64;
+    view.camera = {.from = Vec3(0, 0, 5), .look_at = Vec3::Zero(), .up = Vec3::UnitY(), .field_of_view = 2.0 * std::atan(0.64 / 5.0)};
+  }
+};
+
+TEST(PathTracer, TakesMoreSamplesWhereAShadowEnds) {
+  HalfShaded studio(20.0);  // the camera is below the half-plane
+  studio.lights.sun = {.to_light = Vec3f::UnitZ(), .irradiance = Vec3f::Constant(3.0F), .cosine = std::cos(0.0005F)};
+  const Film film = studio.trace(studio.items);
+  std::array<double, 64> light{}, taken_anew{};
+  for (std::size_t i = 0; i < film.samples.size(); ++i) {
+    const std::size_t x = i % 64;
+    const double share = film.direct.radiance[i].y() * kPi / 1.5;
+    if (film.samples[i] == 1) {
+      if (x < 30 || x > 33) { EXPECT_NEAR(share, x < 32 ? 1.0 : 0.0, 1e-3) << x; }
+      continue;
+    }
+    EXPECT_EQ(film.samples[i], 16u);
+    EXPECT_TRUE(x >= 30 && x <= 33) << x;
+    light[x] += share;
+    taken_anew[x] += 1.0;
+  }
+  // One sample tells on which side of the edge a pixel is: at least the two that differ.
+  EXPECT_GE(std::accumulate(taken_anew.begin(), taken_anew.end(), 0.0), 128.0);
+  // Of the penumbra, as wide as a pixel, half lies in either pixel beside its middle: an eighth of the light.
+  for (const std::size_t x : {31, 32}) {
+    const double most = 4.0 * std::sqrt(0.125 * 0.875 / 16.0 / taken_anew[x]);  // four standard errors of independent rays
+    EXPECT_NEAR(light[x] / taken_anew[x], x == 31 ? 0.875 : 0.125, most);
+  }
+}
+
+TEST(PathTracer, KnowsTheNoiseOfOneSampleByItsNeighbours) {
+  HalfShaded studio(20.0);  // all of the picture lies in the penumbra: 1.5 m to either side of it
+  studio.lights.sun = {.to_light = Vec3f::UnitZ(), .irradiance = Vec3f::Constant(3.0F), .cosine = std::cos(0.075F)};
+  studio.settings.noise = 0.0;
+  studio.settings.most_samples = 256;
+  const Film exact = studio.trace(studio.items);
+  for (const double noise : {0.5, 0.3, 0.2}) {
+    studio.settings.noise = noise;
+    studio.settings.most_samples = 16;  // none is taken anew beyond
+    const Film film = studio.trace(studio.items);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < film.radiance.size(); ++i) {
+      const double light = path::luminance(exact.radiance[i]);
+      const double error = (path::luminance(film.radiance[i]) - light) / (light + 0.1);
+      sum += error * error / static_cast<double>(film.radiance.size());
+    }
+    EXPECT_LT(std::sqrt(sum), noise) << noise;
+  }
+}
+
+TEST(PathTracer, TakesMorePathsInNarrowGaps) {
+  // A trench, four pixels wide and ten deep, between black walls, seen from above.
+  constexpr double kHalf = 0.04, kDepth = 0.2;
+  const Mesh floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  Mesh walls;
+  for (const double x : {-kHalf, kHalf})
+    add_quadrangle(walls, Vec3(x, -90, 0), Vec3(x, 90, 0), Vec3(x, 90, kDepth), Vec3(x, -90, kDepth));
+  std::array items = {matt(floor, 0.5), matt(walls, 0.0)};
+  items[1].two_sided = true;
+  Studio studio;
+  studio.settings.width = studio.settings.height = 64;
+  studio.settings.noise = 1.0;
+  studio.settings.most_samples = 64;
+  studio.view.camera = {.from = Vec3(0, 0, 5), .look_at = Vec3::Zero(), .up = Vec3::UnitY(), .field_of_view = 2.0 * std::atan(0.64 / 5.0)};
+  studio.lights.above = Vec3f::Ones();
+  const Film film = studio.trace(items);
+  double sum = 0.0, count = 0.0;
+  for (const path::DetailedPixel& d : film.detailed) {
+    const int x = static_cast<int>(d.pixel % 64);
+    EXPECT_LT(std::abs(x - 31.5), 16.0);
+    if (d.detail != path::Detail::Gap) continue;
+    EXPECT_EQ(film.samples[d.pixel], 16u);
+    if (x != 31 && x != 32) continue;  // a wall stands on the outer two
+    const double s = 0.02 * (x - 31.5), left = kHalf + s, right = kHalf - s;
+    const double sky = 0.5 * (left / std::hypot(left, kDepth) + right / std::hypot(right, kDepth));
+    const double error = film.radiance[d.pixel].y() / 0.5 - sky;
+    sum += error * error - sky * (1.0 - sky) / 16.0;  // the variance of as many independent paths
+    count += 1.0;
+  }
+  EXPECT_EQ(count, 128.0);
+  EXPECT_LT(sum, 0.0);  // stratified ones do better
 }
 
 TEST(PathTracer, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 
 // Rows that a loop writes are none of those that it reads: they are more than compilers check by themselves.
 #ifdef __clang__
@@ -203,7 +204,7 @@ void Filter::fill(const Film& film, const Vec3f& eye, float footprint) {
   for (auto* v : {&f_.nx, &f_.ny, &f_.nz, &f_.px, &f_.py, &f_.pz, &f_.plane, &f_.near, &f_.shown}) v->resize(pixels);
   f_.cover = film.cover;
   mixed_.assign(pixels, 0);
-  for (const MixedPixel& mixed : film.mixed) mixed_[mixed.pixel] = 1;
+  for (const DetailedPixel& detailed : film.detailed) mixed_[detailed.pixel] = detailed.detail == Detail::Surfaces ? 1 : 0;
   for (Signal& signal : signals_) signal = Signal(pixels);
   rows([&](int y) {
     thread_local std::vector<float> near, cover;
@@ -299,19 +300,20 @@ void Filter::finish(Film& film) const {
     const Vec3f falls(direct.r[i] + indirect.r[i], direct.g[i] + indirect.g[i], direct.b[i] + indirect.b[i]);
     film.radiance[i] = falls.cwiseProduct(film.albedo[i].cwiseMax(kAlbedoFloor));
   }
-  executor_.for_blocks(film.mixed.size(), 16, [&](std::size_t begin, std::size_t end) {
+  executor_.for_blocks(film.detailed.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
-      const MixedPixel& mixed = film.mixed[k];
-      const Neighbours neighbours = around(mixed.pixel);
+      const DetailedPixel& detailed = film.detailed[k];
+      if (detailed.detail != Detail::Surfaces) continue;
+      const std::size_t pixel = detailed.pixel;
+      const Neighbours neighbours = around(pixel);
       Vec3f sum = Vec3f::Zero();
       float cover = 0.0F;
-      for (std::size_t i = mixed.first; i < mixed.last; ++i) {
-        const Facet& facet = film.facets[i];
+      for (const Facet& facet : std::span(film.facets).subspan(detailed.facets, detailed.rays)) {
         if (facet.cover <= 0.0F) continue;
         sum += facet.cover * neighbours.light_of(facet).cwiseProduct(facet.albedo.cwiseMax(kAlbedoFloor));
         cover += facet.cover;
       }
-      if (cover > 0.0F) film.radiance[mixed.pixel] = film.direct.radiance[mixed.pixel] + sum / cover;
+      if (cover > 0.0F) film.radiance[pixel] = film.direct.radiance[pixel] + sum / cover;
     }
   });
 }
