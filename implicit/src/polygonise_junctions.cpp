@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "polygonise_block_edges.h"
 #include "polygonise_roots.h"
@@ -47,6 +49,12 @@ bool vanishes(const Conditions& c, const Vec3& point, double scale) {
   return true;
 }
 
+Vec3 corner_of(const Simplex& simplex, std::size_t k) {
+  Vec3 p;
+  for (int axis = 0; axis < 3; ++axis) p[axis] = (simplex.corner[k] >> axis & 1u) != 0 ? simplex.high[axis] : simplex.low[axis];
+  return p;
+}
+
 /// Coordinates of a simplex along its chain of corners, whose steps have no axis in common and so are orthogonal:
 /// p = origin + sum of s_k step_k, and p is inside when 1 >= s_1 >= s_2 (>= s_3) >= 0.
 struct Chain {
@@ -55,16 +63,11 @@ struct Chain {
   int steps = 0;
 
   explicit Chain(const Simplex& s) : steps(s.size - 1) {
-    origin = corner(s, 0);
+    origin = corner_of(s, 0);
     for (int k = 0; k < steps; ++k) {
       const auto slot = static_cast<std::size_t>(k);
-      step[slot] = corner(s, slot + 1) - corner(s, slot);
+      step[slot] = corner_of(s, slot + 1) - corner_of(s, slot);
     }
-  }
-  static Vec3 corner(const Simplex& s, std::size_t k) {
-    Vec3 p;
-    for (int axis = 0; axis < 3; ++axis) p[axis] = (s.corner[k] >> axis & 1u) != 0 ? s.high[axis] : s.low[axis];
-    return p;
   }
   [[nodiscard]] Vec3 point(const Vec3& s) const {
     Vec3 p = origin;
@@ -124,57 +127,116 @@ Vec3 newton_step(const Conditions& c) {
   return -(c.value[0] * g2.cross(g3) + c.value[1] * g3.cross(g1) + h3 * n) / n.dot(g3);
 }
 
-}  // namespace
-
-Junction find_junction(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels,
-                       const Vec3& start, double scale) {
-  const Chain chain(simplex);
+/// Newton's method from `start`. @param beyond  the point that was found beyond the simplex, if one was
+Junction newton_inside(std::span<const FieldView> fields, const Chain& chain, const LabelSet& labels, const Vec3& start,
+                       double scale, std::optional<Vec3>* beyond) {
   Vec3 s = chain.along(start - chain.origin);
-  Vec3 from = start;  // where to look for F_a = F_b
   for (int i = 0; i < kMaxIterations; ++i) {
     const Vec3 p = chain.point(s);
     Conditions c = conditions_at(fields, labels, p);
     if (vanishes(c, p, scale)) {
       if (chain.contains(s, 0.0)) return {.point = p, .residual = largest(c), .exact = true};
-      from = chain.point(chain.last_inside(chain.along(start - chain.origin), s));
+      if (beyond != nullptr) *beyond = s;
       break;
     }
     for (Vec3& gradient : c.gradient) gradient = chain.in_plane(gradient);
     s += chain.along(newton_step(c));
     if (!chain.contains(s, -1.0)) break;
   }
+  return {.point = start, .residual = 0.0, .exact = false};
+}
 
-  // The two lowest bodies change sides between `from` and the node of whichever is the smaller there.
-  const std::size_t lowest = labels.label[0] == 0 ? 1 : 0;
-  const Label a = labels.label[lowest], b = labels.label[lowest + 1];
-  const FieldView &field_a = fields[a - 1], &field_b = fields[b - 1];
-  const double at_start = field_a.value(from) - field_b.value(from);
-  const Label other = at_start > 0.0 ? b : a;
-  const std::size_t corner =
-      static_cast<std::size_t>(std::find(simplex.label.begin(), simplex.label.end(), other) - simplex.label.begin());
-  const Vec3 node = Chain::corner(simplex, corner);
-  double low = 0.0, high = 1.0, f_low = at_start;
-  Junction result{.point = from, .residual = std::abs(at_start), .exact = false};
-  double t = 0.5;
+}  // namespace
+
+Junction meet_inside(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels, const Vec3& start,
+                     double scale) {
+  return newton_inside(fields, Chain(simplex), labels, start, scale, nullptr);
+}
+
+Junction search_inside(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels, double scale) {
+  std::array<Vec3, 4> corner;
+  Vec3 middle = Vec3::Zero();
+  for (std::size_t v = 0; v < simplex.size; ++v) {
+    corner[v] = corner_of(simplex, v);
+    middle += corner[v] / simplex.size;
+  }
+  const auto from = [&](const Vec3& start) { return meet_inside(fields, simplex, labels, start, scale); };
+  const double size = (simplex.high - simplex.low).norm();
+  std::optional<Vec3> entered;
+  for (std::size_t v = 0; v < 4 && simplex.size == 4; ++v) {
+    Simplex face = simplex;
+    face.size = 0;
+    LabelSet met;
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (k == v) continue;
+      face.label[face.size] = simplex.label[k];
+      face.corner[face.size++] = simplex.corner[k];
+      met.insert(simplex.label[k]);
+    }
+    if (met.count < 3) continue;
+    Junction on_face = meet_inside(fields, face, labels, (4.0 * middle - corner[v]) / 3.0, scale);
+    if (!on_face.exact) on_face = search_inside(fields, face, labels, scale);
+    if (!on_face.exact) continue;
+    if (entered) {
+      if (const Junction found = from(0.5 * (*entered + on_face.point)); found.exact) return found;
+    }
+    entered = on_face.point;
+    const Conditions c = conditions_at(fields, labels, on_face.point);
+    Vec3 along = c.gradient[0].cross(c.gradient[1]).normalized();
+    const Vec3 &a = corner[(v + 1) % 4], across = (corner[(v + 2) % 4] - a).cross(corner[(v + 3) % 4] - a);
+    if ((along.dot(across) > 0.0) != ((corner[v] - a).dot(across) > 0.0)) along = -along;  // into the tetrahedron
+    for (const double share : {0.2, 0.05, 0.01}) {
+      if (const Junction found = from(on_face.point + share * size * along); found.exact) return found;
+    }
+  }
+  for (std::size_t v = 0; v < simplex.size; ++v) {
+    for (const double share : {0.5, 0.1}) {
+      if (const Junction found = from(corner[v] + share * (middle - corner[v])); found.exact) return found;
+    }
+  }
+  return {};
+}
+
+Junction root_between(std::span<const FieldView> fields, Label a, Label b, const Vec3& from, const Vec3& to, double scale) {
+  const auto difference = [&](const Vec3& p, Vec3& gradient) {
+    Vec3 ga = Vec3::Zero(), gb = Vec3::Zero();
+    const double f = (a == 0 ? 0.0 : fields[a - 1].value(p, ga)) - (b == 0 ? 0.0 : fields[b - 1].value(p, gb));
+    gradient = ga - gb;
+    return f;
+  };
+  Vec3 gradient;
+  double low = 0.0, high = 1.0, t = 0.5;
+  const double f_low = difference(from, gradient);
+  Junction result{.point = from, .residual = std::abs(f_low), .exact = false};
   for (int i = 0; i < 200 && result.residual > 0.0 && high - low > std::numeric_limits<double>::epsilon(); ++i) {
-    Vec3 ga, gb;
-    const Vec3 p = from + t * (node - from);
-    const double f = field_a.value(p, ga) - field_b.value(p, gb);
+    const Vec3 p = from + t * (to - from);
+    const double f = difference(p, gradient);
     result.point = p;
     result.residual = std::abs(f);
-    if (std::abs(f) <= root_tolerance(scale, p, ga - gb)) break;
-    if ((f > 0.0) == (f_low > 0.0)) {
-      low = t;
-      f_low = f;
-    } else {
-      high = t;
-    }
-    const double next = t - f / (ga - gb).dot(node - from);
+    if (std::abs(f) <= root_tolerance(scale, p, gradient)) break;
+    ((f > 0.0) == (f_low > 0.0) ? low : high) = t;
+    const double next = t - f / gradient.dot(to - from);
     // Newton where it stays well inside the bracket, else halve it.
     const double width = high - low;
     t = next > low + 0.01 * width && next < high - 0.01 * width ? next : 0.5 * (low + high);
   }
   return result;
+}
+
+Junction find_junction(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels,
+                       const Vec3& start, double scale) {
+  const Chain chain(simplex);
+  std::optional<Vec3> beyond;
+  const Junction met = newton_inside(fields, chain, labels, start, scale, &beyond);
+  if (met.exact) return met;
+  const Vec3 from = beyond ? chain.point(chain.last_inside(chain.along(start - chain.origin), *beyond)) : start;
+  // The two lowest bodies change sides between `from` and the node of whichever is the smaller there.
+  const std::size_t lowest = labels.label[0] == 0 ? 1 : 0;
+  const Label a = labels.label[lowest], b = labels.label[lowest + 1];
+  const Label other = fields[a - 1].value(from) - fields[b - 1].value(from) > 0.0 ? b : a;
+  const std::size_t corner =
+      static_cast<std::size_t>(std::find(simplex.label.begin(), simplex.label.end(), other) - simplex.label.begin());
+  return root_between(fields, a, b, from, corner_of(simplex, corner), scale);
 }
 
 Vec3 normal_at(std::span<const FieldView> fields, const LabelSet& labels, std::uint32_t body, const Vec3& point) {

@@ -44,6 +44,17 @@ struct Junction {
   bool exact = false;     ///< every label's condition holds; otherwise only F_a = F_b of the two lowest bodies
 };
 
+/// The point of the simplex where all labels meet, by Newton's method from `start`; not exact where it is not found inside.
+[[nodiscard]] Junction meet_inside(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels,
+                                   const Vec3& start, double scale);
+
+/// The same for three labels where that fails: in a tetrahedron along the rim from where it enters, then from other places.
+[[nodiscard]] Junction search_inside(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels, double scale);
+
+/// The point between `from`, where F_a >= F_b, and `to`, where F_a <= F_b, with F_a = F_b (outside has F = 0).
+[[nodiscard]] Junction root_between(std::span<const FieldView> fields, Label a, Label b, const Vec3& from, const Vec3& to,
+                                    double scale);
+
 /// The point of the simplex where all its labels meet: F = 0 of every body when outside is among them, else equal
 /// fields. Newton's method from `start`, which lies inside the simplex. When that point lies beyond the simplex: where the
 /// way to it leaves the simplex, taken to F_a = F_b of the two lowest bodies. The point is always inside the simplex.

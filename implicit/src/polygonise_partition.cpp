@@ -9,6 +9,7 @@
 
 #include "polygonise_block_edges.h"
 #include "polygonise_blocks.h"
+#include "polygonise_rims.h"
 #include "supple/core/error.h"
 #include "supple/implicit/polygonise.h"
 
@@ -19,22 +20,18 @@ using namespace lattice;
 
 constexpr std::size_t kBlocksPerTask = 16;
 
-/// A triangle facing from body `inner` into label `outer`; vertices are numbered over all blocks.
-struct Facet {
-  Label inner = 0, outer = 0;
-  std::array<std::uint32_t, 3> vertex{};
-};
-
-struct BodyCount {
-  std::uint32_t body = 0;
-  std::uint64_t count = 0;
-  std::uint64_t first = 0;  ///< index of the first one in the body's mesh
-};
-
-struct FacetPart {
-  std::vector<Facet> facet;
-  std::vector<BodyCount> body;
-};
+/// The corner opposite the face that holds two edges of a tetrahedron, or none.
+constexpr auto kFaceOfEdges = [] {
+  std::array<std::array<unsigned, 6>, 6> faces{};
+  for (std::size_t d = 0; d < 6; ++d) {
+    for (std::size_t e = 0; e < 6; ++e) {
+      unsigned corners = 0;
+      for (const std::uint8_t corner : {kTetEdges[d][0], kTetEdges[d][1], kTetEdges[e][0], kTetEdges[e][1]}) corners |= 1u << corner;
+      faces[d][e] = std::popcount(corners) == 3 ? static_cast<unsigned>(std::countr_one(corners)) : Facet::kInside;
+    }
+  }
+  return faces;
+}();
 
 BodyCount& count_of(std::vector<BodyCount>& counts, std::uint32_t body) {
   for (BodyCount& c : counts) {
@@ -84,8 +81,12 @@ class FacetMaker {
     const TetCase& tet = kTetCases[t][inside];
     for (std::size_t k = 0; k < tet.count; ++k) {
       std::array<std::uint32_t, 3> vertex{};
-      for (std::size_t v = 0; v < 3; ++v) vertex[v] = edge_vertex(cell, t, tet.triangle[k][v]);
-      add(high, low, vertex);
+      std::array<unsigned, 3> face{};
+      for (std::size_t v = 0; v < 3; ++v) {
+        vertex[v] = edge_vertex(cell, t, tet.triangle[k][v]);
+        face[v] = kFaceOfEdges[tet.triangle[k][v]][tet.triangle[k][(v + 1) % 3]];
+      }
+      add(high, low, vertex, cell, t, face);
     }
   }
 
@@ -102,13 +103,14 @@ class FacetMaker {
     };
     const detail::Point top = centroid({0, 1, 2, 3});
     // The segment from point p to the vertex of edge (from, to), as facet that faces from `from` to `to`.
-    const auto facet = [&](std::uint32_t p, const detail::Point& p_at, std::size_t from, std::size_t to) {
+    const auto facet = [&](std::uint32_t p, const detail::Point& p_at, std::size_t from, std::size_t to, std::size_t opposite) {
       if (!wanted(label[from], label[to])) return;
       const std::uint32_t e = edge_vertex(cell, t, tet_edge(from, to));
       const detail::Point to_p = detail::difference(p_at, top);
       const detail::Point to_e = detail::difference(centroid({from, to}), top);
       const bool faces_to = detail::triple(detail::difference(detail::scaled(12, corner(to)), top), to_p, to_e) > 0;
-      add(label[from], label[to], faces_to ? std::array{apex, p, e} : std::array{apex, e, p});
+      add(label[from], label[to], faces_to ? std::array{apex, p, e} : std::array{apex, e, p}, cell, t,
+          {Facet::kInside, static_cast<unsigned>(opposite), Facet::kInside});
     };
     for (std::size_t opposite = 0; opposite < 4; ++opposite) {
       std::array<std::size_t, 3> v{};
@@ -121,15 +123,15 @@ class FacetMaker {
       if (!same01 && !same02 && !same12) {
         const std::uint32_t p = face_vertex(cell, chain[v[0]], chain[v[1]], chain[v[2]]);
         const detail::Point at = centroid({v[0], v[1], v[2]});
-        facet(p, at, v[0], v[1]);
-        facet(p, at, v[0], v[2]);
-        facet(p, at, v[1], v[2]);
+        facet(p, at, v[0], v[1], opposite);
+        facet(p, at, v[0], v[2], opposite);
+        facet(p, at, v[1], v[2], opposite);
         continue;
       }
       const std::size_t alone = same01 ? v[2] : same02 ? v[1] : v[0];
       const std::size_t a = alone == v[0] ? v[1] : v[0], b = alone == v[2] ? v[1] : v[2];
       if (!wanted(label[a], label[alone])) continue;
-      facet(edge_vertex(cell, t, tet_edge(a, alone)), centroid({a, alone}), b, alone);
+      facet(edge_vertex(cell, t, tet_edge(a, alone)), centroid({a, alone}), b, alone, opposite);
     }
   }
 
@@ -172,12 +174,16 @@ class FacetMaker {
     return (a != 0 && has_mesh_[a - 1] != 0) || (b != 0 && has_mesh_[b - 1] != 0);
   }
 
-  void add(Label from, Label to, std::array<std::uint32_t, 3> vertex) {
+  /// @param face  of the edge from each vertex
+  void add(Label from, Label to, std::array<std::uint32_t, 3> vertex, const Cell& cell, std::size_t t, std::array<unsigned, 3> face) {
     if (from == 0) {
       std::swap(from, to);
       std::swap(vertex[1], vertex[2]);
+      std::swap(face[0], face[2]);
     }
-    out_.push_back({.inner = from, .outer = to, .vertex = vertex});
+    const std::size_t tetrahedron = static_cast<std::size_t>((cell.z * kCells + cell.y) * kCells + cell.x) * kTetrahedra.size() + t;
+    out_.push_back({.inner = from, .outer = to, .vertex = vertex, .tetrahedron = static_cast<std::uint16_t>(tetrahedron),
+                    .faces = static_cast<std::uint16_t>(face[0] | face[1] << 3 | face[2] << 6)});
   }
 
   std::span<const LabelledBlock> blocks_;
@@ -188,29 +194,15 @@ class FacetMaker {
   std::uint32_t next_interior_;  ///< interior points are numbered in the order in which tetrahedra are cut
 };
 
-/// All vertices, in block order, and how bodies number those they use.
-struct AllVertices {
-  std::vector<LabelledBlock> block;
-  std::vector<std::uint32_t> use_end;
-  std::vector<VertexUse> use;
-
-  [[nodiscard]] const VertexUse& use_of(std::uint32_t vertex, std::uint32_t body) const {
-    std::uint32_t u = vertex == 0 ? 0 : use_end[vertex - 1];
-    while (use[u].body != body) ++u;
-    return use[u];
-  }
-};
-
-/// Calls use(body, vertex) for both sides of a facet that get a mesh.
+/// Calls use(body, label beyond, vertex) for both sides of a facet that get a mesh.
 template <class Use>
 void for_sides(const Facet& facet, std::span<const std::uint8_t> has_mesh, const Use& use) {
   const auto& v = facet.vertex;
-  if (has_mesh[facet.inner - 1] != 0) use(facet.inner - 1, std::array{v[0], v[1], v[2]});
-  if (facet.outer != 0 && has_mesh[facet.outer - 1] != 0) use(facet.outer - 1, std::array{v[0], v[2], v[1]});
+  if (has_mesh[facet.inner - 1] != 0) use(facet.inner - 1, facet.outer, std::array{v[0], v[1], v[2]});
+  if (facet.outer != 0 && has_mesh[facet.outer - 1] != 0) use(facet.outer - 1, facet.inner, std::array{v[0], v[2], v[1]});
 }
 
-AllVertices join(std::vector<PartitionVertices>& parts, std::vector<std::uint32_t>& vertex_count,
-                 const Lattice& lattice, PolygoniseCounts& counts) {
+AllVertices join(std::vector<PartitionVertices>& parts, const Lattice& lattice, PolygoniseCounts& counts) {
   AllVertices all;
   std::uint64_t vertices = 0, uses = 0;
   for (PartitionVertices& part : parts) {
@@ -222,8 +214,12 @@ AllVertices join(std::vector<PartitionVertices>& parts, std::vector<std::uint32_
     expect_indexable(vertices + uses + part.use.size(), lattice);
     for (const std::uint32_t end : part.use_end) all.use_end.push_back(end + static_cast<std::uint32_t>(uses));
     uses += part.use.size();
-    for (VertexUse& use : part.use) use.local = vertex_count[use.body]++;
     all.use.insert(all.use.end(), part.use.begin(), part.use.end());
+    all.kind.insert(all.kind.end(), part.kind.begin(), part.kind.end());
+    for (Cover cover : part.cover) {
+      cover.vertex += static_cast<std::uint32_t>(vertices - part.use_end.size());
+      all.cover.push_back(cover);
+    }
     counts.nodes += part.counts.nodes;
     counts.residual = std::max(counts.residual, part.counts.residual);
     counts.junctions += part.counts.junctions;
@@ -261,15 +257,25 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
       labeller.take_block(list.block[i], candidates, parts[begin / kBlocksPerTask]);
     }
   });
-  std::vector<std::uint32_t> vertex_count(fields.size());
-  const AllVertices all = join(parts, vertex_count, lattice, count);
+  AllVertices all = join(parts, lattice, count);
 
   std::vector<FacetPart> facets((all.block.size() + kBlocksPerTask - 1) / kBlocksPerTask);
   executor.for_blocks(all.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
     FacetPart& part = facets[begin / kBlocksPerTask];
-    for (std::size_t i = begin; i < end; ++i) FacetMaker(all.block, i, has_mesh, part.facet).run();
-    for (const Facet& facet : part.facet) {
-      for_sides(facet, has_mesh, [&](std::uint32_t body, const auto&) { ++count_of(part.body, body).count; });
+    part.first_block = static_cast<std::uint32_t>(begin);
+    for (std::size_t i = begin; i < end; ++i) {
+      FacetMaker(all.block, i, has_mesh, part.facet).run();
+      part.end.push_back(part.facet.size());
+    }
+  });
+  cut_at_rims(fields, has_mesh, lattice, executor, all, facets, count);
+  std::vector<std::uint32_t> vertex_count(fields.size());
+  for (VertexUse& use : all.use) {
+    if (use.body != kNoBody) use.local = vertex_count[use.body]++;
+  }
+  executor.for_blocks(facets.size(), 1, [&](std::size_t p, std::size_t) {
+    for (const Facet& facet : facets[p].facet) {
+      for_sides(facet, has_mesh, [&](std::uint32_t body, Label, const auto&) { ++count_of(facets[p].body, body).count; });
     }
   });
 
@@ -292,6 +298,7 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
     for (std::size_t i = begin, u = begin == 0 ? 0 : all.use_end[begin - 1]; i < end; ++i) {
       for (; u < all.use_end[i]; ++u) {
         const VertexUse& use = all.use[u];
+        if (use.body == kNoBody) continue;
         meshes[use.body].position[use.local] = use.position;
         meshes[use.body].normal[use.local] = use.normal;
         meshes[use.body].columns[0].values[use.local] = use.contact;
@@ -301,9 +308,10 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
   executor.for_blocks(facets.size(), 1, [&](std::size_t p, std::size_t) {
     FacetPart& part = facets[p];
     for (const Facet& facet : part.facet) {
-      for_sides(facet, has_mesh, [&](std::uint32_t body, const std::array<std::uint32_t, 3>& v) {
+      for_sides(facet, has_mesh, [&](std::uint32_t body, Label other, const std::array<std::uint32_t, 3>& v) {
         std::uint64_t& next = count_of(part.body, body).first;
-        meshes[body].triangle[next++] = {all.use_of(v[0], body).local, all.use_of(v[1], body).local, all.use_of(v[2], body).local};
+        const auto number = [&](std::uint32_t vertex) { return all.use_of(vertex, body, other).local; };
+        meshes[body].triangle[next++] = {number(v[0]), number(v[1]), number(v[2])};
       });
     }
   });

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -43,14 +44,30 @@ void for_all_cells(const Use& use) {
   return set;
 }
 
+inline constexpr Label kAnyLabel = ~Label{0};
+inline constexpr std::uint32_t kNoBody = ~std::uint32_t{0};
+
 /// A vertex as one body sees it.
 struct VertexUse {
   std::uint32_t body = 0;
+  Label other = kAnyLabel;    ///< beyond the triangles that it is meant for
   std::uint32_t contact = 0;  ///< other body + 1, or 0
   std::uint32_t local = 0;    ///< index in the body's mesh
   Vec3 normal = Vec3::Zero();
   Vec3 position = Vec3::Zero();  ///< bit-equal for all bodies of a contact; each body's own across a gap
 };
+
+/// A vertex between two labels where a third one wins: the interface parts there into two, one on either side of it, and each has
+/// the vertex at a place of its own. Between them and the vertices where it does not win runs a rim.
+struct Cover {
+  std::uint32_t vertex = 0;
+  Label low = 0, high = 0;      ///< those that it would lie between, ascending
+  Label by = 0;                 ///< the third
+  Vec3 point = Vec3::Zero();    ///< where the interface would be
+};
+
+/// Uncovered: one that is covered, but has one place like a junction.
+enum class VertexKind : std::uint8_t { Edge, Junction, Covered, Uncovered };
 
 /// A block where labels meet. It owns the vertices of its edges, then its face points, then its interior points.
 struct LabelledBlock {
@@ -68,6 +85,8 @@ struct PartitionVertices {
   std::vector<LabelledBlock> block;
   std::vector<std::uint32_t> use_end;  ///< uses of vertex i end here and begin where those of i - 1 end
   std::vector<VertexUse> use;
+  std::vector<VertexKind> kind;        ///< by vertex
+  std::vector<Cover> cover;            ///< of those that are covered, by vertex
   PolygoniseCounts counts;
 };
 
@@ -85,7 +104,12 @@ class Labeller {
   struct EdgeVertex {
     Label low, high;  ///< its labels, ascending
     Vec3 point, gradient;
-    bool gap = false;  ///< two bodies, and F_low = F_high < 0: a gap thinner than a cell lies between them
+    std::optional<Label> by;  ///< a third label that wins there
+  };
+  /// A covered pair of a face or a tetrahedron, and a point where the third label wins.
+  struct CoveredPair {
+    Label low, high, by;
+    Vec3 middle;
   };
 
   void label_nodes();
@@ -95,6 +119,14 @@ class Labeller {
   void add_junctions(LabelledBlock& block, PartitionVertices& out);
   void add_junction(const Cell& cell, const std::array<std::uint8_t, 4>& chain, std::uint8_t size,
                     const LabelSet& labels, PartitionVertices& out);
+  /// The uses of a covered vertex, its places on the ways from `at_low` to its point and on to `at_high`.
+  void add_covered(const Cover& cover, const Vec3& at_low, const Vec3& at_high, PartitionVertices& out) const;
+  [[nodiscard]] std::optional<Label> winner_at(Label low, Label high, const Vec3& point) const;
+  [[nodiscard]] std::optional<CoveredPair> covered_pair(const Cell& cell, std::span<const std::uint8_t> chain,
+                                                        const LabelSet& labels) const;
+  [[nodiscard]] Vec3 middle_of(const Cell& cell, std::span<const std::uint8_t> chain, Label label) const;
+  [[nodiscard]] double scale_of(Label a, Label b) const { return (a == 0 ? 0.0 : scale_[slot_of(a)]) + (b == 0 ? 0.0 : scale_[slot_of(b)]); }
+  [[nodiscard]] bool has_mesh(Label label) const { return label != 0 && has_mesh_[label - 1] != 0; }
   [[nodiscard]] Vec3 crossing(std::size_t node_a, std::size_t node_b) const;
   [[nodiscard]] Vec3 own_root(Label label, const Vec3& inside, const Vec3& outside) const;
   [[nodiscard]] Vec3 own_junction(Label label, const Cell& cell, std::span<const std::uint8_t> chain,

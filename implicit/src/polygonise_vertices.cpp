@@ -72,7 +72,7 @@ void Labeller::solve_edges(const LabelledBlock& block, Label low, Label high, Pa
     vertex.gradient = roots_.gradient(solved);
     out.counts.residual = std::max(out.counts.residual, std::abs(roots_.value(solved)));
     if (low != 0 && roots_.plus_value(solved) < -root_tolerance(scale_[plus], vertex.point, vertex.gradient)) {
-      vertex.gap = true;
+      vertex.by = 0;
       ++out.counts.gaps;
     }
     ++solved;
@@ -85,7 +85,7 @@ void Labeller::add_edge_vertices(const LabelledBlock& block, PartitionVertices& 
   for_edges(block.edges, [&](int x, int y, int z, unsigned mask) {
     const Cell cell{x, y, z};
     const auto [low, high] = std::minmax(label_[cell.node(0)], label_[cell.node(mask)]);
-    edge_vertex_.push_back({.low = low, .high = high, .point = Vec3::Zero(), .gradient = Vec3::Zero(), .gap = false});
+    edge_vertex_.push_back({.low = low, .high = high, .point = Vec3::Zero(), .gradient = Vec3::Zero(), .by = {}});
     if (pairs.empty() || pairs.back() != std::pair(low, high)) pairs.emplace_back(low, high);
   });
   std::sort(pairs.begin(), pairs.end());
@@ -94,26 +94,80 @@ void Labeller::add_edge_vertices(const LabelledBlock& block, PartitionVertices& 
 
   std::size_t i = 0;
   for_edges(block.edges, [&](int x, int y, int z, unsigned mask) {
-    const EdgeVertex& vertex = edge_vertex_[i++];
+    EdgeVertex& vertex = edge_vertex_[i++];
     const Cell cell{x, y, z};
-    const Vec3 along = nodes_[cell.node(mask)] - nodes_[cell.node(0)];
+    const std::size_t first = cell.node(0), last = cell.node(mask);
+    // A third label that wins between two nodes where others do is seldom far from winning at one of them.
+    const auto change = [&](std::size_t slot) { return std::abs(value(slot, first) - value(slot, last)); };
+    const auto is_near = [&](std::size_t slot) {
+      const Label label = candidates_[slot] + 1;
+      if (label == vertex.low || label == vertex.high) return false;
+      return std::max(value(slot, first), value(slot, last)) > -0.5 * std::max(change(slot), change(slot_of(vertex.high)));
+    };
+    for (std::size_t slot = 0; slot < candidates_.size(); ++slot) {
+      if (!is_near(slot)) continue;
+      if (const std::optional<Label> winner = winner_at(vertex.low, vertex.high, vertex.point)) vertex.by = winner;
+      break;
+    }
+    const auto number = static_cast<std::uint32_t>(out.use_end.size());
+    if (vertex.by && (has_mesh(vertex.low) || has_mesh(vertex.high))) {
+      const Cover cover{number, vertex.low, vertex.high, *vertex.by, vertex.point};
+      const bool low_first = label_[first] == vertex.low;
+      add_covered(cover, nodes_[low_first ? first : last], nodes_[low_first ? last : first], out);
+      return;
+    }
+    const Vec3 along = nodes_[last] - nodes_[first];
     const Label inner = vertex.low == 0 ? vertex.high : vertex.low;
-    const bool inner_first = label_[cell.node(0)] == inner;
+    const bool inner_first = label_[first] == inner;
     const Vec3 normal = outward(vertex.gradient, inner_first ? along : Vec3(-along));
     const auto use = [&](Label label, Label other, const Vec3& shared_normal) {
-      if (has_mesh_[label - 1] == 0) return;
-      VertexUse u{.body = label - 1, .contact = other, .local = 0, .normal = shared_normal, .position = vertex.point};
-      if (vertex.gap) {
-        u.contact = 0;
-        u.position = own_root(label, nodes_[cell.node(label == label_[cell.node(0)] ? 0 : mask)], vertex.point);
-        u.normal = own_normal(label, u.position, shared_normal);
-      }
-      out.use.push_back(u);
+      if (!has_mesh(label)) return;
+      out.use.push_back({.body = label - 1, .contact = other, .normal = shared_normal, .position = vertex.point});
     };
     use(inner, vertex.low == 0 ? 0 : vertex.high, normal);
     if (vertex.low != 0) use(vertex.high, vertex.low, -normal);
     out.use_end.push_back(static_cast<std::uint32_t>(out.use.size()));
+    out.kind.push_back(VertexKind::Edge);
   });
+}
+
+/// The label that wins over two others at a point of the interface between them.
+std::optional<Label> Labeller::winner_at(Label low, Label high, const Vec3& point) const {
+  Vec3 gradient;
+  const double value = fields_[high - 1].value(point, gradient);
+  const double tolerance = root_tolerance(scale_of(low, high), point, gradient);
+  std::optional<Label> winner;
+  double most = (low == 0 ? 0.0 : value) + tolerance;
+  const auto look = [&](Label label, double other) {
+    if (!(other > most)) return;
+    most = other;
+    winner = label;
+  };
+  if (low != 0) look(0, 0.0);
+  for (const std::uint32_t body : candidates_) {
+    if (body + 1 != low && body + 1 != high) look(body + 1, fields_[body].value(point));
+  }
+  return winner;
+}
+
+void Labeller::add_covered(const Cover& cover, const Vec3& at_low, const Vec3& at_high, PartitionVertices& out) const {
+  const auto add = [&](Label label, Label across, Label beyond, const Vec3& place) {
+    if (!has_mesh(label)) return;
+    Vec3 own, other = Vec3::Zero();
+    (void)fields_[label - 1].value(place, own);
+    if (across != 0) (void)fields_[across - 1].value(place, other);
+    out.use.push_back({.body = label - 1, .other = beyond, .contact = across, .normal = outward(own - other, Vec3::UnitZ()),
+                       .position = place});
+  };
+  const Vec3 to_low = root_between(fields_, cover.low, cover.by, at_low, cover.point, scale_of(cover.low, cover.by)).point;
+  const Vec3 to_high = root_between(fields_, cover.by, cover.high, cover.point, at_high, scale_of(cover.by, cover.high)).point;
+  add(cover.low, cover.by, kAnyLabel, to_low);
+  add(cover.by, cover.low, cover.low, to_low);
+  add(cover.by, cover.high, cover.high, to_high);
+  add(cover.high, cover.by, kAnyLabel, to_high);
+  out.use_end.push_back(static_cast<std::uint32_t>(out.use.size()));
+  out.kind.push_back(VertexKind::Covered);
+  out.cover.push_back(cover);
 }
 
 /// Where the values at two nodes with different labels put their interface on the line between them.
@@ -157,6 +211,51 @@ Vec3 Labeller::own_junction(Label label, const Cell& cell, std::span<const std::
   return own_root(label, fields_[label - 1].value(middle) > 0.0 ? middle : first, shared);
 }
 
+/// The middle of a simplex's nodes with this label.
+Vec3 Labeller::middle_of(const Cell& cell, std::span<const std::uint8_t> chain, Label label) const {
+  Vec3 sum = Vec3::Zero();
+  int count = 0;
+  for (const std::uint8_t corner : chain) {
+    if (label_[cell.node(corner)] != label) continue;
+    sum += nodes_[cell.node(corner)];
+    ++count;
+  }
+  return sum / count;
+}
+
+/// The pair of labels of a simplex that a third one keeps apart on all its edges between them.
+std::optional<Labeller::CoveredPair> Labeller::covered_pair(const Cell& cell, std::span<const std::uint8_t> chain,
+                                                            const LabelSet& labels) const {
+  std::optional<CoveredPair> found;
+  for (std::size_t k = 0; k < labels.count; ++k) {
+    const Label by = labels.label[k], low = labels.label[k == 0 ? 1 : 0], high = labels.label[k == 2 ? 1 : 2];
+    if (!has_mesh(low) && !has_mesh(high)) continue;
+    Vec3 middle = Vec3::Zero();
+    int edges = 0;
+    bool covered = true;
+    for (const std::uint8_t a : chain) {
+      for (const std::uint8_t b : chain) {
+        if (label_[cell.node(a)] != low || label_[cell.node(b)] != high || !covered) continue;
+        const Vec3 point = root_between(fields_, low, high, nodes_[cell.node(a)], nodes_[cell.node(b)], scale_of(low, high)).point;
+        covered = winner_at(low, high, point) == std::optional<Label>(by);
+        middle += point;
+        ++edges;
+      }
+    }
+    if (!covered) continue;
+    if (found) return {};  // more than one
+    middle /= edges;
+    for (const double share : {0.5, 0.2, 0.05, 0.01}) {  // a thin gap between convex bodies is not convex
+      const Vec3 inside = middle + share * (middle_of(cell, chain, by) - middle);
+      const auto value = [&](Label label) { return label == 0 ? 0.0 : fields_[label - 1].value(inside); };
+      if (!(value(by) > value(low) && value(by) > value(high))) continue;
+      found = CoveredPair{low, high, by, inside};
+      break;
+    }
+  }
+  return found;
+}
+
 void Labeller::add_junction(const Cell& cell, const std::array<std::uint8_t, 4>& chain, std::uint8_t size,
                             const LabelSet& labels, PartitionVertices& out) {
   Simplex s{.low = nodes_[cell.node(0)], .high = nodes_[cell.node(7)], .corner = chain, .label = {}, .size = size};
@@ -175,8 +274,27 @@ void Labeller::add_junction(const Cell& cell, const std::array<std::uint8_t, 4>&
   for (const Label l : labels.view()) {
     if (l != 0) scale += scale_[slot_of(l)];
   }
-  const Junction junction = find_junction(fields_, s, labels, start, scale);
+  const std::span<const std::uint8_t> corners(chain.data(), size);
   ++out.counts.junctions;
+  Junction junction = meet_inside(fields_, s, labels, start, scale);
+  if (!junction.exact && labels.count == 3) junction = search_inside(fields_, s, labels, scale);
+  if (!junction.exact && labels.count == 3) {
+    if (const std::optional<CoveredPair> pair = covered_pair(cell, corners, labels)) {
+      const auto number = static_cast<std::uint32_t>(out.use_end.size());
+      const Cover cover{number, pair->low, pair->high, pair->by, pair->middle};
+      // Where the middle of its nodes is not a body's own, one of them is.
+      const auto own = [&](Label label) {
+        const Vec3 middle = middle_of(cell, corners, label);
+        const auto value = [&](Label l) { return l == 0 ? 0.0 : fields_[l - 1].value(middle); };
+        if (value(label) > value(pair->by)) return middle;
+        const auto at = std::find_if(corners.begin(), corners.end(), [&](std::uint8_t c) { return label_[cell.node(c)] == label; });
+        return nodes_[cell.node(*at)];
+      };
+      add_covered(cover, own(pair->low), own(pair->high), out);
+      return;
+    }
+  }
+  if (!junction.exact) junction = find_junction(fields_, s, labels, start, scale);
   if (!junction.exact) ++out.counts.junctions_moved;
   out.counts.residual = std::max(out.counts.residual, junction.residual);
 
@@ -190,16 +308,17 @@ void Labeller::add_junction(const Cell& cell, const std::array<std::uint8_t, 4>&
     const std::uint32_t body = labels.label[k] - 1;
     if (has_mesh_[body] == 0) continue;
     const Label contact = labels.label[k == first ? first + 1 : first];
-    VertexUse use{.body = body, .contact = contact, .local = 0,
-                  .normal = normal_at(fields_, labels, body, junction.point), .position = junction.point};
+    VertexUse use{.body = body, .contact = contact, .normal = normal_at(fields_, labels, body, junction.point),
+                  .position = junction.point};
     if (gap) {
       use.contact = 0;
-      use.position = own_junction(labels.label[k], cell, {chain.data(), size}, junction.point);
+      use.position = own_junction(labels.label[k], cell, corners, junction.point);
       use.normal = own_normal(labels.label[k], use.position, use.normal);
     }
     out.use.push_back(use);
   }
   out.use_end.push_back(static_cast<std::uint32_t>(out.use.size()));
+  out.kind.push_back(VertexKind::Junction);
 }
 
 void Labeller::add_junctions(LabelledBlock& block, PartitionVertices& out) {

@@ -29,6 +29,8 @@ struct PolygoniseCounts {
   double residual = 0.0;              ///< largest |F| at a vertex, |F_a - F_b| where two bodies touch
   std::uint64_t junctions = 0;        ///< points where three or more of bodies and outside meet
   std::uint64_t junctions_moved = 0;  ///< of these, not exact: the exact point lies beyond its simplex of the lattice
+  std::uint64_t rim_points = 0;       ///< vertices where a rim leaves the faces between three different nodes
+  std::uint64_t rim_points_moved = 0; ///< of these, not exact: near the rim
   std::uint64_t gaps = 0;             ///< edges across a gap between two bodies that is thinner than a cell
 };
 
@@ -51,8 +53,10 @@ struct PolygoniseCounts {
 /// A vertex on the outer surface has the normal of its own field; inside the contact -+ grad(F_a - F_b).
 /// Every mesh gets a column "contact": index of the other body + 1 on the contact surface and its rim, 0 elsewhere
 /// (where several others meet, the lowest).
-/// Across a gap thinner than a cell each body keeps its own surface (counted). Where a rim leaves the simplex of the
-/// lattice that it belongs to, its vertex stays inside, on F_a = F_b and less than a cell from the rim (counted).
+/// Across a gap thinner than a cell each body keeps its own surface (counted). Rims are met to second order: wherever one passes a
+/// face or a tetrahedron of the lattice a vertex lies on it, also where a third body or outside wins between two nodes and at none.
+/// Where a rim winds through a tetrahedron, or four of bodies and outside meet in one, a vertex may stay inside, less than
+/// a cell from the rim (counted).
 /// An unbounded body (a ground) shapes the others and gets an empty mesh. @throws Error{Usage} when all are unbounded.
 [[nodiscard]] std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice,
                                                      const Executor& executor, PolygoniseCounts* counts = nullptr);
