@@ -201,6 +201,44 @@ bool PolarRuleSolver::integrate() {
   return cut_ || sums.load > 0.0;
 }
 
+/// Of what one ray stands for all around the axis.
+void PolarRuleSolver::keep_along_axis(PatchSums& sums) const {
+  sums.force = sums.force.dot(frame_.axis) * frame_.axis;
+  sums.first = sums.first.dot(frame_.axis) * frame_.axis;
+  sums.moment.setZero();
+}
+
+/// Rim and nodes of the single ray, to all rays of the rule. @param slopes  of the pressures, too
+void PolarRuleSolver::turn(const PolarRule& rule, bool slopes) {
+  const auto angles = static_cast<std::size_t>(rule.angular), radii = node_.size();
+  const Vec3 origin = frame_.origin, axis = frame_.axis;
+  const Vec3 u = frame_.u.normalized(), v = axis.cross(u);
+  node_.resize(angles * radii);
+  for (auto* array : {&weight_, &area_, &pressure_}) array->resize(angles * radii);
+  normal_.resize(angles * radii);
+  const double share = 1.0 / static_cast<double>(angles);
+  for (std::size_t j = 0; j < radii; ++j) {
+    const auto turns = [&](const Vec3& x, const Vec3& shift, std::vector<Vec3>& to) {
+      const Vec3 along = shift + x.dot(axis) * axis, across_u = x.dot(u) * u, across_v = x.dot(u) * v;
+      for (std::size_t k = 0; k < angles; ++k) to[k * radii + j] = along + rule.cosine[k] * across_u + rule.sine[k] * across_v;
+    };
+    turns(Vec3(node_.point[j] - origin), origin, node_.point);
+    turns(Vec3(normal_[j]), Vec3::Zero(), normal_);
+    if (slopes) turns(Vec3(node_.slope_a[j]), Vec3::Zero(), node_.slope_a);
+    if (slopes) turns(Vec3(node_.slope_b[j]), Vec3::Zero(), node_.slope_b);
+    const double weight = share * weight_[j], area = share * area_[j], p = pressure_[j];
+    for (std::size_t k = 0; k < angles; ++k) {
+      weight_[k * radii + j] = weight;
+      area_[k * radii + j] = area;
+      pressure_[k * radii + j] = p;
+    }
+  }
+  rim_.cosine = rule.cosine;
+  rim_.sine = rule.sine;
+  rim_.radius.assign(angles, rim_.radius.front());
+  rim_.height.assign(angles, rim_.height.front());
+}
+
 /// Distance from Sigma, along +axis for A and -axis for B, to where the body's pressure vanishes; the last entry is the
 /// column through the peak.
 bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double tolerance) {
@@ -281,7 +319,7 @@ double PolarRuleSolver::algebraic_error() const {
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                             const std::array<bool, 2>& columns, double extent,
-                            std::span<const ContactBody* const> third, PatchPoints& points) {
+                            std::span<const ContactBody* const> third, bool round, PatchPoints& points) {
   const double error = settings.error;
   third_ = third;
   cut_ = false;
@@ -299,13 +337,20 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   parted_ = 0;
   kinks_.clear();
   for (std::size_t r = first; r <= last; ++r) {
-    start_rim(rules[r], r == first);
+    const PolarRule& rule = round ? polar_rays()[r] : rules[r];
+    start_rim(rule, r == first);
     if (!solve_rim(pressure, rim_, error)) return false;
-    place_nodes(rules[r]);
+    place_nodes(rule);
     if (!solve_heights(pressure, error)) return false;
     coarse_ = fine_;
     if (!integrate()) return false;
+    if (round) keep_along_axis(fine_);
     if (r == first && error < kSplitBelow) find_kinks(pressure);
+    if (round && !kinks_.empty()) {
+      round = false;
+      r = first - 1;
+      continue;
+    }
     if (!third.empty() && taken_by_thirds()) {
       fine_ = {};
       estimate_ = 0.0;
@@ -327,6 +372,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
                               (r == 1 ? kUnseenAtFirst : r == 2 ? kUnseen : 0.0);
     if (difference > error && r < last) continue;
     estimate_ = difference + algebraic_error();
+    if (round) turn(rules[r], columns[0] || columns[1]);
     return finish(pressure, rules[r].column, columns, error, points);
   }
   return false;

@@ -33,11 +33,12 @@ class PolarRuleSolver {
   /// @param columns  whether the squeezed region of A, of B is wanted
   /// @param extent  rims farther away are not believed [m]
   /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
+  /// @param round  both pressures are the same all around the line through the frame's origin along its axis
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
   [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                            const std::array<bool, 2>& columns, double extent, std::span<const ContactBody* const> third,
-                           PatchPoints& points);
+                           bool round, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about the frame's origin
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
@@ -55,6 +56,8 @@ class PolarRuleSolver {
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
+  void keep_along_axis(PatchSums& sums) const;
+  void turn(const PolarRule& rule, bool slopes);
   bool finish(PairPressure& pressure, int column, const std::array<bool, 2>& columns, double error, PatchPoints& points);
   bool add_columns(PairPressure& pressure, int column, int side, double error, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance);

@@ -44,12 +44,12 @@ double cardinal(int n, double x) {
   return math::sin_cos(0.5 * n * x).sin * c / (s * n);
 }
 
-std::vector<PolarRule> make_polar() {
+std::vector<PolarRule> make_polar(bool single_ray) {
   std::vector<PolarRule> rules;
   constexpr std::array<std::array<int, 3>, 7> kSizes{
       {{2, 6, 2}, {3, 8, 2}, {4, 12, 3}, {6, 20, 3}, {8, 28, 4}, {12, 44, 5}, {16, 64, 6}}};
   for (const auto& size : kSizes) {
-    PolarRule rule{.radial = size[0], .angular = size[1], .column = size[2], .cosine = {}, .sine = {},
+    PolarRule rule{.radial = size[0], .angular = single_ray ? 1 : size[1], .column = size[2], .cosine = {}, .sine = {},
                    .from_coarser = {}};
     for (int k = 0; k < rule.angular; ++k) {
       const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * k / rule.angular);
@@ -110,8 +110,13 @@ const KronrodRule& kronrod_rule(bool finer) {
 }
 
 std::span<const PolarRule> polar_rules() {
-  static const std::vector<PolarRule> rules = make_polar();
+  static const std::vector<PolarRule> rules = make_polar(false);
   return rules;
+}
+
+std::span<const PolarRule> polar_rays() {
+  static const std::vector<PolarRule> rays = make_polar(true);
+  return rays;
 }
 
 }  // namespace supple::collision

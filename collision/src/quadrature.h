@@ -33,5 +33,7 @@ struct PolarRule {
   std::vector<double> from_coarser;
 };
 [[nodiscard]] std::span<const PolarRule> polar_rules();
+/// The same with a single ray.
+[[nodiscard]] std::span<const PolarRule> polar_rays();
 
 }  // namespace supple::collision

@@ -60,7 +60,13 @@ double difference_for(double error, bool fine) { return fine ? std::max(error, s
 void PolarRuleSolver::find_kinks(PairPressure& pressure) {
   kinks_.clear();
   Box box;
-  for (const Vec3& x : rim_batch_.point) box.include(x);
+  for (const Vec3& x : rim_batch_.point) {
+    box.include(x);
+    if (rim_.size() > 1) continue;  // the ray stands for those all around
+    const Vec3 reach = Vec3::Constant((x - frame_.origin).norm());
+    box.include(frame_.origin - reach);
+    box.include(frame_.origin + reach);
+  }
   for (const Vec3& x : node_.point) box.include(x);
   pressure.kinks(box, kinks_);
   double square = 0.0;

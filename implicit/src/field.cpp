@@ -289,7 +289,7 @@ std::optional<CorePoint> Field::core_point(const Vec3& place) const {
   // Not stretched, so A is a rotation and half the gradient of q leads to the foot.
   const Mat3 A = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
   const FootSample sample = foot(shape.view, A * (place - Vec3(p.position[0], p.position[1], p.position[2])));
-  return CorePoint{place - A.transpose() * sample.half_gradient, *index_->core_radius};
+  return CorePoint{place - A.transpose() * sample.half_gradient, *index_->core_radius, index_->core_is_point};
 }
 
 namespace {

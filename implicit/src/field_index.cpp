@@ -280,6 +280,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   }
   if (has_convex_core(skeleton) && evaluate(skeleton.primitive[0].kernel, 0.0).value > skeleton.iso) {
     index.core_radius = iso_distance(skeleton.primitive[0].kernel, skeleton.iso);
+    index.core_is_point = skeleton.primitive[0].shape == ShapeKind::Point;
   }
   index.typical_extent = n > 0 ? extent / (3.0 * static_cast<double>(n)) : 0.0;
 }

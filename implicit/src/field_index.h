@@ -89,6 +89,7 @@ struct Field::Index {
   std::vector<double> ball_radius;
   BlendIndex blend;
   std::optional<double> core_radius;  ///< of a convex body: from its core to the surface [m]
+  bool core_is_point = false;
   std::vector<PackedPrimitive> primitive;  ///< by id
   std::vector<PackedShape> shape;          ///< by id
   std::vector<RoundedBox> rounded;         ///< by id

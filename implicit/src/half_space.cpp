@@ -55,7 +55,7 @@ Box HalfSpace::surface_box() const {
 }
 
 std::optional<CorePoint> HalfSpace::core_point(const Vec3& place) const {
-  return CorePoint{place - std::max(0.0, (place - point).dot(normal)) * normal, 0.0};
+  return CorePoint{place - std::max(0.0, (place - point).dot(normal)) * normal, 0.0, true};
 }
 
 double HalfSpace::feature_size() const { return std::numeric_limits<double>::infinity(); }

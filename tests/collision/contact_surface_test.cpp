@@ -4,6 +4,7 @@
 
 #include "bodies.h"
 #include "supple/core/hash.h"
+#include "supple/implicit/solids.h"
 
 namespace supple::collision {
 namespace {
@@ -86,6 +87,90 @@ TEST(ContactSurface, OfManyPairsIsThatOfEachPairAlone) {
   EXPECT_EQ(surface.pair, fresh.pair);
   EXPECT_EQ(surface.point, fresh.point);
   EXPECT_EQ(surface.pressure, fresh.pressure);
+}
+
+TEST(ContactSurface, OfBodiesThatAreTheSameAroundALineIsThatOfAllRays) {
+  const Vec3 along = Vec3(0.3, -0.5, 0.7).normalized(), at(3.0, -2.0, 1.0);
+  const Blobs ball({at}, 1.0), small({at + 0.65 * along}, 0.6), other({at + 0.8 * along}, 1.0);
+  const implicit::HalfSpace plane{at + 0.4 * along, -along, 0.7};
+  struct Pair {
+    implicit::FieldView field;
+    double modulus;
+  };
+  for (const Pair& b : {Pair{small.field, 1.0}, Pair{other.field, 3.0}, Pair{plane, 2.0}}) {
+    for (const bool swap : {false, true}) {
+      for (const double error : {1e-2, 1e-3, 1e-6, 1e-10}) {
+        Stage stage;
+        if (swap) stage.add(b.field, {at + along}, b.modulus);
+        stage.add(ball.field, ball.centre);
+        if (!swap) stage.add(b.field, {at + along}, b.modulus);
+        ContactSettings settings{.error = error};
+        const ContactSurface one = stage.solve(settings);
+        settings.symmetry = false;
+        const ContactSurface all = stage.solve(settings);
+        ASSERT_EQ(one.summary.size(), 1u);
+        ASSERT_EQ(all.summary.size(), 1u);
+        const ContactSurface::Summary &a = one.summary[0], &e = all.summary[0];
+        ASSERT_EQ(a.rule, ContactRule::Polar);
+        EXPECT_LE(a.error_estimate, error);
+        const double most = a.error_estimate + e.error_estimate;
+        EXPECT_LE((a.force - e.force).norm(), most * e.force.norm());
+        EXPECT_NEAR(a.area, e.area, most * e.area);
+        EXPECT_LE((a.centre_of_pressure - e.centre_of_pressure).norm(), most * std::sqrt(e.area));
+        EXPECT_NEAR(a.energy, e.energy, 10.0 * most * e.energy);
+        EXPECT_NEAR(a.displaced_a, e.displaced_a, 10.0 * most * e.displaced_a);
+        EXPECT_LT(a.force.cross(along).norm(), 1e-15 * a.force.norm());
+        settings.energy = false;  // squeezed regions take as many points either way
+        const std::uint64_t evaluations = stage.solve(settings).summary[0].evaluations;
+        settings.symmetry = true;
+        EXPECT_LT(2 * stage.solve(settings).summary[0].evaluations, evaluations);
+        // Its points carry the same force, and lie where both pressures are equal.
+        Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+        for (std::size_t i = 0; i < one.point.size(); ++i) {
+          const Vec3 f = -one.area[i] * one.pressure[i] * one.normal[i];
+          force += f;
+          moment += (one.point[i] - at).cross(f);
+          Vec3 ga, gb;
+          const double pa = stage.bodies()[0].material.modulus * stage.bodies()[0].field.value(one.point[i], ga);
+          const double pb = stage.bodies()[1].material.modulus * stage.bodies()[1].field.value(one.point[i], gb);
+          EXPECT_NEAR(pa, pb, 1e-10);
+          EXPECT_NEAR(one.pressure[i], pa, 1e-10);
+          const Vec3 normal = stage.bodies()[1].material.modulus * gb - stage.bodies()[0].material.modulus * ga;
+          EXPECT_LT((one.normal[i] - normal.normalized()).norm(), 1e-9);
+        }
+        EXPECT_LT((force - a.force).norm(), 1e-14 * a.force.norm());
+        EXPECT_LT(moment.norm(), 1e-14 * a.force.norm());
+      }
+    }
+  }
+}
+
+TEST(ContactSurface, FollowsAllRaysWhereOneBodyIsNotRound) {
+  const Blobs ball({Vec3(0.1, 0.2, 0.75)}, 1.0);
+  implicit::Skeleton skeleton;
+  implicit::Primitive rod;
+  rod.shape = implicit::ShapeKind::Segment;
+  rod.size = Vec3(0.4, 0.0, 0.0);
+  rod.kernel = implicit::Kernel::wyvill(1.0);
+  skeleton.part_count = 1;
+  skeleton.primitive = {rod};
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  const Pose pose;
+  implicit::place_skeleton(skeleton, {&pose, 1}, placed);
+  implicit::index_field(skeleton, placed, field);
+  const implicit::SolidBox box({Vec3(0.1, 0.2, -0.1), Quat::Identity()}, Vec3(0.5, 0.4, 0.4), 0.1, 2.0);
+  for (const implicit::FieldView other : {implicit::FieldView(field), implicit::FieldView(box)}) {
+    Stage stage;
+    stage.add(ball.field, ball.centre);
+    stage.add(other);
+    const ContactSurface one = stage.solve({.error = 1e-4});
+    const ContactSurface all = stage.solve({.error = 1e-4, .symmetry = false});
+    ASSERT_EQ(one.summary.size(), 1u);
+    EXPECT_EQ(one.point, all.point);
+    EXPECT_EQ(one.area, all.area);
+    EXPECT_EQ(one.pressure, all.pressure);
+  }
 }
 
 TEST(ContactSurface, HasBothPressuresEqualAtEveryPoint) {

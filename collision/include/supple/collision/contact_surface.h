@@ -36,6 +36,9 @@ struct ContactSettings {
   /// None: the cheapest rule that fits, polar before samples before marching; otherwise this rule alone. A pair that it does
   /// not fit (no smooth patch; two bodies without skeletons) then has no force, and an error estimate of 1.
   ContactRule only = ContactRule::None;
+  /// Two balls, or a ball and a half-space, are the same all around one line: the polar rule then follows a single ray and
+  /// turns it. Off: every ray is followed, for comparison.
+  bool symmetry = true;
 };
 
 /// Quadrature points of all pairs, sorted by (pair, order of the rule); one array per attribute.

@@ -29,6 +29,7 @@ struct FieldParts {
 struct CorePoint {
   Vec3 point = Vec3::Zero();  ///< of the core, nearest to the place [m]
   double radius = 0.0;        ///< from the core to the surface [m]
+  bool round = false;         ///< the field is the same all around the line from any place to its `point`: balls, half-spaces
 };
 
 /// A field of a convex body may say so; what it says is exact.
