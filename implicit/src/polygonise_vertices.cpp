@@ -277,7 +277,6 @@ void Labeller::add_junction(const Cell& cell, const std::array<std::uint8_t, 4>&
   const std::span<const std::uint8_t> corners(chain.data(), size);
   ++out.counts.junctions;
   Junction junction = meet_inside(fields_, s, labels, start, scale);
-  if (!junction.exact && labels.count == 3) junction = search_inside(fields_, s, labels, scale);
   if (!junction.exact && labels.count == 3) {
     if (const std::optional<CoveredPair> pair = covered_pair(cell, corners, labels)) {
       const auto number = static_cast<std::uint32_t>(out.use_end.size());
@@ -294,6 +293,7 @@ void Labeller::add_junction(const Cell& cell, const std::array<std::uint8_t, 4>&
       return;
     }
   }
+  if (!junction.exact && labels.count == 3) junction = search_inside(fields_, s, labels, scale);
   if (!junction.exact) junction = find_junction(fields_, s, labels, start, scale);
   if (!junction.exact) ++out.counts.junctions_moved;
   out.counts.residual = std::max(out.counts.residual, junction.residual);
