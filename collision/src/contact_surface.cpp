@@ -53,12 +53,8 @@ bool clear_of(const ContactBody& body, const Box& box) {
   return core && (core->point - box.centre()).norm() > core->radius + 0.5 * box.extent().norm();
 }
 
-struct Line {
-  Vec3 point, direction;
-};
-
-/// The line that both bodies are the same all around, out of A and into B, where there is one: balls and half-spaces.
-std::optional<Line> axis_of(const ContactBody& a, const ContactBody& b, const Vec3& near) {
+/// Of balls and half-spaces.
+std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, const Vec3& near) {
   std::optional<implicit::CorePoint> on_a = a.field.core_point(near);
   if (!on_a || !on_a->round) return std::nullopt;
   const std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
@@ -67,20 +63,7 @@ std::optional<Line> axis_of(const ContactBody& a, const ContactBody& b, const Ve
   const Vec3 along = on_b->point - on_a->point;
   const double length = along.norm();
   if (!(length > 0.0)) return std::nullopt;
-  return Line{on_a->point, along / length};
-}
-
-/// The frame of a pair that is the same all around `axis`.
-PeakFrame round_frame(const PeakFrame& found, const Line& axis) {
-  PeakFrame frame = found;
-  const double scale = std::sqrt(found.u.norm() * found.v.norm());
-  frame.origin = axis.point + (found.origin - axis.point).dot(axis.direction) * axis.direction;
-  frame.axis = axis.direction;
-  frame.u = scale * axis.direction.unitOrthogonal();
-  frame.v = axis.direction.cross(frame.u);
-  frame.height_uu = frame.height_vv = 0.5 * (found.height_uu + found.height_vv);
-  frame.height_uv = 0.0;
-  return frame;
+  return CommonAxis{on_a->point, along / length};
 }
 
 /// The solver of one thread; its buffers are reused.
@@ -117,7 +100,7 @@ class PairSolver {
   std::vector<const ContactBody*> third_bodies_;
   std::vector<double> value_;
   PressureBatch batch_;
-  std::optional<Line> axis_;          // that the pair is the same all around
+  std::optional<CommonAxis> axis_;
   std::array<bool, 2> columns_{};  // whether the squeezed region of A, of B is wanted
   Vec3 first_ = Vec3::Zero();  // integral of x p dA
   double load_ = 0.0;
@@ -141,12 +124,13 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
   };
   for (const Vec3& hill : starts_.hill) {
     if (covered(hill, 0.0)) continue;
-    const std::optional<PeakFrame> frame = finder_.climb(pressure, hill, extent);
+    std::optional<PeakFrame> frame;
+    if (axis_ && third.empty()) frame = finder_.find_on_axis(pressure, *axis_, hill, extent);
+    const bool on_axis = frame.has_value();
+    if (!on_axis) frame = finder_.climb(pressure, hill, extent);
     if (!frame || covered(frame->origin, 0.0)) continue;
     const double largest_before = out.summary.largest_pressure;
-    const bool round = axis_.has_value() && third.empty();
-    if (!polar_.solve(pressure, round ? round_frame(*frame, *axis_) : *frame, settings, columns_, 2.0 * extent, third, round,
-                      out.points)) {
+    if (!polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, third, on_axis, out.points)) {
       return false;
     }
     add_sums(polar_.sums(), frame->origin, out.summary);

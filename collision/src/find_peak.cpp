@@ -206,4 +206,43 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
   return std::nullopt;
 }
 
+std::optional<PeakFrame> PeakFinder::find_on_axis(PairPressure& pressure, const CommonAxis& axis, const Vec3& start, double extent) {
+  const double reach = std::min(0.5 * pressure.feature_size(), extent);  // longest step
+  const Vec3 u = axis.direction.unitOrthogonal();
+  PeakFrame frame;
+  frame.axis = axis.direction;
+  frame.origin = axis.point + (start - axis.point).dot(axis.direction) * axis.direction;
+  for (int iteration = 0; iteration < kMostSteps; ++iteration) {
+    batch_.resize(1);
+    batch_.point[0] = frame.origin;
+    pressure.evaluate(batch_);
+    const double a = batch_.a[0], b = batch_.b[0];
+    const double fall = -batch_.slope_a[0].dot(frame.axis), rise = batch_.slope_b[0].dot(frame.axis), steepness = fall + rise;
+    if (!(fall > 0.0) || !(rise > 0.0)) return std::nullopt;
+    const double noise = 16.0 * std::numeric_limits<double>::epsilon() *
+                         std::max(pressure.largest_modulus(), steepness * frame.origin.lpNorm<Eigen::Infinity>());
+    const double level = (a * rise + b * fall) / steepness;  // p at the foot on Sigma, to first order
+    if (std::abs(a - b) > 1e-6 * std::abs(level) + noise) {
+      frame.origin += std::clamp((a - b) / steepness, -reach, reach) * frame.axis;
+      continue;
+    }
+    if (level <= noise) return std::nullopt;
+    // Beside the axis the gradients turn by the second derivatives, the same ones in all directions.
+    const double h = 1e-4 * reach;
+    batch_.point[0] = frame.origin + h * u;
+    pressure.evaluate(batch_);
+    const double a_uu = batch_.slope_a[0].dot(u) / h, b_uu = batch_.slope_b[0].dot(u) / h;
+    const double curvature = std::max(-(a_uu * rise + b_uu * fall) / steepness, 2.0 * level / (extent * extent));
+    frame.peak = level;
+    frame.u = u / std::sqrt(curvature);
+    frame.v = frame.axis.cross(frame.u);
+    frame.depth[0] = level / fall;
+    frame.depth[1] = level / rise;
+    frame.thickness = frame.depth[0] + frame.depth[1];
+    frame.height_uu = frame.height_vv = (a_uu - b_uu) / (steepness * curvature);
+    return frame;
+  }
+  return std::nullopt;
+}
+
 }  // namespace supple::collision

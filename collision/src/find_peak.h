@@ -25,6 +25,12 @@ struct PeakFrame {
   double depth[2] = {0.0, 0.0};  ///< share of A's and of B's squeezed region in it [m]
 };
 
+/// A line that both bodies of a pair are the same all around.
+struct CommonAxis {
+  Vec3 point = Vec3::Zero();
+  Vec3 direction = Vec3::UnitZ();  ///< unit, out of A and into B
+};
+
 /// Starting points of one pair, and points that lie inside both bodies.
 struct StartPoints {
   std::vector<Vec3> hill;    ///< one for each hill of the seeds, most promising first
@@ -41,6 +47,8 @@ class PeakFinder {
   /// @param extent  longest half axis of a patch that is believed [m]
   /// @return nothing where no point with p > 0 was found
   [[nodiscard]] std::optional<PeakFrame> climb(PairPressure& pressure, const Vec3& start, double extent);
+  /// The same where the peak lies on the common axis. @return nothing also where a pressure rises towards the other body
+  [[nodiscard]] std::optional<PeakFrame> find_on_axis(PairPressure& pressure, const CommonAxis& axis, const Vec3& start, double extent);
 
  private:
   PressureBatch batch_;
