@@ -74,7 +74,7 @@ class PairSolver {
 
  private:
   bool polar(PairPressure& pressure, const ContactSettings& settings, double extent,
-             std::span<const ContactBody* const> third, PairResult& out);
+             std::span<const ContactBody* const> third, const Box* faces, PairResult& out);
   bool parts_are_sound(PairPressure& pressure, double extent);
   void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
@@ -82,7 +82,7 @@ class PairSolver {
                const ContactSettings& settings, PairResult& out);
   void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
              const ContactSettings& settings, PairResult& out);
-  bool polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out);
+  bool polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, const Box* faces, PairResult& out);
   void clear(PairResult& out);
   void begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out);
   template <class Rule>
@@ -114,9 +114,10 @@ void PairSolver::add_sums(const PatchSums& sums, const Vec3& reference, ContactS
   load_ += sums.load;
 }
 
-/// One polar patch for each hill. @param third  that patches are cut at   @return false where the rule does not fit
+/// One polar patch for each hill. @param third  that patches are cut at   @param faces  of convex bodies: a box of their overlap
+/// @return false where the rule does not fit
 bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent,
-                       std::span<const ContactBody* const> third, PairResult& out) {
+                       std::span<const ContactBody* const> third, const Box* faces, PairResult& out) {
   cover_count_ = 0;
   const auto covered = [this](const Vec3& x, double slack) {
     return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
@@ -127,17 +128,23 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
     std::optional<PeakFrame> frame;
     if (axis_ && third.empty()) frame = finder_.find_on_axis(pressure, *axis_, hill, extent);
     const bool on_axis = frame.has_value();
-    if (!on_axis) frame = finder_.climb(pressure, hill, extent);
+    if (!on_axis) frame = finder_.climb(pressure, hill, extent, faces != nullptr);
     if (!frame || covered(frame->origin, 0.0)) continue;
     const double largest_before = out.summary.largest_pressure;
-    if (!polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, third, on_axis, out.points)) {
-      return false;
+    const auto solve = [&] {
+      return polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, third, on_axis, faces, out.points);
+    };
+    if (!solve()) {
+      if (!frame->flat) return false;
+      frame = finder_.climb(pressure, hill, extent);
+      if (!frame || covered(frame->origin, 0.0)) continue;
+      if (!solve()) return false;
     }
-    add_sums(polar_.sums(), frame->origin, out.summary);
+    add_sums(polar_.sums(), polar_.origin(), out.summary);
     out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
     out.summary.kinks += polar_.kinks();
-    if (frame->peak > largest_before) {
-      out.summary.largest_pressure = frame->peak;
+    if (polar_.largest() > largest_before) {
+      out.summary.largest_pressure = polar_.largest();
       out.summary.largest_overlap = polar_.thickness();
     }
     if (covers_.size() == cover_count_) covers_.emplace_back();
@@ -256,9 +263,10 @@ void PairSolver::begin_anew(std::span<const ContactBody> bodies, const Box& over
 }
 
 /// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit
-bool PairSolver::polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, PairResult& out) {
+bool PairSolver::polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, const Box* faces,
+                           PairResult& out) {
   clear(out);
-  if (!polar(pressure, settings, extent, third_bodies_, out)) return false;
+  if (!polar(pressure, settings, extent, third_bodies_, faces, out)) return false;
   if (out.points.point.empty()) return true;  // all of it lies in a third body
   out.summary.rule = ContactRule::Polar;
   out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
@@ -342,12 +350,13 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
     finder_.start_from_seeds(pressure, seeds, spacing, starts_);
   }
   const bool any = settings.only == ContactRule::None;
+  const Box* faces = convex && !axis_ && overlap.lower.allFinite() && overlap.upper.allFinite() ? &overlap : nullptr;
   const bool polar_first = any || settings.only == ContactRule::Polar;
-  bool fits = polar_first && polar(pressure, settings, extent, {}, out);
+  bool fits = polar_first && polar(pressure, settings, extent, {}, faces, out);
   if (convex && polar_first && fits && cover_count_ == 0) {
     // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
     finder_.start_from_scan(pressure, overlap, starts_);
-    fits = polar(pressure, settings, extent, {}, out);
+    fits = polar(pressure, settings, extent, {}, faces, out);
   }
   RuleReason reason = any ? RuleReason::Fits : RuleReason::Asked;
   if (any && !fits) reason = RuleReason::NoGraph;
@@ -355,7 +364,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
     out.summary.rule = ContactRule::Polar;
     if (any && !third_.empty() && thirds_press(bodies, boxes, out)) {
       // The squeezed regions of bodies with several parts are not cut that exactly.
-      fits = a.pose.size() == 1 && b.pose.size() == 1 && polar_cut(pressure, settings, extent, out);
+      fits = a.pose.size() == 1 && b.pose.size() == 1 && polar_cut(pressure, settings, extent, faces, out);
       if (!fits) reason = RuleReason::ThirdBody;
     }
   }

@@ -10,11 +10,8 @@ namespace {
 constexpr std::size_t kMostHills = 16;
 constexpr int kMostSteps = 40;
 
-/// Principal directions of a symmetric 2 x 2 matrix: angle of the first, and both eigenvalues.
-struct Principal {
-  double cosine, sine;
-  double first, second;
-};
+}  // namespace
+
 Principal principal(double xx, double xy, double yy) {
   const double mean = 0.5 * (xx + yy), half = 0.5 * (xx - yy);
   const double radius = std::sqrt(half * half + xy * xy);
@@ -32,8 +29,6 @@ Principal principal(double xx, double xy, double yy) {
   }
   return {c, s, mean + radius, mean - radius};
 }
-
-}  // namespace
 
 void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> seeds, double spacing,
                                   StartPoints& out) {
@@ -108,7 +103,7 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(batch_.point[order_[n]]);
 }
 
-std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& start, double extent) {
+std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& start, double extent, bool stop_on_faces) {
   const double reach = std::min(0.5 * pressure.feature_size(), extent);  // longest step
   const double h = 1e-4 * reach;
   PeakFrame frame;
@@ -178,11 +173,14 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     const double g1 = tangential.dot(first), g2 = tangential.dot(other);
     const double gain = 0.5 * (g1 * g1 / c1 + g2 * g2 / c2);
 
-    step = (g1 / c1) * first + (g2 / c2) * other + ((a - b) / steepness) * axis;
+    const bool flat = stop_on_faces && level > noise && std::min(std::abs(p.first), std::abs(p.second)) <= flattest;
+    step = ((a - b) / steepness) * axis;
+    if (!flat) step += (g1 / c1) * first + (g2 / c2) * other;
     const bool on_sigma = gap <= 1e-6 * std::abs(level) + noise;
     const bool at_top = gain <= 1e-12 * std::abs(level) + 1e-3 * noise;
     frame.axis = axis;
-    if ((on_sigma && at_top) || iteration + 1 == kMostSteps) {
+    frame.flat = flat && on_sigma;
+    if (frame.flat || (on_sigma && at_top) || iteration + 1 == kMostSteps) {
       if (level <= noise || !on_sigma || !(fall > 0.0) || !(rise > 0.0)) return std::nullopt;
       frame.origin = x;
       frame.peak = level;

@@ -23,7 +23,15 @@ struct PeakFrame {
   double height_uu = 0.0, height_uv = 0.0, height_vv = 0.0;
   double thickness = 0.0;    ///< of the overlap along the axis, to first order [m]
   double depth[2] = {0.0, 0.0};  ///< share of A's and of B's squeezed region in it [m]
+  bool flat = false;             ///< not the peak: the pressure is that of faces, flat along some direction
 };
+
+/// Principal directions of a symmetric 2 x 2 matrix: of the larger eigenvalue first.
+struct Principal {
+  double cosine, sine;   ///< of the first direction; the second is (-sine, cosine)
+  double first, second;  ///< eigenvalues
+};
+[[nodiscard]] Principal principal(double xx, double xy, double yy);
 
 /// A line that both bodies of a pair are the same all around.
 struct CommonAxis {
@@ -45,8 +53,9 @@ class PeakFinder {
   void start_from_scan(PairPressure& pressure, const Box& overlap, StartPoints& out);
   /// Newton's method for the largest p on Sigma (Lagrange function with Hessian by differences of gradients).
   /// @param extent  longest half axis of a patch that is believed [m]
+  /// @param stop_on_faces  ends where the pressure is flat along some direction, with a frame that says so
   /// @return nothing where no point with p > 0 was found
-  [[nodiscard]] std::optional<PeakFrame> climb(PairPressure& pressure, const Vec3& start, double extent);
+  [[nodiscard]] std::optional<PeakFrame> climb(PairPressure& pressure, const Vec3& start, double extent, bool stop_on_faces = false);
   /// The same where the peak lies on the common axis. @return nothing also where a pressure rises towards the other body
   [[nodiscard]] std::optional<PeakFrame> find_on_axis(PairPressure& pressure, const CommonAxis& axis, const Vec3& start, double extent);
 

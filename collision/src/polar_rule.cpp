@@ -87,7 +87,9 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       if (iteration >= kFreeRimSteps) (on_sigma > 0.0 ? low_[k] : high_[k]) = radius;
       double next = along < 0.0 ? radius - on_sigma / along : 2.0 * radius;
       next = std::clamp(next, 0.4 * radius, 2.0 * radius);
-      const bool near = std::abs(next - radius) <= enough * radius;
+      // On faces the pressure falls over the last part of the way alone, and Newton's method errs by the square over that.
+      const double falls = about_middle_ ? std::min(radius, 2.0 * frame_.peak / std::abs(along)) : radius;
+      const bool near = (next - radius) * (next - radius) <= enough * enough * falls * radius;
       if (!near && (!(next > low_[k]) || !(next < high_[k]))) {
         next = std::isfinite(high_[k]) ? 0.5 * (low_[k] + high_[k]) : 1.5 * radius;
       }
@@ -100,7 +102,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         done_[k] = 1;
         --open;
         // Newton's method leaves about half the square of its last step, which the area feels twice.
-        rim_error_ = std::max(rim_error_, step * step / (radius * radius));
+        rim_error_ = std::max(rim_error_, step * step / (falls * radius));
       }
       radius = next;
       rays.height[k] += lift;
@@ -259,7 +261,7 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   end[n - 1] = frame_.depth[side];
   for (int iteration = 0; iteration < kEndSteps; ++iteration) {
     for (std::size_t i = 0; i + 1 < n; ++i) line_point_[i] = node_.point[i] + (sign * end[i]) * frame_.axis;
-    line_point_[n - 1] = frame_.origin + (sign * end[n - 1]) * frame_.axis;
+    line_point_[n - 1] = peak_ + (sign * end[n - 1]) * frame_.axis;
     pressure.evaluate(side, line_point_, line_value_, line_slope_);
     bool moved = false;
     for (std::size_t i = 0; i < n; ++i) {
@@ -284,7 +286,7 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, 
   if (!column_ends(pressure, side, std::min(1e-3, 0.1 * std::sqrt(error)))) return false;
   const GaussRule& gauss = gauss_rule(column);
   const std::size_t n = node_.size();
-  thickness_ += end_[side][n];
+  thickness_ += end_[side][summit_];
   const double sign = side == 0 ? 1.0 : -1.0;
   const std::size_t begin = points.volume_point.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -319,20 +321,36 @@ double PolarRuleSolver::algebraic_error() const {
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                             const std::array<bool, 2>& columns, double extent,
-                            std::span<const ContactBody* const> third, bool round, PatchPoints& points) {
-  const double error = settings.error;
+                            std::span<const ContactBody* const> third, bool round, const Box* faces, PatchPoints& points) {
+  extent_ = extent;
   third_ = third;
+  peak_ = frame.origin;
+  const std::size_t before = points.point.size();
+  if (!frame.flat && solve_about_peak(pressure, frame, settings, columns, round, points)) return true;
+  if (faces == nullptr) return false;
+  if (!frame.flat) {
+    if (before > 0) return false;
+    points.clear();
+  }
+  if (solve_about_middle(pressure, frame, settings, columns, *faces, points)) return true;
+  if (before == 0) points.clear();
+  return false;
+}
+
+bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                                       const std::array<bool, 2>& columns, bool round, PatchPoints& points) {
+  const double error = settings.error;
   cut_ = false;
+  about_middle_ = false;
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
-  extent_ = extent;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   estimate_ = 1.0;
   const std::span<const PolarRule> rules = polar_rules();
   const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
   const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
-  const bool parts = error < kSplitBelow || !third.empty();
+  const bool parts = error < kSplitBelow || !third_.empty();
   bool parted = false;
   parted_ = 0;
   kinks_.clear();
@@ -351,7 +369,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
       r = first - 1;
       continue;
     }
-    if (!third.empty() && taken_by_thirds()) {
+    if (!third_.empty() && taken_by_thirds()) {
       fine_ = {};
       estimate_ = 0.0;
       thickness_ = frame.thickness;
@@ -361,7 +379,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
       parted = true;
       if (solve_split(pressure, settings)) {
         parted_ = static_cast<std::uint32_t>(crossing_.size());
-        return finish(pressure, rules[last].column, columns, error, points);
+        return finish(pressure, column_of(error), columns, error, points);
       }
       if (crossing_.back() >= kinks_.size()) return false;
       r = first - 1;  // begins again as if there were no kinks
@@ -382,6 +400,13 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
 bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::array<bool, 2>& columns, double error,
                              PatchPoints& points) {
   thickness_ = 0.0;
+  largest_ = frame_.peak;
+  summit_ = node_.size();
+  for (std::size_t i = 0; i < node_.size() && about_middle_; ++i) {
+    if ((cut_ && area_[i] == 0.0) || pressure_[i] <= largest_) continue;
+    largest_ = pressure_[i];
+    summit_ = i;
+  }
   for (const int side : {0, 1}) {
     if (!columns[static_cast<std::size_t>(side)]) {
       thickness_ += 0.5 * frame_.thickness;
@@ -402,6 +427,11 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::arra
 
 void PolarRuleSolver::cover(PolarCover& out) const {
   out.frame = frame_;
+  if (about_middle_) {
+    cover_about_middle(out);
+    return;
+  }
+  out.corner.clear();
   out.radius = rim_.radius;
   out.height = rim_.height;
   out.thickness = thickness_;
@@ -414,17 +444,28 @@ void PolarRuleSolver::cover(PolarCover& out) const {
 bool PolarCover::contains(const Vec3& x, double slack) const {
   const Vec3 d = x - frame.origin;
   const double c = d.dot(frame.u) / frame.u.squaredNorm(), s = d.dot(frame.v) / frame.v.squaredNorm();
-  const double rho = std::sqrt(c * c + s * s);
-  const auto n = static_cast<double>(radius.size());
-  double turn = math::atan2(s, c) / (2.0 * std::numbers::pi);
-  if (turn < 0.0) turn += 1.0;
-  const double at = turn * n;
-  const double below = std::floor(at), share = at - below;
-  const std::size_t k = static_cast<std::size_t>(below) % radius.size(), next = (k + 1) % radius.size();
-  const double reach = (1.0 - share) * radius[k] + share * radius[next];
-  if (rho > (1.0 + slack) * reach) return false;
-  const double rise = (1.0 - share) * height[k] + share * height[next];
-  return std::abs(d.dot(frame.axis) - rise * (rho / reach) * (rho / reach)) <= 2.0 * thickness + 0.5 * std::abs(rise);
+  double far = 0.0, rise = 0.0;  // rho over that of the rim; height of the rim
+  if (corner.empty()) {
+    const auto n = static_cast<double>(radius.size());
+    double turn = math::atan2(s, c) / (2.0 * std::numbers::pi);
+    if (turn < 0.0) turn += 1.0;
+    const double at = turn * n;
+    const double below = std::floor(at), share = at - below;
+    const std::size_t k = static_cast<std::size_t>(below) % radius.size(), next = (k + 1) % radius.size();
+    far = std::sqrt(c * c + s * s) / ((1.0 - share) * radius[k] + share * radius[next]);
+    rise = (1.0 - share) * height[k] + share * height[next];
+  } else {
+    for (std::size_t k = 0; k < corner.size(); ++k) {
+      const Vec2 &a = corner[k], &b = corner[(k + 1) % corner.size()];
+      const double beyond_a = a.x() * s - a.y() * c, beyond_b = c * b.y() - s * b.x(), whole = beyond_a + beyond_b;
+      if (!(beyond_a >= 0.0) || !(beyond_b >= 0.0) || !(whole > 0.0)) continue;
+      far = whole / (a.x() * b.y() - a.y() * b.x());
+      rise = (beyond_b * height[k] + beyond_a * height[(k + 1) % corner.size()]) / whole;
+      break;
+    }
+  }
+  if (far > 1.0 + slack) return false;
+  return std::abs(d.dot(frame.axis) - rise * far * far) <= 2.0 * thickness + 0.5 * std::abs(rise);
 }
 
 }  // namespace supple::collision

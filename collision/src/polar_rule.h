@@ -2,10 +2,12 @@
 /// Spectral quadrature on a smooth patch of Sigma: Gauss-Legendre in the radius times the trapezoid rule in the angle
 /// about the point of largest pressure, both exponentially convergent because the integrand is smooth, periodic and
 /// vanishes at the rim. Where kinks of a field cross the patch, radii are parted at them, and angles where kinks meet the rim
-/// and as finely as the error asks. Columns along the axis carry the integrals over the squeezed regions.
+/// and as finely as the error asks. Where faces lie on faces the pressure has no peak that says anything: there the patch is parted
+/// about its middle. Columns along the axis carry the integrals over the squeezed regions.
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "find_peak.h"
@@ -17,10 +19,13 @@
 
 namespace supple::collision {
 
+using Vec2 = Eigen::Vector2d;
+
 /// The ground that a polar patch covers.
 struct PolarCover {
   PeakFrame frame;
-  std::vector<double> radius, height;  ///< of the rim, by equally spaced angles
+  std::vector<double> radius, height;  ///< of the rim, by equally spaced angles; of `corner` where there are some
+  std::vector<Vec2> corner;            ///< of an outline about the origin, by angle, in units of u and v
   std::vector<Vec3> rim;               ///< its points
   double thickness = 0.0;
   /// Whether x lies over the patch, near Sigma. @param slack  share of the radius that a point may lie outside
@@ -34,24 +39,29 @@ class PolarRuleSolver {
   /// @param extent  rims farther away are not believed [m]
   /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
   /// @param round  both pressures are the same all around the line through the frame's origin along its axis
+  /// @param faces  of convex bodies, a box that holds the patch: where kinks cross it, it is parted about its middle
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
   [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                            const std::array<bool, 2>& columns, double extent, std::span<const ContactBody* const> third,
-                           bool round, PatchPoints& points);
+                           bool round, const Box* faces, PatchPoints& points);
 
-  [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about the frame's origin
+  [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about `origin()`
+  [[nodiscard]] const Vec3& origin() const noexcept { return frame_.origin; }
+  [[nodiscard]] double largest() const noexcept { return largest_; }  ///< pressure: at the peak, or of the nodes about the middle [Pa]
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] std::uint32_t kinks() const noexcept { return parted_; }  ///< that the patch was parted at
-  [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< of the overlap through the peak [m]
+  [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< of the overlap there [m]
   void cover(PolarCover& out) const;                                      ///< of the last solve
 
  private:
   /// Directions from the peak, and where the rim is met on them.
   struct Rays {
-    std::vector<double> cosine, sine, radius, height;
+    std::vector<double> cosine, sine, radius, height;  // (cosine, sine): about the middle, of any length
     [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
   };
+  bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                        const std::array<bool, 2>& columns, bool round, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
@@ -66,8 +76,10 @@ class PolarRuleSolver {
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 
   // Patches that kinks cross: split_rule.cpp.
+  /// Gauss points through a squeezed region.
+  static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
   struct Panel {
-    double begin = 0.0, end = 0.0;  // angles
+    double begin = 0.0, end = 0.0;  // angles, or places along `sectors_`: i to i + 1 is sector i
     std::size_t first = 0, last = 0;  // of `kept_`
     PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with fewer radii besides
     double by_angle = 0.0, by_radius = 0.0;  // differences of these
@@ -89,13 +101,53 @@ class PolarRuleSolver {
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
-  void find_corners(PairPressure& pressure, std::vector<double>& turns);
+  void find_corners(PairPressure& pressure, std::vector<Vec3>& corners);
   void find_crossings(PairPressure& pressure, double error);
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
+  // About the middle: middle_rule.cpp.
+  struct RimPoint {
+    Vec2 at = Vec2::Zero();       // in units of u and v
+    double height = 0.0;
+    Vec2 outward = Vec2::Zero();  // the pressure falls
+  };
+  /// Directions of rays as a parabola through three points near the rim, with heights.
+  struct Sector {
+    std::array<Vec2, 3> at;
+    std::array<double, 3> height;
+  };
+  /// The search for the rim along one ray: the last place inside, and one outside.
+  struct Walk {
+    Vec2 way = Vec2::Zero();
+    Vec3 along = Vec3::Zero();
+    double in = 0.0, in_height = 0.0, pressure = 0.0, slope = 0.0, bend = 0.0;  // pressure along Sigma, its first and second derivatives
+    double rise = 0.0;                   // of Sigma
+    double out = 0.0;
+    double most = 0.0;                   // length of a step that is believed
+    double passed = 0.0;                 // the last kink gone to
+    double at = 0.0, height = 0.0;       // where it looks next
+    bool fresh = true, done = false;     // without a second derivative; at the rim
+    Vec2 outward = Vec2::Zero();
+  };
+  bool solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                          const std::array<bool, 2>& columns, const Box& faces, PatchPoints& points);
+  bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Box& faces);
+  void cover_about_middle(PolarCover& out) const;
+  bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
+  bool move_to_middle(PairPressure& pressure);
+  void add_rays_at_hidden_sides(PairPressure& pressure);
+  void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
+  void make_sectors(std::span<const RimPoint> corners);
+  void cross_outline();
+  void place_rays(const KronrodRule& rule, std::size_t first);
+  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& rule, bool fine);
+
   PeakFrame frame_;
+  Vec3 peak_ = Vec3::Zero();
+  double largest_ = 0.0;
+  std::size_t summit_ = 0;  // node where it is; their number: at the peak
   double jacobian_ = 0.0;  // |u| |v|
   double extent_ = 0.0;
   Rays rim_;
@@ -128,6 +180,11 @@ class PolarRuleSolver {
   Rays rays_;
   std::vector<double> square_, fourth_;  // heights along a ray: s^2 (square + s^2 fourth)
   std::vector<Crossing> crossings_;
+  std::vector<double> turn_;             // what the weight of the angle is multiplied by
+  bool about_middle_ = false;
+  std::vector<RimPoint> outline_, polygon_;  // by angle; with corners
+  std::vector<Sector> sectors_;
+  std::vector<Walk> walks_;
   std::vector<std::size_t> ray_nodes_, ray_fewer_;  // first node of a ray, and of those with fewer radii
   PressureBatch kept_;
   std::vector<double> kept_weight_, kept_area_, kept_pressure_;

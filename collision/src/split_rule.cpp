@@ -47,13 +47,17 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 /// than the coarser one, as in QUADPACK (Piessens et al. 1983, sec. 2.2.4.1); the few points of the coarsest rules, and
 /// panels at the end of a crossing, are not that regular.
 constexpr double kRegular = 2000.0;
-double estimate_of(double regular, double halved, bool fine) {
+/// Sectors of faces, whose pressure is not smooth in the direction where rays pass corners of the cores, are trusted so far only.
+constexpr double kLeastOnFaces = 0.05;
+double estimate_of(double regular, double halved, bool fine, double least) {
   constexpr double kHalf = 0.5;
-  const double share = fine ? std::min(1.0, std::sqrt(kRegular * regular)) : kHalf;
+  const double share = fine ? std::clamp(std::sqrt(kRegular * regular), least, 1.0) : kHalf;
   return share * regular + kHalf * halved;
 }
 /// The difference that an error allows.
-double difference_for(double error, bool fine) { return fine ? std::max(error, std::cbrt(error * error / kRegular)) : error; }
+double difference_for(double error, bool fine, double least) {
+  return fine ? std::max(error, std::min(std::cbrt(error * error / kRegular), error / least)) : error;
+}
 
 }  // namespace
 
@@ -198,8 +202,8 @@ std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const 
   return sum;
 }
 
-/// Angles where a kink meets the rim: p_A = p_B = s = 0.
-void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<double>& turns) {
+/// Where a kink meets the rim, begun between points of `fine_rim_`: p_A = p_B = s = 0.
+void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& corners) {
   const std::vector<Vec3>& rim = fine_rim_;
   const std::size_t n = rim.size();
   std::vector<std::size_t> kink;
@@ -243,9 +247,7 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<double>& 
   }
   for (std::size_t i = 0; i < kink.size(); ++i) {
     if (!(last[i] <= 1e-6 * extent_)) continue;  // the panels find it by halving
-    const Vec3 d = batch.point[i] - frame_.origin;
-    const double turn = math::atan2(d.dot(frame_.v) / frame_.v.squaredNorm(), d.dot(frame_.u) / frame_.u.squaredNorm());
-    turns.push_back(turn < 0.0 ? turn + kTurn : turn);
+    corners.push_back(batch.point[i]);
   }
 }
 
@@ -322,7 +324,8 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
       const double moved = next - x.radius;
       x.height -= (gap + gr * moved) / gt;
       x.radius = next;
-      x.good = std::abs(moved) <= enough && next == radius;
+      // Relative to the piece between kink and rim on faces, whose share of the ray may be small.
+      x.good = std::abs(moved) <= enough * (about_middle_ ? std::abs(1.0 - next) : 1.0) && next == radius;
       if (x.good) --open;
     }
   }
@@ -337,25 +340,32 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
 bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   const std::size_t count = (panels_.size() - first) * per_panel;
-  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &square_, &fourth_}) {
+  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &square_, &fourth_}) {
     column->resize(count);
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    const Panel& panel = panels_[first + i / per_panel];
-    const auto [s, c] = math::sin_cos(0.5 * (panel.begin + panel.end) + 0.5 * (panel.end - panel.begin) * rule.node[i % per_panel]);
-    rays_.cosine[i] = c;
-    rays_.sine[i] = s;
-    const auto [radius, height] = rim_at(c, s);
-    rays_.radius[i] = radius;
-    rays_.height[i] = height;
-    if (!(radius > 0.0)) return false;
+  if (about_middle_) {
+    place_rays(rule, first);
+  } else {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Panel& panel = panels_[first + i / per_panel];
+      turn_[i] = 0.5 * (panel.end - panel.begin);
+      const auto [s, c] = math::sin_cos(0.5 * (panel.begin + panel.end) + turn_[i] * rule.node[i % per_panel]);
+      rays_.cosine[i] = c;
+      rays_.sine[i] = s;
+      const auto [radius, height] = rim_at(c, s);
+      rays_.radius[i] = radius;
+      rays_.height[i] = height;
+      if (!(radius > 0.0)) return false;
+    }
   }
   const double rim_error = rim_error_;
   if (!solve_rim(pressure, rays_, error)) return false;
   rim_error_ = std::max(rim_error_, rim_error);
   for (std::size_t i = 0; i < count; ++i) {
     const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
-    square_[i] = 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+    // Faces are flat about the middle.
+    square_[i] = about_middle_ ? 0.0
+                               : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
     fourth_[i] = rays_.height[i] - square_[i];
   }
   find_crossings(pressure, error);
@@ -369,7 +379,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   std::size_t next = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Panel& panel = panels_[first + i / per_panel];
-    const double half = 0.5 * (panel.end - panel.begin), rim = rays_.radius[i];
+    const double rim = rays_.radius[i];
     const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
     const std::size_t crossing_begin = next;
     while (next < crossings_.size() && crossings_[next].ray == i) ++next;
@@ -379,12 +389,13 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
         const double right = c < next ? crossings_[c].radius : 1.0;
         const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
         if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
-        const GaussRule& gauss = gauss_rule(nodes_on(most, right - left));
+        // On faces it is the short last piece on which the pressure falls.
+        const GaussRule& gauss = gauss_rule(about_middle_ ? most : nodes_on(most, right - left));
         for (std::size_t j = 0; j < gauss.node.size(); ++j) {
           const double along = gauss.node[j], r = left + (right - left) * along;
           foot_.push_back(frame_.origin + (r * rim) * e);
           height_.push_back(model_height(i, r) + lift_left + along * (lift_right - lift_left));
-          weight_.push_back(angle * half * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
+          weight_.push_back(angle * turn_[i] * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
         }
         left = right;
         lift_left = lift_right;
@@ -438,8 +449,15 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   const KronrodRule& rule = kronrod_rule(fine);
   const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;
   const double widest = fine ? kWidest : kWidestCoarse;
+  about_middle_ = false;
+  std::vector<Vec3> corners;
+  find_corners(pressure, corners);
   std::vector<double> turns;
-  find_corners(pressure, turns);
+  for (const Vec3& x : corners) {
+    const Vec3 d = x - frame_.origin;
+    const double turn = math::atan2(d.dot(frame_.v) / frame_.v.squaredNorm(), d.dot(frame_.u) / frame_.u.squaredNorm());
+    turns.push_back(turn < 0.0 ? turn + kTurn : turn);
+  }
   if (turns.empty()) turns.push_back(0.0);
   std::sort(turns.begin(), turns.end());
   turns.push_back(turns.front() + kTurn);
@@ -456,6 +474,12 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
       panels_.push_back(panel);
     }
   }
+  return solve_all_panels(pressure, settings, rule, fine);
+}
+
+/// Halves panels until the estimate is low enough; then nodes and sums of all are in place.
+bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& rule, bool fine) {
+  const double error = settings.error;
   kept_.resize(0);
   kept_weight_.clear();
   kept_area_.clear();
@@ -464,6 +488,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   residual_ = lift_ = rim_error_ = 0.0;
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
+  const double least = about_middle_ ? kLeastOnFaces : 0.0;
   for (;;) {
     if (!solve_panels(pressure, rule, error, begin)) return false;
     all = {};
@@ -475,11 +500,11 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
       panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
       (panel.halved ? halved : regular) += panel.by_angle + panel.by_radius;
     }
-    estimate_ = estimate_of(regular, halved, fine);
+    estimate_ = estimate_of(regular, halved, fine, least);
     if (estimate_ <= kEnough * error || solved >= kMostPanels) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
-    const double share_regular = 0.5 * difference_for(error, fine) / count, share_halved = 0.5 * error / count;
+    const double share_regular = 0.5 * difference_for(error, fine, least) / count, share_halved = 0.5 * error / count;
     std::vector<Panel> finer;
     std::erase_if(panels_, [&](const Panel& panel) {
       const double share = panel.halved ? share_halved : share_regular;

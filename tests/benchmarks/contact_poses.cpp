@@ -178,10 +178,12 @@ int main(int argc, char** argv) {
       const Pose pose = random_pose(draw, draw.uniform(0.0, 1.0) * draw.direction());
       box.put(pose);
       const Vec3 up = pose.orientation * Vec3::UnitZ();
-      plane = {pose.position - (half.z() + kEdge - overlap(draw)) * up, up, 1.0};
-      collision::ContactBody ground = single_part(plane, 10.0 * kE / kEdge, origin);
+      const double h = kEdge - overlap(draw), k = 10.0 * kE / kEdge;
+      const Vec3 core = pose.position - half.z() * up;
+      plane = {core - h * up, up, 1.0};
+      collision::ContactBody ground = single_part(plane, k, origin);
       ground.fixed = true;
-      return Pair{{box.body(), ground}, false, {}};
+      return Pair{{box.body(), ground}, true, face_on_flat(half.x(), half.y(), kEdge, kE, k, h, core, -up)};
     });
   }
   if (wanted("face_on_face")) {

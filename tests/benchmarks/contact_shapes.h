@@ -179,6 +179,35 @@ inline Answer sphere_on_flat(double r, double e, double k, double h, const Vec3&
   });
 }
 
+/// The face [-a, a] x [-b, b] of a box with edges of radius r, p = e (1 - d / r) at the distance d from the core, at height h
+/// over a body whose pressure is k times the depth: an isobar is a rectangle with round corners.
+inline Answer face_on_flat(double a, double b, double r, double e, double k, double h, const Vec3& centre, const Vec3& down) {
+  const double p_max = (r - h) / (r / e + 1.0 / k);
+  Answer sum;
+  double load = 0.0, first = 0.0;
+  const auto add = [&](double p, double z, double area) {
+    sum.area += area;
+    load += p * area;
+    first += p * z * area;
+  };
+  add(p_max, h + p_max / k, 4.0 * a * b);
+  sum.force = 4.0 * a * b * p_max;
+  constexpr int kNodes = 4000;
+  for (int i = 0; i <= kNodes; ++i) {  // Simpson's rule in t, p = p_max cos^2 t: the width rises with t
+    const double t = 0.5 * kPi * i / kNodes;
+    const double weight = (i == 0 || i == kNodes ? 1.0 : i % 2 == 1 ? 4.0 : 2.0) * 0.5 * kPi / kNodes / 3.0;
+    const double s = std::sin(t), c = std::cos(t);
+    const double p = p_max * c * c, z = h + p / k, d = r * (1.0 - p / e);
+    // d^2 - z^2 = (d + z) (r / e + 1 / k) (p_max - p)
+    const double root = std::sqrt((d + z) * (r - h)), width = s * root, dp = 2.0 * p_max * s * c;
+    const double widens = (d * r / e + z / k) * 2.0 * p_max * c / root;
+    sum.force += (4.0 * (a + b) * width + kPi * width * width) * dp * weight;
+    add(p, z, (4.0 * (a + b) + 2.0 * kPi * width) * std::hypot(widens, dp / k) * weight);
+  }
+  sum.centre = centre + (first / load) * down;
+  return sum;
+}
+
 inline double cpu_microseconds() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
