@@ -390,7 +390,8 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
                               (r == 1 ? kUnseenAtFirst : r == 2 ? kUnseen : 0.0);
     if (difference > error && r < last) continue;
     estimate_ = difference + algebraic_error();
-    if (round) turn(rules[r], columns[0] || columns[1]);
+    // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
+    if (round) turn(rules[r - 1], columns[0] || columns[1]);
     return finish(pressure, rules[r].column, columns, error, points);
   }
   return false;
