@@ -187,12 +187,16 @@ class RimCutter {
     }
     return rim > 1;  // more than two sheets of the third label would meet in their edge
   }
+  /// @pre the vertex has one
+  [[nodiscard]] const Cover& cover_of(std::uint32_t vertex) const {
+    return *std::lower_bound(all_.cover.begin(), all_.cover.end(), vertex,
+                             [](const Cover& cover, std::uint32_t v) { return cover.vertex < v; });
+  }
   [[nodiscard]] const Cover* covered(const Facet& facet, std::uint32_t vertex) const {
     if (all_.kind[vertex] != VertexKind::Covered) return nullptr;
-    const auto at = std::lower_bound(all_.cover.begin(), all_.cover.end(), vertex,
-                                     [](const Cover& cover, std::uint32_t v) { return cover.vertex < v; });
+    const Cover& cover = cover_of(vertex);
     const auto [low, high] = std::minmax(facet.inner, facet.outer);
-    return at->low == low && at->high == high ? &*at : nullptr;
+    return cover.low == low && cover.high == high ? &cover : nullptr;
   }
   [[nodiscard]] Side side(const Facet& facet, std::uint32_t vertex) const {
     if (all_.kind[vertex] == VertexKind::Junction || all_.kind[vertex] == VertexKind::Uncovered) return Side::Rim;
@@ -218,9 +222,8 @@ class RimCutter {
   bool uncover(std::uint32_t vertex) {
     if (all_.kind[vertex] != VertexKind::Covered) return false;
     all_.kind[vertex] = VertexKind::Uncovered;
-    const auto at = std::lower_bound(all_.cover.begin(), all_.cover.end(), vertex,
-                                     [](const Cover& cover, std::uint32_t v) { return cover.vertex < v; });
-    const LabelSet labels = labels_between(*at);
+    const Cover& cover = cover_of(vertex);
+    const LabelSet labels = labels_between(cover);
     std::uint32_t last = kNoBody;
     for (VertexUse& use : all_.uses_of(vertex)) {
       use.other = kAnyLabel;
@@ -229,10 +232,10 @@ class RimCutter {
         continue;
       }
       last = use.body;
-      if (at->by == 0) continue;  // bodies apart keep their own
-      use.position = at->point;
+      if (cover.by == 0) continue;  // bodies apart keep their own
+      use.position = cover.point;
       const Label label = use.body + 1;
-      use.contact = label == at->low ? at->high : label == at->high || at->low == 0 ? at->low : contact_of(labels, use.body);
+      use.contact = label == cover.low ? cover.high : label == cover.high || cover.low == 0 ? cover.low : contact_of(labels, use.body);
     }
     return true;
   }
@@ -274,9 +277,8 @@ class RimCutter {
   /// Where a vertex of a crossing lies before it parts.
   [[nodiscard]] const Vec3& place(std::uint32_t vertex, const Crossing& c) const {
     if (all_.kind[vertex] == VertexKind::Covered) {
-      const auto at = std::lower_bound(all_.cover.begin(), all_.cover.end(), vertex,
-                                       [](const Cover& cover, std::uint32_t v) { return cover.vertex < v; });
-      if (at->low == c.low && at->high == c.high) return at->point;
+      const Cover& cover = cover_of(vertex);
+      if (cover.low == c.low && cover.high == c.high) return cover.point;
     }
     return position(vertex, c.high, c.low);
   }

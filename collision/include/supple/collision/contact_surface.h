@@ -66,7 +66,7 @@ struct ContactSurface {
     double load = 0.0;                     ///< integral of p dA [N]
     Vec3 centre_of_pressure = Vec3::Zero();  ///< integral x p dA / integral p dA [m]
     double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]
-    double largest_pressure = 0.0;         ///< [Pa]
+    double largest_pressure = 0.0;         ///< at the peak; of faces on faces at the best of the points [Pa]
     double largest_overlap = 0.0;          ///< to first order without `ContactSettings::energy`: thickness of {p_A > 0, p_B > 0} through the point of largest pressure [m]
     double displaced_a = 0.0;              ///< volume of V_A [m^3]: what A loses to B
     double displaced_b = 0.0;              ///< volume of V_B [m^3]
