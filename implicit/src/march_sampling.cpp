@@ -38,18 +38,11 @@ std::array<int, 3> leaf_corner(unsigned leaf) {
 /// Gives a block tiles with values and takes them from it, all at once.
 class TileChanges {
  public:
-  void begin() {
-    made_ = dropped_ = 0;
-    values_.clear();
-  }
-  /// Room for the values of a tile that follows the one made last. @pre until then no other is asked for
-  [[nodiscard]] float* room() {
-    values_.resize(kTileNodes * (static_cast<std::size_t>(std::popcount(made_)) + 1));
-    return values_.data() + values_.size() - kTileNodes;
-  }
+  void begin() { made_ = dropped_ = 0; }
+  /// Room for the values of a tile.
+  [[nodiscard]] float* room(unsigned place) { return values_.data() + std::size_t{kTileNodes} * place; }
   /// The values there are those of a tile.
   void make(unsigned place, Bits inside) {
-    from_[place] = static_cast<std::uint8_t>(std::popcount(made_));
     inside_[place] = inside;
     made_ |= Bits{1} << place;
   }
@@ -58,24 +51,25 @@ class TileChanges {
   void apply(Block& block) {
     const Bits kept = block.held & ~dropped_ & ~made_, held = kept | made_;
     if (made_ == 0 && kept == block.held) return;
+    old_tiles_.clear();
+    old_values_.clear();
     if (kept != 0) {
-      old_tiles_.assign(block.tile.begin(), block.tile.end());
-      old_values_.assign(block.values.begin(), block.values.end());
+      old_tiles_.swap(block.tile);
+      old_values_.swap(block.values);
     }
-    block.tile.resize(static_cast<std::size_t>(std::popcount(held)));
-    block.values.resize(kTileNodes * block.tile.size());
-    Tile* tile = block.tile.data();
-    float* values = block.values.data();
+    block.tile.clear();
+    block.values.clear();
+    block.tile.reserve(static_cast<std::size_t>(std::popcount(held)));
+    block.values.reserve(kTileNodes * static_cast<std::size_t>(std::popcount(held)));
     for_bits(held, [&](unsigned place) {
-      const bool made = (made_ >> place & 1u) != 0;
-      const std::size_t from = made ? from_[place] : block.rank(place);
-      *tile = made ? Tile{} : old_tiles_[from];
-      if (made) {
-        tile->inside = inside_[place];
-        tile->place = static_cast<std::uint8_t>(place);
+      const float* values = room(place);
+      if ((made_ >> place & 1u) != 0) {
+        block.tile.push_back({.inside = inside_[place], .place = static_cast<std::uint8_t>(place)});
+      } else {
+        block.tile.push_back(old_tiles_[block.rank(place)]);
+        values = old_values_.data() + kTileNodes * block.rank(place);
       }
-      ++tile;
-      values = std::copy_n((made ? values_ : old_values_).data() + kTileNodes * from, kTileNodes, values);
+      block.values.insert(block.values.end(), values, values + kTileNodes);
     });
     block.flipped |= block.held ^ held;
     block.held = held;
@@ -83,9 +77,9 @@ class TileChanges {
 
  private:
   Bits made_ = 0, dropped_ = 0;
-  std::array<std::uint8_t, 64> from_{};
   std::array<Bits, 64> inside_{};
-  std::vector<float> values_, old_values_;
+  alignas(64) std::array<float, 64 * kTileNodes> values_;  // by place
+  std::vector<float> old_values_;
   std::vector<Tile> old_tiles_;
 };
 
@@ -461,17 +455,15 @@ class BlobSampler final : public Sampler {
     // Tiles of a leaf that bounds decided have not been looked at one by one.
     const Bits tiles = was_decided ? own : own & block.changed;
     empty(block, tiles, false, work);
-    Bits inside = work.sure & tiles, sure = 0;  // of its cubes of 2^3 nodes
+    Bits inside = work.sure & tiles;
     if (sure_by_cubes()) {
-      const blobs::SureCubes cubes = blobs::find_sure_cubes(work.leaf, point(leaf_corner(leaf)), kTile / 2, iso_);
-      block.kernel_values += kTileNodes * cubes.added;
-      sure = cubes.inside;
+      const blobs::SureCubes sure = blobs::find_sure_cubes(work.leaf, point(leaf_corner(leaf)), kTile / 2, iso_);
+      block.kernel_values += kTileNodes * sure.added;
+      unsigned t = 0;
+      for_bits(own, [&](unsigned tile) {
+        if ((~sure.inside & tiles_of(t++)) == 0) inside |= tiles & Bits{1} << tile;
+      });
     }
-    for_bits(tiles, [&](unsigned tile) {
-      const auto [x, y, z] = coordinates(tile);
-      const Bits cubes = tiles_of(static_cast<unsigned>((x & 1) | (y & 1) << 1 | (z & 1) << 2));
-      if ((~sure & cubes) == 0) inside |= Bits{1} << tile;
-    });
     block.early |= inside;
     set_sign(block, inside, true);
     select_tiles(leaf, tiles & ~inside, work, [&](unsigned tile, Verdict here, const blobs::TileBlobs& reached) {
@@ -481,7 +473,7 @@ class BlobSampler final : public Sampler {
         return;
       }
       const blobs::TileSums sums =
-          blobs::evaluate_tile(work.leaf, reached, point(corner_of(tile)), iso_, sure_, work.changes.room());
+          blobs::evaluate_tile(work.leaf, reached, point(corner_of(tile)), iso_, sure_, work.changes.room(tile));
       block.kernel_values += kTileNodes * sums.added;
       set_sign(block, at, sums.inside == kAll);
       if (sums.added < reached.count()) {
@@ -535,7 +527,7 @@ class BlobSampler final : public Sampler {
         if (here != Verdict::Unknown) return;
         block.kernel_values += kTileNodes * reached.count();
         const blobs::TileSums sums = blobs::evaluate_tile(work.leaf, reached, point(corner_of(tile)), iso_,
-                                                          std::numeric_limits<float>::infinity(), work.changes.room());
+                                                          std::numeric_limits<float>::infinity(), work.changes.room(tile));
         work.changes.make(tile, sums.inside);
       });
     }
@@ -690,7 +682,7 @@ class ViewSampler final : public Sampler {
     const double* value = values.data();
     for_bits(tiles_of(leaf), [&](unsigned tile) {
       Bits inside = 0;
-      float* out = changes.room();
+      float* out = changes.room(tile);
       for (std::size_t i = 0; i < kTileNodes; ++i) {
         out[i] = static_cast<float>(*value++);
         inside |= Bits{out[i] > 0.0F} << i;
