@@ -128,12 +128,12 @@ TEST(PathTracer, LosesNoLightInADeepWhiteBox) {
 }
 
 /// Whether each box of 2^-a x 2^-(m-a) holds one of 2^m points, for every a: a (0, m, 2)-net in base 2.
-bool is_net(const std::vector<Eigen::Vector2f>& points) {
+bool is_net(const std::vector<path::Pair<float>>& points) {
   const int m = static_cast<int>(std::bit_width(points.size())) - 1;
   for (int a = 0; a <= m; ++a) {
     std::set<std::pair<int, int>> boxes;
-    for (const Eigen::Vector2f& u : points)
-      boxes.emplace(static_cast<int>(u.x() * static_cast<float>(1 << a)), static_cast<int>(u.y() * static_cast<float>(1 << (m - a))));
+    for (const auto& [x, y] : points)
+      boxes.emplace(static_cast<int>(x * static_cast<float>(1 << a)), static_cast<int>(y * static_cast<float>(1 << (m - a))));
     if (boxes.size() != points.size()) return false;
   }
   return true;
@@ -141,9 +141,9 @@ bool is_net(const std::vector<Eigen::Vector2f>& points) {
 
 TEST(Sampler, FillsEveryElementaryIntervalOnceByPairs) {
   const auto points = [](int pixel, int dimension, std::uint32_t count) {
-    std::vector<Eigen::Vector2f> all;
+    std::vector<path::Pair<float>> all;
     for (std::uint32_t s = 0; s < count; ++s) {
-      Sampler random(pixel, 7, 3, count, s);
+      Sampler random(static_cast<std::uint32_t>(pixel), 7, 3, count, s);
       for (int d = 0; d < dimension; ++d) static_cast<void>(random.pair());
       all.push_back(random.pair());
     }
@@ -155,12 +155,12 @@ TEST(Sampler, FillsEveryElementaryIntervalOnceByPairs) {
 }
 
 TEST(Sampler, FillsThemByTheSamplesOfSquareBlocksOfPixelsToo) {
-  for (const int across : {1, 2, 4})
-    for (const int left : {0, 4, 252, 256, 700}) {
-      std::vector<Eigen::Vector2f> points;
-      const auto each = static_cast<std::uint32_t>(16 / (across * across));
-      for (int y = 8; y < 8 + across; ++y)
-        for (int x = left; x < left + across; ++x)
+  for (const std::uint32_t across : {1u, 2u, 4u})
+    for (const std::uint32_t left : {0u, 4u, 252u, 256u, 700u}) {
+      std::vector<path::Pair<float>> points;
+      const std::uint32_t each = 16 / (across * across);
+      for (std::uint32_t y = 8; y < 8 + across; ++y)
+        for (std::uint32_t x = left; x < left + across; ++x)
           for (std::uint32_t s = 0; s < each; ++s) points.push_back(Sampler(x, y, 0, each, s).pair());
       EXPECT_TRUE(is_net(points)) << across << ' ' << left;
     }
@@ -647,30 +647,69 @@ TEST(PathTracer, FollowsBundlesAsItFollowsRays) {
   path::Geometry geometry;
   geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
   std::size_t hits_found = 0, shadows = 0;
-  for (int row = 0; row < 40; ++row) {
-    path::RayBundle rays;
-    std::array<float, path::RayBundle::kSize> choice{};
-    for (std::size_t i = 0; i < 1 + static_cast<std::size_t>(row) % path::RayBundle::kSize; ++i) {
-      choice[i] = 0.1F + 0.11F * static_cast<float>(i);
-      rays.add(Vec3f(-0.8F + 0.04F * static_cast<float>(row) + 0.003F * static_cast<float>(i), -3, 0.1F), Vec3f::UnitY(), 0.0F);
+  for (const bool together : {false, true})
+    for (int row = 0; row < 40; ++row) {
+      const std::size_t count = 1 + static_cast<std::size_t>(row) % path::kLanes;
+      path::RayBundle rays{.from = path::Vec3Lanes::Zero(), .direction = path::Vec3Lanes(Vec3f::UnitY()), .time = {},
+                           .who = path::first_lanes(count), .together = together};
+      path::Lanes choice{}, light{};
+      for (std::size_t i = 0; i < path::kLanes; ++i) {
+        choice[i] = 0.1F + 0.11F * static_cast<float>(i);
+        light[i] = i % 2 == 0 ? INFINITY : 2.9F;
+        rays.from.set_lane(i, Vec3f(-0.8F + 0.04F * static_cast<float>(row) + 0.003F * static_cast<float>(i), -3, 0.1F));
+      }
+      std::array<path::Hit, path::kLanes> hits;
+      const path::LaneMask met = geometry.meet(rays, choice, false, hits);
+      const path::LaneMask blocked = geometry.blocked(rays, light);
+      for (std::size_t i = 0; i < count; ++i) {
+        path::Hit alone;
+        EXPECT_EQ(met[i] != 0, geometry.meet(rays.from.lane(i), Vec3f::UnitY(), 0.0F, choice[i], false, alone));
+        EXPECT_EQ(blocked[i] != 0, geometry.blocked(rays.from.lane(i), Vec3f::UnitY(), light[i], 0.0F));
+        shadows += blocked[i] != 0 ? 1 : 0;
+        if (met[i] == 0) continue;
+        ++hits_found;
+        EXPECT_EQ(hits[i].item, alone.item);
+        EXPECT_NEAR(hits[i].distance, alone.distance, 1e-5);
+      }
+      for (std::size_t i = count; i < path::kLanes; ++i) EXPECT_TRUE(met[i] == 0 && blocked[i] == 0);
     }
-    std::array<path::Hit, path::RayBundle::kSize> together;
-    const auto met = geometry.meet(rays, choice, false, together);
-    const auto blocked = geometry.blocked(rays);
-    for (std::size_t i = 0; i < rays.count; ++i) {
-      path::Hit alone;
-      EXPECT_EQ(met[i], geometry.meet(rays.from[i], rays.direction[i], 0.0F, choice[i], false, alone));
-      EXPECT_EQ(blocked[i], geometry.blocked(rays.from[i], rays.direction[i], INFINITY, 0.0F));
-      shadows += blocked[i] ? 1 : 0;
-      if (!met[i]) continue;
-      ++hits_found;
-      EXPECT_EQ(together[i].item, alone.item);
-      EXPECT_NEAR(together[i].distance, alone.distance, 1e-5);
-    }
-    for (std::size_t i = rays.count; i < path::RayBundle::kSize; ++i) EXPECT_FALSE(met[i] || blocked[i]);
+  EXPECT_GT(hits_found, 120u);
+  EXPECT_GT(shadows, 120u);
+}
+
+// Eight rays scatter as one does: round-off of a few operations, where none cancels.
+TEST(Bsdf, IsTheSameForEightRaysAsForOne) {
+  path::BsdfOf<path::Lanes> eight;
+  std::array<Bsdf, path::kLanes> one;
+  path::Vec3Lanes out = path::Vec3Lanes::Zero(), other = path::Vec3Lanes::Zero();
+  path::LaneBits pixel{};
+  for (std::size_t k = 0; k < path::kLanes; ++k) {
+    const auto t = static_cast<float>(k);
+    one[k] = {.diffuse = Vec3f(0.1F * t, 0.3F, 0.7F), .normal_reflectance = Vec3f::Constant(0.05F * t), .grazing_reflectance = k % 3 == 0 ? 0.0F : 1.0F,
+              .alpha = 0.1F + 0.1F * t};
+    eight.diffuse.set_lane(k, one[k].diffuse);
+    eight.normal_reflectance.set_lane(k, one[k].normal_reflectance);
+    eight.grazing_reflectance[k] = one[k].grazing_reflectance;
+    eight.alpha[k] = one[k].alpha;
+    out.set_lane(k, k == 7 ? Vec3f(Vec3f::UnitZ()) : Vec3f(0.3F - 0.1F * t, 0.2F, k == 5 ? -0.4F : 0.9F).normalized());
+    other.set_lane(k, Vec3f(0.5F, 0.1F * t - 0.3F, 0.6F).normalized());
+    pixel[k] = 17 * static_cast<std::uint32_t>(k);
   }
-  EXPECT_GT(hits_found, 60u);
-  EXPECT_GT(shadows, 60u);
+  path::SamplerOf<path::Lanes> random(pixel, pixel + 3u, path::LaneBits{}, path::LaneBits{} + 4u, path::LaneBits{} + 1u);
+  const path::Lanes which = random.number();
+  const path::Vec3Lanes sampled = eight.sample(out, which, random.pair()), light = eight.evaluate(out, other);
+  const path::Lanes density = eight.density(out, other);
+  for (std::size_t k = 0; k < path::kLanes; ++k) {
+    Sampler alone(pixel[k], pixel[k] + 3, 0, 4, 1);
+    const float choice = alone.number();
+    EXPECT_EQ(which[k], choice) << k;
+    EXPECT_NEAR((sampled.lane(k) - one[k].sample(out.lane(k), choice, alone.pair())).norm(), 0.0, 1e-5) << k;
+    const Vec3f expected = one[k].evaluate(out.lane(k), other.lane(k));
+    EXPECT_NEAR((light.lane(k) - expected).norm(), 0.0, 1e-5 * (1.0 + expected.norm())) << k;
+    const float expected_density = one[k].density(out.lane(k), other.lane(k));
+    EXPECT_NEAR(density[k], expected_density, 1e-5 * (1.0 + expected_density)) << k;
+    EXPECT_EQ(density[k] > 0.0F, k != 5) << k;
+  }
 }
 
 TEST(PathTracer, KeepsAndRefitsHierarchies) {

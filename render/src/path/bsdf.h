@@ -9,97 +9,103 @@
 
 namespace supple::render::path {
 
-struct Bsdf {
-  Vec3f diffuse = Vec3f::Constant(0.8F);  ///< albedo of the base
-  Vec3f normal_reflectance = Vec3f::Constant(0.04F);
-  float grazing_reflectance = 1.0F;
-  float alpha = 0.2F;                     ///< width of the lobe, roughness squared
+template <class Number>
+struct BsdfOf {
+  using Vector = typename LaneTypes<Number>::Vector;
+  Vector diffuse = Vector::Constant(constant<Number>(0.8F));  ///< albedo of the base
+  Vector normal_reflectance = Vector::Constant(constant<Number>(0.04F));
+  Number grazing_reflectance = constant<Number>(1.0F);        ///< 0: no lobe
+  Number alpha = constant<Number>(0.2F);                      ///< width of the lobe, roughness squared
 
-  [[nodiscard]] bool has_lobe() const { return grazing_reflectance > 0.0F; }
+  [[nodiscard]] auto has_lobe() const { return grazing_reflectance > 0.0F; }
 
-  [[nodiscard]] Vec3f fresnel(float cosine) const {  // Schlick 1994
-    const float c = std::clamp(1.0F - cosine, 0.0F, 1.0F);
-    const float weight = c * c * c * c * c;
-    return normal_reflectance + weight * (Vec3f::Constant(grazing_reflectance) - normal_reflectance);
+  [[nodiscard]] Vector fresnel(Number cosine) const {  // Schlick 1994
+    const Number c = clamped(1.0F - cosine, 0.0F, 1.0F);
+    const Number weight = c * c * c * c * c;
+    return normal_reflectance + weight * (Vector::Constant(grazing_reflectance) - normal_reflectance);
   }
 
   /// Chance of taking the lobe instead of the base.
-  [[nodiscard]] float lobe_share(const Vec3f& out) const {
-    if (!has_lobe()) return 0.0F;
-    const float lobe = luminance(fresnel(out.z()));
-    const float base = luminance(diffuse);
-    return base > 0.0F ? std::clamp(lobe / (lobe + base), 0.1F, 0.9F) : 1.0F;
+  [[nodiscard]] Number lobe_share(const Vector& out) const {
+    const Number lobe = luminance(fresnel(out.z()));
+    const Number base = luminance(diffuse);
+    const Number share = clamped(lobe / (lobe + base), 0.1F, 0.9F);
+    return select(has_lobe(), select(base > 0.0F, share, 1.0F), 0.0F);
   }
 
   /// f times the cosine of `in`.
-  [[nodiscard]] Vec3f evaluate(const Vec3f& out, const Vec3f& in) const {
-    if (out.z() <= 0.0F || in.z() <= 0.0F) return Vec3f::Zero();
-    Vec3f f = base(out.z(), in.z());
-    if (has_lobe()) {
-      const Vec3f h = (out + in).normalized();
-      f += fresnel(out.dot(h)) * (distribution(h) * masking(out, in) / (4.0F * out.z() * in.z()));
+  [[nodiscard]] Vector evaluate(const Vector& out, const Vector& in) const {
+    Vector f = base(out.z(), in.z());
+    if (any(has_lobe())) {
+      const Vector h = (out + in).normalized();
+      const Number lobe = distribution(h) * masking(out, in) / (4.0F * out.z() * in.z());
+      f += fresnel(out.dot(h)) * select(has_lobe(), lobe, 0.0F);
     }
-    return f * in.z();
+    return select(above(out, in), Vector(f * in.z()), Vector(Vector::Zero()));
   }
 
-  [[nodiscard]] float density(const Vec3f& out, const Vec3f& in) const {
-    if (out.z() <= 0.0F || in.z() <= 0.0F) return 0.0F;
-    const float share = lobe_share(out);
-    float density = (1.0F - share) * in.z() / kPi;
-    if (share > 0.0F) {
-      const Vec3f h = (out + in).normalized();
-      density += share * distribution(h) / ((1.0F + lambda(out)) * 4.0F * out.z());
+  [[nodiscard]] Number density(const Vector& out, const Vector& in) const {
+    const Number share = lobe_share(out);
+    Number density = (1.0F - share) * in.z() * (1.0F / kPi);
+    if (any(has_lobe())) {
+      const Vector h = (out + in).normalized();
+      const Number lobe = share * distribution(h) / ((1.0F + lambda(out)) * 4.0F * out.z());
+      density += select(has_lobe(), lobe, 0.0F);
     }
-    return density;
+    return select(above(out, in), density, 0.0F);
   }
 
   /// A direction, by `density`; below the horizon (z <= 0) now and then.
-  [[nodiscard]] Vec3f sample(const Vec3f& out, float choice, const Eigen::Vector2f& u) const {
-    if (choice >= lobe_share(out)) return cosine_direction(u);
-    const Vec3f h = visible_normal(out, u);
-    return 2.0F * out.dot(h) * h - out;
+  [[nodiscard]] Vector sample(const Vector& out, Number choice, const Pair<Number>& u) const {
+    const Vector from_base = cosine_direction(u);
+    if (!any(has_lobe())) return from_base;
+    const Vector h = visible_normal(out, u);
+    return select(choice < lobe_share(out), Vector(2.0F * out.dot(h) * h - out), from_base);
   }
 
  private:
+  [[nodiscard]] static auto above(const Vector& out, const Vector& in) { return both(out.z() > 0.0F, in.z() > 0.0F); }
   /// Reciprocal, and dark where the lobe reflects (Ashikhmin & Shirley 2000, eq. 5, for any grazing reflectance g: the
   /// factor is 1 / (1 - 5/28 g), 28/23 for theirs).
-  [[nodiscard]] Vec3f base(float cos_out, float cos_in) const {
-    const Vec3f flat = diffuse.cwiseProduct(Vec3f::Ones() - normal_reflectance) * (1.0F / kPi);
-    if (!has_lobe()) return flat;
-    const auto fall = [](float c) {
-      const float s = 1.0F - 0.5F * c;
-      return s * s * s * s * s;
+  [[nodiscard]] Vector base(Number cos_out, Number cos_in) const {
+    const Vector flat = diffuse.cwiseProduct(Vector::Ones() - normal_reflectance) * (1.0F / kPi);
+    if (!any(has_lobe())) return flat;
+    const auto fall = [](Number c) {
+      const Number s = 1.0F - 0.5F * c;
+      return Number(s * s * s * s * s);
     };
-    const float g = grazing_reflectance;
-    const float both = (1.0F - g * fall(cos_out)) * (1.0F - g * fall(cos_in)) / (1.0F - g * 5.0F / 28.0F);
+    const Number g = grazing_reflectance;
+    const Number both = (1.0F - g * fall(cos_out)) * (1.0F - g * fall(cos_in)) / (1.0F - g * (5.0F / 28.0F));
     return flat * both;
   }
-  [[nodiscard]] float distribution(const Vec3f& h) const {  // Trowbridge & Reitz 1975
-    const float a2 = alpha * alpha;
-    const float d = h.z() * h.z() * (a2 - 1.0F) + 1.0F;
+  [[nodiscard]] Number distribution(const Vector& h) const {  // Trowbridge & Reitz 1975
+    const Number a2 = alpha * alpha;
+    const Number d = h.z() * h.z() * (a2 - 1.0F) + 1.0F;
     return a2 / (kPi * d * d);
   }
-  [[nodiscard]] float lambda(const Vec3f& v) const {
-    const float tan2 = (v.x() * v.x() + v.y() * v.y()) / (v.z() * v.z());
-    return 0.5F * (std::sqrt(1.0F + alpha * alpha * tan2) - 1.0F);
+  [[nodiscard]] Number lambda(const Vector& v) const {
+    const Number tan2 = (v.x() * v.x() + v.y() * v.y()) / (v.z() * v.z());
+    return 0.5F * (root(1.0F + alpha * alpha * tan2) - 1.0F);
   }
   /// Height-correlated Smith term (Heitz 2014).
-  [[nodiscard]] float masking(const Vec3f& out, const Vec3f& in) const { return 1.0F / (1.0F + lambda(out) + lambda(in)); }
+  [[nodiscard]] Number masking(const Vector& out, const Vector& in) const { return 1.0F / (1.0F + lambda(out) + lambda(in)); }
 
   /// A normal of the microfacets seen from `out` (Heitz 2018).
-  [[nodiscard]] Vec3f visible_normal(const Vec3f& out, const Eigen::Vector2f& u) const {
-    const Vec3f v = Vec3f(alpha * out.x(), alpha * out.y(), out.z()).normalized();
-    const float across = v.x() * v.x() + v.y() * v.y();
-    const Vec3f t1 = across > 0.0F ? Vec3f(Vec3f(-v.y(), v.x(), 0.0F) / std::sqrt(across)) : Vec3f(Vec3f::UnitX());
-    const Vec3f t2 = v.cross(t1);
-    const float r = std::sqrt(u.x());
-    const float angle = 2.0F * kPi * u.y();
-    const float a = r * std::cos(angle);
-    const float s = 0.5F * (1.0F + v.z());
-    const float b = (1.0F - s) * std::sqrt(std::max(0.0F, 1.0F - a * a)) + s * r * std::sin(angle);
-    const Vec3f n = a * t1 + b * t2 + std::sqrt(std::max(0.0F, 1.0F - a * a - b * b)) * v;
-    return Vec3f(alpha * n.x(), alpha * n.y(), std::max(1e-6F, n.z())).normalized();
+  [[nodiscard]] Vector visible_normal(const Vector& out, const Pair<Number>& u) const {
+    const Vector v = Vector(alpha * out.x(), alpha * out.y(), out.z()).normalized();
+    const Number across = v.x() * v.x() + v.y() * v.y();
+    const Number scale = 1.0F / root(across);
+    const auto tilted = across > 0.0F;
+    const Vector t1(select(tilted, -v.y() * scale, 1.0F), select(tilted, v.x() * scale, 0.0F), Number{});
+    const Vector t2 = v.cross(t1);
+    const Pair<Number> d = on_disc(u);
+    const Number s = 0.5F * (1.0F + v.z());
+    const Number b = (1.0F - s) * root(larger(1.0F - d.x * d.x, 0.0F)) + s * d.y;
+    const Vector n = d.x * t1 + b * t2 + root(larger(1.0F - d.x * d.x - b * b, 0.0F)) * v;
+    return Vector(alpha * n.x(), alpha * n.y(), larger(n.z(), 1e-6F)).normalized();
   }
 };
+/// Of one surface.
+using Bsdf = BsdfOf<float>;
 
 }  // namespace supple::render::path

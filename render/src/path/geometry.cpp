@@ -282,23 +282,23 @@ bool Geometry::blocked(const Vec3f& from, const Vec3f& direction, float distance
 
 namespace {
 
-/// Rays of a bundle in Embree's layout; lanes without a ray are not looked at.
-void fill(const RayBundle& rays, unsigned mask, RTCRay16& to, std::array<int, RayBundle::kSize>& valid) {
-  for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
-    const std::size_t k = i < rays.count ? i : 0;
-    valid[i] = i < rays.count ? -1 : 0;
-    to.org_x[i] = rays.from[k].x();
-    to.org_y[i] = rays.from[k].y();
-    to.org_z[i] = rays.from[k].z();
-    to.dir_x[i] = rays.direction[k].x();
-    to.dir_y[i] = rays.direction[k].y();
-    to.dir_z[i] = rays.direction[k].z();
-    to.time[i] = rays.time[k];
-    to.tnear[i] = kNear;
-    to.tfar[i] = std::numeric_limits<float>::infinity();
-    to.mask[i] = mask;
-    to.id[i] = to.flags[i] = 0;
-  }
+/// In Embree's layout.
+RTCRay8 packet(const RayBundle& rays, Lanes distance, unsigned mask) {
+  RTCRay8 to;
+  const auto put = [](Lanes from, float* at) { _mm256_store_ps(at, from); };
+  put(rays.from.x(), to.org_x);
+  put(rays.from.y(), to.org_y);
+  put(rays.from.z(), to.org_z);
+  put(rays.direction.x(), to.dir_x);
+  put(rays.direction.y(), to.dir_y);
+  put(rays.direction.z(), to.dir_z);
+  put(rays.time, to.time);
+  put(all_lanes(kNear), to.tnear);
+  put(distance, to.tfar);
+  std::fill_n(to.mask, kLanes, mask);
+  std::fill_n(to.id, kLanes, 0u);
+  std::fill_n(to.flags, kLanes, 0u);
+  return to;
 }
 
 RTCIntersectContext coherent() {
@@ -310,32 +310,46 @@ RTCIntersectContext coherent() {
 
 }  // namespace
 
-std::array<bool, RayBundle::kSize> Geometry::meet(const RayBundle& rays, const std::array<float, RayBundle::kSize>& choice, bool exact,
-                                                  std::array<Hit, RayBundle::kSize>& hits) const {
-  RTCRayHit16 bundle;
-  alignas(64) std::array<int, RayBundle::kSize> valid;
-  fill(rays, 1u, bundle.ray, valid);
-  std::fill_n(bundle.hit.geomID, RayBundle::kSize, RTC_INVALID_GEOMETRY_ID);
+std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) const {
+  std::array<Crossing, kLanes> out;
+  if (!rays.together) {
+    for (std::size_t k = 0; k < kLanes; ++k)
+      if (rays.who[k] != 0) out[k] = crossed(rays.from.lane(k), rays.direction.lane(k), rays.time[k], kNear);
+    return out;
+  }
+  RTCRayHit8 bundle;
+  bundle.ray = packet(rays, all_lanes(INFINITY), 1u);
+  std::fill_n(bundle.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
   RTCIntersectContext context = coherent();
-  rtcIntersect16(valid.data(), scene_, &context, &bundle);
-  std::array<bool, RayBundle::kSize> met{};
-  for (std::size_t i = 0; i < rays.count; ++i) {
-    const Crossing crossing{.distance = bundle.ray.tfar[i], .item = bundle.hit.geomID[i], .triangle = bundle.hit.primID[i],
-                            .u = bundle.hit.u[i], .v = bundle.hit.v[i]};
-    met[i] = first_visible(crossing, rays.from[i], rays.direction[i], rays.time[i], choice[i], exact, hits[i]);
+  rtcIntersect8(reinterpret_cast<const int*>(&rays.who), scene_, &context, &bundle);
+  for (std::size_t k = 0; k < kLanes; ++k)
+    out[k] = {.distance = bundle.ray.tfar[k], .item = bundle.hit.geomID[k], .triangle = bundle.hit.primID[k], .u = bundle.hit.u[k], .v = bundle.hit.v[k]};
+  return out;
+}
+
+LaneMask Geometry::meet(const RayBundle& rays, Lanes choice, bool exact, std::array<Hit, kLanes>& hits) const {
+  const std::array<Crossing, kLanes> crossings = crossed(rays);
+  LaneMask met{};
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    if (rays.who[k] == 0 || crossings[k].item == RTC_INVALID_GEOMETRY_ID) continue;
+    if (first_visible(crossings[k], rays.from.lane(k), rays.direction.lane(k), rays.time[k], choice[k], exact, hits[k])) met[k] = -1;
   }
   return met;
 }
 
-std::array<bool, RayBundle::kSize> Geometry::blocked(const RayBundle& rays) const {
-  RTCRay16 bundle;
-  alignas(64) std::array<int, RayBundle::kSize> valid;
-  fill(rays, 2u, bundle, valid);
+LaneMask Geometry::blocked(const RayBundle& rays) const { return blocked(rays, all_lanes(INFINITY)); }
+
+LaneMask Geometry::blocked(const RayBundle& rays, Lanes distance) const {
+  if (!rays.together) {
+    LaneMask out{};
+    for (std::size_t k = 0; k < kLanes; ++k)
+      if (rays.who[k] != 0 && blocked(rays.from.lane(k), rays.direction.lane(k), distance[k], rays.time[k])) out[k] = -1;
+    return out;
+  }
+  RTCRay8 bundle = packet(rays, distance, 2u);
   RTCIntersectContext context = coherent();
-  rtcOccluded16(valid.data(), scene_, &context, &bundle);
-  std::array<bool, RayBundle::kSize> blocked{};
-  for (std::size_t i = 0; i < rays.count; ++i) blocked[i] = bundle.tfar[i] < 0.0F;
-  return blocked;
+  rtcOccluded8(reinterpret_cast<const int*>(&rays.who), scene_, &context, &bundle);
+  return both(rays.who, _mm256_load_ps(bundle.tfar) < 0.0F);
 }
 
 }  // namespace supple::render::path

@@ -25,17 +25,12 @@ struct Hit {
   std::uint32_t item = 0;
 };
 
-/// Rays that start near each other and go the same way, to be followed together; `time` in [0, 1] of the exposure.
+/// Rays that are followed together; `time` in [0, 1] of the exposure.
 struct RayBundle {
-  static constexpr std::size_t kSize = 16;
-  std::size_t count = 0;
-  std::array<Vec3f, kSize> from, direction;
-  std::array<float, kSize> time{};
-  void add(const Vec3f& start, const Vec3f& along, float when) {
-    from[count] = start;
-    direction[count] = along;
-    time[count++] = when;
-  }
+  Vec3Lanes from, direction;
+  Lanes time;
+  LaneMask who;           ///< lanes that hold a ray
+  bool together = false;  ///< they start near each other and go the same way
 };
 
 class Geometry {
@@ -56,9 +51,10 @@ class Geometry {
   [[nodiscard]] bool meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const;
   [[nodiscard]] bool blocked(const Vec3f& from, const Vec3f& direction, float distance, float time) const;
   /// The same for every ray of a bundle; the distance to a light is infinite.
-  [[nodiscard]] std::array<bool, RayBundle::kSize> meet(const RayBundle& rays, const std::array<float, RayBundle::kSize>& choice, bool exact,
-                                                        std::array<Hit, RayBundle::kSize>& hits) const;
-  [[nodiscard]] std::array<bool, RayBundle::kSize> blocked(const RayBundle& rays) const;
+  [[nodiscard]] LaneMask meet(const RayBundle& rays, Lanes choice, bool exact, std::array<Hit, kLanes>& hits) const;
+  [[nodiscard]] LaneMask blocked(const RayBundle& rays) const;
+  /// @param distance  to the light
+  [[nodiscard]] LaneMask blocked(const RayBundle& rays, Lanes distance) const;
 
   /// Hierarchies of the last `set`.
   struct Counts {
@@ -69,6 +65,7 @@ class Geometry {
  private:
   struct Part;
   struct Crossing;
+  [[nodiscard]] std::array<Crossing, kLanes> crossed(const RayBundle& rays) const;
   [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const;
   [[nodiscard]] bool first_visible(Crossing crossing, const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact,
                                    Hit& hit) const;

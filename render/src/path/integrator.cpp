@@ -78,7 +78,7 @@ class Bundler {
   Bundler(const Tracer& tracer, const Take& take) : tracer_(tracer), take_(take) {}
   void add(const Pick& pick) {
     picks_[count_++] = pick;
-    if (count_ == RayBundle::kSize) flush();
+    if (count_ == kLanes) flush();
   }
   void flush() {
     tracer_.sample(std::span(picks_.data(), count_), samples_);
@@ -89,8 +89,8 @@ class Bundler {
  private:
   const Tracer& tracer_;
   Take take_;
-  std::array<Pick, RayBundle::kSize> picks_;
-  std::array<Sample, RayBundle::kSize> samples_;
+  std::array<Pick, kLanes> picks_;
+  std::array<Sample, kLanes> samples_;
   std::size_t count_ = 0;
 };
 

@@ -1,219 +1,249 @@
 #include "tracer.h"
 
-#include <algorithm>
 #include <array>
 
 namespace supple::render::path {
 namespace {
 
-constexpr float kWideLobe = 0.2F;   // from this alpha on, reflections are about as smooth as diffuse light
+constexpr float kWideLobe = 0.2F;  // from this alpha on, reflections are about as smooth as diffuse light
 constexpr float kSharp = 0.5F;     // mirrors whose every camera ray goes on
+
+/// A column of the picks, one a lane.
+template <class Column>
+LaneBits lanes_of(std::span<const Pick> picks, const Column& column) {
+  LaneBits out{};
+  for (std::size_t k = 0; k < picks.size(); ++k) out[k] = column(picks[k]);
+  return out;
+}
+
+Vec3Lanes turn(const Eigen::Matrix3f& m, const Vec3Lanes& v) {
+  return Vec3Lanes(m.col(0)) * v.x() + Vec3Lanes(m.col(1)) * v.y() + Vec3Lanes(m.col(2)) * v.z();
+}
 
 }  // namespace
 
-Ray Tracer::camera_ray(int x, int y, Sampler& random) const {
-  const Eigen::Vector2f jitter = random.pair();
-  const Eigen::Vector2f at((static_cast<float>(x) + jitter.x()) / static_cast<float>(settings_.width),
-                           (static_cast<float>(settings_.height - 1 - y) + jitter.y()) / static_cast<float>(settings_.height));
-  Vec3f local((2.0F * at.x() - 1.0F) * camera_.half_extent.x(), (2.0F * at.y() - 1.0F) * camera_.half_extent.y(), -1.0F);
-  if (settings_.aperture <= 0.0) return {camera_.eye, (to_world_ * local).normalized()};
-  const Eigen::Vector2f lens = on_disc(random.pair()) * static_cast<float>(settings_.aperture);
-  const Vec3f start(lens.x(), lens.y(), 0.0F);
-  local = local * static_cast<float>(settings_.focus) - start;
-  return {camera_.eye + to_world_ * start, (to_world_ * local).normalized()};
+RayBundle Tracer::camera_rays(std::span<const Pick> picks, LaneMask who, Random& random) const {
+  const Lanes x = number_of(lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.x); }));
+  const Lanes y = number_of(lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.y); }));
+  const Pair<Lanes> jitter = random.pair();
+  const Lanes across = (x + jitter.x) * (2.0F / static_cast<float>(settings_.width)) - 1.0F;
+  const Lanes up = (static_cast<float>(settings_.height - 1) - y + jitter.y) * (2.0F / static_cast<float>(settings_.height)) - 1.0F;
+  Vec3Lanes local(across * camera_.half_extent.x(), up * camera_.half_extent.y(), all_lanes(-1.0F));
+  Vec3Lanes start = Vec3Lanes::Zero();
+  if (settings_.aperture > 0.0) {
+    const Pair<Lanes> lens = on_disc(random.pair());
+    start = static_cast<float>(settings_.aperture) * Vec3Lanes(lens.x, lens.y, Lanes{});
+    local = local * static_cast<float>(settings_.focus) - start;
+  }
+  return {.from = Vec3Lanes(camera_.eye) + turn(to_world_, start), .direction = turn(to_world_, local).normalized(),
+          .time = random.number(), .who = who, .together = true};
 }
 
-Tracer::Met Tracer::meet(const Ray& ray, float time, float choice, Place& place, float& distance, std::size_t& light) const {
-  Hit hit;
-  const bool met_surface = geometry_.meet(ray.from, ray.direction, time, choice, settings_.exact, hit);
-  return nearest(ray, met_surface, hit, place, distance, light);
-}
+/// Of the surfaces that rays meet, the ground and the lamps.
+Tracer::Meeting Tracer::meet(const RayBundle& rays, Lanes choice, Places& places) const {
+  std::array<Hit, kLanes> hits;
+  Meeting met{};
+  met.surface = geometry_.meet(rays, choice, settings_.exact, hits);
+  met.distance = all_lanes(INFINITY);
+  for (std::size_t k = 0; k < kLanes; ++k)
+    if (met.surface[k] != 0) met.distance[k] = hits[k].distance;
+  if (ground_) {
+    const Lanes t = (ground_->height - rays.from.z()) / rays.direction.z();
+    const LaneMask below = both(rays.direction.z() < 0.0F, rays.from.z() > ground_->height);
+    met.ground = both(rays.who, both(below, t < met.distance));
+    met.surface = both(met.surface, ~met.ground);
+    met.distance = select(met.ground, t, met.distance);
+  }
+  for (const Rectangle& lamp : lights_.rectangles) {
+    const Lanes t = lamp.distance(rays.from, rays.direction);
+    const LaneMask nearer = both(rays.who, t < met.distance);
+    met.lamp |= nearer;
+    met.distance = select(nearer, t, met.distance);
+    met.radiance = select(nearer, Vec3Lanes(lamp.radiance), met.radiance);
+    const Lanes density = density_of_face(all_lanes(lamp.area()), -rays.direction.dot(Vec3Lanes(lamp.front)), t);
+    met.density = select(nearer, density / static_cast<float>(lights_.rectangles.size()), met.density);
+  }
+  met.surface = both(met.surface, ~met.lamp);
+  met.ground = both(met.ground, ~met.lamp);
 
-/// Of the surface that a ray meets, the ground and the lamps.
-Tracer::Met Tracer::nearest(const Ray& ray, bool met_surface, const Hit& hit, Place& place, float& distance, std::size_t& light) const {
-  Met met = met_surface ? Met::Surface : Met::Nothing;
-  distance = met_surface ? hit.distance : INFINITY;
-  if (ground_ && ray.direction.z() < 0.0F && ray.from.z() > ground_->height) {
-    const float t = (ground_->height - ray.from.z()) / ray.direction.z();
-    if (t < distance) {
-      met = Met::Ground;
-      distance = t;
-    }
+  if (any(met.ground)) {
+    const Vec3Lanes p = rays.from + met.distance * rays.direction;
+    places = {.point = p, .normal = Vec3Lanes(Vec3f::UnitZ()), .leave = Vec3Lanes(p.x(), p.y(), all_lanes(ground_->height + gap_)),
+              .bsdf = {.diffuse = Vec3Lanes(ground_->albedo), .normal_reflectance = Vec3Lanes::Zero(), .grazing_reflectance = Lanes{}, .alpha = all_lanes(1.0F)}};
+    for (std::size_t k = 0; ground_->pattern != nullptr && k < kLanes; ++k)
+      if (met.ground[k] != 0) places.bsdf.diffuse.set_lane(k, ground_->pattern->colour(p.lane(k).head<2>() + ground_->origin));
   }
-  for (std::size_t i = 0; i < lights_.rectangles.size(); ++i) {
-    const float t = lights_.rectangles[i].distance(ray.from, ray.direction);
-    if (t >= distance) continue;
-    met = Met::Light;
-    distance = t;
-    light = i;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    if (met.surface[k] == 0) continue;
+    const Hit& hit = hits[k];
+    places.point.set_lane(k, hit.point);
+    places.normal.set_lane(k, hit.normal);
+    places.leave.set_lane(k, hit.leave + gap_ * hit.face_normal);
+    places.bsdf.diffuse.set_lane(k, hit.bsdf.diffuse);
+    places.bsdf.normal_reflectance.set_lane(k, hit.bsdf.normal_reflectance);
+    places.bsdf.grazing_reflectance[k] = hit.bsdf.grazing_reflectance;
+    places.bsdf.alpha[k] = hit.bsdf.alpha;
   }
-  if (met == Met::Surface) place = {hit.point, hit.normal, hit.leave + gap_ * hit.face_normal, hit.bsdf};
-  if (met == Met::Ground) {
-    const Vec3f p = ray.from + distance * ray.direction;
-    place = {p, Vec3f::UnitZ(), Vec3f(p.x(), p.y(), ground_->height + gap_),
-             {.diffuse = ground_->pattern != nullptr ? ground_->pattern->colour(p.head<2>() + ground_->origin) : ground_->albedo, .normal_reflectance = Vec3f::Zero(), .grazing_reflectance = 0.0F}};
-  }
+  met.surface |= met.ground;
   return met;
 }
 
 /// Into the background with distance and towards the horizon, as in the shaders.
-float Tracer::ground_share(const Vec3f& point) const {
-  if (!ground_->fades) return 1.0F;
-  const auto step = [](float a, float b, float x) {
-    const float t = std::clamp((x - a) / (b - a), 0.0F, 1.0F);
+Lanes Tracer::ground_share(const Vec3Lanes& point) const {
+  if (!ground_->fades) return all_lanes(1.0F);
+  const auto step = [](float a, float b, Lanes x) {
+    const Lanes t = clamped((x - a) * (1.0F / (b - a)), 0.0F, 1.0F);
     return t * t * (3.0F - 2.0F * t);
   };
-  const float away = std::hypot(point.x(), point.y()) / static_cast<float>(camera_.distance);
-  const float down = (camera_.eye.z() - point.z()) / (camera_.eye - point).norm();
+  const Lanes away = root(point.x() * point.x() + point.y() * point.y()) * (1.0F / static_cast<float>(camera_.distance));
+  const Lanes down = (camera_.eye.z() - point.z()) / (Vec3Lanes(camera_.eye) - point).norm();
   return (1.0F - step(0.7F, 3.2F, away)) * step(0.02F, 0.22F, down);
 }
 
-/// What comes from the sun along `direction` unless something is in the way.
-Vec3f Tracer::sunlight(const Place& place, const Axes& axes, const Vec3f& out, Sampler& random, Vec3f& direction) const {
+/// What comes from the sun unless something is in the way.
+Tracer::Light Tracer::sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const {
   const Sun& sun = lights_.sun;
-  const Eigen::Vector2f u = random.pair();
-  if (!sun.shines()) return Vec3f::Zero();
-  direction = sun.is_point() ? sun.to_light : sun_axes_.to_world(sun.sample(u));
-  const Vec3f in = axes.to_local(direction);
-  const Vec3f f = place.bsdf.evaluate(out, in);
-  if (f.maxCoeff() <= 0.0F) return Vec3f::Zero();
-  if (sun.is_point()) return f.cwiseProduct(sun.irradiance);
-  return f.cwiseProduct(sun_radiance_) * (power_share(sun_density_, place.bsdf.density(out, in)) / sun_density_);
+  const Pair<Lanes> u = random.pair();
+  if (!sun.shines()) return {.light = Vec3Lanes::Zero(), .direction = Vec3Lanes::Zero()};
+  const Vec3Lanes direction = sun.is_point() ? Vec3Lanes(sun.to_light) : sun_axes_.to_world(sun.sample(u));
+  const Vec3Lanes in = axes.to_local(direction);
+  const Vec3Lanes f = places.bsdf.evaluate(out, in);
+  if (sun.is_point()) return {.light = f.cwiseProduct(Vec3Lanes(sun.irradiance)), .direction = direction};
+  const Lanes share = power_share(all_lanes(sun_density_), places.bsdf.density(out, in));
+  return {.light = f.cwiseProduct(sun_radiance_) * (share * (1.0F / sun_density_)), .direction = direction};
 }
 
 /// What comes from one of the rectangles.
-Vec3f Tracer::lamplight(const Place& place, const Axes& axes, const Vec3f& out, float time, Sampler& random) const {
-  if (lights_.rectangles.empty()) return Vec3f::Zero();
-  const Eigen::Vector2f which = random.pair();
-  const Eigen::Vector2f at = random.pair();
+Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, Random& random) const {
+  if (lights_.rectangles.empty()) return Vec3Lanes::Zero();
+  const Lanes which = random.number();
+  const Pair<Lanes> at = random.pair();
   const auto count = static_cast<float>(lights_.rectangles.size());
-  const Rectangle& light = lights_.rectangles[std::min(static_cast<std::size_t>(which.x() * count), lights_.rectangles.size() - 1)];
-  const Vec3f to = light.centre + (2.0F * at.x() - 1.0F) * light.u + (2.0F * at.y() - 1.0F) * light.v - place.leave;
-  const float distance = to.norm();
-  const Vec3f direction = to / distance;
-  if (direction.dot(light.front) >= 0.0F) return Vec3f::Zero();
-  const Vec3f in = axes.to_local(direction);
-  const Vec3f f = place.bsdf.evaluate(out, in);
-  if (f.maxCoeff() <= 0.0F || geometry_.blocked(place.leave, direction, distance * 0.9999F, time)) return Vec3f::Zero();
-  const float density = light.density(distance, direction) / count;
-  return f.cwiseProduct(light.radiance) * (power_share(density, place.bsdf.density(out, in)) / density);
+  Vec3Lanes to = Vec3Lanes::Zero(), front = to, radiance = to;
+  Lanes area{};
+  for (std::size_t i = 0; i < lights_.rectangles.size(); ++i) {  // the last one that begins before `which` stays
+    const Rectangle& lamp = lights_.rectangles[i];
+    const LaneMask mine = which * count >= static_cast<float>(i);
+    const Vec3Lanes point = Vec3Lanes(lamp.centre) + (2.0F * at.x - 1.0F) * Vec3Lanes(lamp.u) + (2.0F * at.y - 1.0F) * Vec3Lanes(lamp.v);
+    to = select(mine, point - places.leave, to);
+    front = select(mine, Vec3Lanes(lamp.front), front);
+    radiance = select(mine, Vec3Lanes(lamp.radiance), radiance);
+    area = select(mine, all_lanes(lamp.area()), area);
+  }
+  const Lanes distance = to.norm();
+  const Vec3Lanes direction = to / distance;
+  const Lanes facing = -direction.dot(front);
+  const Vec3Lanes in = axes.to_local(direction);
+  const Vec3Lanes f = places.bsdf.evaluate(out, in);
+  const LaneMask lit = both(who, both(facing > 0.0F, f.maxCoeff() > 0.0F));
+  if (!any(lit)) return Vec3Lanes::Zero();
+  const LaneMask blocked = geometry_.blocked({.from = places.leave, .direction = direction, .time = time, .who = lit}, distance * 0.9999F);
+  const Lanes density = density_of_face(area, facing, distance) / count;
+  const Vec3Lanes light = f.cwiseProduct(radiance) * (power_share(density, places.bsdf.density(out, in)) / density);
+  return select(both(lit, ~blocked), light, Vec3Lanes::Zero());
 }
 
-/// What comes to a surface from the sky and from other surfaces.
-Vec3f Tracer::indirect(Place place, const Ray& camera_ray, float time, Sampler& random, float& nearness) const {
-  Vec3f sum = Vec3f::Zero();
-  Vec3f weight = Vec3f::Ones();
-  Ray ray = camera_ray;
-  for (int bounce = 1; bounce <= settings_.bounces; ++bounce) {
-    const Axes axes(place.normal);
-    const Vec3f away = axes.to_local(-ray.direction);
-    if (away.z() <= 0.0F) return sum;
-    const float which = random.number();
-    const Vec3f in = place.bsdf.sample(away, which, random.pair());
-    const float density = place.bsdf.density(away, in);
-    if (!(density > 0.0F)) return sum;
-    weight = weight.cwiseProduct(place.bsdf.evaluate(away, in) / density);
-    if (bounce > 1) {  // Russian roulette (Arvo & Kirk 1990)
-      const float stay = std::min(0.95F, weight.maxCoeff());
-      if (!(random.number() < stay)) return sum;
-      weight /= stay;
-    }
-    ray = {place.leave, axes.to_world(in)};
+/// Light that comes straight from sun and rectangles.
+Vec3Lanes Tracer::direct(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, bool together,
+                         Random& random) const {
+  const Light sunny = sunlight(places, axes, out, random);
+  const LaneMask lit = both(who, sunny.light.maxCoeff() > 0.0F);
+  LaneMask shadowed{};
+  if (any(lit)) shadowed = geometry_.blocked({.from = places.leave, .direction = sunny.direction, .time = time, .who = lit, .together = together});
+  return select(both(lit, ~shadowed), sunny.light, Vec3Lanes::Zero()) + lamplight(places, axes, out, who, time, random);
+}
 
-    const auto add = [&](const Vec3f& light) {
-      const Vec3f more = weight.cwiseProduct(light);
-      sum += more * std::min(1.0F, settings_.largest_indirect / std::max(luminance(more), 1e-30F));
+/// What comes to surfaces from the sky and from other surfaces.
+Vec3Lanes Tracer::indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const {
+  Vec3Lanes sum = Vec3Lanes::Zero();
+  Vec3Lanes weight = Vec3Lanes::Ones();
+  RayBundle rays = camera_rays;
+  rays.together = false;
+  for (int bounce = 1; bounce <= settings_.bounces; ++bounce) {
+    const Axes axes(places.normal);
+    const Vec3Lanes away = axes.to_local(-rays.direction);
+    const Lanes which = random.number();
+    const Vec3Lanes in = places.bsdf.sample(away, which, random.pair());
+    const Lanes density = places.bsdf.density(away, in);
+    rays.who = both(rays.who, density > 0.0F);
+    weight = weight.cwiseProduct(places.bsdf.evaluate(away, in)) / density;
+    if (bounce > 1) {  // Russian roulette (Arvo & Kirk 1990)
+      const Lanes stay = smaller(weight.maxCoeff(), 0.95F);
+      rays.who = both(rays.who, random.number() < stay);
+      weight = weight / stay;
+    }
+    if (!any(rays.who)) break;
+    rays.from = places.leave;
+    rays.direction = axes.to_world(in);
+
+    const auto add = [&](LaneMask who, const Vec3Lanes& light) {
+      const Vec3Lanes more = weight.cwiseProduct(light);
+      const Lanes bound = smaller(settings_.largest_indirect / larger(luminance(more), 1e-30F), 1.0F);
+      sum += select(who, more * bound, Vec3Lanes::Zero());
     };
-    float distance = 0.0F;
-    std::size_t light = 0;
-    const float choice = random.number();
-    const Met met = meet(ray, time, choice, place, distance, light);
-    if (met == Met::Nothing) {
-      add(lights_.sky(ray.direction));
-      const Sun& sun = lights_.sun;
-      if (sun.shines() && sun.contains(ray.direction)) add(sun_radiance_ * power_share(density, sun_density_));
-      return sum;
-    }
-    if (met == Met::Light) {
-      const Rectangle& shape = lights_.rectangles[light];
-      const float other = shape.density(distance, ray.direction) / static_cast<float>(lights_.rectangles.size());
-      add(shape.radiance * power_share(density, other));
-      return sum;
-    }
-    if (bounce == 1) nearness = 1.0F / std::max(distance, gap_);
-    const Axes there(place.normal);
-    const Vec3f back = there.to_local(-ray.direction);
-    if (back.z() <= 0.0F) return sum;
-    Vec3f to_sun;
-    const Vec3f sunny = sunlight(place, there, back, random, to_sun);
-    const bool lit = sunny.maxCoeff() > 0.0F && !geometry_.blocked(place.leave, to_sun, INFINITY, time);
-    add((lit ? sunny : Vec3f(Vec3f::Zero())) + lamplight(place, there, back, time, random));
+    const Lanes choice = random.number();
+    const Meeting met = meet(rays, choice, places);
+    const LaneMask outside = both(rays.who, ~(met.surface | met.lamp));
+    const LaneMask sunny = both(outside, lights_.sun.contains(rays.direction));
+    add(outside, lights_.sky(rays.direction));
+    if (any(sunny)) add(sunny, sun_radiance_ * power_share(density, all_lanes(sun_density_)));
+    if (any(met.lamp)) add(met.lamp, met.radiance * power_share(density, met.density));
+    rays.who = met.surface;
+    if (bounce == 1) nearness = select(met.surface, 1.0F / larger(met.distance, gap_), 0.0F);
+
+    const Axes there(places.normal);
+    const Vec3Lanes back = there.to_local(-rays.direction);
+    rays.who = both(rays.who, back.z() > 0.0F);
+    if (!any(rays.who)) break;
+    add(rays.who, direct(places, there, back, rays.who, rays.time, false, random));
   }
   return sum;
 }
 
 void Tracer::sample(std::span<const Pick> picks, std::span<Sample> out) const {
-  constexpr std::size_t kSize = RayBundle::kSize;
-  std::array<Sampler, kSize> random;
-  std::array<Ray, kSize> ray;
-  std::array<Place, kSize> place;
-  std::array<float, kSize> choice{};
-  RayBundle looks;
-  for (std::size_t i = 0; i < picks.size(); ++i) {
-    const Pick& pick = picks[i];
-    random[i] = Sampler(pick.x, pick.y, pick.stream, pick.count, pick.number);
-    ray[i] = camera_ray(pick.x, pick.y, random[i]);
-    looks.add(ray[i].from, ray[i].direction, random[i].number());
-    choice[i] = random[i].number();
-  }
-  std::array<Hit, kSize> hits;
-  const std::array<bool, kSize> met = geometry_.meet(looks, choice, settings_.exact, hits);
+  const LaneMask who = first_lanes(picks.size());
+  const LaneBits x = lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.x); });
+  const LaneBits y = lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.y); });
+  const LaneBits stream = lanes_of(picks, [](const Pick& p) { return p.stream; });
+  Random random(x, y, stream, lanes_of(picks, [](const Pick& p) { return p.count; }), lanes_of(picks, [](const Pick& p) { return p.number; }));
+  const RayBundle rays = camera_rays(picks, who, random);
+  Places places{};
+  const Meeting met = meet(rays, random.number(), places);
 
-  RayBundle to_sun;
-  std::array<std::size_t, kSize> of_ray{};  // to the sun: its sample
-  std::array<Vec3f, kSize> sunny;
-  std::array<bool, kSize> goes_on{};
-  for (std::size_t i = 0; i < picks.size(); ++i) {
-    out[i] = {};
-    out[i].weight = static_cast<float>(picks[i].share);
-    float distance = 0.0F;
-    std::size_t light = 0;
-    const Met what = nearest(ray[i], met[i], hits[i], place[i], distance, light);
-    if (what == Met::Nothing) continue;
-    Facet& facet = out[i].facet;
-    facet.cover = what == Met::Ground ? ground_share(place[i].point) : 1.0F;
-    if (what == Met::Light) {
-      out[i].direct = lights_.rectangles[light].radiance;
-      continue;
-    }
-    facet.albedo = place[i].bsdf.diffuse + place[i].bsdf.normal_reflectance;
-    facet.normal = place[i].normal;
-    facet.position = place[i].point;
-    out[i].mirror = place[i].bsdf.has_lobe() ? std::max(0.0F, 1.0F - place[i].bsdf.alpha / kWideLobe) : 0.0F;
-    const Axes axes(place[i].normal);
-    const Vec3f away = axes.to_local(-ray[i].direction);
-    if (facet.cover <= 0.0F || away.z() <= 0.0F) continue;
-    if (picks[i].sees_mirrors && out[i].mirror > kSharp) out[i].weight = 1.0F;
-    goes_on[i] = out[i].weight > 0.0F;
-    Vec3f direction;
-    sunny[i] = sunlight(place[i], axes, away, random[i], direction);
-    if (sunny[i].maxCoeff() > 0.0F) {
-      of_ray[to_sun.count] = i;
-      to_sun.add(place[i].leave, direction, looks.time[i]);
-    }
-    out[i].direct = lamplight(place[i], axes, away, looks.time[i], random[i]);
+  const Lanes cover = select(met.surface, select(met.ground, ground_ ? ground_share(places.point) : Lanes{}, 1.0F), select(met.lamp, all_lanes(1.0F), 0.0F));
+  const BsdfOf<Lanes>& bsdf = places.bsdf;
+  const Vec3Lanes albedo = bsdf.diffuse + bsdf.normal_reflectance;
+  const Lanes mirror = select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F);
+  const Axes axes(places.normal);
+  const Vec3Lanes away = axes.to_local(-rays.direction);
+  const LaneMask lit = both(met.surface, both(cover > 0.0F, away.z() > 0.0F));
+  const Vec3Lanes bright = direct(places, axes, away, lit, rays.time, true, random);
+  for (std::size_t k = 0; k < picks.size(); ++k) {
+    out[k] = {};
+    out[k].weight = static_cast<float>(picks[k].share);
+    if (lit[k] != 0 && picks[k].sees_mirrors && mirror[k] > kSharp) out[k].weight = 1.0F;
+    out[k].facet.cover = cover[k];
+    out[k].direct = met.lamp[k] != 0 ? met.radiance.lane(k) : bright.lane(k);
+    if (met.surface[k] == 0) continue;
+    out[k].facet = {.cover = cover[k], .albedo = albedo.lane(k), .normal = places.normal.lane(k), .position = places.point.lane(k)};
+    out[k].mirror = mirror[k];
   }
-  if (to_sun.count > 0) {
-    const std::array<bool, kSize> blocked = geometry_.blocked(to_sun);
-    for (std::size_t k = 0; k < to_sun.count; ++k)
-      if (!blocked[k]) out[of_ray[k]].direct += sunny[of_ray[k]];
+
+  RayBundle paths = rays;
+  LaneBits count{}, number{};
+  for (std::size_t k = 0; k < picks.size(); ++k) {
+    const auto share = std::max(1u, static_cast<std::uint32_t>(out[k].weight));
+    count[k] = picks[k].count / share;
+    number[k] = picks[k].number / share;
+    if (lit[k] == 0 || !(out[k].weight > 0.0F)) paths.who[k] = 0;
   }
-  for (std::size_t i = 0; i < picks.size(); ++i) {
-    if (!goes_on[i]) continue;
-    const Pick& pick = picks[i];
-    const auto share = static_cast<std::uint32_t>(out[i].weight);
-    Sampler further(pick.x, pick.y, pick.stream + 1, pick.count / share, pick.number / share);
-    out[i].indirect = indirect(place[i], ray[i], looks.time[i], further, out[i].nearness);
+  if (!any(paths.who)) return;
+  Random further(x, y, stream + 1u, count, number);
+  Lanes nearness{};
+  const Vec3Lanes indirect_light = indirect(places, paths, further, nearness);
+  for (std::size_t k = 0; k < picks.size(); ++k) {
+    out[k].indirect = indirect_light.lane(k);
+    out[k].nearness = nearness[k];
   }
 }
 

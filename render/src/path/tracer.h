@@ -1,5 +1,5 @@
 /// @file tracer.h
-/// One camera ray after the other: what it meets, the light of sun and rectangles there, and a path further on.
+/// Eight camera rays at once: what they meet, the light of sun and rectangles there, and paths further on.
 #pragma once
 
 #include <optional>
@@ -62,38 +62,46 @@ struct Sample {
   Facet facet;
 };
 
-struct Ray {
-  Vec3f from;
-  Vec3f direction;
-};
-
 class Tracer {
  public:
   Tracer(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
          const TraceSettings& settings)
       : geometry_(geometry), lights_(lights), ground_(ground), camera_(camera), settings_(settings),
-        to_world_(camera.view.block<3, 3>(0, 0).transpose()), sun_axes_(lights.sun.to_light), sun_radiance_(lights.sun.radiance()),
-        sun_density_(1.0F / lights.sun.solid_angle()), gap_(2e-5F * static_cast<float>(camera.distance)) {}
+        to_world_(camera.view.block<3, 3>(0, 0).transpose()), sun_axes_(Vec3Lanes(lights.sun.to_light)),
+        sun_radiance_(lights.sun.radiance()), sun_density_(1.0F / lights.sun.solid_angle()),
+        gap_(2e-5F * static_cast<float>(camera.distance)) {}
 
-  /// Of a bundle of at most RayBundle::kSize neighbouring picks.
+  /// Of at most kLanes neighbouring picks.
   void sample(std::span<const Pick> picks, std::span<Sample> out) const;
 
  private:
-  struct Place {
-    Vec3f point;
-    Vec3f normal;
-    Vec3f leave;
-    Bsdf bsdf;
+  using Random = SamplerOf<Lanes>;
+  using Axes = AxesOf<Lanes>;
+  struct Places {
+    Vec3Lanes point, normal, leave;
+    BsdfOf<Lanes> bsdf;
   };
-  enum class Met : std::uint8_t { Nothing, Surface, Ground, Light };
+  /// What rays meet first.
+  struct Meeting {
+    LaneMask surface;  ///< of an item or the ground; its place is known
+    LaneMask ground;
+    LaneMask lamp;
+    Lanes distance;
+    Vec3Lanes radiance;  ///< of the lamp
+    Lanes density;       ///< over solid angle, with which lamplight() takes that direction
+  };
+  struct Light {
+    Vec3Lanes light;
+    Vec3Lanes direction;  ///< it comes from
+  };
 
-  [[nodiscard]] Ray camera_ray(int x, int y, Sampler& random) const;
-  [[nodiscard]] Met meet(const Ray& ray, float time, float choice, Place& place, float& distance, std::size_t& light) const;
-  [[nodiscard]] Met nearest(const Ray& ray, bool met_surface, const Hit& hit, Place& place, float& distance, std::size_t& light) const;
-  [[nodiscard]] Vec3f sunlight(const Place& place, const Axes& axes, const Vec3f& out, Sampler& random, Vec3f& direction) const;
-  [[nodiscard]] Vec3f lamplight(const Place& place, const Axes& axes, const Vec3f& out, float time, Sampler& random) const;
-  [[nodiscard]] Vec3f indirect(Place place, const Ray& camera_ray, float time, Sampler& random, float& nearness) const;
-  [[nodiscard]] float ground_share(const Vec3f& point) const;
+  [[nodiscard]] RayBundle camera_rays(std::span<const Pick> picks, LaneMask who, Random& random) const;
+  [[nodiscard]] Meeting meet(const RayBundle& rays, Lanes choice, Places& places) const;
+  [[nodiscard]] Light sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const;
+  [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, Random& random) const;
+  [[nodiscard]] Vec3Lanes direct(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, bool together, Random& random) const;
+  [[nodiscard]] Vec3Lanes indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const;
+  [[nodiscard]] Lanes ground_share(const Vec3Lanes& point) const;
 
   const Geometry& geometry_;
   const Lights& lights_;
@@ -102,7 +110,7 @@ class Tracer {
   const TraceSettings& settings_;
   Eigen::Matrix3f to_world_;
   Axes sun_axes_;
-  Vec3f sun_radiance_;   // infinite for a point, as is the density of its directions; neither is asked for then
+  Vec3Lanes sun_radiance_;  // infinite for a point, as is the density of its directions; neither is asked for then
   float sun_density_;
   float gap_;  // between a surface and the paths that leave it [m]
 };
