@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -57,11 +58,18 @@ class PairPressure {
     evaluations_ += points.size();
   }
 
-  /// Appends where derivatives of either pressure jump, as far as the fields tell.
-  void kinks(const Box& box, std::vector<implicit::Kink>& out) const {
+  /// Appends where derivatives of either pressure jump, as far as the fields tell. @return whether these are all
+  bool kinks(const Box& box, std::vector<implicit::Kink>& out) const {
+    bool all = true;
     for (const implicit::FieldView& view : field_) {
-      if (const implicit::Field* field = view.as_field()) kinks_of(*field, box, out);
+      if (const implicit::Field* field = view.as_field()) {
+        all = kinks_of(*field, box, out) && all;
+      } else {
+        const std::optional<implicit::CorePoint> core = view.core_point(box.centre());
+        all = all && core && core->round;
+      }
     }
+    return all;
   }
 
   [[nodiscard]] double modulus(int side) const noexcept { return modulus_[side]; }

@@ -18,6 +18,7 @@ struct PatchSums {
   Vec3 first = Vec3::Zero();    ///< integral of (x - reference) p dA [N m]
   double load = 0.0;            ///< integral of p dA [N]
   double area = 0.0;            ///< [m^2]
+  double spread = 0.0;          ///< integral of |x - reference|^2 p dA [N m^2]
 
   void add(const Vec3& from_reference, const Vec3& normal, double weight, double pressure) {
     const Vec3 f = (weight * pressure) * normal;
@@ -26,6 +27,7 @@ struct PatchSums {
     first += (weight * pressure) * from_reference;
     load += weight * pressure;
     area += weight;
+    spread += weight * pressure * from_reference.squaredNorm();
   }
   void add(const PatchSums& other) {
     force += other.force;
@@ -33,6 +35,7 @@ struct PatchSums {
     first += other.first;
     load += other.load;
     area += other.area;
+    spread += other.spread;
   }
   [[nodiscard]] Vec3 centre() const { return load > 0.0 ? Vec3(first / load) : Vec3::Zero().eval(); }
 };

@@ -14,6 +14,7 @@ constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so t
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
+constexpr double kEnough = 0.9;          // leaves room for Newton's method
 constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
 constexpr double kSafetyAtFirst = 2.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr int kRimSteps = 30;
@@ -21,6 +22,23 @@ constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
 constexpr int kEndSteps = 14;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+/// What rule r is off by at most where no kink is near. Its difference from rule r - 1 says so: both converge exponentially, the
+/// faster the less they differ and the less the rim moved, over its radius, from where the angles of rule r - 1 put it. The forces
+/// of both may agree by chance, as their errors change sign with depth; then the spread of the pressure, which converges later,
+/// does not.
+double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums& coarse, double moved) {
+  const double spread = std::abs(fine.spread - coarse.spread) / fine.spread;
+  const double later = r == 1 ? 60.0 : r == 2 ? 25.0 : 10.0;
+  const double difference = std::max(relative_difference(fine, coarse), spread / later), root = std::sqrt(difference);
+  // At least 1.3 times the errors of 20,000 patches between ellipsoids, capsules, discs, boxes and blobs, however eccentric and deep.
+  switch (r) {
+    case 1: return difference * (0.05 + 20.0 * difference + (25.0 + 3600.0 * moved) * moved);
+    case 2: return difference * (0.1 + 10.0 * root + 20.0 * moved);
+    case 3: return difference * (0.01 + 5.0 * root + 60.0 * moved);
+    default: return difference * (0.02 + 30.0 * root + 200.0 * moved);
+  }
+}
 
 }  // namespace
 
@@ -51,6 +69,14 @@ void PolarRuleSolver::start_rim(const PolarRule& rule, bool first) {
     rim_.radius[k] = radius;
     rim_.height[k] = height;
   }
+  start_radius_ = rim_.radius;
+}
+
+/// The largest share of a radius by which the rim is off where `start_rim` put it.
+double PolarRuleSolver::rim_moved() const {
+  double moved = 0.0;
+  for (std::size_t k = 0; k < rim_.size(); ++k) moved = std::max(moved, std::abs(start_radius_[k] / rim_.radius[k] - 1.0));
+  return moved;
 }
 
 bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error) {
@@ -349,21 +375,32 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   const std::span<const PolarRule> rules = polar_rules();
   const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
-  const std::size_t first = std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
+  const auto first_of = [&](bool smooth) {
+    if (smooth) return std::min<std::size_t>(error < 1e-7 ? 2 : error < 1e-3 ? 1 : 0, last - 1);
+    return std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
+  };
   const bool parts = error < kSplitBelow || !third_.empty();
   bool parted = false;
   parted_ = 0;
   kinks_.clear();
+  bool smooth = error < kSplitBelow && third_.empty() && no_kinks_near(pressure);
+  std::size_t first = first_of(smooth);
   for (std::size_t r = first; r <= last; ++r) {
     const PolarRule& rule = round ? polar_rays()[r] : rules[r];
     start_rim(rule, r == first);
     if (!solve_rim(pressure, rim_, error)) return false;
+    if (smooth && std::any_of(rim_batch_.point.begin(), rim_batch_.point.end(), [this](const Vec3& x) { return !smooth_.contains(x); })) {
+      smooth = false;
+      first = first_of(false);
+      r = first - 1;
+      continue;
+    }
     place_nodes(rule);
     if (!solve_heights(pressure, error)) return false;
     coarse_ = fine_;
     if (!integrate()) return false;
     if (round) keep_along_axis(fine_);
-    if (r == first && error < kSplitBelow) find_kinks(pressure);
+    if (!smooth && r == first && error < kSplitBelow) find_kinks(pressure);
     if (round && !kinks_.empty()) {
       round = false;
       r = first - 1;
@@ -386,9 +423,10 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
       continue;
     }
     if (r == first) continue;
-    const double difference = (r == 1 ? kSafetyAtFirst : kSafety) * relative_difference(fine_, coarse_) +
-                              (r == 1 ? kUnseenAtFirst : r == 2 ? kUnseen : 0.0);
-    if (difference > error && r < last) continue;
+    const double difference = smooth   ? error_where_smooth(r, fine_, coarse_, rim_moved())
+                              : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
+                                       : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
+    if (difference > kEnough * error && r < last) continue;
     estimate_ = difference + algebraic_error();
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     if (round) turn(rules[r - 1], columns[0] || columns[1]);

@@ -63,6 +63,7 @@ class PolarRuleSolver {
   bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                         const std::array<bool, 2>& columns, bool round, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
+  [[nodiscard]] double rim_moved() const;
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
@@ -92,6 +93,7 @@ class PolarRuleSolver {
     double left, right;     // it lies between these
     bool good;
   };
+  bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross();
   [[nodiscard]] bool taken_by_thirds();
@@ -151,7 +153,7 @@ class PolarRuleSolver {
   double jacobian_ = 0.0;  // |u| |v|
   double extent_ = 0.0;
   Rays rim_;
-  std::vector<double> coarse_radius_, coarse_height_;
+  std::vector<double> coarse_radius_, coarse_height_, start_radius_;
   std::vector<double> low_, high_;
   std::vector<std::uint8_t> done_;
   PressureBatch rim_batch_, node_;
@@ -173,6 +175,7 @@ class PolarRuleSolver {
   std::vector<int> thirds_seen_;        // 1: pressing harder than the pair somewhere, 2: not so somewhere
   std::uint32_t parted_ = 0;
   std::vector<implicit::Kink> kinks_;
+  Box smooth_;                         // no kink is in it
   std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
   std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height

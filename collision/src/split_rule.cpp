@@ -61,6 +61,24 @@ double difference_for(double error, bool fine, double least) {
 
 }  // namespace
 
+/// Whether there are certainly none where the rim may be, which is kept in `smooth_`.
+bool PolarRuleSolver::no_kinks_near(PairPressure& pressure) {
+  constexpr double kReach = 1.5;  // of the rim, over what the curvature of the pressure says
+  const double square = 2.0 * kReach * kReach * frame_.peak;
+  const double height = std::abs(frame_.height_uu) + 2.0 * std::abs(frame_.height_uv) + std::abs(frame_.height_vv);
+  const Vec3 across = (square * (frame_.u.cwiseAbs2() + frame_.v.cwiseAbs2())).cwiseSqrt();
+  const Vec3 half = across + 0.5 * square * height * frame_.axis.cwiseAbs();
+  smooth_ = {frame_.origin - half, frame_.origin + half};
+  kinks_.clear();
+  const bool known = pressure.kinks(smooth_, kinks_);
+  const double reach = half.norm();
+  const bool near = std::any_of(kinks_.begin(), kinks_.end(), [&](const implicit::Kink& kink) {
+    return std::abs(kink.value(frame_.origin)) <= kink.change(frame_.origin, reach);
+  });
+  kinks_.clear();
+  return known && !near;
+}
+
 void PolarRuleSolver::find_kinks(PairPressure& pressure) {
   kinks_.clear();
   Box box;

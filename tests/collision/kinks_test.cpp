@@ -273,5 +273,27 @@ TEST(SplitRule, IsLeftAloneWhereNoKinkCrosses) {
   EXPECT_EQ(s.summary[0].kinks, 0u);
 }
 
+TEST(SmoothPatches, AreNotVouchedForByForcesThatAgreeByChance) {
+  // The force by 4 radii crosses that by 6 where a linear ball overlaps a plane a hundred times as stiff by 0.300 of its radius.
+  // At pressure p the ball is one of radius 1 - p, the plane has come up by p / k: F = pi integral of (1 - p)^2 - (h + p / k)^2 dp.
+  constexpr double k = 100.0, kModulus = 2.0;
+  const Body ball({make(ShapeKind::Point, Vec3::Zero(), Kernel::gascuel(1.0, 1.5, 0.5))});
+  const auto cube = [](double x) { return x * x * x; };
+  for (int i = 0; i <= 200; ++i) {
+    const double h = 0.71 - 1e-4 * i, most = (1.0 - h) / (1.0 + 1.0 / k);
+    const double force = std::numbers::pi / 3.0 * (1.0 - cube(1.0 - most) - k * (cube(h + most / k) - cube(h)));
+    const implicit::HalfSpace plane{-h * Vec3::UnitZ(), Vec3::UnitZ(), 1.0};
+    Stage stage;
+    stage.add(ball.field, {Vec3::Zero()}, kModulus);
+    stage.add(plane, {Vec3::Zero()}, k);
+    for (const double error : {1e-3, 1e-6, 1e-10}) {
+      const ContactSurface::Summary s = stage.solve({.error = error, .energy = false}).summary.at(0);
+      EXPECT_LE(s.error_estimate, error);
+      EXPECT_LE(std::abs(s.force.z() - force), (s.error_estimate + 1e-12) * force)  // round-off of cubes, times k
+          << h << ' ' << error;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace supple::collision
