@@ -6,11 +6,67 @@
 /// of its facets from neighbours on the same surface.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <vector>
+
 #include "integrator.h"
+#include "plane.h"
 
 namespace supple::render::path {
 
-/// Replaces film.radiance. @param footprint  of a pixel at unit distance  @param eye  relative to the origin
-void denoise(int width, int height, const Vec3f& eye, float footprint, const Executor& executor, Film& film);
+struct Neighbours;  // of a pixel, in denoise.cpp
+
+class Denoiser {
+ public:
+  /// Replaces film.radiance. @param footprint  of a pixel at unit distance  @param eye  relative to the origin
+  void run(int width, int height, const Vec3f& eye, float footprint, const Executor& executor, Film& film);
+
+ private:
+  struct Features {
+    Plane nx, ny, nz, px, py, pz, cover;
+    Plane shown;     ///< 1 where there is a surface, else 0
+    Plane share;     ///< 1 / number of pixels around that show one
+    Plane nearness;  ///< as in the film
+    Plane near;      ///< 1 / distance over which indirect light may change much (Ward & Heckbert 1992)
+    Plane plane;     ///< 1 / distance from the tangent plane that counts as far, at stride 1
+  };
+  struct Light {
+    Plane r, g, b, variance;
+    Plane bright;
+  };
+  /// A part of the light on its way through the filter.
+  struct Signal {
+    Light light, next;
+    Plane noise;  ///< 1 / difference of brightness that counts as large
+    Plane guide;  ///< brightness, a little smoothed
+    Plane scale;  ///< standard errors that count as the same
+  };
+  struct Sums;
+
+  void resize(int width, int height);
+  void fill(const Film& film, const Vec3f& eye, float footprint);
+  void guide(int y);
+  /// One level of the transform.
+  void smooth(int stride);
+  /// @param quiet  lanes whose direct light stays as it is; all that show a surface unless `with_direct`
+  template <bool with_direct>
+  void smooth_block(int stride, int x, int y, LaneMask shown, LaneMask quiet);
+  void finish(Film& film) const;
+  [[nodiscard]] Neighbours around(std::size_t pixel) const;
+  template <class Body>
+  void rows(const Body& body) const;
+  template <class Body>
+  void blocks(int y, const Body& body) const;
+  template <class Body>
+  void shown_blocks(int y, const Body& body) const;
+
+  const Executor* executor_ = nullptr;
+  int width_ = 0;
+  int height_ = 0;
+  Features f_;
+  std::array<Signal, 2> signals_;    ///< direct, indirect
+  std::vector<std::uint8_t> mixed_;  ///< whether surfaces meet in a pixel
+};
 
 }  // namespace supple::render::path

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <span>
-#include <utility>
+
+#include "details.h"
 
 namespace supple::render::path {
 namespace {
@@ -11,13 +12,6 @@ namespace {
 constexpr int kTile = 8;
 constexpr std::uint32_t kRaysAPath = 2;    // camera rays of a pixel of which one goes on beyond its first surface
 constexpr std::uint32_t kDetailStream = 0xfffffff0u;  // those of tiles begin at 0
-constexpr std::uint32_t kSurfacesSamples = 32, kSurfacesTimes = 8;  // at least, and times those of the tile
-constexpr std::uint32_t kLightSamples = 16;  // at least, where light changes within a few pixels
-constexpr float kOneSurface = 0.98F;       // square of the mean of unit normals that are nearly parallel
-constexpr float kSameNormal = 0.95F, kSameCover = 0.1F, kSameAlbedo = 0.03F;
-constexpr float kSameShade = 0.3F;         // difference of direct light, over (luminance + 0.1)
-constexpr float kGap = 0.05F;              // size of a pixel over the distance that its light comes from
-constexpr std::array<std::pair<int, int>, 4> kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
 
 /// Sums of a part of the light of a pixel.
 struct LightSum {
@@ -165,15 +159,13 @@ class Tile {
 /// Fills a film.
 class Exposure {
  public:
-  Exposure(const Tracer& tracer, const TraceSettings& settings, const CameraMatrices& camera, const Executor& executor, Film& film)
-      : tracer_(tracer), settings_(settings), camera_(camera), executor_(executor), film_(film),
+  Exposure(const Tracer& tracer, const TraceSettings& settings, const Executor& executor, Film& film)
+      : tracer_(tracer), settings_(settings), executor_(executor), film_(film),
         most_(static_cast<std::uint32_t>(settings.most_samples)),
         least_(std::min(static_cast<std::uint32_t>(settings.least_samples), most_)) {}
 
   void clear() const;
   void expose_tiles() const;
-  /// Pixels with detail that a filter cannot restore, to Film::detailed.
-  void find_details() const;
   void expose_details() const;
 
  private:
@@ -189,23 +181,12 @@ class Exposure {
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(settings_.width) + static_cast<std::size_t>(x);
   }
-  /// The pixels beside one, inside the picture.
-  template <class Body>
-  void for_neighbours(int x, int y, const Body& body) const {
-    for (const auto& [dx, dy] : kBeside) {
-      if (x + dx >= 0 && y + dy >= 0 && x + dx < settings_.width && y + dy < settings_.height) body(index(x + dx, y + dy));
-    }
-  }
   std::uint32_t sample_until_quiet(const Window& window, Tile& tile) const;
   void keep_surface(std::size_t i, const Sums& sum, std::uint32_t count, float variance) const;
   void keep_paths(std::size_t i, const Sums& sum, std::uint32_t count, float variance) const;
-  [[nodiscard]] bool surfaces_meet(int x, int y) const;
-  [[nodiscard]] bool is_gap(int x, int y) const;
-  [[nodiscard]] bool shadow_ends(int x, int y) const;
 
   const Tracer& tracer_;
   const TraceSettings& settings_;
-  const CameraMatrices& camera_;
   const Executor& executor_;
   Film& film_;
   std::uint32_t most_;
@@ -293,77 +274,6 @@ void Exposure::expose_tiles() const {
   });
 }
 
-bool Exposure::surfaces_meet(int x, int y) const {
-  const std::size_t i = index(x, y);
-  const float cover = film_.cover[i];
-  bool meet = cover > 0.0F && film_.normal[i].squaredNorm() < kOneSurface;
-  for_neighbours(x, y, [&](std::size_t j) {
-    const float other = film_.cover[j];
-    meet |= std::abs(cover - other) > kSameCover;
-    meet |= (cover * film_.albedo[i] - other * film_.albedo[j]).cwiseAbs().maxCoeff() > kSameAlbedo;
-    meet |= cover * other > 0.0F && film_.normal[i].dot(film_.normal[j]) < kSameNormal;
-  });
-  return meet;
-}
-
-/// By the mean nearness of what the pixels around see light from: one path a pixel knows little.
-bool Exposure::is_gap(int x, int y) const {
-  const std::size_t i = index(x, y);
-  if (!(film_.cover[i] > 0.0F)) return false;
-  float near = 0.0F, cover = 0.0F;
-  constexpr int kReach = 2;
-  for (int py = std::max(0, y - kReach); py <= std::min(settings_.height - 1, y + kReach); ++py)
-    for (int px = std::max(0, x - kReach); px <= std::min(settings_.width - 1, x + kReach); ++px) {
-      near += film_.nearness[index(px, py)];
-      cover += film_.cover[index(px, py)];
-    }
-  const float pixel = 2.0F * camera_.half_extent.y() / static_cast<float>(settings_.height) * (film_.position[i] - camera_.eye).norm();
-  return near * pixel > kGap * cover;
-}
-
-bool Exposure::shadow_ends(int x, int y) const {
-  const std::size_t i = index(x, y);
-  if (!(film_.cover[i] > 0.0F)) return false;
-  bool ends = false;
-  for_neighbours(x, y, [&](std::size_t j) {
-    const float step = std::abs(luminance(film_.direct.radiance[i]) - luminance(film_.direct.radiance[j]));
-    const float scale = 0.5F * (luminance(film_.radiance[i]) + luminance(film_.radiance[j])) + 0.1F;
-    ends |= film_.cover[j] > 0.0F && step > kSameShade * scale;
-  });
-  return ends;
-}
-
-void Exposure::find_details() const {
-  std::vector<DetailedPixel> found(film_.radiance.size());
-  for_tiles([&](const Window& window) {
-    window.for_pixels([&](int x, int y) {
-      DetailedPixel& pixel = found[index(x, y)];
-      const std::uint32_t samples = film_.samples[index(x, y)];
-      std::uint32_t rays = 0;
-      if (surfaces_meet(x, y)) {
-        pixel.detail = Detail::Surfaces;
-        rays = std::max(kSurfacesSamples, kSurfacesTimes * samples);
-      } else if (is_gap(x, y)) {
-        pixel.detail = Detail::Gap;
-        rays = kLightSamples;
-      } else if (shadow_ends(x, y)) {
-        pixel.detail = Detail::Shadow;
-        rays = kLightSamples;
-      }
-      rays = std::min(rays, most_);
-      if (rays > samples) pixel.rays = rays;
-    });
-  });
-  film_.detailed.clear();
-  std::size_t facets = 0;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (found[i].rays == 0) continue;
-    film_.detailed.push_back({i, found[i].detail, found[i].rays, facets});
-    if (found[i].detail == Detail::Surfaces) facets += found[i].rays;
-  }
-  film_.facets.resize(facets);
-}
-
 void Exposure::expose_details() const {
   executor_.for_blocks(film_.detailed.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
@@ -395,10 +305,10 @@ void Exposure::expose_details() const {
 void trace(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
            const TraceSettings& settings, const Executor& executor, Film& film) {
   const Tracer tracer(geometry, lights, ground, camera, settings);
-  const Exposure exposure(tracer, settings, camera, executor, film);
+  const Exposure exposure(tracer, settings, executor, film);
   exposure.clear();
   exposure.expose_tiles();
-  exposure.find_details();
+  find_details(camera, settings, executor, film);
   exposure.expose_details();
 }
 

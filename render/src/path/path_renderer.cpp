@@ -30,6 +30,7 @@ class PathRenderer final : public Renderer {
   Executor executor_;
   path::Geometry geometry_;
   path::Film film_;
+  path::Denoiser denoiser_;
 };
 
 /// Sky, sun and ground of the shaders: without a ground, half a sky from below.
@@ -78,7 +79,7 @@ Image PathRenderer::render(const View& view, std::span<const Item> items, Linear
   {
     const CpuClock clock(times_.draw);
     path::trace(geometry_, lights_of(view, settings_.shadow_softness), ground, camera, trace, executor_, film_);
-    if (settings_.denoise) path::denoise(settings_.width, settings_.height, camera.eye, footprint, executor_, film_);
+    if (settings_.denoise) denoiser_.run(settings_.width, settings_.height, camera.eye, footprint, executor_, film_);
   }
   const CpuClock clock(times_.read_back);
   if (linear != nullptr) {

@@ -1,0 +1,49 @@
+/// @file plane.h
+/// One number a pixel, eight pixels at a time.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "lanes.h"
+
+namespace supple::render::path {
+
+/// Rows from the top; kMargin zeros around them and up to whole lanes, so that filters need no borders.
+class Plane {
+ public:
+  static constexpr int kMargin = 16;
+
+  /// All zeros.
+  void reset(int width, int height) {
+    pitch_ = (width + 2 * kMargin + static_cast<int>(kLanes) - 1) / static_cast<int>(kLanes) * static_cast<int>(kLanes);
+    values_.assign(static_cast<std::size_t>(pitch_) * static_cast<std::size_t>(height + 2 * kMargin), 0.0F);
+  }
+  [[nodiscard]] int pitch() const { return pitch_; }
+  [[nodiscard]] float& at(int x, int y) { return *pixel(x, y); }
+  [[nodiscard]] float at(int x, int y) const { return *pixel(x, y); }
+  /// The pixels x to x + 7.
+  [[nodiscard]] Lanes load(int x, int y) const { return _mm256_loadu_ps(pixel(x, y)); }
+  void store(int x, int y, Lanes v) { _mm256_storeu_ps(pixel(x, y), v); }
+  [[nodiscard]] float* pixel(int x, int y) { return values_.data() + offset(x, y); }
+  [[nodiscard]] const float* pixel(int x, int y) const { return values_.data() + offset(x, y); }
+
+ private:
+  [[nodiscard]] std::ptrdiff_t offset(int x, int y) const { return static_cast<std::ptrdiff_t>(y + kMargin) * pitch_ + x + kMargin; }
+  int pitch_ = 0;
+  std::vector<float> values_;
+};
+
+/// Sums over the (2 reach + 1)^2 pixels around, whose weights fall linearly from (reach + 1)^2 in the middle.
+template <int reach>
+[[nodiscard]] Lanes tent_sum(const Plane& plane, int x, int y) {
+  Lanes sum{};
+  for (int dy = -reach; dy <= reach; ++dy) {
+    Lanes row{};
+    for (int dx = -reach; dx <= reach; ++dx) row += plane.load(x + dx, y + dy) * static_cast<float>(reach + 1 - std::abs(dx));
+    sum += row * static_cast<float>(reach + 1 - std::abs(dy));
+  }
+  return sum;
+}
+
+}  // namespace supple::render::path
