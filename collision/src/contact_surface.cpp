@@ -101,7 +101,7 @@ class PairSolver {
   std::vector<double> value_;
   PressureBatch batch_;
   std::optional<CommonAxis> axis_;
-  std::array<bool, 2> columns_{};  // whether the squeezed region of A, of B is wanted
+  Regions regions_{};
   Vec3 first_ = Vec3::Zero();  // integral of x p dA
   double load_ = 0.0;
 };
@@ -132,7 +132,7 @@ bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, 
     if (!frame || covered(frame->origin, 0.0)) continue;
     const double largest_before = out.summary.largest_pressure;
     const auto solve = [&] {
-      return polar_.solve(pressure, *frame, settings, columns_, 2.0 * extent, third, on_axis, faces, out.points);
+      return polar_.solve(pressure, *frame, settings, regions_, 2.0 * extent, third, on_axis, faces, out.points);
     };
     if (!solve()) {
       if (!frame->flat) return false;
@@ -292,7 +292,7 @@ bool PairSolver::samples(PairPressure& pressure, std::span<const ContactBody> bo
   // The spacing of the kept samples, or what they would have.
   constexpr double kAcrossFeature = 3.0;
   const double first = spacing > 0.0 ? spacing : pressure.feature_size() / kAcrossFeature;
-  if (!samples_.solve(pressure, bodies[pair.a], bodies[pair.b], third_bodies_, overlap, first, settings, columns_, reference,
+  if (!samples_.solve(pressure, bodies[pair.a], bodies[pair.b], third_bodies_, overlap, first, settings, regions_, reference,
                       out.points)) {
     return false;
   }
@@ -317,7 +317,8 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   const BodyPair pair = candidates.pair[k];
   const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
   PairPressure pressure(a, b);
-  columns_ = {settings.energy || a.pose.size() > 1, settings.energy || b.pose.size() > 1};
+  const Region least = settings.energy ? Region::Sums : Region::None;
+  regions_ = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   out.summary.bodies = pair;
   clear(out);
   cover_count_ = 0;

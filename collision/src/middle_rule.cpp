@@ -348,10 +348,10 @@ void PolarRuleSolver::place_rays(const KronrodRule& rule, std::size_t first) {
 
 /// @param frame  of any place of the patch   @return false where no kink crosses, or this does not fit
 bool PolarRuleSolver::solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                         const std::array<bool, 2>& columns, const Box& faces, PatchPoints& points) {
+                                         const Regions& regions, const Box& faces, PatchPoints& points) {
   if (!part_about_middle(pressure, frame, settings, faces)) return false;
   parted_ = static_cast<std::uint32_t>(crossing_.size());
-  return finish(pressure, column_of(settings.error), columns, settings.error, points);
+  return finish(pressure, column_of(settings.error), regions, settings.error, nullptr, points);
 }
 
 bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,

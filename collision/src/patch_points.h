@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -49,6 +50,14 @@ inline double relative_difference(const PatchSums& fine, const PatchSums& coarse
   const double centre = (fine.centre() - coarse.centre()).norm() / std::sqrt(fine.area);
   return std::max({force, area, centre});
 }
+
+/// What is wanted of a squeezed region.
+enum class Region : std::uint8_t {
+  None,
+  Sums,    ///< its energy and volume
+  Points,  ///< these, and quadrature points
+};
+using Regions = std::array<Region, 2>;  // of A, of B
 
 struct PatchPoints {
   std::vector<Vec3> point, normal;

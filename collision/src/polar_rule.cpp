@@ -286,6 +286,7 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   }
   end[n - 1] = frame_.depth[side];
   for (int iteration = 0; iteration < kEndSteps; ++iteration) {
+    reached_ = end;
     for (std::size_t i = 0; i + 1 < n; ++i) line_point_[i] = node_.point[i] + (sign * end[i]) * frame_.axis;
     line_point_[n - 1] = peak_ + (sign * end[n - 1]) * frame_.axis;
     pressure.evaluate(side, line_point_, line_value_, line_slope_);
@@ -308,16 +309,43 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   return false;
 }
 
-bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, double error, PatchPoints& points) {
-  if (!column_ends(pressure, side, std::min(1e-3, 0.1 * std::sqrt(error)))) return false;
-  const GaussRule& gauss = gauss_rule(column);
+/// @param column  Gauss points, or as many as would be as exact
+bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, double error, Region region, PatchPoints& points) {
+  const bool from_ends = region == Region::Sums && !cut_;
+  // The slope there is off by as much as the place, as a kernel may change its formula at the surface; the length by its square.
+  if (!column_ends(pressure, side, std::min(1e-3, from_ends ? error : 0.1 * std::sqrt(error)))) return false;
   const std::size_t n = node_.size();
   thickness_ += end_[side][summit_];
   const double sign = side == 0 ? 1.0 : -1.0;
+  for (std::size_t i = 0; i < n; ++i) points.displaced[side] += weight_[i] * end_[side][i];
+  // Pressures and slopes at both ends are known, but third bodies may press harder somewhere between.
+  if (from_ends) {
+    const TwoEndRule& rule = two_end_rule(column - 2);
+    const std::size_t between = rule.node.size();
+    const Vec3 axis = frame_.axis;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
+      const double length = reached_[i], last = line_value_[i], slope = sign * line_slope_[i].dot(axis);
+      const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
+      const double sum = rule.end * (pressure_[i] + last) + rule.slope * length * (sign * begins.dot(axis) - slope);
+      points.energy += weight_[i] * (length * sum + rest);
+    }
+    if (between == 0) return true;
+    line_point_.resize(n * between);
+    line_value_.resize(n * between);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < between; ++j) line_point_[i * between + j] = node_.point[i] + (sign * reached_[i] * rule.node[j]) * axis;
+    }
+    pressure.evaluate(side, line_point_, line_value_);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < between; ++j) points.energy += weight_[i] * reached_[i] * rule.weight[j] * line_value_[i * between + j];
+    }
+    return true;
+  }
+  const GaussRule& gauss = gauss_rule(column);
   const std::size_t begin = points.volume_point.size();
   for (std::size_t i = 0; i < n; ++i) {
     const double length = end_[side][i];
-    points.displaced[side] += weight_[i] * length;
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       points.volume_point.push_back(node_.point[i] + (sign * length * gauss.node[j]) * frame_.axis);
       points.volume_weight.push_back(weight_[i] * length * gauss.weight[j]);
@@ -346,25 +374,25 @@ double PolarRuleSolver::algebraic_error() const {
 }
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                            const std::array<bool, 2>& columns, double extent,
+                            const Regions& regions, double extent,
                             std::span<const ContactBody* const> third, bool round, const Box* faces, PatchPoints& points) {
   extent_ = extent;
   third_ = third;
   peak_ = frame.origin;
   const std::size_t before = points.point.size();
-  if (!frame.flat && solve_about_peak(pressure, frame, settings, columns, round, points)) return true;
+  if (!frame.flat && solve_about_peak(pressure, frame, settings, regions, round, points)) return true;
   if (faces == nullptr) return false;
   if (!frame.flat) {
     if (before > 0) return false;
     points.clear();
   }
-  if (solve_about_middle(pressure, frame, settings, columns, *faces, points)) return true;
+  if (solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
   if (before == 0) points.clear();
   return false;
 }
 
 bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                       const std::array<bool, 2>& columns, bool round, PatchPoints& points) {
+                                       const Regions& regions, bool round, PatchPoints& points) {
   const double error = settings.error;
   cut_ = false;
   about_middle_ = false;
@@ -416,7 +444,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
       parted = true;
       if (solve_split(pressure, settings)) {
         parted_ = static_cast<std::uint32_t>(crossing_.size());
-        return finish(pressure, column_of(error), columns, error, points);
+        return finish(pressure, column_of(error), regions, error, nullptr, points);
       }
       if (crossing_.back() >= kinks_.size()) return false;
       r = first - 1;  // begins again as if there were no kinks
@@ -429,15 +457,16 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
     if (difference > kEnough * error && r < last) continue;
     estimate_ = difference + algebraic_error();
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
-    if (round) turn(rules[r - 1], columns[0] || columns[1]);
-    return finish(pressure, rules[r].column, columns, error, points);
+    return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);
   }
   return false;
 }
 
-/// Columns, and what was found, to `points`.
-bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::array<bool, 2>& columns, double error,
+/// Columns, and what was found, to `points`. @param turns  rule whose rays the single one stands for, or null
+bool PolarRuleSolver::finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns,
                              PatchPoints& points) {
+  const bool all = regions[0] == Region::Points || regions[1] == Region::Points;
+  if (turns != nullptr && all) turn(*turns, true);
   thickness_ = 0.0;
   largest_ = frame_.peak;
   summit_ = node_.size();
@@ -447,12 +476,14 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const std::arra
     summit_ = i;
   }
   for (const int side : {0, 1}) {
-    if (!columns[static_cast<std::size_t>(side)]) {
+    const Region region = regions[static_cast<std::size_t>(side)];
+    if (region == Region::None) {
       thickness_ += 0.5 * frame_.thickness;
-    } else if (!add_columns(pressure, column, side, error, points)) {
+    } else if (!add_columns(pressure, column, side, error, region, points)) {
       return false;
     }
   }
+  if (turns != nullptr && !all) turn(*turns, false);
   for (std::size_t i = 0; i < node_.size(); ++i) {
     if (cut_ && area_[i] == 0.0) continue;
     points.point.push_back(node_.point[i]);

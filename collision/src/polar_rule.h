@@ -35,7 +35,7 @@ struct PolarCover {
 class PolarRuleSolver {
  public:
   /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
-  /// @param columns  whether the squeezed region of A, of B is wanted
+  /// @param regions  what is wanted of the squeezed regions
   /// @param extent  rims farther away are not believed [m]
   /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
   /// @param round  both pressures are the same all around the line through the frame's origin along its axis
@@ -43,7 +43,7 @@ class PolarRuleSolver {
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
   [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                           const std::array<bool, 2>& columns, double extent, std::span<const ContactBody* const> third,
+                           const Regions& regions, double extent, std::span<const ContactBody* const> third,
                            bool round, const Box* faces, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about `origin()`
@@ -61,7 +61,7 @@ class PolarRuleSolver {
     [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
   };
   bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                        const std::array<bool, 2>& columns, bool round, PatchPoints& points);
+                        const Regions& regions, bool round, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   [[nodiscard]] double rim_moved() const;
   void place_nodes(const PolarRule& rule);
@@ -69,8 +69,8 @@ class PolarRuleSolver {
   bool integrate();
   void keep_along_axis(PatchSums& sums) const;
   void turn(const PolarRule& rule, bool slopes);
-  bool finish(PairPressure& pressure, int column, const std::array<bool, 2>& columns, double error, PatchPoints& points);
-  bool add_columns(PairPressure& pressure, int column, int side, double error, PatchPoints& points);
+  bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
+  bool add_columns(PairPressure& pressure, int column, int side, double error, Region region, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double algebraic_error() const;
@@ -134,7 +134,7 @@ class PolarRuleSolver {
     Vec2 outward = Vec2::Zero();
   };
   bool solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                          const std::array<bool, 2>& columns, const Box& faces, PatchPoints& points);
+                          const Regions& regions, const Box& faces, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Box& faces);
   void cover_about_middle(PolarCover& out) const;
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
@@ -157,7 +157,7 @@ class PolarRuleSolver {
   std::vector<double> low_, high_;
   std::vector<std::uint8_t> done_;
   PressureBatch rim_batch_, node_;
-  std::vector<double> height_, weight_, area_, pressure_, end_[2];
+  std::vector<double> height_, weight_, area_, pressure_, end_[2], reached_;
   std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
   std::vector<double> line_value_;
   double residual_ = 0.0;

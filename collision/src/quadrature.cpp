@@ -79,6 +79,41 @@ const GaussRule& gauss_rule(int n) {
   return rules[static_cast<std::size_t>(n)];
 }
 
+const TwoEndRule& two_end_rule(int n) {
+  static const std::vector<TwoEndRule> rules = [] {
+    // On (-1, 1) the nodes are the roots of the Gegenbauer polynomials C_n with parameter 5/2.
+    const double root = std::sqrt(48.0), far = std::sqrt((9.0 + root) / 33.0), near = std::sqrt((9.0 - root) / 33.0);
+    const std::vector<std::vector<double>> nodes{
+        {}, {0.0}, {-std::sqrt(1.0 / 7.0), std::sqrt(1.0 / 7.0)}, {-std::sqrt(1.0 / 3.0), 0.0, std::sqrt(1.0 / 3.0)}, {-far, -near, near, far}};
+    const GaussRule& gauss = gauss_rule(kLargestGauss);
+    std::vector<TwoEndRule> all;
+    for (const std::vector<double>& at : nodes) {
+      TwoEndRule rule{};
+      double whole = 2.0, square = 2.0 / 3.0;  // integrals of 1 and x^2, less those of the nodes
+      for (const double x : at) {
+        // Of the polynomial with double roots at both ends that is 1 at this node and 0 at the others.
+        double weight = 0.0;
+        for (std::size_t k = 0; k < gauss.node.size(); ++k) {
+          const double y = 2.0 * gauss.node[k] - 1.0, fall = (1.0 - y * y) / (1.0 - x * x);
+          double value = fall * fall;
+          for (const double other : at) value *= other == x ? 1.0 : (y - other) / (x - other);
+          weight += 2.0 * gauss.weight[k] * value;
+        }
+        rule.node.push_back(0.5 * (1.0 + x));
+        rule.weight.push_back(0.5 * weight);
+        whole -= weight;
+        square -= weight * x * x;
+      }
+      rule.end = 0.25 * whole;
+      rule.slope = (whole - square) / 16.0;
+      all.push_back(std::move(rule));
+    }
+    return all;
+  }();
+  SUPPLE_EXPECTS(n >= 0 && n < static_cast<int>(rules.size()));
+  return rules[static_cast<std::size_t>(n)];
+}
+
 const KronrodRule& kronrod_rule(bool finer) {
   // The positive nodes from the outside, the middle one last.
   const auto make = [](std::span<const double> node, std::span<const double> weight, std::span<const double> gauss) {

@@ -14,6 +14,15 @@ struct GaussRule {
 /// @pre 1 <= n <= 16
 [[nodiscard]] const GaussRule& gauss_rule(int n);
 
+/// On (0, 1) from values and slopes at both ends: sum = end (f(0) + f(1)) + slope (f'(0) - f'(1)) + weight . f(node), exact for
+/// polynomials of degree 2 n + 3, as Gauss's rule with n + 2 nodes is (Gautschi 2004, BIT 44, 711).
+struct TwoEndRule {
+  double end, slope;
+  std::vector<double> node, weight;
+};
+/// @param n  nodes between the ends, in [0, 4]
+[[nodiscard]] const TwoEndRule& two_end_rule(int n);
+
 /// Gauss-Legendre on (-1, 1) and its extension by Kronrod: every second node is the smaller rule's.
 struct KronrodRule {
   std::vector<double> node;          ///< rising

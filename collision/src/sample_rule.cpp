@@ -433,7 +433,7 @@ double SampleRuleSolver::depth(PairPressure& pressure, int side, const Vec3& pea
 
 bool SampleRuleSolver::solve(PairPressure& pressure, const ContactBody& a, const ContactBody& b,
                              std::span<const ContactBody* const> third, const Box& overlap, double spacing,
-                             const ContactSettings& settings, const std::array<bool, 2>& columns, const Vec3& reference,
+                             const ContactSettings& settings, const Regions& regions, const Vec3& reference,
                              PatchPoints& points) {
   body_ = {&a, &b};
   estimate_ = 1.0;
@@ -469,7 +469,7 @@ bool SampleRuleSolver::solve(PairPressure& pressure, const ContactBody& a, const
   }
   if (!(sums_.load > 0.0)) return false;
   for (const int side : {0, 1}) {
-    if (!columns[static_cast<std::size_t>(side)]) continue;
+    if (regions[static_cast<std::size_t>(side)] == Region::None) continue;
     if (body_[static_cast<std::size_t>(side)]->skeleton != nullptr) {
       add_columns(pressure, side, third, points);
     } else {

@@ -21,11 +21,11 @@ class SampleRuleSolver {
   /// `settings.max_refinement` times and never beyond so many rays.
   /// @param third  bodies whose larger pressure takes space away from the pair
   /// @param spacing  of the seeds to begin with [m], > 0
-  /// @param columns  whether the squeezed region of A, of B is wanted
+  /// @param regions  what is wanted of the squeezed regions
   /// @param reference  origin of the moments in `sums`
   /// @return whether Sigma was met; false too where neither body has a skeleton
   bool solve(PairPressure& pressure, const ContactBody& a, const ContactBody& b, std::span<const ContactBody* const> third,
-             const Box& overlap, double spacing, const ContactSettings& settings, const std::array<bool, 2>& columns,
+             const Box& overlap, double spacing, const ContactSettings& settings, const Regions& regions,
              const Vec3& reference, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }

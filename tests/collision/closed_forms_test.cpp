@@ -59,6 +59,16 @@ TEST(ContactForce, OfALinearSphereOnARigidPlaneIsTheClosedForm) {
   }
 }
 
+TEST(ContactEnergy, OfALinearSphereOnARigidPlaneIsWithinTheErrorAsked) {
+  for (const double error : {1e-2, 1e-3, 1e-4, 1e-6, 1e-8}) {
+    for (const double delta : {0.05, 0.1, 0.2, 0.5}) {
+      const LinearSphere sphere{Vec3(0.1, -0.2, 1.0 - delta), Linear{1.0, 1.0}};
+      const ContactSurface::Summary s = contact(sphere, rigid_plane(), {.error = error});
+      EXPECT_NEAR(s.energy, plane_energy(delta), (error + 1e-7) * plane_energy(delta)) << error << ' ' << delta;  // 1e-7: as above
+    }
+  }
+}
+
 TEST(ContactForce, OfARigidSphereInACompliantHalfSpaceIsTheCapVolume) {
   const LinearSphere sphere{Vec3(0, 0, 0.9), Linear{1.0, 1e6}};
   const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
