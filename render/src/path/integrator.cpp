@@ -244,7 +244,7 @@ std::uint32_t Exposure::sample_until_quiet(const Window& window, Tile& tile) con
     });
     bundler.flush();
     n = next;
-    const bool quiet = settings_.noise > 0.0 && tile.estimate_errors() <= static_cast<float>(settings_.noise * settings_.noise);
+    const bool quiet = tile.estimate_errors() <= static_cast<float>(settings_.noise * settings_.noise) && settings_.noise > 0.0;
     if (quiet || n >= most_) return n;
     next = std::min(2 * n, most_);
   }
@@ -258,14 +258,16 @@ void Exposure::expose_tiles() const {
     Bundler late(tracer_, [&](const Pick& pick, const Sample& sample) {
       if (sample.facet.cover > 0.0F) tile.at(pick.x, pick.y).add_indirect(sample);
     });
+    bool any_late = false;
     window.for_pixels([&](int x, int y) {
       const Sums& sum = tile.at(x, y);
       if (!(sum.cover > 0.0F) || sum.walked_cover > 0.0F) return;
+      any_late = true;
       for (std::uint32_t first = 0, count = least_; first < n; first += count, count = first)
         for (std::uint32_t s = 0; s < count; ++s) late.add({x, y, 2 * first, count, s, 1});
     });
     late.flush();
-    tile.estimate_errors();
+    if (any_late) tile.estimate_errors();
     window.for_pixels([&](int x, int y) {
       const Sums& sum = tile.at(x, y);
       keep_paths(index(x, y), sum, n, tile.variance(x, y).indirect);
