@@ -64,6 +64,12 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
   batch.resize(1);
   batch.point[0] = origin;
   pressure.evaluate(batch);
+  sheets_.clear();
+  for (const implicit::Kink& kink : kinks_) {
+    Sheet sheet;
+    sheet.value = kink.value(origin, sheet.slope);
+    if (kink.form == implicit::Kink::Form::Plane) sheets_.push_back(sheet);
+  }
   const double first = frame_.thickness;
   double middle = 0.0;  // pressure there
   {
@@ -87,10 +93,8 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
   }
   const auto look_ahead = [&](Walk& walk) {
     double kink = kInfinity;
-    for (const implicit::Kink& k : kinks_) {
-      if (k.form != implicit::Kink::Form::Plane) continue;
-      Vec3 slope;
-      const double s = k.value(origin, slope), r = -s / slope.dot(walk.along);
+    for (const Sheet& sheet : sheets_) {
+      const double r = -sheet.value / sheet.slope.dot(walk.along);
       if (r > walk.passed * (1.0 + kSameCorner) && r > kFirst && r * walk.along.norm() < 0.5 * extent_) kink = std::min(kink, r);
     }
     const double falls = -walk.slope, square = falls * falls - 2.0 * walk.bend * walk.pressure;
@@ -385,16 +389,16 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   }
   about_middle_ = true;
   const double error = settings.error;
-  const bool fine = error < 1e-4;
+  const bool fine = error < 1e-4, fewest = error >= 1e-3;
   panels_.clear();
   for (std::size_t k = 0; k < sectors_.size(); ++k) {
     Panel panel;
     panel.begin = static_cast<double>(k);
     panel.end = static_cast<double>(k + 1);
-    panel.nodes = !fine ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
+    panel.nodes = fewest ? kFewest : !fine ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
     panels_.push_back(panel);
   }
-  return solve_all_panels(pressure, settings, kronrod_rule(fine), fine);
+  return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : fine ? 7 : 3), fine);
 }
 
 void PolarRuleSolver::cover_about_middle(PolarCover& out) const {

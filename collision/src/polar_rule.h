@@ -79,6 +79,7 @@ class PolarRuleSolver {
   // Patches that kinks cross: split_rule.cpp.
   /// Gauss points through a squeezed region.
   static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
+  static constexpr int kFewest = 2;  // points on a piece of a ray
   struct Panel {
     double begin = 0.0, end = 0.0;  // angles, or places along `sectors_`: i to i + 1 is sector i
     std::size_t first = 0, last = 0;  // of `kept_`
@@ -86,6 +87,12 @@ class PolarRuleSolver {
     double by_angle = 0.0, by_radius = 0.0;  // differences of these
     bool halved = false;              // or a half of one
     int nodes = 0;                    // on a ray that no kink crosses
+  };
+  /// A kink, and s at the origin with its slope where it is a plane.
+  struct Sheet {
+    double value = 0.0;
+    Vec3 slope = Vec3::Zero();
+    bool flat = true;
   };
   struct Crossing {
     std::size_t ray, kink;
@@ -188,6 +195,7 @@ class PolarRuleSolver {
   std::vector<RimPoint> outline_, polygon_;  // by angle; with corners
   std::vector<Sector> sectors_;
   std::vector<Walk> walks_;
+  std::vector<Sheet> sheets_;
   std::vector<std::size_t> ray_nodes_, ray_fewer_;  // first node of a ray, and of those with fewer radii
   PressureBatch kept_;
   std::vector<double> kept_weight_, kept_area_, kept_pressure_;

@@ -114,19 +114,21 @@ const TwoEndRule& two_end_rule(int n) {
   return rules[static_cast<std::size_t>(n)];
 }
 
-const KronrodRule& kronrod_rule(bool finer) {
+const KronrodRule& kronrod_rule(int gauss) {
   // The positive nodes from the outside, the middle one last.
-  const auto make = [](std::span<const double> node, std::span<const double> weight, std::span<const double> gauss) {
+  const auto make = [](std::span<const double> node, std::span<const double> weight, std::span<const double> smaller) {
     KronrodRule rule;
     const std::size_t half = node.size() - 1;
     for (std::size_t k = 0; k <= 2 * half; ++k) {
       const std::size_t i = k <= half ? k : 2 * half - k;
       rule.node.push_back(k <= half ? -node[i] : node[i]);
       rule.weight.push_back(weight[i]);
-      rule.gauss_weight.push_back(i % 2 == 1 ? gauss[i / 2] : 0.0);
+      rule.gauss_weight.push_back(i % 2 == 1 ? smaller[i / 2] : 0.0);
     }
     return rule;
   };
+  static const KronrodRule coarsest = make(std::array{std::sqrt(6.0 / 7.0), std::sqrt(1.0 / 3.0), 0.0},
+                                           std::array{98.0 / 495.0, 27.0 / 55.0, 28.0 / 45.0}, std::array{1.0});
   static const KronrodRule coarse = make(std::array{0.960491268708020283423507092629080, 0.774596669241483377035853079956480,
                                                     0.434243749346802558002071502844628, 0.0},
                                          std::array{0.104656226026467265193823857192073, 0.268488089868333440728569280666710,
@@ -141,7 +143,8 @@ const KronrodRule& kronrod_rule(bool finer) {
                  0.204432940075298892414161999234649, 0.209482141084727828012999174891714},
       std::array{0.129484966168869693270611432679082, 0.279705391489276667901467771423780, 0.381830050505118944950369775488975,
                  0.417959183673469387755102040816327});
-  return finer ? fine : coarse;
+  SUPPLE_EXPECTS(gauss == 2 || gauss == 3 || gauss == 7);
+  return gauss == 2 ? coarsest : gauss == 3 ? coarse : fine;
 }
 
 std::span<const PolarRule> polar_rules() {

@@ -29,8 +29,8 @@ struct KronrodRule {
   std::vector<double> weight;        ///< sum to 2
   std::vector<double> gauss_weight;  ///< of the smaller rule, 0 where it has no node
 };
-/// @param finer  7 and 15 nodes in place of 3 and 7 (Kronrod 1965; QUADPACK)
-[[nodiscard]] const KronrodRule& kronrod_rule(bool finer);
+/// @param gauss  nodes of the smaller rule, in {2, 3, 7}; 2 gauss + 1 of the larger (Kronrod 1965; QUADPACK)
+[[nodiscard]] const KronrodRule& kronrod_rule(int gauss);
 
 /// The rules of the polar quadrature from coarse to fine (theory of spectral quadrature on a smooth patch).
 struct PolarRule {

@@ -14,6 +14,7 @@ namespace {
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
 constexpr double kWidestCoarse = 3.3;
 constexpr int kMostRadial = 16;
+constexpr double kOfFewest = 2.5;        // the difference is what these are off by, not what the rule that they are compared with is
 constexpr double kUnseen = 0.03;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
 constexpr std::size_t kMostPanels = 48;  // that the estimate may ask for
@@ -27,6 +28,9 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 int nodes_on(int radial, double share) {
   return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), 2, kMostRadial);
 }
+
+/// Points that are compared with n: where the fewest are enough, more of them on the few rays where they are compared.
+int check_of(int n, int fewest) { return n == fewest ? fewest + 1 : n > 4 ? n - 2 : n - 1; }
 
 /// Kinks so near to another, to the peak or to the rim are left out: the error is of the square.
 double shortest_piece(double error) { return 3e-3 * std::sqrt(error); }
@@ -278,16 +282,29 @@ double PolarRuleSolver::model_height(std::size_t ray, double share) const {
 void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
   crossings_.clear();
+  sheets_.clear();
+  for (const std::size_t k : crossing_) {
+    Sheet sheet;
+    sheet.flat = k < kinks_.size() && kinks_[k].form == implicit::Kink::Form::Plane;
+    if (sheet.flat) sheet.value = kinks_[k].value(frame_.origin, sheet.slope);
+    sheets_.push_back(sheet);
+  }
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
     const auto place = [&](double share) -> Vec3 { return frame_.origin + share * reach + model_height(i, share) * frame_.axis; };
-    std::array<Vec3, kSamples + 1> at;
-    for (int j = 0; j <= kSamples; ++j) at[static_cast<std::size_t>(j)] = place(static_cast<double>(j) / kSamples);
-    for (const std::size_t k : crossing_) {
+    std::array<double, kSamples + 1> height;
+    for (int j = 0; j <= kSamples; ++j) height[static_cast<std::size_t>(j)] = model_height(i, static_cast<double>(j) / kSamples);
+    for (std::size_t c = 0; c < crossing_.size(); ++c) {
+      const std::size_t k = crossing_[c];
+      const Sheet& sheet = sheets_[c];
+      const double along = sheet.flat ? sheet.slope.dot(reach) : 0.0, up = sheet.flat ? sheet.slope.dot(frame_.axis) : 0.0;
+      const auto side = [&](double share) {
+        return sheet.flat ? sheet.value + along * share + up * model_height(i, share) : side_of(k, pressure, place(share));
+      };
       const auto between = [&](double left, double s_left, double right, double s_right) {
         double share = left + (right - left) * s_left / (s_left - s_right);
         for (int step = 0; step < 3; ++step) {
-          const double s = side_of(k, pressure, place(share));
+          const double s = side(share);
           ((s > 0.0) == (s_left > 0.0) ? left : right) = share;
           ((s > 0.0) == (s_left > 0.0) ? s_left : s_right) = s;
           share = left + (right - left) * s_left / (s_left - s_right);
@@ -296,7 +313,11 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
                               share + 0.5 / kSamples, false});
       };
       std::array<double, kSamples + 1> s;
-      for (std::size_t j = 0; j < s.size(); ++j) s[j] = side_of(k, pressure, at[j]);
+      for (std::size_t j = 0; j < s.size(); ++j) {
+        const double share = static_cast<double>(j) / kSamples;
+        s[j] = sheet.flat ? sheet.value + along * share + up * height[j]
+                          : side_of(k, pressure, frame_.origin + share * reach + height[j] * frame_.axis);
+      }
       for (std::size_t j = 0; j < kSamples; ++j) {
         const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;
         if ((s[j] > 0.0) != (s[j + 1] > 0.0)) {
@@ -308,7 +329,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
         const double bend = s[j - 1] - 2.0 * s[j] + s[j + 1], slope = 0.5 * (s[j + 1] - s[j - 1]);
         if (!(bend * s[j] > 0.0) || !(std::abs(slope) < std::abs(bend))) continue;
         const double vertex = left - slope / bend / kSamples;
-        const double dip = side_of(k, pressure, place(vertex));
+        const double dip = side(vertex);
         if ((dip > 0.0) == (s[j] > 0.0)) continue;
         const double before = vertex < left ? left - 1.0 / kSamples : left, after = vertex < left ? left : right;
         between(before, vertex < left ? s[j - 1] : s[j], vertex, dip);
@@ -423,7 +444,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
     nodes(panel.nodes, rule.weight[i % per_panel]);
     ray_fewer_.push_back(foot_.size());
     const double fewer = rule.gauss_weight[i % per_panel];
-    if (fewer > 0.0) nodes(panel.nodes > 4 ? panel.nodes - 2 : panel.nodes - 1, fewer);
+    if (fewer > 0.0) nodes(check_of(panel.nodes, kFewest), fewer);
   }
   ray_nodes_.push_back(foot_.size());
   node_.resize(foot_.size());
@@ -445,14 +466,18 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       const Vec3 x = node_.point[i] - frame_.origin;
       weigh(panel.fine, x, normal_[i], area_[i], pressure_[i]);
       weigh(panel.angular, x, normal_[i], area_[i] * (rule.gauss_weight[k] / rule.weight[k]), pressure_[i]);
-      kept_.point.push_back(node_.point[i]);
-      kept_.slope_a.push_back(node_.slope_a[i]);
-      kept_.slope_b.push_back(node_.slope_b[i]);
-      kept_weight_.push_back(weight_[i]);
-      kept_area_.push_back(area_[i]);
-      kept_pressure_.push_back(pressure_[i]);
-      kept_normal_.push_back(normal_[i]);
     }
+    const auto keep = [&](auto& to, const auto& from) {
+      to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
+                from.begin() + static_cast<std::ptrdiff_t>(ray_fewer_[ray + k]));
+    };
+    keep(kept_.point, node_.point);
+    keep(kept_.slope_a, node_.slope_a);
+    keep(kept_.slope_b, node_.slope_b);
+    keep(kept_weight_, weight_);
+    keep(kept_area_, area_);
+    keep(kept_pressure_, pressure_);
+    keep(kept_normal_, normal_);
     for (std::size_t i = ray_fewer_[ray + k]; i < ray_nodes_[ray + k + 1]; ++i) {
       weigh(panel.radial, node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
     }
@@ -464,7 +489,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   const double error = settings.error;
   cut_ = crossing_.back() >= kinks_.size();
   const bool fine = error < 1e-4;
-  const KronrodRule& rule = kronrod_rule(fine);
+  const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
   const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;
   const double widest = fine ? kWidest : kWidestCoarse;
   about_middle_ = false;
@@ -516,6 +541,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     for (Panel& panel : panels_) {
       panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
       panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
+      if (panel.nodes == kFewest) panel.by_radius *= kOfFewest;
       (panel.halved ? halved : regular) += panel.by_angle + panel.by_radius;
     }
     estimate_ = estimate_of(regular, halved, fine, least);

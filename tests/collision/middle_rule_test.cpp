@@ -156,18 +156,20 @@ TEST(FacesOnFaces, HaveForceAndTorqueAsTheGradientOfTheEnergy) {
 }
 
 TEST(FacesOnFaces, ChangeSmoothlyAsTheyLean) {
-  // A thousandth is asked for; from step to step the answer keeps to the fine one much better, or friction would feel the rule.
+  // From step to step the answer keeps to the fine one much better than asked, or friction would feel the rule.
   const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
-  double largest = 0.0;
-  for (int i = -20; i <= 20; ++i) {
-    const Quat turn = turned(1e-4 * i, Vec3(1, 0.3, 0)) * turned(0.7, Vec3::UnitZ());
-    const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + 0.9 * kEdge), turn});
-    const ContactSurface::Summary s = solve(box.field, box.pose.position, plane, Vec3::Zero(), 80.0, 1e-3);
-    const ContactSurface::Summary fine = solve(box.field, box.pose.position, plane, Vec3::Zero(), 80.0, 1e-8);
-    ASSERT_EQ(s.rule, ContactRule::Polar);
-    largest = std::max(largest, difference(s, fine.force, fine.area, fine.centre_of_pressure));
+  for (const double error : {1e-3, 1e-4}) {
+    double largest = 0.0;
+    for (int i = -20; i <= 20; ++i) {
+      const Quat turn = turned(1e-4 * i, Vec3(1, 0.3, 0)) * turned(0.7, Vec3::UnitZ());
+      const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + 0.9 * kEdge), turn});
+      const ContactSurface::Summary s = solve(box.field, box.pose.position, plane, Vec3::Zero(), 80.0, error);
+      const ContactSurface::Summary fine = solve(box.field, box.pose.position, plane, Vec3::Zero(), 80.0, 1e-8);
+      ASSERT_EQ(s.rule, ContactRule::Polar);
+      largest = std::max(largest, difference(s, fine.force, fine.area, fine.centre_of_pressure));
+    }
+    EXPECT_LT(largest, error / 10.0) << error;
   }
-  EXPECT_LT(largest, 1e-5);
 }
 
 }  // namespace
