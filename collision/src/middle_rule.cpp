@@ -398,7 +398,8 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     panel.nodes = fewest ? kFewest : !fine ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
     panels_.push_back(panel);
   }
-  return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : fine ? 7 : 3), fine);
+  const bool third = fine && error >= 1e-6;
+  return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7), third ? &kronrod_rule(7) : nullptr, fine);
 }
 
 void PolarRuleSolver::cover_about_middle(PolarCover& out) const {

@@ -151,7 +151,8 @@ class PolarRuleSolver {
   void make_sectors(std::span<const RimPoint> corners);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
-  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& rule, bool fine);
+  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger,
+                        bool fine);
 
   PeakFrame frame_;
   Vec3 peak_ = Vec3::Zero();

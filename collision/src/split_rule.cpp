@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "polar_rule.h"
 #include "supple/core/math.h"
@@ -517,11 +518,14 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
       panels_.push_back(panel);
     }
   }
-  return solve_all_panels(pressure, settings, rule, fine);
+  return solve_all_panels(pressure, settings, rule, nullptr, fine);
 }
 
 /// Halves panels until the estimate is low enough; then nodes and sums of all are in place.
-bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& rule, bool fine) {
+/// @param larger  rule that panels get before they are halved, or null
+bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first,
+                                       const KronrodRule* larger, bool fine) {
+  const KronrodRule* rule = &first;
   const double error = settings.error;
   kept_.resize(0);
   kept_weight_.clear();
@@ -533,7 +537,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   PatchSums all;
   const double least = about_middle_ ? kLeastOnFaces : 0.0;
   for (;;) {
-    if (!solve_panels(pressure, rule, error, begin)) return false;
+    if (!solve_panels(pressure, *rule, error, begin)) return false;
     all = {};
     for (const Panel& panel : panels_) all.add(panel.fine);
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
@@ -550,15 +554,17 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     const auto count = static_cast<double>(panels_.size());
     const double share_regular = 0.5 * difference_for(error, fine, least) / count, share_halved = 0.5 * error / count;
     std::vector<Panel> finer;
+    bool by_angle = false;
     std::erase_if(panels_, [&](const Panel& panel) {
       const double share = panel.halved ? share_halved : share_regular;
       const bool more = panel.by_radius > share && panel.nodes < kMostRadial, halve = panel.by_angle > share;
       if (!more && !halve) return false;
+      by_angle = by_angle || halve;
       Panel next;
       next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
       next.begin = panel.begin;
-      next.halved = panel.halved || halve;
-      if (halve) {
+      next.halved = panel.halved || (halve && larger == nullptr);
+      if (halve && larger == nullptr) {
         next.end = 0.5 * (panel.begin + panel.end);
         finer.push_back(next);
         next.begin = next.end;
@@ -568,6 +574,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       return true;
     });
     if (finer.empty()) break;
+    if (larger != nullptr && by_angle) rule = std::exchange(larger, nullptr);
     begin = panels_.size();
     solved += finer.size();
     panels_.insert(panels_.end(), finer.begin(), finer.end());
