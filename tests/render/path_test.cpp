@@ -715,6 +715,33 @@ TEST(Bsdf, IsTheSameForEightRaysAsForOne) {
   }
 }
 
+TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {
+  // Where a ball stands on a floor, in even light, its outline passes over the darkest part of the floor.
+  const Mesh ball = sphere(Vec3(0, 0, 0.3), 0.3, 48), floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  const std::array items = {matt(ball, 0.5), matt(floor, 0.5)};
+  Studio studio;
+  studio.settings.width = studio.settings.height = 64;
+  studio.settings.noise = 0.8;
+  studio.view.camera = {.from = Vec3(0, -5, 1.5), .look_at = Vec3(0, 0, 0.1), .up = Vec3::UnitZ(), .field_of_view = 0.12};
+  studio.lights.above = Vec3f::Ones();
+  studio.settings.most_samples = 64;
+  Film film = studio.trace(items);
+  path::Denoiser{}.run(64, 64, Vec3f(0, -5, 1.4F), static_cast<float>(2.0 * std::tan(0.06) / 64.0), Executor(1), film);
+  studio.settings.noise = 0.0;
+  studio.settings.most_samples = 256;
+  const Film reference = studio.trace(items);
+  double bias = 0.0, light = 0.0, count = 0.0;
+  for (const path::DetailedPixel& d : film.detailed) {
+    if (d.detail != path::Detail::Surfaces || !d.walks) continue;
+    bias += film.radiance[d.pixel].y() - reference.radiance[d.pixel].y();
+    light += reference.radiance[d.pixel].y();
+    count += 1.0;
+  }
+  EXPECT_GT(count, 20.0);
+  // Some 3,000 paths with a deviation of at most .4 and a mean of .15: a standard error of 5 %. Neighbours alone are 30 % brighter.
+  EXPECT_LT(std::abs(bias), 0.1 * light);
+}
+
 TEST(PathTracer, KeepsAndRefitsHierarchies) {
   Mesh a = sphere(Vec3::Zero(), 0.5, 8), b = sphere(Vec3::UnitX(), 0.3, 8);
   const std::array items = {matt(a, 0.5), matt(b, 0.5)};

@@ -44,15 +44,20 @@ struct Neighbours {
   Numbers weight = Numbers::Zero();
   Vec3f own = Vec3f::Zero();  ///< light of the pixel itself
 
-  /// What falls on a facet of the pixel from the sky and other surfaces, by the neighbours on the same surface.
-  [[nodiscard]] Vec3f light_of(const Facet& facet) const {
-    const Vec3f &n = facet.normal, &p = facet.position;
+  float near = 0.0F;          ///< 1 / distance over which light may change much
+
+  /// What falls on a facet of the pixel from the sky and other surfaces, by the neighbours on the same surface and its own path.
+  [[nodiscard]] Vec3f light_of(const Sample& sample) const {
+    const Vec3f &n = sample.facet.normal, &p = sample.facet.position;
     const Numbers facing = (normal.col(0) * n.x() + normal.col(1) * n.y() + normal.col(2) * n.z()).max(0.0F);
-    const Numbers off = ((p.x() - position.col(0)) * n.x() + (p.y() - position.col(1)) * n.y() + (p.z() - position.col(2)) * n.z()).abs();
-    const Numbers w = weight * facing.square().square().square() * (off * plane).unaryExpr([](float t) { return fall(t); });
-    constexpr float kOwn = 1e-4F;  // alone where no neighbour is alike
+    const Numbers x = p.x() - position.col(0), y = p.y() - position.col(1), z = p.z() - position.col(2);
+    const Numbers off = (x * n.x() + y * n.y() + z * n.z()).abs() * plane;
+    const Numbers far = sample.weight > 0.0F ? Numbers(off + (x * x + y * y + z * z) * (near * near)) : off;
+    const Numbers w = weight * facing.square().square().square() * far.unaryExpr([](float t) { return fall(t); });
+    constexpr float kMixed = 1e-4F;  // alone where no neighbour is alike
     const Vec3f sum = (light.colwise() * w).colwise().sum().matrix().transpose();
-    return (kOwn * own + sum) / (kOwn + w.sum());
+    const Vec3f path = sample.weight * sample.indirect.cwiseQuotient(sample.facet.albedo.cwiseMax(kAlbedoFloor));
+    return (kMixed * own + path + sum) / (kMixed + sample.weight + w.sum());
   }
 };
 
@@ -243,10 +248,10 @@ void Denoiser::finish(Film& film) const {
       const Neighbours neighbours = around(pixel);
       Vec3f sum = Vec3f::Zero();
       float cover = 0.0F;
-      for (const Facet& facet : std::span(film.facets).subspan(detailed.facets, detailed.rays)) {
-        if (facet.cover <= 0.0F) continue;
-        sum += facet.cover * neighbours.light_of(facet).cwiseProduct(facet.albedo.cwiseMax(kAlbedoFloor));
-        cover += facet.cover;
+      for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
+        if (sample.facet.cover <= 0.0F) continue;
+        sum += sample.facet.cover * neighbours.light_of(sample).cwiseProduct(sample.facet.albedo.cwiseMax(kAlbedoFloor));
+        cover += sample.facet.cover;
       }
       if (cover > 0.0F) film.radiance[pixel] = film.direct.radiance[pixel] + sum / cover;
     }
@@ -258,6 +263,7 @@ Neighbours Denoiser::around(std::size_t pixel) const {
   const Light& light = signals_[1].light;
   const int x = static_cast<int>(pixel % static_cast<std::size_t>(width_)), y = static_cast<int>(pixel / static_cast<std::size_t>(width_));
   Neighbours out;
+  out.near = f_.near.at(x, y);
   out.own = Vec3f(light.r.at(x, y), light.g.at(x, y), light.b.at(x, y));
   Eigen::Index k = 0;
   for (int py = std::max(0, y - kReach); py <= std::min(height_ - 1, y + kReach); ++py)

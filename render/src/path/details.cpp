@@ -106,19 +106,19 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
         const std::uint32_t samples = film.samples[i];
         const Detail detail = meet[k] != 0 ? Detail::Surfaces : gap[k] != 0 ? Detail::Gap : Detail::Shadow;
         const std::uint32_t rays = std::min(most, detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples);
-        if (rays > samples) found[static_cast<std::size_t>(y)].push_back({.pixel = i, .detail = detail, .rays = rays, .facets = 0});
+        if (rays > samples) found[static_cast<std::size_t>(y)].push_back({.pixel = i, .detail = detail, .rays = rays, .walks = gap[k] != 0, .samples = 0});
       }
     }
   });
   film.detailed.clear();
-  std::size_t facets = 0;
+  std::size_t samples = 0;
   for (const std::vector<DetailedPixel>& row : found)
     for (DetailedPixel detailed : row) {
-      detailed.facets = facets;
-      if (detailed.detail == Detail::Surfaces) facets += detailed.rays;
+      detailed.samples = samples;
+      if (detailed.detail == Detail::Surfaces) samples += detailed.rays;
       film.detailed.push_back(detailed);
     }
-  film.facets.resize(facets);
+  film.detailed_samples.resize(samples);
 }
 
 }  // namespace supple::render::path

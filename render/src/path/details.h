@@ -6,7 +6,7 @@
 
 namespace supple::render::path {
 
-/// Fills film.detailed, and makes room for its facets: each pixel by itself and its neighbours.
+/// Fills film.detailed, and makes room for their samples: each pixel by itself and its neighbours.
 void find_details(const CameraMatrices& camera, const TraceSettings& settings, const Executor& executor, Film& film);
 
 }  // namespace supple::render::path

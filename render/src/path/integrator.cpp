@@ -286,15 +286,15 @@ void Exposure::expose_details() const {
       Sums anew;
       Bundler bundler(tracer_, [&](const Pick& pick, const Sample& sample) {
         anew.add(sample);
-        if (detailed.detail == Detail::Surfaces) film_.facets[detailed.facets + pick.number] = sample.facet;
+        if (detailed.detail == Detail::Surfaces) film_.detailed_samples[detailed.samples + pick.number] = sample;
       });
-      const std::uint32_t share = detailed.detail == Detail::Gap ? 1 : 0;
+      const std::uint32_t share = detailed.walks ? 1 : 0;
       for (std::uint32_t s = 0; s < detailed.rays; ++s) bundler.add({x, y, kDetailStream, detailed.rays, s, share, false});
       bundler.flush();
       const float before = film_.cover[i];
       keep_paths(i, anew, detailed.rays, anew.indirect.variance());
       keep_surface(i, anew, detailed.rays, anew.direct.variance());
-      if (detailed.detail == Detail::Gap || !(before > 0.0F && film_.cover[i] > 0.0F)) continue;
+      if (detailed.walks || !(before > 0.0F && film_.cover[i] > 0.0F)) continue;
       const float share_of_cover = film_.cover[i] / before;
       film_.nearness[i] *= share_of_cover;
       film_.indirect.variance[i] /= share_of_cover * share_of_cover;

@@ -21,7 +21,7 @@ struct FilmLight {
 
 /// Why a pixel takes its camera rays anew.
 enum class Detail : std::uint8_t {
-  Surfaces,  ///< meet in it: its indirect light is that of its facets, by neighbours on the same surfaces
+  Surfaces,  ///< meet in it: its indirect light is that of its facets, by neighbours on the same surfaces, in gaps by paths, too
   Gap,       ///< light comes from a few pixels away and changes as fast: it takes more paths, too
   Shadow,    ///< the edge of one is near
 };
@@ -30,7 +30,8 @@ struct DetailedPixel {
   std::size_t pixel = 0;
   Detail detail = Detail::Surfaces;
   std::uint32_t rays = 0;
-  std::size_t facets = 0;  ///< first of `rays` in Film::facets, of Detail::Surfaces
+  bool walks = false;       ///< its rays have paths of their own
+  std::size_t samples = 0;  ///< first of `rays` in Film::detailed_samples, of Detail::Surfaces
 };
 
 /// One pixel after the other from the top left. Features are those of the first surface, for the denoiser.
@@ -46,7 +47,7 @@ struct Film {
   std::vector<float> mirror;       ///< 1 where reflections are sharp, 0 on matt surfaces
   std::vector<std::uint32_t> samples;
   std::vector<DetailedPixel> detailed;  ///< in the order of pixels
-  std::vector<Facet> facets;
+  std::vector<Sample> detailed_samples;
 };
 
 /// The same bits for any number of threads: a tile of 8 x 8 pixels decides about its samples alone, and then each pixel by
