@@ -20,9 +20,9 @@ struct RoundBox {
   Pose pose;
   double edge;
 
-  RoundBox(const Vec3& core, double r, const Pose& at) : edge(r) {
+  RoundBox(const Vec3& core, double r, const Pose& at, implicit::ShapeKind shape = implicit::ShapeKind::Box) : edge(r) {
     implicit::Primitive p;
-    p.shape = implicit::ShapeKind::Box;
+    p.shape = shape;
     p.size = core;
     p.kernel = implicit::Kernel::gascuel(r, 1.5 * r, 0.5 / r);
     skeleton.primitive = {p};
@@ -34,6 +34,11 @@ struct RoundBox {
     implicit::place_skeleton(skeleton, {&pose, 1}, placed);
     implicit::index_field(skeleton, placed, field);
   }
+};
+
+/// A ball of the same pressure.
+struct Ball : RoundBox {
+  Ball(const Vec3& at, double r) : RoundBox(Vec3::Zero(), r, {at, Quat::Identity()}, implicit::ShapeKind::Point) {}
 };
 
 const Vec3 kCore(0.1, 0.08, 0.05);
@@ -169,6 +174,66 @@ TEST(FacesOnFaces, ChangeSmoothlyAsTheyLean) {
       largest = std::max(largest, difference(s, fine.force, fine.area, fine.centre_of_pressure));
     }
     EXPECT_LT(largest, error / 10.0) << error;
+  }
+}
+
+/// Force and first moments of p = (1 - d / r) / 2 of a flat box over z = 0 at the distance h from its core, but where a ball presses
+/// harder, and the area that the ball takes: midpoints of a fine grid. At its side cells are counted that the cut divides.
+struct GridSums {
+  double force = 0.0, taken = 0.0;
+  Vec3 first = Vec3::Zero();
+};
+GridSums beside_a_ball(double h, const Vec3& ball, double edge, double modulus) {
+  constexpr int kCells = 1500;
+  const Vec3 half(kCore.x() + kEdge, kCore.y() + kEdge, 0.0);
+  const double cell = 4.0 * half.x() * half.y() / (kCells * kCells);
+  GridSums sum;
+  for (int j = 0; j < kCells; ++j) {
+    for (int i = 0; i < kCells; ++i) {
+      const Vec3 x(half.x() * ((2.0 * i + 1.0) / kCells - 1.0), half.y() * ((2.0 * j + 1.0) / kCells - 1.0), 0.0);
+      const double dx = std::max(std::abs(x.x()) - kCore.x(), 0.0), dy = std::max(std::abs(x.y()) - kCore.y(), 0.0);
+      const double p = 0.5 * (1.0 - std::sqrt(dx * dx + dy * dy + h * h) / kEdge);
+      if (p <= 0.0) continue;
+      if (0.5 * modulus * (1.0 - (x - ball).norm() / edge) > p) {
+        sum.taken += cell;
+        continue;
+      }
+      sum.force += p * cell;
+      sum.first += p * cell * x;
+    }
+  }
+  return sum;
+}
+
+TEST(FacesOnFaces, StopWhereAThirdBodyPressesHarder) {
+  constexpr double h = 0.85 * kEdge, kModulus = 1.2, kRadius = 0.025;
+  const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + h), Quat::Identity()});
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+  const auto solved = [&](double error, const implicit::FieldView* third, const Vec3& at) {
+    Stage stage;
+    stage.add(box.field, {box.pose.position});
+    stage.add(plane, {Vec3::Zero()}, 1e9);
+    if (third != nullptr) stage.add(*third, {at}, kModulus);
+    const ContactSurface::Summary s = stage.solve({.error = error}).summary.at(0);
+    EXPECT_EQ(s.bodies.b, 1u);
+    EXPECT_EQ(s.rule, ContactRule::Polar);
+    return s;
+  };
+  const double whole = solved(1e-8, nullptr, Vec3::Zero()).area;
+  // Beside the middle, where the patch gets a hole between the points of coarse rules; over the middle; over a side; over a corner.
+  for (const Vec3& at : {Vec3(0.04, 0.01, 0), Vec3(0.01, -0.005, 0), Vec3(0.02, 0.09, 0), Vec3(-0.1, -0.08, 0)}) {
+    const Ball ball(at, kRadius);
+    const GridSums exact = beside_a_ball(h, at, kRadius, kModulus);
+    const implicit::FieldView third = ball.field;
+    for (const double error : {1e-2, 1e-3, 1e-5}) {
+      const ContactSurface::Summary s = solved(error, &third, at);
+      EXPECT_LE(s.error_estimate, error) << at.transpose();
+      // The grid has some 500 cells on the cut, whose shares err at random by half of theirs at most: 1e-5 of the patch.
+      const double most = s.error_estimate + 5e-5;
+      EXPECT_NEAR(s.force.z(), exact.force, most * exact.force) << at.transpose() << ' ' << error;
+      EXPECT_NEAR(s.area, whole - exact.taken, most * whole) << at.transpose() << ' ' << error;
+      EXPECT_LE((s.centre_of_pressure - exact.first / exact.force).norm(), most * std::sqrt(whole)) << at.transpose() << ' ' << error;
+    }
   }
 }
 
