@@ -389,16 +389,16 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   }
   about_middle_ = true;
   const double error = settings.error;
-  const bool fine = error < 1e-4, fewest = error >= 1e-3;
+  const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_;
   panels_.clear();
   for (std::size_t k = 0; k < sectors_.size(); ++k) {
     Panel panel;
     panel.begin = static_cast<double>(k);
     panel.end = static_cast<double>(k + 1);
-    panel.nodes = fewest ? kFewest : !fine ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
+    panel.nodes = fewest ? kFewest : error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
     panels_.push_back(panel);
   }
-  const bool third = fine && error >= 1e-6;
+  const bool third = fine && error >= 1e-6 && !cut_;
   return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7), third ? &kronrod_rule(7) : nullptr, fine);
 }
 

@@ -19,6 +19,7 @@ constexpr double kOfFewest = 2.5;        // the difference is what these are off
 constexpr double kUnseen = 0.03;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
 constexpr std::size_t kMostPanels = 48;  // that the estimate may ask for
+constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
 constexpr int kCornerSteps = 8;
 constexpr int kCrossingSteps = 6;
@@ -535,7 +536,8 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   residual_ = lift_ = rim_error_ = 0.0;
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
-  const double least = about_middle_ ? kLeastOnFaces : 0.0;
+  const bool beside = about_middle_ && cut_;
+  const double least = beside ? 1.0 : about_middle_ ? kLeastOnFaces : 0.0, safety = beside ? kBesideThirds : 1.0;
   for (;;) {
     if (!solve_panels(pressure, *rule, error, begin)) return false;
     all = {};
@@ -548,11 +550,12 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       if (panel.nodes == kFewest) panel.by_radius *= kOfFewest;
       (panel.halved ? halved : regular) += panel.by_angle + panel.by_radius;
     }
-    estimate_ = estimate_of(regular, halved, fine, least);
+    estimate_ = safety * estimate_of(regular, halved, fine, least);
     if (estimate_ <= kEnough * error || solved >= kMostPanels) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
-    const double share_regular = 0.5 * difference_for(error, fine, least) / count, share_halved = 0.5 * error / count;
+    const double share_regular = 0.5 * difference_for(error / safety, fine, least) / count,
+                 share_halved = 0.5 * error / safety / count;
     std::vector<Panel> finer;
     bool by_angle = false;
     std::erase_if(panels_, [&](const Panel& panel) {
