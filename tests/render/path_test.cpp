@@ -726,20 +726,25 @@ TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {
   studio.lights.above = Vec3f::Ones();
   studio.settings.most_samples = 64;
   Film film = studio.trace(items);
+  const std::vector<Vec3f> paths = film.radiance;
   path::Denoiser{}.run(64, 64, Vec3f(0, -5, 1.4F), static_cast<float>(2.0 * std::tan(0.06) / 64.0), Executor(1), film);
   studio.settings.noise = 0.0;
   studio.settings.most_samples = 256;
   const Film reference = studio.trace(items);
-  double bias = 0.0, light = 0.0, count = 0.0;
+  double bias = 0.0, light = 0.0, count = 0.0, error2 = 0.0, path_error2 = 0.0;
   for (const path::DetailedPixel& d : film.detailed) {
     if (d.detail != path::Detail::Surfaces || !d.walks) continue;
-    bias += film.radiance[d.pixel].y() - reference.radiance[d.pixel].y();
+    const double error = film.radiance[d.pixel].y() - reference.radiance[d.pixel].y();
+    bias += error;
+    error2 += error * error;
+    path_error2 += std::pow(paths[d.pixel].y() - reference.radiance[d.pixel].y(), 2);
     light += reference.radiance[d.pixel].y();
     count += 1.0;
   }
   EXPECT_GT(count, 20.0);
   // Some 3,000 paths with a deviation of at most .4 and a mean of .15: a standard error of 5 %. Neighbours alone are 30 % brighter.
   EXPECT_LT(std::abs(bias), 0.1 * light);
+  EXPECT_LT(error2, 0.5 * path_error2);  // outlines learn from outlines
 }
 
 TEST(PathTracer, KeepsAndRefitsHierarchies) {

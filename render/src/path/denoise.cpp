@@ -34,30 +34,46 @@ Number thirty_second_power(Number x) {
 
 }  // namespace
 
-/// Pixels around one where surfaces meet that show one surface each; empty places have no weight.
+bool SurfacePart::take(const Sample& sample, const Vec3f& falls) {
+  constexpr float kSameSide = 0.8F;
+  if (count > 0.0F && normal.dot(sample.facet.normal) < kSameSide * count) return false;
+  normal += sample.facet.normal;
+  position += sample.facet.position;
+  light += falls;
+  count += 1.0F;
+  return true;
+}
+
+/// Surfaces around a pixel where surfaces meet: of pixels that show one each, and the parts of those where others meet; empty
+/// places have no weight.
 struct Neighbours {
-  static constexpr int kMost = 32;
+  static constexpr int kMost = 48;
   using Numbers = Eigen::Array<float, kMost, 1>;
   using Vectors = Eigen::Array<float, kMost, 3>;
   Vectors normal = Vectors::Zero(), position = Vectors::Zero(), light = Vectors::Zero();
   Numbers plane = Numbers::Zero();
   Numbers weight = Numbers::Zero();
+  Eigen::Index count = 0;
   Vec3f own = Vec3f::Zero();  ///< light of the pixel itself
 
-  float near = 0.0F;          ///< 1 / distance over which light may change much
-
-  /// What falls on a facet of the pixel from the sky and other surfaces, by the neighbours on the same surface and its own path.
-  [[nodiscard]] Vec3f light_of(const Sample& sample) const {
-    const Vec3f &n = sample.facet.normal, &p = sample.facet.position;
+  void add(const Vec3f& facing, const Vec3f& place, const Vec3f& falls, float flat, float share) {
+    if (count == kMost) return;
+    normal.row(count) = facing.array();
+    position.row(count) = place.array();
+    light.row(count) = falls.array();
+    plane[count] = flat;
+    weight[count++] = share;
+  }
+  /// What falls on a facet of the pixel from the sky and other surfaces, by the neighbours on the same surface.
+  [[nodiscard]] Vec3f light_of(const Facet& facet) const {
+    const Vec3f &n = facet.normal, &p = facet.position;
     const Numbers facing = (normal.col(0) * n.x() + normal.col(1) * n.y() + normal.col(2) * n.z()).max(0.0F);
     const Numbers x = p.x() - position.col(0), y = p.y() - position.col(1), z = p.z() - position.col(2);
-    const Numbers off = (x * n.x() + y * n.y() + z * n.z()).abs() * plane;
-    const Numbers far = sample.weight > 0.0F ? Numbers(off + (x * x + y * y + z * z) * (near * near)) : off;
+    const Numbers far = (x * n.x() + y * n.y() + z * n.z()).abs() * plane;
     const Numbers w = weight * facing.square().square().square() * far.unaryExpr([](float t) { return fall(t); });
-    constexpr float kMixed = 1e-4F;  // alone where no neighbour is alike
+    constexpr float kOwn = 1e-4F;  // alone where no neighbour is alike
     const Vec3f sum = (light.colwise() * w).colwise().sum().matrix().transpose();
-    const Vec3f path = sample.weight * sample.indirect.cwiseQuotient(sample.facet.albedo.cwiseMax(kAlbedoFloor));
-    return (kMixed * own + path + sum) / (kMixed + sample.weight + w.sum());
+    return (kOwn * own + sum) / (kOwn + w.sum());
   }
 };
 
@@ -125,7 +141,18 @@ void Denoiser::resize(int width, int height) {
 
 void Denoiser::fill(const Film& film, const Vec3f& eye, float footprint) {
   mixed_.assign(film.radiance.size(), 0);
-  for (const DetailedPixel& detailed : film.detailed) mixed_[detailed.pixel] = detailed.detail == Detail::Surfaces ? 1 : 0;
+  parts_.clear();
+  for (const DetailedPixel& detailed : film.detailed) {
+    if (detailed.detail != Detail::Surfaces) continue;
+    std::array<SurfacePart, 2>& parts = parts_.emplace_back();
+    mixed_[detailed.pixel] = static_cast<std::uint32_t>(parts_.size());
+    if (!detailed.walks) continue;
+    for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
+      if (sample.facet.cover <= 0.0F) continue;
+      const Vec3f falls = sample.indirect.cwiseQuotient(sample.facet.albedo.cwiseMax(kAlbedoFloor));
+      if (!parts[0].take(sample, falls)) parts[1].take(sample, falls);
+    }
+  }
   Light &direct = signals_[0].light, &indirect = signals_[1].light;
   const std::array summed = {&f_.cover, &f_.shown, &f_.nearness, &direct.variance, &direct.bright, &indirect.variance, &indirect.bright};
   rows([&](int y) {
@@ -250,7 +277,7 @@ void Denoiser::finish(Film& film) const {
       float cover = 0.0F;
       for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
         if (sample.facet.cover <= 0.0F) continue;
-        sum += sample.facet.cover * neighbours.light_of(sample).cwiseProduct(sample.facet.albedo.cwiseMax(kAlbedoFloor));
+        sum += sample.facet.cover * neighbours.light_of(sample.facet).cwiseProduct(sample.facet.albedo.cwiseMax(kAlbedoFloor));
         cover += sample.facet.cover;
       }
       if (cover > 0.0F) film.radiance[pixel] = film.direct.radiance[pixel] + sum / cover;
@@ -260,22 +287,26 @@ void Denoiser::finish(Film& film) const {
 
 Neighbours Denoiser::around(std::size_t pixel) const {
   constexpr int kReach = 2;
+  constexpr float kPaths = 32.0F;  // that tell as much as a filtered pixel
   const Light& light = signals_[1].light;
-  const int x = static_cast<int>(pixel % static_cast<std::size_t>(width_)), y = static_cast<int>(pixel / static_cast<std::size_t>(width_));
+  const int x = static_cast<int>(pixel % static_cast<std::size_t>(width_));
+  const int y = static_cast<int>(pixel / static_cast<std::size_t>(width_));
   Neighbours out;
-  out.near = f_.near.at(x, y);
   out.own = Vec3f(light.r.at(x, y), light.g.at(x, y), light.b.at(x, y));
-  Eigen::Index k = 0;
   for (int py = std::max(0, y - kReach); py <= std::min(height_ - 1, y + kReach); ++py)
     for (int px = std::max(0, x - kReach); px <= std::min(width_ - 1, x + kReach); ++px) {
-      const std::size_t i = static_cast<std::size_t>(py) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(px);
-      if (f_.cover.at(px, py) <= 0.0F || mixed_[i] != 0) continue;
-      out.normal.row(k) << f_.nx.at(px, py), f_.ny.at(px, py), f_.nz.at(px, py);
-      out.position.row(k) << f_.px.at(px, py), f_.py.at(px, py), f_.pz.at(px, py);
-      out.light.row(k) << light.r.at(px, py), light.g.at(px, py), light.b.at(px, py);
-      out.plane[k] = f_.plane.at(px, py);
-      out.weight[k] = f_.cover.at(px, py) / static_cast<float>((px - x) * (px - x) + (py - y) * (py - y));
-      ++k;
+      if (f_.cover.at(px, py) <= 0.0F) continue;
+      const float closeness = 1.0F / std::max(0.5F, static_cast<float>((px - x) * (px - x) + (py - y) * (py - y)));
+      const float plane = f_.plane.at(px, py);
+      const std::uint32_t mixed = mixed_[static_cast<std::size_t>(py) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(px)];
+      if (mixed == 0) {
+        out.add({f_.nx.at(px, py), f_.ny.at(px, py), f_.nz.at(px, py)}, {f_.px.at(px, py), f_.py.at(px, py), f_.pz.at(px, py)},
+                {light.r.at(px, py), light.g.at(px, py), light.b.at(px, py)}, plane, f_.cover.at(px, py) * closeness);
+        continue;
+      }
+      for (const SurfacePart& part : parts_[mixed - 1])
+        if (part.count > 0.0F)
+          out.add(part.normal.normalized(), part.position / part.count, part.light / part.count, plane, closeness * part.count / kPaths);
     }
   return out;
 }

@@ -17,6 +17,16 @@ namespace supple::render::path {
 
 struct Neighbours;  // of a pixel, in denoise.cpp
 
+/// One of the surfaces that meet in a pixel, by the paths of its samples.
+struct SurfacePart {
+  Vec3f normal = Vec3f::Zero(), position = Vec3f::Zero();
+  Vec3f light = Vec3f::Zero();  ///< that falls on it from the sky and other surfaces
+  float count = 0.0F;           ///< of paths
+
+  /// A sample with a path: only if it faces the same way. @return whether it does
+  bool take(const Sample& sample, const Vec3f& falls);
+};
+
 class Denoiser {
  public:
   /// Replaces film.radiance. @param footprint  of a pixel at unit distance  @param eye  relative to the origin
@@ -66,7 +76,8 @@ class Denoiser {
   int height_ = 0;
   Features f_;
   std::array<Signal, 2> signals_;    ///< direct, indirect
-  std::vector<std::uint8_t> mixed_;  ///< whether surfaces meet in a pixel
+  std::vector<std::uint32_t> mixed_;            ///< of a pixel where surfaces meet, 1 + its place in parts_; 0: one surface
+  std::vector<std::array<SurfacePart, 2>> parts_;
 };
 
 }  // namespace supple::render::path

@@ -106,7 +106,7 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
         const std::uint32_t samples = film.samples[i];
         const Detail detail = meet[k] != 0 ? Detail::Surfaces : gap[k] != 0 ? Detail::Gap : Detail::Shadow;
         const std::uint32_t rays = std::min(most, detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples);
-        if (rays > samples) found[static_cast<std::size_t>(y)].push_back({.pixel = i, .detail = detail, .rays = rays, .walks = gap[k] != 0, .samples = 0});
+        if (rays > samples || detail == Detail::Surfaces) found[static_cast<std::size_t>(y)].push_back({.pixel = i, .detail = detail, .rays = rays, .walks = gap[k] != 0, .samples = 0});
       }
     }
   });

@@ -288,13 +288,14 @@ void Exposure::expose_details() const {
         anew.add(sample);
         if (detailed.detail == Detail::Surfaces) film_.detailed_samples[detailed.samples + pick.number] = sample;
       });
-      const std::uint32_t share = detailed.walks ? 1 : 0;
+      const float before = film_.cover[i];
+      const bool walks = detailed.walks || !(before > 0.0F);  // or nothing is known of its indirect light
+      const std::uint32_t share = walks ? 1 : 0;
       for (std::uint32_t s = 0; s < detailed.rays; ++s) bundler.add({x, y, kDetailStream, detailed.rays, s, share, false});
       bundler.flush();
-      const float before = film_.cover[i];
       keep_paths(i, anew, detailed.rays, anew.indirect.variance());
       keep_surface(i, anew, detailed.rays, anew.direct.variance());
-      if (detailed.walks || !(before > 0.0F && film_.cover[i] > 0.0F)) continue;
+      if (walks || !(film_.cover[i] > 0.0F)) continue;
       const float share_of_cover = film_.cover[i] / before;
       film_.nearness[i] *= share_of_cover;
       film_.indirect.variance[i] /= share_of_cover * share_of_cover;
