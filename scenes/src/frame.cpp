@@ -449,14 +449,17 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
 
 namespace {
 
-/// The meshes of bodies that touch, with the distances that the scene asks for; angles are held by none of them.
+/// The meshes of bodies that touch, within the bounds that the scene asks for.
 std::vector<Mesh> divide(const MeshingDesc& d, std::span<const implicit::FieldView> views, const implicit::Lattice& lattice,
                          const Executor& executor, implicit::PolygoniseCounts& counts) {
   implicit::Lattice coarsest = lattice;
   if (d.method == MeshingName::Delaunay) {
     const double size = d.size.value_or(2.0 * lattice.cell);
-    coarsest.cell = size / std::sqrt(3.0);  // the longest edge of a tetrahedron is no longer than the size
-    return implicit::polygonise_partition_within(views, coarsest, {d.distance.value_or(0.1 * size), "mesh.distance"}, executor, &counts);
+    implicit::DelaunayReport report;
+    std::vector<Mesh> meshes = implicit::delaunay_partition(
+        views, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell}, executor, &report);
+    counts.blocks_visited = counts.blocks_present = report.seeds + report.inserted;
+    return meshes;
   }
   if (!d.error) return implicit::polygonise_partition(views, lattice, executor, &counts);
   coarsest.cell = views.front().feature_size();

@@ -87,7 +87,7 @@ std::string meshing_of(const Scene& scene, const Model& model) {
   const std::string touching = ", tetrahedra where objects touch";
   switch (d.method) {
     case MeshingName::Tetrahedra: return "tetrahedra";
-    case MeshingName::Delaunay: return "Delaunay refinement by CGAL" + touching + " (size and distance hold there, the angle does not)";
+    case MeshingName::Delaunay: return "Delaunay refinement by CGAL, and of free surfaces and contacts between shared rims where objects touch";
     case MeshingName::OpenVdb: return "OpenVDB grid and volumeToMesh" + touching;
     case MeshingName::Cubes: return std::string(d.error ? "marching cubes to the error asked for" : "marching cubes") + touching;
     case MeshingName::Auto: break;

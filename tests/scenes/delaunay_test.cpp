@@ -71,8 +71,8 @@ TEST(DelaunayScene, NamesTheKeyWhenTheBoundsTakeTooMuch) {
   }
 }
 
-// Objects that touch share their contact bit for bit, within the size and the distance asked for.
-TEST(DelaunayScene, DividesObjectsThatTouchWithinSizeAndDistance) {
+// Objects that touch share their contact bit for bit, within the angle, the size and the distance asked for.
+TEST(DelaunayScene, DividesObjectsThatTouchWithinAngleSizeAndDistance) {
   const auto meshes_of = [](const std::string& meshing) {
     const std::string text = R"(
 schema: 1
@@ -102,13 +102,15 @@ output: {mesh: ply, cell: 0.1, meshing: )" + meshing + "}\n";
   for (const Mesh& mesh : coarse) {
     const MeshReport report = inspect(mesh);
     EXPECT_TRUE(report.closed && report.oriented);
-    for (const auto& t : mesh.triangle) {
-      for (std::size_t k = 0; k < 3; ++k) EXPECT_LE((mesh.position[t[k]] - mesh.position[t[(k + 1) % 3]]).norm(), 0.15);
+    EXPECT_GE(least_angle(mesh), std::numbers::pi / 6.0 - 1e-9);
+    for (const auto& t : mesh.triangle) {  // chords of circles with the radius asked for
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_LE((mesh.position[t[k]] - mesh.position[t[(k + 1) % 3]]).norm(), std::sqrt(3.0) * 0.15);
     }
   }
   EXPECT_GT(shared(coarse), 10u);
   const std::vector<Mesh> fine = meshes_of("{method: delaunay, size: 0.15, distance: 0.005}");
   EXPECT_GT(fine[0].triangle_count(), 3 * coarse[0].triangle_count());
+  EXPECT_GE(least_angle(fine[0]), std::numbers::pi / 6.0 - 1e-9);
   EXPECT_GT(shared(fine), shared(coarse));
   const std::vector<Mesh> cubes = meshes_of("{error: 0.005}"), plain = meshes_of("{method: cubes}");
   EXPECT_GT(cubes[0].triangle_count(), plain[0].triangle_count());

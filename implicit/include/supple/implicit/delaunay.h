@@ -5,7 +5,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
+#include <vector>
 
+#include "supple/core/executor.h"
 #include "supple/core/mesh.h"
 #include "supple/implicit/field_view.h"
 
@@ -26,6 +29,7 @@ struct DelaunayReport {
   std::uint64_t seeds = 0;       ///< vertices at the start
   std::uint64_t inserted = 0;    ///< by refinement
   double least_angle = 0.0;      ///< [rad]
+  std::uint64_t sharp = 0;       ///< triangles with a smaller angle than asked for
   double largest_radius = 0.0;   ///< of a triangle's circumcircle [m]; a surface ball's is no smaller
   double largest_distance = 0.0; ///< from a triangle's circumcentre to the surface along its dual edge [m]
 };
@@ -35,5 +39,17 @@ struct DelaunayReport {
 /// @throws Error{Limit} when most_vertices do not reach the bounds: an angle cannot be held where the surface has an edge.
 using DelaunayMesher =
     std::function<Mesh(const FieldView& field, const DelaunayOptions& options, DelaunayReport* report)>;
+
+/// Bodies that touch, as polygonise_partition divides space, with triangles of guaranteed quality: every free surface and every contact of
+/// two is refined by Delaunay's criterion on the surface (Chew 1993) between rims that their patches share and that are split where they
+/// are encroached (Ruppert 1995). Where two bodies meet both meshes have bit-equal vertices and the same triangles reversed.
+/// Dihedral angles do not matter; where rims meet at a sharper angle than asked for, that remains. Bodies whose boxes overlap are a group;
+/// where the rims of one are too tangled, polygonise_partition_within divides it: size and distance hold, the angle does not, largest_radius
+/// and largest_distance are not measured. Either shows as `sharp` > 0 and in `least_angle`. Normals and the column "contact" are those of
+/// polygonise_partition; an unbounded body gets an empty mesh. Contacts narrower than the cell, or half the size where that is less, may be
+/// missed, and sheets nearer to each other than the distance may cross.
+/// @throws Error{Limit} when most_vertices do not reach the bounds.
+[[nodiscard]] std::vector<Mesh> delaunay_partition(std::span<const FieldView> fields, const DelaunayOptions& options,
+                                                   const Executor& executor, DelaunayReport* report = nullptr);
 
 }  // namespace supple::implicit

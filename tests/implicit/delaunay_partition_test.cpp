@@ -1,0 +1,234 @@
+// Bodies that touch, with triangles of guaranteed quality.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "implicit/analytic_fields.h"
+#include "implicit/mesh_checks.h"
+#include "supple/core/error.h"
+#include "supple/implicit/delaunay.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+std::vector<FieldView> views_of(const std::vector<FunctionField>& fields) { return {fields.begin(), fields.end()}; }
+
+DelaunayOptions options_of(double size, double distance) {
+  return {.angle = 30.0 * kDegree, .size = size, .distance = distance, .cell = 0.5 * size};
+}
+
+/// Least angle, largest circumradius and largest distance from a circumcentre to a surface.
+struct Quality {
+  double angle = std::numbers::pi, radius = 0.0, distance = 0.0;
+};
+template <class Distance>
+Quality quality_of(const Mesh& mesh, const Distance& distance) {
+  Quality q;
+  for (const auto& t : mesh.triangle) {
+    const Vec3 &a = mesh.position[t[0]], &b = mesh.position[t[1]], &c = mesh.position[t[2]];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 &at = mesh.position[t[k]], u = mesh.position[t[(k + 1) % 3]] - at, v = mesh.position[t[(k + 2) % 3]] - at;
+      q.angle = std::min(q.angle, std::atan2(u.cross(v).norm(), u.dot(v)));
+    }
+    const Vec3 u = b - a, w = c - a, n = u.cross(w);
+    const Vec3 centre = a + (u.squaredNorm() * w.cross(n) + w.squaredNorm() * n.cross(u)) / (2.0 * n.squaredNorm());
+    q.radius = std::max(q.radius, (centre - a).norm());
+    q.distance = std::max(q.distance, distance(centre));
+  }
+  return q;
+}
+
+/// Triangles of a mesh whose vertices are all in contact with a body, by that of both meshes.
+std::vector<Corners> contact_triangles(const Mesh& mesh, std::size_t other, bool reversed) {
+  std::vector<Corners> found;
+  for (auto t : mesh.triangle) {
+    if (!std::all_of(t.begin(), t.end(), [&](std::uint32_t v) { return mesh.columns.at(0).values[v] == static_cast<double>(other + 1); })) continue;
+    if (reversed) std::swap(t[1], t[2]);
+    found.push_back(corners_of(mesh, t));
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+// From balls that just touch, with a groove as sharp as one likes between them, to one that is nearly inside the other.
+TEST(DelaunayPartition, HoldsAngleSizeAndDistanceAndSharesTheContact) {
+  const std::vector<std::vector<FunctionField>> pairs{
+      {sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)}, {sphere({-0.4995, 0, 0}, 0.5), sphere({0.4995, 0, 0}, 0.5)},
+      {sphere({-0.495, 0, 0}, 0.5), sphere({0.495, 0.01, 0}, 0.5)},    {sphere({-0.05, 0, 0}, 0.5), sphere({0.15, 0.01, 0}, 0.5)},
+      {sphere(Vec3::Zero(), 0.5), sphere({0.4, 0.01, 0}, 0.2)},        {torus(0.4, 0.2), sphere({0.3, 0.05, 0.3}, 0.3)}};
+  for (const auto& [size, distance] : {std::pair{0.1, 0.01}, std::pair{0.1, 0.003}}) {
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const std::vector<FieldView> views = views_of(pairs[i]);
+      DelaunayReport report;
+      const std::vector<Mesh> mesh = delaunay_partition(views, options_of(size, distance), Executor(1), &report);
+      EXPECT_EQ(report.sharp, 0u) << i;
+      Quality worst;
+      for (std::size_t m = 0; m < 2; ++m) {
+        expect_closed(mesh[m]);
+        EXPECT_EQ(inspect(mesh[m]).euler_characteristic, i == 5 && m == 0 ? 0 : 2) << i;
+        EXPECT_EQ(self_intersections(mesh[m], size), 0u) << i;
+        // |grad F| = 1, and |F_a - F_b| is at most twice the distance to where they are equal.
+        const Quality q = quality_of(mesh[m], [&](const Vec3& p) {
+          const double own = views[m].value(p), other = views[1 - m].value(p);
+          return std::min(std::abs(own), 0.5 * std::abs(own - other));
+        });
+        EXPECT_GE(q.angle, 30.0 * kDegree - 1e-9) << i;
+        EXPECT_LE(q.radius, size) << i;
+        EXPECT_LE(q.distance, distance) << i;
+        worst.angle = std::min(worst.angle, q.angle);
+        worst.radius = std::max(worst.radius, q.radius);
+      }
+      EXPECT_NEAR(report.least_angle, worst.angle, 1e-12) << i;
+      EXPECT_NEAR(report.largest_radius, worst.radius, 1e-12) << i;
+      EXPECT_LE(report.largest_distance, distance) << i;
+      const auto here = contact_triangles(mesh[0], 1, false), there = contact_triangles(mesh[1], 0, true);
+      EXPECT_GT(here.size(), 4u) << i;
+      std::vector<Corners> both;
+      std::set_intersection(here.begin(), here.end(), there.begin(), there.end(), std::back_inserter(both));
+      std::size_t lone = 0;  // three vertices of a rim may span a free surface, too
+      for (std::size_t m = 0; m < 2; ++m) {
+        for (const Corners& c : m == 0 ? here : there) {
+          if (std::binary_search(both.begin(), both.end(), c)) continue;
+          ++lone;
+          const Vec3 middle = (Vec3(c[0].data()) + Vec3(c[1].data()) + Vec3(c[2].data())) / 3.0;
+          EXPECT_LT(std::abs(views[m].value(middle)), std::abs(views[0].value(middle) - views[1].value(middle))) << i;
+        }
+      }
+      EXPECT_LT(5 * lone, both.size()) << i;
+    }
+  }
+}
+
+// Vertices lie on what they bound, normals are those of the fields, and both meshes have the vertices of the rim bit by bit.
+TEST(DelaunayPartition, HasItsVerticesOnTheSurfacesAndTheRim) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  const std::vector<FieldView> views = views_of(balls);
+  const std::vector<Mesh> mesh = delaunay_partition(views, options_of(0.12, 0.012), Executor(1));
+  std::array<std::set<std::array<double, 3>>, 2> rim;
+  for (std::size_t m = 0; m < 2; ++m) {
+    ASSERT_EQ(mesh[m].columns.at(0).name, "contact");
+    for (std::uint32_t v = 0; v < mesh[m].vertex_count(); ++v) {
+      const Vec3& p = mesh[m].position[v];
+      Vec3 own, other;
+      const double f = views[m].value(p, own), g = views[1 - m].value(p, other);
+      EXPECT_NEAR(mesh[m].normal[v].norm(), 1.0, 1e-12);
+      if (mesh[m].columns[0].values[v] == 0.0) {
+        EXPECT_LE(std::abs(f), 1e-12);
+        EXPECT_LE(g, 1e-9);
+        EXPECT_LT((mesh[m].normal[v] + own).norm(), 1e-9);
+        continue;
+      }
+      EXPECT_LE(std::abs(f - g), 1e-12);
+      EXPECT_GE(f, -1e-9);
+      if (std::abs(f) < 1e-12) {
+        rim[m].insert({p.x(), p.y(), p.z()});
+      } else {
+        EXPECT_LT((mesh[m].normal[v] + (own - other).normalized()).norm(), 1e-9);
+      }
+    }
+  }
+  EXPECT_EQ(rim[0], rim[1]);
+  EXPECT_GE(rim[0].size(), 8u);
+}
+
+// Four balls around a point: contacts of two, rims of three, corners of four.
+TEST(DelaunayPartition, HoldsTheAngleWhereThreeAndFourBodiesMeet) {
+  std::vector<FunctionField> balls;
+  for (int i = 0; i < 3; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 3.0;
+    balls.push_back(sphere({0.3 * std::cos(angle), 0.3 * std::sin(angle), 0.0}, 0.45));
+  }
+  for (const std::size_t count : {3u, 4u}) {
+    if (count == 4) balls.push_back(sphere({0, 0, 0.35}, 0.4));
+    DelaunayReport report;
+    const std::vector<Mesh> mesh = delaunay_partition(views_of(balls), options_of(0.1, 0.01), Executor(2), &report);
+    EXPECT_EQ(report.sharp, 0u);
+    for (const Mesh& m : mesh) {
+      expect_closed(m);
+      EXPECT_EQ(inspect(m).euler_characteristic, 2);
+      EXPECT_EQ(self_intersections(m, 0.1), 0u);
+      EXPECT_GE(quality_of(m, [](const Vec3&) { return 0.0; }).angle, 30.0 * kDegree - 1e-9);
+    }
+    for (std::size_t a = 0; a < count; ++a) {
+      for (std::size_t b = 0; b < a; ++b) {
+        std::vector<Corners> both;
+        const auto here = contact_triangles(mesh[a], b, false), there = contact_triangles(mesh[b], a, true);
+        std::set_intersection(here.begin(), here.end(), there.begin(), there.end(), std::back_inserter(both));
+        EXPECT_FALSE(both.empty()) << a << " " << b;
+      }
+    }
+  }
+}
+
+// Whatever lies how: meshes are closed, and what is not held is said. Of pairs, nearly all hold the angle.
+TEST(DelaunayPartition, SaysWhereItDoesNotHoldTheAngle) {
+  int held = 0;
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+    Random random(seed);
+    std::vector<FunctionField> balls;
+    for (int i = 0; i < (seed % 4 == 0 ? 6 : 2); ++i) balls.push_back(sphere(random.in_box(0.4), random.uniform(0.25, 0.5)));
+    DelaunayReport report;
+    const std::vector<Mesh> mesh = delaunay_partition(views_of(balls), options_of(0.2, 0.02), Executor(1), &report);
+    double angle = std::numbers::pi;
+    for (const Mesh& m : mesh) {
+      if (m.triangle.empty()) continue;  // inside others
+      expect_closed(m);
+      angle = std::min(angle, quality_of(m, [](const Vec3&) { return 0.0; }).angle);
+    }
+    EXPECT_NEAR(report.least_angle, angle, 1e-9) << seed;
+    EXPECT_EQ(report.sharp == 0, angle >= 30.0 * kDegree - 1e-12) << seed;
+    if (seed % 4 != 0) held += report.sharp == 0 ? 1 : 0;
+  }
+  EXPECT_GE(held, 16);  // of 18
+}
+
+TEST(DelaunayPartition, KeepsGroupsApartAndAGroundWithoutAMesh) {
+  const std::vector<FunctionField> fields{sphere({0, 0, 0.4}, 0.5), below(0.0), sphere({3, 0, 0.5}, 0.4), sphere({3.5, 0.1, 0.6}, 0.4)};
+  DelaunayReport report;
+  const std::vector<Mesh> mesh = delaunay_partition(views_of(fields), options_of(0.1, 0.01), Executor(1), &report);
+  EXPECT_EQ(report.sharp, 0u);
+  EXPECT_TRUE(mesh[1].triangle.empty());
+  for (const std::size_t m : {0u, 2u, 3u}) expect_closed(mesh[m]);
+  const auto others = [&](std::size_t m) { return std::set<double>(mesh[m].columns[0].values.begin(), mesh[m].columns[0].values.end()); };
+  EXPECT_EQ(others(0), (std::set<double>{0.0, 2.0}));
+  EXPECT_EQ(others(2), (std::set<double>{0.0, 4.0}));
+  EXPECT_EQ(others(3), (std::set<double>{0.0, 3.0}));
+  for (std::size_t v = 0; v < mesh[0].vertex_count(); ++v) {
+    const Vec3& p = mesh[0].position[v];
+    const double own = views_of(fields)[0].value(p);
+    if (mesh[0].columns[0].values[v] != 0.0) {
+      EXPECT_NEAR(own, -p.z(), 1e-12);
+    } else {
+      EXPECT_NEAR(own, 0.0, 1e-12);
+    }
+  }
+}
+
+TEST(DelaunayPartition, RepeatsBitByBitOnAnyNumberOfThreads) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  const auto once = hash_of(delaunay_partition(views_of(balls), options_of(0.1, 0.01), Executor(1)));
+  EXPECT_EQ(hash_of(delaunay_partition(views_of(balls), options_of(0.1, 0.01), Executor(2))), once);
+}
+
+TEST(DelaunayPartition, RefusesBoundsThatTakeTooManyVertices) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  DelaunayOptions options = options_of(0.2, 1e-5);
+  options.most_vertices = 1000;
+  try {
+    (void)delaunay_partition(views_of(balls), options, Executor(1));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Limit);
+    EXPECT_EQ(error.faults().front().key, "mesh.size");
+  }
+}
+
+}  // namespace
+}  // namespace supple::implicit
