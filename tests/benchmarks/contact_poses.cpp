@@ -1,10 +1,10 @@
 /// @file contact_poses.cpp
-/// Contact queries in many random poses: ten cases, worst and middle CPU time and error over the poses, one JSON
+/// Contact queries in many random poses: twelve cases, worst and middle CPU time and error over the poses, one JSON
 /// object a line. A query is broad phase, candidates and contact surface of two bodies, through the general path, with
 /// no state from another pose. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are measured against the finest rule for the two bodies in the other order, which has other nodes; what it
 /// may itself be off by is added to the bounds. Poses whose patch a kink of a field crosses are told apart.
-///   contact_poses [POSES] [CASE] [auto|samples|polar|march]
+///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED]
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
@@ -21,6 +21,7 @@ using namespace supple;
 using namespace supple::benchmarks;
 
 collision::ContactRule only_rule = collision::ContactRule::None;  // None: the cheapest that fits
+std::uint64_t seed = 2026;
 
 struct Query {
   collision::ContactCandidates candidates;
@@ -52,7 +53,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
   };
   std::array<std::array<Line, kErrors.size()>, 2> classes;  // smooth, crossed by kinks
   Hasher hasher;
-  Draw draw(2026);
+  Draw draw(seed);
   for (int pose = 0; pose < poses; ++pose) {
     const Pair pair = make_pose(draw);
     Query query;
@@ -115,7 +116,8 @@ int main(int argc, char** argv) {
               : rule == "polar" ? collision::ContactRule::Polar
               : rule == "march" ? collision::ContactRule::March
                                 : collision::ContactRule::None;
-  const auto wanted = [&](std::string_view name) { return only.empty() || only == name; };
+  if (argc > 4) seed = std::strtoull(argv[4], nullptr, 10);
+  const auto wanted = [&](std::string_view name) { return only.empty() || only == "all" || only == name; };
   constexpr double kRadius = 0.1, kSpacing = 0.03, kShallow = 1e-3, kDeep = 0.3, kE = 1e6;
 
   const auto two_spheres = [&](std::string_view name, double rb, double eb) {
@@ -215,6 +217,16 @@ int main(int argc, char** argv) {
     Rigid ball(wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), 0.22), kE, kSpacing);
     Rigid plate(wyvill_shape(implicit::ShapeKind::Rectangle, Vec3(0.15, 0.15, 0.0), 0.15), kE, kSpacing);
     pressed("plate", ball, plate, 0.07);
+  }
+  {
+    Rigid a(wyvill_shape(implicit::ShapeKind::Segment, Vec3(0.2, 0.0, 0.0), 0.2), kE, kSpacing);
+    Rigid b(wyvill_shape(implicit::ShapeKind::Segment, Vec3(0.1, 0.0, 0.0), 0.25), 3.0 * kE, kSpacing);
+    pressed("capsules", a, b, 0.1);
+  }
+  {
+    Rigid disc(wyvill_shape(implicit::ShapeKind::Disc, Vec3(0.15, 0.0, 0.0), 0.15), kE, kSpacing);
+    Rigid box(wyvill_shape(implicit::ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15), 2.0 * kE, kSpacing);
+    pressed("disc_on_box", disc, box, 0.07);
   }
   {
     Rigid a(ten_blobs(1), kE, kSpacing), b(ten_blobs(2), 2.0 * kE, kSpacing);

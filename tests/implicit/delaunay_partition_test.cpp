@@ -170,7 +170,7 @@ TEST(DelaunayPartition, HoldsTheAngleWhereThreeAndFourBodiesMeet) {
 // Whatever lies how: meshes are closed, and what is not held is said. Of pairs, nearly all hold the angle.
 TEST(DelaunayPartition, SaysWhereItDoesNotHoldTheAngle) {
   int held = 0;
-  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Random random(seed);
     std::vector<FunctionField> balls;
     for (int i = 0; i < (seed % 4 == 0 ? 6 : 2); ++i) balls.push_back(sphere(random.in_box(0.4), random.uniform(0.25, 0.5)));
@@ -186,7 +186,7 @@ TEST(DelaunayPartition, SaysWhereItDoesNotHoldTheAngle) {
     EXPECT_EQ(report.sharp == 0, angle >= 30.0 * kDegree - 1e-12) << seed;
     if (seed % 4 != 0) held += report.sharp == 0 ? 1 : 0;
   }
-  EXPECT_GE(held, 16);  // of 18
+  EXPECT_GE(held, 8);  // of 9
 }
 
 TEST(DelaunayPartition, KeepsGroupsApartAndAGroundWithoutAMesh) {
