@@ -3,8 +3,6 @@
 /// axes whose z is the normal, and point away from the surface.
 #pragma once
 
-#include <algorithm>
-
 #include "sampling.h"
 
 namespace supple::render::path {

@@ -131,7 +131,8 @@ void Denoiser::resize(int width, int height) {
   if (width == width_ && height == height_) return;
   width_ = width;
   height_ = height;
-  for (Plane* plane : {&f_.nx, &f_.ny, &f_.nz, &f_.px, &f_.py, &f_.pz, &f_.cover, &f_.shown, &f_.share, &f_.nearness, &f_.near, &f_.plane}) plane->reset(width, height);
+  for (Plane* plane : {&f_.nx, &f_.ny, &f_.nz, &f_.px, &f_.py, &f_.pz, &f_.cover, &f_.shown, &f_.share, &f_.nearness, &f_.near, &f_.plane})
+    plane->reset(width, height);
   for (Signal& signal : signals_) {
     for (Plane* plane : {&signal.noise, &signal.guide, &signal.scale}) plane->reset(width, height);
     for (Light* light : {&signal.light, &signal.next})
@@ -263,7 +264,8 @@ void Denoiser::finish(Film& film) const {
     for (int x = 0; x < width_; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
       if (film.cover[i] <= 0.0F) continue;
-      const Vec3f falls(direct.r.at(x, y) + indirect.r.at(x, y), direct.g.at(x, y) + indirect.g.at(x, y), direct.b.at(x, y) + indirect.b.at(x, y));
+      const Vec3f falls(direct.r.at(x, y) + indirect.r.at(x, y), direct.g.at(x, y) + indirect.g.at(x, y),
+                        direct.b.at(x, y) + indirect.b.at(x, y));
       film.radiance[i] = falls.cwiseProduct(film.albedo[i].cwiseMax(kAlbedoFloor));
     }
   });

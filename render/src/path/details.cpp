@@ -27,8 +27,11 @@ struct Signs {
   Plane direct, light;           ///< luminances
 
   Signs(int width, int height) {
-    for (Plane* plane : {&cover, &inside, &albedo[0], &albedo[1], &albedo[2], &normal[0], &normal[1], &normal[2], &nearness, &size, &direct, &light})
-      plane->reset(width, height);
+    for (Plane* plane : {&cover, &inside, &nearness, &size, &direct, &light}) plane->reset(width, height);
+    for (std::size_t k = 0; k < 3; ++k) {
+      albedo[k].reset(width, height);
+      normal[k].reset(width, height);
+    }
   }
   void fill(const Film& film, const CameraMatrices& camera, float pixel, std::size_t i, int x, int y) {
     inside.at(x, y) = 1.0F;
@@ -85,7 +88,7 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
   const int width = settings.width, height = settings.height;
   const auto rows = [&](const auto& body) {
     executor.for_blocks(static_cast<std::size_t>(height), 8, [&](std::size_t begin, std::size_t end) {
-      for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) body(y, static_cast<std::size_t>(y) * static_cast<std::size_t>(width));
+      for (std::size_t y = begin; y < end; ++y) body(static_cast<int>(y), y * static_cast<std::size_t>(width));
     });
   };
   Signs signs(width, height);
@@ -105,8 +108,10 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
         const std::size_t i = row + static_cast<std::size_t>(left) + k;
         const std::uint32_t samples = film.samples[i];
         const Detail detail = meet[k] != 0 ? Detail::Surfaces : gap[k] != 0 ? Detail::Gap : Detail::Shadow;
-        const std::uint32_t rays = std::min(most, detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples);
-        if (rays > samples || detail == Detail::Surfaces) found[static_cast<std::size_t>(y)].push_back({.pixel = i, .detail = detail, .rays = rays, .walks = gap[k] != 0, .samples = 0});
+        const std::uint32_t asked = detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples;
+        const std::uint32_t rays = std::min(most, asked);
+        if (rays > samples || detail == Detail::Surfaces)
+          found[static_cast<std::size_t>(y)].push_back({.pixel = i, .detail = detail, .rays = rays, .walks = gap[k] != 0, .samples = 0});
       }
     }
   });

@@ -323,7 +323,8 @@ std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) 
   RTCIntersectContext context = coherent();
   rtcIntersect8(reinterpret_cast<const int*>(&rays.who), scene_, &context, &bundle);
   for (std::size_t k = 0; k < kLanes; ++k)
-    out[k] = {.distance = bundle.ray.tfar[k], .item = bundle.hit.geomID[k], .triangle = bundle.hit.primID[k], .u = bundle.hit.u[k], .v = bundle.hit.v[k]};
+    out[k] = {.distance = bundle.ray.tfar[k], .item = bundle.hit.geomID[k], .triangle = bundle.hit.primID[k], .u = bundle.hit.u[k],
+              .v = bundle.hit.v[k]};
   return out;
 }
 

@@ -3,7 +3,6 @@
 /// neither threads nor the order of the work change a bit.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <numbers>
 

@@ -69,7 +69,8 @@ Tracer::Meeting Tracer::meet(const RayBundle& rays, Lanes choice, Places& places
   if (any(met.ground)) {
     const Vec3Lanes p = rays.from + met.distance * rays.direction;
     places = {.point = p, .normal = Vec3Lanes(Vec3f::UnitZ()), .leave = Vec3Lanes(p.x(), p.y(), all_lanes(ground_->height + gap_)),
-              .bsdf = {.diffuse = Vec3Lanes(ground_->albedo), .normal_reflectance = Vec3Lanes::Zero(), .grazing_reflectance = Lanes{}, .alpha = all_lanes(1.0F)}};
+              .bsdf = {.diffuse = Vec3Lanes(ground_->albedo), .normal_reflectance = Vec3Lanes::Zero(), .grazing_reflectance = Lanes{},
+                       .alpha = all_lanes(1.0F)}};
     for (std::size_t k = 0; ground_->pattern != nullptr && k < kLanes; ++k)
       if (met.ground[k] != 0) places.bsdf.diffuse.set_lane(k, ground_->pattern->colour(p.lane(k).head<2>() + ground_->origin));
   }
@@ -137,7 +138,8 @@ Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3La
   const Vec3Lanes f = places.bsdf.evaluate(out, in);
   const LaneMask lit = both(who, both(facing > 0.0F, f.maxCoeff() > 0.0F));
   if (!any(lit)) return Vec3Lanes::Zero();
-  const LaneMask blocked = geometry_.blocked({.from = places.leave, .direction = direction, .time = time, .who = lit}, distance * 0.9999F);
+  const RayBundle to_lamp{.from = places.leave, .direction = direction, .time = time, .who = lit};
+  const LaneMask blocked = geometry_.blocked(to_lamp, distance * 0.9999F);
   const Lanes density = density_of_face(area, facing, distance) / count;
   const Vec3Lanes light = f.cwiseProduct(radiance) * (power_share(density, places.bsdf.density(out, in)) / density);
   return select(both(lit, ~blocked), light, Vec3Lanes::Zero());
@@ -149,7 +151,8 @@ Vec3Lanes Tracer::direct(const Places& places, const Axes& axes, const Vec3Lanes
   const Light sunny = sunlight(places, axes, out, random);
   const LaneMask lit = both(who, sunny.light.maxCoeff() > 0.0F);
   LaneMask shadowed{};
-  if (any(lit)) shadowed = geometry_.blocked({.from = places.leave, .direction = sunny.direction, .time = time, .who = lit, .together = together});
+  if (any(lit))
+    shadowed = geometry_.blocked({.from = places.leave, .direction = sunny.direction, .time = time, .who = lit, .together = together});
   return select(both(lit, ~shadowed), sunny.light, Vec3Lanes::Zero()) + lamplight(places, axes, out, who, time, random);
 }
 
@@ -205,12 +208,14 @@ void Tracer::sample(std::span<const Pick> picks, std::span<Sample> out) const {
   const LaneBits x = lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.x); });
   const LaneBits y = lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.y); });
   const LaneBits stream = lanes_of(picks, [](const Pick& p) { return p.stream; });
-  Random random(x, y, stream, lanes_of(picks, [](const Pick& p) { return p.count; }), lanes_of(picks, [](const Pick& p) { return p.number; }));
+  Random random(x, y, stream, lanes_of(picks, [](const Pick& p) { return p.count; }),
+                lanes_of(picks, [](const Pick& p) { return p.number; }));
   const RayBundle rays = camera_rays(picks, who, random);
   Places places{};
   const Meeting met = meet(rays, random.number(), places);
 
-  const Lanes cover = select(met.surface, select(met.ground, ground_ ? ground_share(places.point) : Lanes{}, 1.0F), select(met.lamp, all_lanes(1.0F), 0.0F));
+  const Lanes of_ground = ground_ ? ground_share(places.point) : Lanes{};
+  const Lanes cover = select(met.ground, of_ground, select(met.surface | met.lamp, all_lanes(1.0F), 0.0F));
   const BsdfOf<Lanes>& bsdf = places.bsdf;
   const Vec3Lanes albedo = bsdf.diffuse + bsdf.normal_reflectance;
   const Lanes mirror = select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F);

@@ -98,8 +98,10 @@ class Tracer {
   [[nodiscard]] RayBundle camera_rays(std::span<const Pick> picks, LaneMask who, Random& random) const;
   [[nodiscard]] Meeting meet(const RayBundle& rays, Lanes choice, Places& places) const;
   [[nodiscard]] Light sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const;
-  [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, Random& random) const;
-  [[nodiscard]] Vec3Lanes direct(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, bool together, Random& random) const;
+  [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time,
+                                    Random& random) const;
+  [[nodiscard]] Vec3Lanes direct(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, bool together,
+                                 Random& random) const;
   [[nodiscard]] Vec3Lanes indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const;
   [[nodiscard]] Lanes ground_share(const Vec3Lanes& point) const;
 
