@@ -484,22 +484,26 @@ TEST(PathTracer, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAnotherPicture) {
   const std::array items = {Item{.mesh = &meshes[0], .colour = Vec3(0.9, 0.3, 0.1)},
                             Item{.mesh = &meshes[1], .colour = Vec3(0.1, 0.3, 0.9), .roughness = 0.2, .metallic = 1.0}};
   View view;
-  view.ground = Ground{};
   view.area_lights = {{.at = Vec3(0, -1, 2)}};
   RenderSettings settings;
   settings.width = 93;
   settings.height = 64;
   settings.kind = RendererKind::Path;
   settings.most_samples = 16;
-  View other = view;
-  other.camera.from = view.camera.look_at + 0.5 * (view.camera.from - view.camera.look_at);
-  const Image one = make_renderer(settings)->render(view, items);
-  for (const int threads : {2, 3}) {
-    settings.threads = threads;
-    const std::unique_ptr<Renderer> renderer = make_renderer(settings);
-    EXPECT_EQ(renderer->render(view, items).pixels, one.pixels) << threads;
-    EXPECT_NE(renderer->render(other, items).pixels, one.pixels) << threads;
-    EXPECT_EQ(renderer->render(view, items).pixels, one.pixels) << threads;
+  for (const bool with_ground : {true, false}) {
+    if (with_ground) view.ground = Ground{};
+    else view.ground.reset();
+    View other = view;
+    other.camera.from = view.camera.look_at + 0.5 * (view.camera.from - view.camera.look_at);
+    settings.threads = 1;
+    const Image one = make_renderer(settings)->render(view, items);
+    for (const int threads : {2, 3}) {
+      settings.threads = threads;
+      const std::unique_ptr<Renderer> renderer = make_renderer(settings);
+      EXPECT_EQ(renderer->render(view, items).pixels, one.pixels) << threads;
+      EXPECT_NE(renderer->render(other, items).pixels, one.pixels) << threads;
+      EXPECT_EQ(renderer->render(view, items).pixels, one.pixels) << threads << ' ' << with_ground;
+    }
   }
 }
 
