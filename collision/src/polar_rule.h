@@ -198,6 +198,17 @@ class PolarRuleSolver {
   std::vector<Walk> walks_;
   std::vector<Sheet> sheets_;
   std::vector<std::size_t> ray_nodes_, ray_fewer_;  // first node of a ray, and of those with fewer radii
+  /// Columns of kept nodes, each with that of the nodes at hand.
+  template <class Body>
+  void for_columns(const Body& body) {
+    body(kept_.point, node_.point);
+    body(kept_.slope_a, node_.slope_a);
+    body(kept_.slope_b, node_.slope_b);
+    body(kept_weight_, weight_);
+    body(kept_area_, area_);
+    body(kept_pressure_, pressure_);
+    body(kept_normal_, normal_);
+  }
   PressureBatch kept_;
   std::vector<double> kept_weight_, kept_area_, kept_pressure_;
   std::vector<Vec3> kept_normal_;

@@ -469,17 +469,10 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       weigh(panel.fine, x, normal_[i], area_[i], pressure_[i]);
       weigh(panel.angular, x, normal_[i], area_[i] * (rule.gauss_weight[k] / rule.weight[k]), pressure_[i]);
     }
-    const auto keep = [&](auto& to, const auto& from) {
-      to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
-                from.begin() + static_cast<std::ptrdiff_t>(ray_fewer_[ray + k]));
-    };
-    keep(kept_.point, node_.point);
-    keep(kept_.slope_a, node_.slope_a);
-    keep(kept_.slope_b, node_.slope_b);
-    keep(kept_weight_, weight_);
-    keep(kept_area_, area_);
-    keep(kept_pressure_, pressure_);
-    keep(kept_normal_, normal_);
+    for_columns([&](auto& kept, const auto& node) {
+      kept.insert(kept.end(), node.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
+                  node.begin() + static_cast<std::ptrdiff_t>(ray_fewer_[ray + k]));
+    });
     for (std::size_t i = ray_fewer_[ray + k]; i < ray_nodes_[ray + k + 1]; ++i) {
       weigh(panel.radial, node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
     }
@@ -590,16 +583,9 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   normal_.clear();
   fine_ = {};
   for (const Panel& panel : panels_) {
-    const auto keep = [&panel](auto& to, const auto& from) {
-      to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(panel.first), from.begin() + static_cast<std::ptrdiff_t>(panel.last));
-    };
-    keep(node_.point, kept_.point);
-    keep(node_.slope_a, kept_.slope_a);
-    keep(node_.slope_b, kept_.slope_b);
-    keep(weight_, kept_weight_);
-    keep(area_, kept_area_);
-    keep(pressure_, kept_pressure_);
-    keep(normal_, kept_normal_);
+    for_columns([&panel](const auto& kept, auto& node) {
+      node.insert(node.end(), kept.begin() + static_cast<std::ptrdiff_t>(panel.first), kept.begin() + static_cast<std::ptrdiff_t>(panel.last));
+    });
     fine_.add(panel.fine);
   }
   node_.resize(node_.point.size());

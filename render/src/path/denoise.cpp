@@ -1,6 +1,5 @@
 #include "denoise.h"
 
-#include <bit>
 #include <cmath>
 #include <span>
 

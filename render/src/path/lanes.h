@@ -117,13 +117,11 @@ struct LaneTypes;
 template <>
 struct LaneTypes<float> {
   using Bits = std::uint32_t;
-  using Mask = bool;
   using Vector = Vec3f;
 };
 template <>
 struct LaneTypes<Lanes> {
   using Bits = LaneBits;
-  using Mask = LaneMask;
   using Vector = Vec3Lanes;
 };
 
