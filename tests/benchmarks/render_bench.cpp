@@ -118,6 +118,7 @@ int bench_rate(int at_once, const RenderSettings& settings) {
     draw(static_cast<std::size_t>(k), meshes.front());
   }
   const auto begin = std::chrono::steady_clock::now();
+  const double cpu = cpu_seconds();
   std::vector<std::thread> threads;
   for (std::size_t k = 0; k < renderers.size(); ++k)
     threads.emplace_back([&, k] {
@@ -125,9 +126,12 @@ int bench_rate(int at_once, const RenderSettings& settings) {
     });
   for (std::thread& thread : threads) thread.join();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double frame_cpu = (cpu_seconds() - cpu) / (at_once * kFrames);
   const std::string quality = path ? "\"noise\": " + std::to_string(settings.noise) : "\"samples\": " + std::to_string(settings.samples);
-  std::printf("{\"name\": \"render/%s/rate\", \"width\": %d, \"height\": %d, %s, \"triangles\": %zu, \"at_once\": %d, \"frames_s\": %.2f}\n",
-              path ? "path" : "gl", settings.width, settings.height, quality.c_str(), meshes.front().triangle_count(), at_once, at_once * kFrames / seconds);
+  std::printf("{\"name\": \"render/%s/rate\", \"width\": %d, \"height\": %d, %s, \"triangles\": %zu, \"at_once\": %d, \"frames_s\": %.2f, "
+              "\"cpu_ms\": %.0f}\n",
+              path ? "path" : "gl", settings.width, settings.height, quality.c_str(), meshes.front().triangle_count(), at_once, at_once * kFrames / seconds,
+              1e3 * frame_cpu);
   return 0;
 }
 

@@ -59,11 +59,34 @@ Mesh plate(double half, const Vec3& at, const Vec3& u, const Vec3& v) {
   return mesh;
 }
 
+struct Pixel {
+  int x, y;
+};
+
+std::vector<Pixel> pixels_of(const Film& film) {
+  std::vector<Pixel> pixels;
+  for (int y = 0; y < film.height; ++y)
+    for (int x = 0; x < film.width; ++x) pixels.push_back({x, y});
+  return pixels;
+}
+
+double mean_green(const Film& film) {
+  double sum = 0.0;
+  for (const auto& [x, y] : pixels_of(film)) sum += film.radiance.at(x, y).y();
+  return sum / (film.width * film.height);
+}
+
+double total(const Film& film, const path::Plane& plane) {
+  double sum = 0.0;
+  for (const auto& [x, y] : pixels_of(film)) sum += plane.at(x, y);
+  return sum;
+}
+
 double rms_difference(const Film& a, const Film& b) {
   double sum = 0.0, count = 0.0;
-  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
-    if (!(a.cover[i] > 0.0F && b.cover[i] > 0.0F)) continue;
-    sum += (a.cover[i] * a.radiance[i] - b.cover[i] * b.radiance[i]).squaredNorm() / 3.0;
+  for (const auto& [x, y] : pixels_of(a)) {
+    if (!(a.cover.at(x, y) > 0.0F && b.cover.at(x, y) > 0.0F)) continue;
+    sum += (a.cover.at(x, y) * a.radiance.at(x, y) - b.cover.at(x, y) * b.radiance.at(x, y)).squaredNorm() / 3.0;
     count += 1.0;
   }
   return std::sqrt(sum / count);
@@ -78,9 +101,9 @@ TEST(PathTracer, FindsAWhiteBodyInEvenLightAsBrightAsTheLight) {
     const Item item = matt(ball, albedo);
     const Film film = studio.trace(std::span(&item, 1));
     double covered = 0.0;
-    for (std::size_t i = 0; i < film.radiance.size(); ++i) {
-      covered += film.cover[i];
-      if (film.cover[i] > 0.0F) { EXPECT_NEAR(film.radiance[i].y(), albedo, 1e-4); }  // each path's weight is exact
+    for (const auto& [x, y] : pixels_of(film)) {
+      covered += film.cover.at(x, y);
+      if (film.cover.at(x, y) > 0.0F) { EXPECT_NEAR(film.radiance.at(x, y).y(), albedo, 1e-4); }  // each path's weight is exact
     }
     EXPECT_GT(covered, 200.0);
   }
@@ -96,9 +119,9 @@ TEST(PathTracer, LosesNoLightBetweenWhiteBodies) {
   studio.lights.above = studio.lights.below = Vec3f::Ones();
   const Film film = studio.trace(items);
   double sum = 0.0, count = 0.0;
-  for (std::size_t i = 0; i < film.radiance.size(); ++i) {
-    sum += film.cover[i] * film.radiance[i].y();
-    count += film.cover[i];
+  for (const auto& [x, y] : pixels_of(film)) {
+    sum += film.cover.at(x, y) * film.radiance.at(x, y).y();
+    count += film.cover.at(x, y);
   }
   // Roulette lets a fifth of some ten thousand paths or less end at 0 or go on heavier: deviation .25 / 100, four times.
   EXPECT_NEAR(sum / count, 1.0, 0.01);
@@ -118,13 +141,9 @@ TEST(PathTracer, LosesNoLightInADeepWhiteBox) {
   studio.settings.most_samples = 64;
   studio.lights.above = studio.lights.below = Vec3f::Ones();
   const Film film = studio.trace(std::span(&item, 1));
-  double sum = 0.0;
-  for (std::size_t i = 0; i < film.radiance.size(); ++i) {
-    ASSERT_EQ(film.cover[i], 1.0F);
-    sum += film.radiance[i].y();
-  }
+  for (const auto& [x, y] : pixels_of(film)) ASSERT_EQ(film.cover.at(x, y), 1.0F);
   // Paths leave after some four bounces, of which roulette ends 5 % and makes the others heavier: deviation .25 of 32,000 paths.
-  EXPECT_NEAR(sum / static_cast<double>(film.radiance.size()), 1.0, 0.01);
+  EXPECT_NEAR(mean_green(film), 1.0, 0.01);
 }
 
 /// Whether each box of 2^-a x 2^-(m-a) holds one of 2^m points, for every a: a (0, m, 2)-net in base 2.
@@ -253,8 +272,7 @@ TEST(PathTracer, LightsATiltedPlateByItsShareOfSkyAndOfWhatIsBelow) {
     const double normal_z = mesh.normal[0].z();
     ASSERT_LT(mesh.normal[0].y(), 0.0);
     const double expected = 0.6 * (2.0 * 0.5 * (1.0 + normal_z) + 0.5 * 0.5 * (1.0 - normal_z));
-    const double mean = std::accumulate(film.radiance.begin(), film.radiance.end(), 0.0,
-                                        [](double s, const Vec3f& v) { return s + v.y(); }) / static_cast<double>(film.radiance.size());
+    const double mean = mean_green(film);
     // A sample is 1.2 or .3 with about even chance: deviation .45, over 512 for 32^2 x 256 samples, four times.
     EXPECT_NEAR(mean, expected, 4.0 * 0.45 / 512.0) << tilt;
   }
@@ -269,8 +287,7 @@ TEST(PathTracer, GivesTheSunItsIrradianceWhateverItsSize) {
     studio.lights.sun.cosine = static_cast<float>(std::cos(radius));
     studio.settings.most_samples = 64;
     const Film film = studio.trace(std::span(&item, 1));
-    const double mean = std::accumulate(film.radiance.begin(), film.radiance.end(), 0.0,
-                                        [](double s, const Vec3f& v) { return s + v.y(); }) / static_cast<double>(film.radiance.size());
+    const double mean = mean_green(film);
     EXPECT_NEAR(mean, 0.5 * 0.8, 0.004) << radius;  // albedo times E / pi times the cosine; the disc is above the plate
   }
 }
@@ -305,8 +322,7 @@ TEST(PathTracer, ShadesTheEdgeOfARectanglesShadowByItsVisiblePart) {
     const Film film = studio.trace(items);
     const double upper = std::clamp(-x, -0.5, 0.5);
     const double expected = 3.0 * view_factor(-0.5 - x, upper - x, -0.5, 0.5, 2.0);
-    double mean = 0.0;
-    for (const Vec3f& v : film.radiance) mean += v.y() / 16.0;
+    const double mean = mean_green(film);
     // 16,384 stratified samples of at most 3 x .08 / (share): below .002 in every case.
     EXPECT_NEAR(mean, expected, 0.003) << x;
   }
@@ -353,13 +369,13 @@ TEST(PathTracer, TakesSamplesUntilTheStatedNoise) {
   for (const double noise : {0.2, 0.05, 0.02}) {
     studio.settings.noise = noise;
     const Film film = studio.trace(std::span(&item, 1));
-    const double samples = std::accumulate(film.samples.begin(), film.samples.end(), 0.0);
+    const double samples = total(film, film.samples);
     EXPECT_GT(samples, before);
     before = samples;
     double sum = 0.0, count = 0.0;
-    for (std::size_t i = 0; i < film.radiance.size(); ++i) {
-      const double exact = path::luminance(reference.radiance[i]) * reference.cover[i];
-      const double error = (path::luminance(film.radiance[i]) * film.cover[i] - exact) / (exact + 0.1);
+    for (const auto& [x, y] : pixels_of(film)) {
+      const double exact = path::luminance(reference.radiance.at(x, y)) * reference.cover.at(x, y);
+      const double error = (path::luminance(film.radiance.at(x, y)) * film.cover.at(x, y) - exact) / (exact + 0.1);
       sum += error * error;
       count += 1.0;
     }
@@ -380,11 +396,11 @@ TEST(PathTracer, TakesMoreSamplesWhereSurfacesMeetInThePicture) {
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
       const double off = std::hypot(x - 31.5, y - 31.5) - radius;
-      const std::uint32_t samples = film.samples[static_cast<std::size_t>(64 * y + x)];
+      const float samples = film.samples.at(x, y);
       if (std::abs(off) < 0.5) {
-        EXPECT_EQ(samples, 32u) << x << ' ' << y;
+        EXPECT_EQ(samples, 32.0F) << x << ' ' << y;
       } else if (off > 3.0 || off < -8.0) {
-        EXPECT_EQ(samples, 1u) << x << ' ' << y;
+        EXPECT_EQ(samples, 1.0F) << x << ' ' << y;
       }
     }
 }
@@ -410,17 +426,16 @@ TEST(PathTracer, TakesMoreSamplesWhereAShadowEnds) {
   studio.lights.sun = {.to_light = Vec3f::UnitZ(), .irradiance = Vec3f::Constant(3.0F), .cosine = std::cos(0.0005F)};
   const Film film = studio.trace(studio.items);
   std::array<double, 64> light{}, taken_anew{};
-  for (std::size_t i = 0; i < film.samples.size(); ++i) {
-    const std::size_t x = i % 64;
-    const double share = film.direct.radiance[i].y() * kPi / 1.5;
-    if (film.samples[i] == 1) {
+  for (const auto& [x, y] : pixels_of(film)) {
+    const double share = film.direct.radiance.at(x, y).y() * kPi / 1.5;
+    if (film.samples.at(x, y) == 1.0F) {
       if (x < 30 || x > 33) { EXPECT_NEAR(share, x < 32 ? 1.0 : 0.0, 1e-3) << x; }
       continue;
     }
-    EXPECT_EQ(film.samples[i], 16u);
+    EXPECT_EQ(film.samples.at(x, y), 16.0F);
     EXPECT_TRUE(x >= 30 && x <= 33) << x;
-    light[x] += share;
-    taken_anew[x] += 1.0;
+    light[static_cast<std::size_t>(x)] += share;
+    taken_anew[static_cast<std::size_t>(x)] += 1.0;
   }
   // One sample tells on which side of the edge a pixel is: at least the two that differ.
   EXPECT_GE(std::accumulate(taken_anew.begin(), taken_anew.end(), 0.0), 128.0);
@@ -464,14 +479,14 @@ TEST(PathTracer, TakesMorePathsInNarrowGaps) {
   const Film film = studio.trace(items);
   double sum = 0.0, count = 0.0;
   for (const path::DetailedPixel& d : film.detailed) {
-    const int x = static_cast<int>(d.pixel % 64);
+    const int x = d.x;
     EXPECT_LT(std::abs(x - 31.5), 16.0);
     if (d.detail != path::Detail::Gap) continue;
-    EXPECT_EQ(film.samples[d.pixel], 16u);
+    EXPECT_EQ(film.samples.at(d.x, d.y), 16.0F);
     if (x != 31 && x != 32) continue;  // a wall stands on the outer two
     const double s = 0.02 * (x - 31.5), left = kHalf + s, right = kHalf - s;
     const double sky = 0.5 * (left / std::hypot(left, kDepth) + right / std::hypot(right, kDepth));
-    const double error = film.radiance[d.pixel].y() / 0.5 - sky;
+    const double error = film.radiance.at(d.x, d.y).y() / 0.5 - sky;
     sum += error * error - sky * (1.0 - sky) / 16.0;  // the variance of as many independent paths
     count += 1.0;
   }
@@ -547,16 +562,16 @@ TEST(PathTracer, MeetsTheFieldInsteadOfACoarseMesh) {
   const Film smooth = studio.trace(std::span(&item, 1));
   const auto inner = [&](const Film& film) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < film.position.size(); ++i)
-      if (exact.cover[i] >= 1.0F && exact.position[i].y() < -0.3F) sum += (film.normal[i] - exact.normal[i]).squaredNorm();
+    for (const auto& [x, y] : pixels_of(film))
+      if (exact.cover.at(x, y) >= 1.0F && exact.position.at(x, y).y() < -0.3F) sum += (film.normal.at(x, y) - exact.normal.at(x, y)).squaredNorm();
     return std::sqrt(sum);
   };
   EXPECT_LT(inner(smooth), 0.1 * inner(faceted));
   // Away from the outline every hit lies on the ball and has its normal.
-  for (std::size_t i = 0; i < smooth.position.size(); ++i)
-    if (smooth.cover[i] >= 1.0F && smooth.position[i].y() < -0.3F) {
-      EXPECT_NEAR(smooth.position[i].norm(), 0.6, 1e-3);  // the mean over a pixel lies a little inside
-      EXPECT_GT(smooth.normal[i].normalized().dot(smooth.position[i].normalized()), 0.9999F);
+  for (const auto& [x, y] : pixels_of(smooth))
+    if (smooth.cover.at(x, y) >= 1.0F && smooth.position.at(x, y).y() < -0.3F) {
+      EXPECT_NEAR(smooth.position.at(x, y).norm(), 0.6, 1e-3);  // the mean over a pixel lies a little inside
+      EXPECT_GT(smooth.normal.at(x, y).normalized().dot(smooth.position.at(x, y).normalized()), 0.9999F);
     }
 }
 
@@ -569,16 +584,15 @@ TEST(PathTracer, BlursWhatMovesAndWhatIsOutOfFocus) {
   studio.settings.most_samples = 256;  // the outermost pixels show the ball a hundredth of the time
   const auto width_of = [&](const Film& film) {
     int width = 0;
-    for (int x = 0; x < 32; ++x) width += film.cover[static_cast<std::size_t>(16 * 32 + x)] > 0.0F ? 1 : 0;
+    for (int x = 0; x < 32; ++x) width += film.cover.at(x, 16) > 0.0F ? 1 : 0;
     return width;
   };
-  const auto total = [](const Film& film) { return std::accumulate(film.cover.begin(), film.cover.end(), 0.0); };
   const Film still = studio.trace(std::span(&item, 1));
   studio.shutter = 0.04;
   const Film moving = studio.trace(std::span(&item, 1));
   // .4 m at 5 m with 32 pixels over 2 x 5 tan(.15) m: 8.5 pixels more, and the same light in all.
   EXPECT_NEAR(width_of(moving) - width_of(still), 8.5, 2.0);
-  EXPECT_NEAR(total(moving), total(still), 0.03 * total(still));
+  EXPECT_NEAR(total(moving, moving.cover), total(still, still.cover), 0.03 * total(still, still.cover));
   studio.shutter = 0.0;
   studio.view.camera.aperture = 0.2;
   EXPECT_LE(std::abs(width_of(studio.trace(std::span(&item, 1))) - width_of(still)), 2);  // in focus
@@ -602,7 +616,7 @@ TEST(PathTracer, FilterBringsAFewSamplesNearerToMany) {
   studio.settings.most_samples = 8;
   Film film = studio.trace(std::span(&item, 1));
   const double before = rms_difference(film, reference);
-  path::Denoiser{}.run(64, 64, Vec3f(0, -5, 0), static_cast<float>(2.0 * std::tan(0.15) / 64.0), Executor(1), film);
+  path::Denoiser{}.run(Vec3f(0, -5, 0), static_cast<float>(2.0 * std::tan(0.15) / 64.0), Executor(1), film);
   EXPECT_LT(rms_difference(film, reference), 0.7 * before);  // much of the picture is outlines at this size
 }
 
@@ -619,9 +633,9 @@ TEST(PathTracer, FilterLeavesTheEdgesOfReflections) {
   studio.settings.most_samples = 8;
   studio.lights.above = Vec3f::Ones();
   Film film = studio.trace(items);
-  path::Denoiser{}.run(64, 64, Vec3f(0, -5, 0.9F), static_cast<float>(2.0 * std::tan(0.05) / 64.0), Executor(1), film);
+  path::Denoiser{}.run(Vec3f(0, -5, 0.9F), static_cast<float>(2.0 * std::tan(0.05) / 64.0), Executor(1), film);
   for (int x = 0; x < 64; ++x) {
-    const float light = film.radiance[static_cast<std::size_t>(32 * 64 + x)].y();
+    const float light = film.radiance.at(x, 32).y();
     if (x < 27) { EXPECT_GT(light, 0.97F) << x; }
     if (x > 36) { EXPECT_LT(light, 0.03F) << x; }
   }
@@ -643,7 +657,7 @@ TEST(PathTracer, FilterKeepsTheDarkOfNarrowGaps) {
   studio.settings.most_samples = 8;
   Film film = studio.trace(items);
   const double before = rms_difference(film, reference);
-  path::Denoiser{}.run(64, 64, Vec3f(-1.2F, 0, 0.1F), static_cast<float>(2.0 * std::tan(0.03) / 64.0), Executor(1), film);
+  path::Denoiser{}.run(Vec3f(-1.2F, 0, 0.1F), static_cast<float>(2.0 * std::tan(0.03) / 64.0), Executor(1), film);
   EXPECT_LT(rms_difference(film, reference), 0.3 * before);
 }
 
@@ -658,7 +672,7 @@ TEST(PathTracer, FollowsBundlesAsItFollowsRays) {
     for (int row = 0; row < 40; ++row) {
       const std::size_t count = 1 + static_cast<std::size_t>(row) % path::kLanes;
       path::RayBundle rays{.from = path::Vec3Lanes::Zero(), .direction = path::Vec3Lanes(Vec3f::UnitY()), .time = {},
-                           .who = path::first_lanes(count), .together = together};
+                           .who = path::first_lanes(static_cast<int>(count)), .together = together};
       path::Lanes choice{}, light{};
       for (std::size_t i = 0; i < path::kLanes; ++i) {
         choice[i] = 0.1F + 0.11F * static_cast<float>(i);
@@ -730,19 +744,19 @@ TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {
   studio.lights.above = Vec3f::Ones();
   studio.settings.most_samples = 64;
   Film film = studio.trace(items);
-  const std::vector<Vec3f> paths = film.radiance;
-  path::Denoiser{}.run(64, 64, Vec3f(0, -5, 1.4F), static_cast<float>(2.0 * std::tan(0.06) / 64.0), Executor(1), film);
+  const path::VectorPlane paths = film.radiance;
+  path::Denoiser{}.run(Vec3f(0, -5, 1.4F), static_cast<float>(2.0 * std::tan(0.06) / 64.0), Executor(1), film);
   studio.settings.noise = 0.0;
   studio.settings.most_samples = 256;
   const Film reference = studio.trace(items);
   double bias = 0.0, light = 0.0, count = 0.0, error2 = 0.0, path_error2 = 0.0;
   for (const path::DetailedPixel& d : film.detailed) {
     if (d.detail != path::Detail::Surfaces || !d.walks) continue;
-    const double error = film.radiance[d.pixel].y() - reference.radiance[d.pixel].y();
+    const double error = film.radiance.at(d.x, d.y).y() - reference.radiance.at(d.x, d.y).y();
     bias += error;
     error2 += error * error;
-    path_error2 += std::pow(paths[d.pixel].y() - reference.radiance[d.pixel].y(), 2);
-    light += reference.radiance[d.pixel].y();
+    path_error2 += std::pow(paths.at(d.x, d.y).y() - reference.radiance.at(d.x, d.y).y(), 2);
+    light += reference.radiance.at(d.x, d.y).y();
     count += 1.0;
   }
   EXPECT_GT(count, 20.0);

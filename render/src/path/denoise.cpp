@@ -78,36 +78,36 @@ struct Neighbours {
 
 /// Of eight pixels.
 struct Denoiser::Sums {
-  Lanes r{}, g{}, b{}, variance{}, weight{};
+  Vec3Lanes colour = Vec3Lanes::Zero();
+  Lanes variance{}, weight{};
   void add(const Light& light, int x, int y, Lanes w) {
-    r += w * light.r.load(x, y);
-    g += w * light.g.load(x, y);
-    b += w * light.b.load(x, y);
+    colour += w * light.colour.load(x, y);
     variance += w * w * light.variance.load(x, y);
     weight += w;
   }
   /// What lies there already, in those lanes.
   void keep(const Light& light, int x, int y, LaneMask who) {
-    r = select(who, light.r.load(x, y), r);
-    g = select(who, light.g.load(x, y), g);
-    b = select(who, light.b.load(x, y), b);
+    colour = select(who, light.colour.load(x, y), colour);
     variance = select(who, light.variance.load(x, y), variance);
     weight = select(who, all_lanes(1.0F), weight);
   }
   /// @param shown  lanes with a surface; the others stay empty
   void store(Light& light, int x, int y, LaneMask shown) const {
     const Lanes share = select(both(shown, weight > 0.0F), 1.0F / weight, 0.0F);
-    light.r.store(x, y, share * r);
-    light.g.store(x, y, share * g);
-    light.b.store(x, y, share * b);
+    light.colour.store(x, y, share * colour);
     light.variance.store(x, y, share * share * variance);
-    light.bright.store(x, y, share * luminance(Vec3Lanes(r, g, b)));
+    light.bright.store(x, y, share * luminance(colour));
   }
 };
 
+void Denoiser::Light::resize(int width, int height) {
+  colour.resize(width, height);
+  for (Plane* plane : {&variance, &bright}) plane->resize(width, height);
+}
+
 template <class Body>
 void Denoiser::rows(const Body& body) const {
-  executor_->for_blocks(static_cast<std::size_t>(height_), 4, [&](std::size_t begin, std::size_t end) {
+  executor_->for_blocks(static_cast<std::size_t>(film_->height), 4, [&](std::size_t begin, std::size_t end) {
     for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) body(y);
   });
 }
@@ -115,7 +115,7 @@ void Denoiser::rows(const Body& body) const {
 /// Eight pixels at a time, and whether some show a surface.
 template <class Body>
 void Denoiser::blocks(int y, const Body& body) const {
-  for (int x = 0; x < width_; x += static_cast<int>(kLanes)) body(x, any(f_.shown.load(x, y) > 0.0F));
+  for (int x = 0; x < film_->width; x += static_cast<int>(kLanes)) body(x, any(film_->cover.load(x, y) > 0.0F));
 }
 
 /// Those of which some do.
@@ -126,26 +126,56 @@ void Denoiser::shown_blocks(int y, const Body& body) const {
   });
 }
 
-void Denoiser::resize(int width, int height) {
-  if (width == width_ && height == height_) return;
-  width_ = width;
-  height_ = height;
-  for (Plane* plane : {&f_.nx, &f_.ny, &f_.nz, &f_.px, &f_.py, &f_.pz, &f_.cover, &f_.shown, &f_.share, &f_.nearness, &f_.near, &f_.plane})
-    plane->reset(width, height);
+void Denoiser::resize() {
+  const int width = film_->width, height = film_->height;
+  for (Plane* plane : {&f_.shown, &f_.share, &f_.near, &f_.plane}) plane->resize(width, height);
   for (Signal& signal : signals_) {
-    for (Plane* plane : {&signal.noise, &signal.guide, &signal.scale}) plane->reset(width, height);
-    for (Light* light : {&signal.light, &signal.next})
-      for (Plane* plane : {&light->r, &light->g, &light->b, &light->variance, &light->bright}) plane->reset(width, height);
+    for (Plane* plane : {&signal.noise, &signal.guide}) plane->resize(width, height);
+    for (Light* light : {&signal.light, &signal.next}) light->resize(width, height);
   }
 }
 
-void Denoiser::fill(const Film& film, const Vec3f& eye, float footprint) {
-  mixed_.assign(film.radiance.size(), 0);
+void Denoiser::fill(const Vec3f& eye, float footprint) {
+  const Film& film = *film_;
+  const std::array parts = {&film.direct, &film.indirect};
+  rows([&](int y) {
+    blocks(y, [&](int x, bool any_shown) {
+      if (!any_shown) {
+        f_.shown.store(x, y, Lanes{});
+        for (Signal& signal : signals_) Sums{}.store(signal.light, x, y, LaneMask{});
+        return;
+      }
+      const LaneMask shown = film.cover.load(x, y) > 0.0F;
+      f_.shown.store(x, y, select(shown, all_lanes(1.0F), 0.0F));
+      f_.plane.store(x, y, 1.0F / (2.0F * footprint * (film.position.load(x, y) - Vec3Lanes(eye)).norm() + 1e-12F));
+      const Vec3Lanes albedo = film.albedo.load(x, y).cwiseMax(kAlbedoFloor);
+      const Lanes scale = 1.0F / luminance(albedo);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Vec3Lanes falls = parts[k]->radiance.load(x, y).cwiseQuotient(albedo);
+        Light& light = signals_[k].light;
+        light.colour.store(x, y, falls);
+        light.variance.store(x, y, parts[k]->variance.load(x, y) * scale * scale);
+        light.bright.store(x, y, luminance(falls));
+      }
+    });
+  });
+  rows([&](int y) {
+    shown_blocks(y, [&](int x) {
+      f_.near.store(x, y, kNearScale * tent_sum<2>(film.nearness, x, y) / tent_sum<2>(film.cover, x, y));
+      f_.share.store(x, y, 1.0F / larger(tent_sum<1>(f_.shown, x, y), 1.0F));
+    });
+  });
+}
+
+/// Of pixels where surfaces meet in gaps, to the surfaces that they left.
+void Denoiser::sort_paths() {
+  const Film& film = *film_;
+  mixed_.assign(static_cast<std::size_t>(film.width) * static_cast<std::size_t>(film.height), 0);
   parts_.clear();
   for (const DetailedPixel& detailed : film.detailed) {
     if (detailed.detail != Detail::Surfaces) continue;
     std::array<SurfacePart, 2>& parts = parts_.emplace_back();
-    mixed_[detailed.pixel] = static_cast<std::uint32_t>(parts_.size());
+    mixed_[index(detailed.x, detailed.y)] = static_cast<std::uint32_t>(parts_.size());
     if (!detailed.walks) continue;
     for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
       if (sample.facet.cover <= 0.0F) continue;
@@ -153,56 +183,17 @@ void Denoiser::fill(const Film& film, const Vec3f& eye, float footprint) {
       if (!parts[0].take(sample, falls)) parts[1].take(sample, falls);
     }
   }
-  Light &direct = signals_[0].light, &indirect = signals_[1].light;
-  const std::array summed = {&f_.cover, &f_.shown, &f_.nearness, &direct.variance, &direct.bright, &indirect.variance, &indirect.bright};
-  rows([&](int y) {
-    for (int x = 0; x < width_; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
-      if (film.cover[i] <= 0.0F) {
-        for (Plane* plane : summed) plane->at(x, y) = 0.0F;
-        continue;
-      }
-      f_.nearness.at(x, y) = film.nearness[i];
-      const Vec3f albedo = film.albedo[i].cwiseMax(kAlbedoFloor);
-      const float scale = 1.0F / luminance(albedo);
-      for (std::size_t k = 0; k < 2; ++k) {
-        const FilmLight& part = k == 0 ? film.direct : film.indirect;
-        const Vec3f falls = part.radiance[i].cwiseQuotient(albedo);
-        Light& light = signals_[k].light;
-        light.r.at(x, y) = falls.x();
-        light.g.at(x, y) = falls.y();
-        light.b.at(x, y) = falls.z();
-        light.variance.at(x, y) = part.variance[i] * scale * scale;
-        light.bright.at(x, y) = luminance(falls);
-      }
-      signals_[0].scale.at(x, y) = kDirectScale;
-      signals_[1].scale.at(x, y) = kMattScale + film.mirror[i] * (kMirrorScale - kMattScale);
-      f_.nx.at(x, y) = film.normal[i].x();
-      f_.ny.at(x, y) = film.normal[i].y();
-      f_.nz.at(x, y) = film.normal[i].z();
-      f_.px.at(x, y) = film.position[i].x();
-      f_.py.at(x, y) = film.position[i].y();
-      f_.pz.at(x, y) = film.position[i].z();
-      f_.cover.at(x, y) = film.cover[i];
-      f_.shown.at(x, y) = 1.0F;
-      f_.plane.at(x, y) = 1.0F / (2.0F * footprint * (film.position[i] - eye).norm() + 1e-12F);
-    }
-  });
-  rows([&](int y) {
-    shown_blocks(y, [&](int x) {
-      f_.near.store(x, y, kNearScale * tent_sum<2>(f_.nearness, x, y) / tent_sum<2>(f_.cover, x, y));
-      f_.share.store(x, y, 1.0F / larger(tent_sum<1>(f_.shown, x, y), 1.0F));
-    });
-  });
 }
 
 /// Means over neighbours: what a single pixel knows of noise and brightness is noisy itself.
 void Denoiser::guide(int y) {
   shown_blocks(y, [&](int x) {
     const Lanes share = f_.share.load(x, y);
-    for (Signal& signal : signals_) {
+    const std::array scale = {all_lanes(kDirectScale), kMattScale + film_->mirror.load(x, y) * (kMirrorScale - kMattScale)};
+    for (std::size_t k = 0; k < 2; ++k) {
+      Signal& signal = signals_[k];
       const Lanes error = root(share * tent_sum<1>(signal.light.variance, x, y));
-      signal.noise.store(x, y, 1.0F / (signal.scale.load(x, y) * error + 1e-4F));
+      signal.noise.store(x, y, 1.0F / (scale[k] * error + 1e-4F));
       signal.guide.store(x, y, share * tent_sum<1>(signal.light.bright, x, y));
     }
   });
@@ -210,10 +201,7 @@ void Denoiser::guide(int y) {
 
 template <bool with_direct>
 void Denoiser::smooth_block(int stride, int x, int y, LaneMask shown, LaneMask quiet) {
-  const auto vector = [](const Plane& a, const Plane& b, const Plane& c, int px, int py) {
-    return Vec3Lanes(a.load(px, py), b.load(px, py), c.load(px, py));
-  };
-  const Vec3Lanes normal = vector(f_.nx, f_.ny, f_.nz, x, y), position = vector(f_.px, f_.py, f_.pz, x, y);
+  const Vec3Lanes normal = film_->normal.load(x, y), position = film_->position.load(x, y);
   const Lanes plane = f_.plane.load(x, y) * (1.0F / static_cast<float>(stride)), near = f_.near.load(x, y);
   const std::array<Lanes, 2> guide = {signals_[0].guide.load(x, y), signals_[1].guide.load(x, y)};
   const std::array<Lanes, 2> noise = {signals_[0].noise.load(x, y), signals_[1].noise.load(x, y)};
@@ -223,13 +211,13 @@ void Denoiser::smooth_block(int stride, int x, int y, LaneMask shown, LaneMask q
     for (int dx = -1; dx <= 1; ++dx) {
       const int px = x + dx * stride, py = y + dy * stride;
       const float kernel = kKernel[static_cast<std::size_t>(std::abs(dx))] * kKernel[static_cast<std::size_t>(std::abs(dy))];
-      const Lanes covered = kernel * f_.cover.load(px, py);
+      const Lanes covered = kernel * film_->cover.load(px, py);
       if (dx == 0 && dy == 0) {  // a pixel is like itself, whatever its features
         for (std::size_t k = first; k < 2; ++k) sums[k].add(signals_[k].light, px, py, covered);
         continue;
       }
-      const Lanes facing = larger(normal.dot(vector(f_.nx, f_.ny, f_.nz, px, py)), 0.0F);
-      const Vec3Lanes apart = vector(f_.px, f_.py, f_.pz, px, py) - position;
+      const Lanes facing = larger(normal.dot(film_->normal.load(px, py)), 0.0F);
+      const Vec3Lanes apart = film_->position.load(px, py) - position;
       const Lanes off = magnitude(apart.dot(normal)) * plane;
       const std::array<Lanes, 2> far = {off, off + apart.dot(apart) * (near * near)};
       const Lanes alike = covered * thirty_second_power(facing);
@@ -258,22 +246,17 @@ void Denoiser::smooth(int stride) {
 }
 
 void Denoiser::finish(Film& film) const {
-  const Light &direct = signals_[0].light, &indirect = signals_[1].light;
   rows([&](int y) {
-    for (int x = 0; x < width_; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
-      if (film.cover[i] <= 0.0F) continue;
-      const Vec3f falls(direct.r.at(x, y) + indirect.r.at(x, y), direct.g.at(x, y) + indirect.g.at(x, y),
-                        direct.b.at(x, y) + indirect.b.at(x, y));
-      film.radiance[i] = falls.cwiseProduct(film.albedo[i].cwiseMax(kAlbedoFloor));
-    }
+    shown_blocks(y, [&](int x) {
+      const Vec3Lanes falls = signals_[0].light.colour.load(x, y) + signals_[1].light.colour.load(x, y);
+      film.radiance.store(x, y, falls.cwiseProduct(film.albedo.load(x, y).cwiseMax(kAlbedoFloor)));
+    });
   });
   executor_->for_blocks(film.detailed.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const DetailedPixel& detailed = film.detailed[k];
       if (detailed.detail != Detail::Surfaces) continue;
-      const std::size_t pixel = detailed.pixel;
-      const Neighbours neighbours = around(pixel);
+      const Neighbours neighbours = around(detailed);
       Vec3f sum = Vec3f::Zero();
       float cover = 0.0F;
       for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
@@ -281,28 +264,28 @@ void Denoiser::finish(Film& film) const {
         sum += sample.facet.cover * neighbours.light_of(sample.facet).cwiseProduct(sample.facet.albedo.cwiseMax(kAlbedoFloor));
         cover += sample.facet.cover;
       }
-      if (cover > 0.0F) film.radiance[pixel] = film.direct.radiance[pixel] + sum / cover;
+      if (cover > 0.0F) film.radiance.store(detailed.x, detailed.y, Vec3f(film.direct.radiance.at(detailed.x, detailed.y) + sum / cover));
     }
   });
 }
 
-Neighbours Denoiser::around(std::size_t pixel) const {
+Neighbours Denoiser::around(const DetailedPixel& pixel) const {
   constexpr int kReach = 2;
   constexpr float kPaths = 32.0F;  // that tell as much as a filtered pixel
+  const Film& film = *film_;
   const Light& light = signals_[1].light;
-  const int x = static_cast<int>(pixel % static_cast<std::size_t>(width_));
-  const int y = static_cast<int>(pixel / static_cast<std::size_t>(width_));
+  const int x = pixel.x, y = pixel.y;
   Neighbours out;
-  out.own = Vec3f(light.r.at(x, y), light.g.at(x, y), light.b.at(x, y));
-  for (int py = std::max(0, y - kReach); py <= std::min(height_ - 1, y + kReach); ++py)
-    for (int px = std::max(0, x - kReach); px <= std::min(width_ - 1, x + kReach); ++px) {
-      if (f_.cover.at(px, py) <= 0.0F) continue;
+  out.own = light.colour.at(x, y);
+  for (int py = std::max(0, y - kReach); py <= std::min(film.height - 1, y + kReach); ++py)
+    for (int px = std::max(0, x - kReach); px <= std::min(film.width - 1, x + kReach); ++px) {
+      const float cover = film.cover.at(px, py);
+      if (cover <= 0.0F) continue;
       const float closeness = 1.0F / std::max(0.5F, static_cast<float>((px - x) * (px - x) + (py - y) * (py - y)));
       const float plane = f_.plane.at(px, py);
-      const std::uint32_t mixed = mixed_[static_cast<std::size_t>(py) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(px)];
+      const std::uint32_t mixed = mixed_[index(px, py)];
       if (mixed == 0) {
-        out.add({f_.nx.at(px, py), f_.ny.at(px, py), f_.nz.at(px, py)}, {f_.px.at(px, py), f_.py.at(px, py), f_.pz.at(px, py)},
-                {light.r.at(px, py), light.g.at(px, py), light.b.at(px, py)}, plane, f_.cover.at(px, py) * closeness);
+        out.add(film.normal.at(px, py), film.position.at(px, py), light.colour.at(px, py), plane, cover * closeness);
         continue;
       }
       for (const SurfacePart& part : parts_[mixed - 1])
@@ -312,10 +295,12 @@ Neighbours Denoiser::around(std::size_t pixel) const {
   return out;
 }
 
-void Denoiser::run(int width, int height, const Vec3f& eye, float footprint, const Executor& executor, Film& film) {
+void Denoiser::run(const Vec3f& eye, float footprint, const Executor& executor, Film& film) {
   executor_ = &executor;
-  resize(width, height);
-  fill(film, eye, footprint);
+  film_ = &film;
+  resize();
+  sort_paths();
+  fill(eye, footprint);
   for (int level = 0; level < kLevels; ++level) smooth(1 << level);
   finish(film);
 }

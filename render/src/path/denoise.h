@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "integrator.h"
-#include "plane.h"
 
 namespace supple::render::path {
 
@@ -30,32 +29,33 @@ struct SurfacePart {
 class Denoiser {
  public:
   /// Replaces film.radiance. @param footprint  of a pixel at unit distance  @param eye  relative to the origin
-  void run(int width, int height, const Vec3f& eye, float footprint, const Executor& executor, Film& film);
+  void run(const Vec3f& eye, float footprint, const Executor& executor, Film& film);
 
  private:
+  /// Beside those of the film.
   struct Features {
-    Plane nx, ny, nz, px, py, pz, cover;
-    Plane shown;     ///< 1 where there is a surface, else 0
-    Plane share;     ///< 1 / number of pixels around that show one
-    Plane nearness;  ///< as in the film
-    Plane near;      ///< 1 / distance over which indirect light may change much (Ward & Heckbert 1992)
-    Plane plane;     ///< 1 / distance from the tangent plane that counts as far, at stride 1
+    Plane shown;  ///< 1 where there is a surface, else 0
+    Plane share;  ///< 1 / number of pixels around that show one
+    Plane near;   ///< 1 / distance over which indirect light may change much (Ward & Heckbert 1992)
+    Plane plane;  ///< 1 / distance from the tangent plane that counts as far, at stride 1
   };
   struct Light {
-    Plane r, g, b, variance;
+    VectorPlane colour;
+    Plane variance;
     Plane bright;
+    void resize(int width, int height);
   };
   /// A part of the light on its way through the filter.
   struct Signal {
     Light light, next;
     Plane noise;  ///< 1 / difference of brightness that counts as large
     Plane guide;  ///< brightness, a little smoothed
-    Plane scale;  ///< standard errors that count as the same
   };
   struct Sums;
 
-  void resize(int width, int height);
-  void fill(const Film& film, const Vec3f& eye, float footprint);
+  void resize();
+  void fill(const Vec3f& eye, float footprint);
+  void sort_paths();
   void guide(int y);
   /// One level of the transform.
   void smooth(int stride);
@@ -63,7 +63,10 @@ class Denoiser {
   template <bool with_direct>
   void smooth_block(int stride, int x, int y, LaneMask shown, LaneMask quiet);
   void finish(Film& film) const;
-  [[nodiscard]] Neighbours around(std::size_t pixel) const;
+  [[nodiscard]] Neighbours around(const DetailedPixel& pixel) const;
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(film_->width) + static_cast<std::size_t>(x);
+  }
   template <class Body>
   void rows(const Body& body) const;
   template <class Body>
@@ -72,11 +75,10 @@ class Denoiser {
   void shown_blocks(int y, const Body& body) const;
 
   const Executor* executor_ = nullptr;
-  int width_ = 0;
-  int height_ = 0;
+  const Film* film_ = nullptr;
   Features f_;
-  std::array<Signal, 2> signals_;    ///< direct, indirect
-  std::vector<std::uint32_t> mixed_;            ///< of a pixel where surfaces meet, 1 + its place in parts_; 0: one surface
+  std::array<Signal, 2> signals_;     ///< direct, indirect
+  std::vector<std::uint32_t> mixed_;  ///< of a pixel where surfaces meet, 1 + its place in parts_; 0: one surface
   std::vector<std::array<SurfacePart, 2>> parts_;
 };
 

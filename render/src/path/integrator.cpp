@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 
 #include "details.h"
 
@@ -13,147 +12,151 @@ constexpr int kTile = 8;
 constexpr std::uint32_t kRaysAPath = 2;    // camera rays of a pixel of which one goes on beyond its first surface
 constexpr std::uint32_t kDetailStream = 0xfffffff0u;  // those of tiles begin at 0
 
-/// Sums of a part of the light of a pixel.
+/// Sums of a part of the light of a pixel, or of eight.
+template <class Number>
 struct LightSum {
-  Vec3f radiance = Vec3f::Zero();
-  float bright = 0.0F;
-  float bright2 = 0.0F;
-  float weight = 0.0F;
-  float count = 0.0F;
+  using Vector = typename LaneTypes<Number>::Vector;
+  Vector radiance = Vector::Zero();
+  Number bright{}, bright2{}, weight{}, count{};
 
-  void add(const Vec3f& light, float share = 1.0F) {
-    radiance += share * light;
-    const float y = luminance(light);
+  /// @param share  0: not this sample
+  void add(const Vector& light, Number share) {
+    radiance += light * share;
+    const Number y = luminance(light);
     bright += share * y;
     bright2 += share * y * y;
     weight += share;
-    count += 1.0F;
+    count += select(share > 0.0F, constant<Number>(1.0F), 0.0F);
   }
   /// Of the mean, estimated as if the samples were independent (stratified ones do better).
-  [[nodiscard]] float variance() const {
-    return count < 2.0F ? 0.0F : std::max(0.0F, bright2 / weight - mean() * mean()) / (count - 1.0F);
+  [[nodiscard]] Number variance() const {
+    const Number average = mean();
+    return select(count >= 2.0F, larger(bright2 / weight - average * average, 0.0F) / (count - 1.0F), 0.0F);
   }
-  [[nodiscard]] float mean() const { return count > 0.0F ? bright / weight : 0.0F; }
+  [[nodiscard]] Number mean() const { return select(count > 0.0F, bright / weight, 0.0F); }
 };
 
-/// Sums of the samples of a pixel.
+/// Sums of the samples of a pixel, or of eight.
+template <class Number>
 struct Sums {
-  LightSum direct, indirect;
-  Vec3f albedo = Vec3f::Zero();
-  Vec3f normal = Vec3f::Zero();
-  Vec3f position = Vec3f::Zero();
-  float cover = 0.0F;
-  float walked_cover = 0.0F;  ///< of the samples that know of indirect light
-  float nearness = 0.0F;
-  float mirror = 0.0F;
+  using Vector = typename LaneTypes<Number>::Vector;
+  LightSum<Number> direct, indirect;
+  Vector albedo = Vector::Zero();
+  Vector normal = Vector::Zero();
+  Vector position = Vector::Zero();
+  Number cover{};
+  Number walked_cover{};  ///< of the samples that know of indirect light
+  Number nearness{};
+  Number mirror{};
 
-  void add(const Sample& s) {
-    direct.add(s.facet.cover * s.direct);
-    albedo += s.facet.cover * s.facet.albedo;
-    normal += s.facet.cover * s.facet.normal;
-    position += s.facet.cover * s.facet.position;
-    cover += s.facet.cover;
-    add_indirect(s);
+  void add(const SampleOf<Number>& s, Number taken) {
+    const FacetOf<Number>& facet = s.facet;
+    direct.add(s.direct * facet.cover, taken);
+    albedo += facet.albedo * facet.cover;
+    normal += facet.normal * facet.cover;
+    position += facet.position * facet.cover;
+    cover += facet.cover;
+    add_indirect(s, s.weight);
   }
-  void add_indirect(const Sample& s) {
-    if (!(s.weight > 0.0F)) return;
-    indirect.add(s.facet.cover * s.indirect, s.weight);
-    const float cover_of_path = s.weight * s.facet.cover;
+  void add_indirect(const SampleOf<Number>& s, Number weight) {
+    const Number cover_of_path = weight * s.facet.cover;
+    indirect.add(s.indirect * s.facet.cover, weight);
     walked_cover += cover_of_path;
     nearness += cover_of_path * s.nearness;
     mirror += cover_of_path * s.mirror;
   }
 };
 
-/// Hands samples over in the order of their picks, made by bundles.
-template <class Take>
-class Bundler {
- public:
-  Bundler(const Tracer& tracer, const Take& take) : tracer_(tracer), take_(take) {}
-  void add(const Pick& pick) {
-    picks_[count_++] = pick;
-    if (count_ == kLanes) flush();
-  }
-  void flush() {
-    tracer_.sample(std::span(picks_.data(), count_), samples_);
-    for (std::size_t i = 0; i < count_; ++i) take_(picks_[i], samples_[i]);
-    count_ = 0;
-  }
+LightSum<float> total(const LightSum<Lanes>& sum) {
+  return {.radiance = path::total(sum.radiance), .bright = path::total(sum.bright), .bright2 = path::total(sum.bright2),
+          .weight = path::total(sum.weight), .count = path::total(sum.count)};
+}
 
- private:
-  const Tracer& tracer_;
-  Take take_;
-  std::array<Pick, kLanes> picks_;
-  std::array<Sample, kLanes> samples_;
-  std::size_t count_ = 0;
-};
+Sums<float> total(const Sums<Lanes>& sum) {
+  return {.direct = total(sum.direct), .indirect = total(sum.indirect), .albedo = path::total(sum.albedo),
+          .normal = path::total(sum.normal), .position = path::total(sum.position), .cover = path::total(sum.cover),
+          .walked_cover = path::total(sum.walked_cover), .nearness = path::total(sum.nearness), .mirror = path::total(sum.mirror)};
+}
 
-/// Pixels [left, right) x [top, bottom).
+/// Pixels [left, right) x [top, bottom), at most kTile across.
 struct Window {
   int left = 0, top = 0, right = 0, bottom = 0;
-  template <class Body>
-  void for_pixels(const Body& body) const {
-    for (int y = top; y < bottom; ++y)
-      for (int x = left; x < right; ++x) body(x, y);
-  }
+  [[nodiscard]] int width() const { return right - left; }
+  [[nodiscard]] int height() const { return bottom - top; }
+  [[nodiscard]] LaneMask inside() const { return first_lanes(width()); }
 };
 
-/// Variances of means of the luminance.
-struct Variance {
-  float direct = 0.0F;
-  float indirect = 0.0F;
+/// The pixels of a row of a tile.
+struct Row {
+  Sums<Lanes> sums;
+  Lanes direct_variance{}, indirect_variance{};  ///< of means of the luminance
 };
 
 /// The pixels of a tile, and what they tell of their noise.
 class Tile {
  public:
   explicit Tile(const Window& window) : window_(window) {}
-  [[nodiscard]] Sums& at(int x, int y) { return sums_[inside(x, y)]; }
-  [[nodiscard]] const Sums& at(int x, int y) const { return sums_[inside(x, y)]; }
-  [[nodiscard]] const Variance& variance(int x, int y) const { return variance_[inside(x, y)]; }
+  [[nodiscard]] Row& operator[](int y) { return rows_[static_cast<std::size_t>(y - window_.top)]; }
 
   /// @return mean over all pixels of their squared standard error over (luminance + 0.1) squared
   float estimate_errors() {
     // One path a pixel knows nothing of its noise: at most what pixels differ by.
-    LightSum spread;
-    window_.for_pixels([&](int x, int y) {
-      const Sums& sum = at(x, y);
-      if (sum.walked_cover > 0.0F) spread.add(sum.indirect.radiance / sum.indirect.weight);
+    LightSum<Lanes> paths;
+    for_rows([&](std::size_t, const Row& row) {
+      const Sums<Lanes>& sum = row.sums;
+      const LaneMask walked = sum.walked_cover > 0.0F;
+      paths.add(select(walked, sum.indirect.radiance / sum.indirect.weight, Vec3Lanes::Zero()), select(walked, all_lanes(1.0F), 0.0F));
     });
-    const float between = spread.variance() * spread.count;
-    float error2 = 0.0F;
-    window_.for_pixels([&](int x, int y) {
-      const Sums& sum = at(x, y);
-      if (sum.cover <= 0.0F) return;
-      Variance& variance = variance_[inside(x, y)];
-      variance.direct = sum.direct.count < 2.0F ? bend(x, y) : sum.direct.variance();
-      variance.indirect = sum.indirect.count < 2.0F ? between : sum.indirect.variance();
-      const float scale = sum.direct.mean() + sum.indirect.mean() + 0.1F;
-      error2 += (variance.direct + variance.indirect) / (scale * scale);
+    const LightSum<float> spread = total(paths);
+    const Lanes between = all_lanes(spread.variance() * spread.count);
+    Lanes error2{};
+    for_rows([&](std::size_t y, Row& row) {
+      const Sums<Lanes>& sum = row.sums;
+      const LaneMask shown = sum.cover > 0.0F;
+      row.direct_variance = select(shown, select(sum.direct.count < 2.0F, bend(y), sum.direct.variance()), 0.0F);
+      row.indirect_variance = select(shown, select(sum.indirect.count < 2.0F, between, sum.indirect.variance()), 0.0F);
+      const Lanes scale = sum.direct.mean() + sum.indirect.mean() + 0.1F;
+      error2 += (row.direct_variance + row.indirect_variance) / (scale * scale);
     });
-    return error2 / static_cast<float>((window_.right - window_.left) * (window_.bottom - window_.top));
+    return path::total(error2) / static_cast<float>(window_.width() * window_.height());
   }
 
  private:
-  [[nodiscard]] std::size_t inside(int x, int y) const { return static_cast<std::size_t>((y - window_.top) * kTile + x - window_.left); }
+  template <class Body>
+  void for_rows(const Body& body) {
+    for (std::size_t y = 0; y < static_cast<std::size_t>(window_.height()); ++y) body(y, rows_[y]);
+  }
   /// Variance of a single sample of direct light by second differences of neighbours, which light that changes evenly does not
   /// have: in the mean at least the true one.
-  [[nodiscard]] float bend(int x, int y) const {
-    float sum = 0.0F, count = 0.0F;
-    const auto add = [&](int cx, int cy, int dx, int dy) {
-      const float d = at(cx, cy).direct.mean() - 0.5F * (at(cx - dx, cy - dy).direct.mean() + at(cx + dx, cy + dy).direct.mean());
+  [[nodiscard]] Lanes bend(std::size_t y) const {
+    const auto mean = [&](std::size_t row) { return rows_[row].sums.direct.mean(); };
+    Lanes sum{};
+    float count = 0.0F;
+    const auto add = [&](Lanes before, Lanes middle, Lanes after) {
+      const Lanes d = middle - 0.5F * (before + after);
       sum += d * d / 1.5F;  // the variance of d is 1 + 2 / 4 times that of a sample
       count += 1.0F;
     };
-    if (window_.right - window_.left > 2) add(std::clamp(x, window_.left + 1, window_.right - 2), y, 1, 0);
-    if (window_.bottom - window_.top > 2) add(x, std::clamp(y, window_.top + 1, window_.bottom - 2), 0, 1);
-    const float mean = at(x, y).direct.mean();
-    return count > 0.0F ? sum / count : mean * mean;
+    const int width = window_.width(), height = window_.height();
+    if (width > 2) {
+      LaneBits at = kLaneNumbers;  // the nearest lane with two neighbours
+      at = at < 1u ? all_lanes(1u) : at;
+      const LaneBits last = all_lanes(static_cast<std::uint32_t>(width - 2));
+      at = at > last ? last : at;
+      const Lanes row = mean(y);
+      add(permuted(row, at - 1u), permuted(row, at), permuted(row, at + 1u));
+    }
+    if (height > 2) {
+      const std::size_t at = std::clamp(y, std::size_t{1}, static_cast<std::size_t>(height - 2));
+      add(mean(at - 1), mean(at), mean(at + 1));
+    }
+    if (count > 0.0F) return sum / count;
+    const Lanes own = mean(y);
+    return own * own;
   }
 
   Window window_;
-  std::array<Sums, kTile * kTile> sums_;
-  std::array<Variance, kTile * kTile> variance_;
+  std::array<Row, kTile> rows_;
 };
 
 /// Fills a film.
@@ -164,7 +167,6 @@ class Exposure {
         most_(static_cast<std::uint32_t>(settings.most_samples)),
         least_(std::min(static_cast<std::uint32_t>(settings.least_samples), most_)) {}
 
-  void clear() const;
   void expose_tiles() const;
   void expose_details() const;
 
@@ -178,12 +180,15 @@ class Exposure {
       body(Window{left, top, std::min(left + kTile, settings_.width), std::min(top + kTile, settings_.height)});
     });
   }
-  [[nodiscard]] std::size_t index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(settings_.width) + static_cast<std::size_t>(x);
+  [[nodiscard]] static Picks picks_of_row(const Window& window, int y) {
+    return {.who = window.inside(), .x = kLaneNumbers + static_cast<std::uint32_t>(window.left), .y = all_lanes(static_cast<std::uint32_t>(y))};
   }
   std::uint32_t sample_until_quiet(const Window& window, Tile& tile) const;
-  void keep_surface(std::size_t i, const Sums& sum, std::uint32_t count, float variance) const;
-  void keep_paths(std::size_t i, const Sums& sum, std::uint32_t count, float variance) const;
+  bool walk_where_no_ray_did(const Window& window, std::uint32_t n, Tile& tile) const;
+  template <class Number>
+  void keep_surface(int x, int y, const Sums<Number>& sum, float count, Number variance) const;
+  template <class Number>
+  void keep_paths(int x, int y, const Sums<Number>& sum, float count, Number variance) const;
 
   const Tracer& tracer_;
   const TraceSettings& settings_;
@@ -193,56 +198,53 @@ class Exposure {
   std::uint32_t least_;
 };
 
-void Exposure::clear() const {
-  const auto pixels = static_cast<std::size_t>(settings_.width) * static_cast<std::size_t>(settings_.height);
-  film_.radiance.assign(pixels, Vec3f::Zero());
-  for (FilmLight* light : {&film_.direct, &film_.indirect}) {
-    light->radiance.assign(pixels, Vec3f::Zero());
-    light->variance.assign(pixels, 0.0F);
-  }
-  film_.cover.assign(pixels, 0.0F);
-  film_.albedo.assign(pixels, Vec3f::Zero());
-  film_.normal.assign(pixels, Vec3f::Zero());
-  film_.position.assign(pixels, Vec3f::Zero());
-  film_.nearness.assign(pixels, 0.0F);
-  film_.mirror.assign(pixels, 0.0F);
-  film_.samples.assign(pixels, 0);
+/// What camera rays alone tell of a pixel, or of eight. @param variance  of the mean luminance of its direct light
+template <class Number>
+void Exposure::keep_surface(int x, int y, const Sums<Number>& sum, float count, Number variance) const {
+  using Vector = typename LaneTypes<Number>::Vector;
+  const auto shown = sum.cover > 0.0F;
+  const Number cover = sum.cover / count;
+  const Number scale = select(shown, 1.0F / cover, 0.0F);
+  const Number share = select(shown, 1.0F / sum.cover, 0.0F);
+  const Vector direct = sum.direct.radiance * select(shown, scale / sum.direct.count, 0.0F);
+  film_.samples.store(x, y, constant<Number>(count));
+  film_.cover.store(x, y, cover);
+  film_.direct.radiance.store(x, y, direct);
+  film_.direct.variance.store(x, y, variance * scale * scale);
+  film_.albedo.store(x, y, Vector(sum.albedo * share));
+  film_.normal.store(x, y, Vector(sum.normal * share));
+  film_.position.store(x, y, Vector(sum.position * share));
 }
 
-/// What camera rays alone tell of a pixel. @param variance  of the mean luminance of its direct light
-void Exposure::keep_surface(std::size_t i, const Sums& sum, std::uint32_t count, float variance) const {
-  film_.samples[i] = count;
-  film_.cover[i] = sum.cover / static_cast<float>(count);
-  if (sum.cover <= 0.0F) return;
-  const float scale = 1.0F / film_.cover[i];
-  film_.direct.radiance[i] = sum.direct.radiance * (scale / sum.direct.count);
-  film_.direct.variance[i] = variance * scale * scale;
-  film_.radiance[i] = film_.direct.radiance[i] + film_.indirect.radiance[i];
-  film_.albedo[i] = sum.albedo / sum.cover;
-  film_.normal[i] = sum.normal / sum.cover;
-  film_.position[i] = sum.position / sum.cover;
-}
-
-/// What the paths of a pixel tell. @param variance  of the mean luminance of its indirect light
-void Exposure::keep_paths(std::size_t i, const Sums& sum, std::uint32_t count, float variance) const {
-  if (!(sum.walked_cover > 0.0F)) return;
-  const float cover = sum.cover / static_cast<float>(count);
-  film_.indirect.radiance[i] = sum.indirect.radiance / sum.walked_cover;
-  film_.indirect.variance[i] = variance / (cover * cover);
-  film_.nearness[i] = cover * sum.nearness / sum.walked_cover;
-  film_.mirror[i] = sum.mirror / sum.walked_cover;
+/// What the paths of a pixel tell, or of eight. @param variance  of the mean luminance of its indirect light
+template <class Number>
+void Exposure::keep_paths(int x, int y, const Sums<Number>& sum, float count, Number variance) const {
+  using Vector = typename LaneTypes<Number>::Vector;
+  const auto walked = sum.walked_cover > 0.0F;
+  const Number share = select(walked, 1.0F / sum.walked_cover, 0.0F);
+  const Number cover = sum.cover / count;
+  film_.indirect.radiance.store(x, y, Vector(sum.indirect.radiance * share));
+  film_.indirect.variance.store(x, y, select(walked, variance / (cover * cover), 0.0F));
+  film_.nearness.store(x, y, cover * sum.nearness * share);
+  film_.mirror.store(x, y, sum.mirror * share);
 }
 
 /// @return camera rays a pixel
 std::uint32_t Exposure::sample_until_quiet(const Window& window, Tile& tile) const {
-  Bundler bundler(tracer_, [&](const Pick& pick, const Sample& sample) { tile.at(pick.x, pick.y).add(sample); });
+  const Lanes taken = select(window.inside(), all_lanes(1.0F), 0.0F);
   std::uint32_t n = 0;
   for (std::uint32_t next = least_;;) {
-    const std::uint32_t count = next - n, share = std::min(kRaysAPath, count);
-    window.for_pixels([&](int x, int y) {
-      for (std::uint32_t s = 0; s < count; ++s) bundler.add({x, y, 2 * n, count, s, (n + s) % kRaysAPath == 0 ? share : 0});
-    });
-    bundler.flush();
+    const std::uint32_t count = next - n;
+    for (int y = window.top; y < window.bottom; ++y) {
+      Picks picks = picks_of_row(window, y);
+      picks.stream = 2 * n;
+      picks.count = count;
+      for (std::uint32_t s = 0; s < count; ++s) {
+        picks.number = all_lanes(s);
+        picks.share = (n + s) % kRaysAPath == 0 ? std::min(kRaysAPath, count) : 0;
+        tile[y].sums.add(tracer_.sample(picks), taken);
+      }
+    }
     n = next;
     const bool quiet = tile.estimate_errors() <= static_cast<float>(settings_.noise * settings_.noise) && settings_.noise > 0.0;
     if (quiet || n >= most_) return n;
@@ -250,29 +252,41 @@ std::uint32_t Exposure::sample_until_quiet(const Window& window, Tile& tile) con
   }
 }
 
+/// Where only rays without a path met a surface, those go on, too. @return whether there are any
+bool Exposure::walk_where_no_ray_did(const Window& window, std::uint32_t n, Tile& tile) const {
+  bool any_did = false;
+  for (int y = window.top; y < window.bottom; ++y) {
+    Sums<Lanes>& sums = tile[y].sums;
+    Picks picks = picks_of_row(window, y);
+    picks.who = both(picks.who, both(sums.cover > 0.0F, ~(sums.walked_cover > 0.0F)));
+    picks.share = 1;
+    if (!any(picks.who)) continue;
+    any_did = true;
+    for (std::uint32_t first = 0, count = least_; first < n; first += count, count = first) {
+      picks.stream = 2 * first;
+      picks.count = count;
+      for (std::uint32_t s = 0; s < count; ++s) {
+        picks.number = all_lanes(s);
+        const Samples samples = tracer_.sample(picks);
+        sums.add_indirect(samples, select(samples.facet.cover > 0.0F, samples.weight, 0.0F));
+      }
+    }
+  }
+  return any_did;
+}
+
 void Exposure::expose_tiles() const {
   for_tiles([&](const Window& window) {
     Tile tile(window);
     const std::uint32_t n = sample_until_quiet(window, tile);
-    // Where only rays without a path met a surface, those go on, too.
-    Bundler late(tracer_, [&](const Pick& pick, const Sample& sample) {
-      if (sample.facet.cover > 0.0F) tile.at(pick.x, pick.y).add_indirect(sample);
-    });
-    bool any_late = false;
-    window.for_pixels([&](int x, int y) {
-      const Sums& sum = tile.at(x, y);
-      if (!(sum.cover > 0.0F) || sum.walked_cover > 0.0F) return;
-      any_late = true;
-      for (std::uint32_t first = 0, count = least_; first < n; first += count, count = first)
-        for (std::uint32_t s = 0; s < count; ++s) late.add({x, y, 2 * first, count, s, 1});
-    });
-    late.flush();
-    if (any_late) tile.estimate_errors();
-    window.for_pixels([&](int x, int y) {
-      const Sums& sum = tile.at(x, y);
-      keep_paths(index(x, y), sum, n, tile.variance(x, y).indirect);
-      keep_surface(index(x, y), sum, n, tile.variance(x, y).direct);
-    });
+    if (walk_where_no_ray_did(window, n, tile)) tile.estimate_errors();
+    const auto count = static_cast<float>(n);
+    for (int y = window.top; y < window.bottom; ++y) {
+      const Row& row = tile[y];
+      keep_surface(window.left, y, row.sums, count, row.direct_variance);
+      keep_paths(window.left, y, row.sums, count, row.indirect_variance);
+      film_.radiance.store(window.left, y, film_.direct.radiance.load(window.left, y) + film_.indirect.radiance.load(window.left, y));
+    }
   });
 }
 
@@ -280,36 +294,52 @@ void Exposure::expose_details() const {
   executor_.for_blocks(film_.detailed.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const DetailedPixel& detailed = film_.detailed[k];
-      const std::size_t i = detailed.pixel;
-      const auto width = static_cast<std::size_t>(settings_.width);
-      const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
-      Sums anew;
-      Bundler bundler(tracer_, [&](const Pick& pick, const Sample& sample) {
-        anew.add(sample);
-        if (detailed.detail == Detail::Surfaces) film_.detailed_samples[detailed.samples + pick.number] = sample;
-      });
-      const float before = film_.cover[i];
+      const int x = detailed.x, y = detailed.y;
+      const float before = film_.cover.at(x, y);
       const bool walks = detailed.walks || !(before > 0.0F);  // or nothing is known of its indirect light
-      const std::uint32_t share = walks ? 1 : 0;
-      for (std::uint32_t s = 0; s < detailed.rays; ++s) bundler.add({x, y, kDetailStream, detailed.rays, s, share, false});
-      bundler.flush();
-      keep_paths(i, anew, detailed.rays, anew.indirect.variance());
-      keep_surface(i, anew, detailed.rays, anew.direct.variance());
-      if (walks || !(film_.cover[i] > 0.0F)) continue;
-      const float share_of_cover = film_.cover[i] / before;
-      film_.nearness[i] *= share_of_cover;
-      film_.indirect.variance[i] /= share_of_cover * share_of_cover;
+      Picks picks{.x = all_lanes(static_cast<std::uint32_t>(x)), .y = all_lanes(static_cast<std::uint32_t>(y)), .stream = kDetailStream,
+                  .count = detailed.rays, .share = walks ? 1u : 0u, .sees_mirrors = false};
+      Sums<Lanes> sums;
+      for (std::uint32_t first = 0; first < detailed.rays; first += kLanes) {
+        picks.who = first_lanes(static_cast<int>(detailed.rays - first));
+        picks.number = kLaneNumbers + first;
+        const Samples samples = tracer_.sample(picks);
+        sums.add(samples, select(picks.who, all_lanes(1.0F), 0.0F));
+        if (detailed.detail != Detail::Surfaces) continue;
+        for (std::size_t s = first; s < std::min(first + kLanes, std::size_t{detailed.rays}); ++s)
+          film_.detailed_samples[detailed.samples + s] = lane(samples, s - first);
+      }
+      const Sums<float> anew = total(sums);
+      const auto count = static_cast<float>(detailed.rays);
+      if (anew.walked_cover > 0.0F) keep_paths(x, y, anew, count, anew.indirect.variance());
+      keep_surface(x, y, anew, count, anew.direct.variance());
+      film_.radiance.store(x, y, Vec3f(film_.direct.radiance.at(x, y) + film_.indirect.radiance.at(x, y)));
+      if (walks || !(anew.cover > 0.0F)) continue;
+      const float share_of_cover = film_.cover.at(x, y) / before;
+      film_.nearness.at(x, y) *= share_of_cover;
+      film_.indirect.variance.at(x, y) /= share_of_cover * share_of_cover;
     }
   });
 }
 
 }  // namespace
 
+void Film::resize(int across, int down) {
+  width = across;
+  height = down;
+  for (FilmLight* light : {&direct, &indirect}) {
+    light->radiance.resize(across, down);
+    light->variance.resize(across, down);
+  }
+  for (VectorPlane* plane : {&radiance, &albedo, &normal, &position}) plane->resize(across, down);
+  for (Plane* plane : {&cover, &nearness, &mirror, &samples}) plane->resize(across, down);
+}
+
 void trace(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
            const TraceSettings& settings, const Executor& executor, Film& film) {
   const Tracer tracer(geometry, lights, ground, camera, settings);
+  film.resize(settings.width, settings.height);
   const Exposure exposure(tracer, settings, executor, film);
-  exposure.clear();
   exposure.expose_tiles();
   find_details(camera, settings, executor, film);
   exposure.expose_details();

@@ -9,14 +9,15 @@
 #include <vector>
 
 #include "supple/core/executor.h"
+#include "plane.h"
 #include "tracer.h"
 
 namespace supple::render::path {
 
 /// A part of the light of all pixels.
 struct FilmLight {
-  std::vector<Vec3f> radiance;     ///< mean over the covered part
-  std::vector<float> variance;     ///< of the mean luminance
+  VectorPlane radiance;  ///< mean over the covered part
+  Plane variance;        ///< of the mean luminance
 };
 
 /// Why a pixel takes its camera rays anew.
@@ -27,27 +28,32 @@ enum class Detail : std::uint8_t {
 };
 
 struct DetailedPixel {
-  std::size_t pixel = 0;
+  int x = 0;
+  int y = 0;
   Detail detail = Detail::Surfaces;
   std::uint32_t rays = 0;
   bool walks = false;       ///< its rays have paths of their own
   std::size_t samples = 0;  ///< first of `rays` in Film::detailed_samples, of Detail::Surfaces
 };
 
-/// One pixel after the other from the top left. Features are those of the first surface, for the denoiser.
+/// Features are those of the first surface, for the denoiser. All are zero where nothing is shown.
 struct Film {
-  FilmLight direct;                ///< that the first surface has straight from sun and rectangles: with the edges of shadows
-  FilmLight indirect;              ///< from the sky and other surfaces: softer, and noisier
-  std::vector<Vec3f> radiance;     ///< the sum of both
-  std::vector<float> cover;        ///< in [0, 1]: not background
-  std::vector<Vec3f> albedo;
-  std::vector<Vec3f> normal;
-  std::vector<Vec3f> position;     ///< relative to the origin [m]
-  std::vector<float> nearness;     ///< mean of 1 / distance of what indirect light comes from [1/m], 0 for the sky, times cover
-  std::vector<float> mirror;       ///< 1 where reflections are sharp, 0 on matt surfaces
-  std::vector<std::uint32_t> samples;
+  int width = 0;
+  int height = 0;
+  FilmLight direct;      ///< that the first surface has straight from sun and rectangles: with the edges of shadows
+  FilmLight indirect;    ///< from the sky and other surfaces: softer, and noisier
+  VectorPlane radiance;  ///< the sum of both
+  Plane cover;           ///< in [0, 1]: not background
+  VectorPlane albedo;
+  VectorPlane normal;
+  VectorPlane position;  ///< relative to the origin [m]
+  Plane nearness;        ///< mean of 1 / distance of what indirect light comes from [1/m], 0 for the sky, times cover
+  Plane mirror;          ///< 1 where reflections are sharp, 0 on matt surfaces
+  Plane samples;         ///< camera rays
   std::vector<DetailedPixel> detailed;  ///< in the order of pixels
   std::vector<Sample> detailed_samples;
+
+  void resize(int across, int down);
 };
 
 /// The same bits for any number of threads: a tile of 8 x 8 pixels decides about its samples alone, and then each pixel by

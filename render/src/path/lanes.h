@@ -20,9 +20,10 @@ using LaneBits = std::uint32_t __attribute__((vector_size(32)));
 using LaneMask = std::int32_t __attribute__((vector_size(32)));  ///< all bits of a lane, or none
 
 [[nodiscard]] inline Lanes all_lanes(float x) { return x - Lanes{}; }
-[[nodiscard]] inline LaneMask first_lanes(std::size_t count) {
-  return LaneMask{0, 1, 2, 3, 4, 5, 6, 7} < static_cast<std::int32_t>(count);
-}
+inline constexpr LaneBits kLaneNumbers = {0, 1, 2, 3, 4, 5, 6, 7};
+[[nodiscard]] inline LaneBits all_lanes(std::uint32_t x) { return x - LaneBits{}; }
+/// None where count <= 0.
+[[nodiscard]] inline LaneMask first_lanes(int count) { return LaneMask{0, 1, 2, 3, 4, 5, 6, 7} < count; }
 [[nodiscard]] inline bool any(LaneMask mask) { return _mm256_movemask_epi8(std::bit_cast<__m256i>(mask)) != 0; }
 [[nodiscard]] inline bool any(bool mask) { return mask; }
 
@@ -49,6 +50,10 @@ template <class Number>
 /// 1 with the sign of x.
 [[nodiscard]] inline Lanes sign(Lanes x) { return std::bit_cast<Lanes>((std::bit_cast<LaneBits>(x) & 0x80000000u) | 0x3f800000u); }
 [[nodiscard]] inline float sign(float x) { return std::copysign(1.0F, x); }
+/// The lanes that `from` names, each below kLanes.
+[[nodiscard]] inline Lanes permuted(Lanes x, LaneBits from) { return _mm256_permutevar8x32_ps(x, std::bit_cast<__m256i>(from)); }
+/// Sum over all lanes.
+[[nodiscard]] inline float total(Lanes x) { return ((x[0] + x[4]) + (x[1] + x[5])) + ((x[2] + x[6]) + (x[3] + x[7])); }
 /// Of an integer below 2^31.
 [[nodiscard]] inline Lanes number_of(LaneBits x) { return _mm256_cvtepi32_ps(std::bit_cast<__m256i>(x)); }
 [[nodiscard]] inline float number_of(std::uint32_t x) { return static_cast<float>(x); }
@@ -88,6 +93,8 @@ class Vec3Lanes {
     return {y_ * b.z_ - z_ * b.y_, z_ * b.x_ - x_ * b.z_, x_ * b.y_ - y_ * b.x_};
   }
   [[nodiscard]] Vec3Lanes cwiseProduct(const Vec3Lanes& b) const { return {x_ * b.x_, y_ * b.y_, z_ * b.z_}; }
+  [[nodiscard]] Vec3Lanes cwiseQuotient(const Vec3Lanes& b) const { return {x_ / b.x_, y_ / b.y_, z_ / b.z_}; }
+  [[nodiscard]] Vec3Lanes cwiseMax(float b) const { return {larger(x_, b), larger(y_, b), larger(z_, b)}; }
   [[nodiscard]] Lanes norm() const { return root(dot(*this)); }
   [[nodiscard]] Vec3Lanes normalized() const { return *this * (1.0F / norm()); }
   [[nodiscard]] Lanes maxCoeff() const { return larger(larger(x_, y_), z_); }
@@ -100,6 +107,7 @@ class Vec3Lanes {
   return {select(mask, yes.x(), no.x()), select(mask, yes.y(), no.y()), select(mask, yes.z(), no.z())};
 }
 [[nodiscard]] inline Vec3f select(bool mask, const Vec3f& yes, const Vec3f& no) { return mask ? yes : no; }
+[[nodiscard]] inline Vec3f total(const Vec3Lanes& v) { return {total(v.x()), total(v.y()), total(v.z())}; }
 
 template <class Number>
 [[nodiscard]] Number constant(float x) {

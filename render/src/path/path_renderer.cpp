@@ -1,5 +1,6 @@
 #include "path_renderer.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "../draw_list.h"
@@ -13,7 +14,9 @@
 namespace supple::render {
 namespace {
 
+using path::Lanes;
 using path::Vec3f;
+using path::Vec3Lanes;
 
 class PathRenderer final : public Renderer {
  public:
@@ -79,36 +82,48 @@ Image PathRenderer::render(const View& view, std::span<const Item> items, Linear
   {
     const CpuClock clock(times_.draw);
     path::trace(geometry_, lights_of(view, settings_.shadow_softness), ground, camera, trace, executor_, film_);
-    if (settings_.denoise) denoiser_.run(settings_.width, settings_.height, camera.eye, footprint, executor_, film_);
+    if (settings_.denoise) denoiser_.run(camera.eye, footprint, executor_, film_);
   }
   const CpuClock clock(times_.read_back);
   if (linear != nullptr) {
     *linear = {.width = settings_.width, .height = settings_.height, .rgba = {}};
-    for (std::size_t i = 0; i < film_.radiance.size(); ++i) {
-      const Vec3f light = film_.cover[i] * film_.radiance[i];
-      linear->rgba.insert(linear->rgba.end(), {light.x(), light.y(), light.z(), film_.cover[i]});
-    }
+    for (int y = 0; y < settings_.height; ++y)
+      for (int x = 0; x < settings_.width; ++x) {
+        const float cover = film_.cover.at(x, y);
+        const Vec3f light = cover * film_.radiance.at(x, y);
+        linear->rgba.insert(linear->rgba.end(), {light.x(), light.y(), light.z(), cover});
+      }
   }
   return develop(view, film_);
 }
 
 /// A fit of the ACES output transform (Narkowicz 2015), as in the shaders.
-Vec3f filmic(const Vec3f& radiance) {
-  const Eigen::Array3f x = radiance.array().max(0.0F) * kExposure;
-  return (x * (2.51F * x + 0.03F) / (x * (2.43F * x + 0.59F) + 0.14F)).min(1.0F).matrix();
+Vec3Lanes filmic(const Vec3Lanes& radiance) {
+  const auto curve = [](Lanes light) {
+    const Lanes x = path::larger(light, 0.0F) * kExposure;
+    return path::smaller(x * (2.51F * x + 0.03F) / (x * (2.43F * x + 0.59F) + 0.14F), 1.0F);
+  };
+  return {curve(radiance.x()), curve(radiance.y()), curve(radiance.z())};
 }
 
 Image PathRenderer::develop(const View& view, const path::Film& film) const {
   Image image{.width = settings_.width, .height = settings_.height, .pixels = {}};
-  image.pixels.resize(3 * film.radiance.size());
+  const auto width = static_cast<std::size_t>(settings_.width), height = static_cast<std::size_t>(settings_.height);
+  image.pixels.resize(3 * width * height);
   const Vec3f top = linear_colour(view.background_top), bottom = linear_colour(view.background_bottom);
-  const auto width = static_cast<std::size_t>(settings_.width);
-  for (std::size_t i = 0; i < film.radiance.size(); ++i) {
-    const float t = 1.0F - (static_cast<float>(i / width) + 0.5F) / static_cast<float>(settings_.height);
-    const Vec3f behind = bottom + t * t * (3.0F - 2.0F * t) * (top - bottom);
-    const Vec3f seen = behind + film.cover[i] * (filmic(film.radiance[i]) - behind);
-    for (Eigen::Index k = 0; k < 3; ++k) image.pixels[3 * i + static_cast<std::size_t>(k)] = srgb_of_linear(static_cast<double>(seen[k]));
-  }
+  executor_.for_blocks(height, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const float t = 1.0F - (static_cast<float>(row) + 0.5F) / static_cast<float>(settings_.height);
+      const Vec3Lanes behind(bottom + t * t * (3.0F - 2.0F * t) * (top - bottom));
+      for (std::size_t left = 0; left < width; left += path::kLanes) {
+        const int x = static_cast<int>(left), y = static_cast<int>(row);
+        const Vec3Lanes seen = behind + film.cover.load(x, y) * (filmic(film.radiance.load(x, y)) - behind);
+        std::uint8_t* pixel = &image.pixels[3 * (row * width + left)];
+        for (std::size_t k = 0; k < std::min(path::kLanes, width - left); ++k)
+          for (const Lanes& channel : {seen.x(), seen.y(), seen.z()}) *pixel++ = srgb_of_linear(static_cast<double>(channel[k]));
+      }
+    }
+  });
   return image;
 }
 

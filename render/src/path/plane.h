@@ -14,8 +14,14 @@ class Plane {
  public:
   static constexpr int kMargin = 16;
 
+  /// All zeros, unless it has that size already.
+  void resize(int width, int height) {
+    if (width != width_ || height != height_) reset(width, height);
+  }
   /// All zeros.
   void reset(int width, int height) {
+    width_ = width;
+    height_ = height;
     pitch_ = (width + 2 * kMargin + static_cast<int>(kLanes) - 1) / static_cast<int>(kLanes) * static_cast<int>(kLanes);
     values_.assign(static_cast<std::size_t>(pitch_) * static_cast<std::size_t>(height + 2 * kMargin), 0.0F);
   }
@@ -25,13 +31,32 @@ class Plane {
   /// The pixels x to x + 7.
   [[nodiscard]] Lanes load(int x, int y) const { return _mm256_loadu_ps(pixel(x, y)); }
   void store(int x, int y, Lanes v) { _mm256_storeu_ps(pixel(x, y), v); }
+  /// The pixel x alone.
+  void store(int x, int y, float v) { at(x, y) = v; }
   [[nodiscard]] float* pixel(int x, int y) { return values_.data() + offset(x, y); }
   [[nodiscard]] const float* pixel(int x, int y) const { return values_.data() + offset(x, y); }
 
  private:
   [[nodiscard]] std::ptrdiff_t offset(int x, int y) const { return static_cast<std::ptrdiff_t>(y + kMargin) * pitch_ + x + kMargin; }
+  int width_ = 0, height_ = 0;
   int pitch_ = 0;
   std::vector<float> values_;
+};
+
+/// One vector a pixel.
+struct VectorPlane {
+  Plane x, y, z;
+  void resize(int width, int height) {
+    for (Plane* plane : {&x, &y, &z}) plane->resize(width, height);
+  }
+  [[nodiscard]] Vec3f at(int px, int py) const { return {x.at(px, py), y.at(px, py), z.at(px, py)}; }
+  [[nodiscard]] Vec3Lanes load(int px, int py) const { return {x.load(px, py), y.load(px, py), z.load(px, py)}; }
+  template <class Vector>
+  void store(int px, int py, const Vector& v) {
+    x.store(px, py, v.x());
+    y.store(px, py, v.y());
+    z.store(px, py, v.z());
+  }
 };
 
 /// Sums over the (2 reach + 1)^2 pixels around, whose weights fall linearly from (reach + 1)^2 in the middle.

@@ -8,23 +8,14 @@ namespace {
 constexpr float kWideLobe = 0.2F;  // from this alpha on, reflections are about as smooth as diffuse light
 constexpr float kSharp = 0.5F;     // mirrors whose every camera ray goes on
 
-/// A column of the picks, one a lane.
-template <class Column>
-LaneBits lanes_of(std::span<const Pick> picks, const Column& column) {
-  LaneBits out{};
-  for (std::size_t k = 0; k < picks.size(); ++k) out[k] = column(picks[k]);
-  return out;
-}
-
 Vec3Lanes turn(const Eigen::Matrix3f& m, const Vec3Lanes& v) {
   return Vec3Lanes(m.col(0)) * v.x() + Vec3Lanes(m.col(1)) * v.y() + Vec3Lanes(m.col(2)) * v.z();
 }
 
 }  // namespace
 
-RayBundle Tracer::camera_rays(std::span<const Pick> picks, LaneMask who, Random& random) const {
-  const Lanes x = number_of(lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.x); }));
-  const Lanes y = number_of(lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.y); }));
+RayBundle Tracer::camera_rays(const Picks& picks, Random& random) const {
+  const Lanes x = number_of(picks.x), y = number_of(picks.y);
   const Pair<Lanes> jitter = random.pair();
   const Lanes across = (x + jitter.x) * (2.0F / static_cast<float>(settings_.width)) - 1.0F;
   const Lanes up = (static_cast<float>(settings_.height - 1) - y + jitter.y) * (2.0F / static_cast<float>(settings_.height)) - 1.0F;
@@ -36,7 +27,7 @@ RayBundle Tracer::camera_rays(std::span<const Pick> picks, LaneMask who, Random&
     local = local * static_cast<float>(settings_.focus) - start;
   }
   return {.from = Vec3Lanes(camera_.eye) + turn(to_world_, start), .direction = turn(to_world_, local).normalized(),
-          .time = random.number(), .who = who, .together = true};
+          .time = random.number(), .who = picks.who, .together = true};
 }
 
 /// Of the surfaces that rays meet, the ground and the lamps.
@@ -203,53 +194,41 @@ Vec3Lanes Tracer::indirect(Places& places, const RayBundle& camera_rays, Random&
   return sum;
 }
 
-void Tracer::sample(std::span<const Pick> picks, std::span<Sample> out) const {
-  const LaneMask who = first_lanes(picks.size());
-  const LaneBits x = lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.x); });
-  const LaneBits y = lanes_of(picks, [](const Pick& p) { return static_cast<std::uint32_t>(p.y); });
-  const LaneBits stream = lanes_of(picks, [](const Pick& p) { return p.stream; });
-  Random random(x, y, stream, lanes_of(picks, [](const Pick& p) { return p.count; }),
-                lanes_of(picks, [](const Pick& p) { return p.number; }));
-  const RayBundle rays = camera_rays(picks, who, random);
+Samples Tracer::sample(const Picks& picks) const {
+  Random random(picks.x, picks.y, all_lanes(picks.stream), all_lanes(picks.count), picks.number);
+  const RayBundle rays = camera_rays(picks, random);
   Places places{};
   const Meeting met = meet(rays, random.number(), places);
 
+  Samples out;
+  const LaneMask shown = met.surface | met.lamp;
   const Lanes of_ground = ground_ ? ground_share(places.point) : Lanes{};
-  const Lanes cover = select(met.ground, of_ground, select(met.surface | met.lamp, all_lanes(1.0F), 0.0F));
+  const Lanes cover = select(met.ground, of_ground, select(shown, all_lanes(1.0F), 0.0F));
   const BsdfOf<Lanes>& bsdf = places.bsdf;
-  const Vec3Lanes albedo = bsdf.diffuse + bsdf.normal_reflectance;
-  const Lanes mirror = select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F);
+  const auto on_surfaces = [&](const Vec3Lanes& v) { return select(met.surface, v, Vec3Lanes::Zero()); };
+  out.facet = {.cover = cover, .albedo = on_surfaces(bsdf.diffuse + bsdf.normal_reflectance), .normal = on_surfaces(places.normal),
+               .position = on_surfaces(places.point)};
+  out.mirror = select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F);
   const Axes axes(places.normal);
   const Vec3Lanes away = axes.to_local(-rays.direction);
   const LaneMask lit = both(met.surface, both(cover > 0.0F, away.z() > 0.0F));
-  const Vec3Lanes bright = direct(places, axes, away, lit, rays.time, true, random);
-  for (std::size_t k = 0; k < picks.size(); ++k) {
-    out[k] = {};
-    out[k].weight = static_cast<float>(picks[k].share);
-    if (lit[k] != 0 && picks[k].sees_mirrors && mirror[k] > kSharp) out[k].weight = 1.0F;
-    out[k].facet.cover = cover[k];
-    out[k].direct = met.lamp[k] != 0 ? met.radiance.lane(k) : bright.lane(k);
-    if (met.surface[k] == 0) continue;
-    out[k].facet = {.cover = cover[k], .albedo = albedo.lane(k), .normal = places.normal.lane(k), .position = places.point.lane(k)};
-    out[k].mirror = mirror[k];
-  }
+  out.direct = select(met.lamp, met.radiance, direct(places, axes, away, lit, rays.time, true, random));
 
+  out.weight = select(picks.who, all_lanes(static_cast<float>(picks.share)), 0.0F);
+  if (picks.sees_mirrors) out.weight = select(both(lit, out.mirror > kSharp), all_lanes(1.0F), out.weight);
   RayBundle paths = rays;
-  LaneBits count{}, number{};
-  for (std::size_t k = 0; k < picks.size(); ++k) {
-    const auto share = std::max(1u, static_cast<std::uint32_t>(out[k].weight));
-    count[k] = picks[k].count / share;
-    number[k] = picks[k].number / share;
-    if (lit[k] == 0 || !(out[k].weight > 0.0F)) paths.who[k] = 0;
+  paths.who = both(lit, out.weight > 0.0F);
+  if (!any(paths.who)) return out;
+  // A path that stands for several rays has the numbers of one of as many fewer.
+  LaneBits count = all_lanes(picks.count), number = picks.number;
+  if (picks.share > 1) {
+    const auto alone = std::bit_cast<LaneBits>(out.weight == 1.0F);
+    count = (count & alone) | (all_lanes(picks.count / picks.share) & ~alone);
+    number = (number & alone) | ((number / picks.share) & ~alone);
   }
-  if (!any(paths.who)) return;
-  Random further(x, y, stream + 1u, count, number);
-  Lanes nearness{};
-  const Vec3Lanes indirect_light = indirect(places, paths, further, nearness);
-  for (std::size_t k = 0; k < picks.size(); ++k) {
-    out[k].indirect = indirect_light.lane(k);
-    out[k].nearness = nearness[k];
-  }
+  Random further(picks.x, picks.y, all_lanes(picks.stream + 1u), count, number);
+  out.indirect = indirect(places, paths, further, out.nearness);
+  return out;
 }
 
 }  // namespace supple::render::path

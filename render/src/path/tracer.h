@@ -3,7 +3,6 @@
 #pragma once
 
 #include <optional>
-#include <span>
 
 #include "../draw_list.h"
 #include "geometry.h"
@@ -33,33 +32,48 @@ struct TraceSettings {
   float largest_indirect = 10.0F;  ///< luminance that a bounce can add; keeps single bright paths out of a picture
 };
 
-/// What one camera ray of a pixel met.
-struct Facet {
-  float cover = 0.0F;
-  Vec3f albedo = Vec3f::Zero();
-  Vec3f normal = Vec3f::Zero();
-  Vec3f position = Vec3f::Zero();  ///< relative to the origin [m]
+/// What one camera ray of a pixel met, or eight of them.
+template <class Number>
+struct FacetOf {
+  using Vector = typename LaneTypes<Number>::Vector;
+  Number cover{};
+  Vector albedo = Vector::Zero();
+  Vector normal = Vector::Zero();
+  Vector position = Vector::Zero();  ///< relative to the origin [m]
 };
+using Facet = FacetOf<float>;
 
-/// Sample `number` of `count` that a pixel takes together from two sequences of numbers, `stream` and the next one.
-struct Pick {
-  int x = 0;
-  int y = 0;
+/// What a camera ray brings.
+template <class Number>
+struct SampleOf {
+  using Vector = typename LaneTypes<Number>::Vector;
+  Vector direct = Vector::Zero();
+  Vector indirect = Vector::Zero();
+  Number weight{};    ///< camera rays that its indirect light stands for; 0: it knows of none
+  Number nearness{};  ///< 1 / distance of where it comes from
+  Number mirror{};
+  FacetOf<Number> facet;
+};
+using Sample = SampleOf<float>;
+using Samples = SampleOf<Lanes>;
+
+[[nodiscard]] inline Sample lane(const Samples& samples, std::size_t k) {
+  const FacetOf<Lanes>& facet = samples.facet;
+  return {.direct = samples.direct.lane(k), .indirect = samples.indirect.lane(k), .weight = samples.weight[k],
+          .nearness = samples.nearness[k], .mirror = samples.mirror[k],
+          .facet = {.cover = facet.cover[k], .albedo = facet.albedo.lane(k), .normal = facet.normal.lane(k), .position = facet.position.lane(k)}};
+}
+
+/// Samples of neighbouring pixels, or of one. Of each pixel they are sample `number` of `count` that it takes together from two
+/// sequences of numbers, `stream` and the next one.
+struct Picks {
+  LaneMask who{};               ///< lanes that hold one
+  LaneBits x{}, y{};
   std::uint32_t stream = 0;
   std::uint32_t count = 1;
-  std::uint32_t number = 0;
-  std::uint32_t share = 0;      ///< camera rays that its path stands for, a power of two up to count; 0: it has no path
-  bool sees_mirrors = true;     ///< sharp reflections are edges, too: there the ray goes on in any case
-};
-
-/// What one camera ray brings.
-struct Sample {
-  Vec3f direct = Vec3f::Zero();
-  Vec3f indirect = Vec3f::Zero();
-  float weight = 0.0F;    ///< camera rays that its indirect light stands for; 0: it knows of none
-  float nearness = 0.0F;  ///< 1 / distance of where it comes from
-  float mirror = 0.0F;
-  Facet facet;
+  LaneBits number{};
+  std::uint32_t share = 0;      ///< camera rays that a path stands for, a power of two up to count; 0: they have no paths
+  bool sees_mirrors = true;     ///< sharp reflections are edges, too: there rays go on in any case
 };
 
 class Tracer {
@@ -71,8 +85,8 @@ class Tracer {
         sun_radiance_(lights.sun.radiance()), sun_density_(1.0F / lights.sun.solid_angle()),
         gap_(2e-5F * static_cast<float>(camera.distance)) {}
 
-  /// Of at most kLanes neighbouring picks.
-  void sample(std::span<const Pick> picks, std::span<Sample> out) const;
+  /// Lanes without a pick bring zeros.
+  [[nodiscard]] Samples sample(const Picks& picks) const;
 
  private:
   using Random = SamplerOf<Lanes>;
@@ -95,7 +109,7 @@ class Tracer {
     Vec3Lanes direction;  ///< it comes from
   };
 
-  [[nodiscard]] RayBundle camera_rays(std::span<const Pick> picks, LaneMask who, Random& random) const;
+  [[nodiscard]] RayBundle camera_rays(const Picks& picks, Random& random) const;
   [[nodiscard]] Meeting meet(const RayBundle& rays, Lanes choice, Places& places) const;
   [[nodiscard]] Light sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const;
   [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time,
