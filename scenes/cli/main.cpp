@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <charconv>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -53,6 +55,7 @@ struct Arguments {
   std::string query;
   std::string group;
   std::string other;
+  std::string camera;
   std::string meshes;
   std::string grids;
   std::string particles;
@@ -191,7 +194,8 @@ int compare(const Arguments& arguments) {
                                                           .second = arguments.other,
                                                           .folder = arguments.out.empty() ? "out/compare" : arguments.out,
                                                           .gain = arguments.gain,
-                                                          .film = !arguments.no_film});
+                                                          .film = !arguments.no_film,
+                                                          .camera = arguments.camera});
   const auto worst = std::min_element(result.frames.begin(), result.frames.end(),
                                       [](const auto& a, const auto& b) { return a.psnr < b.psnr; });
   const auto equal = std::count_if(result.frames.begin(), result.frames.end(), [](const auto& f) { return f.largest == 0; });
@@ -276,7 +280,13 @@ void run_flags(CLI::App* verb, Arguments& a) {
 void drawing_flags(CLI::App* verb, Arguments& a) {
   verb->add_option("--at-once", a.at_once, "frames in work at the same time (default: one a thread, as memory allows; changes no bit)")
       ->check(CLI::Range(0, 64));
-  verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")->check(CLI::PositiveNumber);
+  verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")
+      ->check([](const std::string& text) {
+        double value = 0.0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool good = error == std::errc() && end == text.data() + text.size() && value > 0.0 && std::isfinite(value);
+        return good ? std::string() : "expected a number > 0, found " + text;
+      });
 }
 
 int parse_and_call(int argc, char** argv) {
@@ -321,6 +331,7 @@ int parse_and_call(int argc, char** argv) {
   compare_verb->add_option("second", a.other, "run folder")->required();
   compare_verb->add_option("--out", a.out, "output folder (default: out/compare)");
   compare_verb->add_option("--gain", a.gain, "of the difference pictures")->check(CLI::Range(1.0, 255.0));
+  compare_verb->add_option("--camera", a.camera, "whose frames, where a run has several cameras");
   compare_verb->add_flag("--no-film", a.no_film, "frames and table only");
   compare_verb->footer("Example: supple compare out/literal out/consistent --out out/compare");
 
@@ -386,15 +397,27 @@ int parse_and_call(int argc, char** argv) {
   return query(a);
 }
 
+/// @throws Error{Io} where what was printed could not be written
+void flush_output() {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return;
+  throw Error(ErrorKind::Io, Fault{.place = "standard output", .key = {}, .expected = "cannot be written", .found = {}, .hint = {}});
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
-    return parse_and_call(argc, argv);
+    const int code = parse_and_call(argc, argv);
+    flush_output();
+    return code;
   } catch (const supple::Error& error) {
     std::cout.flush();
     std::fprintf(stderr, "%s\n", error.what());
     return static_cast<int>(error.kind());
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return static_cast<int>(supple::ErrorKind::Io);
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "%s\n", supple::scenes::kOutOfMemory);
     return static_cast<int>(supple::ErrorKind::Limit);

@@ -121,8 +121,8 @@ std::string scene_reference() {
   std::string out =
       "# Scene files\n\n"
       "YAML (and so JSON). Bare numbers are SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted after their dimension has been\n"
-      "checked. Keys that end in `_deg` are in degrees. `--set objects.ball.particles.mass=2` overrides any key. This page is\n"
-      "generated from the lists that read scenes.\n\n";
+      "checked. Numbers are 0 or between 1e-50 and 1e50 in size. Keys that end in `_deg` are in degrees.\n"
+      "`--set objects.ball.particles.mass=2` overrides any key. This page is generated from the lists that read scenes.\n\n";
   write_tables(scene_fields(), "", out);
   return out;
 }

@@ -587,10 +587,10 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   }
   return meshes;
 } catch (const Error& error) {
-  rethrow_with_scene_keys(error);
+  throw with_scene_keys(error);
 }
 
-void rethrow_with_scene_keys(const Error& error) {
+Error with_scene_keys(const Error& error) {
   std::vector<Fault> faults = error.faults();
   for (Fault& fault : faults) {
     if (fault.key == "lattice.cell") fault.key = "output.cell";
@@ -598,7 +598,7 @@ void rethrow_with_scene_keys(const Error& error) {
     if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
   }
-  throw Error(error.kind(), std::move(faults));
+  return {error.kind(), std::move(faults)};
 }
 
 }  // namespace supple::scenes

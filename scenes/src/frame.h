@@ -142,6 +142,6 @@ struct Division {
                                                    const core::Interactions& laws, Frame& frame);
 
 /// The names of meshers' and grids' arguments become those of the scene's keys.
-[[noreturn]] void rethrow_with_scene_keys(const Error& error);
+[[nodiscard]] Error with_scene_keys(const Error& error);
 
 }  // namespace supple::scenes

@@ -278,11 +278,15 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
   return first_film;
 }
 
-/// Of one camera, if all its frames are there.
+/// Of one camera, if all its frames are there, in one size.
 fs::path FrameWriter::make_film(const std::string& name, int last) {
+  const PictureSize size = picture_size(frame_path(options_.folder, name, 1));
   for (int frame = 1; frame <= last; ++frame) {
-    if (fs::exists(frame_path(options_.folder, name, frame))) continue;
-    warnings_.push_back("no film: frame " + std::to_string(frame) + " of " + name + " has no picture");
+    const fs::path path = frame_path(options_.folder, name, frame);
+    const bool there = fs::exists(path);
+    if (there && picture_size(path) == size) continue;
+    warnings_.push_back("no film: frame " + std::to_string(frame) + " of " + name +
+                        (there ? " has another size than frame 1" : " has no picture"));
     return {};
   }
   const fs::path film = options_.folder / (name + ".mp4");

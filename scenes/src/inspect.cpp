@@ -42,9 +42,9 @@ ordered_json read_report(const fs::path& folder) {
 }
 
 std::string line(const char* format, auto... values) {
-  std::array<char, 256> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), format, values...);
-  return std::string(buffer.data()) + '\n';
+  std::string text(static_cast<std::size_t>(std::max(std::snprintf(nullptr, 0, format, values...), 0)), '\0');
+  std::snprintf(text.data(), text.size() + 1, format, values...);
+  return text + '\n';
 }
 
 double number_at(const ordered_json& object, const char* key) {
@@ -78,26 +78,38 @@ std::string files_text(const fs::path& folder) {
   return text;
 }
 
-/// Frame number of "name.0012.png".
-std::optional<int> frame_number(const fs::path& path) {
+struct FrameName {
+  std::string name;
+  int frame = 0;
+};
+
+/// Of "name.0012.png".
+std::optional<FrameName> frame_name(const fs::path& path) {
   const std::string stem = path.stem().string();
   const std::size_t dot = stem.rfind('.');
   if (path.extension() != ".png" || dot == std::string::npos) return std::nullopt;
-  int frame = 0;
-  const auto [end, error] = std::from_chars(stem.data() + dot + 1, stem.data() + stem.size(), frame);
+  FrameName out{.name = stem.substr(0, dot), .frame = 0};
+  const auto [end, error] = std::from_chars(stem.data() + dot + 1, stem.data() + stem.size(), out.frame);
   if (error != std::errc() || end != stem.data() + stem.size()) return std::nullopt;
-  return frame;
+  return out;
 }
 
-std::map<int, fs::path> frames_of(const fs::path& folder) {
-  std::map<int, fs::path> frames;
+/// Of the only camera, or of the one that `camera` names.
+std::map<int, fs::path> frames_of(const fs::path& folder, const std::string& camera) {
+  std::map<std::string, std::map<int, fs::path>> pictures;
   if (fs::is_directory(folder / "frames")) {
     for (const auto& entry : fs::directory_iterator(folder / "frames")) {
-      if (const auto frame = frame_number(entry.path())) frames[*frame] = entry.path();
+      if (const auto file = frame_name(entry.path())) pictures[file->name][file->frame] = entry.path();
     }
   }
-  if (frames.empty()) fail(ErrorKind::Io, folder, "expected a run folder with frames", "none");
-  return frames;
+  if (pictures.empty()) fail(ErrorKind::Io, folder, "expected a run folder with frames", "none");
+  if (pictures.size() == 1) return pictures.begin()->second;
+  std::string known;
+  for (const auto& [name, frames] : pictures) {
+    if (!camera.empty() && name.ends_with('.' + camera)) return frames;
+    known += (known.empty() ? "" : ", ") + name;
+  }
+  fail(ErrorKind::Usage, folder, "expected the frames of one camera, or --camera with the name of one", known);
 }
 
 std::string size_text(const render::Image& image) { return std::to_string(image.width) + " x " + std::to_string(image.height); }
@@ -142,7 +154,8 @@ std::string describe_run(const fs::path& folder) {
 }
 
 Comparison compare_runs(const ComparisonOptions& options) {
-  const std::map<int, fs::path> first = frames_of(options.first), second = frames_of(options.second);
+  const std::map<int, fs::path> first = frames_of(options.first, options.camera),
+                                second = frames_of(options.second, options.camera);
   io::make_writable_folder(options.folder / "frames");
   constexpr int kGap = 2;
   Comparison result;

@@ -263,6 +263,22 @@ bool only_convex(const ObjectModel& object) {
   return true;
 }
 
+/// Whether the seeds of an object's surface, by the boxes of its supports, stay within what memory holds.
+bool seeds_fit(const ObjectModel& object, const core::ParticleState& rest, double spacing) {
+  constexpr double kMostSeeds = 2e8, kMostInRow = 5e5;
+  std::vector<Pose> poses;
+  for (std::uint32_t i = object.first; i < object.last; ++i) poses.push_back({rest.position[i], rest.orientation[i]});
+  implicit::PlacedSkeleton placed;
+  implicit::place_skeleton(object.skeleton, poses, placed);
+  double seeds = 0.0, longest = 0.0;
+  for (const Box& box : placed.support) {
+    const Vec3 side = box.extent() / spacing;
+    seeds += 2.0 * (side.x() * side.y() + side.y() * side.z() + side.z() * side.x());
+    longest = std::max(longest, side.maxCoeff());
+  }
+  return seeds <= kMostSeeds && longest <= kMostInRow;
+}
+
 }  // namespace
 
 double iso_radius(const implicit::Primitive& primitive, double iso) {
@@ -338,6 +354,12 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
                                                   stick_frequency(object, model.particles, model.reaction.stick)));
     if (!needs_samples) continue;
     const double spacing = scene.contact.sample_spacing.value_or(2.0 * object.iso_radius / kSamplesAcross);
+    if (!seeds_fit(object, model.rest, spacing)) {
+      faults.add("contact.sample_spacing", "expected surface samples that memory holds",
+                 "those of '" + object.name + "' " + short_text(spacing) + " m apart",
+                 "ask for a larger sample_spacing, or for fewer or thicker parts");
+      continue;
+    }
     object.samples = implicit::make_sample_layout(object.skeleton, spacing);
   }
 }

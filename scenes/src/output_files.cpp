@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
+#include <map>
 
 #include "frame.h"
+#include "scene_places.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 
@@ -102,14 +105,31 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   }
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);
 } catch (const Error& error) {
-  rethrow_with_scene_keys(error);
+  rethrow_with_places(simulation.scene(), with_scene_keys(error));
+}
+
+PictureSize picture_size(const fs::path& path) {
+  std::array<unsigned char, 24> head{};
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(head.data()), head.size());
+  if (!file) return {};
+  const auto number = [&head](std::size_t at) {
+    return static_cast<int>(head[at] << 24U | head[at + 1] << 16U | head[at + 2] << 8U | head[at + 3]);
+  };
+  return {number(16), number(20)};
 }
 
 fs::path write_contact_sheet(const fs::path& folder, const std::string& name, int last) {
-  std::vector<int> present;
+  std::map<PictureSize, std::vector<int>> frames;
   for (int frame = 1; frame <= last; ++frame) {
-    if (fs::exists(frame_path(folder, name, frame))) present.push_back(frame);
+    const fs::path path = frame_path(folder, name, frame);
+    if (fs::exists(path)) frames[picture_size(path)].push_back(frame);
   }
+  // Frames may have been drawn again in another size: the sheet is of those that most have.
+  const auto most = std::max_element(frames.begin(), frames.end(),
+                                     [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  if (most == frames.end()) return {};
+  const std::vector<int>& present = most->second;
   const int wanted = std::min<int>(kSheetColumns * kSheetRows, static_cast<int>(present.size()));
   std::vector<render::Image> images;
   for (int k = 0; k < wanted; ++k) {
@@ -118,7 +138,6 @@ fs::path write_contact_sheet(const fs::path& folder, const std::string& name, in
     const render::Image frame = render::read_png(frame_path(folder, name, present[index]));
     images.push_back(render::downscale(frame, std::min(kSheetImageWidth, frame.width)));
   }
-  if (images.empty()) return {};
   const fs::path sheet = folder / (name + "_sheet.png");
   render::write_png(sheet, render::contact_sheet(images, kSheetColumns, kSheetGap));
   return sheet;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "supple/implicit/surface_grid.h"
@@ -25,7 +26,12 @@ void remove_temporaries(const std::filesystem::path& folder, const std::string& 
 /// @param updaters  by body, kept from frame to frame: only what moved is made anew
 void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation,
                      std::vector<implicit::GridUpdater>& updaters);
-/// NAME_sheet.png: twelve frames spread over 1 .. last that exist, 3 rows of 4. Empty when none does.
+/// Width and height of a PNG, by its head; zeros of what is none.
+using PictureSize = std::pair<int, int>;
+[[nodiscard]] PictureSize picture_size(const std::filesystem::path& path);
+
+/// NAME_sheet.png: twelve frames spread over those of 1 .. last that exist, of the size that most have, 3 rows of 4. Empty
+/// when none does.
 std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, int last);
 
 /// Books process CPU time of a scope on a stage.

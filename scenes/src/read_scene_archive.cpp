@@ -128,7 +128,7 @@ void ReadArchive::read(const Node& node, const std::string& path, std::string& v
   if (node.kind != Node::Kind::Scalar) {
     fault(node, path, rule.name ? "expected a name" : "expected text", "");
   } else if (rule.name && !is_identifier(node.text)) {
-    fault(node, path, "expected a name", "names are letters, digits, '_', '.', '-', and begin with a letter or '_'");
+    fault(node, path, "expected a name", "names are at most 100 letters, digits, '_', '.', '-', and begin with a letter or '_'");
   } else {
     value = node.text;
   }
@@ -156,7 +156,7 @@ void ReadArchive::read(const Node& node, const std::string& path, Vec3& value, c
 bool ReadArchive::read_items(const Node& node, const std::string& path, const Rule& rule, std::string_view noun) {
   if (node.kind != Node::Kind::List) {
     fault(node, path, "expected a list of " + std::string(noun),
-          node.kind == Node::Kind::Mapping ? "begin each item with '- '" : node.kind == Node::Kind::Null ? "write [] for none" : "");
+          node.kind == Node::Kind::Mapping ? "begin each item with '- '" : node.kind == Node::Kind::Null && rule.least_items == 0 ? "write [] for none" : "");
     return false;
   }
   if (node.items.size() < rule.least_items || node.items.size() > rule.most_items) {

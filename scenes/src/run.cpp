@@ -7,11 +7,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <exception>
 #include <new>
 #include <optional>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "drawing_crew.h"
@@ -35,8 +39,15 @@ class FolderLock {
   explicit FolderLock(const fs::path& folder) {
     const fs::path path = folder / ".lock";
     file_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (file_ < 0 || flock(file_, LOCK_EX | LOCK_NB) != 0) {
-      if (file_ >= 0) close(file_);
+    if (file_ < 0) {
+      throw Error(ErrorKind::Io, Fault{.place = path.string(),
+                                       .key = {},
+                                       .expected = "expected a file that can be written",
+                                       .found = std::system_category().message(errno),
+                                       .hint = "it holds the folder for one run; remove it, or choose another --out"});
+    }
+    if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
+      close(file_);
       throw Error(ErrorKind::Io, Fault{.place = folder.string(),
                                        .key = {},
                                        .expected = "expected an output folder that no other run uses",
@@ -78,15 +89,24 @@ std::string outcome_of(ErrorKind kind) {
   return "internal";
 }
 
-/// What pictures need and a scene only names is looked for before hours of work, and before anything is removed.
+/// What pictures need and a scene only names is looked for before hours of work, and before anything is removed; and
+/// that the frames asked for are some of the scene's.
 /// @throws Error
 void check_needs(const Scene& scene, const RunOptions& options, const OutputRequest& outputs) {
+  if (!options.frames.empty() && *options.frames.begin() > scene.frame_count()) {
+    throw Error(ErrorKind::Usage, Fault{.place = "--frames",
+                                        .key = {},
+                                        .expected = "expected a frame from 1 to " + std::to_string(scene.frame_count()),
+                                        .found = "none before " + std::to_string(*options.frames.begin()),
+                                        .hint = "frame n shows t = (n - 1) / frame_rate"});
+  }
   if (!outputs.images) return;
   check_pictures(scene);
   if (outputs.film && options.frames.empty()) render::find_film_program();
 }
 
 constexpr int kSignalExit = 128;
+constexpr int kMostFrames = 1'000'001;  // of a scene
 constexpr std::size_t kMostOverloads = 10;  // that are told; the report has all
 constexpr const char* kResultFile = "result.json";
 
@@ -119,6 +139,10 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
     result.outcome = outcome_of(error.kind());
     result.reason = error.what();
     result.exit_code = static_cast<int>(error.kind());
+  } catch (const fs::filesystem_error& error) {
+    result.outcome = outcome_of(ErrorKind::Io);
+    result.reason = error.what();
+    result.exit_code = static_cast<int>(ErrorKind::Io);
   } catch (const std::bad_alloc&) {
     result.outcome = outcome_of(ErrorKind::Limit);
     result.reason = kOutOfMemory;
@@ -261,18 +285,23 @@ std::set<int> parse_frames(const std::string& text) {
   while (at <= text.size()) {
     const std::size_t comma = std::min(text.find(',', at), text.size());
     const std::string part = text.substr(at, comma - at);
-    int first = 0, last = 0, step = 1, used = 0;
-    const int size = static_cast<int>(part.size());
-    const auto all = [&](int wanted, int found) { return found == wanted && used == size; };
-    if (!all(3, std::sscanf(part.c_str(), "%d-%d:%d%n", &first, &last, &step, &used))) {
-      step = 1;
-      if (!all(2, std::sscanf(part.c_str(), "%d-%d%n", &first, &last, &used))) {
-        if (!all(1, std::sscanf(part.c_str(), "%d%n", &first, &used))) fail(part);
-        last = first;
-      }
-    }
-    if (first < 1 || last < first || step < 1 || last > 10'000'000) fail(part);
-    for (int frame = first; frame <= last; frame += step) frames.insert(frame);
+    std::string_view rest = part;
+    // A number behind `lead`, if that is there; 0 where no number is.
+    const auto number = [&rest](std::string_view lead, int& value) {
+      if (!rest.starts_with(lead)) return false;
+      rest.remove_prefix(lead.size());
+      rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+      const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
+      if (error != std::errc()) value = 0;
+      rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+      return true;
+    };
+    int first = 0, step = 1;
+    number("", first);
+    int last = first;
+    if (number("-", last)) number(":", step);
+    if (!rest.empty() || first < 1 || last < first || step < 1 || last > kMostFrames) fail(part);
+    for (std::int64_t frame = first; frame <= last; frame += step) frames.insert(static_cast<int>(frame));
     at = comma + 1;
   }
   return frames;

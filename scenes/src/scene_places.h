@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "supple/core/error.h"
 #include "supple/scenes/scene.h"
 #include "yaml_tree.h"
 
@@ -33,5 +34,8 @@ auto read_for(const std::string& key, Read&& read) try {
   }
   throw Error(error.kind(), std::move(faults));
 }
+
+/// Throws the error again, its faults with the places of their keys.
+[[noreturn]] void rethrow_with_places(const Scene& scene, const Error& error);
 
 }  // namespace supple::scenes

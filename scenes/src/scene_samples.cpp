@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "scene_places.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 
@@ -43,7 +44,7 @@ void SceneSamples::follow(Simulation& simulation, const Executor& executor) try 
     fault.key = "output.sampling.spacing";
     fault.hint += ", which are a sixth of the spacing";
   }
-  throw Error(error.kind(), std::move(faults));
+  rethrow_with_places(simulation.scene(), {error.kind(), std::move(faults)});
 }
 
 io::PointSet SceneSamples::points() const {

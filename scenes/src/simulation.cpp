@@ -600,7 +600,11 @@ struct Simulation::Impl {
     pull_fields();
     StageContext wanted = context();
     if (shown) wanted.shown = &shown;
-    meshes = polygonise_objects(wanted, state.particles, laws, pulled);
+    try {
+      meshes = polygonise_objects(wanted, state.particles, laws, pulled);
+    } catch (const Error& error) {
+      rethrow_with_places(scene, error);
+    }
     pulled_meshes = true;
     return meshes;
   }

@@ -34,6 +34,14 @@ constexpr std::array kUnits{
     Unit{"mJ", 1e-3, kTorque.dimension},     Unit{"kJ", 1e3, kTorque.dimension},     Unit{"%", 1e-2, kNoDimension},
 };
 
+/// Of numbers that are not zero: products of six of them are still finite, and so are their inverses.
+constexpr double kSmallest = 1e-50, kLargest = 1e50;
+constexpr const char* kRangeHint = "numbers are 0 or between 1e-50 and 1e50 in size";
+
+bool in_range(double value) {
+  return value == 0.0 || (std::abs(value) >= kSmallest && std::abs(value) <= kLargest);
+}
+
 bool digit(char c) { return c >= '0' && c <= '9'; }
 
 std::string_view trimmed(std::string_view text) {
@@ -73,7 +81,7 @@ Leading leading_number(std::string_view text) {
   out.octal_looking = whole > 1 && text[start] == '0' && i == start + whole;
   const std::size_t sign = text[0] == '+' ? 1 : 0;
   const auto [end, error] = std::from_chars(text.data() + sign, text.data() + i, out.value);
-  out.in_range = error == std::errc() && end == text.data() + i && std::isfinite(out.value);
+  out.in_range = error == std::errc() && end == text.data() + i && in_range(out.value);
   return out;
 }
 
@@ -100,6 +108,7 @@ UnitText read_unit(std::string_view text) {
       continue;
     }
     if (text[i] == '/') {
+      if (sign < 0) break;
       sign = -1;
       ++i;
       continue;
@@ -136,7 +145,8 @@ UnitText read_unit(std::string_view text) {
     }
     sign = 1;
   }
-  out.ok = true;
+  out.ok = sign > 0;
+  if (!out.ok) out.hint = "a unit is missing after '/'";
   return out;
 }
 
@@ -185,7 +195,7 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
   }
   const std::string_view rest = trimmed(text.substr(number.length));
   if (!number.in_range) {
-    out.hint = "the number is out of range";
+    out.hint = kRangeHint;
     return out;
   }
   out.value = number.value;
@@ -213,8 +223,8 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
   }
   const bool degrees = quantity.unit == kAngle.unit;
   if (!(degrees && rest == "deg")) out.value *= degrees ? unit.factor / kDegree : unit.factor;
-  out.ok = std::isfinite(out.value);
-  if (!out.ok) out.hint = "the number is out of range";
+  out.ok = in_range(out.value);
+  if (!out.ok) out.hint = kRangeHint;
   return out;
 }
 

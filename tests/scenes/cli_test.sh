@@ -51,6 +51,8 @@ expect 4 'plain_file' run good.yaml --out plain_file/out --progress none
 expect 4 '--overwrite' run good.yaml --out good --progress none
 expect 2 '' run
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
+expect 2 '1 to 3' run good.yaml --out frames --frames 9 --progress none
+expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
 expect 2 '' query nonsense good.yaml
 expect 0 '' bench --list
 expect 2 '--list' bench cores
@@ -58,6 +60,14 @@ expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
 printf 'x' >> good/states/good.0002.state
 expect 7 'checksum' query forces good.yaml --state good/states/good.0002.state
+
+mkdir -p loop unlocked/.lock && ln -s frames loop/frames
+expect 4 'loop/frames' run good.yaml --out loop --progress none
+expect 4 '.lock' run good.yaml --out unlocked --progress none
+if "$supple" reference > /dev/full 2> err.txt || ! grep -qF 'standard output' err.txt; then
+  echo 'output that could not be written was not missed'
+  failures=$((failures + 1))
+fi
 
 grep -q '"outcome": "diverged"' diverged/result.json || { echo 'no outcome for the diverged run'; failures=$((failures + 1)); }
 expect 3 '' run nan.yaml --out invalid --progress none

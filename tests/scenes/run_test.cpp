@@ -451,16 +451,16 @@ objects:
 output: )";
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"{mesh: ply, cell: 1.8 mm}",
-       "output.cell: expected at most 1000000000 lattice nodes around the body, found about 1.38e+09 with cells of 0.0018 m; "
+       "ball.yaml:9:27: output.cell: expected at most 1000000000 lattice nodes around the body, found about 1.38e+09 with cells of 0.0018 m; "
        "use cells of at least 0.00211 m"},
       {"{grid: vdb, cell: 0.1 mm}",
-       "output.cell: expected a surface in at most 200000000 voxels, found about 6.78e+09 with cells of 0.0001 m; use cells of "
+       "ball.yaml:9:27: output.cell: expected a surface in at most 200000000 voxels, found about 6.78e+09 with cells of 0.0001 m; use cells of "
        "at least 0.000611 m"},
       {"{samples: csv, sampling: {spacing: 10 mm}}",
-       "output.sampling.spacing: expected at most 1000000000 lattice nodes around the body, found about 1.74e+09 with cells of "
+       "ball.yaml:9:44: output.sampling.spacing: expected at most 1000000000 lattice nodes around the body, found about 1.74e+09 with cells of "
        "0.00167 m; use cells of at least 0.00211 m, which are a sixth of the spacing"},
       {"{mesh: ply, meshing: {error: 1e-12}}",
-       "output.meshing.error: expected an error of at most 1e-12 m, found 0.000175 m with cells of 0.0156 m; allow at least "
+       "ball.yaml:9:38: output.meshing.error: expected an error of at most 1e-12 m, found 0.000175 m with cells of 0.0156 m; allow at least "
        "0.000184 m"}};
   for (const auto& [output, message] : cases) {
     RunOptions o = options();
@@ -484,9 +484,61 @@ TEST_F(Run, SaysWhenAFolderCannotBeMade) {
   }
 }
 
+TEST_F(Run, RefusesFramesBehindTheLastOne) {
+  RunOptions o = options();
+  o.frames = {6, 7};
+  const RunResult refused = run_scene(scene_, o);
+  EXPECT_EQ(refused.exit_code, static_cast<int>(ErrorKind::Usage));
+  EXPECT_EQ(refused.reason, "--frames: expected a frame from 1 to 5, found none before 6; frame n shows t = (n - 1) / frame_rate");
+  o.frames = {5, 6};
+  o.overwrite = true;
+  EXPECT_EQ(run_scene(scene_, o).outcome, "done");
+}
+
+TEST_F(Run, FramesDrawnAgainInAnotherSizeLeaveTheSheetOfTheOthersAndNoFilm) {
+  ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
+  const std::vector<std::string> larger{"output.images.size=[48, 32]"};
+  const Scene again = parse_scene(kTiny, "drops.yaml", ".", larger);
+  RunOptions o = options();
+  o.frames = {1, 2};
+  const RunResult drawn = render_run(again, o);
+  ASSERT_EQ(drawn.outcome, "done") << drawn.reason;
+  EXPECT_EQ(drawn.pictures_drawn, 2);
+  EXPECT_TRUE(drawn.film.empty());
+  ASSERT_EQ(drawn.warnings.size(), 1u);
+  EXPECT_EQ(drawn.warnings[0], "no film: frame 3 of drops has another size than frame 1");
+  EXPECT_EQ(render::read_png(folder_ / "frames/drops.0001.png").width, 48);
+  EXPECT_EQ(render::read_png(folder_ / "drops_sheet.png").width, 3 * 96 + 4 * 4);  // of three frames, 4 pixels between
+  o.frames = {};
+  EXPECT_FALSE(render_run(again, o).film.empty());
+}
+
+TEST_F(Run, IsComparedByTheCameraThatIsNamed) {
+  std::string scene = kTiny;
+  const std::size_t camera = scene.find("camera:");
+  scene.replace(camera, scene.find('\n', camera) - camera, "cameras: [{name: front}, {name: above, from: [0, -0.1, 4]}]");
+  ASSERT_EQ(run_scene(parse_scene(scene, "drops.yaml", "."), options()).outcome, "done");
+  ComparisonOptions two{.first = folder_, .second = folder_, .folder = folder_ / "same", .film = false};
+  try {
+    (void)compare_runs(two);
+    FAIL() << "it is open which camera is meant";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Usage);
+    EXPECT_EQ(error.faults()[0].found, "drops.above, drops.front");
+  }
+  two.camera = "above";
+  EXPECT_EQ(compare_runs(two).frames.size(), 5u);
+  const render::Image above = render::read_png(folder_ / "frames/drops.above.0001.png");
+  const render::Image row = render::read_png(folder_ / "same/frames/compare.0001.png");
+  for (std::size_t byte = 0; byte < 3 * 96; ++byte) {  // the first line of the picture on the left, 2 pixels in
+    ASSERT_EQ(row.pixels[3 * (2 * static_cast<std::size_t>(row.width) + 2) + byte], above.pixels[byte]) << byte;
+  }
+}
+
 TEST(Frames, AreRangesWithSteps) {
   EXPECT_EQ(parse_frames("1-3,7,10-20:5"), (std::set<int>{1, 2, 3, 7, 10, 15, 20}));
-  for (const char* bad : {"", "0", "3-1", "1-5:0", "x", "1,", "1-2-3", "1.5"}) {
+  EXPECT_EQ(parse_frames("1, 4-4:2, 5-6:2147483647"), (std::set<int>{1, 4, 5}));
+  for (const char* bad : {"", "0", "3-1", "1-5:0", "x", "1,", "1-2-3", "1.5", "5:2", "1-", "1-2:", "1-9999999", "99999999999"}) {
     EXPECT_THROW((void)parse_frames(bad), Error) << bad;
   }
 }

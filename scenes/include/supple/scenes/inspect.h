@@ -17,6 +17,7 @@ struct ComparisonOptions {
   std::filesystem::path folder;         ///< where the comparison goes
   double gain = 8.0;                    ///< of the difference pictures
   bool film = true;
+  std::string camera{};                 ///< whose frames, where a run has several cameras
 };
 
 struct FrameComparison {
@@ -33,7 +34,7 @@ struct Comparison {
 
 /// Puts the frames of two runs side by side with their difference (absolute, times gain): folder/frames/compare.0001.png,
 /// compare.mp4 and compare.csv (frame, PSNR, largest difference).
-/// @throws Error{Io} without a common frame, Error{Usage} when the sizes differ
+/// @throws Error{Io} without a common frame, Error{Usage} when the sizes differ or it is open which camera is meant
 [[nodiscard]] Comparison compare_runs(const ComparisonOptions& options);
 
 }  // namespace supple::scenes
