@@ -2,7 +2,8 @@
 /// One number a pixel, eight pixels at a time.
 #pragma once
 
-#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "lanes.h"
@@ -23,7 +24,9 @@ class Plane {
     width_ = width;
     height_ = height;
     pitch_ = (width + 2 * kMargin + static_cast<int>(kLanes) - 1) / static_cast<int>(kLanes) * static_cast<int>(kLanes);
-    values_.assign(static_cast<std::size_t>(pitch_) * static_cast<std::size_t>(height + 2 * kMargin), 0.0F);
+    // Planes that lie one after the other begin at different places of their pages, as the sets of a cache go by those.
+    lead_ = static_cast<std::ptrdiff_t>(reinterpret_cast<std::uintptr_t>(this) / sizeof(Plane) % 64 * kCacheLine);
+    values_.assign(static_cast<std::size_t>(lead_ + std::ptrdiff_t{pitch_} * (height + 2 * kMargin)), 0.0F);
   }
   [[nodiscard]] int pitch() const { return pitch_; }
   [[nodiscard]] float& at(int x, int y) { return *pixel(x, y); }
@@ -37,9 +40,11 @@ class Plane {
   [[nodiscard]] const float* pixel(int x, int y) const { return values_.data() + offset(x, y); }
 
  private:
-  [[nodiscard]] std::ptrdiff_t offset(int x, int y) const { return static_cast<std::ptrdiff_t>(y + kMargin) * pitch_ + x + kMargin; }
+  static constexpr std::size_t kCacheLine = 16;  // numbers
+  [[nodiscard]] std::ptrdiff_t offset(int x, int y) const { return lead_ + static_cast<std::ptrdiff_t>(y + kMargin) * pitch_ + x + kMargin; }
   int width_ = 0, height_ = 0;
   int pitch_ = 0;
+  std::ptrdiff_t lead_ = 0;
   std::vector<float> values_;
 };
 
