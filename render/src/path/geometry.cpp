@@ -8,7 +8,6 @@
 #include "paint.h"
 #include "supple/core/error.h"
 #include "supple/core/executor.h"
-#include "supple/core/hash.h"
 
 namespace supple::render::path {
 namespace {
@@ -27,11 +26,9 @@ void check(RTCDevice device) {
 
 Vec3f vector(const float* v) { return {v[0], v[1], v[2]}; }
 
-std::uint64_t topology_of(const Mesh& mesh) {
-  Hasher hasher;
-  for (const auto& t : mesh.triangle)
-    for (const std::uint32_t v : t) hasher.add(std::uint64_t{v});
-  return hasher.value();
+bool same_corners(const Mesh& mesh, std::span<const std::uint32_t> index) {
+  static_assert(sizeof(mesh.triangle[0]) == 3 * sizeof(std::uint32_t));
+  return index.size() == 3 * mesh.triangle_count() && std::memcmp(index.data(), mesh.triangle.data(), index.size_bytes()) == 0;
 }
 
 }  // namespace
@@ -40,7 +37,6 @@ std::uint64_t topology_of(const Mesh& mesh) {
 struct Geometry::Part {
   RTCGeometry geometry = nullptr;
   unsigned id = RTC_INVALID_GEOMETRY_ID;
-  std::uint64_t topology = 0;
   bool moving = false;
   std::vector<float> position;       ///< at the beginning, and for moving ones at the end; [vertices][4]
   std::vector<float> position_end;
@@ -102,9 +98,8 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
     part.normal.resize(n);
     for (std::size_t v = 0; v < n; ++v) part.normal[v] = mesh.normal[v].cast<float>();
 
-    const std::uint64_t topology = topology_of(mesh);
-    const bool same_triangles = part.geometry != nullptr && topology == part.topology && moving == part.moving &&
-                                part.position.size() == begin.size();
+    const bool same_triangles = part.geometry != nullptr && moving == part.moving && part.position.size() == begin.size() &&
+                                same_corners(mesh, part.index);
     if (same_triangles && same_place && begin == part.position && end == part.position_end) {
       ++counts_.kept;
       continue;
@@ -132,7 +127,6 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
       rtcReleaseGeometry(part.geometry);
       part.geometry = nullptr;
     }
-    part.topology = topology;
     part.moving = moving;
     part.index.clear();
     for (const auto& t : mesh.triangle) part.index.insert(part.index.end(), t.begin(), t.end());
