@@ -107,11 +107,14 @@ int bench_rate(int at_once, const RenderSettings& settings) {
   std::vector<Mesh> meshes;
   for (int frame = 0; frame < kFrames; ++frame) meshes.push_back(waving_ball(129, 0.2 * frame));
   std::vector<std::unique_ptr<Renderer>> renderers;
+  std::vector<std::string> hash(static_cast<std::size_t>(at_once));
   const auto draw = [&](std::size_t k, const Mesh& mesh) {
     const fs::path file = fs::temp_directory_path() / ("supple_render_bench_" + std::to_string(k) + ".png");
     const Item item{.mesh = &mesh, .colour = Vec3(0.85, 0.45, 0.2)};
-    write_png(file, renderers[k]->render(view, std::span(&item, 1)));
+    const Image image = renderers[k]->render(view, std::span(&item, 1));
+    write_png(file, image);
     fs::remove(file);
+    if (&mesh == &meshes.back()) hash[k] = hash_of(image);
   };
   for (int k = 0; k < at_once; ++k) {
     renderers.push_back(make_renderer(settings));
@@ -134,9 +137,9 @@ int bench_rate(int at_once, const RenderSettings& settings) {
   const double frame_cpu = (cpu_seconds() - cpu) / (at_once * kFrames);
   const std::string quality = path ? "\"noise\": " + std::to_string(settings.noise) : "\"samples\": " + std::to_string(settings.samples);
   std::printf("{\"name\": \"render/%s/rate\", \"width\": %d, \"height\": %d, %s, \"triangles\": %zu, \"at_once\": %d, \"frames_s\": %.2f, "
-              "\"cpu_ms\": %.0f, \"least_cpu_ms\": %.0f}\n",
+              "\"cpu_ms\": %.0f, \"least_cpu_ms\": %.0f, \"hash\": \"%s\"}\n",
               path ? "path" : "gl", settings.width, settings.height, quality.c_str(), meshes.front().triangle_count(), at_once, at_once * kFrames / seconds,
-              1e3 * frame_cpu, 1e3 * *std::min_element(least.begin(), least.end()));
+              1e3 * frame_cpu, 1e3 * *std::min_element(least.begin(), least.end()), hash.front().c_str());
   return 0;
 }
 
