@@ -75,7 +75,19 @@ class PairSolver {
  private:
   bool polar(PairPressure& pressure, const ContactSettings& settings, double extent,
              std::span<const ContactBody* const> third, const Box* faces, PairResult& out);
-  bool parts_are_sound(PairPressure& pressure, double extent);
+  struct PatchJob {
+    PairPressure& pressure;
+    const ContactSettings& settings;
+    double extent;
+    std::span<const ContactBody* const> third;
+    const Box* faces;
+  };
+  enum class Patch : std::uint8_t { Added, Known, Unfit };
+  static constexpr std::size_t kMostPatches = 16;
+  bool polar(const PatchJob& job, bool follow, bool& unseen, PairResult& out);
+  Patch add_patch(const PatchJob& job, const Vec3& hill, bool follow, PairResult& out);
+  [[nodiscard]] bool patches_overlap() const;
+  std::optional<Vec3> outside_patches(PairPressure& pressure, double extent);
   void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(PairPressure& pressure, std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
   std::optional<Vec3> nearest_on_patch(PairPressure& pressure, const PolarCover& cover, const implicit::FieldView& third);
@@ -119,52 +131,77 @@ void PairSolver::add_sums(const PatchSums& sums, const Vec3& reference, ContactS
 /// @return false where the rule does not fit
 bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent,
                        std::span<const ContactBody* const> third, const Box* faces, PairResult& out) {
-  cover_count_ = 0;
-  const auto covered = [this](const Vec3& x, double slack) {
-    return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
-                       [&](const PolarCover& cover) { return cover.contains(x, slack); });
-  };
-  for (const Vec3& hill : starts_.hill) {
-    if (covered(hill, 0.0)) continue;
-    std::optional<PeakFrame> frame;
-    if (axis_ && third.empty()) frame = finder_.find_on_axis(pressure, *axis_, hill, extent);
-    const bool on_axis = frame.has_value();
-    if (!on_axis) frame = finder_.climb(pressure, hill, extent, faces != nullptr);
-    if (!frame || covered(frame->origin, 0.0)) continue;
-    const double largest_before = out.summary.largest_pressure;
-    const auto solve = [&] {
-      return polar_.solve(pressure, *frame, settings, regions_, 2.0 * extent, third, on_axis, faces, out.points);
-    };
-    if (!solve()) {
-      if (!frame->flat) return false;
-      frame = finder_.climb(pressure, hill, extent);
-      if (!frame || covered(frame->origin, 0.0)) continue;
-      if (!solve()) return false;
-    }
-    add_sums(polar_.sums(), polar_.origin(), out.summary);
-    out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
-    out.summary.kinks += polar_.kinks();
-    if (polar_.largest() > largest_before) {
-      out.summary.largest_pressure = polar_.largest();
-      out.summary.largest_overlap = polar_.thickness();
-    }
-    if (covers_.size() == cover_count_) covers_.emplace_back();
-    polar_.cover(covers_[cover_count_++]);
-  }
-  out.summary.patches = static_cast<std::uint32_t>(cover_count_);
-  return parts_are_sound(pressure, extent);
+  const PatchJob job{pressure, settings, extent, third, faces};
+  bool unseen = false;
+  if (polar(job, false, unseen, out)) return true;
+  if (!unseen) return false;
+  // A rim that is followed all around leaves nothing out.
+  clear(out);
+  return polar(job, true, unseen, out);
 }
 
-/// Patches must not overlap, and every point inside both bodies must belong to one.
-bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
+/// @param follow  all rims   @param unseen  whether there is a place of a patch that its rim leaves out
+bool PairSolver::polar(const PatchJob& job, bool follow, bool& unseen, PairResult& out) {
+  cover_count_ = 0;
+  for (const Vec3& hill : starts_.hill) {
+    if (add_patch(job, hill, follow, out) == Patch::Unfit) return false;
+  }
+  // Two patches may lie so near to each other that their seeds have one hill.
+  for (std::size_t more = 0; const std::optional<Vec3> x = outside_patches(job.pressure, job.extent); ++more) {
+    const Patch found = more < kMostPatches ? add_patch(job, *x, follow, out) : Patch::Unfit;
+    unseen = found == Patch::Known && cover_count_ > 0;
+    if (found != Patch::Added) return false;
+  }
+  out.summary.patches = static_cast<std::uint32_t>(cover_count_);
+  return !patches_overlap();
+}
+
+PairSolver::Patch PairSolver::add_patch(const PatchJob& job, const Vec3& hill, bool follow, PairResult& out) {
+  const auto covered = [this](const Vec3& x) {
+    return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
+                       [&](const PolarCover& cover) { return cover.contains(x, 0.0); });
+  };
+  if (covered(hill)) return Patch::Known;
+  std::optional<PeakFrame> frame;
+  if (axis_ && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *axis_, hill, job.extent);
+  const bool on_axis = frame.has_value();
+  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr);
+  if (!frame || covered(frame->origin)) return Patch::Known;
+  const auto solve = [&] {
+    return polar_.solve(job.pressure, *frame, job.settings, regions_, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
+  };
+  if (!solve()) {
+    if (!frame->flat) return Patch::Unfit;
+    frame = finder_.climb(job.pressure, hill, job.extent);
+    if (!frame || covered(frame->origin)) return Patch::Known;
+    if (!solve()) return Patch::Unfit;
+  }
+  add_sums(polar_.sums(), polar_.origin(), out.summary);
+  out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
+  out.summary.kinks += polar_.kinks();
+  if (polar_.largest() > out.summary.largest_pressure) {
+    out.summary.largest_pressure = polar_.largest();
+    out.summary.largest_overlap = polar_.thickness();
+  }
+  if (covers_.size() == cover_count_) covers_.emplace_back();
+  polar_.cover(covers_[cover_count_++]);
+  return Patch::Added;
+}
+
+bool PairSolver::patches_overlap() const {
   for (std::size_t i = 0; i < cover_count_; ++i) {
     for (std::size_t j = 0; j < cover_count_; ++j) {
       if (i == j) continue;
       for (const Vec3& x : covers_[i].rim) {
-        if (covers_[j].contains(x, 0.0)) return false;
+        if (covers_[j].contains(x, 0.0)) return true;
       }
     }
   }
+  return false;
+}
+
+/// A place of Sigma where both bodies press that belongs to no patch, from the points inside both.
+std::optional<Vec3> PairSolver::outside_patches(PairPressure& pressure, double extent) {
   constexpr double kSlack = 0.05;
   batch_.point.clear();
   for (const Vec3& x : starts_.inside) {
@@ -172,7 +209,7 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
     for (std::size_t i = 0; i < cover_count_ && !inside; ++i) inside = covers_[i].contains(x, kSlack);
     if (!inside) batch_.point.push_back(x);
   }
-  if (batch_.point.empty()) return true;
+  if (batch_.point.empty()) return std::nullopt;
   // The rest may only seem to lie outside, by a slanted axis: what counts is their foot on Sigma.
   batch_.resize(batch_.point.size());
   double peak = 0.0;
@@ -193,12 +230,12 @@ bool PairSolver::parts_are_sound(PairPressure& pressure, double extent) {
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     if (std::min(batch_.a[i], batch_.b[i]) <= 1e-3 * peak) continue;
-    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return false;  // it found no place on Sigma
+    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
     bool inside = false;
     for (std::size_t c = 0; c < cover_count_ && !inside; ++c) inside = covers_[c].contains(batch_.point[i], kSlack);
-    if (!inside) return false;
+    if (!inside) return batch_.point[i];
   }
-  return true;
+  return std::nullopt;
 }
 
 /// Partners of either body whose surfaces may reach the overlap.

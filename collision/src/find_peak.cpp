@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kMostHills = 16;
 constexpr int kMostSteps = 40;
+constexpr double kNearSigma = 0.1;  // gap over the level, where the level is believed
 
 }  // namespace
 
@@ -109,7 +110,7 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
   PeakFrame frame;
   Vec3 x = start;
   double before = -std::numeric_limits<double>::infinity();  // min(p_A, p_B) and |p_A - p_B| at the last point kept
-  double gap_before = 0.0;
+  double gap_before = 0.0, level_before = 0.0;
   Vec3 kept = start, step = Vec3::Zero();
   batch_.resize(5);
   for (int iteration = 0; iteration < kMostSteps; ++iteration) {
@@ -134,7 +135,16 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     pressure.evaluate(batch_);
     const double a = batch_.a[0], b = batch_.b[0];
     const double lower = std::min(a, b), gap = std::abs(a - b);
-    if (lower < before && gap > 0.5 * gap_before && step.norm() > 1e-12 * reach) {  // neither up nor nearer to Sigma
+    const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
+    const double steepness = slope.norm();
+    if (!(steepness > 0.0)) return std::nullopt;
+    const Vec3 axis = -slope / steepness;
+    const double fall = -batch_.slope_a[0].dot(axis), rise = batch_.slope_b[0].dot(axis);
+    const double w = std::clamp(fall / (fall + rise), 0.0, 1.0);
+    const double level = (1.0 - w) * a + w * b;  // p at the foot on Sigma, to first order
+    // Neither up nor nearer to Sigma; along a bent Sigma every good step leaves it a little, but its foot is higher.
+    const bool higher = lower >= before || (level > level_before && gap <= kNearSigma * level);
+    if (!higher && gap > 0.5 * gap_before && step.norm() > 1e-12 * reach) {
       step *= 0.5;
       x = kept + step;
       continue;
@@ -142,19 +152,14 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     kept = x;
     before = lower;
     gap_before = gap;
+    level_before = level;
 
-    const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
-    const double steepness = slope.norm();
-    if (!(steepness > 0.0)) return std::nullopt;
     // Round-off of the pressures, which that of the coordinates adds to.
     const double noise = 16.0 * std::numeric_limits<double>::epsilon() *
                          std::max(pressure.largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
-    const Vec3 axis = -slope / steepness;
     u = (u - u.dot(axis) * axis).normalized();
     v = axis.cross(u);
     // Weights of the Lagrange function q = (1 - w) p_A + w p_B, whose gradient is tangential to Sigma.
-    const double fall = -batch_.slope_a[0].dot(axis), rise = batch_.slope_b[0].dot(axis);
-    const double w = std::clamp(fall / (fall + rise), 0.0, 1.0);
     const Vec3 tangential = (1.0 - w) * batch_.slope_a[0] + w * batch_.slope_b[0];
     const auto second = [&](int side, int i, const Vec3& direction) {
       const std::vector<Vec3>& g = side == 0 ? batch_.slope_a : batch_.slope_b;
@@ -166,7 +171,6 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     const Principal p = principal(-((1.0 - w) * a_uu + w * b_uu), -((1.0 - w) * a_uv + w * b_uv),
                                   -((1.0 - w) * a_vv + w * b_vv));
     const Vec3 first = p.cosine * u + p.sine * v, other = axis.cross(first);
-    const double level = (1.0 - w) * a + w * b;  // p at the foot on Sigma, to first order
     // A patch longer than `extent` along a direction of no curvature is not believed.
     const double flattest = 2.0 * std::max(std::abs(level), noise) / (extent * extent);
     const double c1 = std::max(std::abs(p.first), flattest), c2 = std::max(std::abs(p.second), flattest);

@@ -402,16 +402,4 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7), third ? &kronrod_rule(7) : nullptr, fine);
 }
 
-void PolarRuleSolver::cover_about_middle(PolarCover& out) const {
-  out.corner.clear();
-  out.height.clear();
-  out.rim.clear();
-  out.thickness = thickness_;
-  for (const RimPoint& p : polygon_) {
-    out.corner.push_back(p.at);
-    out.height.push_back(p.height);
-    out.rim.push_back(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis);
-  }
-}
-
 }  // namespace supple::collision

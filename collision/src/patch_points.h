@@ -81,6 +81,26 @@ struct PatchPoints {
     volume_side.clear();
     energy = displaced[0] = displaced[1] = 0.0;
   }
+
+  /// How much there is, to come back to.
+  struct Mark {
+    std::size_t points, volumes;
+    double residual, energy, displaced[2];
+  };
+  [[nodiscard]] Mark mark() const { return {point.size(), volume_point.size(), residual, energy, {displaced[0], displaced[1]}}; }
+  void back_to(const Mark& mark) {
+    point.resize(mark.points);
+    normal.resize(mark.points);
+    area.resize(mark.points);
+    pressure.resize(mark.points);
+    volume_point.resize(mark.volumes);
+    volume_weight.resize(mark.volumes);
+    volume_side.resize(mark.volumes);
+    residual = mark.residual;
+    energy = mark.energy;
+    displaced[0] = mark.displaced[0];
+    displaced[1] = mark.displaced[1];
+  }
 };
 
 }  // namespace supple::collision

@@ -83,6 +83,7 @@ double PolarRuleSolver::rim_moved() const {
 bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error) {
   const std::size_t n = rays.size();
   rim_batch_.resize(n);
+  rays.outward.resize(n);
   low_.assign(n, 0.0);
   high_.assign(n, std::numeric_limits<double>::infinity());
   done_.assign(n, 0);
@@ -128,6 +129,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         if (!(-at > kLeastOverhang * ga.norm()) || !(bt > kLeastOverhang * gb.norm())) return false;
         done_[k] = 1;
         --open;
+        rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
         // Newton's method leaves about half the square of its last step, which the area feels twice.
         rim_error_ = std::max(rim_error_, step * step / (falls * radius));
       }
@@ -376,24 +378,28 @@ double PolarRuleSolver::algebraic_error() const {
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                             const Regions& regions, double extent,
-                            std::span<const ContactBody* const> third, bool round, const Box* faces, PatchPoints& points) {
+                            std::span<const ContactBody* const> third, bool round, bool follow, const Box* faces, PatchPoints& points) {
   extent_ = extent;
   third_ = third;
   peak_ = frame.origin;
-  const std::size_t before = points.point.size();
-  if (!frame.flat && solve_about_peak(pressure, frame, settings, regions, round, points)) return true;
-  if (faces == nullptr) return false;
+  const PatchPoints::Mark before = points.mark();
+  const auto anew = [&] {
+    points.back_to(before);
+    return true;
+  };
   if (!frame.flat) {
-    if (before > 0) return false;
-    points.clear();
+    if (!follow && solve_about_peak(pressure, frame, settings, regions, round, false, points)) return true;
+    if (anew() && solve_about_star(pressure, frame, settings, regions, points)) return true;
   }
-  if (solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
-  if (before == 0) points.clear();
+  if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
+  if (!frame.flat && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, points)) return true;
+  points.back_to(before);
   return false;
 }
 
+/// @param any  whatever the error, and without regard to kinks of the fields
 bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                       const Regions& regions, bool round, PatchPoints& points) {
+                                       const Regions& regions, bool round, bool any, PatchPoints& points) {
   const double error = settings.error;
   cut_ = false;
   about_middle_ = false;
@@ -409,8 +415,9 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
     return std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
   };
   const bool parts = error < kSplitBelow || !third_.empty();
-  bool parted = false;
+  bool parted = any && third_.empty();
   parted_ = 0;
+  polygon_.clear();
   kinks_.clear();
   bool smooth = error < kSplitBelow && third_.empty() && no_kinks_near(pressure);
   std::size_t first = first_of(smooth);
@@ -447,9 +454,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
         parted_ = static_cast<std::uint32_t>(crossing_.size());
         return finish(pressure, column_of(error), regions, error, nullptr, points);
       }
-      if (crossing_.back() >= kinks_.size()) return false;
-      r = first - 1;  // begins again as if there were no kinks
-      continue;
+      return false;
     }
     if (r == first) continue;
     const double difference = smooth   ? error_where_smooth(r, fine_, coarse_, rim_moved())
@@ -457,6 +462,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
                                        : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
     if (difference > kEnough * error && r < last) continue;
     estimate_ = difference + algebraic_error();
+    if (estimate_ > error && !any) return false;
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);
   }
@@ -498,14 +504,20 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const Regions& 
 
 void PolarRuleSolver::cover(PolarCover& out) const {
   out.frame = frame_;
-  if (about_middle_) {
-    cover_about_middle(out);
+  out.corner.clear();
+  out.thickness = thickness_;
+  if (!polygon_.empty()) {
+    out.height.clear();
+    out.rim.clear();
+    for (const RimPoint& p : polygon_) {
+      out.corner.push_back(p.at);
+      out.height.push_back(p.height);
+      out.rim.push_back(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis);
+    }
     return;
   }
-  out.corner.clear();
   out.radius = rim_.radius;
   out.height = rim_.height;
-  out.thickness = thickness_;
   out.rim.resize(rim_.size());
   for (std::size_t k = 0; k < rim_.size(); ++k) {
     out.rim[k] = frame_.origin + rim_.radius[k] * direction(rim_.cosine[k], rim_.sine[k]) + rim_.height[k] * frame_.axis;

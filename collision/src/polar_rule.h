@@ -39,12 +39,13 @@ class PolarRuleSolver {
   /// @param extent  rims farther away are not believed [m]
   /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
   /// @param round  both pressures are the same all around the line through the frame's origin along its axis
+  /// @param follow  the rim all around, whether the peak sees it or not
   /// @param faces  of convex bodies, a box that holds the patch: where kinks cross it, it is parted about its middle
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
   [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                            const Regions& regions, double extent, std::span<const ContactBody* const> third,
-                           bool round, const Box* faces, PatchPoints& points);
+                           bool round, bool follow, const Box* faces, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about `origin()`
   [[nodiscard]] const Vec3& origin() const noexcept { return frame_.origin; }
@@ -58,12 +59,14 @@ class PolarRuleSolver {
   /// Directions from the peak, and where the rim is met on them.
   struct Rays {
     std::vector<double> cosine, sine, radius, height;  // (cosine, sine): about the middle, of any length
+    std::vector<Vec2> outward;                         // the pressure falls, in units of u and v
     [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
   };
   bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                        const Regions& regions, bool round, PatchPoints& points);
+                        const Regions& regions, bool round, bool any, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   [[nodiscard]] double rim_moved() const;
+  [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
@@ -83,6 +86,7 @@ class PolarRuleSolver {
   struct Panel {
     double begin = 0.0, end = 0.0;  // angles, or places along `sectors_`: i to i + 1 is sector i
     std::size_t first = 0, last = 0;  // of `kept_`
+    std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
     PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with fewer radii besides
     double by_angle = 0.0, by_radius = 0.0;  // differences of these
     bool halved = false;              // or a half of one
@@ -143,7 +147,6 @@ class PolarRuleSolver {
   bool solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                           const Regions& regions, const Box& faces, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Box& faces);
-  void cover_about_middle(PolarCover& out) const;
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
   bool move_to_middle(PairPressure& pressure);
   void add_rays_at_hidden_sides(PairPressure& pressure);
@@ -153,6 +156,17 @@ class PolarRuleSolver {
   void place_rays(const KronrodRule& rule, std::size_t first);
   bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger,
                         bool fine);
+
+  // About a point that sees the whole rim: star_rule.cpp.
+  bool solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Regions& regions,
+                        PatchPoints& points);
+  bool move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step);
+  bool walk_to_rim(PairPressure& pressure, const Vec3& along, double step, Vec3& x);
+  bool follow_rim_curve(PairPressure& pressure);
+  static std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
+  bool move_to_star(PairPressure& pressure);
+  void cross_star(PairPressure& pressure);
+  [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
 
   PeakFrame frame_;
   Vec3 peak_ = Vec3::Zero();
@@ -189,11 +203,12 @@ class PolarRuleSolver {
   std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
   std::vector<Vec3> fine_rim_;
   Rays rays_;
-  std::vector<double> square_, fourth_;  // heights along a ray: s^2 (square + s^2 fourth)
+  std::vector<double> linear_, square_, fourth_;  // heights along a ray: s linear + s^2 (square + s^2 fourth)
   std::vector<Crossing> crossings_;
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
-  bool about_middle_ = false;
-  std::vector<RimPoint> outline_, polygon_;  // by angle; with corners
+  bool about_middle_ = false, about_star_ = false;
+  Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis
+  std::vector<RimPoint> outline_, polygon_, kept_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;
   std::vector<Walk> walks_;
   std::vector<Sheet> sheets_;

@@ -24,6 +24,9 @@ constexpr int kSamples = 8;              // of the heights along a ray, to find 
 constexpr int kCornerSteps = 8;
 constexpr int kCrossingSteps = 6;
 constexpr double kSameTurn = 1e-7;       // [rad]
+constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
+constexpr double kLeastSight = 0.1;      // cosine between a ray and the normal of the rim: nearer to grazing, rays begin elsewhere
+constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// Points of the Gauss rule on a piece of a ray.
@@ -277,7 +280,7 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
 
 double PolarRuleSolver::model_height(std::size_t ray, double share) const {
   const double square = share * share;
-  return square * (square_[ray] + square * fourth_[ray]);
+  return share * linear_[ray] + square * (square_[ray] + square * fourth_[ray]);
 }
 
 /// Where the rays cross kinks: first on the heights as the curvature at the peak and the rim give them, then on Sigma.
@@ -381,7 +384,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
 bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   const std::size_t count = (panels_.size() - first) * per_panel;
-  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &square_, &fourth_}) {
+  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &fourth_}) {
     column->resize(count);
   }
   if (about_middle_) {
@@ -393,7 +396,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
       const auto [s, c] = math::sin_cos(0.5 * (panel.begin + panel.end) + turn_[i] * rule.node[i % per_panel]);
       rays_.cosine[i] = c;
       rays_.sine[i] = s;
-      const auto [radius, height] = rim_at(c, s);
+      const auto [radius, height] = about_star_ ? outline_at(c, s) : rim_at(c, s);
       rays_.radius[i] = radius;
       rays_.height[i] = height;
       if (!(radius > 0.0)) return false;
@@ -404,6 +407,13 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   rim_error_ = std::max(rim_error_, rim_error);
   for (std::size_t i = 0; i < count; ++i) {
     const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
+    if (about_star_) {
+      linear_[i] = rim * rise_.dot(direction(c, s));
+      square_[i] = rays_.height[i] - linear_[i];
+      fourth_[i] = 0.0;
+      continue;
+    }
+    linear_[i] = 0.0;
     // Faces are flat about the middle.
     square_[i] = about_middle_ ? 0.0
                                : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
@@ -459,6 +469,29 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   return true;
 }
 
+/// Whether points of the rim are neighbours: the rim leads from one to the next, and its radius changes as its slope says. Where a
+/// ray grazes the rim the radius jumps, and what lies beyond is not seen.
+bool PolarRuleSolver::rim_joins(std::size_t first, std::size_t last, bool closed) const {
+  const double least = about_star_ ? 0.0 : kLeastSight;
+  for (std::size_t i = first; i + (closed ? 0 : 1) < last; ++i) {
+    const RimPoint &p = kept_rim_[i], &q = kept_rim_[i + 1 < last ? i + 1 : first];
+    const Vec2 chord = q.at - p.at;
+    double steepest = 0.0;  // of the logarithm of the radius over the angle
+    for (const RimPoint* x : {&p, &q}) {
+      const Vec2 tangent(-x->outward.y(), x->outward.x());
+      const double sight = x->outward.dot(x->at);
+      if (!(sight > least * x->outward.norm() * x->at.norm())) return false;
+      if (!(tangent.dot(chord) >= kLeastAlong * tangent.norm() * chord.norm())) return false;
+      steepest = std::max(steepest, std::abs(tangent.dot(x->at)) / sight);
+    }
+    const double square_p = p.at.squaredNorm(), square_q = q.at.squaredNorm();
+    const double change = std::abs(square_q - square_p) / (square_p + square_q);
+    const double angle = std::abs(p.at.x() * q.at.y() - p.at.y() * q.at.x()) / std::sqrt(square_p * square_q);
+    if (!(change <= kMostChange * angle * (1.0 + steepest))) return false;
+  }
+  return true;
+}
+
 /// Adds up a panel's rays from `ray` on and keeps its nodes.
 void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
   panel.fine = panel.angular = panel.radial = {};
@@ -478,11 +511,17 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
     }
   }
   panel.last = kept_.point.size();
+  if (about_middle_) return;
+  panel.rim = kept_rim_.size();
+  for (std::size_t i = ray; i < ray + rule.node.size(); ++i) {
+    kept_rim_.push_back({rays_.radius[i] * Vec2(rays_.cosine[i], rays_.sine[i]), rays_.height[i], rays_.outward[i]});
+  }
+  panel.rim_end = kept_rim_.size();
 }
 
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
   const double error = settings.error;
-  cut_ = crossing_.back() >= kinks_.size();
+  cut_ = !crossing_.empty() && crossing_.back() >= kinks_.size();
   const bool fine = error < 1e-4;
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
   const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;
@@ -526,6 +565,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   kept_area_.clear();
   kept_pressure_.clear();
   kept_normal_.clear();
+  kept_rim_.clear();
   residual_ = lift_ = rim_error_ = 0.0;
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
@@ -533,6 +573,9 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   const double least = beside ? 1.0 : about_middle_ ? kLeastOnFaces : 0.0, safety = beside ? kBesideThirds : 1.0;
   for (;;) {
     if (!solve_panels(pressure, *rule, error, begin)) return false;
+    for (std::size_t p = begin; p < panels_.size() && !about_middle_; ++p) {
+      if (!rim_joins(panels_[p].rim, panels_[p].rim_end, false)) return false;
+    }
     all = {};
     for (const Panel& panel : panels_) all.add(panel.fine);
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
@@ -587,6 +630,15 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       node.insert(node.end(), kept.begin() + static_cast<std::ptrdiff_t>(panel.first), kept.begin() + static_cast<std::ptrdiff_t>(panel.last));
     });
     fine_.add(panel.fine);
+  }
+  if (!about_middle_) {
+    polygon_.clear();
+    for (const Panel& panel : panels_) {
+      polygon_.insert(polygon_.end(), kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim),
+                      kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim_end));
+    }
+    kept_rim_ = polygon_;
+    if (!rim_joins(0, kept_rim_.size(), true)) return false;
   }
   node_.resize(node_.point.size());
   estimate_ += kUnseen * error + algebraic_error();
