@@ -14,15 +14,15 @@
 
 namespace supple::render::path {
 
-/// Where a ray met an item.
+/// Where a ray met an item. It begins empty, as eight are made for every bundle.
 struct Hit {
-  float distance = 0.0F;
-  Vec3f point = Vec3f::Zero();        ///< of the triangle, relative to the origin [m]
-  Vec3f face_normal = Vec3f::Zero();  ///< unit, of the triangle, towards the ray
-  Vec3f normal = Vec3f::Zero();       ///< unit, smooth, of the field where the item has one
-  Vec3f leave = Vec3f::Zero();        ///< where paths go on: outside of the smooth surface (Hanika 2021)
+  float distance;
+  Vec3f point;        ///< of the triangle, relative to the origin [m]
+  Vec3f face_normal;  ///< unit, of the triangle, towards the ray
+  Vec3f normal;       ///< unit, smooth, of the field where the item has one
+  Vec3f leave;        ///< where paths go on: outside of the smooth surface (Hanika 2021)
   Bsdf bsdf;
-  std::uint32_t item = 0;
+  std::uint32_t item;
 };
 
 /// Rays that are followed together; `time` in [0, 1] of the exposure.
