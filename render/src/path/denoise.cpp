@@ -126,16 +126,21 @@ void Denoiser::shown_blocks(int y, const Body& body) const {
   });
 }
 
+template <class Vector>
+auto Denoiser::steepness(const Vector& position) const {
+  return 1.0F / (2.0F * footprint_ * Vector(position - Vector(eye_)).norm() + 1e-12F);
+}
+
 void Denoiser::resize() {
   const int width = film_->width, height = film_->height;
-  for (Plane* plane : {&f_.shown, &f_.share, &f_.near, &f_.plane}) plane->resize(width, height);
+  for (Plane* plane : {&f_.shown, &f_.share, &f_.near}) plane->resize(width, height);
   for (Signal& signal : signals_) {
-    for (Plane* plane : {&signal.noise, &signal.guide}) plane->resize(width, height);
+    signal.guide.resize(width, height);
     for (Light* light : {&signal.light, &signal.next}) light->resize(width, height);
   }
 }
 
-void Denoiser::fill(const Vec3f& eye, float footprint) {
+void Denoiser::fill() {
   const Film& film = *film_;
   const std::array parts = {&film.direct, &film.indirect};
   rows([&](int y) {
@@ -147,7 +152,6 @@ void Denoiser::fill(const Vec3f& eye, float footprint) {
       }
       const LaneMask shown = film.cover.load(x, y) > 0.0F;
       f_.shown.store(x, y, select(shown, all_lanes(1.0F), 0.0F));
-      f_.plane.store(x, y, 1.0F / (2.0F * footprint * (film.position.load(x, y) - Vec3Lanes(eye)).norm() + 1e-12F));
       const Vec3Lanes albedo = film.albedo.load(x, y).cwiseMax(kAlbedoFloor);
       const Lanes scale = 1.0F / luminance(albedo);
       for (std::size_t k = 0; k < 2; ++k) {
@@ -185,26 +189,27 @@ void Denoiser::sort_paths() {
   }
 }
 
-/// Means over neighbours: what a single pixel knows of noise and brightness is noisy itself.
+/// Means over neighbours: what a single pixel knows of brightness and noise is noisy itself.
 void Denoiser::guide(int y) {
   shown_blocks(y, [&](int x) {
-    const Lanes share = f_.share.load(x, y);
-    const std::array scale = {all_lanes(kDirectScale), kMattScale + film_->mirror.load(x, y) * (kMirrorScale - kMattScale)};
-    for (std::size_t k = 0; k < 2; ++k) {
-      Signal& signal = signals_[k];
-      const Lanes error = root(share * tent_sum<1>(signal.light.variance, x, y));
-      signal.noise.store(x, y, 1.0F / (scale[k] * error + 1e-4F));
-      signal.guide.store(x, y, share * tent_sum<1>(signal.light.bright, x, y));
-    }
+    for (Signal& signal : signals_) signal.guide.store(x, y, f_.share.load(x, y) * tent_sum<1>(signal.light.bright, x, y));
   });
 }
 
+/// 1 / difference of brightness that counts as large, of direct and indirect light.
+std::array<Lanes, 2> Denoiser::noise(int x, int y) const {
+  const std::array scale = {all_lanes(kDirectScale), kMattScale + film_->mirror.load(x, y) * (kMirrorScale - kMattScale)};
+  std::array<Lanes, 2> out;
+  for (std::size_t k = 0; k < 2; ++k)
+    out[k] = 1.0F / (scale[k] * root(f_.share.load(x, y) * tent_sum<1>(signals_[k].light.variance, x, y)) + 1e-4F);
+  return out;
+}
+
 template <bool with_direct>
-void Denoiser::smooth_block(int stride, int x, int y, LaneMask shown, LaneMask quiet) {
+void Denoiser::smooth_block(int stride, int x, int y, const std::array<Lanes, 2>& noise, LaneMask shown, LaneMask quiet) {
   const Vec3Lanes normal = film_->normal.load(x, y), position = film_->position.load(x, y);
-  const Lanes plane = f_.plane.load(x, y) * (1.0F / static_cast<float>(stride)), near = f_.near.load(x, y);
+  const Lanes plane = steepness(position) * (1.0F / static_cast<float>(stride)), near = f_.near.load(x, y);
   const std::array<Lanes, 2> guide = {signals_[0].guide.load(x, y), signals_[1].guide.load(x, y)};
-  const std::array<Lanes, 2> noise = {signals_[0].noise.load(x, y), signals_[1].noise.load(x, y)};
   constexpr std::size_t first = with_direct ? 0 : 1;
   std::array<Sums, 2> sums;
   for (int dy = -1; dy <= 1; ++dy)
@@ -235,9 +240,11 @@ void Denoiser::smooth(int stride) {
   rows([&](int y) {
     blocks(y, [&](int x, bool any_shown) {
       if (any_shown) {
-        const LaneMask shown = f_.shown.load(x, y) > 0.0F;
-        const LaneMask quiet = signals_[0].noise.load(x, y) * (kQuiet * (signals_[0].guide.load(x, y) + 0.1F)) > 1.0F;
-        return any(both(shown, ~quiet)) ? smooth_block<true>(stride, x, y, shown, quiet) : smooth_block<false>(stride, x, y, shown, quiet);
+        const LaneMask shown = film_->cover.load(x, y) > 0.0F;
+        const std::array<Lanes, 2> large = noise(x, y);
+        const LaneMask quiet = large[0] * (kQuiet * (signals_[0].guide.load(x, y) + 0.1F)) > 1.0F;
+        return any(both(shown, ~quiet)) ? smooth_block<true>(stride, x, y, large, shown, quiet)
+                                        : smooth_block<false>(stride, x, y, large, shown, quiet);
       }
       for (Signal& signal : signals_) Sums{}.store(signal.next, x, y, LaneMask{});
     });
@@ -282,7 +289,7 @@ Neighbours Denoiser::around(const DetailedPixel& pixel) const {
       const float cover = film.cover.at(px, py);
       if (cover <= 0.0F) continue;
       const float closeness = 1.0F / std::max(0.5F, static_cast<float>((px - x) * (px - x) + (py - y) * (py - y)));
-      const float plane = f_.plane.at(px, py);
+      const float plane = steepness(film.position.at(px, py));
       const std::uint32_t mixed = mixed_[index(px, py)];
       if (mixed == 0) {
         out.add(film.normal.at(px, py), film.position.at(px, py), light.colour.at(px, py), plane, cover * closeness);
@@ -298,9 +305,11 @@ Neighbours Denoiser::around(const DetailedPixel& pixel) const {
 void Denoiser::run(const Vec3f& eye, float footprint, const Executor& executor, Film& film) {
   executor_ = &executor;
   film_ = &film;
+  eye_ = eye;
+  footprint_ = footprint;
   resize();
   sort_paths();
-  fill(eye, footprint);
+  fill();
   for (int level = 0; level < kLevels; ++level) smooth(1 << level);
   finish(film);
 }

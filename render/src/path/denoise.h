@@ -37,7 +37,6 @@ class Denoiser {
     Plane shown;  ///< 1 where there is a surface, else 0
     Plane share;  ///< 1 / number of pixels around that show one
     Plane near;   ///< 1 / distance over which indirect light may change much (Ward & Heckbert 1992)
-    Plane plane;  ///< 1 / distance from the tangent plane that counts as far, at stride 1
   };
   struct Light {
     VectorPlane colour;
@@ -48,20 +47,23 @@ class Denoiser {
   /// A part of the light on its way through the filter.
   struct Signal {
     Light light, next;
-    Plane noise;  ///< 1 / difference of brightness that counts as large
     Plane guide;  ///< brightness, a little smoothed
   };
   struct Sums;
 
   void resize();
-  void fill(const Vec3f& eye, float footprint);
+  void fill();
   void sort_paths();
+  /// 1 / distance from the tangent plane there that counts as far, at stride 1.
+  template <class Vector>
+  [[nodiscard]] auto steepness(const Vector& position) const;
   void guide(int y);
+  [[nodiscard]] std::array<Lanes, 2> noise(int x, int y) const;
   /// One level of the transform.
   void smooth(int stride);
   /// @param quiet  lanes whose direct light stays as it is; all that show a surface unless `with_direct`
   template <bool with_direct>
-  void smooth_block(int stride, int x, int y, LaneMask shown, LaneMask quiet);
+  void smooth_block(int stride, int x, int y, const std::array<Lanes, 2>& noise, LaneMask shown, LaneMask quiet);
   void finish(Film& film) const;
   [[nodiscard]] Neighbours around(const DetailedPixel& pixel) const;
   [[nodiscard]] std::size_t index(int x, int y) const {
@@ -76,6 +78,8 @@ class Denoiser {
 
   const Executor* executor_ = nullptr;
   const Film* film_ = nullptr;
+  Vec3f eye_ = Vec3f::Zero();
+  float footprint_ = 0.0F;
   Features f_;
   std::array<Signal, 2> signals_;     ///< direct, indirect
   std::vector<std::uint32_t> mixed_;  ///< of a pixel where surfaces meet, 1 + its place in parts_; 0: one surface
