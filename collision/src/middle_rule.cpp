@@ -395,7 +395,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     Panel panel;
     panel.begin = static_cast<double>(k);
     panel.end = static_cast<double>(k + 1);
-    panel.nodes = fewest ? kFewest : error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
+    panel.nodes = error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
     panels_.push_back(panel);
   }
   const bool third = fine && error >= 1e-6 && !cut_;

@@ -82,7 +82,6 @@ class PolarRuleSolver {
   // Patches that kinks cross: split_rule.cpp.
   /// Gauss points through a squeezed region.
   static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
-  static constexpr int kFewest = 2;  // points on a piece of a ray
   struct Panel {
     double begin = 0.0, end = 0.0;  // angles, or places along `sectors_`: i to i + 1 is sector i
     std::size_t first = 0, last = 0;  // of `kept_`

@@ -15,7 +15,7 @@ namespace {
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
 constexpr double kWidestCoarse = 3.3;
 constexpr int kMostRadial = 16;
-constexpr double kOfFewest = 2.5;        // the difference is what these are off by, not what the rule that they are compared with is
+constexpr int kFewest = 3;
 constexpr double kUnseen = 0.03;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
 constexpr std::size_t kMostPanels = 48;  // that the estimate may ask for
@@ -34,8 +34,8 @@ int nodes_on(int radial, double share) {
   return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), 2, kMostRadial);
 }
 
-/// Points that are compared with n: where the fewest are enough, more of them on the few rays where they are compared.
-int check_of(int n, int fewest) { return n == fewest ? fewest + 1 : n > 4 ? n - 2 : n - 1; }
+/// Points that are compared with n.
+int check_of(int n) { return n > 4 ? n - 2 : n - 1; }
 
 /// Kinks so near to another, to the peak or to the rim are left out: the error is of the square.
 double shortest_piece(double error) { return 3e-3 * std::sqrt(error); }
@@ -434,14 +434,14 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
     const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
     const std::size_t crossing_begin = next;
     while (next < crossings_.size() && crossings_[next].ray == i) ++next;
-    const auto nodes = [&](int most, double angle) {
+    const auto nodes = [&](int most, int inner, double angle) {
       double left = 0.0, lift_left = 0.0;
       for (std::size_t c = crossing_begin; c <= next; ++c) {
         const double right = c < next ? crossings_[c].radius : 1.0;
         const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
         if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
         // On faces it is the short last piece on which the pressure falls.
-        const GaussRule& gauss = gauss_rule(about_middle_ ? most : nodes_on(most, right - left));
+        const GaussRule& gauss = gauss_rule(!about_middle_ ? nodes_on(most, right - left) : c < next ? inner : most);
         for (std::size_t j = 0; j < gauss.node.size(); ++j) {
           const double along = gauss.node[j], r = left + (right - left) * along;
           foot_.push_back(frame_.origin + (r * rim) * e);
@@ -453,10 +453,12 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
       }
     };
     ray_nodes_.push_back(foot_.size());
-    nodes(panel.nodes, rule.weight[i % per_panel]);
+    const int fewest = check_of(kFewest);  // is enough on the inner pieces, where more confirm it
+    nodes(panel.nodes, panel.nodes == kFewest ? fewest : panel.nodes, rule.weight[i % per_panel]);
     ray_fewer_.push_back(foot_.size());
     const double fewer = rule.gauss_weight[i % per_panel];
-    if (fewer > 0.0) nodes(check_of(panel.nodes, kFewest), fewer);
+    const int check = check_of(panel.nodes);
+    if (fewer > 0.0) nodes(check, check == fewest ? kFewest : check, fewer);
   }
   ray_nodes_.push_back(foot_.size());
   node_.resize(foot_.size());
@@ -583,7 +585,6 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     for (Panel& panel : panels_) {
       panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
       panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
-      if (panel.nodes == kFewest) panel.by_radius *= kOfFewest;
       (panel.halved ? halved : regular) += panel.by_angle + panel.by_radius;
     }
     estimate_ = safety * estimate_of(regular, halved, fine, least);

@@ -173,7 +173,7 @@ TEST(FacesOnFaces, ChangeSmoothlyAsTheyLean) {
       ASSERT_EQ(s.rule, ContactRule::Polar);
       largest = std::max(largest, difference(s, fine.force, fine.area, fine.centre_of_pressure));
     }
-    EXPECT_LT(largest, error / 10.0) << error;
+    EXPECT_LT(largest, 1e-5) << error;
   }
 }
 
