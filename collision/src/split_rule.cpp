@@ -18,7 +18,7 @@ constexpr int kMostRadial = 16;
 constexpr int kFewest = 3;
 constexpr double kUnseen = 0.03;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
-constexpr std::size_t kMostPanels = 48;  // that the estimate may ask for
+constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
 constexpr int kCornerSteps = 8;
@@ -588,7 +588,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       (panel.halved ? halved : regular) += panel.by_angle + panel.by_radius;
     }
     estimate_ = safety * estimate_of(regular, halved, fine, least);
-    if (estimate_ <= kEnough * error || solved >= kMostPanels) break;
+    if (estimate_ <= kEnough * error || solved >= (beside ? kMostBesideThirds : kMostPanels)) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
     const double share_regular = 0.5 * difference_for(error / safety, fine, least) / count,

@@ -218,6 +218,7 @@ TEST(FacesOnFaces, StopWhereAThirdBodyPressesHarder) {
     const ContactSurface::Summary s = stage.solve({.error = error}).summary.at(0);
     EXPECT_EQ(s.bodies.b, 1u);
     EXPECT_EQ(s.rule, ContactRule::Polar);
+    EXPECT_LE(s.error_estimate, error);
     return s;
   };
   const double whole = solved(1e-8, nullptr, Vec3::Zero(), 1.0).area;
