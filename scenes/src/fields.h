@@ -492,6 +492,12 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, ObjectMeshingDesc& d) {
+  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of its meshes and grids; auto: as output.cell");
+  archive("error", d.error, above(0.0, kLength).or_auto(), "as output.meshing.error, which it replaces");
+}
+
+template <class Archive>
 void fields(Archive& archive, ObjectDesc& d) {
   archive.required("name", d.name, identifier(), "unique; objects are numbered in the order of their names");
   archive.required("particles", d.particles, {}, "who is there");
@@ -514,6 +520,9 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive("look", d.look, {}, "what else its pictures show");
+  archive("meshing", d.meshing, {}, "cell and error of its own; where objects touch, the smallest of theirs hold for all of them");
+  archive.check(!(d.meshing.cell || d.meshing.error) || !d.skeleton.empty(), "meshing", "expected a skeleton, whose surface it divides", "none",
+                "add 'skeleton' or remove 'meshing'");
   archive.check(!d.separate || (d.interactions.empty() && d.kinds.empty()), "separate",
                 "expected no interactions or kinds in an object of separate bodies", "some",
                 "remove them, or 'separate'");
@@ -635,7 +644,7 @@ void fields(Archive& archive, GriddingDesc& d) {
 template <class Archive>
 void fields(Archive& archive, SamplingDesc& d) {
   archive("spacing", d.spacing, above(0.0, kLength).or_auto(),
-          "no two samples of an object are nearer than half of it, no place of its surface is farther than it from all; auto: four cells");
+          "no two samples of an object are nearer than half of it, no place of its surface is farther than it from all; auto: four times output.cell");
   archive("density", d.density, above(0.0, kInverseArea), "instead: samples a square metre, to a tenth where the surface is smooth and at rest");
   archive.check(!(d.spacing && d.density), "density", "expected either spacing or density", "both", "");
 }
@@ -658,7 +667,7 @@ void fields(Archive& archive, OutputDesc& d) {
   archive("meshing", d.meshing, {}, "how surfaces become meshes");
   archive("gridding", d.gridding, {}, "how fields become grids");
   archive("sampling", d.sampling, {}, "how far apart samples are");
-  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids; auto: 8 cells across the smallest thickness, 64 along each object");
+  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids of objects without 'meshing.cell'; auto: 8 cells across the smallest thickness of these, 64 along each");
   archive.check(!d.film || !d.images || std::count(d.images->formats.begin(), d.images->formats.end(), ImageName::Png) > 0, "film",
                 "expected images as png for a film", "none", "add png to output.images.formats");
   archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");
@@ -801,6 +810,9 @@ void fields(Archive& archive, Scene& d) {
                 d.time_step.size ? number_text(*d.time_step.size) : "", "");
   for (std::size_t i = 0; i < d.objects.size(); ++i) {
     const Vec3& axes = d.objects[i].particles.inertia_axes;
+    archive.check(!d.objects[i].meshing.error || d.output.meshing.method == MeshingName::Auto || d.output.meshing.method == MeshingName::Cubes,
+                  "objects[" + std::to_string(i) + "].meshing.error", "expected output.meshing.method auto or cubes with an error",
+                  std::string(name_of(d.output.meshing.method)), "leave out 'method'");
     archive.check(!d.planar || (axes.x() == axes.y() && axes.y() == axes.z()),
                   "objects[" + std::to_string(i) + "].particles.inertia_axes", "expected three equal ones in a planar scene",
                   "different ones", "a planar particle turns about z only: use inertia_radius");

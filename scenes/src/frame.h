@@ -126,6 +126,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
 /// Bodies that contact divides from each other, and pieces of one object that still overlap, with their claims on space.
 struct Division {
   std::vector<std::uint32_t> body;             ///< ascending
+  std::vector<collision::BodyPair> pair;       ///< which of them divide each other
   std::vector<collision::ContactBody> placed;  ///< all bodies, the fixed ones last; claims view it
   std::vector<collision::ClaimField> claim;    ///< of each `body`
   Division() = default;

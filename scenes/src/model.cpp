@@ -323,19 +323,28 @@ Model build_model(const Scene& scene) {
   model.links = core::make_links(model.particles, model.rest, model.interactions, link_rules);
 
   double cell = std::numeric_limits<double>::infinity();
+  double least_own = cell;
   Box everything;
-  for (const ObjectModel& object : model.objects) {
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    ObjectModel& object = model.objects[i];
+    const ObjectMeshingDesc& meshing = scene.objects[i].meshing;
+    object.own_cell = meshing.cell.has_value();
+    object.own_error = meshing.error.has_value();
+    object.mesh_error = meshing.error ? meshing.error : scene.output.meshing.error;
+    if (meshing.cell) least_own = std::min(least_own, *meshing.cell);
+    double fitting = std::numeric_limits<double>::infinity();
     double reach = object.iso_radius;
     for (const implicit::Primitive& primitive : object.skeleton.primitive) {
       const double thickness = 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive));
-      cell = std::min(cell, thickness / kCellsAcross);
+      fitting = std::min(fitting, thickness / kCellsAcross);
       reach = std::max(reach, primitive.offset.position.norm() + largest_radius(primitive));
     }
     Box own;
     for (std::uint32_t p = object.first; p < object.last; ++p) {
       own = own.united(Box{model.rest.position[p], model.rest.position[p]}.inflated(reach));
     }
-    if (!object.skeleton.primitive.empty()) cell = std::min(cell, own.extent().maxCoeff() / kCellsAlong);
+    if (!object.skeleton.primitive.empty()) fitting = std::min(fitting, own.extent().maxCoeff() / kCellsAlong);
+    if (!object.own_cell) cell = std::min(cell, fitting);
     everything = everything.united(own);
   }
   model.meshing = scene.output.meshing;
@@ -344,8 +353,13 @@ Model build_model(const Scene& scene) {
     if (std::find(formats.begin(), formats.end(), ImageName::Exr) != formats.end()) model.meshing.motion = true;
   }
   if (scene.render.shutter > 0.0) model.meshing.motion = true;
-  for (std::size_t i = 0; i < model.objects.size(); ++i) model.objects[i].look = scene.objects[i].look;
+  if (!std::isfinite(cell)) cell = least_own;
   if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    ObjectModel& object = model.objects[i];
+    object.look = scene.objects[i].look;
+    if (!object.skeleton.primitive.empty()) object.cell = scene.objects[i].meshing.cell.value_or(model.cell);
+  }
   set_believable(scene, everything, model);
   return model;
 }

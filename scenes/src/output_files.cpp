@@ -82,7 +82,6 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   const GriddingDesc& gridding = simulation.scene().output.gridding;
   const Executor executor(1);
   implicit::GridOptions options;
-  options.lattice.cell = simulation.cell();
   options.half_width = gridding.half_width;
   options.content = gridding.content == GridContentName::Field ? implicit::GridContent::Field
                                                                : implicit::GridContent::SignedDistance;
@@ -95,11 +94,13 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
     fields.emplace_back(field);
     if (gridding.of == GriddedName::Scene) continue;
     options.name = bodies[i].name;
+    options.lattice.cell = simulation.model().objects[bodies[i].object].cell;
     grids.push_back(&updaters[i].make(field, options, executor));
   }
   implicit::SurfaceGrid whole;
   if (gridding.of != GriddedName::Objects && !fields.empty()) {
     options.name = "scene";
+    options.lattice.cell = simulation.cell();
     whole = implicit::make_surface_grid(implicit::UnitedField(fields), options, executor);
     grids.push_back(&whole);
   }

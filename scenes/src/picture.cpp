@@ -202,7 +202,7 @@ void ScenePictures::limit_meshes(Simulation& simulation) const {
   double cell = kCoarser * cell_;
   const core::ParticleState& state = simulation.state().particles;
   for (const ObjectModel& object : simulation.model().objects) {
-    if (!(object.iso_radius > 0.0)) continue;
+    if (!(object.iso_radius > 0.0) || object.own_cell) continue;
     for (const render::Camera& camera : cameras) {
       double nearest = std::numeric_limits<double>::infinity();
       for (std::uint32_t p = object.first; p < object.last; ++p)
@@ -297,7 +297,7 @@ void ScenePictures::add_fields(Simulation& simulation) {
         }
       }
     };
-    item.field_reach = simulation.cell();
+    item.field_reach = simulation.model().objects[object].cell;
   }
 }
 

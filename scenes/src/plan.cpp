@@ -73,7 +73,7 @@ implicit::RouteEstimate routes_of(const Model& model) {
     }
     implicit::PlacedSkeleton placed;
     implicit::place_skeleton(object.skeleton, poses, placed);
-    const implicit::RouteEstimate one = implicit::estimate_routes(object.skeleton, placed.support, model.cell);
+    const implicit::RouteEstimate one = implicit::estimate_routes(object.skeleton, placed.support, object.cell);
     sum.leaves += one.leaves;
     sum.cubes_ms += one.cubes_ms;
     sum.openvdb_ms += one.openvdb_ms;
@@ -84,12 +84,13 @@ implicit::RouteEstimate routes_of(const Model& model) {
 /// Which mesher is taken, and why.
 std::string meshing_of(const Scene& scene, const Model& model) {
   const MeshingDesc& d = scene.output.meshing;
+  const bool error = d.error || std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.own_error; });
   const std::string touching = ", tetrahedra where objects touch";
   switch (d.method) {
     case MeshingName::Tetrahedra: return "tetrahedra";
     case MeshingName::Delaunay: return "Delaunay refinement by CGAL, and of free surfaces and contacts between shared rims where objects touch";
     case MeshingName::OpenVdb: return "OpenVDB grid and volumeToMesh" + touching;
-    case MeshingName::Cubes: return std::string(d.error ? "marching cubes to the error asked for" : "marching cubes") + touching;
+    case MeshingName::Cubes: return std::string(error ? "marching cubes to the error asked for" : "marching cubes") + touching;
     case MeshingName::Auto: break;
   }
   if (d.error) return "marching cubes to the error asked for" + touching;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "read_scene_faults.h"
 #include "supple/collision/approach.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
@@ -202,6 +203,21 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   return text(json);
 }
 
+namespace {
+
+/// "0.01 m", or that of every object where one has its own.
+std::string cells_text(const Model& model) {
+  const auto one = [](const ObjectModel& o) { return o.own_cell; };
+  if (std::none_of(model.objects.begin(), model.objects.end(), one)) return short_text(model.cell) + " m";
+  std::string text;
+  for (const ObjectModel& o : model.objects) {
+    if (o.cell > 0.0) text += (text.empty() ? "" : ", ") + o.name + ' ' + short_text(o.cell) + " m";
+  }
+  return text + "; of objects that touch the smallest holds for all of them";
+}
+
+}  // namespace
+
 std::string explain(Simulation& simulation) {
   const Scene& scene = simulation.scene();
   const Model& model = simulation.model();
@@ -223,7 +239,7 @@ std::string explain(Simulation& simulation) {
   }
   line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
        scene.time_step.size || scene.time_step.substeps ? ", fixed by the scene" : ", by the stability limits at frame 1");
-  if (model.cell > 0.0) line("surface lattice cell %g m", model.cell);
+  if (model.cell > 0.0) line("surface lattice cell %s", cells_text(model).c_str());
   out += "\n";
   const StepPlan plan = plan_step(scene, model, requested_outputs(scene));
   for (const PlannedStage& planned : plan.stages) {

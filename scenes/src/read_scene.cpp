@@ -113,8 +113,8 @@ class Override {
 };
 
 /// Keys that change a picture but not the motion: a run with other values continues, or is drawn again.
-constexpr std::array<std::string_view, 14> kLooks = {"title",  "camera", "cameras",   "light",   "lights",  "background",
-                                                     "output", "colour", "roughness", "look",    "visible", "duration", "render", "texture"};
+constexpr std::array<std::string_view, 15> kLooks = {"title",  "camera", "cameras",   "light",   "lights",  "background",
+                                                     "output", "colour", "roughness", "look",    "visible", "duration", "render", "texture", "meshing"};
 
 /// Keys of a scene that change no picture, and those of its output that do.
 constexpr std::array<std::string_view, 2> kUnseen = {"title", "duration"};

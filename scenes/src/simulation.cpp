@@ -741,7 +741,10 @@ void Simulation::set_cells(int cells) {
   for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
     if (!impl_->bodies[i].skeleton.primitive.empty()) all = all.united(impl_->pulled.field[i].surface_box());
   }
-  if (!all.empty()) impl_->model.cell = all.extent().maxCoeff() / cells;
+  if (!all.empty()) {
+    impl_->model.cell = all.extent().maxCoeff() / cells;
+    for (ObjectModel& object : impl_->model.objects) object.cell = impl_->model.cell;
+  }
   impl_->pulled_meshes = false;
 }
 
@@ -749,6 +752,9 @@ void Simulation::set_cell(double cell) {
   SUPPLE_EXPECTS(cell > 0.0);
   if (cell == impl_->model.cell) return;
   impl_->model.cell = cell;
+  for (ObjectModel& object : impl_->model.objects) {
+    if (!object.own_cell) object.cell = cell;
+  }
   impl_->pulled_meshes = false;
 }
 

@@ -61,8 +61,9 @@ void add_without_surface(const StageContext& context, const core::ParticleState&
 void add_missed(const Model& model, std::vector<std::string>& warnings) {
   for (const ObjectModel& object : model.objects) {
     const double thickness = 2.0 * object.iso_radius;
-    if (!(model.cell > thickness && thickness > 0.0)) continue;
-    warnings.push_back("output.cell: cells of " + number_text(model.cell) + " m may miss '" + object.name + "', which is " +
+    if (!(object.cell > thickness && thickness > 0.0)) continue;
+    const std::string key = object.own_cell ? "objects." + object.name + ".meshing.cell" : "output.cell";
+    warnings.push_back(key + ": cells of " + number_text(object.cell) + " m may miss '" + object.name + "', which is " +
                        number_text(thickness) + " m thick");
   }
 }

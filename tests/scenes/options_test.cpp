@@ -335,6 +335,8 @@ void add_surfaces(std::vector<Option>& all) {
     all.push_back(differs("output." + key, In::Surface, {.scene = "output: {" + scene + "}"}, one, other));
   };
   meshed("cell", "cell: $", "auto", "0.05");
+  all.push_back(differs("objects.meshing.cell", In::Surface, {.object = "meshing: {$}"}, "", "cell: 0.05"));
+  all.push_back(differs("objects.meshing.error", In::Surface, {.object = "meshing: {$}", .scene = "output: {cell: 0.1, meshing: {method: cubes}}"}, "", "error: 1e-4"));
   meshed("meshing.method=tetrahedra", "cell: 0.05, meshing: {method: $}", "cubes", "tetrahedra");
   meshed("meshing.method=openvdb", "cell: 0.05, meshing: {method: $}", "cubes", "openvdb");
   meshed("meshing.method=auto", "cell: 0.05, meshing: {method: $}", "tetrahedra", "auto");

@@ -43,6 +43,10 @@ struct ObjectModel {
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
   LookDesc look;                          ///< decides which columns its meshes carry
+  double cell = 0.0;                      ///< lattice cell of its meshes and grids [m]; 0 without surface
+  bool own_cell = false;                  ///< `cell` is asked for by the object itself
+  std::optional<double> mesh_error;       ///< that its meshes are made to [m]
+  bool own_error = false;                 ///< likewise
 };
 
 /// A solid that nothing moves, and that touches every object that has contact. Without keys it stands where it is; with
@@ -71,7 +75,7 @@ struct Model {
   collision::ReactionSettings reaction;
   collision::BulgeSettings bulge;
   MeshingDesc meshing;                    ///< how surfaces become meshes
-  double cell = 0.0;                      ///< lattice cell for meshes and grids [m]; 0 when nothing has a surface
+  double cell = 0.0;                      ///< that of objects that ask for none of their own [m]; 0 when nothing has a surface
   double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
   double largest_dissipation = 0.0;       ///< d of all pairs that touch [s/m]
   double smallest_length = 0.0;           ///< what a step must resolve: nearest rest distance or iso radius [m]

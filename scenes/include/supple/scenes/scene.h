@@ -239,6 +239,12 @@ struct VolumeDesc {
   double damping = 0.05;              ///< beta
 };
 
+/// objects[].meshing: instead of what `output` says of all
+struct ObjectMeshingDesc {
+  std::optional<double> cell;               ///< lattice cell [m]; absent: as output.cell
+  std::optional<double> error;              ///< largest distance of a triangle's centroid to the surface [m]; absent: as output.meshing.error
+};
+
 struct ObjectDesc {
   std::string name;
   ParticlesDesc particles;
@@ -261,6 +267,7 @@ struct ObjectDesc {
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
   double roughness = 0.45;
   LookDesc look;
+  ObjectMeshingDesc meshing;
 };
 
 struct RestitutionDesc {

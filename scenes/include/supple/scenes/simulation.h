@@ -109,9 +109,11 @@ class Simulation {
   /// Fields of the bodies at the current state; valid until the next step.
   [[nodiscard]] const std::vector<implicit::Field>& fields();
 
-  /// Edge of a lattice cell of `meshes` [m], and its choice by a number of cells along the longest side of all surfaces.
+  /// Edge of a lattice cell of `meshes` [m], of objects that ask for none of their own.
   [[nodiscard]] double cell() const;
+  /// The same for all objects, by a number of cells along the longest side of all surfaces.
   void set_cells(int cells);
+  /// For objects that ask for none of their own.
   void set_cell(double cell);
   /// From now on `meshes` leaves out (as empty ones) bodies that touch nothing and whose surface lies in a box for which
   /// this is false. An empty function: all are made.

@@ -1,0 +1,100 @@
+/// `objects[].meshing`: cells and errors of their own, alone and where objects touch.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "supple/core/error.h"
+#include "supple/scenes/query.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+namespace {
+
+/// A coin beside a house or on it, and a tower that touches nothing.
+std::string scene_of(const std::string& coin, const std::string& output, const std::string& coin_at = "[3, 0, 0]") {
+  const std::string body = ", mass: 1}\n    contact: {modulus: 1e4}\n    skeleton: [{shape: point, kernel: {radius: ";
+  return "schema: 1\nduration: 1\nobjects:\n"
+         "  - name: coin\n    particles: {at: " + coin_at + body + "0.5}}]\n    meshing: {" + coin + "}\n"
+         "  - name: house\n    particles: {at: [0, 0, 0]" + body + "2}}]\n"
+         "  - name: tower\n    particles: {at: [0, 6, 0]" + body + "2}}]\n"
+         "output: {mesh: ply" + output + "}\n";
+}
+
+std::vector<Mesh> meshes_of(const std::string& text) { return Simulation(parse_scene(text, "test.yaml", ".")).meshes(); }
+
+bool same(const Mesh& a, const Mesh& b) { return a.position == b.position && a.triangle == b.triangle; }
+
+// Of two lone balls of radii R and r at iso 1/2: their surfaces lie at 0.454 R and 0.454 r.
+constexpr const char* kTouching = "[1.0, 0, 0]";
+
+TEST(ObjectMeshing, CellOfAnObjectThatTouchesNothingLeavesTheOthersAlone) {
+  const std::vector<Mesh> own = meshes_of(scene_of("cell: 0.02", ", cell: 0.1"));
+  const std::vector<Mesh> coarse = meshes_of(scene_of("", ", cell: 0.1")), fine = meshes_of(scene_of("", ", cell: 0.02"));
+  ASSERT_GT(fine[0].triangle_count(), 4 * coarse[0].triangle_count());
+  EXPECT_TRUE(same(own[0], fine[0]));
+  EXPECT_TRUE(same(own[1], coarse[1]));
+  EXPECT_TRUE(same(own[2], coarse[2]));
+}
+
+TEST(ObjectMeshing, SmallestCellHoldsForObjectsThatTouch) {
+  const std::vector<Mesh> own = meshes_of(scene_of("cell: 0.05", ", cell: 0.1", kTouching));
+  const std::vector<Mesh> coarse = meshes_of(scene_of("", ", cell: 0.1", kTouching));
+  const std::vector<Mesh> fine = meshes_of(scene_of("", ", cell: 0.05", kTouching));
+  for (const std::size_t k : {0u, 1u}) {
+    EXPECT_TRUE(same(own[k], fine[k])) << k;
+    EXPECT_FALSE(same(coarse[k], fine[k])) << k;
+  }
+  EXPECT_TRUE(same(own[2], coarse[2]));
+  // A coarser wish of one of them does not count.
+  const std::vector<Mesh> wished = meshes_of(scene_of("cell: 0.2", ", cell: 0.1", kTouching));
+  EXPECT_TRUE(same(wished[0], coarse[0]) && same(wished[1], coarse[1]));
+}
+
+TEST(ObjectMeshing, ErrorIsOfTheObjectOrOfAllThatTouchIt) {
+  const std::string cubes = ", cell: 0.1, meshing: {method: cubes";
+  for (const std::string at : {"[3, 0, 0]", kTouching}) {
+    const std::vector<Mesh> own = meshes_of(scene_of("error: 2 mm", cubes + '}', at));
+    const std::vector<Mesh> none = meshes_of(scene_of("", cubes + '}', at)), all = meshes_of(scene_of("", cubes + ", error: 2 mm}", at));
+    ASSERT_FALSE(same(none[0], all[0]) || same(none[1], all[1]));
+    EXPECT_TRUE(same(own[0], all[0]));
+    EXPECT_TRUE(same(own[1], at == kTouching ? all[1] : none[1]));
+    EXPECT_TRUE(same(own[2], none[2]));
+  }
+  const std::vector<Mesh> two = meshes_of(scene_of("error: 2 mm", cubes + ", error: 20 mm}", kTouching));
+  const std::vector<Mesh> all = meshes_of(scene_of("", cubes + ", error: 2 mm}", kTouching));
+  EXPECT_TRUE(same(two[0], all[0]) && same(two[1], all[1]));
+}
+
+TEST(ObjectMeshing, AutomaticCellIsByTheObjectsWithoutOne) {
+  const Simulation both(parse_scene(scene_of("cell: 1 mm", ""), "test.yaml", "."));
+  const Simulation alone(parse_scene(scene_of("", ""), "test.yaml", "."));
+  const double fitting = both.model().objects[1].cell;
+  EXPECT_EQ(both.cell(), fitting);
+  EXPECT_EQ(both.model().objects[0].cell, 1e-3);
+  EXPECT_NEAR(fitting, 4.0 * alone.cell(), 1e-12);  // four times as thick
+}
+
+TEST(ObjectMeshing, ChangesNoBitOfTheMotionAndIsExplained) {
+  const Scene plain = parse_scene(scene_of("", ", cell: 0.1"), "test.yaml", "."), own = parse_scene(scene_of("cell: 0.05", ", cell: 0.1"), "test.yaml", ".");
+  EXPECT_EQ(plain.content_hash, own.content_hash);
+  EXPECT_NE(plain.picture_hash, own.picture_hash);
+  Simulation simulation(own);
+  const std::string text = explain(simulation);
+  EXPECT_NE(text.find("surface lattice cell coin 0.05 m, house 0.1 m, tower 0.1 m; of objects that touch the smallest holds for all of them"),
+            std::string::npos) << text;
+}
+
+TEST(ObjectMeshing, IsNamedWhereItCannotBe) {
+  try {
+    (void)meshes_of(scene_of("cell: 1e-12", ", cell: 0.1"));
+    FAIL() << "such cells fit into no memory";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Limit);
+    EXPECT_EQ(error.faults()[0].key, "objects.coin.meshing.cell");
+    EXPECT_EQ(error.faults()[0].place, "test.yaml:8:21");
+  }
+}
+
+}  // namespace
+}  // namespace supple::scenes
