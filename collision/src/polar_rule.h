@@ -206,6 +206,7 @@ class PolarRuleSolver {
   std::vector<Crossing> crossings_;
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;
+  bool corners_lost_ = false;            // where kinks meet the rim
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis
   std::vector<RimPoint> outline_, polygon_, kept_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;

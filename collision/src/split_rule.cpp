@@ -247,6 +247,7 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
       before = here;
     }
   }
+  corners_lost_ = false;
   if (kink.empty()) return;
   batch.resize(batch.point.size());
   std::vector<double> last(kink.size(), 0.0);
@@ -273,7 +274,13 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
     if (!moved) break;
   }
   for (std::size_t i = 0; i < kink.size(); ++i) {
-    if (!(last[i] <= 1e-6 * extent_)) continue;  // the panels find it by halving
+    const auto same = [&](std::size_t j) { return kink[j] == kink[i] && (batch.point[j] - batch.point[i]).norm() <= 1e-6 * extent_; };
+    bool found = last[i] <= 1e-6 * extent_;
+    for (std::size_t j = 0; j < i && found; ++j) found = !same(j);
+    if (!found) {  // the panels find it by halving
+      corners_lost_ = true;
+      continue;
+    }
     corners.push_back(batch.point[i]);
   }
 }
@@ -572,7 +579,8 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
   const bool beside = about_middle_ && cut_;
-  const double least = beside ? 1.0 : about_middle_ ? kLeastOnFaces : 0.0, safety = beside ? kBesideThirds : 1.0;
+  // A corner within a panel keeps its larger rule from converging faster.
+  const double least = beside || corners_lost_ ? 1.0 : about_middle_ ? kLeastOnFaces : 0.0, safety = beside ? kBesideThirds : 1.0;
   for (;;) {
     if (!solve_panels(pressure, *rule, error, begin)) return false;
     for (std::size_t p = begin; p < panels_.size() && !about_middle_; ++p) {
