@@ -1,5 +1,6 @@
 #include "march_rule.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -65,6 +66,11 @@ void clip_tetrahedron(const Tetrahedron& tetrahedron, const F& f, std::vector<Te
   }
 }
 
+/// Corners at which A presses at least as hard as B.
+int count_above(const std::array<MarchVertex, 4>& corner) {
+  return static_cast<int>(std::count_if(corner.begin(), corner.end(), [](const MarchVertex& v) { return v.a - v.b >= 0.0; }));
+}
+
 }  // namespace
 
 void MarchRuleSolver::add_facet(Polygon& polygon, int count) {
@@ -115,15 +121,8 @@ void MarchRuleSolver::add_squeezed(const Tetrahedron& corner, int side) {
   volume_side_.push_back(static_cast<std::uint8_t>(side));
 }
 
-void MarchRuleSolver::visit_tetrahedron(const Tetrahedron& corner) {
-  bool a_somewhere = false, b_somewhere = false;
-  int above = 0;
-  for (const MarchVertex& v : corner) {
-    a_somewhere = a_somewhere || v.a > 0.0;
-    b_somewhere = b_somewhere || v.b > 0.0;
-    above += v.a - v.b >= 0.0 ? 1 : 0;
-  }
-  if (!a_somewhere || !b_somewhere) return;
+void MarchRuleSolver::cut_tetrahedron(const Tetrahedron& corner) {
+  const int above = count_above(corner);
   if (above > 0 && above < 4) {
     std::array<const MarchVertex*, 4> up{}, down{};
     std::size_t ups = 0, downs = 0;
@@ -150,15 +149,57 @@ void MarchRuleSolver::visit_tetrahedron(const Tetrahedron& corner) {
     }
     add_facet(polygon, count);
   }
-  if (above < 4) add_squeezed(corner, 0);
-  if (above > 0) add_squeezed(corner, 1);
+}
+
+template <class Visit>
+Box MarchRuleSolver::for_tetrahedra(const Visit& visit) {
+  const auto& n = cells_;
+  const auto index = [&](std::size_t i, std::size_t j, std::size_t k) { return (k * (n[1] + 1) + j) * (n[0] + 1) + i; };
+  Box held;
+  // Six tetrahedra around the main diagonal of a cell: one for each order of the axes.
+  constexpr std::array<std::array<std::size_t, 2>, 6> kPaths{{{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
+  for (std::size_t k = 0; k < n[2]; ++k) {
+    for (std::size_t j = 0; j < n[1]; ++j) {
+      for (std::size_t i = 0; i < n[0]; ++i) {
+        std::array<std::size_t, 8> at;
+        bool a_somewhere = false, b_somewhere = false;
+        for (std::size_t c = 0; c < 8; ++c) {
+          at[c] = index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+          a_somewhere = a_somewhere || node_.a[at[c]] > 0.0;
+          b_somewhere = b_somewhere || node_.b[at[c]] > 0.0;
+        }
+        if (!a_somewhere || !b_somewhere) continue;
+        held.include(node_.point[at[0]]);
+        held.include(node_.point[at[7]]);
+        const auto vertex = [&](std::size_t c) { return MarchVertex{node_.point[at[c]], node_.a[at[c]], node_.b[at[c]], third_[at[c]]}; };
+        for (const auto& path : kPaths) {
+          const Tetrahedron corner{vertex(0), vertex(path[0]), vertex(path[1]), vertex(7)};
+          const bool a = std::any_of(corner.begin(), corner.end(), [](const MarchVertex& v) { return v.a > 0.0; });
+          const bool b = std::any_of(corner.begin(), corner.end(), [](const MarchVertex& v) { return v.b > 0.0; });
+          if (a && b) visit(corner);
+        }
+      }
+    }
+  }
+  return held;
+}
+
+void MarchRuleSolver::squeeze() {
+  volume_point_.clear();
+  volume_weight_.clear();
+  volume_side_.clear();
+  (void)for_tetrahedra([this](const Tetrahedron& corner) {
+    const int above = count_above(corner);
+    if (above < 4) add_squeezed(corner, 0);
+    if (above > 0) add_squeezed(corner, 1);
+  });
 }
 
 Box MarchRuleSolver::march(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& box,
                            int cells) {
   const Vec3 extent = box.extent();
   const double cell = extent.maxCoeff() / cells;
-  std::array<std::size_t, 3> n{};
+  auto& n = cells_;
   for (std::size_t k = 0; k < 3; ++k) {
     n[k] = static_cast<std::size_t>(std::max(2.0, std::ceil(extent[static_cast<Eigen::Index>(k)] / cell - 1e-9)));
   }
@@ -177,7 +218,7 @@ Box MarchRuleSolver::march(PairPressure& pressure, std::span<const ContactBody* 
     }
   }
   pressure.evaluate_values(node_);
-  third_.assign(node_.size(), -std::numeric_limits<double>::infinity());
+  third_.assign(node_.size(), third.empty() ? -std::numeric_limits<double>::max() : -std::numeric_limits<double>::infinity());
   value_.resize(node_.size());
   for (const ContactBody* body : third) {
     body->field.evaluate(node_.point, value_);
@@ -189,34 +230,7 @@ Box MarchRuleSolver::march(PairPressure& pressure, std::span<const ContactBody* 
   facet_.point.clear();
   facet_normal_.clear();
   facet_area_.clear();
-  volume_point_.clear();
-  volume_weight_.clear();
-  volume_side_.clear();
-  Box held;
-  // Six tetrahedra around the main diagonal of a cell: one for each order of the axes.
-  constexpr std::array<std::array<std::size_t, 2>, 6> kPaths{{{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
-  for (std::size_t k = 0; k < n[2]; ++k) {
-    for (std::size_t j = 0; j < n[1]; ++j) {
-      for (std::size_t i = 0; i < n[0]; ++i) {
-        std::array<std::size_t, 8> at;
-        bool a_somewhere = false, b_somewhere = false;
-        for (std::size_t c = 0; c < 8; ++c) {
-          at[c] = index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-          a_somewhere = a_somewhere || node_.a[at[c]] > 0.0;
-          b_somewhere = b_somewhere || node_.b[at[c]] > 0.0;
-        }
-        if (!a_somewhere || !b_somewhere) continue;
-        held.include(node_.point[at[0]]);
-        held.include(node_.point[at[7]]);
-        const auto vertex = [&](std::size_t c) {
-          return MarchVertex{node_.point[at[c]], node_.a[at[c]], node_.b[at[c]],
-                             third.empty() ? -std::numeric_limits<double>::max() : third_[at[c]]};
-        };
-        for (const auto& path : kPaths) visit_tetrahedron({vertex(0), vertex(path[0]), vertex(path[1]), vertex(7)});
-      }
-    }
-  }
-  return held;
+  return for_tetrahedra([this](const Tetrahedron& corner) { cut_tetrahedron(corner); });
 }
 
 /// Moves the centroids of the facets onto Sigma along the facets' normals and sums up.
@@ -311,6 +325,7 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
   }
   if (!known) return false;
 
+  squeeze();
   for (const int side : {0, 1}) {
     facet_.point.clear();
     const std::size_t begin = points.volume_point.size();

@@ -39,9 +39,15 @@ class MarchRuleSolver {
   using Polygon = std::array<MarchVertex, 10>;
   using Tetrahedron = std::array<MarchVertex, 4>;
 
-  /// One grid. @return the box of the cells that hold anything
+  /// The facets of one grid. @return the box of the cells that hold anything
   Box march(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& box, int cells);
-  void visit_tetrahedron(const Tetrahedron& corner);
+  /// The space that the bodies take from each other, of the last grid. Apart from the facets, because only the grid that is
+  /// kept needs it.
+  void squeeze();
+  /// Calls visit(tetrahedron) wherever both bodies may be. @return the box of these cells
+  template <class Visit>
+  Box for_tetrahedra(const Visit& visit);
+  void cut_tetrahedron(const Tetrahedron& corner);
   void add_facet(Polygon& polygon, int count);
   void add_squeezed(const Tetrahedron& corner, int side);
   /// The line through the point of largest pressure along Sigma's normal there.
@@ -52,6 +58,7 @@ class MarchRuleSolver {
   void place_on_sigma(PairPressure& pressure, double cell, const Vec3& reference, PatchPoints& points);
 
   PressureBatch node_, facet_;
+  std::array<std::size_t, 3> cells_{};  ///< of `node_` along x, y, z
   std::vector<double> third_, value_;
   std::vector<Vec3> facet_normal_;
   std::vector<double> facet_area_;
