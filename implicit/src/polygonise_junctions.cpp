@@ -9,6 +9,13 @@
 #include "polygonise_roots.h"
 
 namespace supple::implicit::lattice {
+
+Vec3 corner_of(const Simplex& simplex, std::size_t k) {
+  Vec3 p;
+  for (int axis = 0; axis < 3; ++axis) p[axis] = (simplex.corner[k] >> axis & 1u) != 0 ? simplex.high[axis] : simplex.low[axis];
+  return p;
+}
+
 namespace {
 
 constexpr int kMaxIterations = 12;
@@ -47,12 +54,6 @@ bool vanishes(const Conditions& c, const Vec3& point, double scale) {
     if (!(std::abs(c.value[k]) <= root_tolerance(scale, point, c.gradient[k]))) return false;
   }
   return true;
-}
-
-Vec3 corner_of(const Simplex& simplex, std::size_t k) {
-  Vec3 p;
-  for (int axis = 0; axis < 3; ++axis) p[axis] = (simplex.corner[k] >> axis & 1u) != 0 ? simplex.high[axis] : simplex.low[axis];
-  return p;
 }
 
 /// Coordinates of a simplex along its chain of corners, whose steps have no axis in common and so are orthogonal:

@@ -3,6 +3,7 @@
 /// Label 0 is outside, label m + 1 is body m.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -27,6 +28,12 @@ struct LabelSet {
     ++count;
   }
   [[nodiscard]] std::span<const Label> view() const { return {label.data(), count}; }
+  [[nodiscard]] bool has(Label l) const { return std::find(label.begin(), label.begin() + count, l) != label.begin() + count; }
+  [[nodiscard]] LabelSet with(Label l) const {
+    LabelSet set = *this;
+    set.insert(l);
+    return set;
+  }
 };
 
 /// A simplex of the lattice: `corners` of the cell whose lowest node is at `low` and whose opposite node is at `high`,
@@ -37,6 +44,8 @@ struct Simplex {
   std::array<Label, 4> label{};
   std::uint8_t size = 0;  ///< 3: a face, 4: a tetrahedron
 };
+
+[[nodiscard]] Vec3 corner_of(const Simplex& simplex, std::size_t k);
 
 struct Junction {
   Vec3 point = Vec3::Zero();

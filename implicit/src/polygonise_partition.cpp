@@ -1,7 +1,7 @@
 // Interfaces between labels are made once, as triangles between two labels, and given to both bodies. A tetrahedron with
 // two labels is cut as for one body. With three or four labels, its faces are divided around their face points and the
 // interfaces are the cones over those segments from an interior point: faces of a subdivision of the tetrahedron, so
-// they cannot intersect.
+// they cannot intersect. So are those of one with two labels in which these meet with two others.
 
 #include "polygonise_partition.h"
 
@@ -70,7 +70,7 @@ class FacetMaker {
       labels.insert(label[v]);
     }
     if (labels.count == 1) return;
-    if (labels.count > 2) {
+    if (labels.count > 2 || std::binary_search(block_.lone_key.begin(), block_.lone_key.end(), tetrahedron_key(cell, t))) {
       cone(cell, t, label);
       return;
     }
@@ -181,8 +181,7 @@ class FacetMaker {
       std::swap(vertex[1], vertex[2]);
       std::swap(face[0], face[2]);
     }
-    const std::size_t tetrahedron = static_cast<std::size_t>((cell.z * kCells + cell.y) * kCells + cell.x) * kTetrahedra.size() + t;
-    out_.push_back({.inner = from, .outer = to, .vertex = vertex, .tetrahedron = static_cast<std::uint16_t>(tetrahedron),
+    out_.push_back({.inner = from, .outer = to, .vertex = vertex, .tetrahedron = tetrahedron_key(cell, t),
                     .faces = static_cast<std::uint16_t>(face[0] | face[1] << 3 | face[2] << 6)});
   }
 
@@ -219,6 +218,10 @@ AllVertices join(std::vector<PartitionVertices>& parts, const Lattice& lattice, 
     for (Cover cover : part.cover) {
       cover.vertex += static_cast<std::uint32_t>(vertices - part.use_end.size());
       all.cover.push_back(cover);
+    }
+    for (Meeting meeting : part.meeting) {
+      meeting.vertex += static_cast<std::uint32_t>(vertices - part.use_end.size());
+      all.meeting.push_back(meeting);
     }
     counts.nodes += part.counts.nodes;
     counts.residual = std::max(counts.residual, part.counts.residual);

@@ -38,6 +38,10 @@ void for_all_cells(const Use& use) {
                                     face);
 }
 
+[[nodiscard]] inline std::uint16_t tetrahedron_key(const Cell& base, std::size_t tetrahedron) {
+  return static_cast<std::uint16_t>(static_cast<std::size_t>((base.z * kCells + base.y) * kCells + base.x) * kTetrahedra.size() + tetrahedron);
+}
+
 [[nodiscard]] inline LabelSet labels_of(std::span<const Label> labels) {
   LabelSet set;
   for (const Label l : labels) set.insert(l);
@@ -57,13 +61,21 @@ struct VertexUse {
   Vec3 position = Vec3::Zero();  ///< bit-equal for all bodies of a contact; each body's own across a gap
 };
 
-/// A vertex between two labels where a third one wins: the interface parts there into two, one on either side of it, and each has
-/// the vertex at a place of its own. Between them and the vertices where it does not win runs a rim.
+/// A vertex between two or three labels where another one wins: the interfaces part there, one sheet on every side of it, and each has the
+/// vertex at a place of its own. Between them and the vertices where it does not win runs a rim.
 struct Cover {
   std::uint32_t vertex = 0;
-  Label low = 0, high = 0;      ///< those that it would lie between, ascending
-  Label by = 0;                 ///< the third
-  Vec3 point = Vec3::Zero();    ///< where the interface would be
+  LabelSet between;             ///< those that would meet there
+  Label by = 0;                 ///< the other
+  Vec3 point = Vec3::Zero();    ///< where they would
+
+  [[nodiscard]] bool parts(Label a, Label b) const { return between.has(a) && between.has(b); }
+};
+
+/// What meets at a junction.
+struct Meeting {
+  std::uint32_t vertex = 0;
+  LabelSet labels;
 };
 
 /// Uncovered: one that is covered, but has one place like a junction.
@@ -75,6 +87,7 @@ struct LabelledBlock {
   EdgeSet edges;
   std::uint32_t edge_count = 0;
   std::vector<std::uint16_t> face_key;   ///< of its face points, ascending
+  std::vector<std::uint16_t> lone_key;   ///< of tetrahedra with nodes of two labels and an interior point, ascending
   std::vector<Label> label;              ///< of its nodes, shape [kBlockNodes]
   bool has_junctions = false;            ///< three or more labels in the block
   std::uint32_t first_vertex = 0;        ///< within its task, then over all blocks
@@ -87,6 +100,7 @@ struct PartitionVertices {
   std::vector<VertexUse> use;
   std::vector<VertexKind> kind;        ///< by vertex
   std::vector<Cover> cover;            ///< of those that are covered, by vertex
+  std::vector<Meeting> meeting;        ///< of junctions, by vertex
   PolygoniseCounts counts;
 };
 
@@ -106,11 +120,6 @@ class Labeller {
     Vec3 point, gradient;
     std::optional<Label> by;  ///< a third label that wins there
   };
-  /// A covered pair of a face or a tetrahedron, and a point where the third label wins.
-  struct CoveredPair {
-    Label low, high, by;
-    Vec3 middle;
-  };
 
   void label_nodes();
   void mark_edges(LabelledBlock& block);
@@ -119,13 +128,33 @@ class Labeller {
   void add_junctions(LabelledBlock& block, PartitionVertices& out);
   void add_junction(const Cell& cell, const std::array<std::uint8_t, 4>& chain, std::uint8_t size,
                     const LabelSet& labels, PartitionVertices& out);
-  /// The uses of a covered vertex, its places on the ways from `at_low` to its point and on to `at_high`.
-  void add_covered(const Cover& cover, const Vec3& at_low, const Vec3& at_high, PartitionVertices& out) const;
-  [[nodiscard]] std::optional<Label> winner_at(Label low, Label high, const Vec3& point) const;
-  [[nodiscard]] std::optional<CoveredPair> covered_pair(const Cell& cell, std::span<const std::uint8_t> chain,
+  void add_junction(const LabelSet& labels, const Junction& junction, PartitionVertices& out) const;
+  [[nodiscard]] Simplex simplex_of(const Cell& cell, const std::array<std::uint8_t, 4>& chain, std::uint8_t size) const;
+  /// The uses of a covered vertex: its places on the ways to its point from where each of the labels is the largest.
+  void add_covered(const Cover& cover, std::span<const Vec3> at, PartitionVertices& out) const;
+  void add_covered(const Cell& cell, std::span<const std::uint8_t> chain, const Cover& cover, PartitionVertices& out) const;
+  /// Where the labels of a simplex meet, and perhaps one more; or what covers that place.
+  struct Met {
+    Junction junction;
+    LabelSet labels;
+    std::optional<Cover> cover;
+  };
+  [[nodiscard]] Met meet_three(const Cell& cell, const Simplex& simplex, const LabelSet& labels, const Vec3& start) const;
+  [[nodiscard]] Met meet_on_face(const Cell& cell, const Simplex& face, const LabelSet& labels) const;
+  [[nodiscard]] std::optional<Cover> covered_by_fourth(const Cell& cell, const Simplex& simplex, const LabelSet& labels, const Vec3& middle) const;
+  [[nodiscard]] Vec3 middle_of_crossings(const Cell& cell, const Simplex& simplex) const;
+  [[nodiscard]] bool can_part(const LabelSet& labels) const;
+  [[nodiscard]] bool wins_over(Label by, const LabelSet& labels, const Vec3& point) const;
+  [[nodiscard]] Met meet_four(const Cell& cell, const Simplex& simplex, const LabelSet& labels, const Vec3& start) const;
+  [[nodiscard]] std::optional<Junction> meet_with_others(const Cell& cell, const Simplex& simplex, LabelSet& labels) const;
+  [[nodiscard]] std::optional<Vec3> linear_meeting(const Cell& cell, const Simplex& simplex, const LabelSet& labels) const;
+  /// Other labels that may win inside a simplex.
+  [[nodiscard]] std::vector<Label> others_near(const Cell& cell, std::span<const std::uint8_t> chain, const LabelSet& labels) const;
+  [[nodiscard]] double scale_of(const LabelSet& labels) const;
+  [[nodiscard]] std::optional<Label> winner_at(const LabelSet& labels, const Vec3& point) const;
+  [[nodiscard]] std::optional<Cover> covered_pair(const Cell& cell, std::span<const std::uint8_t> chain,
                                                         const LabelSet& labels) const;
   [[nodiscard]] Vec3 middle_of(const Cell& cell, std::span<const std::uint8_t> chain, Label label) const;
-  [[nodiscard]] double scale_of(Label a, Label b) const { return (a == 0 ? 0.0 : scale_[slot_of(a)]) + (b == 0 ? 0.0 : scale_[slot_of(b)]); }
   [[nodiscard]] bool has_mesh(Label label) const { return label != 0 && has_mesh_[label - 1] != 0; }
   [[nodiscard]] Vec3 crossing(std::size_t node_a, std::size_t node_b) const;
   [[nodiscard]] Vec3 own_root(Label label, const Vec3& inside, const Vec3& outside) const;

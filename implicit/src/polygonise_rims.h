@@ -1,7 +1,8 @@
 /// @file polygonise_rims.h
 /// Rims inside the triangles between two labels. Where a third label wins at some vertices of a triangle and not at others, a rim
 /// passes through: the triangle is cut there, at points on the rim in the faces and tetrahedra of the lattice, and beyond them
-/// parts into one on either side of the third label. All of it stays in the tetrahedron of the triangle.
+/// parts into one on either side of the third label. Where different labels win at its vertices it is cut for both, and where these two
+/// meet in it a wall between them stands on the cut. All of it stays in the tetrahedron of the triangle.
 #pragma once
 
 #include <array>
@@ -45,7 +46,8 @@ struct AllVertices {
   std::vector<std::uint32_t> use_end;
   std::vector<VertexUse> use;
   std::vector<VertexKind> kind;
-  std::vector<Cover> cover;  ///< by vertex, ascending
+  std::vector<Cover> cover;      ///< by vertex, ascending
+  std::vector<Meeting> meeting;  ///< by vertex, ascending
 
   [[nodiscard]] std::span<VertexUse> uses_of(std::uint32_t vertex) {
     const std::uint32_t begin = vertex == 0 ? 0 : use_end[vertex - 1];

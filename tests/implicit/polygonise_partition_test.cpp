@@ -165,6 +165,46 @@ TEST(PolygonisePartition, FindsTheRimOfALensThatHoldsNoNode) {
   }
 }
 
+// Where four of balls and outside meet there is a vertex of all that do, wherever the lattice lies, and rims run straight to it.
+TEST(PolygonisePartition, HasAVertexWhereFourMeet) {
+  constexpr double kRadius = 0.5, kAround = 0.35;
+  std::vector<FunctionField> balls;
+  for (const Vec3& corner : {Vec3(1, 1, 1), Vec3(1, -1, -1), Vec3(-1, 1, -1), Vec3(-1, -1, 1)}) {
+    balls.push_back(sphere(kAround / std::sqrt(3.0) * corner, kRadius));
+  }
+  // Three balls and outside meet on the line through the origin and the middle of their centres, all four in the origin.
+  const double middle = kAround / 3.0, across = std::sqrt(kAround * kAround - middle * middle);
+  const double height = middle + std::sqrt(kRadius * kRadius - across * across);
+  std::vector<std::pair<Vec3, std::vector<std::size_t>>> points{{Vec3::Zero(), {0, 1, 2, 3}}};
+  for (std::size_t without = 0; without < 4; ++without) {
+    points.push_back({-height * balls[without].box.centre().normalized(), {}});
+    for (std::size_t m = 0; m < 4; ++m) {
+      if (m != without) points.back().second.push_back(m);
+    }
+  }
+  Random random(5);
+  std::size_t meshes = 0, all = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Lattice lattice{.origin = random.in_box(0.1), .cell = random.uniform(0.04, 0.1)};
+    PolygoniseCounts counts;
+    const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice, Executor(1), &counts);
+    expect_all_closed(mesh);
+    EXPECT_LT(counts.residual, 1e-12);
+    for (const auto& [point, bodies] : points) {
+      std::size_t with = 0;
+      for (const std::size_t m : bodies) {
+        const auto& p = mesh[m].position;
+        with += std::any_of(p.begin(), p.end(), [&](const Vec3& q) { return (q - point).norm() < 1e-9; }) ? 1 : 0;
+      }
+      EXPECT_GT(with, 0u) << i;
+      meshes += with;
+      all += bodies.size();
+    }
+    for (const Mesh& m : mesh) EXPECT_EQ(self_intersections(m, lattice.cell), 0u);
+  }
+  EXPECT_GT(10 * meshes, 9 * all);  // where a thin wedge of one ends in a vertex beside it, its mesh does without
+}
+
 // Between two balls, a third one's wedge may lie on lattice edges without a node: both sheets of it are there.
 TEST(PolygonisePartition, ThreeBallsMeetAtTheirRims) {
   std::vector<FunctionField> balls;
@@ -326,12 +366,13 @@ TEST(PolygonisePartition, DoesNotCrossItselfOnCoarseRandomBodies) {
   }
 }
 
-// Rims of rims: balls of a few cells, between which any labels meet in any tetrahedron.
+// Rims of rims: balls of a few cells, between which any labels meet in any tetrahedron, with and without a ground.
 TEST(PolygonisePartition, IsClosedAndDoesNotCrossItselfWhereRimsMeet) {
-  for (std::uint64_t seed = 139; seed < 155; ++seed) {
+  for (std::uint64_t seed = 139; seed < 163; ++seed) {
     Random random(seed);
     std::vector<FunctionField> balls;
     for (std::uint64_t i = 0; i < 2 + seed % 6; ++i) balls.push_back(sphere(random.in_box(0.4), random.uniform(0.15, 0.5)));
+    if (seed % 3 == 0) balls.push_back(below(-0.2));
     const double cell = 0.05 + 0.01 * static_cast<double>(seed % 8);
     PolygoniseCounts counts;
     const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(cell), Executor(1), &counts);

@@ -55,8 +55,9 @@ struct PolygoniseCounts {
 /// (where several others meet, the lowest).
 /// Across a gap thinner than a cell each body keeps its own surface (counted). Rims are met to second order: wherever one passes a
 /// face or a tetrahedron of the lattice a vertex lies on it, also where a third body or outside wins between two nodes and at none.
-/// Where a rim winds through a tetrahedron, or four of bodies and outside meet in one, a vertex may stay inside, less than
-/// a cell from the rim (counted).
+/// Where four of bodies and outside meet there is a vertex; the tetrahedron is divided around it. Where a rim winds through a
+/// tetrahedron, or sheets of a thin body would cross in one, a vertex may stay inside, less than a cell from the rim (partly counted), and a
+/// body that is thinner than a cell may end before the point where it meets three others.
 /// An unbounded body (a ground) shapes the others and gets an empty mesh. @throws Error{Usage} when all are unbounded.
 [[nodiscard]] std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice,
                                                      const Executor& executor, PolygoniseCounts* counts = nullptr);
