@@ -1,0 +1,237 @@
+// Stage 9: from fields and the contact surface to meshes.
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "frame.h"
+#include "look_columns.h"
+#include "supple/collision/deformed_field.h"
+#include "supple/core/error.h"
+#include "supple/core/parts.h"
+#include "supple/implicit/creases.h"
+#include "supple/implicit/mesh_motion.h"
+#include "supple/implicit/mesh_routes.h"
+#include "supple/implicit/polygonise.h"
+#include "supple/implicit/surface_grid.h"
+
+namespace supple::scenes {
+namespace {
+
+/// Bodies that are divided on one lattice.
+struct DivisionGroup {
+  std::vector<std::size_t> member;      ///< of Division::body, ascending
+  const ObjectModel* finest = nullptr;  ///< whose cell it is
+  const ObjectModel* strictest = nullptr;  ///< whose error it is; null: none is asked for
+};
+
+/// Of bodies that touch, directly or by way of others, the smallest cell and error hold for all of them. What has the same
+/// of both is divided in one go, whether it touches or not.
+std::vector<DivisionGroup> groups_of(const Model& model, const std::vector<Body>& bodies, const Division& division) {
+  const std::vector<std::uint32_t>& all = division.body;
+  std::vector<std::size_t> root(all.size());
+  std::iota(root.begin(), root.end(), std::size_t{0});
+  const auto root_of = [&](std::uint32_t body) {
+    auto k = static_cast<std::size_t>(std::lower_bound(all.begin(), all.end(), body) - all.begin());
+    while (root[k] != k) k = root[k] = root[root[k]];
+    return k;
+  };
+  for (const collision::BodyPair& pair : division.pair) {
+    const std::size_t a = root_of(pair.a), b = root_of(pair.b);
+    root[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<DivisionGroup> parts(all.size());
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const ObjectModel& object = model.objects[bodies[all[k]].object];
+    DivisionGroup& part = parts[root_of(all[k])];
+    if (part.finest == nullptr || object.cell < part.finest->cell) part.finest = &object;
+    const bool strict = object.mesh_error && (part.strictest == nullptr || *object.mesh_error < *part.strictest->mesh_error);
+    if (strict) part.strictest = &object;
+  }
+  const auto lattice_of = [](const DivisionGroup& group) {
+    return std::pair(group.finest->cell, group.strictest != nullptr ? *group.strictest->mesh_error : 0.0);
+  };
+  std::vector<DivisionGroup> groups;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const DivisionGroup& part = parts[root_of(all[k])];
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const DivisionGroup& g) { return lattice_of(g) == lattice_of(part); });
+    if (group == groups.end()) group = groups.insert(groups.end(), part);
+    group->member.push_back(k);
+  }
+  return groups;
+}
+
+/// The meshes of bodies that touch, within the bounds that the scene asks for.
+std::vector<Mesh> divide(const MeshingDesc& d, std::optional<double> error, std::span<const implicit::FieldView> views,
+                         const implicit::Lattice& lattice, const Executor& executor, implicit::PolygoniseCounts& counts) {
+  implicit::Lattice coarsest = lattice;
+  if (d.method == MeshingName::Delaunay) {
+    const double size = d.size.value_or(2.0 * lattice.cell);
+    implicit::DelaunayReport report;
+    std::vector<Mesh> meshes = implicit::delaunay_partition(
+        views, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell}, executor, &report);
+    counts.blocks_visited = counts.blocks_present = report.seeds + report.inserted;
+    return meshes;
+  }
+  if (!error) return implicit::polygonise_partition(views, lattice, executor, &counts);
+  coarsest.cell = views.front().feature_size();
+  for (const implicit::FieldView& view : views) coarsest.cell = std::min(coarsest.cell, view.feature_size());
+  coarsest.cell *= 0.5;
+  return implicit::polygonise_partition_within(views, coarsest, {*error}, executor, &counts);
+}
+
+/// The names of meshers' and grids' arguments become those of the scene's keys.
+/// @param cell, error  objects that ask for these themselves; null: the scene does
+Error with_keys_of(const Error& failure, const ObjectModel* cell, const ObjectModel* error) {
+  std::vector<Fault> faults = failure.faults();
+  for (Fault& fault : faults) {
+    if (fault.key == "lattice.cell" && cell != nullptr && cell->own_cell) fault.key = "objects." + cell->name + ".meshing.cell";
+    if (fault.key == "mesh.error" && error != nullptr && error->own_error) fault.key = "objects." + error->name + ".meshing.error";
+  }
+  return with_scene_keys({failure.kind(), std::move(faults)});
+}
+
+/// The surfaces of bodies that touch, by body. They are divided together, those that share a lattice; the ground divides
+/// nothing, it is flat and opaque. Pieces of one object are divided where they still overlap.
+void mesh_divided(const StageContext& context, const Division& division, StageProfile& profile, std::vector<Mesh>& surfaces) {
+  for (const DivisionGroup& group : groups_of(context.model, context.bodies, division)) {
+    std::vector<implicit::FieldView> views;
+    for (const std::size_t k : group.member) views.emplace_back(division.claim[k]);
+    implicit::PolygoniseCounts counts;
+    try {
+      const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
+      std::vector<Mesh> parts = divide(context.model.meshing, error, views, {.origin = Vec3::Zero(), .cell = group.finest->cell},
+                                       context.executor, counts);
+      for (std::size_t k = 0; k < parts.size(); ++k) surfaces[division.body[group.member[k]]] = std::move(parts[k]);
+    } catch (const Error& failure) {
+      throw with_keys_of(failure, group.finest, group.strictest);
+    }
+    profile.visited += counts.blocks_visited;
+    profile.present += counts.blocks_present;
+  }
+}
+
+/// The surface of a body that touches no other.
+Mesh mesh_alone(const StageContext& context, std::size_t i, StageProfile& profile, Frame& frame) {
+  const MeshingDesc& d = context.model.meshing;
+  const ObjectModel& object = context.model.objects[context.bodies[i].object];
+  const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = object.cell};
+  const implicit::Field& field = frame.field[i];
+  try {
+    if (d.method == MeshingName::Tetrahedra) {
+      implicit::PolygoniseCounts counts;
+      Mesh mesh = implicit::polygonise(field, lattice, context.executor, &counts);
+      profile.visited += counts.blocks_visited;
+      profile.present += counts.blocks_present;
+      return mesh;
+    }
+    if (d.method == MeshingName::Delaunay) {
+      const double size = d.size.value_or(2.0 * object.cell);
+      implicit::DelaunayReport report;
+      Mesh mesh = (*context.delaunay)(
+          field, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = object.cell}, &report);
+      profile.visited += report.seeds + report.inserted;
+      profile.present += report.seeds + report.inserted;
+      return mesh;
+    }
+    const bool automatic = d.method == MeshingName::Auto && !object.mesh_error;
+    if (d.method == MeshingName::OpenVdb ||
+        (automatic && !implicit::estimate_routes(context.bodies[i].skeleton, frame.placed[i].support, object.cell).prefers_cubes())) {
+      return implicit::mesh_of(implicit::make_surface_grid(field, {.lattice = lattice}, context.executor), field, context.executor);
+    }
+    implicit::MarchCounts marched;
+    Mesh mesh = automatic && implicit::has_creases(field)
+                    ? implicit::march_creases(field, lattice, context.executor, &marched)
+                    : frame.mesher[i].make(field, {.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip},
+                                           context.executor, &marched);
+    profile.visited += marched.tiles;
+    profile.present += 64 * marched.blocks;
+    return mesh;
+  } catch (const Error& failure) {
+    throw with_keys_of(failure, &object, &object);
+  }
+}
+
+}  // namespace
+
+Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
+                     std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface) {
+  Division out;
+  for (const auto& s : surface.summary) {
+    for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
+      if (body < bodies.size()) out.body.push_back(body);
+    }
+    if (s.bodies.b < bodies.size()) out.pair.push_back(s.bodies);
+  }
+  out.placed.assign(placed.begin(), placed.end());
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty()) continue;
+    if (out.placed[i].pose.empty()) out.placed[i].field = fields[i];
+    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+      if (bodies[j].skeleton.primitive.empty()) continue;
+      if (!fields[i].surface_box().overlaps(fields[j].surface_box())) continue;
+      out.body.insert(out.body.end(), {i, j});
+      out.pair.push_back({i, j});
+    }
+  }
+  std::sort(out.body.begin(), out.body.end());
+  out.body.erase(std::unique(out.body.begin(), out.body.end()), out.body.end());
+  out.claim.reserve(out.body.size());
+  for (const std::uint32_t i : out.body) out.claim.emplace_back(out.placed, i, surface, model.bulge);
+  return out;
+}
+
+std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
+                                     const core::Interactions& laws, Frame& frame) {
+  const Model& model = context.model;
+  const std::vector<Body>& bodies = context.bodies;
+  StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
+  StageTimer timer(profile, true);
+  std::vector<Mesh> surfaces(bodies.size());
+  const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
+  mesh_divided(context, division, profile, surfaces);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
+    if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {
+      profile.present += 1;
+    } else {
+      surfaces[i] = mesh_alone(context, i, profile, frame);
+    }
+  }
+  for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {
+    if (surfaces[i].position.empty()) continue;
+    core::gather_motion(model.particles, particles, bodies[i].particle, frame.velocity[i], frame.spin[i]);
+    std::vector<implicit::PartMotion> parts(bodies[i].particle.size());
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      parts[k] = {.centre = frame.pose[i][k].position, .velocity = frame.velocity[i][k],
+                  .angular_velocity = frame.spin[i][k], .id = bodies[i].particle[k]};
+    }
+    implicit::add_motion(frame.field[i], parts, context.executor, surfaces[i]);
+  }
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (!surfaces[i].position.empty())
+      add_look_columns(model, bodies[i], particles, laws, frame.field[i], frame.pose[i], context.executor, surfaces[i]);
+  }
+  std::vector<Mesh> meshes(model.objects.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    Mesh& mesh = meshes[bodies[i].object];
+    if (mesh.position.empty()) {
+      mesh = std::move(surfaces[i]);
+    } else {
+      append(mesh, surfaces[i]);
+    }
+  }
+  return meshes;
+}
+
+Error with_scene_keys(const Error& error) {
+  std::vector<Fault> faults = error.faults();
+  for (Fault& fault : faults) {
+    if (fault.key == "lattice.cell") fault.key = "output.cell";
+    if (fault.key == "mesh.error") fault.key = "output.meshing.error";
+    if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
+    if (fault.key == "mesh.size") fault.key = "output.meshing.size";
+  }
+  return {error.kind(), std::move(faults)};
+}
+
+}  // namespace supple::scenes
