@@ -382,6 +382,19 @@ TEST(PolygonisePartition, IsClosedAndDoesNotCrossItselfWhereRimsMeet) {
   }
 }
 
+// Where one label lies between three at one end of an edge, and another covers the other end, a wall between the two ends in a triangle.
+TEST(PolygonisePartition, ClosesWallsThatEndWhereThreePart) {
+  Random random(100105);
+  std::vector<FunctionField> balls;
+  for (int i = 0; i < 5; ++i) {
+    const Vec3 centre = random.in_box(0.4);
+    balls.push_back(sphere(centre, random.uniform(0.15, 0.5)));
+  }
+  const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(0.06), Executor(1));
+  expect_all_closed(mesh);
+  for (const Mesh& m : mesh) EXPECT_EQ(self_intersections(m, 0.06), 0u);
+}
+
 TEST(PolygonisePartition, BodiesApartByLessThanACellKeepTheirOwnSurfaces) {
   constexpr double kCell = 0.05;
   const std::vector<FunctionField> balls{sphere({-0.51, 0.03, 0}, 0.5), sphere({0.5, 0, 0.02}, 0.5)};
