@@ -558,15 +558,16 @@ class ViewSampler final : public Sampler {
   ViewSampler(const FieldView& field, const Lattice& lattice) : field_(field), lattice_(lattice) {}
 
   void prepare(const Executor& executor, BlockTable& table) override {
-    leaves_ = find_surface_blocks(field_, lattice_, executor);
-    if (leaves_.empty()) {
+    PolygoniseCounts counts;
+    leaves_ = lattice::surface_blocks(field_, lattice_, executor, lattice::kBlockLimit, counts);
+    if (leaves_.block.empty()) {
       table = {};
       return;
     }
     Cells lower, upper;
     lower.fill(std::numeric_limits<std::int64_t>::max());
     upper.fill(std::numeric_limits<std::int64_t>::min());
-    for (const auto& leaf : leaves_) {
+    for (const auto& leaf : leaves_.block) {
       for (std::size_t k = 0; k < 3; ++k) {
         lower[k] = std::min<std::int64_t>(lower[k], std::int64_t{kLeafNodes} * leaf[k]);
         upper[k] = std::max<std::int64_t>(upper[k], std::int64_t{kLeafNodes} * (leaf[k] + 1));
@@ -583,7 +584,7 @@ class ViewSampler final : public Sampler {
     std::fill(table.touched.begin(), table.touched.end(), std::uint8_t{1});
     // By block, so that a block is written by one task.
     std::vector<std::uint8_t> leaves(table.block.size());
-    for (const auto& leaf : leaves_) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
+    for (const auto& leaf : leaves_.block) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
     executor.for_blocks(table.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
       thread_local TileChanges changes;
       for (std::size_t b = begin; b < end; ++b) {
@@ -593,7 +594,7 @@ class ViewSampler final : public Sampler {
         changes.apply(table.block[b]);
       }
     });
-    sign_neighbours(table, leaves);
+    sign_inside(table);
   }
 
   void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const override {
@@ -692,28 +693,24 @@ class ViewSampler final : public Sampler {
     });
   }
 
-  /// Leaves without surface next to those with it: the sign at one node.
-  void sign_neighbours(BlockTable& table, std::span<const std::uint8_t> sampled) const {
-    std::vector<Vec3> points;
-    std::vector<std::pair<std::size_t, unsigned>> places;
-    for (const auto& leaf : leaves_) {
-      for (int step = 1; step < 8; ++step) {
-        const BlockCoord at{leaf[0] + (step & 1), leaf[1] + (step >> 1 & 1), leaf[2] + (step >> 2)};
-        const std::size_t b = table.index(block_of(at));
-        if ((sampled[b] >> slot_of(at) & 1u) != 0) continue;
-        places.emplace_back(b, slot_of(at));
-        points.push_back(lattice::node_position(lattice_, std::int64_t{kLeafNodes} * at[0],
-                                                std::int64_t{kLeafNodes} * at[1], std::int64_t{kLeafNodes} * at[2]));
+  /// Leaves without surface: the others lie outside.
+  void sign_inside(BlockTable& table) const {
+    for (const lattice::BlockBox& box : leaves_.inside) {
+      for (std::int32_t z = box.lower[2]; z <= box.upper[2]; ++z) {
+        for (std::int32_t y = box.lower[1]; y <= box.upper[1]; ++y) {
+          for (std::int32_t x = box.lower[0]; x <= box.upper[0]; ++x) {
+            const BlockCoord leaf{x, y, z};
+            if (table.find(block_of(leaf)) == nullptr) continue;
+            set_sign(table.block[table.index(block_of(leaf))], tiles_of(slot_of(leaf)), true);
+          }
+        }
       }
     }
-    std::vector<double> values(points.size());
-    field_.evaluate(points, values);
-    for (std::size_t i = 0; i < places.size(); ++i) set_sign(table.block[places[i].first], tiles_of(places[i].second), values[i] > 0.0);
   }
 
   FieldView field_;
   Lattice lattice_;
-  std::vector<BlockCoord> leaves_;
+  lattice::BlockList leaves_;
 };
 
 }  // namespace

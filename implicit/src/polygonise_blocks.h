@@ -68,12 +68,16 @@ struct RefineOptions {
 
 inline constexpr std::uint64_t kBlockLimit = 4'000'000;
 
-/// Blocks where the label "largest positive field, or outside" can change, with the fields that can be it. Unbounded
+/// Blocks where the label "largest positive field, or outside" can change, with the fields that can be it, and `inside`. Unbounded
 /// fields count only where a bounded one can be positive.
 /// @param surface  surface_box() of each field
 [[nodiscard]] BlockList find_label_blocks(std::span<const FieldView> fields, std::span<const Box> surface,
                                           const Lattice& lattice, const Executor& executor, std::uint64_t limit,
                                           PolygoniseCounts& counts);
+
+/// find_surface_blocks(), and the boxes of blocks between them that are inside.
+[[nodiscard]] BlockList surface_blocks(const FieldView& field, const Lattice& lattice, const Executor& executor, std::uint64_t limit,
+                                       PolygoniseCounts& counts);
 
 [[nodiscard]] bool is_bounded(const Box& box);
 /// x with three significant digits, for messages.

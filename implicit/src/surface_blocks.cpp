@@ -231,7 +231,17 @@ BlockList find_label_blocks(std::span<const FieldView> fields, std::span<const B
     for (const Candidate& c : found) left.push_back(c.body);
     return Verdict::Keep;
   };
-  return refine_blocks(range, lattice, static_cast<std::uint32_t>(fields.size()), executor, {.limit = limit}, decide);
+  return refine_blocks(range, lattice, static_cast<std::uint32_t>(fields.size()), executor, {.limit = limit, .keep_inside = true}, decide);
+}
+
+BlockList surface_blocks(const FieldView& field, const Lattice& lattice, const Executor& executor, std::uint64_t limit,
+                         PolygoniseCounts& counts) {
+  counts = {};
+  const Box surface = field.surface_box();
+  if (!surface.empty() && !is_bounded(surface)) (void)block_range(surface, lattice, 1);
+  BlockList list = find_label_blocks({&field, 1}, {&surface, 1}, lattice, executor, limit, counts);
+  counts.blocks_visited = list.block.size();
+  return list;
 }
 
 }  // namespace lattice
@@ -240,13 +250,7 @@ std::vector<std::array<std::int32_t, 3>> find_surface_blocks(const FieldView& fi
                                                              const Executor& executor, std::uint64_t limit,
                                                              PolygoniseCounts* counts) {
   PolygoniseCounts local;
-  PolygoniseCounts& count = counts != nullptr ? *counts : local;
-  count = {};
-  const Box surface = field.surface_box();
-  if (!surface.empty() && !lattice::is_bounded(surface)) (void)lattice::block_range(surface, lattice, 1);
-  lattice::BlockList list = lattice::find_label_blocks({&field, 1}, {&surface, 1}, lattice, executor, limit, count);
-  count.blocks_visited = list.block.size();
-  return std::move(list.block);
+  return std::move(lattice::surface_blocks(field, lattice, executor, limit, counts != nullptr ? *counts : local).block);
 }
 
 }  // namespace supple::implicit

@@ -115,6 +115,33 @@ TEST(MarchCubes, MeetsAreaAndVolumeOfTheWyvillSphereWithOrderTwo) {
   }
 }
 
+TEST(MarchCubes, MeetsTheVolumeOfThickBodiesOfAnyShape) {
+  // Within them lie many blocks of 8^3 cells that only bounds know the sign of.
+  for (const ShapeKind shape : {ShapeKind::Segment, ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Box, ShapeKind::Ellipsoid,
+                                ShapeKind::Superquadric, ShapeKind::Directed}) {
+    Primitive p;
+    p.shape = shape;
+    p.kernel = Kernel::wyvill(1.4);
+    p.size = shape == ShapeKind::Ellipsoid || shape == ShapeKind::Superquadric ? Vec3(1.8, 1.6, 1.5) : Vec3(0.7, 0.6, 0.5);
+    if (shape == ShapeKind::Directed) {
+      p.size = Vec3(1.8, 1.6, 1.5);
+      p.control = {Vec3(1.4, 1.7, 1.9)};
+    }
+    Body body;
+    body.skeleton.primitive = {p};
+    body.skeleton.part_count = 1;
+    body.parts.resize(1);
+    body.place();
+    constexpr double kCell = 0.025;
+    const MeshReport cubes = expect_closed(march_cubes(body.field, {.lattice = lattice_of(kCell)}, Executor(2)));
+    const MeshReport tetrahedra = expect_closed(polygonise(body.field, lattice_of(kCell), Executor(2)));
+    EXPECT_EQ(cubes.components, 1u) << static_cast<int>(shape);
+    EXPECT_EQ(cubes.euler_characteristic, 2) << static_cast<int>(shape);
+    // Either lies within a quarter of h^2 / r of the surface, whose radii r are at least 0.4 here.
+    EXPECT_NEAR(cubes.volume, tetrahedra.volume, 0.5 * kCell * kCell / 0.4 * cubes.area) << static_cast<int>(shape);
+  }
+}
+
 TEST(MarchCubes, FindsOneBodyBelowTheMergingDistanceAndTwoAbove) {
   const auto components = [](double D) {
     const Body body = body_of({{wyvill_point(1.0), Vec3(-0.5 * D, 0, 0)}, {wyvill_point(1.0), Vec3(0.5 * D, 0, 0)}});
