@@ -387,12 +387,12 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     points.back_to(before);
     return true;
   };
-  if (!frame.flat) {
-    if (!follow && solve_about_peak(pressure, frame, settings, regions, round, false, points)) return true;
-    if (anew() && solve_about_star(pressure, frame, settings, regions, points)) return true;
-  }
+  if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, points)) return true;
   if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
-  if (!frame.flat && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, points)) return true;
+  // Samples of flat faces are near enough to a coarse error, and change more evenly as the faces lean.
+  const bool peaked = !frame.flat && (faces == nullptr || settings.error < kSplitBelow);
+  if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, points)) return true;
+  if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, points)) return true;
   points.back_to(before);
   return false;
 }
