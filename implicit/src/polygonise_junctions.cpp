@@ -16,6 +16,19 @@ Vec3 corner_of(const Simplex& simplex, std::size_t k) {
   return p;
 }
 
+std::optional<Simplex> face_of(const Simplex& tetrahedron, std::size_t opposite) {
+  Simplex face = tetrahedron;
+  face.size = 0;
+  LabelSet labels;
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (k == opposite) continue;
+    face.label[face.size] = tetrahedron.label[k];
+    face.corner[face.size++] = tetrahedron.corner[k];
+    labels.insert(tetrahedron.label[k]);
+  }
+  return labels.count == 3 ? std::optional(face) : std::nullopt;
+}
+
 namespace {
 
 constexpr int kMaxIterations = 12;
@@ -165,18 +178,10 @@ Junction search_inside(std::span<const FieldView> fields, const Simplex& simplex
   const double size = (simplex.high - simplex.low).norm();
   std::optional<Vec3> entered;
   for (std::size_t v = 0; v < 4 && simplex.size == 4; ++v) {
-    Simplex face = simplex;
-    face.size = 0;
-    LabelSet met;
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (k == v) continue;
-      face.label[face.size] = simplex.label[k];
-      face.corner[face.size++] = simplex.corner[k];
-      met.insert(simplex.label[k]);
-    }
-    if (met.count < 3) continue;
-    Junction on_face = meet_inside(fields, face, labels, (4.0 * middle - corner[v]) / 3.0, scale);
-    if (!on_face.exact) on_face = search_inside(fields, face, labels, scale);
+    const std::optional<Simplex> face = face_of(simplex, v);
+    if (!face) continue;
+    Junction on_face = meet_inside(fields, *face, labels, (4.0 * middle - corner[v]) / 3.0, scale);
+    if (!on_face.exact) on_face = search_inside(fields, *face, labels, scale);
     if (!on_face.exact) continue;
     if (entered) {
       if (const Junction found = from(0.5 * (*entered + on_face.point)); found.exact) return found;

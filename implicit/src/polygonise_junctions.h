@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "polygonise_lattice.h"
@@ -46,6 +47,8 @@ struct Simplex {
 };
 
 [[nodiscard]] Vec3 corner_of(const Simplex& simplex, std::size_t k);
+/// The face of a tetrahedron opposite to a corner, where three labels meet on it.
+[[nodiscard]] std::optional<Simplex> face_of(const Simplex& tetrahedron, std::size_t opposite);
 
 struct Junction {
   Vec3 point = Vec3::Zero();

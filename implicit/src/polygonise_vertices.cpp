@@ -12,20 +12,6 @@ namespace {
 
 LabelSet pair_of(Label a, Label b) { return labels_of(std::array{a, b}); }
 
-/// The face of a tetrahedron opposite to a corner, where three labels meet on it.
-std::optional<Simplex> face_of(const Simplex& tetrahedron, std::size_t opposite) {
-  Simplex face = tetrahedron;
-  face.size = 0;
-  LabelSet labels;
-  for (std::size_t k = 0; k < 4; ++k) {
-    if (k == opposite) continue;
-    face.label[face.size] = tetrahedron.label[k];
-    face.corner[face.size++] = tetrahedron.corner[k];
-    labels.insert(tetrahedron.label[k]);
-  }
-  return labels.count == 3 ? std::optional(face) : std::nullopt;
-}
-
 }  // namespace
 
 std::size_t Labeller::slot_of(Label label) const {
