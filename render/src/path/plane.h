@@ -17,10 +17,7 @@ class Plane {
 
   /// All zeros, unless it has that size already.
   void resize(int width, int height) {
-    if (width != width_ || height != height_) reset(width, height);
-  }
-  /// All zeros.
-  void reset(int width, int height) {
+    if (width == width_ && height == height_) return;
     width_ = width;
     height_ = height;
     pitch_ = (width + 2 * kMargin + static_cast<int>(kLanes) - 1) / static_cast<int>(kLanes) * static_cast<int>(kLanes);
@@ -28,7 +25,6 @@ class Plane {
     lead_ = static_cast<std::ptrdiff_t>(reinterpret_cast<std::uintptr_t>(this) / sizeof(Plane) % 64 * kCacheLine);
     values_.assign(static_cast<std::size_t>(lead_ + std::ptrdiff_t{pitch_} * (height + 2 * kMargin)), 0.0F);
   }
-  [[nodiscard]] int pitch() const { return pitch_; }
   [[nodiscard]] float& at(int x, int y) { return *pixel(x, y); }
   [[nodiscard]] float at(int x, int y) const { return *pixel(x, y); }
   /// The pixels x to x + 7.
