@@ -1,5 +1,7 @@
 #include "rest.h"
 
+#include <algorithm>
+
 #include "supple/core/parts.h"
 
 namespace supple::scenes {
@@ -44,6 +46,52 @@ std::vector<collision::BodyMotion> motions_of(const std::vector<Body>& bodies, c
     if (i != kNobody) motion[i].load += load.factor(time) / mass[i] * core::free_translation(set.pinned[load.particle], load.force);
   }
   return motion;
+}
+
+std::vector<collision::BodyPair> tied_bodies(const std::vector<Body>& bodies, const core::Interactions& laws) {
+  std::vector<collision::BodyPair> tied;
+  for (const auto& [a, b] : core::acting_objects(laws)) {
+    std::uint32_t first = 0;
+    while (first < bodies.size() && bodies[first].object != a && bodies[first].object != b) ++first;
+    for (std::uint32_t i = first + 1; i < bodies.size(); ++i) {
+      if (bodies[i].object == a || bodies[i].object == b) tied.push_back({first, i});
+    }
+  }
+  return tied;
+}
+
+std::vector<std::uint32_t> newly_loaded(const std::vector<Body>& bodies, const core::Interactions& laws, double from, double to) {
+  std::vector<std::uint32_t> loaded;
+  for (const core::ExternalLoad& load : laws.external) {
+    if (!load.changes(from, to)) continue;
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+      if (std::binary_search(bodies[i].particle.begin(), bodies[i].particle.end(), load.particle)) loaded.push_back(i);
+    }
+  }
+  return loaded;
+}
+
+void still(const Body& body, const core::ParticleSet& set, State& state) {
+  for (const std::uint32_t p : body.particle) {
+    Vec3 &v = state.particles.velocity[p], &turn = state.particles.angular_momentum[p];
+    const Vec3 momentum = set.mass[p] * v;
+    state.ledger.dissipated += 0.5 * momentum.dot(v) + 0.5 * turn.dot(core::angular_velocity(set, state.particles, p));
+    state.ledger.pin_impulse -= momentum;
+    state.ledger.pin_angular_impulse -= state.particles.position[p].cross(momentum) + turn;
+    v.setZero();
+    turn.setZero();
+  }
+}
+
+void give_half_kick(const Body& body, const core::ParticleSet& set, const core::Loads& loads, double dt, State& state) {
+  for (const std::uint32_t p : body.particle) {
+    const Vec3 j = core::free_translation(set.pinned[p], 0.5 * dt * loads.force[p]);
+    const Vec3 turn = core::free_rotation(set.pinned[p], 0.5 * dt * loads.torque[p]);
+    state.particles.velocity[p] += j / set.mass[p];
+    state.particles.angular_momentum[p] += turn;
+    state.ledger.pin_impulse += j;
+    state.ledger.pin_angular_impulse += state.particles.position[p].cross(j) + turn;
+  }
 }
 
 }  // namespace supple::scenes

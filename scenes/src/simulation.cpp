@@ -3,42 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "audits.h"
 #include "frame.h"
 #include "held_volumes.h"
 #include "model_faults.h"
 #include "overload.h"
+#include "pieces.h"
 #include "read_scene_faults.h"
 #include "rest.h"
+#include "time_steps.h"
 #include "warnings.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 
 namespace supple::scenes {
-namespace {
-
-constexpr std::uint64_t kStepsPerRefinement = 4;
-constexpr double kDampedShare = 0.4;  // of the inverse of d v: what a step may take of a speed by damping
-
-int log2_of(int n) {
-  int k = 0;
-  while ((1 << k) < n) ++k;
-  return k;
-}
-
-/// How to mend what asks for the smallest step.
-std::string what_needs(const core::StepLimits& limits, double damping) {
-  const double step = core::stable_step(limits);
-  if (step == core::stable_step({.length = limits.length, .speed = limits.speed})) {
-    return "slow down what moves " + number_text(limits.speed) + " m/s past lengths of " + number_text(limits.length) + " m";
-  }
-  if (step == core::stable_step({.angular_speed = limits.angular_speed})) return "slow down what turns " + number_text(limits.angular_speed) + " rad/s";
-  if (damping > 2.0) return "lower the dissipation of contact (or ask for a higher restitution)";
-  return "soften the stiffest interaction or contact, or make the lightest particle heavier";
-}
-
-double share(double value, double scale) { return scale > 0.0 ? value / scale : value; }
-
-}  // namespace
 
 struct Simulation::Impl {
   Scene scene;
@@ -104,10 +82,10 @@ struct Simulation::Impl {
     state.volumes.resize(volumes);
     form_bodies();
     measure_targets(context(), state.particles, pulled, model);
-    for (const Body& body : bodies) state.samples.push_back({.distance = std::vector<double>(body.samples.size(), -1.0)});
+    for (const Body& body : bodies) state.samples.push_back(fresh_samples(body));
     if (scene.sleep) state.sleep.reset(bodies.size());
     form_awake();
-    choose_step();
+    state.halvings = first_halvings(scene, model, integrator, laws, state);
     book_audits();
     warnings = find_odd_start(context(), state.particles, pulled);
   }
@@ -167,7 +145,7 @@ struct Simulation::Impl {
     workspace = core::InteractionWorkspace(particles, awake_laws);
     if (!scene.sleep) return;
     integrator_workspace = core::IntegratorWorkspace();
-    tie_bodies();
+    tied = tied_bodies(bodies, laws);
   }
 
   void take(State other) {
@@ -186,7 +164,7 @@ struct Simulation::Impl {
   /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces.
   void update_links() {
     if (model.links.size() == 0) return;
-    const bool fades = age_broken_links();
+    const bool fades = age_broken_links(model, dt(), state);
     const core::LinkChange change = core::update_links(model.particles, state.particles, laws, model.links, dt(),
                                                        state.links, state.ledger);
     if (change.any()) form_laws();
@@ -200,75 +178,13 @@ struct Simulation::Impl {
     state.ledger.dissipated += collision::stick_energy(model.reaction.stick, state.sticks);  // bodies have other numbers now
     state.sticks = {};
     state.kick.valid = false;
-    inherit_apart(before);
-    std::vector<implicit::SampleState> samples;
-    for (const Body& body : bodies) {
-      const auto same = std::find_if(before.begin(), before.end(),
-                                     [&body](const Body& old) { return old.particle == body.particle; });
-      samples.push_back(same != before.end() ? state.samples[static_cast<std::size_t>(same - before.begin())]
-                                             : implicit::SampleState{std::vector<double>(body.samples.size(), -1.0)});
-    }
-    state.samples = std::move(samples);
-    rules = make_body_rules(model, bodies, state.apart);
-    frame.pairs_present.reset();
+    state.apart = inherited_apart(model, before, state.apart, bodies);
+    state.samples = inherited_samples(before, state.samples, bodies);
+    divide_anew();
   }
 
-  /// Links that broke grow older, up to the time in which their blend fades. @return whether any did
-  bool age_broken_links() {
-    bool any = false;
-    for (std::size_t k = 0; k < state.broken_for.size(); ++k) {
-      if (state.links.broken[k] == 0) continue;
-      const double fade = model.objects[model.particles.object[model.links.first[k]]].fade;
-      if (!(state.broken_for[k] < fade)) continue;
-      state.broken_for[k] = std::min(state.broken_for[k] + dt(), fade);
-      any = true;
-    }
-    return any;
-  }
-
-  /// Two pieces are apart when those that they broke from were.
-  void inherit_apart(const std::vector<Body>& before) {
-    const auto origin = [&before](const Body& body) {
-      for (const Body& old : before) {
-        if (std::binary_search(old.particle.begin(), old.particle.end(), body.particle.front())) return old.particle.front();
-      }
-      return body.particle.front();
-    };
-    const ApartPairs old_pairs = std::move(state.apart);
-    state.apart.clear();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (model.objects[bodies[i].object].separate) continue;
-      for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-        const auto [a, b] = std::minmax({origin(bodies[i]), origin(bodies[j])});
-        if (std::binary_search(old_pairs.begin(), old_pairs.end(), collision::BodyPair{a, b})) {
-          state.apart.push_back({bodies[i].particle.front(), bodies[j].particle.front()});
-        }
-      }
-    }
-  }
-
-  /// Pieces of one object whose surfaces are in separate boxes at the start of a step touch from then on.
-  void note_apart() {
-    if (bodies.size() == model.objects.size()) return;
-    ApartPairs fresh;
-    std::vector<std::uint8_t> placed(bodies.size(), 0);
-    const auto surface_box = [&](std::size_t i) {
-      if (placed[i] == 0) place_and_index(context(), state.particles, i, pulled);
-      placed[i] = 1;
-      return pulled.field[i].surface_box();
-    };
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const ObjectModel& object = model.objects[bodies[i].object];
-      if (!object.collides || object.separate || bodies[i].skeleton.primitive.empty()) continue;
-      for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-        const collision::BodyPair pair{bodies[i].particle.front(), bodies[j].particle.front()};
-        if (bodies[j].skeleton.primitive.empty() || std::binary_search(state.apart.begin(), state.apart.end(), pair)) continue;
-        if (!surface_box(i).overlaps(surface_box(j))) fresh.push_back(pair);
-      }
-    }
-    if (fresh.empty()) return;
-    state.apart.insert(state.apart.end(), fresh.begin(), fresh.end());
-    std::sort(state.apart.begin(), state.apart.end());
+  /// Other pieces of one object are apart now.
+  void divide_anew() {
     rules = make_body_rules(model, bodies, state.apart);
     frame.pairs_present.reset();
   }
@@ -278,56 +194,11 @@ struct Simulation::Impl {
   [[nodiscard]] double time() const { return (state.frame - 1) * frame_time() + state.substep * dt(); }
   [[nodiscard]] bool contact_on() const { return !options.skip || plan.on(Stage::FindContacts); }
 
-  /// The step of the next frame interval: frame time / 2^k by the stability limits (or as the scene fixes it).
-  void choose_step() {
-    const TimeStepDesc& desc = scene.time_step;
-    if (desc.substeps) {
-      state.halvings = log2_of(*desc.substeps);
-      return;
-    }
-    if (desc.size) {
-      state.halvings = core::halvings(frame_time(), *desc.size);
-      return;
-    }
-    state.halvings = needed_halvings();
-  }
-
-  /// Within a frame a step may only become finer: substeps stay on the grid of the frame.
+  /// Substeps stay on the grid of the frame.
   void refine_step() {
-    if (scene.time_step.substeps || scene.time_step.size || state.steps % kStepsPerRefinement != 0) return;
-    const int needed = needed_halvings();
-    if (needed <= state.halvings) return;
-    state.substep <<= needed - state.halvings;
-    state.halvings = needed;
-  }
-
-  /// The coarsest step that is stable now; laws get stiffer where particles come close.
-  [[nodiscard]] int needed_halvings() const {
-    const TimeStepDesc& desc = scene.time_step;
-    const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
-    double frequency = integrator.limiting_frequency, damping = 1.0;
-    const core::Integrator method = integrator.settings.method;
-    if (method == core::Integrator::Symplectic || method == core::Integrator::RungeKutta4) {
-      // Damping d v p takes at most d v w of its speed in a second, w the contact's frequency: fast where d v is large.
-      damping = std::max(1.0, kDampedShare * model.largest_dissipation * (speeds.linear + model.solid_speed));
-      frequency = std::max(frequency, std::hypot(core::largest_frequency(model.particles, state.particles, laws),
-                                                 model.contact_frequency * damping));
-    }
-    const core::StepLimits limits = step_limits(scene, model, frequency, speeds);
-    const double step = core::stable_step(limits);
-    const bool possible = step > 0.0;
-    const int k = possible && step < frame_time() ? core::halvings(frame_time(), step) : 0;
-    if (!possible || k > log2_of(desc.max_substeps)) {
-      throw Error(ErrorKind::Limit,
-                  Fault{.place = place_of(scene, "time_step.max_substeps"),
-                        .key = "time_step.max_substeps",
-                        .expected = "expected a stable step with at most " + std::to_string(desc.max_substeps) +
-                                    " substeps a frame",
-                        .found = "one of " + number_text(step) + " s (" + (possible ? number_text(std::ldexp(1.0, k)) : "no number of") + " substeps) at frame " +
-                                 std::to_string(state.frame),
-                        .hint = "raise time_step.max_substeps, or " + what_needs(limits, damping)});
-    }
-    return k;
+    const int halvings = next_halvings(scene, model, integrator, laws, state);
+    state.substep <<= halvings - state.halvings;
+    state.halvings = halvings;
   }
 
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out) {
@@ -348,18 +219,6 @@ struct Simulation::Impl {
     }
   }
 
-  /// Bodies that act on each other by laws, which makes them one island: the first of two objects with all others.
-  void tie_bodies() {
-    tied.clear();
-    for (const auto& [a, b] : core::acting_objects(laws)) {
-      std::uint32_t first = 0;
-      while (first < bodies.size() && bodies[first].object != a && bodies[first].object != b) ++first;
-      for (std::uint32_t i = first + 1; i < bodies.size(); ++i) {
-        if (bodies[i].object == a || bodies[i].object == b) tied.push_back({first, i});
-      }
-    }
-  }
-
   /// Wakes the islands of bodies. @return those that were asleep
   std::vector<std::uint32_t> wake(const std::vector<std::uint32_t>& which) {
     std::vector<std::uint32_t> rose = collision::wake(which, state.sleep);
@@ -372,13 +231,10 @@ struct Simulation::Impl {
   /// Before a step: bodies under a load that changes in it, or near an obstacle that moves, are awake and not quiet.
   void wake_loaded() {
     if (!scene.sleep) return;
-    std::vector<std::uint32_t> loaded;
-    if (awake.size() < bodies.size()) loaded = find_stirred(context(), state.particles, frame);
-    for (const core::ExternalLoad& load : laws.external) {
-      if (!load.changes(time(), time() + dt())) continue;
-      for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-        if (std::binary_search(bodies[i].particle.begin(), bodies[i].particle.end(), load.particle)) loaded.push_back(i);
-      }
+    std::vector<std::uint32_t> loaded = newly_loaded(bodies, laws, time(), time() + dt());
+    if (awake.size() < bodies.size()) {
+      const std::vector<std::uint32_t> stirred = find_stirred(context(), state.particles, frame);
+      loaded.insert(loaded.end(), stirred.begin(), stirred.end());
     }
     wake(loaded);
     for (const std::uint32_t i : loaded) state.sleep.quiet_for[i] = 0.0;
@@ -396,17 +252,9 @@ struct Simulation::Impl {
     }
     if (touched.empty()) return;
     const core::Loads loads = state.kick.sample.internal;
-    for (const std::uint32_t i : wake(touched)) {
-      if (integrator.settings.method != core::Integrator::Symplectic) break;
-      for (const std::uint32_t p : bodies[i].particle) {
-        const Vec3 j = core::free_translation(particles.pinned[p], 0.5 * dt() * loads.force[p]);
-        const Vec3 turn = core::free_rotation(particles.pinned[p], 0.5 * dt() * loads.torque[p]);
-        state.particles.velocity[p] += j / particles.mass[p];
-        state.particles.angular_momentum[p] += turn;
-        state.ledger.pin_impulse += j;
-        state.ledger.pin_angular_impulse += state.particles.position[p].cross(j) + turn;
-      }
-    }
+    const std::vector<std::uint32_t> rose = wake(touched);
+    if (integrator.settings.method != core::Integrator::Symplectic) return;
+    for (const std::uint32_t i : rose) give_half_kick(bodies[i], particles, loads, dt(), state);
   }
 
   /// After a step: islands that have been quiet for long enough stop, and what they had is booked as held and dissipated.
@@ -424,17 +272,7 @@ struct Simulation::Impl {
     const std::vector<std::uint32_t> slept =
         collision::fall_asleep({scene.sleep->speed, scene.sleep->time}, dt(), motion, joined, state.sleep);
     if (slept.empty()) return;
-    for (const std::uint32_t i : slept) {
-      for (const std::uint32_t p : bodies[i].particle) {
-        Vec3 &v = state.particles.velocity[p], &turn = state.particles.angular_momentum[p];
-        const Vec3 momentum = particles.mass[p] * v;
-        state.ledger.dissipated += 0.5 * momentum.dot(v) + 0.5 * turn.dot(core::angular_velocity(particles, state.particles, p));
-        state.ledger.pin_impulse -= momentum;
-        state.ledger.pin_angular_impulse -= state.particles.position[p].cross(momentum) + turn;
-        v.setZero();
-        turn.setZero();
-      }
-    }
+    for (const std::uint32_t i : slept) still(bodies[i], particles, state);
     form_awake();
     state.kick.valid = false;
   }
@@ -443,11 +281,11 @@ struct Simulation::Impl {
     drop_results();
     if (state.substep == 0) {
       last_frame = state;
-      choose_step();
+      state.halvings = first_halvings(scene, model, integrator, laws, state);
     } else {
       refine_step();
     }
-    note_apart();
+    if (bodies.size() != model.objects.size() && note_apart(context(), state.particles, pulled, state.apart)) divide_anew();
     wake_loaded();
     // Velocity Verlet sees to it by itself; an adaptive integrator chooses steps of its own inside this one.
     const core::Integrator method = integrator.settings.method;
@@ -619,48 +457,9 @@ struct Simulation::Impl {
     return e;
   }
 
-  /// Compares motion and energy with frame 1 and with what the ledger booked; keeps the largest deviations.
   void book_audits() {
-    RunRecord& r = state.record;
-    const core::Motion motion = core::measure_motion(model.particles, state.particles);
-    const double energy = energies().total();
-    if (!r.valid) {
-      r = {};
-      r.valid = true;
-      r.initial = motion;
-      r.initial_energy = energy;
-      r.objects.resize(model.objects.size());
-    }
-    const core::Ledger& ledger = state.ledger;
-    const Vec3 momentum = motion.momentum - r.initial.momentum - ledger.external_impulse - ledger.pin_impulse;
-    const Vec3 angular = motion.angular_momentum - r.initial.angular_momentum - ledger.external_angular_impulse -
-                         ledger.pin_angular_impulse;
-    r.momentum_error = std::max(r.momentum_error, momentum.norm());
-    r.angular_momentum_error = std::max(r.angular_momentum_error, angular.norm());
-    r.momentum_scale = std::max(r.momentum_scale, motion.momentum_scale);
-    r.angular_momentum_scale = std::max(r.angular_momentum_scale, motion.angular_momentum_scale);
-    r.largest_energy = std::max(r.largest_energy, energy);
-    r.energy_error =
-        std::max(r.energy_error, std::abs(energy - r.initial_energy - ledger.external_work + ledger.dissipated));
-    r.most_dissipated = std::max(r.most_dissipated, ledger.dissipated);
-    r.energy_returned = std::max(r.energy_returned, r.most_dissipated - ledger.dissipated);
-    for (const auto& s : pulled.surface.summary) {
-      r.contact_residual = std::max(r.contact_residual, s.residual);
-      r.largest_overlap = std::max(r.largest_overlap, s.largest_overlap);
-      double thickness = std::numeric_limits<double>::infinity();
-      for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
-        if (body < bodies.size()) thickness = std::min(thickness, 2.0 * model.objects[bodies[body].object].iso_radius);
-      }
-      r.largest_overlap_share = std::max(r.largest_overlap_share, s.largest_overlap / thickness);
-    }
-    for (std::size_t i = 0; i < model.objects.size(); ++i) {
-      const ObjectModel& o = model.objects[i];
-      const std::size_t n = o.last - o.first;
-      const core::ShapeError error = core::shape_error(std::span(model.rest.position).subspan(o.first, n),
-                                                       std::span(state.particles.position).subspan(o.first, n));
-      r.objects[i].final_shape_error = share(error.rms, o.rest_diameter);
-      r.objects[i].largest_deformation = std::max(r.objects[i].largest_deformation, r.objects[i].final_shape_error);
-    }
+    const double energy = energies().total();  // and the contacts
+    scenes::book_audits(model, bodies, energy, pulled.surface, state);
   }
 };
 
@@ -767,16 +566,7 @@ Energies Simulation::energies() { return impl_->energies(); }
 
 const std::vector<std::string>& Simulation::warnings() const { return impl_->warnings; }
 
-Audits Simulation::audits() const {
-  const RunRecord& r = impl_->state.record;
-  return {.momentum_error = share(r.momentum_error, r.momentum_scale),
-          .angular_momentum_error = share(r.angular_momentum_error, r.angular_momentum_scale),
-          .energy_error = share(r.energy_error, r.largest_energy),
-          .energy_returned = share(r.energy_returned, r.largest_energy),
-          .contact_residual = r.contact_residual,
-          .largest_overlap = r.largest_overlap,
-          .largest_overlap_share = r.largest_overlap_share};
-}
+Audits Simulation::audits() const { return audits_of(impl_->state.record); }
 
 Profile Simulation::profile() const {
   Profile profile = impl_->profile;

@@ -1,0 +1,81 @@
+/// @file fields_output.h
+/// The keys of what a run leaves; see fields.h.
+#pragma once
+
+#include <algorithm>
+#include <string>
+
+#include "fields_rules.h"
+#include "read_scene_faults.h"
+
+namespace supple::scenes {
+
+template <class Archive>
+void fields(Archive& archive, ObjectMeshingDesc& d) {
+  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of its meshes and grids; auto: as output.cell");
+  archive("error", d.error, above(0.0, kLength).or_auto(), "as output.meshing.error, which it replaces");
+}
+
+template <class Archive>
+void fields(Archive& archive, ImagesDesc& d) {
+  archive("size", d.size, between(16.0, 16384.0, kNumber).items(2, 2), "width, height [pixel]");
+  archive("samples", d.samples, between(1.0, 8.0, kNumber), "a pixel: 1, 2, 4 or 8");
+  archive("formats", d.formats, {}, "exr: half floats, light before exposure and tone curve times cover, cover, depth, normals, velocities and numbers of objects");
+  archive.check(!d.formats.empty(), "formats", "expected a format of images", "none", "write 'images: false' for no images");
+  archive.check((d.samples & (d.samples - 1)) == 0, "samples", "expected 1, 2, 4 or 8", std::to_string(d.samples), "");
+}
+
+template <class Archive>
+void fields(Archive& archive, MeshingDesc& d) {
+  using enum MeshingName;
+  const auto only = [&d](const Rule& rule) { return rule.only("method", d.method, {Delaunay}); };
+  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra, to the same error; delaunay refines what bounds them, too); auto: cubes or openvdb, whichever costs less by counts, and vertices on the creases of blending graphs; openvdb: through a grid; delaunay: triangles of guaranteed quality, needs the component supple_cgal");
+  archive("error", d.error, above(0.0, kLength).or_auto(), "largest distance of a triangle's centroid to the surface, for cubes and where objects touch; auto: by the cell");
+  archive("angle_deg", d.angle, only(degrees(1.0, 30.0)), "least angle of a triangle");
+  archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
+  archive("distance", d.distance, only(above(0.0, kLength).or_auto()), "from a triangle's circumcentre to that point; auto: a tenth of the size");
+  archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
+  archive.check(!d.error || d.method == Auto || d.method == Cubes, "error", "expected method auto or cubes with an error",
+                std::string(name_of(d.method)), "leave out 'method'");
+}
+
+template <class Archive>
+void fields(Archive& archive, GriddingDesc& d) {
+  archive("of", d.of, {}, "a grid of each object under its name, one of all named 'scene', or both");
+  archive("content", d.content, {}, "signed distance near the surface to first order, or the field");
+  archive("half_width", d.half_width, between(1.0, 100.0, kNumber), "of the band on each side of the surface, in cells");
+}
+
+template <class Archive>
+void fields(Archive& archive, SamplingDesc& d) {
+  archive("spacing", d.spacing, above(0.0, kLength).or_auto(),
+          "no two samples of an object are nearer than half of it, no place of its surface is farther than it from all; auto: four times output.cell");
+  archive("density", d.density, above(0.0, kInverseArea), "instead: samples a square metre, to a tenth where the surface is smooth and at rest");
+  archive.check(!(d.spacing && d.density), "density", "expected either spacing or density", "both", "");
+}
+
+template <class Archive>
+void fields(Archive& archive, FilmDesc& d) {
+  archive("frame_rate", d.frame_rate, between(0.1, 1000.0, kRate).or_auto(),
+          "frames a second of the film; auto: the scene's; less is slow motion");
+}
+
+template <class Archive>
+void fields(Archive& archive, OutputDesc& d) {
+  archive("images", d.images, {}, "a PNG a frame");
+  archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
+  archive("contacts", d.contacts, {}, "points of the contact surfaces, and of every pair that touches force, area, energy and dissipation, a frame; vtk: .vtp files and a .pvd each");
+  archive("particles", d.particles, {}, "particles and bonds a frame; vtk: .vtp files and a .pvd");
+  archive("samples", d.samples, {}, "points spread evenly over the surfaces a frame, which ride on their particles: id, owner, normal and area; as if nothing touched; vtk: .vtp files and a .pvd");
+  archive("mesh", d.mesh, {}, "surfaces; ply, obj: a file an object and frame; usd: one file with all frames");
+  archive("grid", d.grid, {}, "fields a frame");
+  archive("meshing", d.meshing, {}, "how surfaces become meshes");
+  archive("gridding", d.gridding, {}, "how fields become grids");
+  archive("sampling", d.sampling, {}, "how far apart samples are");
+  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids of objects without 'meshing.cell'; auto: 8 cells across the smallest thickness of these, 64 along each");
+  archive.check(!d.film || !d.images || std::count(d.images->formats.begin(), d.images->formats.end(), ImageName::Png) > 0, "film",
+                "expected images as png for a film", "none", "add png to output.images.formats");
+  archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");
+}
+
+}  // namespace supple::scenes
