@@ -3,8 +3,10 @@
 
 namespace supple::render::shaders {
 
-// Along each azimuth the columns of the height range hide elevations from atan(low / d) to atan(high / d); with the
-// cosine weight of a diffuse receiver the hidden share is the difference of sin^2 of the elevations.
+// Along each azimuth the columns of the height range hide elevations from atan(low / d) to atan(high / d), and what joins one
+// column to the next the elevations in between; with the cosine weight of a diffuse receiver the hidden share is the measure
+// of their sin^2. What is hidden already is kept in bins (Therrien, Levesque & Gilet 2023), for a wall may stand behind what
+// hangs overhead. Their borders differ from azimuth to azimuth, so that the mean over all knows no steps.
 std::string ground_occlusion() {
   return std::string(kVersion) + R"(
 uniform sampler2D heights;
@@ -13,27 +15,44 @@ uniform float target_size;   // edge of this target [texel]
 out vec4 visibility;
 const int kAzimuths = 20;
 const int kSteps = 12;
+const float kBins = 31.0;
+
+uint bins_below(float share, float border) { return (1u << uint(share * (kBins - 1.0) + border)) - 1u; }
+
+float count(uint bins) {
+  bins -= (bins >> 1) & 0x55555555u;
+  bins = (bins & 0x33333333u) + ((bins >> 2) & 0x33333333u);
+  bins = (bins + (bins >> 4)) & 0x0f0f0f0fu;
+  return float((bins * 0x01010101u) >> 24);
+}
+
 void main() {
   vec2 here = gl_FragCoord.xy / target_size;
   float hidden = 0.0;
   for (int a = 0; a < kAzimuths; ++a) {
     float angle = 6.2831853 * (float(a) + 0.5) / float(kAzimuths);
+    float border = fract(0.61803399 * float(a));
     vec2 along = vec2(cos(angle), sin(angle));
-    float lowest = 1.0;
-    float highest = 0.0;
+    uint bins = 0u;
+    float distance_before = 0.0;
+    vec2 heights_before = vec2(0.0, -1.0);
+    vec2 shares_before = vec2(0.0);
     for (int k = 0; k < kSteps; ++k) {
       float s = (float(k) + 0.5) / float(kSteps);
-      float distance = 0.6 * s * s + 0.002;
-      vec2 range = textureLod(heights, here + along * distance, 0.0).rg;
-      float d2 = distance * distance * map_size * map_size;
-      float low = max(-range.x, 0.0);
-      float high = range.y;
-      if (high >= 0.0) {
-        lowest = min(lowest, low * low / (low * low + d2));
-        highest = max(highest, high * high / (high * high + d2));
-      }
+      float distance = (0.6 * s * s + 0.002) * map_size;
+      vec2 range = textureLod(heights, here + along * (distance / map_size), 0.0).rg;
+      range.x = max(-range.x, 0.0);
+      vec2 shares = range * range / (range * range + distance * distance);
+      float gap = max(range.x - heights_before.y, heights_before.x - range.y);
+      bool joined = heights_before.y >= 0.0 && gap < distance - distance_before;   // else one hangs over the other
+      float from = joined ? min(shares.x, shares_before.x) : shares.x;
+      float to = joined ? max(shares.y, shares_before.y) : shares.y;
+      if (range.y >= 0.0) bins |= bins_below(to, border) & ~bins_below(from, border);
+      distance_before = distance;
+      heights_before = range;
+      shares_before = shares;
     }
-    hidden += max(highest - lowest, 0.0);
+    hidden += count(bins) / (kBins - 1.0);
   }
   vec2 rim = smoothstep(vec2(0.0), vec2(0.12), min(here, 1.0 - here));
   visibility = vec4(1.0 - hidden / float(kAzimuths) * rim.x * rim.y);

@@ -115,6 +115,44 @@ double rectangle_share(double x0, double x1, double y0, double y1, double h) {
   return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0);
 }
 
+/// A ring of round section that lies on z = 0.
+Mesh lying_ring(double radius, double thickness) {
+  constexpr std::uint32_t kAround = 96, kAcross = 48;
+  Mesh mesh;
+  for (std::uint32_t i = 0; i < kAround; ++i)
+    for (std::uint32_t j = 0; j < kAcross; ++j) {
+      const double a = 2.0 * M_PI * i / kAround, b = 2.0 * M_PI * j / kAcross;
+      const Vec3 out(std::cos(a), std::sin(a), 0.0), n = std::cos(b) * out + std::sin(b) * Vec3::UnitZ();
+      mesh.position.push_back(radius * out + thickness * (n + Vec3::UnitZ()));
+      mesh.normal.push_back(n);
+      const std::uint32_t here = i * kAcross + j, ahead = (i + 1) % kAround * kAcross + j;
+      const std::uint32_t up = i * kAcross + (j + 1) % kAcross, both = (i + 1) % kAround * kAcross + (j + 1) % kAcross;
+      mesh.triangle.push_back({here, ahead, both});
+      mesh.triangle.push_back({here, both, up});
+    }
+  return mesh;
+}
+
+TEST(Ground, SeesTheSkyBetweenAWallAndWhatHangsOverhead) {
+  // In the middle of a ring r / R = 1 / 3 all around hides elevations up to 2 atan(1/3), whose sine squared is .36, and a ball
+  // of .3 in a height of 1.2 overhead hides (.3 / 1.2)^2; a matt plane sees the rest.
+  const Mesh ring = lying_ring(0.6, 0.2), ball = sphere(Vec3(0, 0, 1.2), 0.3, 32);
+  const std::array items = {Item{.mesh = &ring, .colour = Vec3::Zero(), .reflectance = 0.0},
+                            Item{.mesh = &ball, .colour = Vec3::Zero(), .reflectance = 0.0}};
+  View view;
+  view.camera = {.from = Vec3(0, -3.5, 3.5), .look_at = Vec3::Zero(), .field_of_view = 0.01};
+  view.ground = Ground{.height = 0.0, .colour = Vec3::Constant(srgb(0.4))};
+  view.light.intensity = 0.0;
+  for (const RendererKind kind : renderers()) {
+    RenderSettings settings = settings_for(kind);
+    settings.most_samples = 256;
+    const double visible = mean(light_of(settings, view, items))[1] / (0.4 * kSky[1]);
+    // The tracer's error is that of 256 x 256 rays; OpenGL looks along 12 columns, of which those under the rim of the ball are
+    // a tenth of the sine squared apart.
+    EXPECT_NEAR(visible, 1.0 - 0.36 - 0.0625, kind == RendererKind::Path ? 0.01 : 0.1) << static_cast<int>(kind);
+  }
+}
+
 TEST(AreaLights, ShadeTheGroundThroughTheirPenumbraAsTheirVisiblePartDoes) {
   // A light of 1 x .6 at z = 2, and below it a half plane over x > 0: from the ground at x, the part of the light below
   // -x (2 - z) / z + ... is seen. At z = 1 the penumbra is as wide as the light, at z = .4 a quarter of it.
