@@ -158,28 +158,60 @@ bool BlobGrid::sort_moved() {
   return true;
 }
 
+BlobGrid::BinRange BlobGrid::bins_near(const Cells& base, const Cells& size, std::int64_t margin) const {
+  const auto reach = static_cast<std::int64_t>(std::ceil(reach_)) + 1 + margin;
+  BinRange bins;
+  for (std::size_t k = 0; k < 3; ++k) {
+    bins.from[k] = std::max<std::int64_t>(bin_at(base[k] - reach, shift_) - first_[k], 0);
+    bins.to[k] = std::min<std::int64_t>(bin_at(base[k] + size[k] + reach, shift_) - first_[k], count_[k] - 1);
+  }
+  return bins;
+}
+
+void BlobGrid::add_runs(const BinRange& bins, std::int64_t layer, std::vector<BlobRun>& runs) const {
+  if (bins.from[0] > bins.to[0]) return;
+  for (std::int64_t y = bins.from[1]; y <= bins.to[1]; ++y) {
+    const auto row = static_cast<std::size_t>(layer * count_[1] + y) * row_length();
+    const std::size_t begin = start_[row + static_cast<std::size_t>(bins.from[0])];
+    const std::size_t end = start_[row + static_cast<std::size_t>(bins.to[0]) + 1];
+    if (begin < end) runs.push_back({begin, end});
+  }
+}
+
 void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list, BlobList* far) const {
   thread_local std::vector<BlobRun> runs;
   runs.clear();
-  const auto reach = static_cast<std::int64_t>(std::ceil(reach_)) + 1 + margin;
-  Cells from{}, to{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    from[k] = std::max<std::int64_t>(bin_at(base[k] - reach, shift_) - first_[k], 0);
-    to[k] = std::min<std::int64_t>(bin_at(base[k] + size + reach, shift_) - first_[k], count_[k] - 1);
-  }
-  if (from[0] <= to[0]) {
-    for (std::int64_t z = from[2]; z <= to[2]; ++z) {
-      for (std::int64_t y = from[1]; y <= to[1]; ++y) {
-        const auto row = static_cast<std::size_t>(z * count_[1] + y) * row_length();
-        const std::size_t begin = start_[row + static_cast<std::size_t>(from[0])];
-        const std::size_t end = start_[row + static_cast<std::size_t>(to[0]) + 1];
-        if (begin < end) runs.push_back({begin, end});
-      }
-    }
-  }
+  const BinRange bins = bins_near(base, {size, size, size}, margin);
+  for (std::int64_t z = bins.from[2]; z <= bins.to[2]; ++z) add_runs(bins, z, runs);
   blobs::gather({x_.data(), y_.data(), z_.data(), scale_.data()}, runs,
                 {static_cast<double>(base[0]), static_cast<double>(base[1]), static_cast<double>(base[2])}, static_cast<double>(size),
                 static_cast<double>(margin), list, far);
+}
+
+void BlobGrid::gather_column(const Cells& base, std::int64_t size, std::int64_t height, Column& column) const {
+  thread_local std::vector<BlobRun> runs;
+  thread_local std::vector<std::uint32_t> layer;
+  runs.clear();
+  layer.clear();
+  const BinRange bins = bins_near(base, {size, size, height}, 0);
+  for (std::int64_t z = bins.from[2]; z <= bins.to[2]; ++z) {
+    add_runs(bins, z, runs);
+    layer.push_back(static_cast<std::uint32_t>(runs.size()));
+  }
+  column.base = base;
+  column.first_layer = bins.from[2];
+  blobs::gather_column({x_.data(), y_.data(), z_.data(), scale_.data()}, runs, layer,
+                       {static_cast<double>(base[0]), static_cast<double>(base[1])}, static_cast<double>(size), column.blobs);
+}
+
+void BlobGrid::gather(const Column& column, const Cells& base, std::int64_t size, BlobList& list, BlobList* far) const {
+  const BinRange bins = bins_near(base, {size, size, size}, 0);
+  const std::vector<std::uint32_t>& start = column.blobs.start;
+  const auto at = [&](std::int64_t layer) {
+    return start[static_cast<std::size_t>(std::clamp<std::int64_t>(layer - column.first_layer, 0, static_cast<std::int64_t>(start.size()) - 1))];
+  };
+  const std::size_t begin = at(bins.from[2]), end = std::max<std::size_t>(begin, at(bins.to[2] + 1));
+  blobs::gather(column.blobs, begin, end, static_cast<double>(base[2]), static_cast<double>(size), list, far);
 }
 
 }  // namespace supple::implicit::blobs

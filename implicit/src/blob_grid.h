@@ -62,6 +62,15 @@ class BlobGrid {
   /// Blobs whose support may meet the cube of `size` cells above `base`, wider by `margin`; in the frame of `base`.
   /// @param far  as in blobs::gather
   void gather(const Cells& base, std::int64_t size, std::int64_t margin, BlobList& list, BlobList* far = nullptr) const;
+  /// The blobs around the cubes of `size` cells that stand between `base` and `height` cells above it.
+  struct Column {
+    std::int64_t first_layer = 0;  ///< of bins
+    Cells base{};
+    BlobColumn blobs;
+  };
+  void gather_column(const Cells& base, std::int64_t size, std::int64_t height, Column& column) const;
+  /// As above, for a cube of a column that holds it and without a margin.
+  void gather(const Column& column, const Cells& base, std::int64_t size, BlobList& list, BlobList* far = nullptr) const;
   /// Calls use(box) for each bin that holds blobs, with the cells that their centres lie in.
   template <class Use>
   void for_bins(const Use& use) const {
@@ -127,6 +136,14 @@ class BlobGrid {
     z_[place] = centre[2];
     scale_[place] = radius_scale_;
   }
+  /// Inclusive, from the lowest bin.
+  struct BinRange {
+    Cells from{}, to{};
+  };
+  /// Bins of the blobs whose support may meet a box, wider by `margin`; none where from > to.
+  [[nodiscard]] BinRange bins_near(const Cells& base, const Cells& size, std::int64_t margin) const;
+  /// The blobs of a layer of these, row by row.
+  void add_runs(const BinRange& bins, std::int64_t layer, std::vector<BlobRun>& runs) const;
   void sort_all();
   [[nodiscard]] bool sort_moved();
 };

@@ -85,45 +85,118 @@ HWY_INLINE void append_far(const BlobList& far, std::size_t far_count, BlobList&
   list.pad();
 }
 
-void Gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
-            BlobList& list, BlobList* far) {
+/// A list while blobs near a cube are put into it, those near it first where `far` is not null.
+class Gathered {
+ public:
+  Gathered(std::size_t most, BlobList& list, BlobList* far) : list_(list), far_(far) {
+    list.reserve(most);
+    if (far != nullptr) far->reserve(most);
+  }
+  /// The first `valid` lanes, those whose support may meet the cube.
+  HWY_INLINE void add(V s, V x, V y, V z, V near2, std::size_t valid) {
+    const D d;
+    auto keep = hn::Lt(near2, hn::Set(d, kReach2));
+    if (valid < kWidth) keep = hn::And(keep, hn::FirstN(d, valid));
+    if (far_ == nullptr) {
+      count_ = append(s, x, y, z, keep, list_, count_);
+      return;
+    }
+    const auto near = hn::Lt(near2, hn::Set(d, kNear2));
+    count_ = append(s, x, y, z, hn::And(near, keep), list_, count_);
+    far_count_ = append(s, x, y, z, hn::AndNot(near, keep), *far_, far_count_);
+  }
+  HWY_INLINE void finish() {
+    if (far_ != nullptr) {
+      append_far(*far_, far_count_, list_, count_);
+      return;
+    }
+    list_.near = list_.count = count_;
+    list_.pad();
+  }
+
+ private:
+  BlobList& list_;
+  BlobList* far_;
+  std::size_t count_ = 0, far_count_ = 0;
+};
+
+/// Centres along one axis from `origin` on, scaled; loaded and subtracted in double precision.
+HWY_INLINE V scaled(const double* from, double origin, V s) {
   const D d;
   const hn::Half<D> dh;
   const hn::Rebind<double, decltype(dh)> dd;
+  const auto low = hn::Sub(hn::LoadU(dd, from), hn::Set(dd, origin));
+  const auto high = hn::Sub(hn::LoadU(dd, from + kWidth / 2), hn::Set(dd, origin));
+  const auto low_scale = hn::PromoteTo(dd, hn::LowerHalf(dh, s)), high_scale = hn::PromoteTo(dd, hn::UpperHalf(dh, s));
+  return hn::Combine(d, hn::DemoteTo(dh, hn::Mul(high, high_scale)), hn::DemoteTo(dh, hn::Mul(low, low_scale)));
+}
+
+void Gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
+            BlobList& list, BlobList* far) {
+  const D d;
   std::size_t most = 0;
   for (const BlobRun& run : runs) most += run.end - run.begin;
-  list.reserve(most);
-  if (far != nullptr) far->reserve(most);
+  Gathered gathered(most, list, far);
   const V centre = hn::Set(d, static_cast<float>(0.5 * size)), half = hn::Set(d, static_cast<float>(0.5 * size + margin));
-  std::size_t count = 0, far_count = 0;
   for (const BlobRun& run : runs) {
     for (std::size_t i = run.begin; i < run.end; i += kWidth) {
       const V s = hn::LoadU(d, all.scale + i);
-      const auto low_scale = hn::PromoteTo(dd, hn::LowerHalf(dh, s)), high_scale = hn::PromoteTo(dd, hn::UpperHalf(dh, s));
-      const auto load = [&](const double* from, double origin) HWY_ATTR {
-        const auto low = hn::Sub(hn::LoadU(dd, from + i), hn::Set(dd, origin));
-        const auto high = hn::Sub(hn::LoadU(dd, from + i + kWidth / 2), hn::Set(dd, origin));
-        return hn::Combine(d, hn::DemoteTo(dh, hn::Mul(high, high_scale)), hn::DemoteTo(dh, hn::Mul(low, low_scale)));
-      };
-      const V x = load(all.x, base[0]), y = load(all.y, base[1]), z = load(all.z, base[2]);
-      const V near2 = distances(s, x, y, z, centre, centre, centre, half).near2;
-      auto keep = hn::Lt(near2, hn::Set(d, kReach2));
-      if (run.end - i < kWidth) keep = hn::And(keep, hn::FirstN(d, run.end - i));
-      if (far == nullptr) {
-        count = append(s, x, y, z, keep, list, count);
-      } else {
-        const auto near = hn::Lt(near2, hn::Set(d, kNear2));
-        count = append(s, x, y, z, hn::And(near, keep), list, count);
-        far_count = append(s, x, y, z, hn::AndNot(near, keep), *far, far_count);
-      }
+      const V x = scaled(all.x + i, base[0], s), y = scaled(all.y + i, base[1], s), z = scaled(all.z + i, base[2], s);
+      gathered.add(s, x, y, z, distances(s, x, y, z, centre, centre, centre, half).near2, run.end - i);
     }
   }
-  if (far != nullptr) {
-    append_far(*far, far_count, list, count);
-    return;
+  gathered.finish();
+}
+
+void GatherColumn(const BlobArrays& all, std::span<const BlobRun> runs, std::span<const std::uint32_t> layer,
+                  const std::array<double, 2>& base, double size, BlobColumn& column) {
+  const D d;
+  const hn::RebindToUnsigned<D> du;
+  std::size_t most = 2 * kLanes;
+  for (const BlobRun& run : runs) most += run.end - run.begin;
+  if (column.scale.size() < most) {
+    most += most / 2;
+    for (auto* array : {&column.scale, &column.x, &column.y}) array->resize(most);
+    column.z.resize(most);
   }
-  list.near = list.count = count;
-  list.pad();
+  const V half = hn::Set(d, static_cast<float>(0.5 * size));
+  std::size_t count = 0, r = 0;
+  column.start.assign(1, 0);
+  for (const std::uint32_t end : layer) {
+    for (; r < end; ++r) {
+      const BlobRun& run = runs[r];
+      for (std::size_t i = run.begin; i < run.end; i += kWidth) {
+        const V s = hn::LoadU(d, all.scale + i), x = scaled(all.x + i, base[0], s), y = scaled(all.y + i, base[1], s);
+        // What is added along z takes none nearer.
+        const V z = hn::Mul(s, half);
+        auto keep = hn::Lt(distances(s, x, y, z, half, half, half, half).near2, hn::Set(d, kReach2));
+        if (run.end - i < kWidth) keep = hn::And(keep, hn::FirstN(d, run.end - i));
+        hn::StoreU(hn::Compress(s, keep), d, column.scale.data() + count);
+        hn::StoreU(hn::Compress(x, keep), d, column.x.data() + count);
+        hn::StoreU(hn::Compress(y, keep), d, column.y.data() + count);
+        // Doubles as pairs of words, which compress by the same mask.
+        hn::VFromD<decltype(du)> low, high;
+        hn::LoadInterleaved2(du, reinterpret_cast<const std::uint32_t*>(all.z + i), low, high);
+        const auto words = hn::RebindMask(du, keep);
+        hn::StoreInterleaved2(hn::Compress(low, words), hn::Compress(high, words), du, reinterpret_cast<std::uint32_t*>(column.z.data() + count));
+        count += hn::CountTrue(d, keep);
+      }
+    }
+    column.start.push_back(static_cast<std::uint32_t>(count));
+  }
+}
+
+void GatherFromColumn(const BlobColumn& column, std::size_t begin, std::size_t end, double base_z, double size, BlobList& list,
+                      BlobList* far) {
+  const D d;
+  Gathered gathered(end - begin, list, far);
+  const V half = hn::Set(d, static_cast<float>(0.5 * size));
+  for (std::size_t i = begin; i < end; i += kWidth) {
+    const V s = hn::LoadU(d, column.scale.data() + i), x = hn::LoadU(d, column.x.data() + i), y = hn::LoadU(d, column.y.data() + i);
+    const V z = scaled(column.z.data() + i, base_z, s);
+    gathered.add(s, x, y, z, distances(s, x, y, z, half, half, half, half).near2, end - i);
+  }
+  gathered.finish();
 }
 
 /// @param far  null: the order stays
@@ -629,6 +702,8 @@ HWY_AFTER_NAMESPACE();
 namespace supple::implicit::blobs {
 
 HWY_EXPORT(Gather);
+HWY_EXPORT(GatherColumn);
+HWY_EXPORT(GatherFromColumn);
 HWY_EXPORT(Select);
 HWY_EXPORT(SelectNearFirst);
 HWY_EXPORT(SelectTiles);
@@ -656,6 +731,15 @@ void BlobList::pad() {
 void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
             BlobList& list, BlobList* far) {
   HWY_DYNAMIC_DISPATCH(Gather)(all, runs, base, size, margin, list, far);
+}
+
+void gather_column(const BlobArrays& all, std::span<const BlobRun> runs, std::span<const std::uint32_t> layer,
+                   const std::array<double, 2>& base, double size, BlobColumn& column) {
+  HWY_DYNAMIC_DISPATCH(GatherColumn)(all, runs, layer, base, size, column);
+}
+
+void gather(const BlobColumn& column, std::size_t begin, std::size_t end, double base_z, double size, BlobList& list, BlobList* far) {
+  HWY_DYNAMIC_DISPATCH(GatherFromColumn)(column, begin, end, base_z, size, list, far);
 }
 
 PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {

@@ -45,6 +45,18 @@ struct BlobRun {
 void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
             BlobList& list, BlobList* far);
 
+/// Blobs around cubes that stand on each other, layer by layer of bins: what is read once for all of them.
+struct BlobColumn {
+  std::vector<float> scale, x, y;    ///< x and y as in a list of one of the cubes
+  std::vector<double> z;             ///< [cells] from the lattice's origin
+  std::vector<std::uint32_t> start;  ///< those of layer l are [start[l], start[l + 1])
+};
+/// Those whose support may meet some cube of `size` cells over x, y in `base`. @param layer  ends of the layers, numbers of runs
+void gather_column(const BlobArrays& all, std::span<const BlobRun> runs, std::span<const std::uint32_t> layer,
+                   const std::array<double, 2>& base, double size, BlobColumn& column);
+/// What `gather` finds in the layers [begin, end) for the cube above `base_z`, by the column around it and without a margin.
+void gather(const BlobColumn& column, std::size_t begin, std::size_t end, double base_z, double size, BlobList& list, BlobList* far);
+
 /// Bounds of the potential on a box from the nearest and farthest distance of each blob; round-off included.
 struct PotentialBounds {
   float lower = 0.0F;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "field_index.h"
@@ -161,9 +162,9 @@ void count_held(BlockTable& table, std::size_t index) {
   block.counted = held;
 }
 
-/// Where the nodes of a block and of its upper faces (0..16) stand in a table with four entries for each.
+/// Where the nodes of a block and of its upper faces (0..16) stand in a table with three entries for each.
 constexpr int kTableSide = kBlockNodes + 1;
-constexpr int node_place(int x, int y, int z) { return 4 * ((z * kTableSide + y) * kTableSide + x); }
+constexpr int node_place(int x, int y, int z) { return 3 * ((z * kTableSide + y) * kTableSide + x); }
 /// Those of a word of bits that are `edge` nodes apart.
 template <int edge>
 constexpr auto kPlaces = [] {
@@ -176,48 +177,84 @@ constexpr auto kPlaces = [] {
 }();
 constexpr auto kTilePlace = kPlaces<blobs::kTile>, kNodePlace = kPlaces<1>;
 
-/// Points of the vertices on the edges of a block's cells, by the edge's lower node and its axis.
-class PointTable {
+/// Vertices on the edges of a block's cells: those of the block by their order, then those that its upper neighbours own. What a
+/// cell asks for is small enough to stay in the nearest cache.
+class LocalVertices {
  public:
-  /// @param own  tiles of the block that are needed
-  void fill(const BlocksAbove& above, Bits own) {
-    for (const Tile& tile : above[0]->tile) {
-      if ((own >> tile.place & 1u) != 0) add(*above[0], tile, kTilePlace[tile.place], kAll, 0);
+  using Number = std::uint16_t;
+
+  /// @param own     tiles of the block that are needed
+  /// @param points  of all blocks
+  void fill(const BlocksAbove& above, Bits own, const EdgePoint* points) {
+    const Block& block = *above[0];
+    const std::size_t most = block.vertices + kMostBeyond;
+    if (point_.size() < most) {
+      point_.resize(most);
+      vertex_.resize(most);
     }
+    for (const Tile& tile : block.tile) {
+      if ((own >> tile.place & 1u) != 0) add_own(tile, points + block.first_point);
+    }
+    std::iota(vertex_.begin(), vertex_.begin() + block.vertices, block.first_vertex);
+    count_ = block.vertices;
     for (unsigned step = 1; step < 7; ++step) {
       if (above[step] == nullptr) continue;
-      const Bits face = first_of(step);  // on the block's upper faces
       const int from = node_place(kBlockNodes * static_cast<int>(step & 1u), kBlockNodes * static_cast<int>(step >> 1 & 1u),
                                   kBlockNodes * static_cast<int>(step >> 2));
-      for_bits(above[step]->held & face, [&](unsigned at) {
-        add(*above[step], above[step]->tile[above[step]->rank(at)], from + kTilePlace[at], face, step);
+      for_bits(above[step]->held & first_of(step), [&](unsigned at) {
+        add_beyond(*above[step], above[step]->tile[above[step]->rank(at)], from + kTilePlace[at], step, points);
       });
     }
   }
   /// From a node on, by kEdgePlace.
-  [[nodiscard]] const std::uint32_t* from(int node) const { return point_.data() + node; }
+  [[nodiscard]] const Number* from(int node) const { return number_.data() + node; }
+  [[nodiscard]] const EdgePoint* points() const { return point_.data(); }
+  /// Numbers in the mesh. @param from  readable seven beyond its end
+  void translate(const Number* from, std::size_t count, std::uint32_t* to) const {
+    constexpr std::size_t kWide = 8;
+    const auto* vertex = reinterpret_cast<const int*>(vertex_.data());
+    std::size_t i = 0;
+    for (; i + kWide <= count; i += kWide) {
+      const __m256i at = _mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from + i)));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + i), _mm256_i32gather_epi32(vertex, at, 4));
+    }
+    for (; i < count; ++i) to[i] = vertex_[from[i]];
+  }
 
  private:
-  /// Edges that start at `nodes` and run along other axes than `without`.
-  void add(const Block& block, const Tile& tile, int from, Bits nodes, unsigned without) {
-    std::uint32_t point = block.first_point + tile.first_vertex;
-    std::uint32_t* table = point_.data() + from;
+  /// Edges in the upper faces of a block.
+  static constexpr std::size_t kMostBeyond = std::size_t{3} * 2 * kTableSide * kTableSide;
+
+  void add_own(const Tile& tile, const EdgePoint* points) {
+    std::copy_n(points + tile.first_vertex, tile.vertices, point_.data() + tile.first_vertex);
+    Number number = tile.first_vertex;
+    Number* table = number_.data() + kTilePlace[tile.place];
     for (unsigned axis = 0; axis < 3; ++axis) {
-      const Bits edges = tile.edges[axis];
-      if (nodes == kAll) {
-        for_bits(edges, [&](unsigned node) { table[static_cast<unsigned>(kNodePlace[node]) + axis] = point++; });
-        continue;
-      }
-      if ((without >> axis & 1u) == 0) {
-        for_bits(edges & nodes, [&](unsigned node) {
-          table[static_cast<unsigned>(kNodePlace[node]) + axis] =
-              point + static_cast<std::uint32_t>(std::popcount(edges & ((Bits{1} << node) - 1)));
-        });
-      }
-      point += static_cast<std::uint32_t>(std::popcount(edges));
+      for_bits(tile.edges[axis], [&](unsigned node) { table[static_cast<unsigned>(kNodePlace[node]) + axis] = number++; });
     }
   }
-  std::array<std::uint32_t, 4 * kTableSide * kTableSide * kTableSide> point_;
+  /// Edges on the face, or edge, that a tile of the block in the direction `without` has in common with this one.
+  void add_beyond(const Block& block, const Tile& tile, int from, unsigned without, const EdgePoint* points) {
+    std::uint32_t first = tile.first_vertex;
+    Number* table = number_.data() + from;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const Bits edges = tile.edges[axis];
+      if ((without >> axis & 1u) == 0) {
+        for_bits(edges & first_of(without), [&](unsigned node) {
+          const std::uint32_t at = first + static_cast<std::uint32_t>(std::popcount(edges & ((Bits{1} << node) - 1)));
+          point_[count_] = points[block.first_point + at];
+          vertex_[count_] = block.first_vertex + at;
+          table[static_cast<unsigned>(kNodePlace[node]) + axis] = static_cast<Number>(count_++);
+        });
+      }
+      first += static_cast<std::uint32_t>(std::popcount(edges));
+    }
+  }
+
+  std::array<Number, std::size_t{3} * kTableSide * kTableSide * kTableSide> number_;
+  std::vector<EdgePoint> point_;       ///< by number
+  std::vector<std::uint32_t> vertex_;  ///< of the mesh, by number
+  std::size_t count_ = 0;
 };
 
 /// From the place of a cell to that of its edges.
@@ -244,14 +281,14 @@ constexpr auto kEdgeLine = [] {
 }();
 
 /// The triangles of a cell as places of their edges. A cell with one loop of four or more vertices has a choice of fans.
-struct CellTriangles {
+struct alignas(64) CellTriangles {  // the fans of most cells lie in two lines
   static constexpr std::size_t kMostFans = 7;
-  std::array<std::array<std::uint16_t, 3 * kMostTriangles>, kMostFans> place{};  ///< by the apex of the fan
   std::array<std::uint16_t, kMostFans> corner{};  ///< of the loop
   std::array<std::uint8_t, kMostFans> edge{};     ///< on which they lie
   std::uint8_t count = 0;
   std::uint8_t size = 0;    ///< of the only loop
   std::uint8_t apices = 0;  ///< bit k: its fan around corner k is allowed
+  std::array<std::array<std::uint16_t, 3 * kMostTriangles>, kMostFans> place{};  ///< by the apex of the fan
 };
 
 constexpr CellTriangles make_triangles(const CellLoops& loops) {
@@ -291,7 +328,7 @@ constexpr auto kCellTriangles = [] {
 /// Corners of a cell's loop and their normals, behind an unused number.
 struct LoopCorner {
   __m128 place, normal;
-  LoopCorner(const CellTriangles& c, std::size_t k, const std::uint32_t* point, const EdgePoint* points) {
+  LoopCorner(const CellTriangles& c, std::size_t k, const LocalVertices::Number* point, const EdgePoint* points) {
     const EdgeLine& line = kEdgeLine[c.edge[k]];
     normal = _mm_load_ps(&points[point[c.corner[k]]].t);
     const __m128 t = _mm_permute_ps(normal, 0);
@@ -311,7 +348,7 @@ __m128 bends(const LoopCorner& a0, const LoopCorner& a1, const LoopCorner& b0, c
 }
 
 /// The fan of a cell whose chords lie closest to the surface.
-std::size_t best_fan(const CellTriangles& c, const std::uint32_t* point, const EdgePoint* points) {
+std::size_t best_fan(const CellTriangles& c, const LocalVertices::Number* point, const EdgePoint* points) {
   const LoopCorner first(c, 0, point, points), second(c, 1, point, points), third(c, 2, point, points), fourth(c, 3, point, points);
   if (c.size != 5) {
     const __m128 bend = bends(first, third, second, fourth);
@@ -495,44 +532,18 @@ void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::
   mesh.triangle.resize(count);
 }
 
-/// From points of a block and of those above it to the numbers of their vertices.
-void find_numbers(const BlocksAbove& above, std::vector<Shift>& numbers) {
-  numbers.clear();
-  for (const Block* block : above) {
-    if (block != nullptr && block->vertices > 0) numbers.push_back({block->first_point, block->first_vertex - block->first_point});
-  }
-  std::sort(numbers.begin(), numbers.end(), [](const Shift& a, const Shift& b) { return a.first < b.first; });
-  std::size_t kept = 0;
-  std::uint32_t total = 0;
-  for (const Shift number : numbers) {
-    if (kept > 0 && number.more == total) continue;
-    numbers[kept++] = {number.first, number.more - total};
-    total = number.more;
-  }
-  numbers.resize(kept);
-}
-
 /// The triangles of the tiles marked `emit`.
 void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint* points, Mesh& mesh) {
   if (block.emit == 0 || block.triangles == 0) return;
-  using Triangle = std::array<std::uint32_t, 3>;
+  using Triangle = std::array<LocalVertices::Number, 3>;
   thread_local std::vector<Triangle> thread_found;
-  thread_local std::vector<Shift> numbers;
-  PointTable table_of_points;
-  const BlocksAbove above = blocks_above(table, block);
-  table_of_points.fill(above, with_next(block.emit));
-  find_numbers(above, numbers);
+  thread_local LocalVertices vertices;
+  vertices.fill(blocks_above(table, block), with_next(block.emit), points);
   thread_found.resize(block.triangles + kMostTriangles);
   std::size_t begin = 0, end = 0;  // of those that follow each other without a gap
   const auto place_run = [&] {
     if (begin == end) return;
-    const Triangle *from = thread_found.data() + begin, *to_end = thread_found.data() + end;
-    Triangle* to = mesh.triangle.data() + block.first_triangle + begin;
-    if (numbers.size() == 1 && numbers[0].more == 0) {
-      std::copy(from, to_end, to);
-    } else {
-      move_numbers(from->data(), to->data(), 3 * (end - begin), numbers);
-    }
+    vertices.translate(thread_found[begin].data(), 3 * (end - begin), mesh.triangle[block.first_triangle + begin].data());
   };
   for (const Tile& tile : block.tile) {
     if ((block.emit >> tile.place & 1u) == 0) continue;
@@ -542,11 +553,11 @@ void emit_triangles(const BlockTable& table, const Block& block, const EdgePoint
     }
     Triangle* out = thread_found.data() + tile.first_triangle;
     const std::uint8_t* corners = block.corners.data() + tile.first_cell;
-    const std::uint32_t* first = table_of_points.from(kTilePlace[tile.place]);
+    const LocalVertices::Number* first = vertices.from(kTilePlace[tile.place]);
     for (Bits cells = tile.cells; cells != 0; cells &= cells - 1) {
       const CellTriangles& c = kCellTriangles[*corners++];
-      const std::uint32_t* point = first + kNodePlace[static_cast<std::size_t>(std::countr_zero(cells))];
-      const std::uint16_t* place = c.place[best_fan(c, point, points)].data();
+      const LocalVertices::Number* point = first + kNodePlace[static_cast<std::size_t>(std::countr_zero(cells))];
+      const std::uint16_t* place = c.place[best_fan(c, point, vertices.points())].data();
       // As many as most cells have or more: cheaper than a branch that cannot be foreseen.
       constexpr std::size_t kOften = 3;
       for (std::size_t k = 0; k < kOften; ++k, place += 3) out[k] = {point[place[0]], point[place[1]], point[place[2]]};
@@ -608,8 +619,7 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   // Vertices follow the nodes of a tile and its upper neighbours, triangles the vertices of these.
   const auto reach_down = [&] {
     const std::vector<std::uint8_t> from = table.touched;
-    const bool all = std::find(from.begin(), from.end(), std::uint8_t{0}) == from.end();
-    for (std::size_t b = 0; b < from.size() && !all; ++b) {
+    for (std::size_t b = 0; b < from.size() && !table.all; ++b) {
       if (from[b] != 0) for_blocks_below(table, table.block[b], [&](std::size_t below) { table.touched[below] = 1; });
     }
     std::vector<std::uint32_t> list;
@@ -672,7 +682,7 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   move_runs(same_vertices, vertices, mesh.normal);
   place_points(table, blocks, counted, vertices, same_vertices.empty(), scratch.point);
   move_triangles(table, same_triangles, triangles, mesh);
-  for_each(counted, [&](const Block& block) { sampler.solve(table, block, mesh, scratch.point); });
+  sampler.solve(executor, table, counted, mesh, scratch.point);
   for_each(emitting, [&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });
 }
 

@@ -151,51 +151,32 @@ class BlobSampler final : public Sampler {
   }
 
   void sample(const Executor& executor, BlockTable& table) override {
-    const std::vector<std::uint32_t> blocks = grid_.change().all ? all_blocks(table) : changed_blocks(table);
-    for (const std::uint32_t b : blocks) table.touched[b] = 1;
+    const bool all = grid_.change().all;
+    const std::vector<std::uint32_t> blocks = all ? all_blocks(table) : changed_blocks(table);
+    for (const std::uint32_t b : blocks) {
+      table.touched[b] = 1;
+      table.blank[b] = 0;
+    }
     // A node that touches one outside lies a cell's slope above the iso value at most, but for rare places.
     sure_ = skip_ ? iso_ + static_cast<float>(kSteepest / grid_.reach()) : std::numeric_limits<float>::infinity();
-    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
-      Workspace& work = Workspace::of_thread();
-      for (std::size_t i = begin; i < end; ++i) sample_block(table.block[blocks[i]], work);
+    for_columns(executor, table, blocks, [&](Block& block, Workspace& work) {
+      if (all) {
+        block.clear();
+        block.changed = kAll;
+      }
+      sample_block(block, work);
     });
     if (skip_) evaluate_needed(executor, blocks, table);
   }
 
-  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const override {
-    Bits wanted = 0;
-    for (const Tile& tile : block.tile) wanted |= Bits{tile.vertices > 0} << tile.place;
-    wanted &= block.solve;
-    if (wanted == 0) return;
-    Workspace& work = Workspace::of_thread();
-    const BlocksAbove above = blocks_above(table, block);
-    grid_.gather(block.base(), kBlockNodes, 0, work.block);
-    blobs::EdgeBatch& edges = work.edges;
-    edges.count = 0;
-    for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
-      if ((wanted & tiles_of(leaf)) == 0) continue;
-      (void)blobs::select(work.block, centre_of(leaf_corner(leaf), kLeafNodes), 0.5F * kLeafNodes, work.leaf_of_block[leaf]);
-    }
-    const blobs::Placement placement = placement_of(block);
-    std::size_t begin = 0, to = 0;  // of the vertices that follow each other without a gap
-    const auto place_run = [&] {
-      if (edges.count == begin) return;
-      blobs::place_vertices(edges, begin, edges.count, placement, mesh.position[to].data(), mesh.normal[to].data(),
-                            &points[block.first_point + (to - block.first_vertex)].t);
-    };
-    for_bits(wanted, [&](unsigned place) {
-      const std::size_t rank = block.rank(place), first = edges.count;
-      const Tile& tile = block.tile[rank];
-      const std::size_t vertex = block.first_vertex + tile.first_vertex;
-      if (vertex != to + (first - begin)) {
-        place_run();
-        begin = first;
-        to = vertex;
-      }
-      collect_edges(above, tile, block.values.data() + kTileNodes * rank, edges);
-      blobs::solve_edges(work.leaf_of_block[leaf_of(place)], iso_, edges, first, work.near);
+  void solve(const Executor& executor, const BlockTable& table, std::span<const std::uint32_t> blocks, Mesh& mesh,
+             std::vector<EdgePoint>& points) const override {
+    // In the order of the mesh, not in columns: what is written lies close together.
+    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      Workspace& work = Workspace::of_thread();
+      work.in_column = false;
+      for (std::size_t i = begin; i < end; ++i) solve(table, table.block[blocks[i]], work, mesh, points);
     });
-    place_run();
   }
 
   void begin_projection() const override {
@@ -231,6 +212,8 @@ class BlobSampler final : public Sampler {
     blobs::EdgeBatch edges;
     Bits sure = 0;                       // tiles of the block at work that are sure to be inside
     const Block* near_block = nullptr;   // that points were last projected near
+    blobs::BlobGrid::Column column;      // around the block at work and others above or below it
+    bool in_column = false;
     BlobList block, leaf, tile, near, far;
     BlobList around_block, around_leaf;  // of near_block and its leaf near_leaf
     blobs::LeafTiles tiles;
@@ -242,6 +225,70 @@ class BlobSampler final : public Sampler {
       return work;
     }
   };
+
+  /// Calls use(block, workspace) for blocks, those on each other one after the other: bins around them are then read once.
+  template <class Table, class Use>
+  void for_columns(const Executor& executor, Table& table, std::span<const std::uint32_t> blocks, const Use& use) const {
+    constexpr std::size_t kPerTask = 16;
+    constexpr std::int32_t kNear = 2;  // a gap that costs less than another column
+    const auto columns = static_cast<std::size_t>(table.count[0]) * static_cast<std::size_t>(table.count[1]);
+    std::vector<std::uint32_t> start(columns + 1), order(blocks.size());
+    for (const std::uint32_t b : blocks) ++start[b % columns + 1];
+    for (std::size_t c = 0; c < columns; ++c) start[c + 1] += start[c];
+    for (const std::uint32_t b : blocks) order[start[b % columns]++] = b;
+    executor.for_blocks(order.size(), kPerTask, [&](std::size_t begin, std::size_t end) {
+      Workspace& work = Workspace::of_thread();
+      for (std::size_t i = begin, next = begin; i < end; i = next) {
+        const BlockCoord& low = table.block[order[i]].coord;
+        std::int32_t top = low[2];
+        for (next = i + 1; next < end && order[next] % columns == order[i] % columns; ++next) {
+          const std::int32_t z = table.block[order[next]].coord[2];
+          if (z > top + kNear) break;
+          top = z;
+        }
+        work.in_column = next > i + 1 && grid_.reach() >= kColumns;
+        if (work.in_column) {
+          grid_.gather_column(table.block[order[i]].base(), kBlockNodes, std::int64_t{kBlockNodes} * (top - low[2] + 1), work.column);
+        }
+        for (std::size_t k = i; k < next; ++k) use(table.block[order[k]], work);
+      }
+    });
+  }
+
+  void solve(const BlockTable& table, const Block& block, Workspace& work, Mesh& mesh, std::vector<EdgePoint>& points) const {
+    Bits wanted = 0;
+    for (const Tile& tile : block.tile) wanted |= Bits{tile.vertices > 0} << tile.place;
+    wanted &= block.solve;
+    if (wanted == 0) return;
+    const BlocksAbove above = blocks_above(table, block);
+    gather(block, work, nullptr);
+    blobs::EdgeBatch& edges = work.edges;
+    edges.count = 0;
+    for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
+      if ((wanted & tiles_of(leaf)) == 0) continue;
+      (void)blobs::select(work.block, centre_of(leaf_corner(leaf), kLeafNodes), 0.5F * kLeafNodes, work.leaf_of_block[leaf]);
+    }
+    const blobs::Placement placement = placement_of(block);
+    std::size_t begin = 0, to = 0;  // of the vertices that follow each other without a gap
+    const auto place_run = [&] {
+      if (edges.count == begin) return;
+      blobs::place_vertices(edges, begin, edges.count, placement, mesh.position[to].data(), mesh.normal[to].data(),
+                            &points[block.first_point + (to - block.first_vertex)].t);
+    };
+    for_bits(wanted, [&](unsigned place) {
+      const std::size_t rank = block.rank(place), first = edges.count;
+      const Tile& tile = block.tile[rank];
+      const std::size_t vertex = block.first_vertex + tile.first_vertex;
+      if (vertex != to + (first - begin)) {
+        place_run();
+        begin = first;
+        to = vertex;
+      }
+      collect_edges(above, tile, block.values.data() + kTileNodes * rank, edges);
+      blobs::solve_edges(work.leaf_of_block[leaf_of(place)], iso_, edges, first, work.near);
+    });
+    place_run();
+  }
 
   static std::array<float, 3> centre_of(const std::array<int, 3>& corner, int edge) {
     const float half = 0.5F * static_cast<float>(edge);
@@ -307,19 +354,21 @@ class BlobSampler final : public Sampler {
     }
   }
 
-  /// Empties the table; @return the blocks that a support may enter, all tiles marked.
+  /// The blocks that a support may enter; empties the others.
   [[nodiscard]] std::vector<std::uint32_t> all_blocks(BlockTable& table) const {
-    for (Block& block : table.block) block.clear();
-    table.touched.assign(table.touched.size(), 1);
+    table.all = true;
     std::vector<std::uint8_t> entered(table.block.size());
     grid_.for_bins([&](const blobs::CellBox& bin) { for_blocks_in(table, bin, [&](std::size_t b) { entered[b] = 1; }); });
     const auto reach = static_cast<std::int64_t>(std::ceil(grid_.reach())) + 1;
     spread(entered, table.count, static_cast<std::size_t>((reach + kBlockNodes - 1) / kBlockNodes));
     std::vector<std::uint32_t> list;
     for (std::size_t b = 0; b < table.block.size(); ++b) {
-      if (entered[b] == 0) continue;
-      table.block[b].changed = kAll;
-      list.push_back(static_cast<std::uint32_t>(b));
+      if (entered[b] != 0) {
+        list.push_back(static_cast<std::uint32_t>(b));
+      } else if (table.blank[b] == 0) {
+        table.block[b].clear();
+        table.touched[b] = table.blank[b] = 1;
+      }
     }
     return list;
   }
@@ -386,7 +435,7 @@ class BlobSampler final : public Sampler {
 
   /// Samples the marked tiles; the others are kept.
   void sample_block(Block& block, Workspace& work) const {
-    gather(block, work);
+    gather_to_sample(block, work);
     work.sure = 0;
     if (sure_by_tiles() && work.block.count > 0) {
       // Where cells are small, bounds show as much of tiles next to the surface, and those are needed.
@@ -402,8 +451,15 @@ class BlobSampler final : public Sampler {
     work.changes.apply(block);
   }
 
-  void gather(const Block& block, Workspace& work) const {
-    grid_.gather(block.base(), kBlockNodes, 0, work.block, near_first(kSureTiles) ? &work.far : nullptr);
+  void gather(const Block& block, Workspace& work, BlobList* far) const {
+    if (work.in_column) {
+      grid_.gather(work.column, block.base(), kBlockNodes, work.block, far);
+    } else {
+      grid_.gather(block.base(), kBlockNodes, 0, work.block, far);
+    }
+  }
+  void gather_to_sample(const Block& block, Workspace& work) const {
+    gather(block, work, near_first(kSureTiles) ? &work.far : nullptr);
   }
 
   [[nodiscard]] Verdict select_leaf(unsigned leaf, Workspace& work) const {
@@ -506,19 +562,13 @@ class BlobSampler final : public Sampler {
         block.needed = next_to_outside(table, block, block.early);
       }
     });
-    for (const std::uint32_t b : blocks) {
-      if (table.block[b].needed != 0) table.touched[b] = 1;
-    }
-    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
-      Workspace& work = Workspace::of_thread();
-      for (std::size_t i = begin; i < end; ++i) {
-        if (table.block[blocks[i]].needed != 0) evaluate_needed(table.block[blocks[i]], work);
-      }
-    });
+    std::erase_if(blocks, [&](std::uint32_t b) { return table.block[b].needed == 0; });
+    for (const std::uint32_t b : blocks) table.touched[b] = 1;
+    for_columns(executor, table, blocks, [&](Block& block, Workspace& work) { evaluate_needed(block, work); });
   }
 
   void evaluate_needed(Block& block, Workspace& work) const {
-    gather(block, work);
+    gather_to_sample(block, work);
     work.changes.begin();
     for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
       const Bits tiles = block.needed & tiles_of(leaf);
@@ -539,6 +589,8 @@ class BlobSampler final : public Sampler {
   static constexpr double kSteepest = 3.5;
   /// Radii in cells from which bounds show that cubes of 2^3 and of 4^3 nodes lie inside.
   static constexpr double kSureCubes = 5.0, kSureTiles = 9.0;
+  /// Below it rows of bins hold enough blobs to fill vectors.
+  static constexpr double kColumns = 5.0;
   [[nodiscard]] bool sure_by_tiles() const { return skip_ && grid_.reach() >= kSureTiles; }
   [[nodiscard]] bool sure_by_cubes() const { return skip_ && !sure_by_tiles() && grid_.reach() >= kSureCubes; }
   /// Beyond this blobs are few, and bounds look at all of them.
@@ -581,7 +633,9 @@ class ViewSampler final : public Sampler {
       block.clear();
       block.changed = kAll;
     }
-    std::fill(table.touched.begin(), table.touched.end(), std::uint8_t{1});
+    table.all = true;
+    table.touched.assign(table.block.size(), 1);
+    table.blank.assign(table.block.size(), 0);
     // By block, so that a block is written by one task.
     std::vector<std::uint8_t> leaves(table.block.size());
     for (const auto& leaf : leaves_.block) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
@@ -597,7 +651,33 @@ class ViewSampler final : public Sampler {
     sign_inside(table);
   }
 
-  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const override {
+  void solve(const Executor& executor, const BlockTable& table, std::span<const std::uint32_t> blocks, Mesh& mesh,
+             std::vector<EdgePoint>& points) const override {
+    executor.for_blocks(blocks.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) solve(table, table.block[blocks[i]], mesh, points);
+    });
+  }
+
+  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals) const override {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Projection found = project_to_surface(field_, points[i]);
+      if (!found.converged) {  // left where it is, in the middle between two vertices
+        Vec3 gradient;
+        (void)field_.value(points[i], gradient);
+        normals[i] = lattice::outward(gradient, Vec3::UnitZ());
+        continue;
+      }
+      points[i] = found.point;
+      normals[i] = found.normal;
+    }
+  }
+
+  [[nodiscard]] bool single_precision() const override { return false; }
+
+ private:
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+  void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const {
     thread_local lattice::EdgeRoots roots;
     for (const Tile& tile : block.tile) {
       if (tile.vertices == 0) continue;
@@ -642,25 +722,6 @@ class ViewSampler final : public Sampler {
       });
     }
   }
-
-  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals) const override {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Projection found = project_to_surface(field_, points[i]);
-      if (!found.converged) {  // left where it is, in the middle between two vertices
-        Vec3 gradient;
-        (void)field_.value(points[i], gradient);
-        normals[i] = lattice::outward(gradient, Vec3::UnitZ());
-        continue;
-      }
-      points[i] = found.point;
-      normals[i] = found.normal;
-    }
-  }
-
-  [[nodiscard]] bool single_precision() const override { return false; }
-
- private:
-  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
   static BlockCoord block_of(const BlockCoord& leaf) { return {leaf[0] >> 1, leaf[1] >> 1, leaf[2] >> 1}; }
   static unsigned slot_of(const BlockCoord& leaf) {
@@ -776,12 +837,16 @@ void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const La
   table.block.assign(blocks, Block{});
   table.touched.assign(blocks, 1);
   table.holds.assign(blocks, 0);
+  table.blank.assign(blocks, 1);
   std::size_t b = 0;
   for (std::int32_t z = 0; z < table.count[2]; ++z) {
     for (std::int32_t y = 0; y < table.count[1]; ++y) {
       for (std::int32_t x = 0; x < table.count[0]; ++x) {
         const BlockCoord coord{table.lower[0] + x, table.lower[1] + y, table.lower[2] + z};
-        if (old.find(coord) != nullptr) table.block[b] = std::move(old.block[old.index(coord)]);
+        if (old.find(coord) != nullptr) {
+          table.block[b] = std::move(old.block[old.index(coord)]);
+          table.blank[b] = old.blank[old.index(coord)];
+        }
         table.block[b].coord = coord;
         table.holds[b] = table.block[b].uniform() ? 0 : 1;
         table.held.tiles += table.block[b].counted.tiles;

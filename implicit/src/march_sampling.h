@@ -26,9 +26,10 @@ class Sampler {
   virtual void prepare(const Executor& executor, BlockTable& table) = 0;
   /// Fills tiles with signs and values, those that are not as in the last call, and marks them as changed.
   virtual void sample(const Executor& executor, BlockTable& table) = 0;
-  /// Vertices of the tiles marked `solve` at their place in the mesh: positions, normals, and, among the points of the block, both
-  /// as seen from the edge.
-  virtual void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const = 0;
+  /// Vertices of the tiles marked `solve` at their place in the mesh: positions, normals, and, among the points of their block, both
+  /// as seen from the edge. @param blocks  ascending
+  virtual void solve(const Executor& executor, const BlockTable& table, std::span<const std::uint32_t> blocks, Mesh& mesh,
+                     std::vector<EdgePoint>& points) const = 0;
   /// Called on a thread before it projects points.
   virtual void begin_projection() const {}
   /// Moves points near a tile to the surface.

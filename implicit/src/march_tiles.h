@@ -145,10 +145,13 @@ struct BlockTable {
   std::vector<Block> block;
   std::vector<std::uint8_t> touched;  ///< by block: whether something of it was made anew in this call
   std::vector<std::uint8_t> holds;    ///< by block: whether it held values when it was last counted
+  std::vector<std::uint8_t> blank;    ///< by block: whether it is as Block::clear leaves it
+  bool all = false;                   ///< whether all that hold values were touched in this call
   Held held;                          ///< of all blocks
 
   /// Forgets what was made anew.
   void begin_call() {
+    all = false;
     for (std::size_t b = 0; b < block.size(); ++b) {
       if (touched[b] == 0) continue;
       touched[b] = 0;

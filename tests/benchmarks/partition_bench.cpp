@@ -16,6 +16,7 @@
 
 #include "implicit/analytic_fields.h"
 #include "patch_complex.h"
+#include "supple/core/hash.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/polygonise.h"
 
@@ -139,6 +140,7 @@ void rims(int sets, double cell) {
     Figures rim, point, near;
     double seconds = 0.0;
     PolygoniseCounts all;
+    Hasher hasher;
     for (int set = 1; set <= sets; ++set) {
       const std::vector<Ball> balls = random_balls(static_cast<std::uint64_t>(set), count);
       std::vector<testing::FunctionField> fields;
@@ -148,6 +150,12 @@ void rims(int sets, double cell) {
       const double start = cpu_seconds();
       const std::vector<Mesh> meshes = polygonise_partition(views, {.origin = Vec3(0.0137, -0.0071, 0.0229), .cell = cell}, Executor(1), &counts);
       seconds += cpu_seconds() - start;
+      for (const Mesh& mesh : meshes) {
+        hasher.add(std::span<const Vec3>(mesh.position));
+        for (const auto& t : mesh.triangle) {
+          for (const std::uint32_t v : t) hasher.add(std::uint64_t{v});
+        }
+      }
       all.junctions += counts.junctions;
       all.junctions_moved += counts.junctions_moved;
       all.rim_points += counts.rim_points;
@@ -170,10 +178,11 @@ void rims(int sets, double cell) {
       }
     }
     std::printf("{\"balls\":%d,\"sets\":%d,\"rim\":%zu,\"rim_off\":%zu,\"rim_rms\":%.2e,\"rim_largest\":%.2f,\"points\":%zu,\"points_off\":%zu,"
-                "\"exact_points\":%zu,\"without\":%zu,\"farthest\":%.2f,\"junctions\":%llu,\"moved\":%llu,\"rim_points\":%llu,\"rim_moved\":%llu,\"s\":%.3f}\n",
+                "\"exact_points\":%zu,\"without\":%zu,\"farthest\":%.2f,\"junctions\":%llu,\"moved\":%llu,\"rim_points\":%llu,\"rim_moved\":%llu,\"s\":%.3f,\"hash\":\"%s\"}\n",
                 count, sets, rim.count, rim.off, rim.rms(), rim.largest, point.count, point.off, near.count, near.off, near.largest,
                 static_cast<unsigned long long>(all.junctions), static_cast<unsigned long long>(all.junctions_moved),
-                static_cast<unsigned long long>(all.rim_points), static_cast<unsigned long long>(all.rim_points_moved), seconds);
+                static_cast<unsigned long long>(all.rim_points), static_cast<unsigned long long>(all.rim_points_moved), seconds,
+                to_hex(hasher.value()).c_str());
   }
 }
 

@@ -7,7 +7,9 @@
 #include <numbers>
 #include <set>
 
+#include "blob_grid.h"
 #include "blob_lanes.h"
+#include "field_index.h"
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
@@ -527,6 +529,37 @@ Body dense(std::uint64_t seed, std::uint32_t count, double radius) {
     if (p.norm() < 1.0) blobs.emplace_back(wyvill_point(random.uniform(0.8, 1.2) * radius), p);
   }
   return body_of(blobs);
+}
+
+// Bins around cubes on each other are read once, and each cube has the blobs in the order and with the bits that its own bins give.
+TEST(BlobColumns, GiveWhatTheBinsAroundACubeGive) {
+  for (const double cell : {0.02, 0.05, 0.21}) {
+    const Body body = blobs(11, 3000, 0.08, 0.3);
+    blobs::BlobGrid grid;
+    grid.build(body.field.packed().primitive, {.origin = Vec3(0.013, -0.02, 0.007), .cell = cell});
+    blobs::BlobList expected, found, expected_far, far;
+    blobs::BlobGrid::Column column;
+    std::size_t all = 0;
+    for (int round = 0; round < 12; ++round) {
+      const std::int64_t side = round % 3 == 0 ? 8 : 16, x = 16 * (round % 4 - 2), y = 8 * (round % 5 - 2);
+      const blobs::Cells base{x, y, -4 * side};
+      grid.gather_column(base, side, 8 * side, column);
+      for (std::int64_t z = 0; z < 8; ++z) {
+        const blobs::Cells at{x, y, base[2] + z * side};
+        const bool near_first = (round + z) % 2 == 0;
+        grid.gather(at, side, 0, expected, near_first ? &expected_far : nullptr);
+        grid.gather(column, at, side, found, near_first ? &far : nullptr);
+        ASSERT_EQ(found.count, expected.count);
+        ASSERT_EQ(found.near, expected.near);
+        for (std::size_t i = 0; i < found.count; ++i) {
+          const auto numbers = [&](const blobs::BlobList& list) { return std::array{list.scale[i], list.x[i], list.y[i], list.z[i]}; };
+          ASSERT_EQ(numbers(found), numbers(expected)) << cell << " " << z << " " << i;
+        }
+        all += found.count;
+      }
+    }
+    EXPECT_GT(all, 3000u);
+  }
 }
 
 // A cube is sure only if F is positive at all its nodes, to the last ten thousandth, and nearly always if it is so by a factor of two.
