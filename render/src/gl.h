@@ -17,8 +17,8 @@ namespace supple::render {
 #define SUPPLE_GL_FUNCTIONS(X)                                                                                \
   X(ACTIVETEXTURE, ActiveTexture) X(ATTACHSHADER, AttachShader) X(BINDBUFFER, BindBuffer)                     \
   X(BINDFRAMEBUFFER, BindFramebuffer) X(BINDSAMPLER, BindSampler) X(BINDTEXTURE, BindTexture)                 \
-  X(BINDVERTEXARRAY, BindVertexArray) X(BLENDEQUATION, BlendEquation) X(BUFFERDATA, BufferData)               \
-  X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus) X(CLEAR, Clear) X(CLEARBUFFERUIV, ClearBufferuiv)         \
+  X(BINDVERTEXARRAY, BindVertexArray) X(BUFFERDATA, BufferData)               \
+  X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus) X(CLEAR, Clear)         \
   X(CLEARCOLOR, ClearColor) X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram)                   \
   X(CREATESHADER, CreateShader) X(CULLFACE, CullFace) X(DELETEBUFFERS, DeleteBuffers)                         \
   X(DELETESHADER, DeleteShader) X(DELETETEXTURES, DeleteTextures) X(DEPTHFUNC, DepthFunc)                     \

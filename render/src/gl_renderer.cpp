@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "height_map.h"
 #include "process_time.h"
 #include "supple/core/error.h"
 
@@ -48,17 +49,10 @@ void GlRenderer::draw_shadow_map(const MapFit& fit) const {
   draw_all_items();
 }
 
-void GlRenderer::draw_ground_occlusion(const MapFit& fit, float ground_height) const {
-  begin(heights_, false);
-  gl_.ClearColor(-1e30F, -1e30F, 0.0F, 0.0F);
-  gl_.Clear(GL_COLOR_BUFFER_BIT);
-  gl_.Enable(GL_BLEND);
-  gl_.BlendEquation(GL_MAX);
-  programs_->height.use();
-  programs_->height.set("to_clip", fit.to_clip);
-  programs_->height.set("ground_height", ground_height);
-  draw_all_items();
-  gl_.Disable(GL_BLEND);
+void GlRenderer::draw_ground_occlusion(const MapFit& fit, float ground_height) {
+  fill_heights(list_, fit, ground_height, kHeightMapSize, height_values_);
+  gl_.ActiveTexture(GL_TEXTURE0 + kHeights);
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RG32F, kHeightMapSize, kHeightMapSize, 0, GL_RG, GL_FLOAT, height_values_.data());
 
   begin(ground_occlusion_, false);
   programs_->ground_occlusion.use();
@@ -74,8 +68,6 @@ void GlRenderer::draw_geometry(const CameraMatrices& camera, std::span<const Ite
     return;
   }
   begin(geometry_, true);
-  constexpr std::array<GLuint, 4> no_item{};
-  gl_.ClearBufferuiv(GL_COLOR, 0, no_item.data());
   gl_.Clear(GL_DEPTH_BUFFER_BIT);
   programs_->geometry.use();
   programs_->geometry.set("to_clip", camera.view_projection);
@@ -325,7 +317,6 @@ GlRenderer::Shot GlRenderer::draw(const View& view, std::span<const Item> items)
     draw_shadow_map(*shot.shadow);
   }
   if (!view.area_lights.empty()) shot.area = draw_area_maps(view);
-  gl_.Disable(GL_CULL_FACE);  // lowest and highest points are on different sides
   if (has_region && view.ground) {
     const double ground = view.ground->height - origin.z();
     const double above = region.upper.z() - ground;

@@ -76,7 +76,7 @@ class GlRenderer final : public Renderer {
   [[nodiscard]] Shot draw(const View& view, std::span<const Item> items);
   [[nodiscard]] std::vector<AreaMap> draw_area_maps(const View& view);
   void draw_shadow_map(const MapFit& fit) const;
-  void draw_ground_occlusion(const MapFit& fit, float ground_height) const;
+  void draw_ground_occlusion(const MapFit& fit, float ground_height);
   void draw_geometry(const CameraMatrices& camera, std::span<const Item> items) const;
   void draw_painted_geometry(const CameraMatrices& camera, std::span<const Item> items) const;
   void draw_wires(const DrawRange& range, const Item& item) const;
@@ -108,7 +108,6 @@ class GlRenderer final : public Renderer {
   bool priming_ = false;
 
   Target shadow_;
-  Target heights_;
   Target ground_occlusion_;
   Target geometry_;
   Target occlusion_;
@@ -121,9 +120,11 @@ class GlRenderer final : public Renderer {
   GLuint vertex_buffer_ = 0;
   GLuint index_buffer_ = 0;
   GLuint materials_ = 0;
+  GLuint heights_ = 0;
   GLuint compare_sampler_ = 0;
   DrawList list_;
   std::vector<float> material_values_;
+  std::vector<float> height_values_;
   std::vector<std::uint8_t> rgba_;
 
  public:
@@ -133,7 +134,6 @@ class GlRenderer final : public Renderer {
 struct GlRenderer::Programs {
   Programs(const Gl& gl, int samples);
   Program depth;
-  Program height;
   Program ground_occlusion;
   Program geometry;
   Program occlusion;

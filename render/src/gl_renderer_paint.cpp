@@ -140,8 +140,6 @@ void GlRenderer::draw_wires(const DrawRange& range, const Item& item) const {
 
 void GlRenderer::draw_painted_geometry(const CameraMatrices& camera, std::span<const Item> items) const {
   begin(painting_->target, true);
-  constexpr std::array<GLuint, 4> no_item{};
-  gl_.ClearBufferuiv(GL_COLOR, 0, no_item.data());
   gl_.Clear(GL_DEPTH_BUFFER_BIT);
   const Program& program = painting_->geometry;
   program.use();

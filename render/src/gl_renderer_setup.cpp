@@ -8,7 +8,6 @@ namespace supple::render {
 
 GlRenderer::Programs::Programs(const Gl& gl, int samples)
     : depth(gl, shaders::position_only(), shaders::nothing()),
-      height(gl, shaders::position_only(), shaders::height_range()),
       ground_occlusion(gl, shaders::whole_picture(), shaders::ground_occlusion()),
       geometry(gl, shaders::surface(), shaders::geometry()),
       occlusion(gl, shaders::whole_picture(), shaders::screen_occlusion(samples)),
@@ -77,7 +76,6 @@ void GlRenderer::make_targets() {
   const int half_height = (height + 1) / 2;
   const int shadow_size = std::max(1, settings_.shadow_size);
   shadow_ = make_target(gl_, shadow_size, shadow_size, {.colour = 0, .depth = true});
-  heights_ = make_target(gl_, kHeightMapSize, kHeightMapSize, {.colour = GL_RG32F});
   ground_occlusion_ =
       make_target(gl_, kGroundOcclusionSize, kGroundOcclusionSize, {.colour = GL_R32F, .filter = GL_LINEAR});
   geometry_ = make_target(gl_, width, height, {.colour = GL_RG32UI, .depth = true, .samples = samples_});
@@ -110,17 +108,22 @@ void GlRenderer::bind(int unit, GLuint texture, GLenum kind) const {
 void GlRenderer::bind_textures() {
   bind(kShadowDepth, shadow_.depth, GL_TEXTURE_2D);
   bind(kShadowCompare, shadow_.depth, GL_TEXTURE_2D);
-  bind(kHeights, heights_.colour, GL_TEXTURE_2D);
   bind(kGroundOcclusion, ground_occlusion_.colour, GL_TEXTURE_2D);
   const GLenum kind = samples_ > 1 ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D;
   bind(kGeometry, geometry_.colour, kind);
   bind(kDepths, geometry_.depth, kind);
   bind(kOcclusion, occlusion_.colour, GL_TEXTURE_2D);
   bind(kBlurred, blurred_.colour, GL_TEXTURE_2D);
-  gl_.GenTextures(1, &materials_);
-  bind(kMaterials, materials_, GL_TEXTURE_2D);
-  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  const auto make_table = [this](int unit, GLuint& texture) {
+    gl_.GenTextures(1, &texture);
+    bind(unit, texture, GL_TEXTURE_2D);
+    gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  };
+  make_table(kMaterials, materials_);
+  make_table(kHeights, heights_);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
 
   // The shadow map is read twice: as numbers, and as comparisons filtered over two by two texels.
   gl_.GenSamplers(1, &compare_sampler_);

@@ -55,7 +55,11 @@ vec3 background_colour() {
 
 vec4 encoded(vec3 light) {
   vec3 linear = clamp(light, 0.0, 1.0);
-  vec3 high = 1.055 * pow(max(linear, 1e-6), vec3(1.0 / 2.4)) - 0.055;
+  // 1.055 x^(1/2.4) - 0.055 to 4e-5, a hundredth of a level of 8 bits.
+  vec3 half_power = sqrt(linear);
+  vec3 quarter_power = sqrt(half_power);
+  vec3 high = 1.12268099 * half_power + 0.19613609 * quarter_power - 0.33550082 * half_power * quarter_power +
+              0.08132968 * linear - 0.06461156;
   return vec4(mix(linear * 12.92, high, vec3(greaterThan(linear, vec3(0.0031308)))), 1.0);
 }
 )";

@@ -27,8 +27,7 @@ struct Lighting {
 
 // Fragment stages; `samples` is that of the geometry buffer.
 [[nodiscard]] std::string nothing();                      ///< depth only
-[[nodiscard]] std::string height_range();                 ///< -lowest and highest point above the ground, for GL_MAX
-[[nodiscard]] std::string ground_occlusion();             ///< share of the sky a ground point sees past that range
+[[nodiscard]] std::string ground_occlusion();             ///< share of the sky a ground point sees past the height map
 [[nodiscard]] std::string geometry();                     ///< normal and id
 [[nodiscard]] std::string painted_geometry();             ///< and the square root of the albedo
 [[nodiscard]] std::string screen_occlusion(int samples);  ///< ambient occlusion of items at half size, with depth

@@ -68,9 +68,7 @@ std::string position_only() {
   return std::string(kVersion) + R"(
 layout(location = 0) in vec3 position;
 uniform mat4 to_clip;
-out vec3 world;
 void main() {
-  world = position;
   gl_Position = to_clip * vec4(position, 1.0);
 })";
 }
@@ -111,17 +109,6 @@ void main() {
 }
 
 std::string nothing() { return std::string(kVersion) + "void main() {}\n"; }
-
-std::string height_range() {
-  return std::string(kVersion) + R"(
-in vec3 world;
-uniform float ground_height;
-out vec4 range;
-void main() {
-  float height = max(world.z - ground_height, 0.0);
-  range = vec4(-height, height, 0.0, 0.0);
-})";
-}
 
 std::string geometry() {
   return std::string(kVersion) + kPacking + R"(

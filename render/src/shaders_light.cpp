@@ -317,7 +317,7 @@ float contact_line(uint id, float depth) {
     ivec2 there = clamp(ivec2(gl_FragCoord.xy + turned), ivec2(0), last);
     uint other = GEOMETRY(there, 0).g;
     float gap = abs(eye_depth(DEPTH(there, 0).r) - depth);
-    touching += other > 0u && other != id ? max(1.0 - gap / near_by, 0.0) : 0.0;
+    touching += other != id ? max(1.0 - gap / near_by, 0.0) : 0.0;
     turned = mat2(0.70710678, 0.70710678, -0.70710678, 0.70710678) * turned;
   }
   return 1.0 - 0.6 * min(touching * 0.5, 1.0);
@@ -401,10 +401,10 @@ std::string classify(const Lighting& lighting) {
   return header(lighting.samples) + choices(lighting) + kGeometry + kPixel + kLight + kShown + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  uint any = 0u;
-  for (int s = 0; s < SAMPLES; ++s) any |= GEOMETRY(pixel, s).g;
+  float nearest = 1.0;
+  for (int s = 0; s < SAMPLES; ++s) nearest = min(nearest, DEPTH(pixel, s).r);
   bool is_floor = ground_depth(eye_ray(gl_FragCoord.xy)) < depth_range.y;
-  gl_FragDepth = any > 0u ? 0.9 : (is_floor ? 0.1 : 0.5);
+  gl_FragDepth = nearest < 1.0 ? 0.9 : (is_floor ? 0.1 : 0.5);
   colour = stored(background(background_colour()));
 })";
 }
@@ -438,8 +438,9 @@ void main() {
   bool open[SAMPLES];
   for (int s = 0; s < SAMPLES; ++s) {
     uvec2 item = GEOMETRY(pixel, s).rg;
-    float item_depth = eye_depth(DEPTH(pixel, s).r);
-    bool is_item = item.y > 0u && item_depth <= floor_depth;
+    float stored_depth = DEPTH(pixel, s).r;
+    float item_depth = eye_depth(stored_depth);
+    bool is_item = stored_depth < 1.0 && item_depth <= floor_depth;
     id[s] = is_item ? item.y : 0u;
     normal[s] = is_item ? unpack_normal(item.x) : vec3(0.0, 0.0, 1.0);
     depth[s] = is_item ? item_depth : floor_depth;

@@ -68,17 +68,17 @@ const int kTaps = 14;
 void main() {
   ivec2 last = ivec2(picture_size) - 1;
   ivec2 pixel = min(ivec2(gl_FragCoord.xy) * 2, last);
-  uvec2 item = GEOMETRY(pixel, 0).rg;
+  float stored_depth = DEPTH(pixel, 0).r;
   vec3 ray = eye_ray(vec2(pixel) + 0.5);
-  float depth = eye_depth(DEPTH(pixel, 0).r);
-  vec3 n = mat3(view) * unpack_normal(item.x);
+  float depth = eye_depth(stored_depth);
+  vec3 n = mat3(view) * unpack_normal(GEOMETRY(pixel, 0).r);
   vec3 p = ray * depth;
   // Four by four turns, which the blur averages exactly.
   ivec2 cell = ivec2(gl_FragCoord.xy) & 3;
   float turn = 6.2831853 * float((cell.x * 4 + cell.y * 5 + (cell.y & 1) * 2) & 15) / 16.0;
   vec2 turned = vec2(cos(turn), sin(turn));
   float pixels = clamp(radius / (depth * half_extent.y) * 0.5 * picture_size.y, 3.0, 0.15 * picture_size.y);
-  int taps = item.y > 0u ? kTaps : 0;
+  int taps = stored_depth < 1.0 ? kTaps : 0;
   float r2 = radius * radius;
   float sum = 0.0;
   for (int i = 0; i < taps; ++i) {
