@@ -177,7 +177,9 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     }
     if (!(axes.maxCoeff() > 0.0)) {
       faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
-                      n > 1 ? "two particles lie at one place, so give it" : "a single particle without a surface needs it");
+                      n > 1 && !d.separate ? "two particles lie at one place, so give it"
+                      : d.skeleton.empty() ? "a single particle without a surface needs it"
+                                           : "the field of its skeleton was nowhere found to reach the iso value");
     }
     const Vec3 inertia = principal_moments(d.particles.mass, axes);
     const Quat& q = arrangement.orientation[i];

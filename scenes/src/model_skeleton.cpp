@@ -212,22 +212,30 @@ Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool pl
   implicit::index_field(own, placed, field);
   const Box box = field.surface_box();
   if (box.empty()) return Vec3::Zero();
-  constexpr int kCells = 32;
-  const Vec3 cell = box.extent() / kCells;
-  std::vector<Vec3> point;
-  for (int k = 0; k < kCells; ++k) {
-    for (int j = 0; j < kCells; ++j) {
-      for (int i = 0; i < kCells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
-    }
-  }
-  std::vector<double> value(point.size());
-  implicit::FieldView(field).evaluate(point, value);
+  // As fine as it takes to meet solids that are thin askew of the axes.
+  constexpr int kCells = 32, kMostCells = 256;
+  constexpr double kEnough = 400.0;
   Vec3 squares = Vec3::Zero();
   double inside = 0.0;
-  for (std::size_t s = 0; s < point.size(); ++s) {
-    if (!(value[s] > 0.0)) continue;
-    squares += point[s].cwiseAbs2();
-    inside += 1.0;
+  for (int cells = kCells; cells <= kMostCells && inside < kEnough; cells *= 2) {
+    const Vec3 cell = box.extent() / cells;
+    std::vector<Vec3> point;
+    std::vector<double> value;
+    squares.setZero();
+    inside = 0.0;
+    for (int k = 0; k < cells; ++k) {
+      point.clear();
+      for (int j = 0; j < cells; ++j) {
+        for (int i = 0; i < cells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
+      }
+      value.resize(point.size());
+      implicit::FieldView(field).evaluate(point, value);
+      for (std::size_t s = 0; s < point.size(); ++s) {
+        if (!(value[s] > 0.0)) continue;
+        squares += point[s].cwiseAbs2();
+        inside += 1.0;
+      }
+    }
   }
   if (inside == 0.0) return Vec3::Zero();
   Vec3 axes2 = 5.0 / inside * squares;

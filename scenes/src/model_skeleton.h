@@ -24,7 +24,7 @@ namespace supple::scenes {
 [[nodiscard]] implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<const Vec3> rest, ModelFaults& faults);
 
 /// Semi-axes of the ellipsoid whose second moments along a particle's axes are those of the solid that it carries alone;
-/// exact for a ball, within a hundredth otherwise. Zero without a surface.
+/// exact for a ball, within a hundredth otherwise, within some of those that are thin askew. Zero without a surface.
 [[nodiscard]] Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool planar);
 
 }  // namespace supple::scenes

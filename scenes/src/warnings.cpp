@@ -13,10 +13,23 @@ std::string names_of(const StageContext& context, const collision::BodyPair& pai
   return '\'' + body_name(context.model, context.bodies, pair.a) + "' and '" + body_name(context.model, context.bodies, pair.b) + '\'';
 }
 
-/// The middle of a primitive in the world: of its corners where it has some.
+/// A point of a primitive's shape in the world, in its middle where that belongs to it.
 Vec3 middle_of(const implicit::Primitive& primitive, const Pose& carrier) {
   Vec3 middle = Vec3::Zero();
-  for (const Vec3& corner : primitive.control) middle += corner / static_cast<double>(primitive.control.size());
+  switch (primitive.shape) {
+    case implicit::ShapeKind::Ring:
+    case implicit::ShapeKind::Arc: middle.x() = primitive.size.x(); break;
+    case implicit::ShapeKind::Curve: {  // de Casteljau at the half of the parameter
+      std::vector<Vec3> corner = primitive.control;
+      for (; corner.size() > 1; corner.pop_back()) {
+        for (std::size_t i = 0; i + 1 < corner.size(); ++i) corner[i] = 0.5 * (corner[i] + corner[i + 1]);
+      }
+      middle = corner.front();
+      break;
+    }
+    default:
+      for (const Vec3& corner : primitive.control) middle += corner / static_cast<double>(primitive.control.size());
+  }
   const Vec3 at = primitive.offset.position + primitive.offset.orientation * middle.cwiseProduct(primitive.stretch);
   return carrier.position + carrier.orientation * at;
 }

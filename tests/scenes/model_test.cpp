@@ -168,6 +168,33 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   EXPECT_NE(thin[0].find("'a' may have no surface"), std::string::npos) << thin[0];
 }
 
+TEST(Warnings, LookForRingsArcsAndCurvesWhereTheyAre) {
+  const auto warnings_of = [](const std::string& objects) {
+    return Simulation(parse_scene("schema: 1\nduration: 1 s\nobjects:\n" + objects, "test.yaml", ".")).warnings();
+  };
+  const std::string kernel = ", kernel: {radius: 0.1}}], contact: {}}\n";
+  const std::string ball = "  - {name: ball, particles: {}, skeleton: [{shape: point, kernel: {radius: 0.4}}], contact: {}}\n";
+  const auto beside = [&](const std::string& shape) { return warnings_of(ball + "  - {name: a, particles: {}, skeleton: [{" + shape + kernel); };
+  // Around the ball without a touch, and with a surface though the middle of the circle has none.
+  EXPECT_TRUE(beside("shape: ring, radius: 0.5").empty());
+  EXPECT_TRUE(beside("shape: ring, radius: 0.5, convolve: true").empty());
+  EXPECT_TRUE(beside("shape: arc, radius: 0.5, half_angle_deg: 80, convolve: true").empty());
+  // The mean of the corners lies in the ball, the curve passes it by.
+  EXPECT_TRUE(beside("shape: curve, points: [[-0.5, 0, -0.45], [0, 0, 0.9], [0.5, 0, -0.45]]").empty());
+  EXPECT_FALSE(beside("shape: ring, radius: 0.1").empty());
+  EXPECT_FALSE(beside("shape: curve, points: [[-0.5, 0, 0], [0, 0, 0.05], [0.5, 0, 0]]").empty());
+}
+
+TEST(Model, FindsTheMomentsOfARodThatLiesAskew) {
+  // A rod of length l along (1, 1, 1) / sqrt 3: second moments l^2 / 36 about each plane, so semi-axes with squares 5 l^2 / 36 and
+  // moments 2/5 m times that; the rod's own thickness and its ends add 2 a / l of it, 1 %.
+  const Model model = model_of(std::string(kHead) +
+                               "  - {name: a, particles: {mass: 3}, skeleton: [{shape: curve, points: [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], "
+                               "kernel: {radius: 0.02}}]}\n");
+  const double moment = 0.4 * 3.0 * 5.0 / 36.0 * 3.0;
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(model.particles.inertia[0][k], moment, 0.03 * moment);
+}
+
 TEST(Planar, HoldsEveryParticleInOnePlane) {
   const Model model = model_of("planar: true\n" + std::string(kHead) + kSpiral);
   EXPECT_EQ(model.particles.pinned[0], core::kPinPosition | core::kPlanar);
