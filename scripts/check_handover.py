@@ -28,10 +28,13 @@ def read_ply(path):
     header = data[:end].decode().split("\n")
     vertices = int(next(line for line in header if line.startswith("element vertex")).split()[2])
     faces = int(next(line for line in header if line.startswith("element face")).split()[2])
-    names = [line.split()[2] for line in header if line.startswith("property float")]
-    table = np.frombuffer(data, "<f4", vertices * len(names), end).reshape(vertices, len(names))
+    kinds = {"double": "<f8", "float": "<f4"}
+    properties = [line.split() for line in header if line.split()[:2] in (["property", kind] for kind in kinds)]
+    table = np.frombuffer(data, np.dtype([(name, kinds[kind]) for _, kind, name in properties]), vertices, end)
     triangles = np.frombuffer(data, np.dtype([("n", "u1"), ("v", "<i4", 3)]), faces, end + table.nbytes)["v"]
-    return table[:, :3], triangles, dict(zip(names, table.T))
+    # In single precision, as the other formats have them.
+    columns = {name: table[name].astype(np.float32) for name in table.dtype.names}
+    return np.stack([columns[axis] for axis in "xyz"], axis=1), triangles, columns
 
 
 def frames_of(folder, pattern):

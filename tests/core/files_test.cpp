@@ -96,27 +96,27 @@ TEST_F(Files, FoldersAreMadeOrRefused) {
 
 TEST_F(Files, OfMeshesAreBinaryPly) {
   Mesh mesh;
-  mesh.position = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0.5)};
+  mesh.position = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 8.0 + 1e-9)};
   mesh.normal.assign(3, Vec3::UnitZ());
   mesh.triangle = {{0, 1, 2}};
   mesh.columns = {{"contact pressure", {1.5, 2.5, 3.5}}};
   io::write_ply(path("m.ply"), mesh);
   const std::string text = text_of(path("m.ply"));
   const std::string header =
-      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
       "property float nx\nproperty float ny\nproperty float nz\nproperty float contact_pressure\nelement face 1\n"
       "property list uchar int vertex_indices\nend_header\n";
   ASSERT_EQ(text.substr(0, header.size()), header);
-  ASSERT_EQ(text.size(), header.size() + 3 * 7 * 4 + 13);
-  const auto number = [&](std::size_t index) {
-    float value = 0.0F;
-    std::memcpy(&value, text.data() + header.size() + 4 * index, 4);
+  constexpr std::size_t kVertex = 3 * 8 + 4 * 4;
+  ASSERT_EQ(text.size(), header.size() + 3 * kVertex + 13);
+  const auto number = [&](auto value, std::size_t vertex, std::size_t offset) {
+    std::memcpy(&value, text.data() + header.size() + vertex * kVertex + offset, sizeof value);
     return value;
   };
-  EXPECT_EQ(number(2 * 7 + 2), 0.5F);
-  EXPECT_EQ(number(1 * 7 + 5), 1.0F);
-  EXPECT_EQ(number(2 * 7 + 6), 3.5F);
-  EXPECT_EQ(text[header.size() + 84], 3);
+  EXPECT_EQ(number(0.0, 2, 16), 8.0 + 1e-9);
+  EXPECT_EQ(number(0.0F, 1, 32), 1.0F);
+  EXPECT_EQ(number(0.0F, 2, 36), 3.5F);
+  EXPECT_EQ(text[header.size() + 3 * kVertex], 3);
   std::int32_t last = 0;
   std::memcpy(&last, text.data() + text.size() - 4, 4);
   EXPECT_EQ(last, 2);

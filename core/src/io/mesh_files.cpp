@@ -71,14 +71,15 @@ void write_ply(const std::filesystem::path& path, const Mesh& mesh) {
   for (const Mesh::Column& column : mesh.columns) SUPPLE_EXPECTS(column.values.size() == n);
 
   std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(n) + '\n';
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) bytes += std::string("property float ") + name + '\n';
+  for (const char* name : {"x", "y", "z"}) bytes += std::string("property double ") + name + '\n';
+  for (const char* name : {"nx", "ny", "nz"}) bytes += std::string("property float ") + name + '\n';
   for (const Mesh::Column& column : mesh.columns) bytes += "property float " + word(column.name) + '\n';
   bytes += "element face " + std::to_string(mesh.triangle_count()) +
            "\nproperty list uchar int vertex_indices\nend_header\n";
-  bytes.reserve(bytes.size() + n * 4 * (6 + mesh.columns.size()) + 13 * mesh.triangle_count());
+  bytes.reserve(bytes.size() + n * 4 * (9 + mesh.columns.size()) + 13 * mesh.triangle_count());
 
   for (std::size_t i = 0; i < n; ++i) {
-    for (int k = 0; k < 3; ++k) append(bytes, static_cast<float>(mesh.position[i][k]));
+    for (int k = 0; k < 3; ++k) append(bytes, mesh.position[i][k]);
     for (int k = 0; k < 3; ++k) append(bytes, static_cast<float>(mesh.normal[i][k]));
     for (const Mesh::Column& column : mesh.columns) append(bytes, static_cast<float>(column.values[i]));
   }

@@ -11,7 +11,8 @@
 
 namespace supple::io {
 
-/// Binary little-endian PLY with normals and every column as a float property. @throws Error{Io}
+/// Binary little-endian PLY with normals and every column as a float property. Positions are double: in single precision small
+/// triangles far from the origin would collapse or cross. @throws Error{Io}
 void write_ply(const std::filesystem::path& path, const Mesh& mesh);
 
 /// Wavefront OBJ (ASCII) with normals; columns have no place in it. Numbers in single precision. @throws Error{Io}
