@@ -17,6 +17,9 @@ inline constexpr int kTile = 4;  ///< nodes along the edge of a tile
 inline constexpr std::size_t kTileNodes = std::size_t{kTile} * kTile * kTile;
 inline constexpr std::size_t kLanes = 16;  ///< widest vector; lists may be read and written this far beyond their end
 
+/// A support is kept when the box lies within this of it, squared and relative: more than round-off.
+inline constexpr float kReach2 = 1.0001F;
+
 /// Blobs near a block, f(x) = (1 - |scale x - centre|^2)^3 with x in cells from the block's lowest node,
 /// scale = cell / R and centre already scaled.
 struct BlobList {

@@ -35,6 +35,11 @@ void for_bits(Bits word, const Use& use) {
   return {static_cast<int>(bit & 3u), static_cast<int>(bit >> 2 & 3u), static_cast<int>(bit >> 4)};
 }
 
+/// The first along the axes in the mask `step`.
+[[nodiscard]] constexpr Bits first_of(unsigned step) {
+  return ((step & 1u) != 0 ? kFirstX : kAll) & ((step & 2u) != 0 ? kFirstY : kAll) & ((step & 4u) != 0 ? kFirstZ : kAll);
+}
+
 /// What lies one step up the axes in the mask `step`, of words and the seven above them, by step.
 struct Steps {
   std::array<Bits, 8> step;

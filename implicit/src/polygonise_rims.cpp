@@ -605,24 +605,32 @@ class RimCutter {
     return true;
   }
 
+  using Corners = std::array<const VertexUse*, 3>;
   /// Do triangles of one body cross?
   [[nodiscard]] bool cross(std::span<const Facet> facets) const {
-    for (std::size_t i = 0; i < facets.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) {
-        for (const Label label : {facets[i].inner, facets[i].outer}) {
-          if (label == 0 || has_mesh_[label - 1] == 0 || (label != facets[j].inner && label != facets[j].outer)) continue;
-          const auto a = corners(facets[i], label), b = corners(facets[j], label);
-          if (pierces(a, b) || pierces(b, a)) return true;
+    struct Sheet {
+      Label label;
+      Corners corners;
+      Box box;
+    };
+    std::vector<Sheet> sheets;
+    sheets.reserve(2 * facets.size());
+    for (const Facet& facet : facets) {
+      for (const auto& [label, other] : {std::pair(facet.inner, facet.outer), std::pair(facet.outer, facet.inner)}) {
+        if (label == 0 || has_mesh_[label - 1] == 0) continue;
+        Sheet sheet{.label = label, .corners = {}, .box = {}};
+        for (std::size_t k = 0; k < 3; ++k) {
+          sheet.corners[k] = &all_.use_of(facet.vertex[k], label - 1, other);
+          sheet.box.include(sheet.corners[k]->position);
         }
+        for (const Sheet& before : sheets) {
+          if (before.label != label || !before.box.overlaps(sheet.box)) continue;
+          if (pierces(before.corners, sheet.corners) || pierces(sheet.corners, before.corners)) return true;
+        }
+        sheets.push_back(sheet);
       }
     }
     return false;
-  }
-  using Corners = std::array<const VertexUse*, 3>;
-  [[nodiscard]] Corners corners(const Facet& facet, Label label) const {
-    const Label other = label == facet.inner ? facet.outer : facet.inner;
-    const auto& v = facet.vertex;
-    return {&all_.use_of(v[0], label - 1, other), &all_.use_of(v[1], label - 1, other), &all_.use_of(v[2], label - 1, other)};
   }
   /// Does an edge of s that has no vertex in common with t pass through it, by more than rounding?
   static bool pierces(const Corners& s, const Corners& t) {
