@@ -137,8 +137,9 @@ std::string describe_run(const fs::path& folder) {
   if (report.contains("objects")) {
     text += "objects\n";
     for (const auto& [name, object] : report["objects"].items()) {
-      text += line("  %-20s %6.0f particles, %.0f in pieces, largest deformation %.3g, in the end %.3g", name.c_str(),
-                   number_at(object, "particles"), number_at(object, "pieces"), number_at(object, "largest_deformation"),
+      const double particles = number_at(object, "particles"), pieces = number_at(object, "pieces");
+      text += line("  %-20s %6.0f particle%s in %.0f piece%s, largest deformation %.3g, in the end %.3g", name.c_str(), particles,
+                   particles == 1.0 ? "" : "s", pieces, pieces == 1.0 ? "" : "s", number_at(object, "largest_deformation"),
                    number_at(object, "final_shape_error"));
     }
   }

@@ -298,6 +298,7 @@ TEST_F(Run, DrawsMissingPicturesOnResuming) {
 TEST_F(Run, IsDescribedAndCompared) {
   ASSERT_EQ(run_scene(scene_, options()).outcome, "done");
   const std::string text = describe_run(folder_);
+  EXPECT_NE(text.find("1 particle in 1 piece, largest deformation"), std::string::npos) << text;
   for (const char* part : {"Two drops", "outcome     done", "frames      5 of 5", "momentum_error", "left ", "solve_contact_surface",
                            "frames/*.png", "states/*.state", "drops.mp4"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
