@@ -399,7 +399,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     panels_.push_back(panel);
   }
   const bool third = fine && error >= 1e-6 && !cut_;
-  return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7), third ? &kronrod_rule(7) : nullptr, fine);
+  return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7), third ? &kronrod_rule(7) : nullptr);
 }
 
 }  // namespace supple::collision

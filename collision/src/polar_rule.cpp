@@ -93,6 +93,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   const double thickness = frame_.thickness;
   std::size_t open = n;
   rim_error_ = 0.0;
+  rim_errors_.assign(n, 0.0);
   for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
     for (std::size_t k = 0; k < n; ++k) {
       const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
@@ -131,7 +132,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         --open;
         rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
         // Newton's method leaves about half the square of its last step, which the area feels twice.
-        rim_error_ = std::max(rim_error_, step * step / (falls * radius));
+        rim_errors_[k] = step * step / (falls * radius);
+        rim_error_ = std::max(rim_error_, rim_errors_[k]);
       }
       radius = next;
       rays.height[k] += lift;

@@ -79,7 +79,7 @@ class PolarRuleSolver {
   [[nodiscard]] double algebraic_error() const;
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 
-  // Patches that kinks cross: split_rule.cpp.
+  // Patches that kinks cross: split_rule.cpp, cross_kinks.cpp.
   /// Gauss points through a squeezed region.
   static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
   struct Panel {
@@ -87,9 +87,14 @@ class PolarRuleSolver {
     std::size_t first = 0, last = 0;  // of `kept_`
     std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
     PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with fewer radii besides
-    double by_angle = 0.0, by_radius = 0.0;  // differences of these
-    bool halved = false;              // or a half of one
+    double by_angle = 0.0, by_radius = 0.0;  // what the finest sums may be off by, for either reason
+    double by_rim = 0.0;                     // its area, as the rim was left
     int nodes = 0;                    // on a ray that no kink crosses
+    std::size_t rays = 0;             // of `fine`
+    std::size_t change = 0, change_end = 0;  // of `changes_`
+    bool halved = false;              // or a part of one
+    bool lost = false;                // a crossing that seemed to be there was not found
+    [[nodiscard]] bool even() const { return change == change_end && !lost; }
   };
   /// A kink, and s at the origin with its slope where it is a plane.
   struct Sheet {
@@ -115,8 +120,12 @@ class PolarRuleSolver {
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
   void find_corners(PairPressure& pressure, std::vector<Vec3>& corners);
   void find_crossings(PairPressure& pressure, double error);
+  void find_changes(const KronrodRule& rule, std::size_t first);
+  static void follow_signs(std::span<const double> values, std::vector<double>& places);
+  bool add_missed_kinks();
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
+  void doubt(Panel& panel, const PatchSums& all) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   // About the middle: middle_rule.cpp.
@@ -153,8 +162,7 @@ class PolarRuleSolver {
   void make_sectors(std::span<const RimPoint> corners);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
-  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger,
-                        bool fine);
+  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger);
 
   // About a point that sees the whole rim: star_rule.cpp.
   bool solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Regions& regions,
@@ -183,6 +191,7 @@ class PolarRuleSolver {
   std::vector<double> line_value_;
   double residual_ = 0.0;
   double rim_error_ = 0.0;  // relative, of the area
+  std::vector<double> rim_errors_;  // of rays
   double lift_ = 0.0;       // largest distance of a node from Sigma
   double size_ = 0.0;       // of the bodies' features
   PatchSums fine_, coarse_;
@@ -204,9 +213,9 @@ class PolarRuleSolver {
   Rays rays_;
   std::vector<double> linear_, square_, fourth_;  // heights along a ray: s linear + s^2 (square + s^2 fourth)
   std::vector<Crossing> crossings_;
+  std::vector<double> changes_;          // where within a panel rays begin to meet other kinks, or in another order
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;
-  bool corners_lost_ = false;            // where kinks meet the rim
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis
   std::vector<RimPoint> outline_, polygon_, kept_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;

@@ -1,0 +1,395 @@
+/// Where kinks of a field, and the borders of third bodies, cross a patch: on its rim, on rays, and where rays begin to meet others.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "polar_rule.h"
+#include "supple/core/math.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr double kFarOff = 0.2;          // of the radius: crossings from where the heights that are guessed have them
+constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
+constexpr int kCornerSteps = 8;
+constexpr int kCrossingSteps = 8;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+}  // namespace
+
+/// Whether there are certainly none where the rim may be, which is kept in `smooth_`.
+bool PolarRuleSolver::no_kinks_near(PairPressure& pressure) {
+  constexpr double kReach = 1.5;  // of the rim, over what the curvature of the pressure says
+  const double square = 2.0 * kReach * kReach * frame_.peak;
+  const double height = std::abs(frame_.height_uu) + 2.0 * std::abs(frame_.height_uv) + std::abs(frame_.height_vv);
+  const Vec3 across = (square * (frame_.u.cwiseAbs2() + frame_.v.cwiseAbs2())).cwiseSqrt();
+  const Vec3 half = across + 0.5 * square * height * frame_.axis.cwiseAbs();
+  smooth_ = {frame_.origin - half, frame_.origin + half};
+  kinks_.clear();
+  const bool known = pressure.kinks(smooth_, kinks_);
+  const double reach = half.norm();
+  const bool near = std::any_of(kinks_.begin(), kinks_.end(), [&](const implicit::Kink& kink) {
+    return std::abs(kink.value(frame_.origin)) <= kink.change(frame_.origin, reach);
+  });
+  kinks_.clear();
+  return known && !near;
+}
+
+void PolarRuleSolver::find_kinks(PairPressure& pressure) {
+  kinks_.clear();
+  Box box;
+  for (const Vec3& x : rim_batch_.point) {
+    box.include(x);
+    if (rim_.size() > 1) continue;  // the ray stands for those all around
+    const Vec3 reach = Vec3::Constant((x - frame_.origin).norm());
+    box.include(frame_.origin - reach);
+    box.include(frame_.origin + reach);
+  }
+  for (const Vec3& x : node_.point) box.include(x);
+  pressure.kinks(box, kinks_);
+  double square = 0.0;
+  for (const Vec3& x : rim_batch_.point) square = std::max(square, (x - frame_.origin).squaredNorm());
+  constexpr double kMargin = 1.2;  // what finer rules may find the rim to reach beyond
+  const double reach = kMargin * std::sqrt(square);
+  std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
+}
+
+/// Pressures of the third bodies at points, and their slopes.
+void PolarRuleSolver::evaluate_thirds(std::span<const Vec3> points) {
+  const std::size_t n = points.size();
+  third_value_.resize(third_.size() * n);
+  third_slope_.resize(third_.size() * n);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    const auto value = std::span(third_value_).subspan(t * n, n);
+    const auto slope = std::span(third_slope_).subspan(t * n, n);
+    third_[t]->field.evaluate(points, value, slope);
+    for (double& v : value) v *= third_[t]->material.modulus;
+    for (Vec3& g : slope) g *= third_[t]->material.modulus;
+  }
+}
+
+/// s of a kink; of a third body, how much harder than the pair it presses where the axis through x meets Sigma, to first order.
+double PolarRuleSolver::side_of(std::size_t kink, PairPressure& pressure, const Vec3& x) {
+  if (kink < kinks_.size()) return kinks_[kink].value(x);
+  const ContactBody& body = *third_[kink - kinks_.size()];
+  const double share = frame_.depth[0] / frame_.thickness;
+  double a, b;
+  pressure.evaluate(0, {&x, 1}, {&a, 1});
+  pressure.evaluate(1, {&x, 1}, {&b, 1});
+  return body.material.modulus * body.field.value(x) - (share * a + (1.0 - share) * b);
+}
+
+/// The same with its slope at point i of a batch, for which the third bodies have been evaluated.
+double PolarRuleSolver::side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const {
+  if (kink < kinks_.size()) return kinks_[kink].value(at.point[i], slope);
+  const std::size_t k = (kink - kinks_.size()) * at.size() + i;
+  const double share = frame_.depth[0] / frame_.thickness;
+  slope = third_slope_[k] - (share * at.slope_a[i] + (1.0 - share) * at.slope_b[i]);
+  return third_value_[k] - (share * at.a[i] + (1.0 - share) * at.b[i]);
+}
+
+/// Whether third bodies press harder than the pair all over the patch, as far as its nodes and the rim show.
+bool PolarRuleSolver::taken_by_thirds() {
+  const auto taken = [this](std::size_t n, std::size_t i, double p) {
+    for (std::size_t t = 0; t < third_.size(); ++t) {
+      if (third_value_[t * n + i] > p) return true;
+    }
+    return false;
+  };
+  evaluate_thirds(node_.point);
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    if (!taken(node_.size(), i, pressure_[i])) return false;
+  }
+  follow_rim();
+  evaluate_thirds(fine_rim_);
+  for (std::size_t i = 0; i < fine_rim_.size(); ++i) {
+    if (!taken(fine_rim_.size(), i, 0.0)) return false;
+  }
+  return true;
+}
+
+/// Whether some change their side on the patch, as far as its nodes show and the rim as they give it; keeps which.
+bool PolarRuleSolver::kinks_cross() {
+  crossing_.clear();
+  if (kinks_.empty() && third_.empty()) return false;
+  follow_rim();
+  for (std::size_t k = 0; k < kinks_.size(); ++k) {
+    const bool side = kinks_[k].value(frame_.origin) > 0.0;
+    const auto other = [&](const Vec3& x) { return (kinks_[k].value(x) > 0.0) != side; };
+    if (std::any_of(fine_rim_.begin(), fine_rim_.end(), other) ||
+        std::any_of(node_.point.begin(), node_.point.end(), other)) {
+      crossing_.push_back(k);
+    }
+  }
+  if (third_.empty()) return !crossing_.empty();
+  thirds_seen_.assign(third_.size(), 0);
+  const auto look = [this](std::size_t n, std::size_t i, double p) {
+    for (std::size_t t = 0; t < third_.size(); ++t) thirds_seen_[t] |= third_value_[t * n + i] > p ? 1 : 2;
+  };
+  evaluate_thirds(node_.point);
+  for (std::size_t i = 0; i < node_.size(); ++i) look(node_.size(), i, pressure_[i]);
+  evaluate_thirds(fine_rim_);
+  for (std::size_t i = 0; i < fine_rim_.size(); ++i) look(fine_rim_.size(), i, 0.0);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    if (thirds_seen_[t] == 3) crossing_.push_back(kinks_.size() + t);
+  }
+  return !crossing_.empty();
+}
+
+/// The rim found so far as a trigonometric sum, and points of it that leave no room for a kink between them.
+void PolarRuleSolver::follow_rim() {
+  const std::size_t n = rim_.size(), half = n / 2;
+  for (const int which : {0, 1}) {
+    const std::vector<double>& f = which == 0 ? rim_.radius : rim_.height;
+    std::vector<double>& out = wave_[which];
+    out.assign(2 * half + 2, 0.0);
+    for (std::size_t m = 0; m <= half; ++m) {
+      const double scale = (m == 0 || 2 * m == n ? 1.0 : 2.0) / static_cast<double>(n);
+      for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t at = m * k % n;
+        out[2 * m] += scale * f[k] * rim_.cosine[at];
+        out[2 * m + 1] += scale * f[k] * rim_.sine[at];
+      }
+    }
+  }
+  fine_rim_.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    for (const double part : {0.0, 0.25, 0.5, 0.75}) {
+      const auto [s, c] = math::sin_cos(kTurn * (static_cast<double>(i) + part) / static_cast<double>(n));
+      const auto [radius, height] = rim_at(c, s);
+      fine_rim_.push_back(frame_.origin + radius * direction(c, s) + height * frame_.axis);
+    }
+  }
+}
+
+std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const {
+  std::array<double, 2> sum{};
+  double c = 1.0, s = 0.0;
+  for (std::size_t m = 0; 2 * m < wave_[0].size(); ++m) {
+    for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
+      sum[which] += wave_[which][2 * m] * c + wave_[which][2 * m + 1] * s;
+    }
+    const double next = c * cosine - s * sine;
+    s = s * cosine + c * sine;
+    c = next;
+  }
+  return sum;
+}
+
+/// Where a function changes its sign around a closed line, from its values at points of it: i + t lies between points i and i + 1.
+/// Between two changes that no point saw it is the parabola through three points.
+void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<double>& places) {
+  const std::size_t n = values.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double last = values[(i + n - 1) % n], here = values[i], next = values[(i + 1) % n];
+    const bool side = here > 0.0;
+    if ((next > 0.0) != side) {
+      places.push_back(static_cast<double>(i) + here / (here - next));
+      continue;
+    }
+    const double bend = last - 2.0 * here + next, slope = 0.5 * (next - last), square = slope * slope - 2.0 * bend * here;
+    if ((last > 0.0) != side || !(bend * here > 0.0) || !(std::abs(slope) <= 0.5 * std::abs(bend)) || !(square > 0.0)) continue;
+    for (const double sign : {-1.0, 1.0}) {
+      const double at = static_cast<double>(i) + (sign * std::sqrt(square) - slope) / bend;
+      places.push_back(at < 0.0 ? at + static_cast<double>(n) : at);
+    }
+  }
+}
+
+/// Where a kink meets the rim, begun between points of `fine_rim_`: p_A = p_B = s = 0.
+void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& corners) {
+  const std::vector<Vec3>& rim = fine_rim_;
+  const std::size_t n = rim.size();
+  std::vector<std::size_t> kink;
+  std::vector<double> sides(n), places;
+  PressureBatch& batch = rim_batch_;
+  batch.point.clear();
+  for (const std::size_t k : crossing_) {
+    for (std::size_t i = 0; i < n; ++i) sides[i] = side_of(k, pressure, rim[i]);
+    places.clear();
+    follow_signs(sides, places);
+    for (const double place : places) {
+      const double whole = std::floor(place);
+      const auto i = static_cast<std::size_t>(whole) % n;
+      batch.point.push_back(rim[i] + (place - whole) * (rim[(i + 1) % n] - rim[i]));
+      kink.push_back(k);
+    }
+  }
+  if (kink.empty()) return;
+  batch.resize(batch.point.size());
+  std::vector<double> last(kink.size(), 0.0);
+  for (int step = 0; step < kCornerSteps; ++step) {
+    pressure.evaluate(batch);
+    evaluate_thirds(batch.point);
+    bool moved = false;
+    for (std::size_t i = 0; i < kink.size(); ++i) {
+      Vec3 slope;
+      const double s = side_of(kink[i], batch, i, slope);
+      Mat3 rows;
+      rows.row(0) = batch.slope_a[i];
+      rows.row(1) = batch.slope_b[i];
+      rows.row(2) = slope;
+      const double volume = rows.determinant();
+      const Vec3 value(batch.a[i], batch.b[i], s);
+      const Vec3 &a = batch.slope_a[i], &b = batch.slope_b[i];
+      Vec3 move = -(value[0] * b.cross(slope) + value[1] * slope.cross(a) + value[2] * a.cross(b)) / volume;
+      last[i] = move.norm();
+      if (!(last[i] <= extent_)) move.setZero();
+      batch.point[i] += move;
+      moved = moved || last[i] > 1e-9 * extent_;
+    }
+    if (!moved) break;
+  }
+  for (std::size_t i = 0; i < kink.size(); ++i) {
+    const auto same = [&](std::size_t j) { return kink[j] == kink[i] && (batch.point[j] - batch.point[i]).norm() <= 1e-6 * extent_; };
+    bool found = last[i] <= 1e-6 * extent_;  // the panels find others by being parted
+    for (std::size_t j = 0; j < i && found; ++j) found = !same(j);
+    if (found) corners.push_back(batch.point[i]);
+  }
+}
+
+double PolarRuleSolver::model_height(std::size_t ray, double share) const {
+  const double square = share * share;
+  return share * linear_[ray] + square * (square_[ray] + square * fourth_[ray]);
+}
+
+/// Where the rays cross kinks: first on the heights as the curvature at the peak and the rim give them, then on Sigma.
+void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
+  const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
+  crossings_.clear();
+  sheets_.clear();
+  for (const std::size_t k : crossing_) {
+    Sheet sheet;
+    sheet.flat = k < kinks_.size() && kinks_[k].form == implicit::Kink::Form::Plane;
+    if (sheet.flat) sheet.value = kinks_[k].value(frame_.origin, sheet.slope);
+    sheets_.push_back(sheet);
+  }
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
+    const auto place = [&](double share) -> Vec3 { return frame_.origin + share * reach + model_height(i, share) * frame_.axis; };
+    std::array<double, kSamples + 1> height;
+    for (int j = 0; j <= kSamples; ++j) height[static_cast<std::size_t>(j)] = model_height(i, static_cast<double>(j) / kSamples);
+    for (std::size_t c = 0; c < crossing_.size(); ++c) {
+      const std::size_t k = crossing_[c];
+      const Sheet& sheet = sheets_[c];
+      const double along = sheet.flat ? sheet.slope.dot(reach) : 0.0, up = sheet.flat ? sheet.slope.dot(frame_.axis) : 0.0;
+      const auto side = [&](double share) {
+        return sheet.flat ? sheet.value + along * share + up * model_height(i, share) : side_of(k, pressure, place(share));
+      };
+      const std::size_t others = crossings_.size();
+      const auto between = [&](double left, double s_left, double right, double s_right) {
+        double share = left + (right - left) * s_left / (s_left - s_right);
+        for (int step = 0; step < 3; ++step) {
+          const double s = side(share);
+          ((s > 0.0) == (s_left > 0.0) ? left : right) = share;
+          ((s > 0.0) == (s_left > 0.0) ? s_left : s_right) = s;
+          share = left + (right - left) * s_left / (s_left - s_right);
+        }
+        // Two of one kink must not become one; the borders of third bodies are round.
+        const bool alone = crossings_.size() == others && k < kinks_.size();
+        const double far = alone ? kFarOff : 0.5 / kSamples;
+        if (!alone && crossings_.size() > others) {
+          Crossing& last = crossings_.back();
+          last.left = std::max(0.0, last.radius - far);
+          last.right = last.radius + far;
+        }
+        crossings_.push_back({i, k, share, model_height(i, share), std::max(0.0, share - far), share + far, false});
+      };
+      std::array<double, kSamples + 1> s;
+      for (std::size_t j = 0; j < s.size(); ++j) {
+        const double share = static_cast<double>(j) / kSamples;
+        s[j] = sheet.flat ? sheet.value + along * share + up * height[j]
+                          : side_of(k, pressure, frame_.origin + share * reach + height[j] * frame_.axis);
+      }
+      for (std::size_t j = 0; j < kSamples; ++j) {
+        const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;
+        if ((s[j] > 0.0) != (s[j + 1] > 0.0)) {
+          between(left, s[j], right, s[j + 1]);
+          continue;
+        }
+        // A ray that dips through a kink and back between two samples: at the vertex of a parabola through three of them.
+        if (j == 0 || (s[j - 1] > 0.0) != (s[j] > 0.0)) continue;
+        const double bend = s[j - 1] - 2.0 * s[j] + s[j + 1], slope = 0.5 * (s[j + 1] - s[j - 1]);
+        if (!(bend * s[j] > 0.0) || !(std::abs(slope) < std::abs(bend))) continue;
+        const double vertex = left - slope / bend / kSamples;
+        const double dip = side(vertex);
+        if ((dip > 0.0) == (s[j] > 0.0)) continue;
+        const double before = vertex < left ? left - 1.0 / kSamples : left, after = vertex < left ? left : right;
+        between(before, vertex < left ? s[j - 1] : s[j], vertex, dip);
+        between(vertex, dip, after, vertex < left ? s[j] : s[j + 1]);
+      }
+    }
+  }
+  PressureBatch& batch = rim_batch_;
+  batch.resize(crossings_.size());
+  std::size_t open = crossings_.size();
+  for (int step = 0; step < kCrossingSteps && open > 0; ++step) {
+    for (std::size_t c = 0; c < crossings_.size(); ++c) {
+      const Crossing& x = crossings_[c];
+      batch.point[c] = frame_.origin + (x.radius * rays_.radius[x.ray]) * direction(rays_.cosine[x.ray], rays_.sine[x.ray]) +
+                       x.height * frame_.axis;
+    }
+    pressure.evaluate(batch);
+    evaluate_thirds(batch.point);
+    for (std::size_t c = 0; c < crossings_.size(); ++c) {
+      Crossing& x = crossings_[c];
+      if (x.good) continue;
+      const Vec3 e = rays_.radius[x.ray] * direction(rays_.cosine[x.ray], rays_.sine[x.ray]);
+      Vec3 slope;
+      const double s = side_of(x.kink, batch, c, slope), gap = batch.a[c] - batch.b[c];
+      const Vec3 across = batch.slope_a[c] - batch.slope_b[c];
+      const double gr = across.dot(e), gt = across.dot(frame_.axis), sr = slope.dot(e), st = slope.dot(frame_.axis);
+      const double determinant = gr * st - gt * sr;
+      const double radius = x.radius + (gt * s - st * gap) / determinant;
+      if (!std::isfinite(radius)) continue;
+      const double next = std::clamp(radius, x.left, x.right);  // two that lie close must not change places
+      const double moved = next - x.radius;
+      x.height -= (gap + gr * moved) / gt;
+      x.radius = next;
+      // Relative to the piece between kink and rim on faces, whose share of the ray may be small.
+      x.good = std::abs(moved) <= enough * (about_middle_ ? std::abs(1.0 - next) : 1.0) && next == radius;
+      if (x.good) --open;
+    }
+  }
+  std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& x, const Crossing& y) {
+    return x.ray != y.ray ? x.ray < y.ray : x.radius != y.radius ? x.radius < y.radius : x.kink < y.kink;
+  });
+}
+
+/// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
+void PolarRuleSolver::find_changes(const KronrodRule& rule, std::size_t first) {
+  const std::size_t per_panel = rule.node.size();
+  for (const Crossing& x : crossings_) {
+    if (!x.good) panels_[first + x.ray / per_panel].lost = true;
+  }
+  std::erase_if(crossings_, [](const Crossing& x) { return !x.good || x.radius >= 1.0; });
+  const auto same = [](const Crossing& x, const Crossing& y) { return x.kink == y.kink; };
+  std::size_t next = 0;
+  for (std::size_t p = first; p < panels_.size(); ++p) {
+    Panel& panel = panels_[p];
+    const double half = 0.5 * (panel.end - panel.begin);
+    panel.change = changes_.size();
+    std::span<const Crossing> before;
+    for (std::size_t k = 0; k < per_panel; ++k) {
+      const std::size_t begin = next;
+      while (next < crossings_.size() && crossings_[next].ray == (p - first) * per_panel + k) ++next;
+      const std::span<const Crossing> here = std::span(crossings_).subspan(begin, next - begin);
+      const auto differ = std::mismatch(before.begin(), before.end(), here.begin(), here.end(), same);
+      const bool change = differ.first != before.end() || differ.second != here.end();
+      if (k > 0 && change) {
+        double share = 0.5;
+        const auto at = static_cast<std::size_t>(differ.first - before.begin());
+        if (before.size() == here.size() && at + 1 < here.size() && same(before[at], here[at + 1]) && same(before[at + 1], here[at])) {
+          // Two that change places do so where they meet.
+          const double left = before[at + 1].radius - before[at].radius, right = here[at + 1].radius - here[at].radius;
+          if (left + right > 0.0) share = left / (left + right);
+        }
+        changes_.push_back(panel.begin + half * (1.0 + rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1])));
+      }
+      before = here;
+    }
+    panel.change_end = changes_.size();
+  }
+}
+
+}  // namespace supple::collision
