@@ -242,8 +242,8 @@ void PolarRuleSolver::cross_outline() {
   for (std::size_t t = 0; t < third_.size(); ++t) crossing_.push_back(kinks_.size() + t);
 }
 
-/// Where kinks meet the rim, p_A = p_B = s = 0, begun on the tangents of the outline, which lie outside the patch.
-void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners) {
+/// The outline with the places where its tangents meet, which lie outside the patch, so that no kink hides between points of it.
+void PolarRuleSolver::follow_tangents() {
   const std::size_t n = outline_.size();
   fine_rim_.clear();
   for (std::size_t i = 0; i < n; ++i) {
@@ -253,6 +253,10 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
       fine_rim_.push_back(frame_.origin + direction(corner->x(), corner->y()) + 0.5 * (a.height + b.height) * frame_.axis);
     }
   }
+}
+
+/// Where kinks meet the rim, p_A = p_B = s = 0, begun on `fine_rim_`.
+void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners) {
   std::vector<Vec3> found;
   find_corners(pressure, found);
   for (const Vec3& x : found) {
@@ -381,25 +385,29 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   cross_outline();
   if (crossing_.empty()) return false;
   cut_ = !third_.empty();
-  std::vector<RimPoint> corners;
-  find_outline_corners(pressure, corners);
-  make_sectors(corners);
-  for (const Sector& sector : sectors_) {
-    if (!(cross(sector.at[0], sector.at[1]) > 0.0) || !(cross(sector.at[1], sector.at[2]) > 0.0)) return false;
-  }
+  follow_tangents();
   about_middle_ = true;
   const double error = settings.error;
-  const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_;
-  panels_.clear();
-  for (std::size_t k = 0; k < sectors_.size(); ++k) {
-    Panel panel;
-    panel.begin = static_cast<double>(k);
-    panel.end = static_cast<double>(k + 1);
-    panel.nodes = error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
-    panels_.push_back(panel);
+  const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
+  for (;;) {
+    std::vector<RimPoint> corners;
+    find_outline_corners(pressure, corners);
+    make_sectors(corners);
+    for (const Sector& sector : sectors_) {
+      if (!(cross(sector.at[0], sector.at[1]) > 0.0) || !(cross(sector.at[1], sector.at[2]) > 0.0)) return false;
+    }
+    panels_.clear();
+    for (std::size_t k = 0; k < sectors_.size(); ++k) {
+      Panel panel;
+      panel.begin = static_cast<double>(k);
+      panel.end = static_cast<double>(k + 1);
+      panel.nodes = error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
+      panels_.push_back(panel);
+    }
+    const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
+    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr)) return false;
+    if (!fine || !add_missed_kinks()) return true;
   }
-  const bool third = fine && error >= 1e-6 && !cut_;
-  return solve_all_panels(pressure, settings, kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7), third ? &kronrod_rule(7) : nullptr);
 }
 
 }  // namespace supple::collision

@@ -158,6 +158,7 @@ class PolarRuleSolver {
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
   bool move_to_middle(PairPressure& pressure);
   void add_rays_at_hidden_sides(PairPressure& pressure);
+  void follow_tangents();
   void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
   void make_sectors(std::span<const RimPoint> corners);
   void cross_outline();
@@ -217,7 +218,7 @@ class PolarRuleSolver {
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis
-  std::vector<RimPoint> outline_, polygon_, kept_rim_;  // by angle; of a patch that is parted; by panel
+  std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;
   std::vector<Walk> walks_;
   std::vector<Sheet> sheets_;

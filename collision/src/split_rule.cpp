@@ -205,7 +205,6 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
   panel.by_rim = rim / whole;
   panel.rays = rule.node.size();
   panel.last = kept_.point.size();
-  if (about_middle_) return;
   panel.rim = kept_rim_.size();
   for (std::size_t i = ray; i < ray + rule.node.size(); ++i) {
     kept_rim_.push_back({rays_.radius[i] * Vec2(rays_.cosine[i], rays_.sine[i]), rays_.height[i], rays_.outward[i]});
@@ -370,14 +369,15 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     });
     fine_.add(panel.fine);
   }
+  sorted_rim_.clear();
+  for (const Panel& panel : panels_) {
+    sorted_rim_.insert(sorted_rim_.end(), kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim),
+                       kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim_end));
+  }
+  kept_rim_.swap(sorted_rim_);
   if (!about_middle_) {
-    polygon_.clear();
-    for (const Panel& panel : panels_) {
-      polygon_.insert(polygon_.end(), kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim),
-                      kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim_end));
-    }
-    kept_rim_ = polygon_;
     if (!rim_joins(0, kept_rim_.size(), true)) return false;
+    polygon_ = kept_rim_;
   }
   node_.resize(node_.point.size());
   estimate_ += kUnseen * error + algebraic_error();
