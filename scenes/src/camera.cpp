@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "supple/core/error.h"
+
 namespace supple::scenes {
 namespace {
 
@@ -30,6 +32,22 @@ Row interpolate(const std::vector<CameraKeyDesc>& keys, double time) {
          (3 * t2 - 2 * t3) * row_of(keys[k + 1]) + (t3 - t2) * width * slope(k + 1);
 }
 
+/// How far before `middle` in the direction `back` the middle `share` of a picture holds a box.
+double distance_to_see(const Box& box, const Vec3& middle, const Vec3& back, const CameraDesc& desc, double aspect, double share) {
+  Vec3 right = desc.up.cross(back);
+  if (!(right.norm() > 1e-9 * desc.up.norm())) right = back.unitOrthogonal();
+  right.normalize();
+  const Vec3 up = back.cross(right);
+  const double half_height = share * std::tan(0.5 * desc.field_of_view), half_width = aspect * half_height;
+  double distance = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 x;
+    for (int k = 0; k < 3; ++k) x[k] = ((corner >> k & 1) != 0 ? box.upper : box.lower)[k] - middle[k];
+    distance = std::max(distance, x.dot(back) + std::max(std::abs(x.dot(right)) / half_width, std::abs(x.dot(up)) / half_height));
+  }
+  return distance;
+}
+
 }  // namespace
 
 std::span<const CameraDesc> cameras_of(const Scene& scene) {
@@ -37,10 +55,35 @@ std::span<const CameraDesc> cameras_of(const Scene& scene) {
   return scene.cameras;
 }
 
+bool is_open(const CameraDesc& desc) { return desc.keys.empty() && !(desc.from && desc.look_at); }
+
+std::vector<CameraDesc> placed_cameras(const Scene& scene, const Box& seen) {
+  constexpr double kShare = 0.8;
+  const Vec3 usual(0.4, -2.6, 1.4);
+  const std::vector<int> size = scene.output.images ? scene.output.images->size : ImagesDesc{}.size;
+  const double aspect = static_cast<double>(size.at(0)) / size.at(1);
+  const std::span<const CameraDesc> all = cameras_of(scene);
+  std::vector<CameraDesc> cameras(all.begin(), all.end());
+  for (CameraDesc& camera : cameras) {
+    if (!is_open(camera)) continue;
+    if (!camera.look_at) camera.look_at = seen.empty() ? Vec3(Vec3::Zero()) : seen.centre();
+    if (!camera.from) {
+      const Vec3 back = usual.normalized();
+      const double distance = seen.empty() ? usual.norm() : distance_to_see(seen, *camera.look_at, back, camera, aspect, kShare);
+      camera.from = *camera.look_at + distance * back;
+    }
+    if (*camera.from == *camera.look_at) camera.look_at = *camera.from - usual;
+  }
+  return cameras;
+}
+
 render::Camera camera_at(const CameraDesc& desc, double time, double duration) {
-  render::Camera camera{.from = desc.from, .look_at = desc.look_at, .up = desc.up, .field_of_view = desc.field_of_view,
-                        .aperture = desc.aperture, .focus = desc.focus.value_or(0.0)};
-  if (!desc.keys.empty()) {
+  SUPPLE_EXPECTS(!is_open(desc));
+  render::Camera camera{.up = desc.up, .field_of_view = desc.field_of_view, .aperture = desc.aperture, .focus = desc.focus.value_or(0.0)};
+  if (desc.keys.empty()) {
+    camera.from = *desc.from;
+    camera.look_at = *desc.look_at;
+  } else {
     const Row row = interpolate(desc.keys, time);
     camera.from = row.head<3>();
     camera.look_at = row.segment<3>(3);

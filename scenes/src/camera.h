@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "supple/render/view.h"
 #include "supple/scenes/scene.h"
@@ -11,8 +12,15 @@ namespace supple::scenes {
 /// `cameras`, or the one `camera`.
 [[nodiscard]] std::span<const CameraDesc> cameras_of(const Scene& scene);
 
+/// The same, with places for those that the scene leaves open: so that the middle four fifths of the picture hold the box; an empty one
+/// leaves them at the origin. @param seen  surfaces at the start [m]
+[[nodiscard]] std::vector<CameraDesc> placed_cameras(const Scene& scene, const Box& seen);
+
+/// Whether a camera has yet to be placed.
+[[nodiscard]] bool is_open(const CameraDesc& desc);
+
 /// Keys are joined by cubic Hermite curves whose slopes are those of the chord over each key (Catmull & Rom 1974, uneven
-/// times) and 0 at the ends; the turntable turns at an even rate.
+/// times) and 0 at the ends; the turntable turns at an even rate. @pre keys, or a place
 [[nodiscard]] render::Camera camera_at(const CameraDesc& desc, double time, double duration);
 
 /// Whether anything of a box, or of the shadow it throws, may be in the picture. Conservative: false only where the box and

@@ -62,18 +62,21 @@ void fields(Archive& archive, CameraKeyDesc& d) {
 template <class Archive>
 void fields(Archive& archive, CameraDesc& d) {
   archive("name", d.name, identifier(), "part of the names of its images and its film; required under 'cameras'");
-  archive("from", d.from, any(kLength), "where it stands");
-  archive("look_at", d.look_at, any(kLength), "what is in the middle");
+  archive("from", d.from, any(kLength).or_auto(),
+          "where it stands; auto: before the scene, to the right and above, where surfaces, obstacles and the ground below them are seen as they are at the start");
+  archive("look_at", d.look_at, any(kLength).or_auto(), "what is in the middle of the picture; auto: the middle of these");
   archive("up", d.up, direction(), "what is up in the picture");
   archive("field_of_view_deg", d.field_of_view, degrees(1.0, 150.0), "vertical");
   archive("aperture", d.aperture, at_least(0.0, kLength), "radius of the lens; 0: everything is sharp; renderer path");
   archive("focus", d.focus, above(0.0, kLength).or_auto(), "distance that is sharp; auto: that of look_at");
   archive("turntable_deg", d.turntable, degrees(-36000.0, 36000.0), "how far it turns about 'up' through look_at during the scene");
   archive("keys", d.keys, {}, "places at times, joined smoothly; before the first and after the last it stands still");
-  const Vec3 sight = d.look_at - d.from;
-  archive.check(sight.norm() > 0.0, "look_at", "expected a point apart from 'from'", "the same point", "");
-  archive.check(sight.norm() == 0.0 || sight.cross(d.up).norm() > 1e-6 * sight.norm() * d.up.norm(), "up",
-                "expected a direction across the line of sight", "one along it", "");
+  if (d.from && d.look_at) {
+    const Vec3 sight = *d.look_at - *d.from;
+    archive.check(sight.norm() > 0.0, "look_at", "expected a point apart from 'from'", "the same point", "");
+    archive.check(sight.norm() == 0.0 || sight.cross(d.up).norm() > 1e-6 * sight.norm() * d.up.norm(), "up",
+                  "expected a direction across the line of sight", "one along it", "");
+  }
   for (std::size_t k = 1; k < d.keys.size(); ++k) {
     archive.check(d.keys[k - 1].time < d.keys[k].time, "keys[" + std::to_string(k) + "].time", "expected a later time than the key before",
                   number_text(d.keys[k].time), "");

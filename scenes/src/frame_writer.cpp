@@ -225,7 +225,7 @@ void FrameWriter::add_to_animation(const Simulation& simulation, const std::vect
   for (const Mesh& mesh : obstacles) all.push_back(&mesh);
   const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
   std::vector<io::UsdCamera> cameras;
-  for (const CameraDesc& desc : cameras_of(scene_)) {
+  for (const CameraDesc& desc : simulation.model().cameras) {
     const render::Camera at = camera_at(desc, simulation.time(), scene_.duration);
     cameras.push_back({desc.name.empty() ? "camera" : desc.name, at.from, at.look_at, at.up, at.field_of_view,
                        static_cast<double>(size.at(0)) / size.at(1)});

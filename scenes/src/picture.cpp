@@ -187,7 +187,7 @@ void ScenePictures::add(render::Item item, std::string name) {
 
 void ScenePictures::limit_meshes(Simulation& simulation) const {
   std::vector<render::Camera> cameras;
-  for (const CameraDesc& desc : cameras_of(scene_)) cameras.push_back(camera_at(desc, simulation.time(), scene_.duration));
+  for (const CameraDesc& desc : simulation.model().cameras) cameras.push_back(camera_at(desc, simulation.time(), scene_.duration));
   const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
   const double aspect = static_cast<double>(size.at(0)) / size.at(1);
   if (scene_.render.renderer == RendererName::Gl) {
@@ -328,7 +328,7 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
 }
 
 render::Image ScenePictures::draw(Simulation& simulation, std::size_t camera, render::LinearImage* linear) {
-  view_.camera = camera_at(cameras_of(scene_)[camera], simulation.time(), scene_.duration);
+  view_.camera = camera_at(simulation.model().cameras[camera], simulation.time(), scene_.duration);
   warn_inside(simulation, camera);
   const std::vector<FixedBody>& fixed = simulation.model().fixed;
   const bool led = std::any_of(fixed.begin(), fixed.end(), [](const FixedBody& body) { return body.led(); });

@@ -100,7 +100,7 @@ class ReadArchive {
   }
 
   template <class T>
-    requires std::same_as<T, double> || std::same_as<T, int> || std::same_as<T, bool>
+    requires std::same_as<T, double> || std::same_as<T, int> || std::same_as<T, bool> || std::same_as<T, Vec3>
   void read(const Node& node, const std::string& path, std::optional<T>& value, const Rule& rule) {
     if (rule.automatic && node.kind == Node::Kind::Scalar && node.text == "auto") return;
     const std::size_t before = faults_.count();

@@ -4,10 +4,12 @@
 #include <cmath>
 
 #include "audits.h"
+#include "camera.h"
 #include "frame.h"
 #include "held_volumes.h"
 #include "model_faults.h"
 #include "overload.h"
+#include "picture.h"
 #include "pieces.h"
 #include "read_scene_faults.h"
 #include "rest.h"
@@ -87,6 +89,7 @@ struct Simulation::Impl {
     form_awake();
     state.halvings = first_halvings(scene, model, integrator, laws, state);
     book_audits();
+    place_cameras();
     warnings = find_odd_start(context(), state.particles, pulled);
   }
 
@@ -102,6 +105,26 @@ struct Simulation::Impl {
             .time = time(),
             .awake = awake.size() < bodies.size() ? &awake : nullptr,
             .sticks = &state.sticks};
+  }
+
+  /// Cameras that the scene leaves open see what is there now, and the ground below it.
+  void place_cameras() {
+    const std::span<const CameraDesc> cameras = cameras_of(scene);
+    Box seen;
+    if (std::any_of(cameras.begin(), cameras.end(), is_open)) {
+      pull_fields();
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const LookDesc& look = scene.objects[bodies[i].object].look;
+        if (!bodies[i].skeleton.primitive.empty() && (look.surface || look.wireframe)) seen = seen.united(pulled.field[i].surface_box());
+      }
+      const std::vector<Mesh> obstacles = obstacle_meshes(scene, model, time());
+      for (std::size_t i = 0; i < obstacles.size(); ++i) {
+        if (scene.obstacles[i].shape == ObstacleName::Plane) continue;
+        for (const Vec3& p : obstacles[i].position) seen.include(p);
+      }
+      if (scene.ground && scene.ground->visible && !seen.empty()) seen.lower.z() = std::min(seen.lower.z(), scene.ground->height);
+    }
+    model.cameras = placed_cameras(scene, seen);
   }
 
   /// Bodies, rules and frames for the present pieces.

@@ -11,6 +11,7 @@
 #include "supple/render/renderer.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
 namespace {
@@ -55,7 +56,7 @@ TEST(Camera, TurnsAboutWhatItLooksAt) {
   desc.look_at = Vec3(0, 0, 0.5);
   desc.turntable = 2.0 * M_PI;
   EXPECT_LT((camera_at(desc, 0.25, 1.0).from - Vec3(3, 0, 1)).norm(), 1e-12);
-  EXPECT_LT((camera_at(desc, 1.0, 1.0).from - desc.from).norm(), 1e-12);
+  EXPECT_LT((camera_at(desc, 1.0, 1.0).from - *desc.from).norm(), 1e-12);
 }
 
 TEST(Camera, PassesItsKeysAndRestsAtBothEnds) {
@@ -70,6 +71,69 @@ TEST(Camera, PassesItsKeysAndRestsAtBothEnds) {
   const Vec3 after = (camera_at(desc, 2.0 + h, 5.0).from - camera_at(desc, 2.0, 5.0).from) / h;
   EXPECT_LT((before - after).norm(), 1e-4);
   EXPECT_LT((camera_at(desc, 1.0 + h, 5.0).from - desc.keys[0].from).norm() / h, 1e-4);
+}
+
+/// Where a point is in the picture, -1 to 1 in both directions.
+Eigen::Vector2d seen_at(const render::Camera& camera, double aspect, const Vec3& p) {
+  const Vec3 back = (camera.from - camera.look_at).normalized(), right = camera.up.cross(back).normalized(), up = back.cross(right);
+  const Vec3 x = p - camera.from;
+  const double scale = -1.0 / (x.dot(back) * std::tan(0.5 * camera.field_of_view));
+  return {scale * x.dot(right) / aspect, scale * x.dot(up)};
+}
+
+TEST(Camera, WithoutAPlaceHoldsAllThatIsThereInFourFifthsOfThePicture) {
+  Scene scene;
+  scene.output.images = ImagesDesc{.size = {200, 100}};
+  scene.cameras.resize(3);
+  scene.cameras[1].look_at = Vec3(1, 2, 3);
+  scene.cameras[2].field_of_view = 1.5;
+  for (const Box& box : {Box{Vec3(-1, -2, 0), Vec3(1, 2, 0.5)}, Box{Vec3(-3, 0, 0), Vec3(3, 0.1, 0.1)}, Box{Vec3(1000, 0, 0), Vec3(1000.01, 0.02, 0.03)}}) {
+    for (const CameraDesc& desc : placed_cameras(scene, box)) {
+      const render::Camera camera = camera_at(desc, 0.0, 1.0);
+      double most = 0.0;
+      for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 p((corner & 1 ? box.upper : box.lower).x(), (corner & 2 ? box.upper : box.lower).y(), (corner & 4 ? box.upper : box.lower).z());
+        EXPECT_GT((camera.from - p).dot(camera.from - camera.look_at), 0.0);
+        most = std::max(most, seen_at(camera, 2.0, p).cwiseAbs().maxCoeff());
+      }
+      EXPECT_NEAR(most, 0.8, 1e-6);  // 1e-16 of 1 km over 1 cm, and some
+    }
+  }
+  EXPECT_EQ(placed_cameras(scene, Box{Vec3(-1, -2, 0), Vec3(1, 2, 0.5)})[0].look_at, Vec3(0, 0, 0.25));
+  EXPECT_EQ(placed_cameras(scene, Box{Vec3(-1, -2, 0), Vec3(1, 2, 0.5)})[1].look_at, Vec3(1, 2, 3));
+  EXPECT_EQ(placed_cameras(scene, Box())[0].look_at, Vec3(0, 0, 0));  // nothing to see: any place will do
+}
+
+TEST(Camera, WithAPlaceAloneLooksAtTheMiddleOfWhatIsThere) {
+  Scene scene;
+  scene.camera.from = Vec3(0, -5, 2);
+  const Box box{Vec3(-1, -2, 0), Vec3(1, 2, 0.5)};
+  EXPECT_EQ(placed_cameras(scene, box)[0].from, Vec3(0, -5, 2));
+  EXPECT_EQ(placed_cameras(scene, box)[0].look_at, Vec3(0, 0, 0.25));
+  scene.camera.from = Vec3(0, 0, 0.25);
+  EXPECT_NE(placed_cameras(scene, box)[0].look_at, scene.camera.from);
+}
+
+TEST(Camera, WithoutAPlaceSeesSurfacesObstaclesAndTheGroundBelow) {
+  const auto placed = [](const std::string& rest) {
+    Scene scene = parse_scene(R"(
+schema: 1
+duration: 0.1 s
+objects:
+  - name: ball
+    particles: {arrange: single, at: [3, 2, 1], mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+)" + rest, "looks.yaml", ".");
+    return *Simulation(std::move(scene)).model().cameras.at(0).look_at;
+  };
+  EXPECT_LT((placed("") - Vec3(3, 2, 1)).norm(), 1e-9);
+  const Vec3 low = placed("ground: {height: -1}\n");
+  EXPECT_LT((low.head<2>() - Vec3(3, 2, 0).head<2>()).norm(), 1e-9);
+  EXPECT_NEAR(low.z(), 0.5 * (1.0 + 0.5 * std::sqrt(1.0 - std::cbrt(0.5)) - 1.0), 0.05);  // a bound of the ball's top
+  EXPECT_EQ(placed("ground: {height: -1, visible: false}\n"), placed(""));
+  const Vec3 beside = placed("obstacles: [{name: block, shape: box, at: [5, 2, 1], half_sizes: [0.5, 0.5, 0.5]}]\n");
+  EXPECT_GT(beside.x(), 3.8);
+  EXPECT_EQ(placed("obstacles: [{name: floor, shape: plane, at: [5, 2, -9]}]\n"), placed(""));
 }
 
 TEST(Camera, SeesBoxesAndTheirShadows) {

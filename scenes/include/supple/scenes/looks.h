@@ -51,8 +51,8 @@ struct CameraKeyDesc {
 /// camera, cameras[]
 struct CameraDesc {
   std::string name;                   ///< empty: the only one
-  Vec3 from = Vec3(0.4, -2.6, 1.4);
-  Vec3 look_at = Vec3::Zero();
+  std::optional<Vec3> from;           ///< absent: where all that is there at the start is seen (`Model::cameras`)
+  std::optional<Vec3> look_at;        ///< absent: the middle of that
   Vec3 up = Vec3::UnitZ();
   double field_of_view = 0.61;        ///< vertical [rad] (key field_of_view_deg)
   double aperture = 0.0;              ///< radius of the lens [m]

@@ -74,6 +74,7 @@ struct Model {
   collision::ContactSettings contact;
   collision::ReactionSettings reaction;
   collision::BulgeSettings bulge;
+  std::vector<CameraDesc> cameras;        ///< of the scene, with their places; empty until a Simulation has them
   MeshingDesc meshing;                    ///< how surfaces become meshes
   double cell = 0.0;                      ///< that of objects that ask for none of their own [m]; 0 when nothing has a surface
   double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
