@@ -73,6 +73,35 @@ vec3 filmic(vec3 radiance) {
 }
 )";
 
+/// A GGX lobe over a diffuse base, as in path/bsdf.h, by cosines from the normal; what reflects less than any solid has no lobe.
+const char* const kMaterial = R"(
+float grazing_of(vec3 normal_reflectance) {
+  return min(50.0 * max(max(normal_reflectance.r, normal_reflectance.g), normal_reflectance.b), 1.0);
+}
+
+vec3 fresnel_of(vec3 normal_reflectance, float cosine) {   // Schlick 1994
+  float c = 1.0 - cosine;
+  return normal_reflectance + (grazing_of(normal_reflectance) - normal_reflectance) * (c * c * c * c * c);
+}
+
+// Of the base: what goes in or out under that angle (Ashikhmin & Shirley 2000, eq. 5).
+float base_share(float grazing, float cosine) {
+  float s = 1.0 - 0.5 * cosine;
+  return 1.0 - grazing * (s * s * s * s * s);
+}
+
+// Reflectance of the base over its albedo, for light from one direction.
+vec3 base_of(vec3 normal_reflectance, float out_cosine, float in_cosine) {
+  float grazing = grazing_of(normal_reflectance);
+  return (1.0 - normal_reflectance) * (base_share(grazing, out_cosine) * base_share(grazing, in_cosine) / (1.0 - 5.0 / 28.0 * grazing));
+}
+
+// The same for even light from all around.
+vec3 base_of(vec3 normal_reflectance, float out_cosine) {
+  return (1.0 - normal_reflectance) * base_share(grazing_of(normal_reflectance), out_cosine);
+}
+)";
+
 /// What becomes of light: a colour of the display over the background, or radiance and cover for compositing.
 const char* const kShown = R"(
 #ifdef SCENE_LINEAR
@@ -196,7 +225,9 @@ vec3 area_light(vec3 p, vec3 n, vec3 v, vec3 albedo, vec3 normal_reflectance, fl
     vec3 c = area_centre[i];
     vec3 front = normalize(cross(area_u[i], area_v[i]));
     float lit = dot(p - c, front) > 0.0 ? area_visibility(i, p, n) : 0.0;
-    sum += area_radiance[i] * albedo * (lit * rectangle_share(p, n, c, area_u[i], area_v[i]));
+    float nv = max(dot(n, v), 0.08);
+    vec3 base = base_of(normal_reflectance, nv, max(dot(n, normalize(c - p)), 0.0));
+    sum += area_radiance[i] * albedo * base * (lit * rectangle_share(p, n, c, area_u[i], area_v[i]));
     float t = dot(c - p, front) / min(dot(mirrored, front), -1e-3);
     vec3 hit = p + mirrored * max(t, 0.0) - c;
     float u = clamp(dot(hit, area_u[i]) / dot(area_u[i], area_u[i]), -1.0, 1.0);
@@ -207,13 +238,12 @@ vec3 area_light(vec3 p, vec3 n, vec3 v, vec3 albedo, vec3 normal_reflectance, fl
     vec3 h = normalize(l + v);
     float nh = max(dot(n, h), 0.0);
     float nl = max(dot(n, l), 0.0);
-    float nv = max(dot(n, v), 0.08);
     float area = 4.0 * length(area_u[i]) * length(area_v[i]);
     // The lobe is widened by the light's angular size and keeps its energy.
     float wide = min(sqrt(a2) + 0.5 * sqrt(area / d2), 1.0);
     float spread = nh * nh * (a2 - 1.0) + 1.0;
     float lobe = a2 / (spread * spread) * (a2 / (wide * wide)) * 0.25 / (nl * nv + 0.05);
-    vec3 fresnel = normal_reflectance + (1.0 - normal_reflectance) * pow(1.0 - max(dot(v, h), 0.0), 5.0);
+    vec3 fresnel = fresnel_of(normal_reflectance, max(dot(v, h), 0.0));
     float seen_share = min(nl * max(-dot(l, front), 0.0) * area / (d2 * 3.14159265), 1.0);
     sum += area_radiance[i] * fresnel * (lit * lobe * seen_share);
   }
@@ -345,15 +375,14 @@ vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   float spread = nh * nh * (a2 - 1.0) + 1.0;
   float d = a2 / (spread * spread);
   float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
-  vec3 fresnel = normal_reflectance + (1.0 - normal_reflectance) * pow(1.0 - vh, 5.0);
-  vec3 radiance = sun * (nl * visible) * (albedo * (1.0 - fresnel) + d * smith * fresnel);
+  vec3 radiance = sun * (nl * visible) * (albedo * base_of(normal_reflectance, nv, nl) + d * smith * fresnel_of(normal_reflectance, vh));
 
   // Occlusion with the light that an occluder of the same colour sends back (Jimenez et al. 2016).
   float ao = item_visibility(depth);
   vec3 many = max(vec3(ao), ((2.0404 * albedo - 0.3324) * ao + (-4.7951 * albedo + 0.6417)) * ao * ao +
                                 (2.7552 * albedo + 0.6903) * ao);
   vec3 around = mix(bounce, sky, 0.5 + 0.5 * n.z);
-  radiance += albedo * around * many;
+  radiance += albedo * base_of(normal_reflectance, nv) * around * many;
 
   // The studio in the mirror: sky over floor, and a broad soft box opposite the sun. Split sum by Karis 2013.
   vec3 mirrored = reflect(-v, n);
@@ -363,7 +392,7 @@ vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   seen += sky * 1.6 * smoothstep(0.80 - 0.4 * roughness, 0.90 + 0.1 * roughness, dot(mirrored, box));
   vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
   float split = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
-  vec3 gloss = normal_reflectance * (-1.04 * split + r.z) + (1.04 * split + r.w);
+  vec3 gloss = normal_reflectance * (-1.04 * split + r.z) + grazing_of(normal_reflectance) * (1.04 * split + r.w);
   radiance += seen * gloss * ao;
 #ifdef AREA_LIGHTS
   radiance += area_light(p, n, v, albedo, normal_reflectance, a2);
@@ -410,7 +439,7 @@ void main() {
 }
 
 std::string lit_ground(const Lighting& lighting) {
-  return std::string(kVersion) + choices(lighting) + kDisc + kGeometry + kPixel + kShadow + kLight + kShown + lights(lighting) +
+  return std::string(kVersion) + choices(lighting) + kDisc + kGeometry + kPixel + kShadow + kLight + kMaterial + kShown + lights(lighting) +
          kGroundLight + R"(
 void main() {
   vec3 ray = eye_ray(gl_FragCoord.xy);
@@ -424,7 +453,7 @@ void main() {
 std::string lit_items(const Lighting& lighting) {
   return header(lighting.samples) + choices(lighting) +
          (lighting.painted ? painted_access(lighting.samples) : std::string("#define ALBEDO(at, s) vec3(0.0)\n")) + kDisc + kGeometry +
-         kPixel + kShadow + kLight + kShown + lights(lighting) + kGroundLight + kItemLight + R"(
+         kPixel + kShadow + kLight + kMaterial + kShown + lights(lighting) + kGroundLight + kItemLight + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 ray = eye_ray(gl_FragCoord.xy);

@@ -2,6 +2,7 @@
 // rectangles, patterns of the ground.
 #include <cmath>
 
+#include "path/bsdf.h"
 #include "shapes.h"
 #include "supple/render/renderer.h"
 #include "support.h"
@@ -68,6 +69,41 @@ TEST(SceneLinear, IsTheRadianceOfTheGroundUnderSunAndSky) {
       }
       EXPECT_EQ(found[3], 1.0);
     }
+  }
+}
+
+TEST(SceneLinear, IsWhatTheMaterialSendsBackOfTheSun) {
+  // The bidirectional reflectance has a closed form; the sky is the same with and without the sun.
+  Mesh plate;
+  add_quadrangle(plate, Vec3(-1, -1, 0), Vec3(1, -1, 0), Vec3(1, 1, 0), Vec3(-1, 1, 0));
+  const Vec3 to_sun = Vec3(0.4, 0.3, 0.6).normalized();
+  for (const RendererKind kind : renderers()) {
+    RenderSettings settings = settings_for(kind, 8);
+    settings.shadow_softness = 1e-3;
+    const std::unique_ptr<Renderer> renderer = make_renderer(settings);
+    for (const double reflectance : {0.0, 0.01, 0.04})
+      for (const double elevation : {1.4, 0.8, 0.35}) {
+        const Item item{.mesh = &plate, .colour = Vec3::Constant(srgb(0.5)), .roughness = 0.6, .reflectance = reflectance};
+        View view;
+        const Vec3 to_eye(0, -std::cos(elevation), std::sin(elevation));
+        view.camera = {.from = 50.0 * to_eye, .look_at = Vec3::Zero(), .up = Vec3(0, 0.6, 0.8), .field_of_view = 2e-3};
+        view.light = {.direction = -to_sun, .intensity = 2.0};
+        const std::array<double, 4> lit = mean(light_of(*renderer, view, std::span(&item, 1)));
+        view.light.intensity = 0.0;
+        const std::array<double, 4> dark = mean(light_of(*renderer, view, std::span(&item, 1)));
+        using path::Vec3f;
+        path::Bsdf bsdf;
+        bsdf.diffuse = Vec3f::Constant(0.5F);
+        bsdf.normal_reflectance = Vec3f::Constant(static_cast<float>(reflectance));
+        bsdf.grazing_reflectance = static_cast<float>(std::min(1.0, 50.0 * reflectance));
+        bsdf.alpha = 0.36F;
+        const Vec3f f = bsdf.evaluate(to_eye.cast<float>(), to_sun.cast<float>());
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double expected = M_PI * static_cast<double>(f[0]) * 2.0 * kSun[k];
+          // OpenGL widens the lobe by half the sun's tangent, and a pixel has normals of 16 bits.
+          EXPECT_NEAR(lit[k] - dark[k], expected, 5e-3 * expected) << static_cast<int>(kind) << ' ' << reflectance << ' ' << elevation;
+        }
+      }
   }
 }
 
