@@ -282,6 +282,7 @@ TEST(SeparateBodies, TouchEachOther) {
   EXPECT_LE((end.momentum - start.momentum).norm(), 1e-12 * start.momentum_scale);
   EXPECT_LT(simulation.state().particles.velocity[4].x(), 0.5);  // the last one was stopped by the wall
   EXPECT_EQ(simulation.meshes().size(), 2u);
+  EXPECT_EQ(simulation.state().record.objects[0].largest_deformation, 0.0);  // none of them was deformed, though the row was
 
   const Simulation one = make(row_of_balls(false));
   EXPECT_EQ(one.bodies().size(), 2u);

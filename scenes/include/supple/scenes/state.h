@@ -20,7 +20,7 @@ namespace supple::scenes {
 /// What result.json reports about a run so far; kept over restarts, not part of the hash.
 struct RunRecord {
   struct ObjectRecord {
-    double largest_deformation = 0.0;  ///< RMS after the best rigid fit over the rest diameter [1]
+    double largest_deformation = 0.0;  ///< RMS after the best rigid fit over the rest diameter; 0 of separate bodies [1]
     double final_shape_error = 0.0;    ///< the same, now
   };
   core::Motion initial;                ///< at frame 1
