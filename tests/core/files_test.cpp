@@ -186,6 +186,8 @@ TEST_F(Files, OfMeshesAsObjCountVerticesFromOne) {
   EXPECT_EQ(text_of(path("m.obj")),
             "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nvn 1 0 0\nvn 1 0 0\nvn 1 0 0\nvn 1 0 0\n"
             "f 1//1 3//3 2//2\nf 1//1 2//2 4//4\nf 1//1 4//4 3//3\nf 2//2 3//3 4//4\n");
+  io::write_obj(path("far.obj"), tetrahedron(8.0 + 1e-9));
+  EXPECT_NE(text_of(path("far.obj")).find("v 8.000000001 0 0\n"), std::string::npos);
 }
 
 io::PointSet three_points() {

@@ -93,16 +93,17 @@ void write_ply(const std::filesystem::path& path, const Mesh& mesh) {
 void write_obj(const std::filesystem::path& path, const Mesh& mesh) {
   SUPPLE_EXPECTS(mesh.normal.size() == mesh.vertex_count());
   std::string text;
-  text.reserve(80 * mesh.vertex_count() + 40 * mesh.triangle_count());
-  const auto add = [&text](std::string_view head, const std::vector<Vec3>& vectors) {
-    for (const Vec3& v : vectors) {
-      text += head;
-      append_vector(text, v, " ");
-      text += '\n';
-    }
-  };
-  add("v ", mesh.position);
-  add("vn ", mesh.normal);
+  text.reserve(100 * mesh.vertex_count() + 40 * mesh.triangle_count());
+  for (const Vec3& p : mesh.position) {
+    text += "v ";
+    append_vector<double>(text, p, " ");
+    text += '\n';
+  }
+  for (const Vec3& n : mesh.normal) {
+    text += "vn ";
+    append_vector(text, n, " ");
+    text += '\n';
+  }
   for (const auto& t : mesh.triangle) {
     text += 'f';
     for (const std::uint32_t v : t) {

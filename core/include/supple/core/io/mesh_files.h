@@ -15,7 +15,7 @@ namespace supple::io {
 /// triangles far from the origin would collapse or cross. @throws Error{Io}
 void write_ply(const std::filesystem::path& path, const Mesh& mesh);
 
-/// Wavefront OBJ (ASCII) with normals; columns have no place in it. Numbers in single precision. @throws Error{Io}
+/// Wavefront OBJ (ASCII) with normals; columns have no place in it. Positions in double precision, as in PLY. @throws Error{Io}
 void write_obj(const std::filesystem::path& path, const Mesh& mesh);
 
 /// One named column of a table; all columns of a table have the same length.
