@@ -33,9 +33,13 @@ Number thirty_second_power(Number x) {
 
 }  // namespace
 
-bool SurfacePart::take(const Sample& sample, const Vec3f& falls) {
-  constexpr float kSameSide = 0.8F;
-  if (count > 0.0F && normal.dot(sample.facet.normal) < kSameSide * count) return false;
+bool SurfacePart::take(const Sample& sample, const Vec3f& falls, float steepness) {
+  constexpr float kSameSide = 0.8F, kSamePlane = 4.0F;
+  if (count > 0.0F) {
+    if (normal.dot(sample.facet.normal) < kSameSide * count) return false;
+    const float off = std::abs((sample.facet.position - position / count).dot(normal.normalized()));
+    if (off * steepness > kSamePlane) return false;
+  }
   normal += sample.facet.normal;
   position += sample.facet.position;
   light += falls;
@@ -184,7 +188,8 @@ void Denoiser::sort_paths() {
     for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
       if (sample.facet.cover <= 0.0F) continue;
       const Vec3f falls = sample.indirect.cwiseQuotient(sample.facet.albedo.cwiseMax(kAlbedoFloor));
-      if (!parts[0].take(sample, falls)) parts[1].take(sample, falls);
+      const float steep = steepness(sample.facet.position);
+      if (!parts[0].take(sample, falls, steep)) parts[1].take(sample, falls, steep);
     }
   }
 }

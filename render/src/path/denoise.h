@@ -22,8 +22,9 @@ struct SurfacePart {
   Vec3f light = Vec3f::Zero();  ///< that falls on it from the sky and other surfaces
   float count = 0.0F;           ///< of paths
 
-  /// A sample with a path: only if it faces the same way. @return whether it does
-  bool take(const Sample& sample, const Vec3f& falls);
+  /// A sample with a path: only if it faces the same way and lies in the same plane, to some pixels. @return whether it does
+  /// @param steepness  1 / (two pixels) where it lies [1/m]
+  bool take(const Sample& sample, const Vec3f& falls, float steepness);
 };
 
 class Denoiser {

@@ -13,6 +13,8 @@ constexpr float kOneSurface = 0.98F;         // square of the mean of unit norma
 constexpr float kSameNormal = 0.95F, kSameCover = 0.1F, kSameAlbedo = 0.03F;
 constexpr float kSameShade = 0.3F;           // difference of direct light, over (luminance + 0.1)
 constexpr float kGap = 0.05F;                // size of a pixel over the distance that its light comes from
+constexpr int kAround = 2;                   // pixels, as far as the denoiser looks for single surfaces
+constexpr std::uint8_t kMeet = 1, kInGap = 2, kEnds = 4;
 constexpr std::array<std::pair<int, int>, 4> kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
 
 /// What tells details, of eight pixels each.
@@ -69,23 +71,44 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
   const int width = film.width, height = film.height;
   const Signs signs(film, camera.eye, 2.0F * camera.half_extent.y() / static_cast<float>(height));
   const auto most = static_cast<std::uint32_t>(settings.most_samples);
+  const auto across = static_cast<std::size_t>(width);
+  std::vector<std::uint8_t> seen(across * static_cast<std::size_t>(height));
+  const auto for_rows = [&](const auto& body) {
+    executor.for_blocks(static_cast<std::size_t>(height), 8, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t row = begin; row < end; ++row) body(row, static_cast<int>(row));
+    });
+  };
+  for_rows([&](std::size_t row, int y) {
+    for (std::size_t left = 0; left < across; left += kLanes) {
+      const int x = static_cast<int>(left);
+      const LaneMask meet = signs.surfaces_meet(x, y), gap = signs.are_gaps(x, y), ends = signs.shadows_end(x, y);
+      if (!any(meet | gap | ends)) continue;
+      for (std::size_t k = 0; k < std::min(kLanes, across - left); ++k)
+        seen[row * across + left + k] = static_cast<std::uint8_t>((meet[k] & kMeet) | (gap[k] & kInGap) | (ends[k] & kEnds));
+    }
+  });
+  const auto seen_at = [&](int x, int y) { return seen[static_cast<std::size_t>(y) * across + static_cast<std::size_t>(x)]; };
+  /// Whether hardly a pixel around shows a single surface, whose light this one could have: where one sees through something.
+  const auto sees_through = [&](int x, int y) {
+    int meet = 0, all = 0;
+    for (int py = std::max(0, y - kAround); py <= std::min(height - 1, y + kAround); ++py)
+      for (int px = std::max(0, x - kAround); px <= std::min(width - 1, x + kAround); ++px, ++all) meet += seen_at(px, py) & kMeet;
+    return 5 * meet >= 4 * all;
+  };
   std::vector<std::vector<DetailedPixel>> found(static_cast<std::size_t>(height));
-  executor.for_blocks(static_cast<std::size_t>(height), 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t row = begin; row < end; ++row)
-      for (int left = 0, y = static_cast<int>(row); left < width; left += static_cast<int>(kLanes)) {
-        const LaneMask meet = signs.surfaces_meet(left, y), gap = signs.are_gaps(left, y), ends = signs.shadows_end(left, y);
-        if (!any(meet | gap | ends)) continue;
-        for (std::size_t k = 0; k < std::min(kLanes, static_cast<std::size_t>(width - left)); ++k) {
-          if ((meet[k] | gap[k] | ends[k]) == 0) continue;
-          const int x = left + static_cast<int>(k);
-          const auto samples = static_cast<std::uint32_t>(film.samples.at(x, y));
-          const Detail detail = meet[k] != 0 ? Detail::Surfaces : gap[k] != 0 ? Detail::Gap : Detail::Shadow;
-          const std::uint32_t asked = detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples;
-          const std::uint32_t rays = std::min(most, asked);
-          if (rays > samples || detail == Detail::Surfaces)
-            found[row].push_back({.x = x, .y = y, .detail = detail, .rays = rays, .walks = gap[k] != 0, .samples = 0});
-        }
-      }
+  for_rows([&](std::size_t row, int y) {
+    for (int x = 0; x < width; ++x) {
+      const std::uint8_t here = seen_at(x, y);
+      const bool through = sees_through(x, y);
+      if (here == 0 && !through) continue;
+      const auto samples = static_cast<std::uint32_t>(film.samples.at(x, y));
+      const Detail detail = (here & kMeet) != 0 || through ? Detail::Surfaces : (here & kInGap) != 0 ? Detail::Gap : Detail::Shadow;
+      const std::uint32_t asked = detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples;
+      const std::uint32_t rays = std::min(most, asked);
+      const bool walks = (here & kInGap) != 0 || through;
+      if (rays > samples || detail == Detail::Surfaces)
+        found[row].push_back({.x = x, .y = y, .detail = detail, .rays = rays, .walks = walks, .samples = 0});
+    }
   });
   film.detailed.clear();
   std::size_t samples = 0;
