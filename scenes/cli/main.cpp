@@ -212,8 +212,10 @@ int check(const Arguments& arguments) {
   const scenes::Simulation simulation(scene, simulation_options(1));
   for (const std::string& warning : simulation.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
-    std::printf("%s: no fault found (%zu objects, %zu particles, %d frames)\n", arguments.scene.c_str(),
-                scene.objects.size(), simulation.model().particles.size(), scene.frame_count());
+    const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
+    const std::size_t objects = scene.objects.size(), particles = simulation.model().particles.size();
+    std::printf("%s: no fault found (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(), objects, plural(objects),
+                particles, plural(particles), scene.frame_count());
   }
   return 0;
 }
