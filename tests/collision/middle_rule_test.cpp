@@ -276,23 +276,31 @@ ContactSurface::Summary on_a_plane(const RoundBox& box, double error, const impl
   return s;
 }
 
-TEST(FacesOnFaces, HaveHolesWhereASmallThirdBodyPressesBetweenThePointsOfTheRule) {
-  // Of a fortieth of the patch, anywhere on it.
-  constexpr double kRadius = 0.018;
-  const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + 0.85 * kEdge), Quat::Identity()});
+/// Balls anywhere on the patch of a box on a plane, against a fine rule. @param solved  (error, third body, its place, its modulus)
+template <class Solved>
+void expect_bounds_beside_balls(double radius, const Solved& solved) {
   for (int i = 0; i < 20; ++i) {
     const auto part = [i](double step) { return std::fmod(0.37 + step * i, 1.0); };
-    const Vec3 at(2.2 * kCore.x() * (part(0.732) - 0.5), 2.2 * kCore.y() * (part(0.236) - 0.5), 0.3 * kRadius * part(0.618));
+    const Vec3 at(2.2 * kCore.x() * (part(0.732) - 0.5), 2.2 * kCore.y() * (part(0.236) - 0.5), 0.3 * radius * part(0.618));
     const double modulus = 0.3 + 2.0 * part(0.414);
-    const Ball ball(at, kRadius);
+    const Ball ball(at, radius);
     const implicit::FieldView third = ball.field;
-    const ContactSurface::Summary fine = on_a_plane(box, 1e-5, &third, at, modulus);
+    const ContactSurface::Summary fine = solved(1e-5, &third, at, modulus);
     for (const double error : {1e-2, 1e-3, 1e-4}) {
-      const ContactSurface::Summary s = on_a_plane(box, error, &third, at, modulus);
+      const ContactSurface::Summary s = solved(error, &third, at, modulus);
       EXPECT_LE(difference(s, fine.force, fine.area, fine.centre_of_pressure), s.error_estimate + fine.error_estimate)
           << at.transpose() << ' ' << modulus << ' ' << error;
     }
   }
+}
+
+TEST(FacesOnFaces, HaveHolesWhereASmallThirdBodyPressesBetweenThePointsOfTheRule) {
+  // Of a fortieth of the patch, anywhere on it.
+  constexpr double kRadius = 0.018;
+  const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + 0.85 * kEdge), Quat::Identity()});
+  expect_bounds_beside_balls(kRadius, [&](double error, const implicit::FieldView* third, const Vec3& at, double modulus) {
+    return on_a_plane(box, error, third, at, modulus);
+  });
 }
 
 TEST(FacesOnFaces, StopWhereAThirdBodyPressesHarder) {
@@ -318,20 +326,7 @@ TEST(FacesOnFaces, StopWhereAThirdBodyPressesHarder) {
       EXPECT_LE((s.centre_of_pressure - exact.first / exact.force).norm(), most * std::sqrt(whole)) << at.transpose() << ' ' << error;
     }
   }
-  // Anywhere, against a fine rule.
-  for (int i = 0; i < 20; ++i) {
-    const auto part = [i](double step) { return std::fmod(0.37 + step * i, 1.0); };
-    const Vec3 at(2.2 * kCore.x() * (part(0.732) - 0.5), 2.2 * kCore.y() * (part(0.236) - 0.5), 0.3 * kRadius * part(0.618));
-    const double modulus = 0.3 + 2.0 * part(0.414);
-    const Ball ball(at, kRadius);
-    const implicit::FieldView third = ball.field;
-    const ContactSurface::Summary fine = solved(1e-5, &third, at, modulus);
-    for (const double error : {1e-2, 1e-3, 1e-4}) {
-      const ContactSurface::Summary s = solved(error, &third, at, modulus);
-      EXPECT_LE(difference(s, fine.force, fine.area, fine.centre_of_pressure), s.error_estimate + fine.error_estimate)
-          << at.transpose() << ' ' << modulus << ' ' << error;
-    }
-  }
+  expect_bounds_beside_balls(kRadius, solved);
 }
 
 }  // namespace

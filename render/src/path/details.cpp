@@ -88,7 +88,7 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
     }
   });
   const auto seen_at = [&](int x, int y) { return seen[static_cast<std::size_t>(y) * across + static_cast<std::size_t>(x)]; };
-  /// Whether hardly a pixel around shows a single surface, whose light this one could have: where one sees through something.
+  // Whether hardly a pixel around shows a single surface, whose light this one could have: where one sees through something.
   const auto sees_through = [&](int x, int y) {
     int meet = 0, all = 0;
     for (int py = std::max(0, y - kAround); py <= std::min(height - 1, y + kAround); ++py)
