@@ -28,6 +28,10 @@ class PatchComplex {
 
     [[nodiscard]] bool has(Vertex v) const { return vertex[0] == v || vertex[1] == v || vertex[2] == v; }
     [[nodiscard]] std::size_t place_of(Vertex v) const { return vertex[0] == v ? 0 : vertex[1] == v ? 1 : 2; }
+    /// The corner opposite to an edge.
+    [[nodiscard]] Vertex apex(Vertex a, Vertex b) const {
+      return vertex[0] != a && vertex[0] != b ? vertex[0] : vertex[1] != a && vertex[1] != b ? vertex[1] : vertex[2];
+    }
     [[nodiscard]] bool same_patch(const Triangle& t) const { return inner == t.inner && outer == t.outer; }
   };
   /// Those at an edge.

@@ -135,6 +135,15 @@ struct Figures {
 
 std::vector<FieldView> views_of(const std::vector<testing::FunctionField>& fields) { return {fields.begin(), fields.end()}; }
 
+void add(const std::vector<Mesh>& meshes, Hasher& hasher) {
+  for (const Mesh& mesh : meshes) {
+    hasher.add(std::span<const Vec3>(mesh.position));
+    for (const auto& t : mesh.triangle) {
+      for (const std::uint32_t v : t) hasher.add(std::uint64_t{v});
+    }
+  }
+}
+
 void rims(int sets, double cell) {
   for (const int count : {2, 3, 4, 6}) {
     Figures rim, point, near;
@@ -150,12 +159,7 @@ void rims(int sets, double cell) {
       const double start = cpu_seconds();
       const std::vector<Mesh> meshes = polygonise_partition(views, {.origin = Vec3(0.0137, -0.0071, 0.0229), .cell = cell}, Executor(1), &counts);
       seconds += cpu_seconds() - start;
-      for (const Mesh& mesh : meshes) {
-        hasher.add(std::span<const Vec3>(mesh.position));
-        for (const auto& t : mesh.triangle) {
-          for (const std::uint32_t v : t) hasher.add(std::uint64_t{v});
-        }
-      }
+      add(meshes, hasher);
       all.junctions += counts.junctions;
       all.junctions_moved += counts.junctions_moved;
       all.rim_points += counts.rim_points;
@@ -191,6 +195,7 @@ void delaunay(int sets, double size) {
     int held = 0, divided = 0;
     std::size_t most = 0;
     double seconds = 0.0;
+    Hasher hasher;
     for (int set = 1; set <= sets; ++set) {
       std::vector<testing::FunctionField> fields;
       for (const Ball& ball : random_balls(static_cast<std::uint64_t>(set), count)) fields.push_back(testing::sphere(ball.centre, ball.radius));
@@ -204,9 +209,10 @@ void delaunay(int sets, double size) {
       std::size_t triangles = 0;
       for (const Mesh& mesh : meshes) triangles += mesh.triangle_count();
       most = std::max(most, triangles);
+      add(meshes, hasher);
     }
-    std::printf("{\"balls\":%d,\"sets\":%d,\"held\":%d,\"divided_by_tetrahedra\":%d,\"most_triangles\":%zu,\"s\":%.2f}\n", count, sets, held, divided,
-                most, seconds);
+    std::printf("{\"balls\":%d,\"sets\":%d,\"held\":%d,\"divided_by_tetrahedra\":%d,\"most_triangles\":%zu,\"s\":%.2f,\"hash\":\"%s\"}\n", count, sets, held, divided,
+                most, seconds, to_hex(hasher.value()).c_str());
     std::fflush(stdout);
   }
 }

@@ -1,0 +1,17 @@
+/// @file patch_refine.h
+/// Vertices for the bad triangles of a PatchComplex: circumcentres, taken to the surface (Chew 1993), and points of the rims that these
+/// would come too near to (Ruppert 1995).
+#pragma once
+
+#include "patch_complex.h"
+#include "patch_surface.h"
+#include "supple/implicit/delaunay.h"
+
+namespace supple::implicit {
+
+/// Adds vertices until angle, size and distance hold, but for the angle where rims meet at a sharper one.
+/// @return false where edges become ever shorter
+/// @throws Error{Limit} when most_vertices do not reach the bounds
+[[nodiscard]] bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, PatchComplex& complex, DelaunayReport& report);
+
+}  // namespace supple::implicit
