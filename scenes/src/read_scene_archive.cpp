@@ -34,6 +34,16 @@ std::string_view our_word(std::string_view key) {
   return "";
 }
 
+std::string expected_text(FieldType type, const Rule& rule) {
+  return "expected " + expectation(type, {}, rule) + (rule.automatic ? ", or auto" : "");
+}
+
+/// For a word where a number or `auto` belongs.
+std::string automatic_hint(std::string_view text, const Rule& rule) {
+  constexpr std::array<std::string_view, 1> kWords{"auto"};
+  return rule.automatic && !nearest_word(text, kWords).empty() ? "did you mean 'auto'?" : "";
+}
+
 /// Where else a key of this name exists: "objects.particles", or "" when nowhere or at the top.
 std::string home_of(std::string_view key, const std::vector<FieldInfo>& list, const std::string& path) {
   for (const FieldInfo& info : list) {
@@ -89,38 +99,38 @@ void ReadArchive::finish() {
 }
 
 void ReadArchive::read(const Node& node, const std::string& path, double& value, const Rule& rule) {
-  const std::string expected = "expected " + rule_text(rule, false);
+  const std::string expected = expected_text(FieldType::Number, rule);
   if (node.kind != Node::Kind::Scalar) {
     fault(node, path, expected, "");
     return;
   }
   const QuantityText text = read_quantity(node.text, rule.quantity);
   if (!text.ok || !rule.holds(text.value)) {
-    fault(node, path, expected, text.hint);
+    fault(node, path, expected, text.hint.empty() ? automatic_hint(node.text, rule) : text.hint);
     return;
   }
   value = rule.degrees ? text.value * kDegree : text.value;
 }
 
 void ReadArchive::read(const Node& node, const std::string& path, int& value, const Rule& rule) {
-  const std::string expected = "expected " + rule_text(rule, true);
+  const std::string expected = expected_text(FieldType::Whole, rule);
   if (node.kind != Node::Kind::Scalar) {
     fault(node, path, expected, "");
     return;
   }
   const WholeText text = read_whole(node.text);
   if (!text.ok || !rule.holds(static_cast<double>(text.value)) || std::abs(text.value) > 2'000'000'000) {
-    fault(node, path, expected, text.hint);
+    fault(node, path, expected, text.hint.empty() ? automatic_hint(node.text, rule) : text.hint);
     return;
   }
   value = static_cast<int>(text.value);
 }
 
-void ReadArchive::read(const Node& node, const std::string& path, bool& value, const Rule& /*rule*/) {
+void ReadArchive::read(const Node& node, const std::string& path, bool& value, const Rule& rule) {
   if (node.kind == Node::Kind::Scalar && !node.quoted && (node.text == "true" || node.text == "false")) {
     value = node.text == "true";
   } else {
-    fault(node, path, "expected true or false", "");
+    fault(node, path, expected_text(FieldType::Boolean, rule), node.kind == Node::Kind::Scalar ? automatic_hint(node.text, rule) : "");
   }
 }
 
@@ -137,13 +147,15 @@ void ReadArchive::read(const Node& node, const std::string& path, std::string& v
 void ReadArchive::read(const Node& node, const std::string& path, Vec3& value, const Rule& rule) {
   const std::size_t least = rule.least_items == 0 ? 3 : rule.least_items;
   if (node.kind != Node::Kind::List || node.items.size() < least || node.items.size() > 3) {
-    fault(node, path, "expected " + expectation(FieldType::Vector, {}, rule), "");
+    fault(node, path, expected_text(FieldType::Vector, rule), node.kind == Node::Kind::Scalar ? automatic_hint(node.text, rule) : "");
     return;
   }
   const std::size_t before = faults_.count();
   Vec3 read_value = Vec3::Zero();
+  Rule each = rule;
+  each.automatic = false;  // the vector as a whole
   for (std::size_t i = 0; i < node.items.size(); ++i) {
-    read(*node.items[i], path + '[' + std::to_string(i) + ']', read_value[static_cast<Eigen::Index>(i)], rule);
+    read(*node.items[i], path + '[' + std::to_string(i) + ']', read_value[static_cast<Eigen::Index>(i)], each);
   }
   if (faults_.count() != before) return;
   if (rule.direction && !(read_value.norm() > 1e-150 && read_value.norm() < 1e150)) {

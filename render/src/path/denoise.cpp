@@ -116,6 +116,16 @@ void Denoiser::rows(const Body& body) const {
   });
 }
 
+/// Rows that lie `stride` apart one after the other: two of the three that a row asks for are then in the nearest cache.
+template <class Body>
+void Denoiser::rows_apart(int stride, const Body& body) const {
+  const int height = film_->height, longest = (height + stride - 1) / stride;
+  executor_->for_blocks(static_cast<std::size_t>(stride * longest), 16, [&](std::size_t begin, std::size_t end) {
+    for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k)
+      if (const int y = k / longest + k % longest * stride; y < height) body(y);
+  });
+}
+
 /// Eight pixels at a time, and whether some show a surface.
 template <class Body>
 void Denoiser::blocks(int y, const Body& body) const {
@@ -242,7 +252,7 @@ void Denoiser::smooth_block(int stride, int x, int y, const std::array<Lanes, 2>
 
 void Denoiser::smooth(int stride) {
   rows([&](int y) { guide(y); });
-  rows([&](int y) {
+  rows_apart(stride, [&](int y) {
     blocks(y, [&](int x, bool any_shown) {
       if (any_shown) {
         const LaneMask shown = film_->cover.load(x, y) > 0.0F;

@@ -73,6 +73,8 @@ class Denoiser {
   template <class Body>
   void rows(const Body& body) const;
   template <class Body>
+  void rows_apart(int stride, const Body& body) const;
+  template <class Body>
   void blocks(int y, const Body& body) const;
   template <class Body>
   void shown_blocks(int y, const Body& body) const;

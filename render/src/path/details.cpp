@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 
 namespace supple::render::path {
@@ -14,6 +15,7 @@ constexpr float kSameNormal = 0.95F, kSameCover = 0.1F, kSameAlbedo = 0.03F;
 constexpr float kSameShade = 0.3F;           // difference of direct light, over (luminance + 0.1)
 constexpr float kGap = 0.05F;                // size of a pixel over the distance that its light comes from
 constexpr int kAround = 2;                   // pixels, as far as the denoiser looks for single surfaces
+constexpr int kRun = 16;                     // pixels that are passed over at once where nothing is seen
 constexpr std::uint8_t kMeet = 1, kInGap = 2, kEnds = 4;
 constexpr std::array<std::pair<int, int>, 4> kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
 
@@ -81,7 +83,9 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
   for_rows([&](std::size_t row, int y) {
     for (std::size_t left = 0; left < across; left += kLanes) {
       const int x = static_cast<int>(left);
-      const LaneMask meet = signs.surfaces_meet(x, y), gap = signs.are_gaps(x, y), ends = signs.shadows_end(x, y);
+      const LaneMask meet = signs.surfaces_meet(x, y), covered = film.cover.load(x, y) > 0.0F;
+      const bool shown = any(covered);
+      const LaneMask gap = shown ? signs.are_gaps(x, y) : LaneMask{}, ends = shown ? signs.shadows_end(x, y) : LaneMask{};
       if (!any(meet | gap | ends)) continue;
       for (std::size_t k = 0; k < std::min(kLanes, across - left); ++k)
         seen[row * across + left + k] = static_cast<std::uint8_t>((meet[k] & kMeet) | (gap[k] & kInGap) | (ends[k] & kEnds));
@@ -95,9 +99,20 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
       for (int px = std::max(0, x - kAround); px <= std::min(width - 1, x + kAround); ++px, ++all) meet += seen_at(px, py) & kMeet;
     return 5 * meet >= 4 * all;
   };
+  const auto nothing_seen = [&](int x, int y) {
+    if (y < 0) return true;
+    const std::span row = std::span(seen).subspan(static_cast<std::size_t>(y) * across, across);
+    const std::span run = row.subspan(static_cast<std::size_t>(std::max(x - kAround, 0)));
+    const auto length = std::min(run.size(), static_cast<std::size_t>(kRun + 2 * kAround));
+    return std::all_of(run.begin(), run.begin() + static_cast<std::ptrdiff_t>(length), [](std::uint8_t sign) { return sign == 0; });
+  };
   std::vector<std::vector<DetailedPixel>> found(static_cast<std::size_t>(height));
   for_rows([&](std::size_t row, int y) {
     for (int x = 0; x < width; ++x) {
+      if (x % kRun == 0 && nothing_seen(x, y) && nothing_seen(x, y + 1 < height ? y + 1 : y - 1)) {  // two of at most five rows
+        x += kRun - 1;
+        continue;
+      }
       const std::uint8_t here = seen_at(x, y);
       const bool through = sees_through(x, y);
       if (here == 0 && !through) continue;
