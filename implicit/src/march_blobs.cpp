@@ -175,12 +175,6 @@ class BlobSampler final : public Sampler {
     });
   }
 
-  /// Values have left the nearer caches since they were written.
-  static void fetch_ahead(const std::vector<float>& values) {
-    constexpr std::size_t kLine = 64 / sizeof(float);
-    for (std::size_t i = 0; i < values.size(); i += kLine) _mm_prefetch(reinterpret_cast<const char*>(&values[i]), _MM_HINT_T0);
-  }
-
   void solve(const BlockTable& table, const Block& block, Workspace& work, Mesh& mesh, std::vector<EdgePoint>& points) const {
     Bits wanted = 0;
     for (const Tile& tile : block.tile) wanted |= Bits{tile.vertices > 0} << tile.place;
@@ -188,7 +182,7 @@ class BlobSampler final : public Sampler {
     if (wanted == 0) return;
     const BlocksAbove above = blocks_above(table, block);
     for (const unsigned step : {0u, 2u, 4u}) {  // one step along x is the next block
-      if (above[step] != nullptr) fetch_ahead(above[step]->values);
+      if (above[step] != nullptr) fetch_ahead(above[step]->values.data(), above[step]->values.size());
     }
     gather(block, work, nullptr);
     blobs::EdgeBatch& edges = work.edges;

@@ -5,6 +5,8 @@
 /// and the nodes of a tile are bits x + 4 y + 16 z of a word.
 #pragma once
 
+#include <immintrin.h>
+
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -81,6 +83,14 @@ void for_tile_edges(const Tile& tile, const Use& use) {
   for (unsigned axis = 0; axis < 3; ++axis) {
     for_bits(tile.edges[axis], [&](unsigned node) { use(node, axis); });
   }
+}
+
+/// Brings what has left the nearer caches back before it is asked for.
+template <class Item>
+void fetch_ahead(const Item* items, std::size_t count) {
+  constexpr std::size_t kLine = 64;
+  const char* bytes = reinterpret_cast<const char*>(items);
+  for (std::size_t i = 0; i < count * sizeof(Item); i += kLine) _mm_prefetch(bytes + i, _MM_HINT_T0);
 }
 
 /// The tiles of a leaf.

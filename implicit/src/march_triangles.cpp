@@ -44,6 +44,7 @@ class LocalVertices {
   /// @param points  of all blocks
   void fill(const BlocksAbove& above, Bits own, const EdgePoint* points) {
     const Block& block = *above[0];
+    fetch_ahead(points + block.first_point, block.vertices);
     const std::size_t most = block.vertices + kMostBeyond;
     if (point_.size() < most) {
       point_.resize(most);
