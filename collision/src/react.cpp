@@ -125,6 +125,24 @@ class Side {
     }
   }
 
+  /// Inverse mass that a force at `centre` meets [1/kg], at most over its directions. @param load  p dA of the points
+  [[nodiscard]] double yield(std::span<const double> load, const Vec3& centre) {
+    if (body_->yield.empty()) return 0.0;
+    const auto of_part = [&](std::size_t k) {
+      return body_->yield[k].inverse_mass + (centre - body_->pose[k].position).squaredNorm() * body_->yield[k].inverse_inertia;
+    };
+    if (single()) return of_part(0);
+    std::fill(share_.begin(), share_.end(), 0.0);
+    double all = 0.0, sum = 0.0;
+    for (std::size_t i = 0; i < load.size(); ++i) {
+      for_parts(i, [&](std::size_t k, double lambda) { share_[k] += lambda * load[i]; });
+      all += load[i];
+    }
+    for (std::size_t k = 0; all > 0.0 && k < share_.size(); ++k)
+      if (share_[k] > 0.0) sum += share_[k] / all * (share_[k] / all) * of_part(k);
+    return sum;
+  }
+
   [[nodiscard]] double sign() const noexcept { return sign_; }
 
   /// Hands over what was gathered and starts again from zero.
@@ -214,6 +232,21 @@ struct PairReaction {
   bool touches = false;          ///< false: no points, and nothing else here counts
 };
 
+/// Contacts of every body that press, among which what stops it is divided; empty: nobody asks.
+using ContactCount = std::vector<std::uint32_t>;
+
+/// Speed below which friction fades out. Slower bodies lose at most kTaken times their slip within a step: 1 stops them, at 2
+/// they would go on to and fro.
+double regularisation_of(const ReactionSettings& settings, const ContactCount& contacts, const BodyPair& pair, double friction,
+                         std::span<const double> load, const Vec3& centre, Side (&sides)[2]) {
+  if (contacts.empty()) return settings.friction_speed;
+  double total = 0.0;
+  for (const double l : load) total += l;
+  const double yield = contacts[pair.a] * sides[0].yield(load, centre) + contacts[pair.b] * sides[1].yield(load, centre);
+  constexpr double kTaken = 1.6, kMollifierSlope = 2.0;
+  return std::max(settings.friction_speed, kMollifierSlope / kTaken * friction * total * settings.step * yield);
+}
+
 /// Relative velocity of two bodies where one point of both is; bodies of one part move alike everywhere.
 class Slip {
  public:
@@ -235,8 +268,8 @@ class Slip {
 
 /// The reaction of pair k, whose points and squeezed regions are the given ranges of the surface.
 void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
-                const ReactionSettings& settings, const StickState* sticks, std::uint32_t k, const Range& points,
-                const Range& volume, PairReaction& out) {
+                const ReactionSettings& settings, const StickState* sticks, const ContactCount& contacts, std::uint32_t k,
+                const Range& points, const Range& volume, PairReaction& out) {
   thread_local Side sides[2];
   thread_local std::vector<double> load_buffer;
   const ContactSurface::Summary& summary = surface.summary[k];
@@ -287,6 +320,7 @@ void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, 
   const bool rubs = material.friction > 0.0 && !springs;
   if (rubs || material.dissipation > 0.0) {
     const Slip slip(sides);
+    const double slow = rubs ? regularisation_of(settings, contacts, pair, material.friction, load, centre, sides) : 0.0;
     double power = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3 v = slip.at(i, x[i]);
@@ -296,7 +330,7 @@ void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, 
       const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
       Vec3 f = -load[i] * (factor - 1.0) * normal[i];
       if (speed > 0.0 && rubs) {
-        const double grip = friction_mollifier(speed, settings.friction_speed) / speed;
+        const double grip = friction_mollifier(speed, slow) / speed;
         f -= (material.friction * load[i] * factor * grip) * slide;
       }
       if (!sides[0].single()) sides[0].add_by_contribution(i, x[i], f);
@@ -336,6 +370,7 @@ struct Reactions {
   std::vector<PairReaction> pair;
   std::vector<std::uint32_t> offset;           // pairs of body i are of_body[offset[i] .. offset[i + 1]), rising
   std::vector<std::uint32_t> of_body;
+  ContactCount contacts;
 
   void begin(std::span<const ContactBody> bodies, std::span<const ContactSurface::Summary> summary) {
     pair.resize(summary.size());
@@ -379,6 +414,15 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
   thread_local Reactions kept;
   Reactions& all = kept;  // of the calling thread, whoever fills it
   all.begin(bodies, surface.summary);
+  all.contacts.clear();
+  if (settings.step > 0.0 && !(settings.stick.stiffness > 0.0)) {
+    all.contacts.resize(bodies.size());
+    for (const ContactSurface::Summary& s : surface.summary) {
+      if (!(s.force.norm() > 0.0)) continue;
+      ++all.contacts[s.bodies.a];
+      ++all.contacts[s.bodies.b];
+    }
+  }
   // In the portions of stage 6, so that threads find the points that they made.
   constexpr std::size_t kPortion = 512, kPairs = 4, kBodies = 32;
   for (std::size_t portion = 0; portion < pairs; portion += kPortion) {
@@ -393,7 +437,7 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
         points = advance_range(surface.pair, points.end, k);
         volume = advance_range(surface.volume_pair, volume.end, k);
         PairReaction& reaction = all.pair[k];
-        react_pair(bodies, rules, surface, settings, sticks, k, points, volume, reaction);
+        react_pair(bodies, rules, surface, settings, sticks, all.contacts, k, points, volume, reaction);
         if (!reaction.touches) continue;
         if (pair_power != nullptr) (*pair_power)[k] = reaction.power;
         if (traction_force != nullptr) (*traction_force)[k] = reaction.traction;

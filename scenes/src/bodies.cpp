@@ -161,9 +161,13 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
     for (std::uint32_t i = object.first; i < object.last; ++i) {
       if (piece[i] == i) {
         body_of[i] = bodies.size();
-        bodies.push_back({.object = o, .name = object.name, .particle = {}, .skeleton = {}, .samples = {}});
+        bodies.push_back({.object = o, .name = object.name, .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
       }
-      bodies[body_of[piece[i]]].particle.push_back(i);
+      Body& body = bodies[body_of[piece[i]]];
+      body.particle.push_back(i);
+      const core::ParticleSet& set = model.particles;
+      body.yield.push_back({core::free_translation(set.pinned[i], Vec3::Constant(1.0 / set.mass[i])).maxCoeff(),
+                            core::free_rotation(set.pinned[i], Vec3::Constant(1.0 / set.inertia[i].minCoeff())).maxCoeff()});
     }
     const std::size_t pieces = bodies.size() - begin;
     const std::size_t particles = object.last - object.first;

@@ -90,6 +90,7 @@ void view_body(const StageContext& context, const core::ParticleState& particles
   body.angular_velocity = frame.spin[i];
   body.samples = &frame.samples[i];
   body.skeleton = &own.skeleton;
+  body.yield = own.yield;
   body.core_value = std::numeric_limits<double>::infinity();
   for (const implicit::Primitive& primitive : own.skeleton.primitive) {
     body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);
@@ -416,7 +417,9 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
       }
     }
   });
-  frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, model.reaction, context.executor,
+  collision::ReactionSettings settings = model.reaction;
+  settings.step = context.step;
+  frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, settings, context.executor,
                                     frame.loads, &frame.traction_force, frame.dissipative, &frame.pair_power, context.sticks);
   const bool dissipates = frame.reaction.dissipated_power != 0.0 || model.reaction.stick.stiffness > 0.0;
   if (dissipates) out.dissipative.reset(model.particles.size());

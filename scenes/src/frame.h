@@ -98,6 +98,7 @@ struct StageContext {
   bool every_call = false;
   const implicit::DelaunayMesher* delaunay = nullptr;
   double time = 0.0;                                  ///< that obstacles are led by [s]
+  double step = 0.0;                                  ///< for which loads are held [s]; 0: they are not
   const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all
   const collision::StickState* sticks = nullptr;
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all

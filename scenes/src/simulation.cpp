@@ -103,6 +103,7 @@ struct Simulation::Impl {
             .every_call = options.profile,
             .delaunay = &options.delaunay,
             .time = time(),
+            .step = held_step(),
             .awake = awake.size() < bodies.size() ? &awake : nullptr,
             .sticks = &state.sticks};
   }
@@ -214,6 +215,8 @@ struct Simulation::Impl {
 
   [[nodiscard]] double frame_time() const { return 1.0 / scene.frame_rate; }
   [[nodiscard]] double dt() const { return std::ldexp(frame_time(), -state.halvings); }
+  /// For which loads act unchanged [s]; the adaptive method chooses steps of its own.
+  [[nodiscard]] double held_step() const { return integrator.settings.method != core::Integrator::Adaptive ? dt() : 0.0; }
   [[nodiscard]] double time() const { return (state.frame - 1) * frame_time() + state.substep * dt(); }
   [[nodiscard]] bool contact_on() const { return !options.skip || plan.on(Stage::FindContacts); }
 
@@ -440,6 +443,7 @@ struct Simulation::Impl {
       StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
       quiet.sticks = &state.sticks;
       quiet.time = time();
+      quiet.step = held_step();
       find_contact_surface(quiet, state.particles, trial, pulled, true);
       pulled_sample.internal.reset(model.particles.size());
       apply_reactions(quiet, pulled, pulled_sample);

@@ -178,6 +178,59 @@ TEST(React, PullsASlidingBodyBackWithTheCoefficientTimesTheNormalForce) {
   EXPECT_NEAR(other[0].force[0].x(), -0.7 * other[0].force[0].z(), 1e-8);
 }
 
+TEST(React, TakesNotMuchMoreThanStopsSlowBodiesWithinAStep) {
+  // A ball in a wedge, whose two contacts share what stops it: 1.6 times that where it is slow, and Coulomb's force where it is fast.
+  const LinearSphere sphere{Vec3::Zero(), Linear{1.0, 1.0}};
+  const implicit::HalfSpace left{Vec3(0, -0.9, 0), Vec3::UnitY(), 1e9}, right{Vec3(0, 0.9, 0), -Vec3::UnitY(), 1e9};
+  const PartYield yield{2.0, 5.0};
+  Stage stage;
+  stage.add(sphere, {sphere.centre}).yield = {&yield, 1};
+  stage.add(left).fixed = true;
+  stage.add(right).fixed = true;
+  for (ContactBody& body : stage.bodies()) body.material.friction = 0.3;
+  stage.solve();
+  const double normal = -stage.react()[1].force[0].y();
+  const double arm2 = stage.surface.summary.at(0).centre_of_pressure.squaredNorm(), mobility = yield.inverse_mass + arm2 * yield.inverse_inertia;
+  const double slow = 1e-12;
+  for (const double step : {1e-3, 1e-1}) {
+    stage.velocity(0)[0] = Vec3(slow, 0, 0);
+    EXPECT_NEAR(-stage.react({.friction_speed = 1e-15, .step = step})[0].force[0].x() * step * mobility, 1.6 * slow, 1e-6 * slow);
+    stage.velocity(0)[0] = Vec3(1e3, 0, 0);
+    EXPECT_NEAR(-stage.react({.friction_speed = 1e-15, .step = step})[0].force[0].x(), 2.0 * 0.3 * normal, 1e-6 * normal);
+  }
+  // A large regularisation speed of its own is kept, and so it is where nothing gives way.
+  stage.velocity(0)[0] = Vec3(0.1, 0, 0);
+  const double own = stage.react({.friction_speed = 10.0})[0].force[0].x();
+  EXPECT_EQ(stage.react({.friction_speed = 10.0, .step = 1e-3})[0].force[0].x(), own);
+  stage.bodies()[0].yield = {};
+  EXPECT_EQ(stage.react({.friction_speed = 10.0, .step = 1e3})[0].force[0].x(), own);
+}
+
+TEST(React, StopsSlowBodiesOfSeveralPartsLittleByLittle) {
+  // What the loads of a step do to the slip at the centre of pressure, by the contributions there.
+  TwoPointsOnPlane scene;
+  const std::vector<PartYield> yield{{1.0, 30.0}, {4.0, 80.0}};
+  scene.stage.bodies()[0].yield = yield;
+  scene.stage.bodies()[0].material.friction = scene.stage.bodies()[1].material.friction = 0.5;
+  const double slow = 1e-9, step = 1e-2;
+  for (Vec3& v : scene.stage.velocity(0)) v = Vec3(slow, 0, 0);
+  const auto elastic = scene.stage.react({.friction_speed = 1e9});
+  const auto loads = scene.stage.react({.friction_speed = 1e-15, .step = step});
+  const Vec3 centre = scene.stage.surface.summary.at(0).centre_of_pressure;
+  implicit::FieldParts parts;
+  scene.points.field.evaluate_parts(std::span(&centre, 1), parts);
+  double all = 0.0, change = 0.0;
+  for (const double f : parts.value) all += f;
+  for (std::size_t e = 0; e < parts.part.size(); ++e) {
+    const std::size_t k = parts.part[e];
+    const Vec3 force = loads[0].force[k] - elastic[0].force[k], torque = loads[0].torque[k] - elastic[0].torque[k];
+    const Vec3 turned = (yield[k].inverse_inertia * torque).cross(centre - scene.points.centre[k]);
+    change += step * parts.value[e] / all * (yield[k].inverse_mass * force + turned).x();
+  }
+  EXPECT_LT(change, -0.5 * slow);
+  EXPECT_GT(change, -2.0 * slow);
+}
+
 TEST(React, PressesHarderOnApproachAndNeverPulls) {
   // Hunt & Crossley: p (1 + d v_n)_+.
   const LinearSphere sphere{Vec3(0, 0, 0.9), Linear{1.0, 1.0}};

@@ -219,6 +219,55 @@ TEST(Incline, SlidesByGravityLessFrictionAndStaysBelowTheFrictionAngle) {
   EXPECT_LT(std::abs(way(1)), 0.01);
 }
 
+/// Down a slope of ten degrees along x, `substeps` a frame of a 24th of a second.
+std::string rolling(int substeps, const std::string& dissipation) {
+  return R"(
+schema: 1
+duration: 1 s
+time_step: {substeps: )" + std::to_string(substeps) + R"(}
+gravity: [0, 0, -9.81]
+obstacles: [{name: slope, shape: plane, normal: [0.17364817766693033, 0, 0.984807753012208], modulus: 1e7, friction: 0.5}]
+objects:
+  - name: ball
+    particles: {at: [0, 0, 0.1], mass: 1}
+    skeleton: [{shape: point, kernel: {radius: 0.22}}]
+    contact: {modulus: 2e5, friction: 0.5, dissipation: )" + dissipation + R"(}
+)";
+}
+
+TEST(RollingBall, HasTheAccelerationOfItsMomentsAndNoForceAside) {
+  const double sine = 0.17364817766693033, cosine = 0.984807753012208;
+  Simulation simulation = make(rolling(32, "0"));
+  double height = 0.0;  // of its centre over the slope, mean
+  while (simulation.frame() < 25) {
+    simulation.step_frame();
+    const Vec3& x = simulation.state().particles.position[0];
+    height += (sine * x.x() + cosine * x.z()) / 24.0;
+    const ContactReport report = report_contacts(simulation);
+    ASSERT_EQ(report.pairs.size(), 1u);
+    EXPECT_LT(std::abs(report.pairs[0].force.y()), 1e-12 * report.pairs[0].force.norm());
+  }
+  const Vec3& v = simulation.state().particles.velocity[0];
+  const double inertia = simulation.model().particles.inertia[0].y();  // of a kilogram
+  // It bounces by a twentieth of its radius, which changes the mean of 1 / height^2 by a hundredth of that.
+  EXPECT_NEAR(cosine * v.x() - sine * v.z(), 9.81 * sine / (1.0 + inertia / (height * height)), 5e-3 * 1.2);
+}
+
+TEST(RollingBall, FeelsTheFrictionOfFinerSteps) {
+  const auto frictions = [](int substeps) {
+    Simulation simulation = make(rolling(substeps, "2"));
+    std::vector<double> out;
+    while (simulation.frame() < 25) {
+      simulation.step_frame();
+      const Vec3 force = report_contacts(simulation).pairs.at(0).force;
+      out.push_back(0.984807753012208 * force.x() - 0.17364817766693033 * force.z());
+    }
+    return out;
+  };
+  const std::vector<double> found = frictions(32), exact = frictions(1024);
+  for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k], exact[k], 0.05 * std::abs(exact[k])) << k;
+}
+
 TEST(Cradle, PassesTheSpeedOfTheFirstBallToTheLast) {
   Simulation simulation = library("contacts/newtons_cradle");
   while (simulation.frame() < 61) simulation.step_frame();

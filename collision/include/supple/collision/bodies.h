@@ -29,6 +29,12 @@ struct PairMaterial {
 };
 [[nodiscard]] PairMaterial combine(const ContactMaterial& a, const ContactMaterial& b);
 
+/// How readily a part gives way to an impulse, at most over all directions; both are 0 for what is held.
+struct PartYield {
+  double inverse_mass = 0.0;     ///< [1/kg]
+  double inverse_inertia = 0.0;  ///< [1/(kg m^2)]
+};
+
 struct ContactBody {
   implicit::FieldView field;
   ContactMaterial material;
@@ -38,6 +44,7 @@ struct ContactBody {
   const implicit::SurfaceSamples* samples = nullptr;  ///< null: the body offers no seeds (a half-space)
   /// What the rule by samples sends its rays from, placed by `pose`; null: the body offers none.
   const implicit::Skeleton* skeleton = nullptr;
+  std::span<const PartYield> yield;          ///< of the parts, shape [parts]; empty: the body does not give way
   bool fixed = false;                        ///< takes forces without moving; two fixed bodies do not touch
   double core_value = std::numeric_limits<double>::infinity();  ///< F where the body is deepest [1], or less; for hard cores
 };

@@ -24,6 +24,9 @@ enum class SplitRule : std::uint8_t {
 struct ReactionSettings {
   SplitRule split = SplitRule::Energy;
   double friction_speed = 1e-3;  ///< regularisation speed of Coulomb friction [m/s], > 0
+  /// For which an explicit method holds these loads [s]: it raises `friction_speed` of pairs that would turn back within it, to and
+  /// fro at every step. 0: nothing does.
+  double step = 0.0;
   StickRule stick{};             ///< with a stiffness: friction by springs in place of `friction_speed`
 };
 

@@ -94,6 +94,7 @@ struct Body {
   std::uint32_t object = 0;
   std::string name;                        ///< of the object; of several pieces "name.1", "name.2" ...
   std::vector<std::uint32_t> particle;     ///< its parts are these, ascending
+  std::vector<collision::PartYield> yield; ///< of its parts
   implicit::Skeleton skeleton;
   implicit::SampleLayout samples;
 };
