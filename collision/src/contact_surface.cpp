@@ -90,7 +90,6 @@ class PairSolver {
   std::optional<Vec3> outside_patches(PairPressure& pressure, double extent);
   void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(PairPressure& pressure, std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
-  std::optional<Vec3> nearest_on_patch(PairPressure& pressure, const PolarCover& cover, const implicit::FieldView& third);
   bool samples(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
                const ContactSettings& settings, PairResult& out);
   void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
@@ -103,6 +102,7 @@ class PairSolver {
   void add_sums(const PatchSums& sums, const Vec3& reference, ContactSurface::Summary& summary);
 
   PeakFinder finder_;
+  ImprintFinder imprint_;
   PolarRuleSolver polar_;
   SampleRuleSolver samples_;
   MarchRuleSolver march_;
@@ -253,31 +253,6 @@ void PairSolver::find_thirds(const BodyPair& pair, const Partners& partners, std
   }
 }
 
-/// Where a convex body is nearest to Sigma on a patch, and presses hardest as its level sets lie at equal distances:
-/// by going from one to the other; pressures near there stay in `batch_`. It may press between the points of a rule that is coarse.
-std::optional<Vec3> PairSolver::nearest_on_patch(PairPressure& pressure, const PolarCover& cover, const implicit::FieldView& third) {
-  constexpr int kSteps = 6;
-  Vec3 x = cover.frame.origin;
-  for (int step = 0; step < kSteps; ++step) {
-    const std::optional<implicit::CorePoint> core = third.core_point(x);
-    if (!core) return std::nullopt;
-    const Vec3 axis = cover.frame.axis, from = core->point - cover.frame.origin;
-    batch_.resize(1);
-    batch_.point[0] = core->point - from.dot(axis) * axis;
-    for (int newton = 0; newton < 2; ++newton) {
-      pressure.evaluate(batch_);
-      const double rate = (batch_.slope_b[0] - batch_.slope_a[0]).dot(axis);
-      if (!(rate > 0.0)) return std::nullopt;
-      batch_.point[0] += ((batch_.a[0] - batch_.b[0]) / rate) * axis;
-    }
-    const double moved = (batch_.point[0] - x).norm();
-    x = batch_.point[0];
-    if (moved <= 1e-3 * cover.thickness) break;
-  }
-  if (!cover.contains(x, 0.0)) return std::nullopt;
-  return x;
-}
-
 /// Whether a third body presses on the patches nearly as much as the pair does.
 /// @param boxes  of the bodies' surfaces
 bool PairSolver::thirds_press(PairPressure& pressure, std::span<const ContactBody> bodies, std::span<const Box> boxes,
@@ -300,10 +275,7 @@ bool PairSolver::thirds_press(PairPressure& pressure, std::span<const ContactBod
       press = press || p > out.points.pressure[i] - kMargin * out.summary.largest_pressure;
     }
     for (std::size_t i = 0; i < cover_count_ && !press; ++i) {
-      const std::optional<Vec3> x = nearest_on_patch(pressure, covers_[i], bodies[c].field);
-      if (!x) continue;
-      const double p = bodies[c].material.modulus * bodies[c].field.value(*x);
-      press = p > std::max(std::min(batch_.a[0], batch_.b[0]) - kMargin * out.summary.largest_pressure, 0.0);
+      press = imprint_.find(pressure, covers_[i], bodies[c], kMargin * out.summary.largest_pressure).has_value();
     }
     // Beyond the outermost nodes the pressure of the pair falls to zero.
     for (std::size_t i = 0; i < cover_count_ && !press; ++i) {

@@ -13,6 +13,8 @@ constexpr double kFarOff = 0.2;          // of the radius: crossings from where 
 constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
 constexpr int kCornerSteps = 8;
 constexpr int kCrossingSteps = 8;
+constexpr int kBorderSteps = 16;         // of Illinois' method to the border of an imprint
+constexpr double kBorder = 0.01;         // of the way from its middle
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 }  // namespace
@@ -109,7 +111,7 @@ bool PolarRuleSolver::taken_by_thirds() {
 }
 
 /// Whether some change their side on the patch, as far as its nodes show and the rim as they give it; keeps which.
-bool PolarRuleSolver::kinks_cross() {
+bool PolarRuleSolver::kinks_cross(PairPressure& pressure) {
   crossing_.clear();
   if (kinks_.empty() && third_.empty()) return false;
   follow_rim();
@@ -123,17 +125,45 @@ bool PolarRuleSolver::kinks_cross() {
   }
   if (third_.empty()) return !crossing_.empty();
   thirds_seen_.assign(third_.size(), 0);
-  const auto look = [this](std::size_t n, std::size_t i, double p) {
-    for (std::size_t t = 0; t < third_.size(); ++t) thirds_seen_[t] |= third_value_[t * n + i] > p ? 1 : 2;
+  std::vector<const Vec3*> inside(third_.size(), nullptr);
+  const auto look = [&](std::span<const Vec3> points, std::size_t i, double p) {
+    for (std::size_t t = 0; t < third_.size(); ++t) {
+      const bool harder = third_value_[t * points.size() + i] > p;
+      thirds_seen_[t] |= harder ? 1 : 2;
+      if (harder && p > 0.0) inside[t] = &points[i];
+    }
   };
   evaluate_thirds(node_.point);
-  for (std::size_t i = 0; i < node_.size(); ++i) look(node_.size(), i, pressure_[i]);
+  for (std::size_t i = 0; i < node_.size(); ++i) look(node_.point, i, pressure_[i]);
   evaluate_thirds(fine_rim_);
-  for (std::size_t i = 0; i < fine_rim_.size(); ++i) look(fine_rim_.size(), i, 0.0);
+  for (std::size_t i = 0; i < fine_rim_.size(); ++i) look(fine_rim_, i, 0.0);
+  imprints_.clear();
+  cover(cover_);
   for (std::size_t t = 0; t < third_.size(); ++t) {
+    if (find_imprint(pressure, t, inside[t])) thirds_seen_[t] |= 1;
     if (thirds_seen_[t] == 3) crossing_.push_back(kinks_.size() + t);
   }
   return !crossing_.empty();
+}
+
+/// That of one third body on `cover_`. @param inside  a place in it, or null   @return whether there is one, whether its border is found or not
+bool PolarRuleSolver::find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside) {
+  cover_.thickness = frame_.thickness;
+  const std::optional<Vec3> place = inside != nullptr ? std::optional<Vec3>(*inside) : finder_.find(pressure, cover_, *third_[third], 0.0);
+  if (!place) return false;
+  Imprint imprint;
+  imprint.third = third;
+  if (finder_.trace(pressure, cover_, *third_[third], *place, imprint)) imprints_.push_back(std::move(imprint));
+  return true;
+}
+
+/// Those on a patch with the rim `outline_`.
+void PolarRuleSolver::find_imprints(PairPressure& pressure) {
+  imprints_.clear();
+  if (third_.empty()) return;
+  polygon_ = outline_;
+  cover(cover_);
+  for (std::size_t t = 0; t < third_.size(); ++t) find_imprint(pressure, t, nullptr);
 }
 
 /// The rim found so far as a trigonometric sum, and points of it that leave no room for a kink between them.
@@ -215,6 +245,11 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
       kink.push_back(k);
     }
   }
+  for (const Imprint& imprint : imprints_) {
+    if (std::find(crossing_.begin(), crossing_.end(), kinks_.size() + imprint.third) == crossing_.end()) continue;
+    batch.point.insert(batch.point.end(), imprint.leaves.begin(), imprint.leaves.end());
+    kink.resize(batch.point.size(), kinks_.size() + imprint.third);
+  }
   if (kink.empty()) return;
   batch.resize(batch.point.size());
   std::vector<double> last(kink.size(), 0.0);
@@ -253,6 +288,54 @@ double PolarRuleSolver::model_height(std::size_t ray, double share) const {
   return share * linear_[ray] + square * (square_[ray] + square * fourth_[ray]);
 }
 
+/// Where a ray crosses the border of a third body whose imprint may lie between two of its samples s. @return false where they show it
+bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s) {
+  if (std::count_if(s.begin(), s.end(), [](double x) { return x > 0.0; }) > 1) return false;
+  const std::size_t third = kink - kinks_.size();
+  const double radius = rays_.radius[ray];
+  const Vec2 way(rays_.cosine[ray], rays_.sine[ray]);
+  struct Sample {
+    double share, s, height;
+    bool within;
+  };
+  const auto look = [&](double share, bool within) -> Sample {
+    const auto [excess, height] = finder_.excess_at(pressure, frame_, *third_[third], (share * radius) * way, model_height(ray, share));
+    return {share, excess, height, within};
+  };
+  std::vector<Sample> samples;
+  for (const Imprint& imprint : imprints_) {
+    if (imprint.third != third) continue;
+    const std::optional<double> middle = imprint.middle_on(way);
+    if (middle && *middle < radius) samples.push_back(look(*middle / radius, true));
+  }
+  if (samples.empty()) return false;
+  for (std::size_t j = 0; j < s.size(); ++j) {
+    const double share = static_cast<double>(j) / static_cast<double>(s.size() - 1);
+    samples.push_back({share, s[j], model_height(ray, share), false});
+  }
+  std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.share < b.share; });
+  for (std::size_t j = 0; j + 1 < samples.size(); ++j) {
+    Sample left = samples[j], right = samples[j + 1], last = left;
+    if ((left.s > 0.0) == (right.s > 0.0)) continue;
+    const double from = left.share, to = right.share, within = left.within ? from : to;
+    for (int step = 0; step < kBorderSteps; ++step) {
+      const double before = last.share;
+      last = look(left.share + (right.share - left.share) * left.s / (left.s - right.s), false);
+      if (step > 0 && std::abs(last.share - before) <= kBorder * std::abs(last.share - within)) break;
+      // Illinois: an end that stays counts half.
+      if ((last.s > 0.0) == (left.s > 0.0)) {
+        left = last;
+        right.s *= 0.5;
+      } else {
+        right = last;
+        left.s *= 0.5;
+      }
+    }
+    crossings_.push_back({ray, kink, last.share, last.height, from, to, false});
+  }
+  return true;
+}
+
 /// Where the rays cross kinks: first on the heights as the curvature at the peak and the rim give them, then on Sigma.
 void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
@@ -288,7 +371,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
         // Two of one kink must not become one; the borders of third bodies are round.
         const bool alone = crossings_.size() == others && k < kinks_.size();
         const double far = alone ? kFarOff : 0.5 / kSamples;
-        if (!alone && crossings_.size() > others) {
+        if (!alone && crossings_.size() > others && k < kinks_.size()) {
           Crossing& last = crossings_.back();
           last.left = std::max(0.0, last.radius - far);
           last.right = last.radius + far;
@@ -301,6 +384,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
         s[j] = sheet.flat ? sheet.value + along * share + up * height[j]
                           : side_of(k, pressure, frame_.origin + share * reach + height[j] * frame_.axis);
       }
+      if (k >= kinks_.size() && cross_imprints(pressure, i, k, s)) continue;
       for (std::size_t j = 0; j < kSamples; ++j) {
         const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;
         if ((s[j] > 0.0) != (s[j + 1] > 0.0)) {
@@ -356,6 +440,12 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
   });
 }
 
+std::array<double, 2> PolarRuleSolver::Panel::bend(double x) const {
+  const double width = end - begin, y = 0.5 * (1.0 + x), z = 1.0 - y;
+  if (touch_begin && touch_end) return {begin + width * y * y * (3.0 - 2.0 * y), 3.0 * width * y * z};
+  return touch_begin ? std::array{begin + width * y * y, width * y} : std::array{end - width * z * z, width * z};
+}
+
 /// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
 void PolarRuleSolver::find_changes(const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
@@ -384,7 +474,8 @@ void PolarRuleSolver::find_changes(const KronrodRule& rule, std::size_t first) {
           const double left = before[at + 1].radius - before[at].radius, right = here[at + 1].radius - here[at].radius;
           if (left + right > 0.0) share = left / (left + right);
         }
-        changes_.push_back(panel.begin + half * (1.0 + rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1])));
+        const double places = 1.0 + rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1]);
+        changes_.push_back(panel.touches() ? panel.bend(places - 1.0)[0] : panel.begin + half * places);
       }
       before = here;
     }

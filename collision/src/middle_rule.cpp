@@ -271,7 +271,7 @@ void PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
   // A polygon of all points known; of those that lie on one ray, corners are kept.
   struct Mark {
     RimPoint point;
-    bool corner;
+    bool corner, touch = false;
   };
   std::vector<Mark> all;
   for (const RimPoint& p : corners) all.push_back({p, true});
@@ -291,6 +291,25 @@ void PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
   if (marks.size() > 1 && same(marks.back(), marks.front())) {
     if (!marks.front().corner) marks.front() = marks.back();
     marks.pop_back();
+  }
+  for (const Imprint& imprint : imprints_) {
+    for (const Vec2& way : imprint.touches) {
+      for (std::size_t k = 0; k < marks.size(); ++k) {
+        const Mark &a = marks[k], &b = marks[(k + 1) % marks.size()];
+        const double beyond = cross(a.point.at, way), left = cross(way, b.point.at);
+        if (!(beyond >= 0.0) || !(left > 0.0)) continue;
+        const double s = beyond / (beyond + left);
+        Mark touch{{(1.0 - s) * a.point.at + s * b.point.at, (1.0 - s) * a.point.height + s * b.point.height, Vec2::Zero()}, true, true};
+        if (same(a, touch)) {
+          marks[k].corner = marks[k].touch = true;
+        } else if (same(touch, b)) {
+          marks[(k + 1) % marks.size()].corner = marks[(k + 1) % marks.size()].touch = true;
+        } else {
+          marks.insert(marks.begin() + static_cast<std::ptrdiff_t>(k + 1), touch);
+        }
+        break;
+      }
+    }
   }
   const std::size_t n = marks.size();
   polygon_.clear();
@@ -325,7 +344,8 @@ void PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
     }
     const RimPoint &a = marks[(begin + from) % n].point, &b = marks[(begin + to) % n].point;
     const RimPoint middle = along(0.5 * (a.at + b.at), (begin + from) % n, to - from);
-    sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height}});
+    sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height},
+                        marks[(begin + from) % n].touch, marks[(begin + to) % n].touch});
     from = to;
   }
 }
@@ -334,7 +354,8 @@ void PolarRuleSolver::place_rays(const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Panel& panel = panels_[first + i / per_panel];
-    const double half = 0.5 * (panel.end - panel.begin), at = panel.begin + half * (1.0 + rule.node[i % per_panel]);
+    const double node = rule.node[i % per_panel], half = 0.5 * (panel.end - panel.begin);
+    const auto [at, rate_at] = panel.touches() ? panel.bend(node) : std::array{panel.begin + half * (1.0 + node), half};
     const double whole = std::floor(panel.begin), x = at - whole;
     const Sector& sector = sectors_[static_cast<std::size_t>(whole)];
     const std::array<double, 3> share{(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)};
@@ -350,7 +371,7 @@ void PolarRuleSolver::place_rays(const KronrodRule& rule, std::size_t first) {
     rays_.sine[i] = way.y();
     rays_.radius[i] = 1.0;
     rays_.height[i] = height;
-    turn_[i] = half * cross(way, moves);
+    turn_[i] = rate_at * cross(way, moves);
   }
 }
 
@@ -383,6 +404,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   add_rays_at_hidden_sides(pressure);
   cross_outline();
+  find_imprints(pressure);
   if (crossing_.empty()) return false;
   cut_ = !third_.empty();
   follow_tangents();
@@ -401,6 +423,8 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
       Panel panel;
       panel.begin = static_cast<double>(k);
       panel.end = static_cast<double>(k + 1);
+      panel.touch_begin = sectors_[k].touch_begin;
+      panel.touch_end = sectors_[k].touch_end;
       panel.nodes = error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
       panels_.push_back(panel);
     }

@@ -383,6 +383,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
                             std::span<const ContactBody* const> third, bool round, bool follow, const Box* faces, PatchPoints& points) {
   extent_ = extent;
   third_ = third;
+  imprints_.clear();
   peak_ = frame.origin;
   const PatchPoints::Mark before = points.mark();
   const auto anew = [&] {
@@ -450,7 +451,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
       thickness_ = frame.thickness;
       return true;
     }
-    if (!parted && parts && kinks_cross()) {
+    if (!parted && parts && kinks_cross(pressure)) {
       parted = true;
       if (solve_split(pressure, settings)) {
         parted_ = static_cast<std::uint32_t>(crossing_.size());
@@ -526,16 +527,15 @@ void PolarRuleSolver::cover(PolarCover& out) const {
   }
 }
 
-bool PolarCover::contains(const Vec3& x, double slack) const {
-  const Vec3 d = x - frame.origin;
-  const double c = d.dot(frame.u) / frame.u.squaredNorm(), s = d.dot(frame.v) / frame.v.squaredNorm();
+PolarCover::Reach PolarCover::reach(const Vec2& at) const {
+  const double c = at.x(), s = at.y();
   double far = 0.0, rise = 0.0;  // rho over that of the rim; height of the rim
   if (corner.empty()) {
     const auto n = static_cast<double>(radius.size());
     double turn = math::atan2(s, c) / (2.0 * std::numbers::pi);
     if (turn < 0.0) turn += 1.0;
-    const double at = turn * n;
-    const double below = std::floor(at), share = at - below;
+    const double place = turn * n;
+    const double below = std::floor(place), share = place - below;
     const std::size_t k = static_cast<std::size_t>(below) % radius.size(), next = (k + 1) % radius.size();
     far = std::sqrt(c * c + s * s) / ((1.0 - share) * radius[k] + share * radius[next]);
     rise = (1.0 - share) * height[k] + share * height[next];
@@ -549,6 +549,12 @@ bool PolarCover::contains(const Vec3& x, double slack) const {
       break;
     }
   }
+  return {far, rise};
+}
+
+bool PolarCover::contains(const Vec3& x, double slack) const {
+  const Vec3 d = x - frame.origin;
+  const auto [far, rise] = reach(Vec2(d.dot(frame.u) / frame.u.squaredNorm(), d.dot(frame.v) / frame.v.squaredNorm()));
   if (far > 1.0 + slack) return false;
   return std::abs(d.dot(frame.axis) - rise * far * far) <= 2.0 * thickness + 0.5 * std::abs(rise);
 }

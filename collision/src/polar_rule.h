@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "find_peak.h"
+#include "imprint.h"
 #include "pair_pressure.h"
 #include "patch_points.h"
 #include "quadrature.h"
@@ -19,8 +20,6 @@
 
 namespace supple::collision {
 
-using Vec2 = Eigen::Vector2d;
-
 /// The ground that a polar patch covers.
 struct PolarCover {
   PeakFrame frame;
@@ -28,6 +27,12 @@ struct PolarCover {
   std::vector<Vec2> corner;            ///< of an outline about the origin, by angle, in units of u and v
   std::vector<Vec3> rim;               ///< its points
   double thickness = 0.0;
+  /// Along the ray from the origin through a point, in units of u and v: the distance of the point over that of the rim, 0 where no
+  /// corner is near the ray, and the height of the rim there.
+  struct Reach {
+    double far = 0.0, rise = 0.0;
+  };
+  [[nodiscard]] Reach reach(const Vec2& at) const;
   /// Whether x lies over the patch, near Sigma. @param slack  share of the radius that a point may lie outside
   [[nodiscard]] bool contains(const Vec3& x, double slack) const;
 };
@@ -93,8 +98,13 @@ class PolarRuleSolver {
     std::size_t rays = 0;             // of `fine`
     std::size_t change = 0, change_end = 0;  // of `changes_`
     bool halved = false;              // or a part of one
+    bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
     bool lost = false;                // a crossing that seemed to be there was not found
     [[nodiscard]] bool even() const { return change == change_end && !lost; }
+    [[nodiscard]] bool touches() const { return touch_begin || touch_end; }
+    /// Where node x in (-1, 1) is put between begin and end, and its rate. What a ray has of an imprint grows as the root of the
+    /// angle from where it touches it: as a polynomial, when the angle grows as a square.
+    [[nodiscard]] std::array<double, 2> bend(double x) const;
   };
   /// A kink, and s at the origin with its slope where it is a plane.
   struct Sheet {
@@ -110,8 +120,10 @@ class PolarRuleSolver {
   };
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
-  bool kinks_cross();
+  bool kinks_cross(PairPressure& pressure);
   [[nodiscard]] bool taken_by_thirds();
+  bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
+  void find_imprints(PairPressure& pressure);
   void evaluate_thirds(std::span<const Vec3> points);
   [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
   [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
@@ -120,6 +132,7 @@ class PolarRuleSolver {
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
   void find_corners(PairPressure& pressure, std::vector<Vec3>& corners);
   void find_crossings(PairPressure& pressure, double error);
+  bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
   void find_changes(const KronrodRule& rule, std::size_t first);
   static void follow_signs(std::span<const double> values, std::vector<double>& places);
   bool add_missed_kinks();
@@ -138,6 +151,7 @@ class PolarRuleSolver {
   struct Sector {
     std::array<Vec2, 3> at;
     std::array<double, 3> height;
+    bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
   };
   /// The search for the rim along one ray: the last place inside, and one outside.
   struct Walk {
@@ -204,6 +218,9 @@ class PolarRuleSolver {
   std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other
   std::vector<Vec3> third_slope_;
   std::vector<int> thirds_seen_;        // 1: pressing harder than the pair somewhere, 2: not so somewhere
+  ImprintFinder finder_;
+  std::vector<Imprint> imprints_;
+  PolarCover cover_;
   std::uint32_t parted_ = 0;
   std::vector<implicit::Kink> kinks_;
   Box smooth_;                         // no kink is in it

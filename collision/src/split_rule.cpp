@@ -78,8 +78,10 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   } else {
     for (std::size_t i = 0; i < count; ++i) {
       const Panel& panel = panels_[first + i / per_panel];
-      turn_[i] = 0.5 * (panel.end - panel.begin);
-      const auto [s, c] = math::sin_cos(0.5 * (panel.begin + panel.end) + turn_[i] * rule.node[i % per_panel]);
+      const double node = rule.node[i % per_panel], half = 0.5 * (panel.end - panel.begin);
+      const auto [angle, rate] = panel.touches() ? panel.bend(node) : std::array{0.5 * (panel.begin + panel.end) + half * node, half};
+      turn_[i] = rate;
+      const auto [s, c] = math::sin_cos(angle);
       rays_.cosine[i] = c;
       rays_.sine[i] = s;
       const auto [radius, height] = about_star_ ? outline_at(c, s) : rim_at(c, s);
@@ -244,24 +246,36 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   for (;;) {
     std::vector<Vec3> corners;
     find_corners(pressure, corners);
-    std::vector<double> turns;
+    struct Turn {
+      double angle;
+      bool touch;
+    };
+    std::vector<Turn> turns;
+    const auto add = [&](double x, double y, bool touch) {
+      const double turn = math::atan2(y, x);
+      turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
+    };
     for (const Vec3& x : corners) {
       const Vec3 d = x - frame_.origin;
-      const double turn = math::atan2(d.dot(frame_.v) / frame_.v.squaredNorm(), d.dot(frame_.u) / frame_.u.squaredNorm());
-      turns.push_back(turn < 0.0 ? turn + kTurn : turn);
+      add(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm(), false);
     }
-    if (turns.empty()) turns.push_back(0.0);
-    std::sort(turns.begin(), turns.end());
-    turns.push_back(turns.front() + kTurn);
+    for (const Imprint& imprint : imprints_) {
+      for (const Vec2& x : imprint.touches) add(x.x(), x.y(), true);
+    }
+    if (turns.empty()) turns.push_back({0.0, false});
+    std::sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.angle < b.angle; });
+    turns.push_back({turns.front().angle + kTurn, turns.front().touch});
     panels_.clear();
     for (std::size_t t = 0; t + 1 < turns.size(); ++t) {
-      const double width = turns[t + 1] - turns[t];
+      const double width = turns[t + 1].angle - turns[t].angle;
       if (width < kSameTurn) continue;
       const int parts = static_cast<int>(std::ceil(width / widest));
       for (int i = 0; i < parts; ++i) {
         Panel panel;
-        panel.begin = turns[t] + width * i / parts;
-        panel.end = turns[t] + width * (i + 1) / parts;
+        panel.begin = turns[t].angle + width * i / parts;
+        panel.end = turns[t].angle + width * (i + 1) / parts;
+        panel.touch_begin = turns[t].touch && i == 0;
+        panel.touch_end = turns[t + 1].touch && i + 1 == parts;
         panel.nodes = radial;
         panels_.push_back(panel);
       }
@@ -337,16 +351,19 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
         next.end = place;
         finer.push_back(next);
         next.begin = next.end;
+        next.touch_begin = false;
       };
+      next.touch_begin = panel.touch_begin;
       next.halved = panel.halved || (part && larger == nullptr);
       if (part && panel.change < panel.change_end && !beside) {
         for (std::size_t c = panel.change; c < panel.change_end; ++c) end_at(changes_[c]);
       } else if (part && larger == nullptr) {
-        end_at(0.5 * (panel.begin + panel.end));
+        end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end));
       } else {
         by_angle = by_angle || part;
       }
       next.end = panel.end;
+      next.touch_end = panel.touch_end;
       finer.push_back(next);
       return true;
     });

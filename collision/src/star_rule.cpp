@@ -235,6 +235,7 @@ void PolarRuleSolver::cross_star(PairPressure& pressure) {
     if (std::any_of(outline_.begin(), outline_.end(), other)) crossing_.push_back(k);
   }
   for (std::size_t t = 0; t < third_.size(); ++t) crossing_.push_back(kinks_.size() + t);
+  find_imprints(pressure);
 }
 
 /// Radius and height of the outline in a direction, linear between its points.

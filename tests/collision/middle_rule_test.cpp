@@ -295,12 +295,13 @@ void expect_bounds_beside_balls(double radius, const Solved& solved) {
 }
 
 TEST(FacesOnFaces, HaveHolesWhereASmallThirdBodyPressesBetweenThePointsOfTheRule) {
-  // Of a fortieth of the patch, anywhere on it.
-  constexpr double kRadius = 0.018;
-  const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + 0.85 * kEdge), Quat::Identity()});
-  expect_bounds_beside_balls(kRadius, [&](double error, const implicit::FieldView* third, const Vec3& at, double modulus) {
-    return on_a_plane(box, error, third, at, modulus);
-  });
+  // Of a fortieth of the patch and less, anywhere on it.
+  for (const double radius : {0.018, 0.006}) {
+    const RoundBox box(kCore, kEdge, {Vec3(0, 0, kCore.z() + 0.85 * kEdge), Quat::Identity()});
+    expect_bounds_beside_balls(radius, [&](double error, const implicit::FieldView* third, const Vec3& at, double modulus) {
+      return on_a_plane(box, error, third, at, modulus);
+    });
+  }
 }
 
 TEST(FacesOnFaces, StopWhereAThirdBodyPressesHarder) {
