@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kInside = 0.999;       // of the way to the rim: where the pair still presses
 constexpr int kCoreSteps = 6;
+constexpr double kNear = 0.25;          // radii of the patch, by which the place nearest to a core may be missed where Sigma is bent
 constexpr int kGrid = 7;                // points along a side
 constexpr int kClimbSteps = 10;
 constexpr int kHalvings = 4;
@@ -122,13 +123,17 @@ ImprintFinder::Spot ImprintFinder::look(PairPressure& pressure, const PeakFrame&
 /// @return false where the body says nothing of a core
 bool ImprintFinder::begin_at_core(PairPressure& pressure, const PolarCover& cover, const ContactBody& body) {
   const PeakFrame& frame = cover.frame;
+  const double radius = (cover.rim.front() - frame.origin).norm();
   Vec3 x = frame.origin;
   for (int step = 0; step < kCoreSteps; ++step) {
     const std::optional<implicit::CorePoint> core = body.field.core_point(x);
     if (!core) return false;
     spots_.assign(1, on_patch(cover, in_units(frame, core->point - frame.origin)));
-    const Spot& spot = spots_[0];
-    if ((place_of(frame, spot.at, spot.height) - core->point).norm() > core->radius + cover.thickness) return true;
+    Spot& spot = spots_[0];
+    if ((place_of(frame, spot.at, spot.height) - core->point).norm() > core->radius + cover.thickness + kNear * radius) {
+      spot.third = -std::numeric_limits<double>::infinity();
+      return true;
+    }
     look(pressure, frame, body);
     const Vec3 next = place_of(frame, spot.at, spot.height);
     const double moved = (next - x).norm();
@@ -169,7 +174,7 @@ std::optional<Vec3> ImprintFinder::find(PairPressure& pressure, const PolarCover
   const double lu = frame.u.norm(), lv = frame.v.norm(), radius = (cover.rim.front() - frame.origin).norm();
   if (!begin_at_core(pressure, cover, body)) {
     begin_on_grid(pressure, cover, body);
-  } else if (spots_[0].third <= 0.0) {
+  } else if (const Spot& spot = spots_[0]; -spot.third > kNear * radius * Vec2(spot.rise.x() / lu, spot.rise.y() / lv).norm()) {
     return std::nullopt;
   }
   Spot spot = spots_[0];

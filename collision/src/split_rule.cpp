@@ -18,6 +18,7 @@ constexpr double kWidestCoarse = 3.3;
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.1;           // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
+constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
 constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
@@ -397,7 +398,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     polygon_ = kept_rim_;
   }
   node_.resize(node_.point.size());
-  estimate_ += kUnseen * error + algebraic_error();
+  estimate_ += (cut_ ? kUnseenBesideThirds : kUnseen) * error + algebraic_error();
   return true;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "bodies.h"
@@ -133,6 +134,28 @@ TEST(Imprints, ThatTheRimCutsAreLeftOut) {
     const double turn = 0.3 + i, r = 0.5896;
     Ball small{{{Vec3(r * std::cos(turn), r * std::sin(turn), 0.0163), Linear{0.075, 1.0}}}, 265.5};
     for (const double error : {1e-2, 1e-6}) expect_within_bounds({&small, 1}, i % 2 == 0, error);
+  }
+}
+
+TEST(Imprints, OnABentPatchAreThoseOfAFineRule) {
+  // Two unequal balls. The last core lies beyond the rim, where the place nearest to it is not below it along the axis.
+  const LinearSphere a{Vec3(0, 0, kHeight), Linear{1.0, 1.0}}, b{Vec3(0, 0, -0.45), Linear{0.7, 1.0}};
+  for (const auto& [i, error] : std::vector<std::pair<int, double>>{{32, 1e-6}, {35, 1e-6}, {51, 1e-2}}) {
+    Ball any = ball(i, 0.3);
+    any.field.centre.z() += 0.12 + 0.1 * any.field.centre.head<2>().squaredNorm();
+    const auto solved = [&](double asked) {
+      Stage stage;
+      stage.add(a);
+      stage.add(b, {Vec3::Zero()}, 3.0);
+      stage.add(any.field, {any.field.centre}, any.modulus);
+      stage.rules.allowed = [](std::uint32_t x, std::uint32_t y) { return std::min(x, y) == 0; };
+      return stage.solve({.error = asked}).summary.at(0);
+    };
+    const ContactSurface::Summary s = solved(error), fine = solved(1e-9);
+    const double most = s.error_estimate + fine.error_estimate;
+    EXPECT_LE((s.force - fine.force).norm(), most * fine.force.norm()) << i;
+    EXPECT_NEAR(s.area, fine.area, most * fine.area) << i;
+    EXPECT_LE((s.centre_of_pressure - fine.centre_of_pressure).norm(), most * std::sqrt(fine.area)) << i;
   }
 }
 
