@@ -194,7 +194,7 @@ TEST(PolygonisePartition, HasAVertexWhereFourMeet) {
       std::size_t with = 0;
       for (const std::size_t m : bodies) {
         const auto& p = mesh[m].position;
-        with += std::any_of(p.begin(), p.end(), [&](const Vec3& q) { return (q - point).norm() < 1e-9; }) ? 1 : 0;
+        with += std::any_of(p.begin(), p.end(), [&at = point](const Vec3& q) { return (q - at).norm() < 1e-9; }) ? 1 : 0;
       }
       EXPECT_GT(with, 0u) << i;
       meshes += with;

@@ -3,7 +3,8 @@
 
 All get the same body on the same lattice. VTK and OpenVDB need the field on nodes first; they get it from the fast field
 stage of `mesh_bench --grid` (single precision, vector loops, the same candidate search), whose time is added to theirs:
-for VTK values wherever a support reaches, for OpenVDB only the 8^3 leaves that bounds leave. Times are CPU times of one
+for VTK values wherever a support reaches, for OpenVDB only the 8^3 leaves that bounds leave; and once more ("splatted") with what
+users of these libraries have, each blob added to the nodes that it reaches. Times are CPU times of one
 thread, the least of several runs; programs take turns. Errors of all meshes come from mesh_bench, both
 ways: from the mesh to the exact surface, and back.
 
@@ -115,16 +116,18 @@ def main():
             result, = call(python, __file__, "--vtk", grid, mesh)
             errors, = call(arguments.bench, "--errors", body, cells, mesh)
             keep("VTK", field["cpu_ms_touched"] + result["cpu_ms"], errors)
+            keep("VTK, splatted", field["cpu_ms_splat"] + result["cpu_ms"], errors)
             result, = call(openvdb, grid, mesh)
             errors, = call(arguments.bench, "--errors", body, cells, mesh)
             keep("OpenVDB", field["cpu_ms_surface"] + result["cpu_ms"], errors)
+            keep("OpenVDB, splatted", field["cpu_ms_splat"] + result["cpu_ms"], errors)
         print(f"{case:8s} {'':20s} {'cpu ms':>8s} {'triangles':>10s} {'centroid/h':>11s} {'vertex/h':>10s} "
               f"{'back/h':>8s} {'farthest':>9s}")
         for name, row in rows.items():
             print(f"{'':8s} {name:20s} {row['cpu_ms']:8.1f} {row['items']:10d} {row['error']:11.5f} "
                   f"{row['rms_vertex_over_h']:10.2g} {row['rms_back_over_h']:8.4f} {row['largest_back_over_h']:9.3g}")
         # Time of ours at the errors of the peer, both ways: error ~ cell^2 and time ~ cell^-2, so time ~ 1 / error.
-        for name in ("VTK", "OpenVDB"):
+        for name in ("VTK", "VTK, splatted", "OpenVDB", "OpenVDB, splatted"):
             peer = rows[name]
             for method in ("cubes", "refined", "refined_twice"):
                 ours = rows[f"ours, {method}"]
