@@ -43,7 +43,7 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive("spin", d.spin, any(kSpin), "at the start, of the whole about its centre of mass");
   archive("mass", d.mass, above(0.0, kMass), "of one particle");
   archive("inertia_radius", d.inertia_radius, above(0.0, kLength).or_auto(),
-          "a in the inertia 2/5 m a^2; auto: half the distance of the nearest neighbour; of single and `separate` particles, the moments of the solid that each carries");
+          "a in the inertia 2/5 m a^2; auto: half the distance of the nearest neighbour; of single and `separate` particles, the moments of the solid that each carries, to whose principal axes its frame is then turned");
   archive("inertia_axes", d.inertia_axes, at_least(0.0, kLength),
           "instead: semi-axes of a solid ellipsoid in each particle's frame; zero: not given");
   if (archive.given("inertia_axes")) {

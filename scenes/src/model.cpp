@@ -54,30 +54,73 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
   return out;
 }
 
-/// Distance of each point to its nearest neighbour; infinite for a single one. Sweeps along the longest extent.
-std::vector<double> nearest_distances(std::span<const Vec3> points) {
-  Box box;
-  for (const Vec3& p : points) box.include(p);
-  Eigen::Index axis = 0;
-  if (!points.empty()) box.extent().maxCoeff(&axis);
-  std::vector<std::size_t> order(points.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return points[a][axis] != points[b][axis] ? points[a][axis] < points[b][axis] : a < b;
-  });
-  std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const Vec3& here = points[order[i]];
-    double& least = nearest[order[i]];
-    for (std::size_t j = i + 1; j < order.size() && points[order[j]][axis] - here[axis] < least; ++j) {
-      least = std::min(least, (points[order[j]] - here).norm());
+/// Nearest neighbours by a tree of halves (Bentley 1975).
+class NearestNeighbours {
+ public:
+  explicit NearestNeighbours(std::span<const Vec3> points) : points_(points.begin(), points.end()), index_(points.size()) {
+    std::iota(index_.begin(), index_.end(), std::size_t{0});
+    divide(0, points_.size(), 0);
+    for (std::size_t i = 0; i < index_.size(); ++i) points_[i] = points[index_[i]];
+  }
+
+  /// Distance of each point to its nearest neighbour; infinite for a single one.
+  [[nodiscard]] std::vector<double> distances() const {
+    std::vector<double> out(points_.size());
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      double least = std::numeric_limits<double>::infinity();
+      search(i, 0, points_.size(), 0, least);
+      out[index_[i]] = std::sqrt(least);
     }
-    for (std::size_t j = i; j > 0 && here[axis] - points[order[j - 1]][axis] < least; --j) {
-      least = std::min(least, (points[order[j - 1]] - here).norm());
+    return out;
+  }
+
+ private:
+  struct Plane {
+    Eigen::Index axis = 0;
+    double at = 0.0;
+  };
+  static constexpr std::size_t kLeaf = 8;
+
+  void divide(std::size_t begin, std::size_t end, std::size_t node) {
+    if (end - begin <= kLeaf) return;
+    Box box;
+    for (std::size_t i = begin; i < end; ++i) box.include(points_[index_[i]]);
+    Plane plane;
+    box.extent().maxCoeff(&plane.axis);
+    const auto at = [&](std::size_t i) { return index_.begin() + static_cast<std::ptrdiff_t>(i); };
+    const std::size_t middle = begin + (end - begin) / 2;
+    std::nth_element(at(begin), at(middle), at(end),
+                     [&](std::size_t a, std::size_t b) { return points_[a][plane.axis] < points_[b][plane.axis]; });
+    plane.at = points_[index_[middle]][plane.axis];
+    if (plane_.size() <= node) plane_.resize(node + 1);
+    plane_[node] = plane;
+    divide(begin, middle, 2 * node + 1);
+    divide(middle, end, 2 * node + 2);
+  }
+
+  /// Squared distance; what is beyond a plane farther away than the least so far is passed by.
+  void search(std::size_t own, std::size_t begin, std::size_t end, std::size_t node, double& least) const {
+    if (end - begin <= kLeaf) {
+      for (std::size_t i = begin; i < end; ++i) {
+        if (i != own) least = std::min(least, (points_[i] - points_[own]).squaredNorm());
+      }
+      return;
+    }
+    const std::size_t middle = begin + (end - begin) / 2;
+    const double beyond = points_[own][plane_[node].axis] - plane_[node].at;
+    if (beyond < 0.0) {
+      search(own, begin, middle, 2 * node + 1, least);
+      if (beyond * beyond < least) search(own, middle, end, 2 * node + 2, least);
+    } else {
+      search(own, middle, end, 2 * node + 2, least);
+      if (beyond * beyond < least) search(own, begin, middle, 2 * node + 1, least);
     }
   }
-  return nearest;
-}
+
+  std::vector<Vec3> points_;          ///< in the order of the leaves
+  std::vector<std::size_t> index_;    ///< of each of these
+  std::vector<Plane> plane_;
+};
 
 /// Largest distance of two points: pairs in falling order of their distances from the centre, cut when none can win.
 double largest_distance(std::span<const Vec3> points) {
@@ -159,19 +202,23 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     object.target = std::move(volume);
   }
 
-  const std::vector<double> nearest = nearest_distances(arrangement.position);
+  const std::vector<double> nearest = NearestNeighbours(arrangement.position).distances();
   Vec3 centre = Vec3::Zero();
   for (const Vec3& p : arrangement.position) centre += p;
   centre /= n;  // all masses of an object are equal
   const bool all_alike = std::all_of(d.skeleton.begin(), d.skeleton.end(), [](const SkeletonDesc& s) { return s.particles.empty(); });
-  Vec3 lone = Vec3::Zero();
+  // The frame of a lone particle is turned to the principal axes of its solid; no laws read it.
+  CarriedSolid lone;
+  std::vector<Quat> turn(n, Quat::Identity());
   for (std::uint32_t i = 0; i < n; ++i) {
     Vec3 axes = d.particles.inertia_axes;
     if (d.particles.inertia_radius) {
       axes.setConstant(*d.particles.inertia_radius);
     } else if (axes.isZero() && (n == 1 || d.separate)) {
-      if (i == 0 || !all_alike) lone = enclosed_axes(object.skeleton, i, scene.planar);
-      axes = lone;
+      if (i == 0 || !all_alike) lone = carried_solid(object.skeleton, i, scene.planar);
+      axes = lone.axes;
+      if (scene.planar) axes.setConstant(std::sqrt(0.5 * (axes.x() * axes.x() + axes.y() * axes.y())));  // it turns about z alone
+      turn[i] = lone.turn;
     } else if (axes.isZero()) {
       axes.setConstant(0.5 * nearest[i]);
     }
@@ -182,20 +229,22 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
                                            : "the field of its skeleton was nowhere found to reach the iso value");
     }
     const Vec3 inertia = principal_moments(d.particles.mass, axes);
-    const Quat& q = arrangement.orientation[i];
+    Quat q = arrangement.orientation[i];
+    if (turn[i].w() != 1.0) q = (q * turn[i]).normalized();
     model.particles.mass.push_back(d.particles.mass);
     model.particles.inertia.push_back(inertia);
-    model.particles.normal.push_back(Vec3::UnitZ());
+    model.particles.normal.push_back(turn[i].conjugate() * Vec3::UnitZ());
     model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
     model.particles.pinned.push_back(0);
     model.particles.kind.push_back(0);
     model.initial.position.push_back(arrangement.position[i]);
-    model.initial.orientation.push_back(arrangement.orientation[i]);
+    model.initial.orientation.push_back(q);
     model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
     model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
     if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
     model.smallest_length = std::min({model.smallest_length, nearest[i], n == 1 ? 0.5 * object.rest_diameter : nearest[i]});
   }
+  turn_primitives(turn, object.skeleton);
   if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);
   if (n > 1) object.rest_diameter = largest_distance(arrangement.position);
 }

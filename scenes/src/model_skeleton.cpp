@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <utility>
+
+#include <Eigen/Jacobi>
 
 #include "model_contact.h"
 #include "supple/core/arrange.h"
@@ -77,6 +80,78 @@ implicit::Kernel kernel_of(const KernelDesc& d, double radius, double iso) {
     case KernelName::BlancSchlick: return Kernel::blanc_schlick(radius, d.hardness);
   }
   return Kernel::wyvill(radius);
+}
+
+/// Whether moments are principal, as closely as they are known.
+bool has_no_products(const Mat3& moments) {
+  constexpr double kKnown = 1e-4;
+  const double largest = std::max({std::abs(moments(0, 1)), std::abs(moments(0, 2)), std::abs(moments(1, 2))});
+  return largest <= kKnown * moments.trace();
+}
+
+/// The mean of x x^T over a solid, in axes turned by `turn` [m^2]; zero where no surface is found. @param cells  at least, along its box
+Mat3 second_moments(const implicit::Skeleton& solid, const Quat& turn, int cells) {
+  const Pose pose{Vec3::Zero(), turn.conjugate()};
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  implicit::place_skeleton(solid, {&pose, 1}, placed);
+  implicit::index_field(solid, placed, field);
+  Box box = field.surface_box();
+  if (box.empty()) return Mat3::Zero();
+  // As fine as it takes to meet solids that are thin askew of the axes, whose box is then drawn closer.
+  constexpr int kMostCells = 256;
+  constexpr double kEnough = 400.0, kTight = 0.5;
+  Mat3 sum = Mat3::Zero();
+  double inside = 0.0;
+  while (cells <= kMostCells) {
+    const Vec3 cell = box.extent() / cells;
+    std::vector<Vec3> point;
+    std::vector<double> value;
+    Box met;
+    sum.setZero();
+    inside = 0.0;
+    for (int k = 0; k < cells; ++k) {
+      point.clear();
+      for (int j = 0; j < cells; ++j) {
+        for (int i = 0; i < cells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
+      }
+      value.resize(point.size());
+      implicit::FieldView(field).evaluate(point, value);
+      for (std::size_t s = 0; s < point.size(); ++s) {
+        if (!(value[s] > 0.0)) continue;
+        sum += point[s] * point[s].transpose();
+        inside += 1.0;
+        met.include(point[s] - cell);
+        met.include(point[s] + cell);
+      }
+    }
+    const bool tight = inside == 0.0 || (met.extent().array() >= kTight * box.extent().array()).all();
+    if (!tight) {
+      box = met;
+    } else if (inside < kEnough) {
+      cells *= 2;
+    } else {
+      break;
+    }
+  }
+  return inside > 0.0 ? Mat3(sum / inside) : sum;
+}
+
+/// The rotation to axes in which symmetric moments have no products, by Jacobi's rotations: among these it is a near one.
+Quat principal_axes(Mat3 moments) {
+  if (has_no_products(moments)) return Quat::Identity();
+  Mat3 axes = Mat3::Identity();
+  constexpr int kSweeps = 8;  // convergence is quadratic
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (const auto& [p, q] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}}) {
+      Eigen::JacobiRotation<double> turn;
+      turn.makeJacobi(moments, p, q);
+      moments.applyOnTheLeft(p, q, turn.adjoint());
+      moments.applyOnTheRight(p, q, turn);
+      axes.applyOnTheRight(p, q, turn);
+    }
+  }
+  return Quat(axes).normalized();
 }
 
 }  // namespace
@@ -194,53 +269,40 @@ implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<c
   return blend;
 }
 
-Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool planar) {
+CarriedSolid carried_solid(const implicit::Skeleton& object, std::uint32_t part, bool own_axes) {
+  const auto before = [](const implicit::Primitive& a, std::uint32_t b) { return a.part < b; };
   implicit::Skeleton own{.primitive = {}, .part_count = 1, .iso = object.iso, .blend = {}};
-  for (const implicit::Primitive& primitive : object.primitive) {
-    if (primitive.part == part) own.primitive.push_back(primitive);
-    if (primitive.part == part) own.primitive.back().part = 0;
+  for (auto p = std::lower_bound(object.primitive.begin(), object.primitive.end(), part, before);
+       p != object.primitive.end() && p->part == part; ++p) {
+    own.primitive.push_back(*p);
+    own.primitive.back().part = 0;
   }
-  if (own.primitive.empty()) return Vec3::Zero();
+  if (own.primitive.empty()) return {};
   const implicit::Primitive& first = own.primitive.front();
   const bool ball = own.primitive.size() == 1 && first.shape == implicit::ShapeKind::Point && !first.convolved &&
                     first.stretch == Vec3::Ones() && first.offset.position.isZero();
-  if (ball) return Vec3::Constant(iso_radius(first, own.iso));
-  const Pose still;
-  implicit::PlacedSkeleton placed;
-  implicit::Field field;
-  implicit::place_skeleton(own, {&still, 1}, placed);
-  implicit::index_field(own, placed, field);
-  const Box box = field.surface_box();
-  if (box.empty()) return Vec3::Zero();
-  // As fine as it takes to meet solids that are thin askew of the axes.
-  constexpr int kCells = 32, kMostCells = 256;
-  constexpr double kEnough = 400.0;
-  Vec3 squares = Vec3::Zero();
-  double inside = 0.0;
-  for (int cells = kCells; cells <= kMostCells && inside < kEnough; cells *= 2) {
-    const Vec3 cell = box.extent() / cells;
-    std::vector<Vec3> point;
-    std::vector<double> value;
-    squares.setZero();
-    inside = 0.0;
-    for (int k = 0; k < cells; ++k) {
-      point.clear();
-      for (int j = 0; j < cells; ++j) {
-        for (int i = 0; i < cells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));
-      }
-      value.resize(point.size());
-      implicit::FieldView(field).evaluate(point, value);
-      for (std::size_t s = 0; s < point.size(); ++s) {
-        if (!(value[s] > 0.0)) continue;
-        squares += point[s].cwiseAbs2();
-        inside += 1.0;
-      }
-    }
+  if (ball) return {Vec3::Constant(iso_radius(first, own.iso)), Quat::Identity()};
+  constexpr int kCells = 32;
+  // Found along the axes of the first shape and, where the solid lies askew to them, again along its own: there its box is tight.
+  Quat turn = first.offset.orientation;
+  Mat3 moments = second_moments(own, turn, kCells);
+  if (const Quat askew = principal_axes(moments); !askew.isApprox(Quat::Identity(), 0.0)) {
+    turn = (turn * askew).normalized();
+    moments = second_moments(own, turn, 2 * kCells);  // ends across an axis lie anywhere in a cell
   }
-  if (inside == 0.0) return Vec3::Zero();
-  Vec3 axes2 = 5.0 / inside * squares;
-  if (planar) axes2.setConstant(0.5 * (axes2.x() + axes2.y()));  // it turns about z alone
-  return axes2.cwiseSqrt();
+  const Mat3 m = turn.toRotationMatrix();
+  const Mat3 along_own = m * moments * m.transpose();
+  const bool kept = own_axes || has_no_products(along_own);
+  if (kept) return {(5.0 * along_own.diagonal()).cwiseSqrt(), Quat::Identity()};
+  return {(5.0 * moments.diagonal()).cwiseSqrt(), turn};
+}
+
+void turn_primitives(std::span<const Quat> turn, implicit::Skeleton& skeleton) {
+  for (implicit::Primitive& primitive : skeleton.primitive) {
+    const Quat back = turn[primitive.part].conjugate();
+    if (back.w() == 1.0) continue;
+    primitive.offset = {back * primitive.offset.position, (back * primitive.offset.orientation).normalized()};
+  }
 }
 
 }  // namespace supple::scenes

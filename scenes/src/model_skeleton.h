@@ -23,8 +23,17 @@ namespace supple::scenes {
 /// How the particles of an object blend. @param rest  their places
 [[nodiscard]] implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<const Vec3> rest, ModelFaults& faults);
 
-/// Semi-axes of the ellipsoid whose second moments along a particle's axes are those of the solid that it carries alone;
-/// exact for a ball, within a hundredth otherwise, within some of those that are thin askew. Zero without a surface.
-[[nodiscard]] Vec3 enclosed_axes(const implicit::Skeleton& object, std::uint32_t part, bool planar);
+/// The ellipsoid that has the second moments of a solid about the origin of its particle.
+struct CarriedSolid {
+  Vec3 axes = Vec3::Zero();        ///< semi-axes [m]
+  Quat turn = Quat::Identity();    ///< their directions, in the particle's frame
+};
+
+/// Of the solid that a particle carries alone; exact for a ball, within a hundredth otherwise. Zero without a surface.
+/// @param own_axes  takes the moments along the particle's axes and leaves out their products: the turn is none
+[[nodiscard]] CarriedSolid carried_solid(const implicit::Skeleton& object, std::uint32_t part, bool own_axes);
+
+/// What lay so in the frame of each part lies alike in space when the frame is turned. @param turn  shape [part_count]
+void turn_primitives(std::span<const Quat> turn, implicit::Skeleton& skeleton);
 
 }  // namespace supple::scenes

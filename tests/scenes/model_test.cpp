@@ -185,14 +185,37 @@ TEST(Warnings, LookForRingsArcsAndCurvesWhereTheyAre) {
   EXPECT_FALSE(beside("shape: curve, points: [[-0.5, 0, 0], [0, 0, 0.05], [0.5, 0, 0]]").empty());
 }
 
+/// In world axes at the start.
+Mat3 inertia_of(const Model& model, std::size_t i) {
+  const Mat3 q = model.initial.orientation[i].toRotationMatrix();
+  return q * model.particles.inertia[i].asDiagonal() * q.transpose();
+}
+
 TEST(Model, FindsTheMomentsOfARodThatLiesAskew) {
-  // A rod of length l along (1, 1, 1) / sqrt 3: second moments l^2 / 36 about each plane, so semi-axes with squares 5 l^2 / 36 and
-  // moments 2/5 m times that; the rod's own thickness and its ends add 2 a / l of it, 1 %.
+  // A rod of length l and radius a along u with round ends: mean squares of a cylinder and of two half balls.
   const Model model = model_of(std::string(kHead) +
                                "  - {name: a, particles: {mass: 3}, skeleton: [{shape: curve, points: [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], "
                                "kernel: {radius: 0.02}}]}\n");
-  const double moment = 0.4 * 3.0 * 5.0 / 36.0 * 3.0;
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(model.particles.inertia[0][k], moment, 0.03 * moment);
+  const double a = kIso * 0.02, l = std::sqrt(3.0), ends = 4.0 * a / (3.0 * l + 4.0 * a);
+  const double along = (1.0 - ends) * l * l / 12.0 + ends * (l * l / 4.0 + 3.0 / 8.0 * a * l + a * a / 5.0);
+  const double across = (1.0 - ends) * a * a / 4.0 + ends * a * a / 5.0;
+  const Vec3 u = Vec3::Ones().normalized();
+  const Mat3 around = u * u.transpose();
+  const Mat3 expected = 3.0 * ((along + across) * (Mat3::Identity() - around) + 2.0 * across * around);
+  EXPECT_LT((inertia_of(model, 0) - expected).cwiseAbs().maxCoeff(), 0.005 * expected.trace());
+}
+
+TEST(Model, ASolidTurnedInItsParticleTurnsAsOneWhoseParticleIsTurned) {
+  const std::string shape = "skeleton: [{shape: ellipsoid, semi_axes: [0.5, 0.3, 0.2], kernel: {}";
+  const std::string spin = "particles: {at: [1, 2, 3], spin: [1, -2, 0.5], mass: 2";
+  const Model turned = model_of(std::string(kHead) + "  - {name: a, " + spin + ", axis: [0.6, 0, 0.8]}, " + shape + "}]}\n");
+  const Model askew = model_of(std::string(kHead) + "  - {name: a, " + spin + "}, " + shape +
+                               ", turn_axis: [0, 1, 0], turn_deg: 36.86989764584402}]}\n");
+  EXPECT_LT((inertia_of(askew, 0) - inertia_of(turned, 0)).norm(), 1e-12);
+  EXPECT_LT((askew.initial.angular_momentum[0] - turned.initial.angular_momentum[0]).norm(), 1e-12);
+  const Quat direction = askew.initial.orientation[0] * askew.objects[0].skeleton.primitive[0].offset.orientation;
+  EXPECT_NEAR(direction.angularDistance(turned.initial.orientation[0]), 0.0, 1e-7);
+  EXPECT_NEAR((askew.initial.orientation[0] * askew.particles.normal[0] - Vec3::UnitZ()).norm(), 0.0, 1e-12);
 }
 
 TEST(Planar, HoldsEveryParticleInOnePlane) {
