@@ -110,6 +110,17 @@ TEST(Model, FindsNearestNeighboursOfUnevenPoints) {
   EXPECT_NEAR(model.objects[0].rest_diameter, std::hypot(5.0, 3.0), 1e-15);
 }
 
+TEST(Model, FindsNearestNeighboursOfManyPoints) {
+  const Model model = model_of(std::string(kHead) +
+                               "  - {name: a, particles: {arrange: grid, columns: 7, rows: 6, layers: 5, spacing: 1, disorder: 0.9}}\n");
+  const std::vector<Vec3>& position = model.rest.position;
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    double nearest = 100.0;
+    for (std::size_t j = 0; j < position.size(); ++j) nearest = j == i ? nearest : std::min(nearest, (position[j] - position[i]).norm());
+    EXPECT_DOUBLE_EQ(model.particles.inertia[i].x(), 0.1 * nearest * nearest * model.particles.mass[i]);
+  }
+}
+
 TEST(Model, StartsAsARigidMotionAboutTheCentreOfMass) {
   const Model model = model_of(std::string(kHead) +
                                "  - {name: a, particles: {arrange: line, count: 2, spacing: 2, at: [5, 0, 0], velocity: [1, 0, 0], "
