@@ -23,7 +23,7 @@ constexpr int kHeightSteps = 14;
 constexpr int kEndSteps = 14;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-/// What rule r is off by at most where no kink is near. Its difference from rule r - 1 says so: both converge exponentially, the
+/// What tells whether rule r is enough where no kink is near; far above what force, area and centre are off by, as energies converge later. Its difference from rule r - 1 says so: both converge exponentially, the
 /// faster the less they differ and the less the rim moved, over its radius, from where the angles of rule r - 1 put it. The forces
 /// of both may agree by chance, as their errors change sign with depth; then the spread of the pressure, which converges later,
 /// does not.
@@ -39,6 +39,19 @@ double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums&
     case 3: return difference * (0.01 + 5.0 * root + 60.0 * moved);
     default: return difference * (0.02 + 30.0 * root + 200.0 * moved);
   }
+}
+
+/// What force, area and centre of rule r are off by at most there.
+double bound_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums& coarse, double moved, bool round) {
+  const double loose = error_where_smooth(r, fine, coarse, moved), relative = relative_difference(fine, coarse);
+  if (r == 1) {
+    // Two radii integrate the force of a paraboloid exactly, but make its spread a sixth too large.
+    const double difference = std::max(relative, std::abs(7.0 / 6.0 - coarse.spread / fine.spread) / 60.0);
+    return std::min(loose, difference * (0.005 + 15.0 * difference + (25.0 + 3600.0 * moved) * moved));
+  }
+  if (r != 2 || !round) return loose;
+  const double difference = std::max(relative, std::abs(1.0 - coarse.spread / fine.spread) / 25.0);
+  return std::min(loose, difference * (0.005 + 7.0 * std::sqrt(difference)));
 }
 
 }  // namespace
@@ -464,7 +477,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
                               : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
                                        : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
     if (difference > kEnough * error && r < last) continue;
-    estimate_ = difference + algebraic_error();
+    estimate_ = (smooth ? bound_where_smooth(r, fine_, coarse_, rim_moved(), round) : difference) + algebraic_error();
     if (estimate_ > error && !any) return false;
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);

@@ -117,8 +117,10 @@ TEST(ContactSurface, OfBodiesThatAreTheSameAroundALineIsThatOfAllRays) {
         EXPECT_LE((a.force - e.force).norm(), most * e.force.norm());
         EXPECT_NEAR(a.area, e.area, most * e.area);
         EXPECT_LE((a.centre_of_pressure - e.centre_of_pressure).norm(), most * std::sqrt(e.area));
-        EXPECT_NEAR(a.energy, e.energy, 10.0 * most * e.energy);
-        EXPECT_NEAR(a.displaced_a, e.displaced_a, 10.0 * most * e.displaced_a);
+        // Columns are as exact as asked for; bounds are of force, area and centre, and may be far below.
+        const double columns = std::max(10.0 * most, error);
+        EXPECT_NEAR(a.energy, e.energy, columns * e.energy);
+        EXPECT_NEAR(a.displaced_a, e.displaced_a, columns * e.displaced_a);
         EXPECT_LT(a.force.cross(along).norm(), 1e-15 * a.force.norm());
         settings.energy = false;  // squeezed regions take as many points either way
         const std::uint64_t evaluations = stage.solve(settings).summary[0].evaluations;
