@@ -388,6 +388,26 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
   }
 }
 
+TEST(SmoothPatches, HaveBoundsNearTheirErrors) {
+  // A linear ball of radius 1 on a rigid plane, F = pi E d^2 (1 - 2 d / 3) with E d / (1 + E / k) in place of E d for a plane of slope k.
+  constexpr double k = 1e9;
+  const Body ball({make(ShapeKind::Point, Vec3::Zero(), Kernel::gascuel(1.0, 1.5, 0.5))});
+  std::vector<double> ratio;
+  for (int i = 1; i <= 100; ++i) {
+    const double d = 1e-3 * i, force = std::numbers::pi / 2.0 * 2.0 * d * d * (1.0 - 2.0 * d / 3.0);
+    const implicit::HalfSpace plane{-(1.0 - d) * Vec3::UnitZ(), Vec3::UnitZ(), 1.0};
+    Stage stage;
+    stage.add(ball.field, {Vec3::Zero()}, 2.0);
+    stage.add(plane, {Vec3::Zero()}, k);
+    const ContactSurface::Summary s = stage.solve({.error = 1e-3}).summary.at(0);
+    const double error = std::abs(s.force.z() / force - 1.0);
+    EXPECT_LE(error, s.error_estimate + 1e-8) << d;  // that the plane gives way
+    ratio.push_back(s.error_estimate / error);
+  }
+  std::nth_element(ratio.begin(), ratio.begin() + 50, ratio.end());
+  EXPECT_LT(ratio[50], 30.0);
+}
+
 TEST(SmoothPatches, AreNotVouchedForByForcesThatAgreeByChance) {
   // The force by 4 radii crosses that by 6 where a linear ball overlaps a plane a hundred times as stiff by 0.300 of its radius.
   // At pressure p the ball is one of radius 1 - p, the plane has come up by p / k: F = pi integral of (1 - p)^2 - (h + p / k)^2 dp.
