@@ -241,10 +241,12 @@ Interval Field::bound(const Box& box) const {
   return {std::max(sums.lower - index.iso - round_off, -index.iso), sums.upper - index.iso + round_off};
 }
 
-Interval Field::tight_bound(const Box& box) const {
+Interval Field::tight_bound(const Box& box) const { return box_bounds(box).value; }
+
+Field::BoxBounds Field::box_bounds(const Box& box) const {
   const Index& index = this->index();
   const Interval plain = bound(box);
-  if (box.empty() || index.blend.active() || !box.lower.allFinite() || !box.upper.allFinite()) return plain;
+  if (box.empty() || index.blend.active() || !box.lower.allFinite() || !box.upper.allFinite()) return {.value = plain};
   const Vec3 centre = box.centre();
   const Vec3 half = 0.5 * box.extent();
   const double reach2 = half.squaredNorm();
@@ -252,6 +254,7 @@ Interval Field::tight_bound(const Box& box) const {
   Vec3 gradient = Vec3::Zero();
   double least = 0.0, largest = 0.0;     // second derivatives
   Interval rest{0.0, 0.0};               // of what is not
+  bool second_order = true;
   double scale = index.iso, terms = 0.0;
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (!index.support[id].overlaps(box)) continue;
@@ -270,6 +273,7 @@ Interval Field::tight_bound(const Box& box) const {
       const PrimitiveBound one = bound_primitive(index, id, box, false);
       rest.lower += one.value.lower;
       rest.upper += one.value.upper;
+      second_order = false;
       continue;
     }
     using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -282,11 +286,15 @@ Interval Field::tight_bound(const Box& box) const {
     least += stretch * curvature.lower;
     largest += stretch * curvature.upper;
   }
-  if (terms == 0.0) return plain;
+  if (terms == 0.0) return {.value = plain, .second_order = true};
   const double first = gradient.cwiseAbs().dot(half);
   const double round_off = (64.0 + 2.0 * terms) * kEps * scale;
-  return {std::max(plain.lower, value + rest.lower - first + 0.5 * least * reach2 - round_off),
-          std::min(plain.upper, value + rest.upper + first + 0.5 * largest * reach2 + round_off)};
+  const double turn = std::max(-least, largest) * std::sqrt(reach2);  // of the gradient, from the centre on
+  const double steepness = gradient.norm() * (1.0 - 1e-12) - round_off / half.maxCoeff();
+  return {.value = {std::max(plain.lower, value + rest.lower - first + 0.5 * least * reach2 - round_off),
+                    std::min(plain.upper, value + rest.upper + first + 0.5 * largest * reach2 + round_off)},
+          .least_slope = second_order && half.maxCoeff() > 0.0 ? std::max(steepness - turn, 0.0) : 0.0,
+          .second_order = second_order};
 }
 
 double Field::gradient_bound(const Box& box) const {

@@ -7,7 +7,8 @@
 ///                                              and back, with a bounded error (needs the component supple_cgal)
 ///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
 ///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the blobs moved;
-///                                              /field: the field stage against its floors
+///                                              /field: the field stage against its floors; /searched, only by its whole name:
+///                                              cubes and the pieces that they miss
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
 ///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
 #include <algorithm>
@@ -27,6 +28,7 @@
 #include "support/mesh_distance.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/march_cubes.h"
+#include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/implicit/surface_grid.h"
 #ifdef SUPPLE_HAS_CGAL
@@ -132,11 +134,11 @@ std::string hash_of(const Mesh& mesh) {
 
 struct Method {
   std::string_view name;
-  int refinements;  ///< -1: tetrahedra, -2: a grid and OpenVDB's volumeToMesh
+  int refinements;  ///< -1: tetrahedra, -2: a grid and OpenVDB's volumeToMesh, -3: cubes and a search for missed pieces
 };
 /// "refined" starts from a lattice of twice the cell, "refined_twice" of four times.
-constexpr std::array<Method, 5> kMethods{
-    {{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}, {"openvdb", -2}}};
+constexpr std::array<Method, 6> kMethods{
+    {{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}, {"openvdb", -2}, {"searched", -3}}};
 
 /// 1 % of the blobs, those nearest to one on the surface.
 std::vector<std::uint32_t> blobs_at_the_side(const Body& body) {
@@ -253,16 +255,20 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
   Mesh mesh;
   CubeMesher mesher;
   MarchCounts counts;
+  MissedPieces missed;
   const Mesh* made = &mesh;
   Lattice coarse = lattice;
   coarse.cell *= std::ldexp(1.0, std::max(method.refinements, 0));
-  for (int repeat = 0; repeat < 200 && (repeat < 3 || total < 0.6); ++repeat) {
+  for (int repeat = 0; repeat < 200 && (repeat < (method.refinements == -3 ? 1 : 3) || total < 0.6); ++repeat) {
     mesher.forget();  // memory stays at hand, as in an animation where all moves
     const double begin = cpu_seconds();
     body.place();
     const double indexed = cpu_seconds();
     if (method.refinements == -2) {
       mesh = mesh_of(make_surface_grid(body.field, {.lattice = lattice}, executor), body.field, executor);
+    } else if (method.refinements == -3) {
+      mesh = mesher.make(body.field, {.lattice = lattice}, executor, &counts);
+      missed = add_missed_pieces(body.field, lattice, executor, mesh);
     } else if (method.refinements < 0) {
       mesh = polygonise(body.field, lattice, executor);
     } else {
@@ -280,11 +286,12 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
   const Back back = two_sided ? distance_back(body.field, lattice, mesh) : Back{};
   std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"index_cpu_ms\": %.4g, "
               "\"items\": %zu, \"items_per_s\": %.4g, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", "
-              "\"rms_vertex_over_h\": %.3g, \"rms_back_over_h\": %.3g, \"largest_back_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"hash\": \"%s\"}\n",
+              "\"rms_vertex_over_h\": %.3g, \"rms_back_over_h\": %.3g, \"largest_back_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"pieces\": %llu, \"joined\": %llu, \"undecided\": %llu, \"hash\": \"%s\"}\n",
               name.c_str(), 1e3 * best, 1e3 * index, mesh.triangle_count(),
               static_cast<double>(mesh.triangle_count()) / best, centroid_error, vertex_error,
               back.rms / lattice.cell, back.largest / lattice.cell,
-              1e-6 * static_cast<double>(bytes_of(mesh)), 1e-6 * static_cast<double>(bytes), hash_of(mesh).c_str());
+              1e-6 * static_cast<double>(bytes_of(mesh)), 1e-6 * static_cast<double>(bytes), static_cast<unsigned long long>(missed.pieces),
+              static_cast<unsigned long long>(missed.joined), static_cast<unsigned long long>(missed.undecided), hash_of(mesh).c_str());
   std::fflush(stdout);
 }
 
@@ -542,7 +549,7 @@ int main(int argc, char** argv) {
     for (const int cells : {64, 128, 256, 512}) {
       for (const Method& method : kMethods) {
         const std::string name = body_name + '/' + std::to_string(cells) + '/' + std::string(method.name);
-        if (name.compare(0, filter.size(), filter) != 0) continue;
+        if (name.compare(0, filter.size(), filter) != 0 || (method.refinements == -3 && name != filter)) continue;
         measure(name, body, frame.lattice(cells), method, two_sided);
       }
       const std::string name = body_name + '/' + std::to_string(cells) + "/moved";

@@ -52,7 +52,8 @@ TEST_P(BoundedBody, TightIntervalHoldsTheRangeAndIsNeverWider) {
   Random random(87);
   std::vector<Vec3> points(24);
   std::vector<double> values(24);
-  int violations = 0, decided = 0, plainly = 0;
+  std::vector<Vec3> gradients(24);
+  int violations = 0, decided = 0, plainly = 0, steep = 0;
   for (int trial = 0; trial < 8000; ++trial) {
     const double size = 0.4 * std::pow(10.0, -2.0 * random.uniform(0, 1));
     const Vec3 centre = random.in_box(1.5);
@@ -63,10 +64,13 @@ TEST_P(BoundedBody, TightIntervalHoldsTheRangeAndIsNeverWider) {
       const Vec3 t = i < 8 ? Vec3(bit(0), bit(1), bit(2)) : Vec3(0.5 * (Vec3::Ones() + random.in_box(1.0)));
       points[i] = (box.lower + t.cwiseProduct(box.extent())).cwiseMax(box.lower).cwiseMin(box.upper);
     }
-    body_.field.evaluate(points, values);
+    body_.field.evaluate(points, values, gradients);
     const Interval plain = body_.field.bound(box);
     const Interval tight = body_.field.tight_bound(box);
     for (const double value : values) violations += !tight.contains(value);
+    const double least_slope = body_.field.box_bounds(box).least_slope;
+    for (const Vec3& gradient : gradients) violations += gradient.norm() < least_slope;
+    steep += least_slope > 0.0;
     EXPECT_GE(tight.lower, plain.lower);
     EXPECT_LE(tight.upper, plain.upper);
     decided += tight.upper < 0.0 || tight.lower > 0.0;
@@ -74,6 +78,7 @@ TEST_P(BoundedBody, TightIntervalHoldsTheRangeAndIsNeverWider) {
   }
   EXPECT_EQ(violations, 0);
   EXPECT_GE(decided, plainly);
+  EXPECT_GT(steep, 0);
 }
 
 TEST_P(BoundedBody, IntervalShrinksToTheValueOnAPoint) {

@@ -41,6 +41,13 @@ class Field {
   /// gradient at the centre and bounds of the second derivatives leave an error of second order in the box. Costs about
   /// twice as much. Of fields with another rule than Sum: `bound`.
   [[nodiscard]] Interval tight_bound(const Box& box) const;
+  /// The same, and what |grad F| is at least [1/m]: above 0 only on boxes so small that the gradient hardly turns.
+  struct BoxBounds {
+    Interval value{};
+    double least_slope = 0.0;
+    bool second_order = false;  ///< false: by values alone, for some second derivative is unknown, and the slope with it
+  };
+  [[nodiscard]] BoxBounds box_bounds(const Box& box) const;
 
   /// Hessian of F [1/m^2] at one point (mean curvature, tests); the mean curvature is > 0 for a sphere:
   /// kappa = (g^T H g - |g|^2 tr H) / (2 |g|^3).
