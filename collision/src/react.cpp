@@ -89,13 +89,7 @@ class Side {
     const std::size_t parts = body_->pose.size();
     elastic_force_.assign(parts, Vec3::Zero());
     elastic_torque_.assign(parts, Vec3::Zero());
-    double all = 0.0;
-    for (std::size_t i = 0; i < load.size(); ++i) {
-      for_parts(i, [&](std::size_t k, double lambda) { share_[k] += lambda * load[i]; });
-      all += load[i];
-    }
-    if (!(all > 0.0)) return;
-    for (double& s : share_) s /= all;
+    if (!share_out(load)) return;
 
     own_point_.clear();
     own_weight_.clear();
@@ -132,14 +126,10 @@ class Side {
       return body_->yield[k].inverse_mass + (centre - body_->pose[k].position).squaredNorm() * body_->yield[k].inverse_inertia;
     };
     if (single()) return of_part(0);
-    std::fill(share_.begin(), share_.end(), 0.0);
-    double all = 0.0, sum = 0.0;
-    for (std::size_t i = 0; i < load.size(); ++i) {
-      for_parts(i, [&](std::size_t k, double lambda) { share_[k] += lambda * load[i]; });
-      all += load[i];
-    }
-    for (std::size_t k = 0; all > 0.0 && k < share_.size(); ++k)
-      if (share_[k] > 0.0) sum += share_[k] / all * (share_[k] / all) * of_part(k);
+    double sum = 0.0;
+    if (!share_out(load)) return sum;
+    for (std::size_t k = 0; k < share_.size(); ++k)
+      if (share_[k] > 0.0) sum += share_[k] * share_[k] * of_part(k);
     return sum;
   }
 
@@ -159,6 +149,19 @@ class Side {
     double sum = 0.0;
     for (std::uint32_t e = begin; e < end; ++e) sum += rows_.value[e];
     for (std::uint32_t e = begin; e < end; ++e) rows_.value[e] /= sum;
+  }
+
+  /// The parts' mean contributions. @return whether any load is there to share
+  bool share_out(std::span<const double> load) {
+    std::fill(share_.begin(), share_.end(), 0.0);
+    double all = 0.0;
+    for (std::size_t i = 0; i < load.size(); ++i) {
+      for_parts(i, [&](std::size_t k, double lambda) { share_[k] += lambda * load[i]; });
+      all += load[i];
+    }
+    if (!(all > 0.0)) return false;
+    for (double& s : share_) s /= all;
+    return true;
   }
 
   template <class Use>
