@@ -32,6 +32,8 @@ std::optional<Simplex> face_of(const Simplex& tetrahedron, std::size_t opposite)
 namespace {
 
 constexpr int kMaxIterations = 12;
+/// Of a step along a simplex: what lies beyond it by less is on its border, as where bodies meet in a plane of the lattice.
+constexpr double kOnBorder = 1e-9;
 
 /// Differences that vanish at the junction, with gradients; at most three.
 struct Conditions {
@@ -106,6 +108,12 @@ struct Chain {
     }
     return above >= margin;
   }
+  /// The nearest coordinates inside, of some that lie beyond by rounding.
+  [[nodiscard]] Vec3 clipped(Vec3 s) const {
+    double above = 1.0;
+    for (int k = 0; k < steps; ++k) above = s[k] = std::clamp(s[k], 0.0, above);
+    return s;
+  }
   /// The last point with a margin of a hundredth on the way from a point inside to one that is not.
   [[nodiscard]] Vec3 last_inside(const Vec3& inside, const Vec3& beyond) const {
     double share = 1.0;
@@ -150,6 +158,10 @@ Junction newton_inside(std::span<const FieldView> fields, const Chain& chain, co
     Conditions c = conditions_at(fields, labels, p);
     if (vanishes(c, p, scale)) {
       if (chain.contains(s, 0.0)) return {.point = p, .residual = largest(c), .exact = true};
+      if (chain.contains(s, -kOnBorder)) {
+        const Vec3 on_border = chain.point(chain.clipped(s));
+        return {.point = on_border, .residual = largest(conditions_at(fields, labels, on_border)), .exact = true};
+      }
       if (beyond != nullptr) *beyond = s;
       break;
     }

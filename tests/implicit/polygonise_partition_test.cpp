@@ -290,6 +290,31 @@ TEST(PolygonisePartition, ReachesTheErrorThatIsAskedForWhereBodiesTouch) {
   }
 }
 
+// Bodies in mirror image of each other meet in a plane of a lattice that is laid by it: rounding decides on which side points lie.
+TEST(PolygonisePartition, MeetsTheRimInAPlaneOfTheLattice) {
+  constexpr double kRadius = 0.5, kApart = 0.44;
+  for (const Vec3& beside : {Vec3(0, 0, 0), Vec3(0, 0.0034, 0.0071), Vec3(0, 0.05, -0.025)}) {
+    const Vec3 apart(kApart, 0, 0);
+    const std::vector<FunctionField> balls{sphere(beside - apart, kRadius), sphere(beside + apart, kRadius)};
+    const Lattice lattice{.origin = Vec3::Zero(), .cell = 0.025};
+    PolygoniseCounts counts;
+    const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice, Executor(1), &counts);
+    expect_all_closed(mesh);
+    EXPECT_GT(counts.junctions, 0u);
+    EXPECT_EQ(counts.junctions_moved, 0u);
+    EXPECT_LT(counts.residual, 1e-13);
+    // Chords of a tetrahedron are at most sqrt(3) cells long; a chord of the rim, of radius 0.24, leaves it by most.
+    const double sagitta = 3.0 * lattice.cell * lattice.cell / (8.0 * std::sqrt(kRadius * kRadius - kApart * kApart));
+    for (std::size_t m = 0; m < 2; ++m) {
+      const Vec3 axis = m == 0 ? -Vec3::UnitX() : Vec3(Vec3::UnitX());
+      for (const auto& t : mesh[m].triangle) {
+        const Vec3 c = (mesh[m].position[t[0]] + mesh[m].position[t[1]] + mesh[m].position[t[2]]) / 3.0;
+        EXPECT_LT(distance_to_half(c - beside, axis, kApart, kRadius), sagitta) << c.transpose();
+      }
+    }
+  }
+}
+
 TEST(PolygonisePartition, VolumesAddUpToTheUnion) {
   // Two balls of radius r at distance D: the lens in both has the volume pi (4 r + D) (2 r - D)^2 / 12.
   const double r = 0.5, D = 0.6, ball = 4.0 / 3.0 * std::numbers::pi * r * r * r;
