@@ -295,21 +295,21 @@ void advance(const ParticleSet& set, const Interactions& interactions, const For
                        [&](const ExternalLoad& load) { return load.changes(from, to); });
   };
   const double middle = time + 0.5 * dt, end = time + dt;
-  const bool starts = changes(time, middle);
+  const bool starts = changes(time, middle), ends = changes(middle, end);
+  const bool changing = starts || ends;  // the work of halves adds up only if both are booked in the same way
   if (starts) external_loads(set, interactions, time, middle, sample.external);
 
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Forward, state, ledger);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
-  (starts ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
+  (changing ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
   drift(set, rotation, dt, state);
-  if (!starts) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
+  if (!changing) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   evaluate(forces, state, end, sample);
   kick_state.valid = true;
-  const bool ends = changes(middle, end);
   if (ends) external_loads(set, interactions, middle, end, sample.external);
-  if (!ends) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
-  (ends ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
+  if (!changing) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
+  (changing ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
   if (ends) external_loads(set, interactions, end, end, sample.external);
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);

@@ -299,6 +299,17 @@ TEST(ExternalTorque, DoesItsWorkOnASpinningBody) {
   }
 }
 
+TEST(ExternalWork, OfALoadThatBeginsWithinAStepIsWhatAFreeBodyGains) {
+  for (const double begin : {0.113, 0.117, 0.12}) {  // in the first and the second half of a step, and where one begins
+    System s;
+    s.p.add(Vec3::Zero(), 2.0);
+    s.interactions.external.push_back({.particle = 0, .force = Vec3(3, 0, 0), .torque = Vec3(0, 0, 0.3), .begin = begin, .end = 0.657, .ramp = 0.1});
+    s.run(0.01, 100);
+    EXPECT_NEAR(s.p.state.velocity[0].x(), 1.5 * (0.657 - begin - 0.1), 1e-14);
+    EXPECT_NEAR(s.energy(), s.ledger.external_work, 1e-13 * s.energy()) << begin;
+  }
+}
+
 TEST(ExternalWork, ClosesTheEnergyBalanceToSecondOrder) {
   const auto imbalance = [](double dt) {
     System s = make_moving_spiral();
