@@ -220,4 +220,50 @@ double BlendIndex::slope_bound(std::span<const NodeBound> nodes) const {
   return largest * math::pow(sum, 1.0 / exponent_);
 }
 
+bool BlendIndex::find_terms(std::span<const NodeBound> nodes, std::vector<Term>& terms) const {
+  terms.clear();
+  const double least = bound(nodes).lower;
+  // Of what blends with node k beside node j.
+  const auto beside = [&](std::size_t k, std::size_t j) {
+    Interval sum;
+    for_neighbours(nodes, k, [&](std::size_t i, double w) {
+      if (i == j) return;
+      sum.lower += w * std::min(nodes[i].value.lower, nodes[k].value.lower);
+      sum.upper += w * std::min(nodes[i].value.upper, nodes[k].value.upper);
+    });
+    return sum;
+  };
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const Interval& own = nodes[k].value;
+    if (rule_ == BlendRule::Gradient) {
+      for (const NodeBound& other : nodes.first(k)) {
+        if (own.upper > opening_ * other.value.lower && other.value.upper > opening_ * own.lower) return false;
+      }
+      if (own.upper >= least) terms.push_back({.winner = k, .node = k});
+      continue;
+    }
+    double largest = own.upper;
+    for_neighbours(nodes, k, [&](std::size_t j, double w) { largest += w * std::min(nodes[j].value.upper, own.upper); });
+    if (largest < least) continue;
+    terms.push_back({.winner = k, .node = k});
+    for_neighbours(nodes, k, [&](std::size_t j, double w) {
+      const Interval& other = nodes[j].value;
+      if (other.lower > own.upper) {
+        terms.push_back({.winner = k, .node = k, .weight = w});
+        return;
+      }
+      // With f_j > f_k node k only wins by what blends with it beside j.
+      const bool is_less = other.upper < own.lower || beside(k, j).upper <= beside(j, k).lower;
+      terms.push_back({.winner = k, .node = j, .weight = w, .or_winner = !is_less});
+    });
+  }
+  return true;
+}
+
+Interval BlendIndex::share(const NodeBound& node, const Interval& all) const {
+  // (f_k / F)^(n - 1)
+  const auto power = [&](double f, double F) { return f > 0.0 ? math::pow(f / F, exponent_ - 1.0) : 0.0; };
+  return {power(node.value.lower, all.upper), node.value.upper < all.lower ? power(node.value.upper, all.lower) : 1.0};
+}
+
 }  // namespace supple::implicit

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "supple/implicit/blend.h"
 
@@ -48,6 +49,16 @@ class BlendIndex {
   [[nodiscard]] Interval bound(std::span<const NodeBound> nodes) const;
   /// Of |grad F|; infinite for Gradient where two nodes are met, for the angle turns without a limit where gradients vanish.
   [[nodiscard]] double slope_bound(std::span<const NodeBound> nodes) const;
+  /// Graph and Gradient: which sums of nodes' gradients may be that of F somewhere, by bounds of the f_k; `terms` receives them, those
+  /// of one winning node in a row. False where Gradient blends.
+  struct Term {
+    std::size_t winner = 0, node = 0;  ///< positions in `nodes`
+    double weight = 1.0;
+    bool or_winner = false;            ///< the winner's gradient may stand for the node's
+  };
+  [[nodiscard]] bool find_terms(std::span<const NodeBound> nodes, std::vector<Term>& terms) const;
+  /// Ricci: the least and largest dF/df_k, by bounds of the f_k. @param all  bound(nodes)
+  [[nodiscard]] Interval share(const NodeBound& node, const Interval& all) const;
 
  private:
   /// Calls use(j, weight) for the positions j in `nodes` of the neighbours of nodes[k].

@@ -1,5 +1,5 @@
 // Bounds of F and |grad F| on boxes: kernels fall with distance, so f on a box lies between g(d_far) and g(d_near), and
-// the sum of these intervals holds F.
+// the sum of these intervals holds F. Those of second order: field_box_bounds.cpp.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,13 +13,8 @@ namespace {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
-/// Squared distances, as the kernel sees them, between which all points of a box lie.
-struct DistanceRange {
-  double near2, far2;
-};
-
 /// @param lower, upper  corners of the box relative to the primitive's position
-DistanceRange distance_range(const PackedPrimitive& p, const PackedShape& shape, const Vec3& lower, const Vec3& upper) {
+DistanceRange range_between(const PackedPrimitive& p, const PackedShape& shape, const Vec3& lower, const Vec3& upper) {
   if (p.kind == PackedKind::PointWyvill || p.kind == PackedKind::PointGascuel) {
     const Vec3 near = lower.cwiseMax(-upper).cwiseMax(0.0);
     const Vec3 far = lower.cwiseAbs().cwiseMax(upper.cwiseAbs());
@@ -63,15 +58,6 @@ DistanceRange distance_range(const PackedPrimitive& p, const PackedShape& shape,
   const double least = std::max(here * (1.0 - 1e-14) - change, 0.0);
   const double most = here * (1.0 + 1e-14) + change;
   return {std::max(near.squaredNorm(), least * least), std::min(far.squaredNorm(), most * most)};
-}
-
-/// Distances within the part of the box that the support reaches. Where the box reaches beyond the support, that part
-/// ends on the support's box, so far2 is R^2 or more and the least f is zero, as it should be.
-DistanceRange clipped_range(const Field::Index& index, std::uint32_t i, const Box& box) {
-  const PackedPrimitive& p = index.primitive[i];
-  const Vec3 position(p.position[0], p.position[1], p.position[2]);
-  const Box part = box.intersection(index.support[i]);
-  return distance_range(p, index.shape[i], part.lower - position, part.upper - position);
 }
 
 /// Adds the range of primitive i to the sums.
@@ -220,10 +206,17 @@ PrimitiveBound bound_convolution(const Field::Index& index, std::uint32_t id, co
 
 }  // namespace
 
+DistanceRange distance_range(const Field::Index& index, std::uint32_t id, const Box& box) {
+  const PackedPrimitive& p = index.primitive[id];
+  const Vec3 position(p.position[0], p.position[1], p.position[2]);
+  const Box part = box.intersection(index.support[id]);
+  return range_between(p, index.shape[id], part.lower - position, part.upper - position);
+}
+
 PrimitiveBound bound_primitive(const Field::Index& index, std::uint32_t id, const Box& box, bool with_slope) {
   const PackedShape& shape = index.shape[id];
   if (shape.foot == PackedFoot::Convolved) return bound_convolution(index, id, box);
-  const DistanceRange range = clipped_range(index, id, box);
+  const DistanceRange range = distance_range(index, id, box);
   PrimitiveBound bound{{evaluate(shape.kernel, range.far2).value, evaluate(shape.kernel, range.near2).value}};
   if (with_slope) {
     bound.slope = shape.distance_scale * lipschitz(shape.kernel, std::sqrt(range.near2), std::sqrt(range.far2));
@@ -239,62 +232,6 @@ Interval Field::bound(const Box& box) const {
   if (sums.terms == 0.0) return {-index.iso, -index.iso};
   const double round_off = (16.0 + sums.terms) * kEps * (sums.scale + index.iso);
   return {std::max(sums.lower - index.iso - round_off, -index.iso), sums.upper - index.iso + round_off};
-}
-
-Interval Field::tight_bound(const Box& box) const { return box_bounds(box).value; }
-
-Field::BoxBounds Field::box_bounds(const Box& box) const {
-  const Index& index = this->index();
-  const Interval plain = bound(box);
-  if (box.empty() || index.blend.active() || !box.lower.allFinite() || !box.upper.allFinite()) return {.value = plain};
-  const Vec3 centre = box.centre();
-  const Vec3 half = 0.5 * box.extent();
-  const double reach2 = half.squaredNorm();
-  double value = -index.iso;             // of what is expanded about the centre
-  Vec3 gradient = Vec3::Zero();
-  double least = 0.0, largest = 0.0;     // second derivatives
-  Interval rest{0.0, 0.0};               // of what is not
-  bool second_order = true;
-  double scale = index.iso, terms = 0.0;
-  for (const std::uint32_t id : candidates_of(index, box)) {
-    if (!index.support[id].overlaps(box)) continue;
-    const PackedPrimitive& p = index.primitive[id];
-    const PackedShape& shape = index.shape[id];
-    scale += shape.peak + shape.lipschitz * half.norm();
-    terms += 1.0;
-    const DistanceRange range = clipped_range(index, id, box);
-    const bool clipped = !(index.support[id].contains(box.lower) && index.support[id].contains(box.upper));
-    const double far = clipped ? shape.kernel.radius : std::sqrt(range.far2);
-    const CurvatureRange curvature = curvature_range(shape.kernel, std::sqrt(range.near2), far);
-    // Squared distances of convex shapes have second derivatives between 0 and 2, those of plane curves do not.
-    const bool convex = shape.foot == PackedFoot::Slab || shape.foot == PackedFoot::Disc || shape.view.kind == ShapeKind::Triangle ||
-                        shape.view.kind == ShapeKind::Polygon;
-    if (!convex || shape.foot == PackedFoot::Convolved || !std::isfinite(curvature.upper)) {
-      const PrimitiveBound one = bound_primitive(index, id, box, false);
-      rest.lower += one.value.lower;
-      rest.upper += one.value.upper;
-      second_order = false;
-      continue;
-    }
-    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    const Eigen::Map<const RowMajor> A(shape.to_local.data());
-    const FootSample sample = foot(shape.view, A * (centre - Vec3(p.position[0], p.position[1], p.position[2])));
-    const KernelSample kernel = supple::implicit::evaluate(shape.kernel, sample.q);
-    value += kernel.value;
-    gradient += 2.0 * kernel.slope * (A.transpose() * sample.half_gradient);
-    const double stretch = shape.distance_scale * shape.distance_scale;
-    least += stretch * curvature.lower;
-    largest += stretch * curvature.upper;
-  }
-  if (terms == 0.0) return {.value = plain, .second_order = true};
-  const double first = gradient.cwiseAbs().dot(half);
-  const double round_off = (64.0 + 2.0 * terms) * kEps * scale;
-  const double turn = std::max(-least, largest) * std::sqrt(reach2);  // of the gradient, from the centre on
-  const double steepness = gradient.norm() * (1.0 - 1e-12) - round_off / half.maxCoeff();
-  return {.value = {std::max(plain.lower, value + rest.lower - first + 0.5 * least * reach2 - round_off),
-                    std::min(plain.upper, value + rest.upper + first + 0.5 * largest * reach2 + round_off)},
-          .least_slope = second_order && half.maxCoeff() > 0.0 ? std::max(steepness - turn, 0.0) : 0.0,
-          .second_order = second_order};
 }
 
 double Field::gradient_bound(const Box& box) const {

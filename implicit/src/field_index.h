@@ -125,6 +125,13 @@ void part_rows(const Field::Index& index, std::span<const Vec3> points, FieldPar
 /// Hessian of one part's sum.
 [[nodiscard]] Mat3 part_hessian(const Field::Index& index, std::uint32_t part, const Vec3& point);
 
+/// Squared distances, as the kernel sees them, between which all points of a box lie that the support reaches. Where the box
+/// reaches beyond the support, that part ends on the support's box, so far2 is R^2 or more and the least f is zero, as it should be.
+struct DistanceRange {
+  double near2, far2;
+};
+[[nodiscard]] DistanceRange distance_range(const Field::Index& index, std::uint32_t id, const Box& box);
+
 /// Of one primitive on a box.
 struct PrimitiveBound {
   Interval value{};

@@ -117,6 +117,36 @@ double inflection(const Kernel& k) {
   return k.radius * std::sqrt(low);
 }
 
+/// Its second derivative is 0 within the thickness and linear outside; the first is bounded as in `lipschitz`.
+CurvatureRange gascuel_curvature(const Kernel& k, double near, double far) noexcept {
+  CurvatureRange range{.lower = -lipschitz(k, near, far) / near};
+  if (far <= k.thickness) return range;
+  const auto [D, G] = OuterCubic(k);
+  for (const double d : {std::max(near, k.thickness), far}) {
+    const double second = k.iso * (2.0 * (D * d + G) + 4.0 * D * (d - k.radius));
+    range = {std::min(range.lower, second), std::max(range.upper, second)};
+  }
+  return range;
+}
+
+/// Bounds of 2 f' and e = 2 f' + 4 u f'' over R^2 by interval arithmetic on either side of the joint: both derivatives keep
+/// their signs there, and what they are made of is linear in u. @param p  hardness
+CurvatureRange blanc_schlick_inner(double p, double from, double to) noexcept {
+  if (from > to) return {};
+  const double b = 4.5 - 4.0 * p;
+  const double D = 1.125 + std::min(b * (from - 0.25), b * (to - 0.25));
+  const double largest = 2.0 * p + std::max(b * from, b * to);
+  return {-to * (18.0 * largest / (D * D) + 72.0 * p * p / (D * D * D)), 0.0};
+}
+CurvatureRange blanc_schlick_outer(double p, double from, double to) noexcept {
+  if (from > to) return {};
+  const double b = 1.5 + 4.0 * p, end = 2.25 + 3.0 * p;
+  const double D = 1.125 + b * (from - 0.25), D_end = 1.125 + b * (to - 0.25);
+  const double least = -2.0 * (1.0 - from) * (2.25 + b * (to + 0.5)) / (D * D);
+  const double largest = -2.0 * (1.0 - to) * (2.25 + b * (from + 0.5)) / (D_end * D_end);
+  return {least, std::max(largest + 8.0 * to * end * end / (D * D * D), 0.0)};
+}
+
 }  // namespace
 
 Kernel Kernel::wyvill(double radius) {
@@ -262,10 +292,11 @@ CurvatureRange curvature_range(const Kernel& kernel, double near, double far) no
     case KernelKind::Blinn: extremum = 1.5 / a; break;
     case KernelKind::Cauchy: extremum = 0.6 / a; break;
     case KernelKind::Nishimura: return {from < 1.0 / 9.0 ? -6.0 / R2 : 2.0 * in_square(kernel, from).first / R2, to > 1.0 / 9.0 ? 3.0 / R2 : 0.0};
-    case KernelKind::Gascuel:
+    case KernelKind::Gascuel: return gascuel_curvature(kernel, near, std::min(far, kernel.radius));
     case KernelKind::BlancSchlick: {
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      return {-kInfinity, kInfinity};
+      const CurvatureRange inner = blanc_schlick_inner(kernel.shape, from, std::min(to, 0.25));
+      const CurvatureRange outer = blanc_schlick_outer(kernel.shape, std::max(from, 0.25), to);
+      return {std::min(inner.lower, outer.lower) / R2, std::max(inner.upper, outer.upper) / R2};
     }
   }
   const auto radial = [&](double u) {

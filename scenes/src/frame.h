@@ -15,6 +15,7 @@
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/march_cubes.h"
+#include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/solids.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/simulation.h"
@@ -28,6 +29,17 @@ struct LedSolid {
   Vec3 velocity = Vec3::Zero();
   Vec3 spin = Vec3::Zero();
   bool moves = false;
+};
+
+/// What searches between the nodes of lattices found, of meshes of bodies.
+struct SearchCounts {
+  implicit::MissedPieces found;
+  std::uint64_t unsearched = 0;  ///< meshes of bodies that touch others
+  void add(const SearchCounts& other) {
+    found.pieces += other.found.pieces;
+    found.undecided += other.found.undecided;
+    unsearched += other.unsearched;
+  }
 };
 
 struct Frame {
@@ -44,6 +56,7 @@ struct Frame {
   std::uint64_t bodies_present = 0;           ///< that collide
   std::uint64_t samples_present = 0;          ///< of these
   std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
+  SearchCounts missed;                        ///< by the last meshes
   std::vector<std::uint8_t> convex;           ///< 1: a contact body that is convex; shape [bodies + fixed ones]
   std::vector<std::uint8_t> near;             ///< 1: its supports reach another body
   std::vector<std::uint32_t> reached;         ///< bodies in `reaching`, ascending; the others have no flags

@@ -135,7 +135,7 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, StageProfile& profil
     }
     const bool automatic = d.method == MeshingName::Auto && !object.mesh_error;
     if (d.method == MeshingName::OpenVdb ||
-        (automatic && !implicit::estimate_routes(context.bodies[i].skeleton, frame.placed[i].support, object.cell).prefers_cubes())) {
+        (automatic && !d.search && !implicit::estimate_routes(context.bodies[i].skeleton, frame.placed[i].support, object.cell).prefers_cubes())) {
       return implicit::mesh_of(implicit::make_surface_grid(field, {.lattice = lattice}, context.executor), field, context.executor);
     }
     implicit::MarchCounts marched;
@@ -143,6 +143,11 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, StageProfile& profil
                     ? implicit::march_creases(field, lattice, context.executor, &marched)
                     : frame.mesher[i].make(field, {.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip},
                                            context.executor, &marched);
+    if (d.search) {
+      const implicit::MissedPieces found =
+          implicit::add_missed_pieces(field, {.origin = Vec3::Zero(), .cell = marched.cell}, context.executor, mesh);
+      frame.missed.add({.found = found});
+    }
     profile.visited += marched.tiles;
     profile.present += 64 * marched.blocks;
     return mesh;
@@ -187,8 +192,10 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
   StageTimer timer(profile, true);
   std::vector<Mesh> surfaces(bodies.size());
+  frame.missed = {};
   const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
   mesh_divided(context, division, profile, surfaces);
+  if (model.meshing.search) frame.missed.unsearched = division.body.size();
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {

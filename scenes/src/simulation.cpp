@@ -54,6 +54,7 @@ struct Simulation::Impl {
   bool pulled_meshes = false;
   std::function<bool(const Box&)> shown;
   std::vector<std::string> warnings;
+  SearchCounts missed;  ///< by all meshes so far
 
   Impl(Scene s, SimulationOptions o)
       : scene(std::move(s)),
@@ -467,6 +468,8 @@ struct Simulation::Impl {
     if (shown) wanted.shown = &shown;
     try {
       meshes = polygonise_objects(wanted, state.particles, laws, pulled);
+      missed.add(pulled.missed);
+      set_missed(missed, warnings);
     } catch (const Error& error) {
       rethrow_with_places(scene, error);
     }

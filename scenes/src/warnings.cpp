@@ -72,12 +72,13 @@ void add_without_surface(const StageContext& context, const core::ParticleState&
 }
 
 void add_missed(const Model& model, std::vector<std::string>& warnings) {
+  if (model.meshing.search) return;
   for (const ObjectModel& object : model.objects) {
     const double thickness = 2.0 * object.iso_radius;
     if (!(object.cell > thickness && thickness > 0.0)) continue;
     const std::string key = object.own_cell ? "objects." + object.name + ".meshing.cell" : "output.cell";
     warnings.push_back(key + ": cells of " + number_text(object.cell) + " m may miss '" + object.name + "', which is " +
-                       number_text(thickness) + " m thick");
+                       number_text(thickness) + " m thick; 'output.meshing.search' would look for it");
   }
 }
 
@@ -100,6 +101,15 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
                              ", which has no force where this is so; 'auto' fits all";
     if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
   }
+}
+
+void set_missed(const SearchCounts& all, std::vector<std::string>& warnings) {
+  if (all.found.pieces + all.found.undecided + all.unsearched == 0) return;
+  const std::string key = "output.meshing.search: ";
+  std::erase_if(warnings, [&](const std::string& warning) { return warning.starts_with(key); });
+  warnings.push_back(key + "pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: " +
+                     std::to_string(all.found.pieces) + "; cells where one may be missed: " + std::to_string(all.found.undecided) +
+                     "; meshes of bodies that touch others, which are not searched: " + std::to_string(all.unsearched));
 }
 
 }  // namespace supple::scenes

@@ -16,4 +16,7 @@ namespace supple::scenes {
 void add_unresolved(const StageContext& context, RuleName only, const collision::ContactSurface& surface,
                     std::vector<std::string>& warnings);
 
+/// What searches for missed pieces of meshes found in all frames, in one sentence that takes the place of the last; none for none.
+void set_missed(const SearchCounts& all, std::vector<std::string>& warnings);
+
 }  // namespace supple::scenes

@@ -107,6 +107,21 @@ TEST(MissedPieces, ThatHangTogetherWithTheMeshAreDropped) {
   EXPECT_EQ(hash_of(s.mesh), hash_of(s.coarse));
 }
 
+TEST(MissedPieces, AreFoundWhereCreasesAreToo) {
+  Body body = hollow();
+  Blend& blend = body.skeleton.blend;
+  blend.rule = BlendRule::Graph;
+  for (std::uint32_t a = 0; a < 12; ++a) {
+    for (std::uint32_t b = a + 1; b < 12; ++b) blend.edge.push_back({a, b, 0.5});
+  }
+  body.place();
+  const Lattice lattice = lattice_around({0.5, 0.5, 0.5});
+  const Searched s = search(body, lattice);
+  EXPECT_EQ(s.found.pieces, 1u);
+  EXPECT_TRUE(s.found.complete());
+  expect_closed(s.mesh);
+}
+
 TEST(MissedPieces, ChangeNothingWhereNothingIsMissed) {
   const Body body = random_body({.seed = 3, .parts = 30, .only_points = true});
   const Searched s = search(body, lattice_of(0.03));
@@ -116,8 +131,10 @@ TEST(MissedPieces, ChangeNothingWhereNothingIsMissed) {
 }
 
 TEST(MissedPieces, AreUndecidedWithoutSecondDerivatives) {
-  Primitive p;
-  p.kernel = Kernel::gascuel(0.5, 1.0, 1.0);
+  Primitive p = wyvill_point(1.0);
+  p.shape = ShapeKind::Segment;
+  p.size.x() = 0.5;
+  p.taper = 0.7;
   const Searched s = search(body_of({{p, Vec3::Zero()}}), lattice_of(0.2));
   EXPECT_EQ(s.found.pieces, 0u);
   EXPECT_FALSE(s.found.complete());

@@ -51,6 +51,29 @@ TEST(ObjectMeshing, SmallestCellHoldsForObjectsThatTouch) {
   EXPECT_TRUE(same(wished[0], coarse[0]) && same(wished[1], coarse[1]));
 }
 
+TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodes) {
+  const auto make = [](const std::string& search, const std::string& at) {
+    return Simulation(parse_scene(scene_of("cell: 0.9", ", cell: 0.1, meshing: {" + search + '}', at), "test.yaml", "."));
+  };
+  const std::string between = "[3.1, 0.4, 0.4]";  // 0.7 m from the nearest node
+  Simulation plain = make("", between), searched = make("search: true", between);
+  const std::vector<Mesh> without = plain.meshes(), with = searched.meshes();
+  EXPECT_EQ(without[0].triangle_count(), 0u);
+  EXPECT_GT(with[0].triangle_count(), 100u);
+  for (const Vec3& x : with[0].position) EXPECT_NEAR((x - Vec3(3.1, 0.4, 0.4)).norm(), 0.5 * 0.454202019, 1e-6);
+  EXPECT_TRUE(same(with[1], without[1]) && same(with[2], without[2]));
+  ASSERT_EQ(plain.warnings().size(), 1u);
+  EXPECT_NE(plain.warnings()[0].find("cells of 0.9 m may miss 'coin'"), std::string::npos) << plain.warnings()[0];
+  ASSERT_EQ(searched.warnings().size(), 1u);
+  EXPECT_EQ(searched.warnings()[0],
+            "output.meshing.search: pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: 1; "
+            "cells where one may be missed: 0; meshes of bodies that touch others, which are not searched: 0");
+  Simulation touching = make("search: true", kTouching);
+  (void)touching.meshes();
+  ASSERT_EQ(touching.warnings().size(), 1u);
+  EXPECT_NE(touching.warnings()[0].find("are not searched: 2"), std::string::npos) << touching.warnings()[0];
+}
+
 TEST(ObjectMeshing, ErrorIsOfTheObjectOrOfAllThatTouchIt) {
   const std::string cubes = ", cell: 0.1, meshing: {method: cubes";
   for (const std::string at : {"[3, 0, 0]", kTouching}) {

@@ -72,7 +72,7 @@ struct Kernel {
 /// max of |df/dd| for d in [near, far] [1/m].
 [[nodiscard]] double lipschitz(const Kernel& kernel, double near, double far) noexcept;
 /// Bounds of the second derivatives of f of a point by place, for distances in [near, far]: they lie between the least and
-/// largest of d2f/dd2 and (df/dd)/d, and 0 [1/m^2]. Infinite for Gascuel's and Blanc & Schlick's kernels.
+/// largest of d2f/dd2 and (df/dd)/d, and 0 [1/m^2]. The lower one is infinite at the tip of Gascuel's cone, near = 0.
 struct CurvatureRange {
   double lower = 0.0, upper = 0.0;
 };

@@ -1,0 +1,126 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "bodies.h"
+#include "supple/implicit/field.h"
+#include "supple/implicit/project.h"
+
+namespace supple::implicit {
+namespace {
+
+using testing::Body;
+using testing::Random;
+
+/// Primitives of one kind under one rule.
+struct Case {
+  const char* name;
+  ShapeKind shape = ShapeKind::Point;
+  Kernel kernel = Kernel::wyvill(0.5);
+  bool convolved = false;
+  BlendRule rule = BlendRule::Sum;
+  std::uint32_t group = 1;  ///< parts in a node
+};
+std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
+
+Body body_of_case(const Case& c) {
+  constexpr std::uint32_t kParts = 24;
+  Random random(31);
+  Body body;
+  body.skeleton.part_count = kParts;
+  for (std::uint32_t i = 0; i < kParts; ++i) {
+    Primitive p;
+    p.part = i;
+    p.shape = c.shape;
+    p.kernel = c.kernel;
+    p.convolved = c.convolved;
+    p.size = 0.5 * Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1));
+    testing::set_details(p, random, 0.5);
+    p.taper = 1.0;
+    if (c.convolved) p.stretch = Vec3::Ones();
+    body.skeleton.primitive.push_back(p);
+    body.parts.push_back({random.in_box(0.9), random.rotation()});
+    body.skeleton.blend.node.push_back(i / c.group);
+  }
+  Blend& blend = body.skeleton.blend;
+  blend.rule = c.rule;
+  for (std::uint32_t a = 0; a < kParts / c.group; ++a) {
+    for (std::uint32_t b = a + 1; b < kParts / c.group; ++b) {
+      if ((a + b) % 3 != 0) blend.edge.push_back({a, b, a % 2 == 0 ? 1.0 : 0.4});
+    }
+  }
+  body.place();
+  return body;
+}
+
+/// Length of the shortest vector in the convex hull, from above: the Frank-Wolfe method.
+double least_in_hull(std::span<const Vec3> vectors) {
+  Vec3 at = vectors[0];
+  for (int i = 0; i < 50; ++i) {
+    const Vec3* best = &vectors[0];
+    for (const Vec3& v : vectors) best = v.dot(at) < best->dot(at) ? &v : best;
+    const Vec3 step = *best - at;
+    const double length2 = step.squaredNorm();
+    if (length2 == 0.0) break;
+    at += std::clamp(-at.dot(step) / length2, 0.0, 1.0) * step;
+  }
+  return at.norm();
+}
+
+class BoundsOnBoxes : public ::testing::TestWithParam<Case> {};
+
+TEST_P(BoundsOnBoxes, HoldValuesAndGradientsAndAreOfUse) {
+  const Body body = body_of_case(GetParam());
+  Random random(5);
+  std::vector<Vec3> points(32), gradients(32);
+  std::vector<double> values(32);
+  int violations = 0, crossed = 0, steep = 0;
+  for (int trial = 0; trial < 4000; ++trial) {
+    const double size = 0.3 * std::pow(10.0, -2.5 * random.uniform(0, 1));
+    const Vec3 half = 0.5 * size * (Vec3::Ones() + 0.9 * random.in_box(1.0));
+    Vec3 centre = random.in_box(1.1);
+    const Vec3 other = random.in_box(1.1);
+    if ((FieldView(body.field).value(centre) > 0.0) != (FieldView(body.field).value(other) > 0.0)) {
+      centre = root_on_segment(body.field, centre, other);
+    }
+    const Box box{centre - half, centre + half};
+    for (Vec3& x : points) x = centre + half.cwiseProduct(random.in_box(1.0));
+    body.field.evaluate(points, values, gradients);
+    const Field::BoxBounds bounds = body.field.box_bounds(box);
+    for (const double v : values) violations += !bounds.value.contains(v);
+    violations += least_in_hull(gradients) < bounds.least_slope;
+    if (size > 0.005 || bounds.value.lower > 0.0 || bounds.value.upper < 0.0) continue;
+    ++crossed;
+    steep += bounds.least_slope > 0.0;
+  }
+  EXPECT_EQ(violations, 0);
+  EXPECT_GT(crossed, 100);
+  // Where the rule blends by angles nothing is known, elsewhere little is left.
+  EXPECT_GT(steep, (GetParam().rule == BlendRule::Gradient ? 0.3 : 0.8) * crossed);
+  RecordProperty("crossed", crossed);
+  RecordProperty("steep", steep);
+}
+
+const Kernel kGascuel = Kernel::gascuel(0.25, 0.5, 3.0);
+
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, BoundsOnBoxes,
+    ::testing::Values(Case{.name = "points"}, Case{.name = "gascuel", .kernel = kGascuel},
+                      Case{.name = "gascuel_boxes", .shape = ShapeKind::Box, .kernel = kGascuel},
+                      Case{.name = "blanc_schlick", .kernel = Kernel::blanc_schlick(0.5, 0.3)},
+                      Case{.name = "blanc_schlick_hard", .kernel = Kernel::blanc_schlick(0.5, 1.0)},
+                      Case{.name = "rings", .shape = ShapeKind::Ring}, Case{.name = "arcs", .shape = ShapeKind::Arc},
+                      Case{.name = "arcs_gascuel", .shape = ShapeKind::Arc, .kernel = kGascuel},
+                      Case{.name = "triangles", .shape = ShapeKind::Triangle},
+                      Case{.name = "convolved_segments", .shape = ShapeKind::Segment, .convolved = true},
+                      Case{.name = "convolved_arcs", .shape = ShapeKind::Arc, .kernel = Kernel::cauchy(0.5, 2.0), .convolved = true},
+                      Case{.name = "convolved_triangles", .shape = ShapeKind::Triangle, .kernel = Kernel::murakami(0.5), .convolved = true},
+                      Case{.name = "graph", .rule = BlendRule::Graph}, Case{.name = "graph_of_groups", .rule = BlendRule::Graph, .group = 4},
+                      Case{.name = "graph_gascuel", .kernel = kGascuel, .rule = BlendRule::Graph},
+                      Case{.name = "ricci", .rule = BlendRule::Ricci}, Case{.name = "gradient", .rule = BlendRule::Gradient}),
+    [](const auto& case_of) { return std::string(case_of.param.name); });
+
+}  // namespace
+}  // namespace supple::implicit
