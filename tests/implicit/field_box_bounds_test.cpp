@@ -122,5 +122,21 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{.name = "ricci", .rule = BlendRule::Ricci}, Case{.name = "gradient", .rule = BlendRule::Gradient}),
     [](const auto& case_of) { return std::string(case_of.param.name); });
 
+// Near the axis of a ring F rises to both sides around it, by (f' / d) (1 - r / rho).
+TEST(BoxBounds, KnowHowRingsBend) {
+  Primitive p = testing::wyvill_point(1.2);
+  p.shape = ShapeKind::Ring;
+  p.size.x() = 1.0;
+  const Body body = testing::body_of({{p, Vec3::Zero()}});
+  for (const double rho : {0.1, 0.2, 0.4}) {
+    const Vec3 centre(rho, 0.0, 0.0), half(1e-4, 0.3 * rho, 1e-4);
+    const Box box{centre - half, centre + half};
+    const Interval bound = body.field.tight_bound(box);
+    const double middle = FieldView(body.field).value(centre), end = FieldView(body.field).value(centre + 0.99 * half.y() * Vec3::UnitY());
+    EXPECT_LE(end, bound.upper) << rho;
+    EXPECT_LT(bound.upper - middle, 4.0 * (end - middle)) << rho;
+  }
+}
+
 }  // namespace
 }  // namespace supple::implicit
