@@ -743,8 +743,8 @@ TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {
   studio.view.camera = {.from = Vec3(0, -5, 1.5), .look_at = Vec3(0, 0, 0.1), .up = Vec3::UnitZ(), .field_of_view = 0.12};
   studio.lights.above = Vec3f::Ones();
   studio.settings.most_samples = 64;
+  const Film paths = studio.trace(items);
   Film film = studio.trace(items);
-  const path::VectorPlane paths = film.radiance;
   path::Denoiser{}.run(Vec3f(0, -5, 1.4F), static_cast<float>(2.0 * std::tan(0.06) / 64.0), Executor(1), film);
   studio.settings.noise = 0.0;
   studio.settings.most_samples = 256;
@@ -755,7 +755,7 @@ TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {
     const double error = film.radiance.at(d.x, d.y).y() - reference.radiance.at(d.x, d.y).y();
     bias += error;
     error2 += error * error;
-    path_error2 += std::pow(paths.at(d.x, d.y).y() - reference.radiance.at(d.x, d.y).y(), 2);
+    path_error2 += std::pow(paths.radiance.at(d.x, d.y).y() - reference.radiance.at(d.x, d.y).y(), 2);
     light += reference.radiance.at(d.x, d.y).y();
     count += 1.0;
   }

@@ -84,23 +84,23 @@ struct Neighbours {
 struct Denoiser::Sums {
   Vec3Lanes colour = Vec3Lanes::Zero();
   Lanes variance{}, weight{};
-  void add(const Light& light, int x, int y, Lanes w) {
-    colour += w * light.colour.load(x, y);
-    variance += w * w * light.variance.load(x, y);
+  void add(const Light& light, std::ptrdiff_t at, Lanes w) {
+    colour += w * light.colour.load(at);
+    variance += w * w * light.variance.load(at);
     weight += w;
   }
   /// What lies there already, in those lanes.
-  void keep(const Light& light, int x, int y, LaneMask who) {
-    colour = select(who, light.colour.load(x, y), colour);
-    variance = select(who, light.variance.load(x, y), variance);
+  void keep(const Light& light, std::ptrdiff_t at, LaneMask who) {
+    colour = select(who, light.colour.load(at), colour);
+    variance = select(who, light.variance.load(at), variance);
     weight = select(who, all_lanes(1.0F), weight);
   }
   /// @param shown  lanes with a surface; the others stay empty
-  void store(Light& light, int x, int y, LaneMask shown) const {
+  void store(Light& light, std::ptrdiff_t at, LaneMask shown) const {
     const Lanes share = select(both(shown, weight > 0.0F), 1.0F / weight, 0.0F);
-    light.colour.store(x, y, share * colour);
-    light.variance.store(x, y, share * share * variance);
-    light.bright.store(x, y, share * luminance(colour));
+    light.colour.store(at, share * colour);
+    light.variance.store(at, share * share * variance);
+    light.bright.store(at, share * luminance(colour));
   }
 };
 
@@ -120,23 +120,24 @@ void Denoiser::rows(const Body& body) const {
 template <class Body>
 void Denoiser::rows_apart(int stride, const Body& body) const {
   const int height = film_->height, longest = (height + stride - 1) / stride;
-  executor_->for_blocks(static_cast<std::size_t>(stride * longest), 16, [&](std::size_t begin, std::size_t end) {
+  executor_->for_blocks(static_cast<std::size_t>(stride * longest), 32, [&](std::size_t begin, std::size_t end) {
     for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k)
       if (const int y = k / longest + k % longest * stride; y < height) body(y);
   });
 }
 
-/// Eight pixels at a time, and whether some show a surface.
+/// Eight pixels at a time, by the first of them, and whether some show a surface.
 template <class Body>
 void Denoiser::blocks(int y, const Body& body) const {
-  for (int x = 0; x < film_->width; x += static_cast<int>(kLanes)) body(x, any(film_->cover.load(x, y) > 0.0F));
+  const std::ptrdiff_t begin = film_->cover.index(0, y), end = film_->cover.index(film_->width, y);
+  for (std::ptrdiff_t at = begin; at < end; at += static_cast<std::ptrdiff_t>(kLanes)) body(at, any(film_->cover.load(at) > 0.0F));
 }
 
 /// Those of which some do.
 template <class Body>
 void Denoiser::shown_blocks(int y, const Body& body) const {
-  blocks(y, [&](int x, bool shown) {
-    if (shown) body(x);
+  blocks(y, [&](std::ptrdiff_t at, bool shown) {
+    if (shown) body(at);
   });
 }
 
@@ -158,29 +159,29 @@ void Denoiser::fill() {
   const Film& film = *film_;
   const std::array parts = {&film.direct, &film.indirect};
   rows([&](int y) {
-    blocks(y, [&](int x, bool any_shown) {
+    blocks(y, [&](std::ptrdiff_t at, bool any_shown) {
       if (!any_shown) {
-        f_.shown.store(x, y, Lanes{});
-        for (Signal& signal : signals_) Sums{}.store(signal.light, x, y, LaneMask{});
+        f_.shown.store(at, Lanes{});
+        for (Signal& signal : signals_) Sums{}.store(signal.light, at, LaneMask{});
         return;
       }
-      const LaneMask shown = film.cover.load(x, y) > 0.0F;
-      f_.shown.store(x, y, select(shown, all_lanes(1.0F), 0.0F));
-      const Vec3Lanes albedo = film.albedo.load(x, y).cwiseMax(kAlbedoFloor);
+      const LaneMask shown = film.cover.load(at) > 0.0F;
+      f_.shown.store(at, select(shown, all_lanes(1.0F), 0.0F));
+      const Vec3Lanes albedo = film.albedo.load(at).cwiseMax(kAlbedoFloor);
       const Lanes scale = 1.0F / luminance(albedo);
       for (std::size_t k = 0; k < 2; ++k) {
-        const Vec3Lanes falls = parts[k]->radiance.load(x, y).cwiseQuotient(albedo);
+        const Vec3Lanes falls = parts[k]->radiance.load(at).cwiseQuotient(albedo);
         Light& light = signals_[k].light;
-        light.colour.store(x, y, falls);
-        light.variance.store(x, y, parts[k]->variance.load(x, y) * scale * scale);
-        light.bright.store(x, y, luminance(falls));
+        light.colour.store(at, falls);
+        light.variance.store(at, parts[k]->variance.load(at) * scale * scale);
+        light.bright.store(at, luminance(falls));
       }
     });
   });
   rows([&](int y) {
-    shown_blocks(y, [&](int x) {
-      f_.near.store(x, y, kNearScale * tent_sum<2>(film.nearness, x, y) / tent_sum<2>(film.cover, x, y));
-      f_.share.store(x, y, 1.0F / larger(tent_sum<1>(f_.shown, x, y), 1.0F));
+    shown_blocks(y, [&](std::ptrdiff_t at) {
+      f_.near.store(at, kNearScale * tent_sum<2>(film.nearness, at) / tent_sum<2>(film.cover, at));
+      f_.share.store(at, 1.0F / larger(tent_sum<1>(f_.shown, at), 1.0F));
     });
   });
 }
@@ -206,62 +207,69 @@ void Denoiser::sort_paths() {
 
 /// Means over neighbours: what a single pixel knows of brightness and noise is noisy itself.
 void Denoiser::guide(int y) {
-  shown_blocks(y, [&](int x) {
-    for (Signal& signal : signals_) signal.guide.store(x, y, f_.share.load(x, y) * tent_sum<1>(signal.light.bright, x, y));
+  shown_blocks(y, [&](std::ptrdiff_t at) {
+    for (Signal& signal : signals_) signal.guide.store(at, f_.share.load(at) * tent_sum<1>(signal.light.bright, at));
   });
 }
 
 /// 1 / difference of brightness that counts as large, of direct and indirect light.
-std::array<Lanes, 2> Denoiser::noise(int x, int y) const {
-  const std::array scale = {all_lanes(kDirectScale), kMattScale + film_->mirror.load(x, y) * (kMirrorScale - kMattScale)};
+std::array<Lanes, 2> Denoiser::noise(std::ptrdiff_t at) const {
+  const std::array scale = {all_lanes(kDirectScale), kMattScale + film_->mirror.load(at) * (kMirrorScale - kMattScale)};
   std::array<Lanes, 2> out;
   for (std::size_t k = 0; k < 2; ++k)
-    out[k] = 1.0F / (scale[k] * root(f_.share.load(x, y) * tent_sum<1>(signals_[k].light.variance, x, y)) + 1e-4F);
+    out[k] = 1.0F / (scale[k] * root(f_.share.load(at) * tent_sum<1>(signals_[k].light.variance, at)) + 1e-4F);
   return out;
 }
 
 template <bool with_direct>
-void Denoiser::smooth_block(int stride, int x, int y, const std::array<Lanes, 2>& noise, LaneMask shown, LaneMask quiet) {
-  const Vec3Lanes normal = film_->normal.load(x, y), position = film_->position.load(x, y);
-  const Lanes plane = steepness(position) * (1.0F / static_cast<float>(stride)), near = f_.near.load(x, y);
-  const std::array<Lanes, 2> guide = {signals_[0].guide.load(x, y), signals_[1].guide.load(x, y)};
+void Denoiser::smooth_block(int stride, std::ptrdiff_t at, const std::array<Lanes, 2>& noise, LaneMask shown, LaneMask quiet) {
+  const Vec3Lanes normal = film_->normal.load(at), position = film_->position.load(at);
+  const Lanes plane = steepness(position) * (1.0F / static_cast<float>(stride)), near = f_.near.load(at);
+  const std::array<Lanes, 2> guide = {signals_[0].guide.load(at), signals_[1].guide.load(at)};
   constexpr std::size_t first = with_direct ? 0 : 1;
   std::array<Sums, 2> sums;
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
-      const int px = x + dx * stride, py = y + dy * stride;
+      const std::ptrdiff_t other = at + stride * film_->cover.index(dx, dy);
       const float kernel = kKernel[static_cast<std::size_t>(std::abs(dx))] * kKernel[static_cast<std::size_t>(std::abs(dy))];
-      const Lanes covered = kernel * film_->cover.load(px, py);
+      const Lanes covered = kernel * film_->cover.load(other);
       if (dx == 0 && dy == 0) {  // a pixel is like itself, whatever its features
-        for (std::size_t k = first; k < 2; ++k) sums[k].add(signals_[k].light, px, py, covered);
+        for (std::size_t k = first; k < 2; ++k) sums[k].add(signals_[k].light, at, covered);
         continue;
       }
-      const Lanes facing = larger(normal.dot(film_->normal.load(px, py)), 0.0F);
-      const Vec3Lanes apart = film_->position.load(px, py) - position;
+      const Lanes facing = larger(normal.dot(film_->normal.load(other)), 0.0F);
+      const Vec3Lanes apart = film_->position.load(other) - position;
       const Lanes off = magnitude(apart.dot(normal)) * plane;
       const std::array<Lanes, 2> far = {off, off + apart.dot(apart) * (near * near)};
       const Lanes alike = covered * thirty_second_power(facing);
       for (std::size_t k = first; k < 2; ++k) {
-        const Lanes differs = magnitude(signals_[k].guide.load(px, py) - guide[k]) * noise[k];
-        sums[k].add(signals_[k].light, px, py, alike * fall(far[k] + differs));
+        const Lanes differs = magnitude(signals_[k].guide.load(other) - guide[k]) * noise[k];
+        sums[k].add(signals_[k].light, other, alike * fall(far[k] + differs));
       }
     }
-  sums[0].keep(signals_[0].light, x, y, quiet);
-  for (std::size_t k = 0; k < 2; ++k) sums[k].store(signals_[k].next, x, y, shown);
+  sums[0].keep(signals_[0].light, at, quiet);
+  for (std::size_t k = 0; k < 2; ++k) sums[k].store(signals_[k].next, at, shown);
 }
 
 void Denoiser::smooth(int stride) {
   rows([&](int y) { guide(y); });
+  const std::array<const VectorPlane*, 4> vectors = {&film_->normal, &film_->position, &signals_[0].light.colour, &signals_[1].light.colour};
+  const std::array<const Plane*, 5> numbers = {&film_->cover, &signals_[0].guide, &signals_[1].guide, &signals_[0].light.variance,
+                                               &signals_[1].light.variance};
   rows_apart(stride, [&](int y) {
-    blocks(y, [&](int x, bool any_shown) {
+    // More streams than processors follow on their own: the row that the next one asks for is fetched beside this one.
+    const std::ptrdiff_t ahead = film_->cover.index(0, std::min(2 * stride, film_->height - 1 - y));
+    blocks(y, [&](std::ptrdiff_t at, bool any_shown) {
+      for (const VectorPlane* plane : vectors) plane->prefetch(at + ahead);
+      for (const Plane* plane : numbers) plane->prefetch(at + ahead);
       if (any_shown) {
-        const LaneMask shown = film_->cover.load(x, y) > 0.0F;
-        const std::array<Lanes, 2> large = noise(x, y);
-        const LaneMask quiet = large[0] * (kQuiet * (signals_[0].guide.load(x, y) + 0.1F)) > 1.0F;
-        return any(both(shown, ~quiet)) ? smooth_block<true>(stride, x, y, large, shown, quiet)
-                                        : smooth_block<false>(stride, x, y, large, shown, quiet);
+        const LaneMask shown = film_->cover.load(at) > 0.0F;
+        const std::array<Lanes, 2> large = noise(at);
+        const LaneMask quiet = large[0] * (kQuiet * (signals_[0].guide.load(at) + 0.1F)) > 1.0F;
+        return any(both(shown, ~quiet)) ? smooth_block<true>(stride, at, large, shown, quiet)
+                                        : smooth_block<false>(stride, at, large, shown, quiet);
       }
-      for (Signal& signal : signals_) Sums{}.store(signal.next, x, y, LaneMask{});
+      for (Signal& signal : signals_) Sums{}.store(signal.next, at, LaneMask{});
     });
   });
   for (Signal& signal : signals_) std::swap(signal.light, signal.next);
@@ -269,9 +277,9 @@ void Denoiser::smooth(int stride) {
 
 void Denoiser::finish(Film& film) const {
   rows([&](int y) {
-    shown_blocks(y, [&](int x) {
-      const Vec3Lanes falls = signals_[0].light.colour.load(x, y) + signals_[1].light.colour.load(x, y);
-      film.radiance.store(x, y, falls.cwiseProduct(film.albedo.load(x, y).cwiseMax(kAlbedoFloor)));
+    shown_blocks(y, [&](std::ptrdiff_t at) {
+      const Vec3Lanes falls = signals_[0].light.colour.load(at) + signals_[1].light.colour.load(at);
+      film.radiance.store(at, falls.cwiseProduct(film.albedo.load(at).cwiseMax(kAlbedoFloor)));
     });
   });
   executor_->for_blocks(film.detailed.size(), 16, [&](std::size_t begin, std::size_t end) {

@@ -59,12 +59,12 @@ class Denoiser {
   template <class Vector>
   [[nodiscard]] auto steepness(const Vector& position) const;
   void guide(int y);
-  [[nodiscard]] std::array<Lanes, 2> noise(int x, int y) const;
+  [[nodiscard]] std::array<Lanes, 2> noise(std::ptrdiff_t at) const;
   /// One level of the transform.
   void smooth(int stride);
   /// @param quiet  lanes whose direct light stays as it is; all that show a surface unless `with_direct`
   template <bool with_direct>
-  void smooth_block(int stride, int x, int y, const std::array<Lanes, 2>& noise, LaneMask shown, LaneMask quiet);
+  void smooth_block(int stride, std::ptrdiff_t at, const std::array<Lanes, 2>& noise, LaneMask shown, LaneMask quiet);
   void finish(Film& film) const;
   [[nodiscard]] Neighbours around(const DetailedPixel& pixel) const;
   [[nodiscard]] std::size_t index(int x, int y) const {

@@ -26,35 +26,36 @@ class Signs {
   Signs(const Film& film, const Vec3f& eye, float pixel) : film_(film), eye_(eye), pixel_(pixel) {}
 
   [[nodiscard]] LaneMask surfaces_meet(int x, int y) const {
-    const Lanes covered = film_.cover.load(x, y);
-    const Vec3Lanes own = film_.normal.load(x, y), colour = film_.albedo.load(x, y) * covered;
+    const std::ptrdiff_t at = film_.cover.index(x, y);
+    const Lanes covered = film_.cover.load(at);
+    const Vec3Lanes own = film_.normal.load(at), colour = film_.albedo.load(at) * covered;
     LaneMask meet = both(covered > 0.0F, own.dot(own) < kOneSurface);
     for (const auto& [dx, dy] : kBeside) {
-      const int px = x + dx, py = y + dy;
-      const Lanes other = film_.cover.load(px, py);
-      const Vec3Lanes apart = colour - film_.albedo.load(px, py) * other;
+      const std::ptrdiff_t beside = at + film_.cover.index(dx, dy);
+      const Lanes other = film_.cover.load(beside);
+      const Vec3Lanes apart = colour - film_.albedo.load(beside) * other;
       const Lanes differs = larger(larger(magnitude(apart.x()), magnitude(apart.y())), magnitude(apart.z()));
-      const LaneMask turned = both(both(covered > 0.0F, other > 0.0F), own.dot(film_.normal.load(px, py)) < kSameNormal);
-      meet |= both(inside(px, py), (magnitude(covered - other) > kSameCover) | (differs > kSameAlbedo) | turned);
+      const LaneMask turned = both(both(covered > 0.0F, other > 0.0F), own.dot(film_.normal.load(beside)) < kSameNormal);
+      meet |= both(inside(x + dx, y + dy), (magnitude(covered - other) > kSameCover) | (differs > kSameAlbedo) | turned);
     }
     return meet;
   }
   /// By the mean nearness of what the pixels around see light from: one path a pixel knows little.
-  [[nodiscard]] LaneMask are_gaps(int x, int y) const {
-    const Lanes size = pixel_ * (film_.position.load(x, y) - Vec3Lanes(eye_)).norm();
-    return both(film_.cover.load(x, y) > 0.0F, tent_sum<2>(film_.nearness, x, y) * size > kGap * tent_sum<2>(film_.cover, x, y));
+  [[nodiscard]] LaneMask are_gaps(std::ptrdiff_t at) const {
+    const Lanes size = pixel_ * (film_.position.load(at) - Vec3Lanes(eye_)).norm();
+    return both(film_.cover.load(at) > 0.0F, tent_sum<2>(film_.nearness, at) * size > kGap * tent_sum<2>(film_.cover, at));
   }
-  [[nodiscard]] LaneMask shadows_end(int x, int y) const {
-    const auto direct = [&](int px, int py) { return luminance(film_.direct.radiance.load(px, py)); };
-    const auto light = [&](int px, int py) { return luminance(film_.radiance.load(px, py)); };
-    const Lanes own = direct(x, y), all = light(x, y);
+  [[nodiscard]] LaneMask shadows_end(std::ptrdiff_t at) const {
+    const auto direct = [&](std::ptrdiff_t pixel) { return luminance(film_.direct.radiance.load(pixel)); };
+    const auto light = [&](std::ptrdiff_t pixel) { return luminance(film_.radiance.load(pixel)); };
+    const Lanes own = direct(at), all = light(at);
     LaneMask ends{};
     for (const auto& [dx, dy] : kBeside) {
-      const int px = x + dx, py = y + dy;
-      const Lanes scale = 0.5F * (all + light(px, py)) + 0.1F;
-      ends |= both(film_.cover.load(px, py) > 0.0F, magnitude(own - direct(px, py)) > kSameShade * scale);
+      const std::ptrdiff_t beside = at + film_.cover.index(dx, dy);
+      const Lanes scale = 0.5F * (all + light(beside)) + 0.1F;
+      ends |= both(film_.cover.load(beside) > 0.0F, magnitude(own - direct(beside)) > kSameShade * scale);
     }
-    return both(film_.cover.load(x, y) > 0.0F, ends);
+    return both(film_.cover.load(at) > 0.0F, ends);
   }
 
  private:
@@ -83,9 +84,10 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
   for_rows([&](std::size_t row, int y) {
     for (std::size_t left = 0; left < across; left += kLanes) {
       const int x = static_cast<int>(left);
-      const LaneMask meet = signs.surfaces_meet(x, y), covered = film.cover.load(x, y) > 0.0F;
-      const bool shown = any(covered);
-      const LaneMask gap = shown ? signs.are_gaps(x, y) : LaneMask{}, ends = shown ? signs.shadows_end(x, y) : LaneMask{};
+      const std::ptrdiff_t at = film.cover.index(x, y);
+      const bool shown = any(film.cover.load(at) > 0.0F);
+      const LaneMask meet = signs.surfaces_meet(x, y);
+      const LaneMask gap = shown ? signs.are_gaps(at) : LaneMask{}, ends = shown ? signs.shadows_end(at) : LaneMask{};
       if (!any(meet | gap | ends)) continue;
       for (std::size_t k = 0; k < std::min(kLanes, across - left); ++k)
         seen[row * across + left + k] = static_cast<std::uint8_t>((meet[k] & kMeet) | (gap[k] & kInGap) | (ends[k] & kEnds));

@@ -14,6 +14,9 @@ namespace supple::render::path {
 class Plane {
  public:
   static constexpr int kMargin = 16;
+  Plane() = default;
+  Plane(Plane&&) = default;
+  Plane& operator=(Plane&&) = default;
 
   /// All zeros, unless it has that size already.
   void resize(int width, int height) {
@@ -22,25 +25,28 @@ class Plane {
     height_ = height;
     pitch_ = (width + 2 * kMargin + static_cast<int>(kLanes) - 1) / static_cast<int>(kLanes) * static_cast<int>(kLanes);
     // Planes that lie one after the other begin at different places of their pages, as the sets of a cache go by those.
-    lead_ = static_cast<std::ptrdiff_t>(reinterpret_cast<std::uintptr_t>(this) / sizeof(Plane) % 64 * kCacheLine);
-    values_.assign(static_cast<std::size_t>(lead_ + std::ptrdiff_t{pitch_} * (height + 2 * kMargin)), 0.0F);
+    const std::size_t lead = reinterpret_cast<std::uintptr_t>(this) / sizeof(Plane) % 64 * kCacheLine;
+    values_.assign(lead + static_cast<std::size_t>(pitch_ * (height + 2 * kMargin)), 0.0F);
+    first_ = values_.data() + lead + index(kMargin, kMargin);
   }
-  [[nodiscard]] float& at(int x, int y) { return *pixel(x, y); }
-  [[nodiscard]] float at(int x, int y) const { return *pixel(x, y); }
-  /// The pixels x to x + 7.
-  [[nodiscard]] Lanes load(int x, int y) const { return _mm256_loadu_ps(pixel(x, y)); }
-  void store(int x, int y, Lanes v) { _mm256_storeu_ps(pixel(x, y), v); }
+  /// Of a pixel, or from one pixel to another; the same in all planes of one size.
+  [[nodiscard]] std::ptrdiff_t index(int x, int y) const { return std::ptrdiff_t{y} * pitch_ + x; }
+  [[nodiscard]] float& at(int x, int y) { return first_[index(x, y)]; }
+  [[nodiscard]] float at(int x, int y) const { return first_[index(x, y)]; }
+  /// That pixel and the seven to its right.
+  [[nodiscard]] Lanes load(std::ptrdiff_t index) const { return _mm256_loadu_ps(first_ + index); }
+  [[nodiscard]] Lanes load(int x, int y) const { return load(index(x, y)); }
+  void prefetch(std::ptrdiff_t index) const { __builtin_prefetch(first_ + index); }
+  void store(std::ptrdiff_t index, Lanes v) { _mm256_storeu_ps(first_ + index, v); }
+  void store(int x, int y, Lanes v) { store(index(x, y), v); }
   /// The pixel x alone.
   void store(int x, int y, float v) { at(x, y) = v; }
-  [[nodiscard]] float* pixel(int x, int y) { return values_.data() + offset(x, y); }
-  [[nodiscard]] const float* pixel(int x, int y) const { return values_.data() + offset(x, y); }
 
  private:
   static constexpr std::size_t kCacheLine = 16;  // numbers
-  [[nodiscard]] std::ptrdiff_t offset(int x, int y) const { return lead_ + static_cast<std::ptrdiff_t>(y + kMargin) * pitch_ + x + kMargin; }
   int width_ = 0, height_ = 0;
   int pitch_ = 0;
-  std::ptrdiff_t lead_ = 0;
+  float* first_ = nullptr;  ///< the pixel (0, 0)
   std::vector<float> values_;
 };
 
@@ -51,7 +57,16 @@ struct VectorPlane {
     for (Plane* plane : {&x, &y, &z}) plane->resize(width, height);
   }
   [[nodiscard]] Vec3f at(int px, int py) const { return {x.at(px, py), y.at(px, py), z.at(px, py)}; }
-  [[nodiscard]] Vec3Lanes load(int px, int py) const { return {x.load(px, py), y.load(px, py), z.load(px, py)}; }
+  [[nodiscard]] Vec3Lanes load(std::ptrdiff_t index) const { return {x.load(index), y.load(index), z.load(index)}; }
+  [[nodiscard]] Vec3Lanes load(int px, int py) const { return load(x.index(px, py)); }
+  void prefetch(std::ptrdiff_t index) const {
+    for (const Plane* plane : {&x, &y, &z}) plane->prefetch(index);
+  }
+  void store(std::ptrdiff_t index, const Vec3Lanes& v) {
+    x.store(index, v.x());
+    y.store(index, v.y());
+    z.store(index, v.z());
+  }
   template <class Vector>
   void store(int px, int py, const Vector& v) {
     x.store(px, py, v.x());
@@ -62,11 +77,11 @@ struct VectorPlane {
 
 /// Sums over the (2 reach + 1)^2 pixels around, whose weights fall linearly from (reach + 1)^2 in the middle.
 template <int reach>
-[[nodiscard]] Lanes tent_sum(const Plane& plane, int x, int y) {
+[[nodiscard]] Lanes tent_sum(const Plane& plane, std::ptrdiff_t index) {
   Lanes sum{};
   for (int dy = -reach; dy <= reach; ++dy) {
     Lanes row{};
-    for (int dx = -reach; dx <= reach; ++dx) row += plane.load(x + dx, y + dy) * static_cast<float>(reach + 1 - std::abs(dx));
+    for (int dx = -reach; dx <= reach; ++dx) row += plane.load(index + plane.index(dx, dy)) * static_cast<float>(reach + 1 - std::abs(dx));
     sum += row * static_cast<float>(reach + 1 - std::abs(dy));
   }
   return sum;
