@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 namespace supple::render {
 
@@ -12,5 +13,7 @@ namespace supple::render {
 
 /// The value nearest to the curve at light clamped to [0, 1], by a table.
 [[nodiscard]] std::uint8_t srgb_of_linear(double light);
+/// The same of many. @pre as many values
+void srgb_of_linear(std::span<const float> light, std::span<std::uint8_t> values);
 
 }  // namespace supple::render

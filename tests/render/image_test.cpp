@@ -143,6 +143,20 @@ TEST(Srgb, IsTheNearestToTheCurve) {
   for (int value = 0; value < 256; ++value) EXPECT_EQ(srgb_of_linear(linear_of_srgb()[static_cast<std::size_t>(value)]), value);
 }
 
+TEST(Srgb, OfManyNumbersIsThatOfEach) {
+  std::vector<float> light = {-1.0F, 0.0F, 1.0F, 2.0F};
+  for (int value = 1; value < 256; ++value) {
+    // The steps, between neighbouring numbers.
+    float below = 0.0F, above = 1.0F;
+    for (float middle = 0.5F; middle > below && middle < above; middle = 0.5F * (below + above))
+      (srgb_of_linear(static_cast<double>(middle)) < value ? below : above) = middle;
+    light.insert(light.end(), {below, above});
+  }
+  std::vector<std::uint8_t> values(light.size());
+  srgb_of_linear(light, values);
+  for (std::size_t i = 0; i < light.size(); ++i) EXPECT_EQ(values[i], srgb_of_linear(static_cast<double>(light[i]))) << light[i];
+}
+
 TEST(Downscale, AveragesInLinearLight) {
   Image image = plain(2, 2, {0, 0, 0});
   for (const std::size_t i : {0UL, 1UL, 2UL, 9UL, 10UL, 11UL}) image.pixels[i] = 255;

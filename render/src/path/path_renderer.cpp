@@ -1,7 +1,9 @@
 #include "path_renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "../draw_list.h"
 #include "../lighting.h"
@@ -112,16 +114,18 @@ Image PathRenderer::develop(const View& view, const path::Film& film) const {
   image.pixels.resize(3 * width * height);
   const Vec3f top = linear_colour(view.background_top), bottom = linear_colour(view.background_bottom);
   executor_.for_blocks(height, 16, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> light(3 * width);
     for (std::size_t row = begin; row < end; ++row) {
       const float t = 1.0F - (static_cast<float>(row) + 0.5F) / static_cast<float>(settings_.height);
       const Vec3Lanes behind(bottom + t * t * (3.0F - 2.0F * t) * (top - bottom));
       for (std::size_t left = 0; left < width; left += path::kLanes) {
         const int x = static_cast<int>(left), y = static_cast<int>(row);
         const Vec3Lanes seen = behind + film.cover.load(x, y) * (filmic(film.radiance.load(x, y)) - behind);
-        std::uint8_t* pixel = &image.pixels[3 * (row * width + left)];
+        const std::array channels = {seen.x(), seen.y(), seen.z()};
         for (std::size_t k = 0; k < std::min(path::kLanes, width - left); ++k)
-          for (const Lanes& channel : {seen.x(), seen.y(), seen.z()}) *pixel++ = srgb_of_linear(static_cast<double>(channel[k]));
+          for (std::size_t c = 0; c < 3; ++c) light[3 * (left + k) + c] = channels[c][k];
       }
+      srgb_of_linear(light, std::span(image.pixels).subspan(3 * row * width, 3 * width));
     }
   });
   return image;
