@@ -416,9 +416,11 @@ TEST(MarchCubes, LiesOnTheExactSurfaceBothWaysAndAMissedPartShows) {
   }
   const Body without = body_of({{wyvill_point(1.0), Vec3(-0.4, 0, 0)}, {wyvill_point(1.0), Vec3(0.4, 0, 0)}});
   const Mesh less = march_cubes(without.field, {.lattice = lattice_of(kCell)}, Executor(1));
-  const supple::testing::MeshDistance to_less(less, kCell);
+  const supple::testing::MeshDistance to_less(less, 8.0 * kCell);  // from afar
   double back = 0.0;
-  for (const Vec3& p : exact.position) back = std::max(back, to_less(p));
+  for (const Vec3& p : exact.position) {
+    if (p.x() > 2.0) back = std::max(back, to_less(p));
+  }
   EXPECT_GT(back, 1.0);
 }
 

@@ -40,6 +40,7 @@ TEST(StepPlan, OfEveryLibrarySceneIsWellFormedForEveryKindOfOutput) {
   ASSERT_GE(scenes.size(), 5u);
   for (const fs::path& path : scenes) {
     const Scene scene = read_scene(path);
+    const Model model = build_model(scene);
     for (unsigned bits = 0; bits < 64; ++bits) {
       const OutputRequest outputs{.images = (bits & 1) != 0,
                                   .film = (bits & 2) != 0,
@@ -47,7 +48,7 @@ TEST(StepPlan, OfEveryLibrarySceneIsWellFormedForEveryKindOfOutput) {
                                   .grids = (bits & 8) != 0,
                                   .contacts = (bits & 16) != 0,
                                   .particles = (bits & 32) != 0};
-      EXPECT_TRUE(well_formed(plan_of(scene, outputs))) << path << " " << bits;
+      EXPECT_TRUE(well_formed(plan_step(scene, model, outputs))) << path << " " << bits;
     }
   }
 }

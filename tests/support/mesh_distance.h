@@ -95,9 +95,10 @@ class MeshDistance {
     const auto high = [&](std::size_t k) { return std::min(centre[k] + ring, count_[k] - 1); };
     for (long z = low(2); z <= high(2); ++z) {
       for (long y = low(1); y <= high(1); ++y) {
+        // Rows at the ring's sides are on it, of the others their ends.
         const bool whole = std::abs(z - centre[2]) == ring || std::abs(y - centre[1]) == ring;
-        for (long x = low(0); x <= high(0); ++x) {
-          if (whole || std::abs(x - centre[0]) == ring) use(static_cast<std::size_t>((z * count_[1] + y) * count_[0] + x));
+        for (long x = whole ? low(0) : centre[0] - ring; x <= (whole ? high(0) : centre[0] + ring); x += whole ? 1 : 2 * ring) {
+          if (x >= 0 && x < count_[0]) use(static_cast<std::size_t>((z * count_[1] + y) * count_[0] + x));
         }
       }
     }
