@@ -226,7 +226,35 @@ void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<d
   }
 }
 
-/// Where a kink meets the rim, begun between points of `fine_rim_`: p_A = p_B = s = 0.
+/// Newton's method to where kinks meet the rim, p_A = p_B = s = 0. @param kink  of each point   @param last  lengths of the last steps
+void PolarRuleSolver::move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last) {
+  batch.resize(batch.point.size());
+  last.assign(kink.size(), 0.0);
+  for (int step = 0; step < kCornerSteps; ++step) {
+    pressure.evaluate(batch);
+    evaluate_thirds(batch.point);
+    bool moved = false;
+    for (std::size_t i = 0; i < kink.size(); ++i) {
+      Vec3 slope;
+      const double s = side_of(kink[i], batch, i, slope);
+      Mat3 rows;
+      rows.row(0) = batch.slope_a[i];
+      rows.row(1) = batch.slope_b[i];
+      rows.row(2) = slope;
+      const double volume = rows.determinant();
+      const Vec3 value(batch.a[i], batch.b[i], s);
+      const Vec3 &a = batch.slope_a[i], &b = batch.slope_b[i];
+      Vec3 move = -(value[0] * b.cross(slope) + value[1] * slope.cross(a) + value[2] * a.cross(b)) / volume;
+      last[i] = move.norm();
+      if (!(last[i] <= extent_)) move.setZero();
+      batch.point[i] += move;
+      moved = moved || last[i] > 1e-9 * extent_;
+    }
+    if (!moved) break;
+  }
+}
+
+/// Where a kink meets the rim, begun between points of `fine_rim_`.
 void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& corners) {
   const std::vector<Vec3>& rim = fine_rim_;
   const std::size_t n = rim.size();
@@ -251,30 +279,8 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
     kink.resize(batch.point.size(), kinks_.size() + imprint.third);
   }
   if (kink.empty()) return;
-  batch.resize(batch.point.size());
-  std::vector<double> last(kink.size(), 0.0);
-  for (int step = 0; step < kCornerSteps; ++step) {
-    pressure.evaluate(batch);
-    evaluate_thirds(batch.point);
-    bool moved = false;
-    for (std::size_t i = 0; i < kink.size(); ++i) {
-      Vec3 slope;
-      const double s = side_of(kink[i], batch, i, slope);
-      Mat3 rows;
-      rows.row(0) = batch.slope_a[i];
-      rows.row(1) = batch.slope_b[i];
-      rows.row(2) = slope;
-      const double volume = rows.determinant();
-      const Vec3 value(batch.a[i], batch.b[i], s);
-      const Vec3 &a = batch.slope_a[i], &b = batch.slope_b[i];
-      Vec3 move = -(value[0] * b.cross(slope) + value[1] * slope.cross(a) + value[2] * a.cross(b)) / volume;
-      last[i] = move.norm();
-      if (!(last[i] <= extent_)) move.setZero();
-      batch.point[i] += move;
-      moved = moved || last[i] > 1e-9 * extent_;
-    }
-    if (!moved) break;
-  }
+  std::vector<double> last;
+  move_to_corners(pressure, kink, batch, last);
   for (std::size_t i = 0; i < kink.size(); ++i) {
     const auto same = [&](std::size_t j) { return kink[j] == kink[i] && (batch.point[j] - batch.point[i]).norm() <= 1e-6 * extent_; };
     bool found = last[i] <= 1e-6 * extent_;  // the panels find others by being parted
@@ -404,7 +410,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
       }
     }
   }
-  PressureBatch& batch = rim_batch_;
+  PressureBatch& batch = crossing_batch_;
   batch.resize(crossings_.size());
   std::size_t open = crossings_.size();
   for (int step = 0; step < kCrossingSteps && open > 0; ++step) {
@@ -446,8 +452,30 @@ std::array<double, 2> PolarRuleSolver::Panel::bend(double x) const {
   return touch_begin ? std::array{begin + width * y * y, width * y} : std::array{end - width * z * z, width * z};
 }
 
+/// Share of the angle between a ray and the next one at which a kink meets the rim, where its sides say that it does.
+std::optional<double> PolarRuleSolver::corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray) {
+  const auto rim_point = [this](std::size_t i) -> Vec3 {
+    return frame_.origin + rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]) + rays_.height[i] * frame_.axis;
+  };
+  const Vec3 a = rim_point(ray), b = rim_point(ray + 1);
+  const double left = side_of(kink, pressure, a), right = side_of(kink, pressure, b);
+  if ((left > 0.0) == (right > 0.0)) return std::nullopt;
+  const double share = left / (left - right);
+  crossing_batch_.point.assign(1, a + share * (b - a));
+  std::vector<double> last;
+  move_to_corners(pressure, {&kink, 1}, crossing_batch_, last);
+  const Vec3 d = crossing_batch_.point[0] - frame_.origin;
+  const Vec2 way(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
+  const auto angle = [&](const Vec2& to) {
+    const double c = rays_.cosine[ray], s = rays_.sine[ray];
+    return math::atan2(c * to.y() - s * to.x(), c * to.x() + s * to.y());
+  };
+  const double exact = angle(way) / angle(Vec2(rays_.cosine[ray + 1], rays_.sine[ray + 1]));
+  return exact > 0.0 && exact < 1.0 ? exact : share;
+}
+
 /// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
-void PolarRuleSolver::find_changes(const KronrodRule& rule, std::size_t first) {
+void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   for (const Crossing& x : crossings_) {
     if (!x.good) panels_[first + x.ray / per_panel].lost = true;
@@ -473,6 +501,13 @@ void PolarRuleSolver::find_changes(const KronrodRule& rule, std::size_t first) {
           // Two that change places do so where they meet.
           const double left = before[at + 1].radius - before[at].radius, right = here[at + 1].radius - here[at].radius;
           if (left + right > 0.0) share = left / (left + right);
+        } else if (std::max(before.size(), here.size()) == at + 1 && std::min(before.size(), here.size()) == at) {
+          // One that leaves through the rim does so at a corner.
+          const std::size_t kink = before.size() > at ? before[at].kink : here[at].kink, ray = (p - first) * per_panel + k;
+          if (const std::optional<double> corner = corner_between(pressure, kink, ray - 1)) {
+            share = *corner;
+            panel.leaves = true;
+          }
         }
         const double places = 1.0 + rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1]);
         changes_.push_back(panel.touches() ? panel.bend(places - 1.0)[0] : panel.begin + half * places);

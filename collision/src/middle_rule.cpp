@@ -147,7 +147,8 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
         walk.at = slope < 0.0 ? here - p / slope : -kInfinity;
       }
       const double step = walk.at - here;
-      if (std::abs(step) <= enough * here && std::abs(p) <= kNear * middle && slope < 0.0) {
+      const bool to_kink = p > 0.0 && walk.at == walk.passed;  // the rim may lie on either side of it
+      if (std::abs(step) <= enough * here && std::abs(p) <= kNear * middle && slope < 0.0 && !to_kink) {
         walk.done = true;
         --open;
         walk.outward = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);

@@ -30,13 +30,13 @@ struct PatchSums {
     area += weight;
     spread += weight * pressure * from_reference.squaredNorm();
   }
-  void add(const PatchSums& other) {
-    force += other.force;
-    moment += other.moment;
-    first += other.first;
-    load += other.load;
-    area += other.area;
-    spread += other.spread;
+  void add(const PatchSums& other, double weight = 1.0) {
+    force += weight * other.force;
+    moment += weight * other.moment;
+    first += weight * other.first;
+    load += weight * other.load;
+    area += weight * other.area;
+    spread += weight * other.spread;
   }
   [[nodiscard]] Vec3 centre() const { return load > 0.0 ? Vec3(first / load) : Vec3::Zero().eval(); }
 };

@@ -12,11 +12,12 @@ namespace {
 constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
 constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so that columns stay inside the rim
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
+constexpr double kOfLast = 0.2;          // of the bound of the rule before: the next may agree with it by chance
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
 constexpr double kEnough = 0.9;          // leaves room for Newton's method
 constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
-constexpr double kSafetyAtFirst = 2.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
+constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -106,7 +107,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   const double thickness = frame_.thickness;
   std::size_t open = n;
   rim_error_ = 0.0;
-  rim_errors_.assign(n, 0.0);
+  rim_left_.assign(n, 0.0);
+  moved_.assign(n, 0.0);
   for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
     for (std::size_t k = 0; k < n; ++k) {
       const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
@@ -137,6 +139,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       }
       const double step = next - radius;
       const double lift = ((a - b) + (ar - br) * step) / rate;
+      const double last_move = moved_[k];
+      moved_[k] = step * step * e.squaredNorm() + lift * lift;
       const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
       if (near && settled) {
         // Both bodies must fall away from the axis beyond the rim, or their squeezed regions reach over it.
@@ -145,8 +149,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         --open;
         rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
         // Newton's method leaves about half the square of its last step, which the area feels twice.
-        rim_errors_[k] = step * step / (falls * radius);
-        rim_error_ = std::max(rim_error_, rim_errors_[k]);
+        rim_error_ = std::max(rim_error_, step * step / (falls * radius));
+        if (last_move > 0.0) rim_left_[k] = std::abs(step) / radius * moved_[k] / last_move;
       }
       radius = next;
       rays.height[k] += lift;
@@ -437,6 +441,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   kinks_.clear();
   bool smooth = error < kSplitBelow && third_.empty() && no_kinks_near(pressure);
   std::size_t first = first_of(smooth);
+  double difference = 0.0;
   for (std::size_t r = first; r <= last; ++r) {
     const PolarRule& rule = round ? polar_rays()[r] : rules[r];
     start_rim(rule, r == first);
@@ -473,9 +478,11 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
       return false;
     }
     if (r == first) continue;
-    const double difference = smooth   ? error_where_smooth(r, fine_, coarse_, rim_moved())
-                              : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
-                                       : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
+    const double last_difference = difference;
+    difference = smooth   ? error_where_smooth(r, fine_, coarse_, rim_moved())
+                 : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
+                          : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
+    if (!parts && r > first + 2) difference = std::max(difference, kOfLast * last_difference);
     if (difference > kEnough * error && r < last) continue;
     estimate_ = (smooth ? bound_where_smooth(r, fine_, coarse_, rim_moved(), round) : difference) + algebraic_error();
     if (estimate_ > error && !any) return false;

@@ -92,6 +92,7 @@ class PolarRuleSolver {
     std::size_t first = 0, last = 0;  // of `kept_`
     std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
     PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with fewer radii besides
+    std::array<PatchSums, 4> highest;  // as a polynomial of the angle, its coefficients of the highest degrees, falling
     double by_angle = 0.0, by_radius = 0.0;  // what the finest sums may be off by, for either reason
     double by_rim = 0.0;                     // its area, as the rim was left
     int nodes = 0;                    // on a ray that no kink crosses
@@ -100,6 +101,7 @@ class PolarRuleSolver {
     bool halved = false;              // or a part of one
     bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
     bool lost = false;                // a crossing that seemed to be there was not found
+    bool leaves = false;              // a kink meets the rim between two rays
     [[nodiscard]] bool even() const { return change == change_end && !lost; }
     [[nodiscard]] bool touches() const { return touch_begin || touch_end; }
     /// Where node x in (-1, 1) is put between begin and end, and its rate. What a ray has of an imprint grows as the root of the
@@ -130,14 +132,18 @@ class PolarRuleSolver {
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
+  void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
   void find_corners(PairPressure& pressure, std::vector<Vec3>& corners);
+  [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
   void find_crossings(PairPressure& pressure, double error);
   bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
-  void find_changes(const KronrodRule& rule, std::size_t first);
+  void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
   static void follow_signs(std::span<const double> values, std::vector<double>& places);
   bool add_missed_kinks();
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
+  [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
+  static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
@@ -200,13 +206,14 @@ class PolarRuleSolver {
   std::vector<double> coarse_radius_, coarse_height_, start_radius_;
   std::vector<double> low_, high_;
   std::vector<std::uint8_t> done_;
-  PressureBatch rim_batch_, node_;
+  PressureBatch rim_batch_, crossing_batch_, node_;
   std::vector<double> height_, weight_, area_, pressure_, end_[2], reached_;
   std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
   std::vector<double> line_value_;
   double residual_ = 0.0;
   double rim_error_ = 0.0;  // relative, of the area
-  std::vector<double> rim_errors_;  // of rays
+  // Of rays: the square of the last step of Newton's method to the rim [m^2], and what the last two say is left of the way, over the radius.
+  std::vector<double> moved_, rim_left_;
   double lift_ = 0.0;       // largest distance of a node from Sigma
   double size_ = 0.0;       // of the bodies' features
   PatchSums fine_, coarse_;

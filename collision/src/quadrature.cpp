@@ -36,6 +36,30 @@ GaussRule make_gauss(int n) {
   return rule;
 }
 
+/// Orthonormal polynomials at the nodes, from those of lower degrees by Gram and Schmidt, twice for round-off.
+void add_highest(KronrodRule& rule) {
+  const std::size_t n = rule.node.size();
+  const auto product = [&](const std::vector<double>& f, const std::vector<double>& g) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < n; ++k) sum += rule.weight[k] * f[k] * g[k];
+    return sum;
+  };
+  std::vector<std::vector<double>> all;
+  for (std::size_t degree = 0; degree < n; ++degree) {
+    std::vector<double> next(n, 1.0);
+    for (std::size_t k = 0; k < n && degree > 0; ++k) next[k] = rule.node[k] * all.back()[k];
+    for (std::size_t i = 0; i < 2 * degree; ++i) {
+      const std::vector<double>& lower = all[i % degree];
+      const double share = product(next, lower);
+      for (std::size_t k = 0; k < n; ++k) next[k] -= share * lower[k];
+    }
+    const double length = std::sqrt(product(next, next));
+    for (double& value : next) value /= length;
+    all.push_back(std::move(next));
+  }
+  for (std::size_t d = 0; d < rule.highest.size(); ++d) rule.highest[d] = all[n - 1 - d];
+}
+
 /// Weight of an even number n of equally spaced angles in the trigonometric interpolant, at distance x from an angle:
 /// sin(n x / 2) cot(x / 2) / n.
 double cardinal(int n, double x) {
@@ -125,6 +149,7 @@ const KronrodRule& kronrod_rule(int gauss) {
       rule.weight.push_back(weight[i]);
       rule.gauss_weight.push_back(i % 2 == 1 ? smaller[i / 2] : 0.0);
     }
+    add_highest(rule);
     return rule;
   };
   static const KronrodRule coarsest = make(std::array{std::sqrt(6.0 / 7.0), std::sqrt(1.0 / 3.0), 0.0},

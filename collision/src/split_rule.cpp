@@ -16,7 +16,7 @@ namespace {
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
 constexpr double kWidestCoarse = 3.3;
 constexpr int kMostRadial = 16;
-constexpr double kShort = 0.1;           // share of a ray on which two points are always enough
+constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
@@ -62,7 +62,7 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 constexpr double kRegular = 2000.0, kRegularCoarse = 400.0;
 constexpr double kLeastShare = 0.02, kHalf = 0.5;
 constexpr double kOnFaces = 0.2;
-constexpr double kRadial = 0.05, kRadialCoarse = 0.1;
+constexpr double kRadial = 0.05, kRadialCoarse = 0.1, kSlowRadial = 1.2;
 constexpr std::size_t kFine = 15;  // rays
 
 }  // namespace
@@ -109,7 +109,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
     fourth_[i] = rays_.height[i] - square_[i];
   }
   find_crossings(pressure, error);
-  find_changes(rule, first);
+  find_changes(pressure, rule, first);
   const double shortest = shortest_piece(error);
   std::erase_if(crossings_, [&](const Crossing& x) { return x.radius < shortest || x.radius > 1.0 - shortest; });
 
@@ -182,20 +182,38 @@ bool PolarRuleSolver::rim_joins(std::size_t first, std::size_t last, bool closed
   return true;
 }
 
+/// What Newton's method may have left of the way to the rim, over the radius: twice the larger of two estimates. One is half the square of its
+/// last step, times the second derivatives of the pressures, which the slopes at the rim and at the last node before it tell. The other has
+/// its rate from the steps of rays that took two or more.
+double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
+  const std::size_t i = ray_fewer_[ray] - 1;
+  const Vec3 &a = rim_batch_.slope_a[ray], &b = rim_batch_.slope_b[ray], reach = rays_.radius[ray] * direction(rays_.cosine[ray], rays_.sine[ray]);
+  const double at = a.dot(frame_.axis), bt = b.dot(frame_.axis), fall = b.dot(reach) * at - a.dot(reach) * bt;
+  const double turn = (a - node_.slope_a[i]).norm() * bt - (b - node_.slope_b[i]).norm() * at;
+  const double bend = turn / (fall * (rim_batch_.point[ray] - node_.point[i]).norm());
+  return moved_[ray] * std::max(bend, 2.0 * rate);
+}
+
 /// Adds up a panel's rays from `ray` on and keeps its nodes.
 void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
   panel.fine = panel.angular = panel.radial = {};
+  panel.highest = {};
   panel.first = kept_.point.size();
-  double rim = 0.0, whole = 0.0;
+  double rim = 0.0, whole = 0.0, rate = 0.0;
+  for (std::size_t k = ray; k < ray + rule.node.size(); ++k) {
+    if (moved_[k] > 0.0) rate = std::max(rate, rim_left_[k] / moved_[k]);
+  }
   for (std::size_t k = 0; k < rule.node.size(); ++k) {
-    const double fewer = rule.gauss_weight[k] / rule.weight[k];
+    PatchSums along;
     for (std::size_t i = ray_nodes_[ray + k]; i < ray_fewer_[ray + k]; ++i) {
       const Vec3 x = node_.point[i] - frame_.origin;
       weigh(panel.fine, x, normal_[i], area_[i], pressure_[i]);
-      weigh(panel.angular, x, normal_[i], area_[i] * fewer, pressure_[i]);
+      weigh(along, x, normal_[i], area_[i], pressure_[i]);
     }
+    panel.angular.add(along, rule.gauss_weight[k] / rule.weight[k]);
+    for (std::size_t d = 0; d < panel.highest.size(); ++d) panel.highest[d].add(along, rule.highest[d][k]);
     const double area = rule.weight[k] * turn_[ray + k] * rays_.radius[ray + k] * rays_.radius[ray + k];
-    rim += area * rim_errors_[ray + k];
+    rim += area * rim_error(ray + k, rate);
     whole += area;
     for_columns([&](auto& kept, const auto& node) {
       kept.insert(kept.end(), node.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
@@ -215,6 +233,17 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
   panel.rim_end = kept_rim_.size();
 }
 
+/// What the coefficients of the highest degrees say that a panel's sums are off by, over those of `all`: nothing to speak of where they fall
+/// from one pair of degrees to the next, as the larger rule is exact to far higher ones; as much as they are where they hardly fall.
+/// Such coefficients are the null rules of Berntsen & Espelid 1991, ACM TOMS 17(2).
+double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
+  std::array<double, 4> size;
+  for (std::size_t d = 0; d < size.size(); ++d) size[d] = share_of_difference(panel.highest[d], {}, all);
+  const double high = std::sqrt(size[0] * size[0] + size[1] * size[1]), low = std::sqrt(size[2] * size[2] + size[3] * size[3]);
+  const double fall = high < low ? high / low : 1.0;
+  return high * std::min(fall, 10.0 * fall * fall * fall);
+}
+
 /// What the sums of a panel are off by at most, over those of `all`.
 void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   const bool fine = panel.rays >= kFine;
@@ -231,9 +260,13 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   } else if (fine) {
     panel.by_angle *= std::clamp(std::sqrt(kRegular * panel.by_angle), kLeastShare, 1.0);
   } else {
-    panel.by_angle *= about_middle_ ? kOnFaces : std::clamp(kRegularCoarse * panel.by_angle, kLeastShare, kHalf);
+    const double difference = panel.by_angle;
+    panel.by_angle *= about_middle_ ? kOnFaces : std::clamp(kRegularCoarse * difference, kLeastShare, kHalf);
+    panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
   }
-  panel.by_radius *= panel.lost ? kHalf : fine ? kRadial : kRadialCoarse;
+  const double relative = panel.fine.area > 0.0 ? panel.by_radius * all.area / panel.fine.area : 0.0;
+  const double slow = kSlowRadial * std::sqrt(std::sqrt(relative));
+  panel.by_radius *= panel.lost ? kHalf : fine ? kRadial : std::clamp(slow, kRadialCoarse, kHalf);
 }
 
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
@@ -335,14 +368,18 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       estimate_ += panel.by_angle + panel.by_radius;
       rim_error_ += panel.by_rim * panel.fine.area / all.area;
     }
-    if (estimate_ <= kEnough * error || solved >= (beside ? kMostBesideThirds : kMostPanels)) break;
+    // Rules agree by chance where panels do not begin at the rim's corners.
+    const auto unseen = [&](const Panel& panel) { return panel.leaves && !panel.halved && panel.rays >= kFine && !beside; };
+    const bool enough = estimate_ <= kEnough * error;
+    if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= (beside ? kMostBesideThirds : kMostPanels)) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
     const double share = 0.5 * error / count;
     std::vector<Panel> finer;
     bool by_angle = false;
     std::erase_if(panels_, [&](const Panel& panel) {
-      const bool more = panel.by_radius > share && panel.nodes < kMostRadial, part = panel.by_angle > share;
+      const bool more = !enough && panel.by_radius > share && panel.nodes < kMostRadial;
+      const bool part = (!enough && panel.by_angle > share) || unseen(panel);
       if (!more && !part) return false;
       Panel next;
       next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
@@ -355,7 +392,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
         next.touch_begin = false;
       };
       next.touch_begin = panel.touch_begin;
-      next.halved = panel.halved || (part && larger == nullptr);
+      next.halved = panel.halved || (part && (larger == nullptr || unseen(panel)));
       if (part && panel.change < panel.change_end && !beside) {
         for (std::size_t c = panel.change; c < panel.change_end; ++c) end_at(changes_[c]);
       } else if (part && larger == nullptr) {

@@ -358,10 +358,15 @@ TEST(StarRule, FindsAllOfThePatchesOfTwoLumps) {
 }
 
 TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
-  // Poses of `contact_poses 1000 disc_on_box auto SEED`, against the bodies in the other order at 1e-10: a ray that meets two kinks in
-  // another order than the next one; a kink that lies elsewhere on Sigma than the guess of its heights says; a kink that the first
-  // rim does not reach, but that of more rays; pieces of rays on which rules of three and of four points put the same two.
+  // Poses of `contact_poses 1000 SHAPES auto SEED`, against the bodies in the other order at 1e-10. Of a disc on a box: a ray that meets
+  // two kinks in another order than the next one; a kink that lies elsewhere on Sigma than the guess of its heights says; a kink that the
+  // first rim does not reach, but that of more rays; pieces of rays on which rules of three and of four points put the same two, twice; a
+  // kink that leaves the patch between two rays and is not parted exactly there; rules without kinks that agree by chance. Of capsules: Newton's method to the rim where the pressure bends there; a kink that
+  // leaves the patch between two rays. Of blobs: an angle at which the rim nearly goes along the ray; many short pieces; the two
+  // coarsest rules.
+  enum class Shapes : std::uint8_t { DiscOnBox, Capsules, Blobs };
   struct Case {
+    Shapes shapes;
     std::uint64_t seed;
     int pose;
     double asked;
@@ -374,12 +379,25 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
     solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
     return surface.summary.at(0);
   };
-  for (const Case& c : {Case{12, 306, 1e-6}, Case{12, 437, 1e-10}, Case{11, 48, 1e-5}, Case{11, 6, 1e-4}}) {
-    benchmarks::Rigid disc(benchmarks::wyvill_shape(ShapeKind::Disc, Vec3(0.15, 0, 0), 0.15), 1e6, 0.03);
-    benchmarks::Rigid box(benchmarks::wyvill_shape(ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15), 2e6, 0.03);
+  const auto shape = [](ShapeKind kind, const Vec3& size, double support, double modulus) {
+    return benchmarks::Rigid(benchmarks::wyvill_shape(kind, size, support), modulus, 0.03);
+  };
+  for (const Case& c : {Case{Shapes::DiscOnBox, 12, 306, 1e-6}, Case{Shapes::DiscOnBox, 12, 437, 1e-10}, Case{Shapes::DiscOnBox, 11, 48, 1e-5},
+                        Case{Shapes::DiscOnBox, 11, 6, 1e-4}, Case{Shapes::DiscOnBox, 1234, 69, 1e-4}, Case{Shapes::DiscOnBox, 1234, 134, 1e-6},
+                        Case{Shapes::DiscOnBox, 102, 519, 1e-2}, Case{Shapes::Capsules, 1234, 265, 1e-6}, Case{Shapes::Capsules, 77, 967, 1e-5},
+                        Case{Shapes::Capsules, 101, 852, 1e-5}, Case{Shapes::Blobs, 1234, 227, 1e-3}, Case{Shapes::Blobs, 102, 767, 1e-3},
+                        Case{Shapes::Blobs, 1234, 898, 1e-2}}) {
+    const bool disc = c.shapes == Shapes::DiscOnBox, blobs = c.shapes == Shapes::Blobs;
+    benchmarks::Rigid a = disc    ? shape(ShapeKind::Disc, Vec3(0.15, 0, 0), 0.15, 1e6)
+                          : blobs ? benchmarks::Rigid(benchmarks::ten_blobs(1), 1e6, 0.03)
+                                  : shape(ShapeKind::Segment, Vec3(0.2, 0, 0), 0.2, 1e6);
+    benchmarks::Rigid b = disc    ? shape(ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15, 2e6)
+                          : blobs ? benchmarks::Rigid(benchmarks::ten_blobs(2), 2e6, 0.03)
+                                  : shape(ShapeKind::Segment, Vec3(0.1, 0, 0), 0.25, 3e6);
+    const double size = disc ? 0.07 : blobs ? 0.05 : 0.1;
     benchmarks::Draw draw(c.seed);
-    for (int pose = 0; pose <= c.pose; ++pose) benchmarks::press(disc, box, draw.logarithmic(0.01, 0.3) * 0.07, draw);
-    const ContactSurface::Summary exact = solve({box.body(), disc.body()}, 1e-10), s = solve({disc.body(), box.body()}, c.asked);
+    for (int pose = 0; pose <= c.pose; ++pose) benchmarks::press(a, b, draw.logarithmic(0.01, 0.3) * size, draw);
+    const ContactSurface::Summary exact = solve({b.body(), a.body()}, 1e-10), s = solve({a.body(), b.body()}, c.asked);
     EXPECT_EQ(s.rule, ContactRule::Polar);
     EXPECT_LE(exact.error_estimate, 1e-10);
     EXPECT_LE(s.error_estimate, c.asked);
