@@ -698,6 +698,28 @@ TEST(PathTracer, FollowsBundlesAsItFollowsRays) {
   EXPECT_GT(shadows, 120u);
 }
 
+TEST(PathTracer, MissesNothingInBundlesAlongTheFacesOfTheBoxOfAllItems) {
+  // In planes of the box, where the distance of a ray to them is no number.
+  const Mesh mesh = plate(1.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  const Item item = matt(mesh, 0.5);
+  path::Geometry geometry;
+  geometry.set(std::span(&item, 1), Vec3::Zero(), 0.0, 0.0F);
+  int hits_found = 0;
+  for (int place = 0; place < 49; ++place)
+    for (const bool together : {false, true}) {
+      const Vec3f from(0.5F * static_cast<float>(place % 7 - 3), 0.5F * static_cast<float>(place / 7 - 3), 1.0F), down = -Vec3f::UnitZ();
+      const path::RayBundle rays{.from = path::Vec3Lanes(from), .direction = path::Vec3Lanes(down), .time = {},
+                                 .who = path::first_lanes(1), .together = together};
+      std::array<path::Hit, path::kLanes> hits;
+      path::Hit alone;
+      const bool met = geometry.meet(from, down, 0.0F, 0.0F, false, alone);
+      EXPECT_EQ(geometry.meet(rays, path::Lanes{}, false, hits)[0] != 0, met) << from.transpose();
+      EXPECT_EQ(geometry.blocked(rays)[0] != 0, geometry.blocked(from, down, INFINITY, 0.0F)) << from.transpose();
+      hits_found += met ? 1 : 0;
+    }
+  EXPECT_EQ(hits_found, 2 * 25);
+}
+
 // Eight rays scatter as one does: round-off of a few operations, where none cancels.
 TEST(Bsdf, IsTheSameForEightRaysAsForOne) {
   path::BsdfOf<path::Lanes> eight;

@@ -153,7 +153,14 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
   // By one thread, so that the hierarchy, and with it the choice between triangles that a ray meets at one place, is always
   // the same. A device with threads=1 would limit the threads of the whole process.
   if (changed) Executor(1).run([this] { rtcJoinCommitScene(scene_); });
+  RTCBounds box;
+  rtcGetSceneBounds(scene_, &box);
   check(device_);
+  lower_ = {box.lower_x, box.lower_y, box.lower_z};
+  upper_ = {box.upper_x, box.upper_y, box.upper_z};
+  const float margin = 1e-4F * (upper_ - lower_).norm();  // of round-off, and no ray along a face lies in it
+  lower_.array() -= margin;
+  upper_.array() += margin;
 }
 
 /// Of a ray and a triangle.
@@ -304,18 +311,34 @@ RTCIntersectContext coherent() {
 
 }  // namespace
 
+/// Rays that cross the box of all items (Kay & Kajiya 1986), and at most a few others.
+LaneMask Geometry::cross_box(const RayBundle& rays) const {
+  const auto between = [](float lower, float upper, Lanes from, Lanes direction) {
+    const Lanes scale = 1.0F / direction, a = (lower - from) * scale, b = (upper - from) * scale;
+    return Pair<Lanes>{smaller(a, b), larger(a, b)};
+  };
+  const Pair<Lanes> x = between(lower_.x(), upper_.x(), rays.from.x(), rays.direction.x());
+  const Pair<Lanes> y = between(lower_.y(), upper_.y(), rays.from.y(), rays.direction.y());
+  const Pair<Lanes> z = between(lower_.z(), upper_.z(), rays.from.z(), rays.direction.z());
+  const Lanes enter = larger(larger(x.x, y.x), z.x), leave = smaller(smaller(x.y, y.y), z.y);
+  constexpr float kRoundOff = 1.0F + 1e-5F;
+  return both(rays.who, ~((enter > kRoundOff * leave) | (leave < 0.0F)));
+}
+
 std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) const {
   std::array<Crossing, kLanes> out;
+  const LaneMask who = cross_box(rays);
+  if (!any(who)) return out;
   if (!rays.together) {
     for (std::size_t k = 0; k < kLanes; ++k)
-      if (rays.who[k] != 0) out[k] = crossed(rays.from.lane(k), rays.direction.lane(k), rays.time[k], kNear);
+      if (who[k] != 0) out[k] = crossed(rays.from.lane(k), rays.direction.lane(k), rays.time[k], kNear);
     return out;
   }
   RTCRayHit8 bundle;
   bundle.ray = packet(rays, all_lanes(INFINITY), 1u);
   std::fill_n(bundle.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
   RTCIntersectContext context = coherent();
-  rtcIntersect8(reinterpret_cast<const int*>(&rays.who), scene_, &context, &bundle);
+  rtcIntersect8(reinterpret_cast<const int*>(&who), scene_, &context, &bundle);
   for (std::size_t k = 0; k < kLanes; ++k)
     out[k] = {.distance = bundle.ray.tfar[k], .item = bundle.hit.geomID[k], .triangle = bundle.hit.primID[k], .u = bundle.hit.u[k],
               .v = bundle.hit.v[k]};
@@ -335,16 +358,18 @@ LaneMask Geometry::meet(const RayBundle& rays, Lanes choice, bool exact, std::ar
 LaneMask Geometry::blocked(const RayBundle& rays) const { return blocked(rays, all_lanes(INFINITY)); }
 
 LaneMask Geometry::blocked(const RayBundle& rays, Lanes distance) const {
+  const LaneMask who = cross_box(rays);
+  if (!any(who)) return LaneMask{};
   if (!rays.together) {
     LaneMask out{};
     for (std::size_t k = 0; k < kLanes; ++k)
-      if (rays.who[k] != 0 && blocked(rays.from.lane(k), rays.direction.lane(k), distance[k], rays.time[k])) out[k] = -1;
+      if (who[k] != 0 && blocked(rays.from.lane(k), rays.direction.lane(k), distance[k], rays.time[k])) out[k] = -1;
     return out;
   }
   RTCRay8 bundle = packet(rays, distance, 2u);
   RTCIntersectContext context = coherent();
-  rtcOccluded8(reinterpret_cast<const int*>(&rays.who), scene_, &context, &bundle);
-  return both(rays.who, _mm256_load_ps(bundle.tfar) < 0.0F);
+  rtcOccluded8(reinterpret_cast<const int*>(&who), scene_, &context, &bundle);
+  return both(who, _mm256_load_ps(bundle.tfar) < 0.0F);
 }
 
 }  // namespace supple::render::path
