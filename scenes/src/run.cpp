@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -108,6 +109,7 @@ void check_needs(const Scene& scene, const RunOptions& options, const OutputRequ
 constexpr int kSignalExit = 128;
 constexpr int kMostFrames = 1'000'001;  // of a scene
 constexpr std::size_t kMostOverloads = 10;  // that are told; the report has all
+constexpr double kMuchEnergy = 0.05;        // energy_error that implicit steps which nobody asked for are blamed for
 constexpr const char* kResultFile = "result.json";
 
 std::string overload_text(const RunRecord::Overload& o) {
@@ -159,6 +161,12 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
     for (std::size_t k = 0; k < std::min(overloads.size(), kMostOverloads); ++k) result.warnings.push_back(overload_text(overloads[k]));
     if (overloads.size() > kMostOverloads) {
       result.warnings.push_back(std::to_string(overloads.size() - kMostOverloads) + " more pairs were overloaded ('overloads' in the report)");
+    }
+    const IntegratorPlan& plan = simulation->integrator();
+    const double error = simulation->audits().energy_error;
+    if (plan.chosen && plan.settings.method == core::Integrator::BackwardEuler && error > kMuchEnergy) {
+      result.warnings.push_back("integrator.method: auto took backward_euler, which damps what its steps do not resolve: the balance of energy is off by " +
+                                std::to_string(std::lround(100.0 * error)) + " %; implicit_midpoint keeps it");
     }
   }
   // Where nothing was done, the report of an earlier run stays.

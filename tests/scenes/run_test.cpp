@@ -53,6 +53,31 @@ class Run : public testing::Test {
   Scene scene_;
 };
 
+// A stiff pendulum without damping that falls from the level of its pivot.
+TEST_F(Run, SaysWhenStepsThatNobodyAskedForDampTheMotion) {
+  const auto warnings_of = [&](const std::string& integrator) {
+    const Scene scene = parse_scene(R"(
+schema: 1
+duration: 1 s
+frame_rate: 100
+gravity: [0, 0, -9.81]
+objects:
+  - name: pendulum
+    particles: {arrange: line, count: 2, spacing: 1, inertia_radius: 1 mm}
+    interactions: [{law: bond_frame, stretch: 1e5, rotation: 0}]
+    pins: [{particle: 0, orientation: false}]
+integrator: {method: )" + integrator + "}", "pendulum.yaml", ".");
+    RunOptions settings = options();
+    settings.overwrite = true;
+    return run_scene(scene, settings).warnings;
+  };
+  const std::vector<std::string> warnings = warnings_of("auto");
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].find("integrator.method: auto took backward_euler"), 0u) << warnings[0];
+  EXPECT_TRUE(warnings_of("backward_euler").empty());
+  EXPECT_TRUE(warnings_of("implicit_midpoint").empty());
+}
+
 TEST_F(Run, LeavesFramesFilmTablesStatesAndAResult) {
   const RunResult done = run_scene(scene_, options());
   ASSERT_EQ(done.outcome, "done") << done.reason;
