@@ -44,7 +44,7 @@ void fields(Archive& archive, MeshingDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, GriddingDesc& d) {
-  archive("of", d.of, {}, "a grid of each object under its name, one of all named 'scene', or both");
+  archive("of", d.of, {}, "a grid of each object under its name, one of their union named 'scene', or both");
   archive("content", d.content, {}, "signed distance near the surface to first order, or the field");
   archive("half_width", d.half_width, between(1.0, 100.0, kNumber), "of the band on each side of the surface, in cells");
 }
@@ -71,7 +71,7 @@ void fields(Archive& archive, OutputDesc& d) {
   archive("particles", d.particles, {}, "particles and bonds a frame; vtk: .vtp files and a .pvd");
   archive("samples", d.samples, {}, "points spread evenly over the surfaces a frame, which ride on their particles: id, owner, normal and area; as if nothing touched; vtk: .vtp files and a .pvd");
   archive("mesh", d.mesh, {}, "surfaces; ply, obj: a file an object and frame; usd: one file with all frames");
-  archive("grid", d.grid, {}, "fields a frame");
+  archive("grid", d.grid, {}, "fields a frame, as contact deforms them");
   archive("meshing", d.meshing, {}, "how surfaces become meshes");
   archive("gridding", d.gridding, {}, "how fields become grids");
   archive("sampling", d.sampling, {}, "how far apart samples are");

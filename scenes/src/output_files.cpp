@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <fstream>
 #include <map>
+#include <utility>
 
 #include "frame.h"
 #include "scene_places.h"
+#include "supple/collision/deformed_field.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 
@@ -21,6 +24,17 @@ constexpr int kSheetColumns = 4;
 constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
 constexpr int kSheetGap = 4;
+
+/// The field of a body that others divide. @param united  with its bulges, but what others claim is not taken off
+collision::DeformedField deformed_field(const Division& division, std::uint32_t body, bool united) {
+  const auto at = static_cast<std::size_t>(std::lower_bound(division.body.begin(), division.body.end(), body) - division.body.begin());
+  const collision::ClaimField& own = division.claim[at];
+  std::vector<collision::ClaimField> others;
+  for (std::size_t k = 0; k < division.claim.size() && !united; ++k) {
+    if (k != at && division.claim[k].surface_box().overlaps(own.surface_box())) others.push_back(division.claim[k]);
+  }
+  return {own, std::move(others), division.placed[body].material.modulus};
+}
 
 }  // namespace
 
@@ -85,23 +99,35 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   options.half_width = gridding.half_width;
   options.content = gridding.content == GridContentName::Field ? implicit::GridContent::Field
                                                                : implicit::GridContent::SignedDistance;
+  const std::vector<implicit::Field>& fields = simulation.fields();
+  const Division division = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
   std::vector<const implicit::SurfaceGrid*> grids;
-  std::vector<implicit::FieldView> fields;
+  std::deque<implicit::SurfaceGrid> deformed;  // of bodies that touch, which no updater knows
+  std::deque<collision::DeformedField> claims;
+  std::vector<implicit::FieldView> united;
   updaters.resize(bodies.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
-    const implicit::Field& field = simulation.fields()[i];
-    fields.emplace_back(field);
-    if (gridding.of == GriddedName::Scene) continue;
     options.name = bodies[i].name;
     options.lattice.cell = simulation.model().objects[bodies[i].object].cell;
-    grids.push_back(&updaters[i].make(field, options, executor));
+    const bool apart = !std::binary_search(division.body.begin(), division.body.end(), i);
+    if (apart) {
+      united.emplace_back(fields[i]);
+    } else {
+      united.emplace_back(claims.emplace_back(deformed_field(division, i, true)));
+    }
+    if (gridding.of == GriddedName::Scene) continue;
+    if (apart) {
+      grids.push_back(&updaters[i].make(fields[i], options, executor));
+    } else {
+      grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(deformed_field(division, i, false), options, executor)));
+    }
   }
   implicit::SurfaceGrid whole;
-  if (gridding.of != GriddedName::Objects && !fields.empty()) {
+  if (gridding.of != GriddedName::Objects && !united.empty()) {
     options.name = "scene";
     options.lattice.cell = simulation.cell();
-    whole = implicit::make_surface_grid(implicit::UnitedField(fields), options, executor);
+    whole = implicit::make_surface_grid(implicit::UnitedField(united), options, executor);
     grids.push_back(&whole);
   }
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);

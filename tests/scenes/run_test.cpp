@@ -454,6 +454,28 @@ TEST_F(Run, WritesGridsOfObjectsOfTheSceneOrBoth) {
   EXPECT_GT(implicit::read_grid(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
 }
 
+TEST_F(Run, GridsOfBodiesThatTouchEndWhereTheyDo) {
+  scene_.output.images.reset();
+  scene_.output.film.reset();
+  scene_.output.gridding.of = GriddedName::Both;
+  scene_.output.cell = 0.02;
+  for (ObjectDesc& object : scene_.objects) object.particles.at.x() = object.name == "left" ? -0.2 : 0.2;
+  RunOptions first = options();
+  first.frames = {1};
+  EXPECT_EQ(run_scene(scene_, first).outcome, "done");
+  const fs::path file = folder_ / "grids/drops.0001.vdb";
+  const implicit::SurfaceGrid left = implicit::read_grid(file, "left"), right = implicit::read_grid(file, "right"),
+                              both = implicit::read_grid(file, "scene");
+  // In the plane between equal drops, whose undeformed surfaces lie 0.027 m beyond it, and to its sides.
+  for (const double y : {-0.04, 0.0, 0.04}) {
+    EXPECT_NEAR(left.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
+    EXPECT_NEAR(right.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
+    EXPECT_NEAR(left.interpolate(Vec3(-0.02, y, 0.0)), -0.02, 1e-3);
+    EXPECT_NEAR(right.interpolate(Vec3(-0.02, y, 0.0)), 0.02, 1e-3);
+    EXPECT_LT(both.interpolate(Vec3(0.0, y, 0.0)), -0.01);  // nothing parts their union
+  }
+}
+
 TEST_F(Run, RefusesGridsOfTooManyVoxelsByTheKeyOfTheScene) {
   scene_.output.images.reset();
   scene_.output.film.reset();

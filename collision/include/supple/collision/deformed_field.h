@@ -3,6 +3,9 @@
 /// meshed and drawn.
 #pragma once
 
+#include <utility>
+#include <vector>
+
 #include "supple/collision/bodies.h"
 #include "supple/collision/contact_surface.h"
 
@@ -83,6 +86,9 @@ class DeformedField {
  public:
   DeformedField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
                 const BulgeSettings& settings);
+  /// What `others` leave of a claim. @param modulus  P_i [Pa], > 0
+  DeformedField(ClaimField own, std::vector<ClaimField> others, double modulus)
+      : own_(std::move(own)), others_(std::move(others)), modulus_(modulus) {}
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
   void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
   void evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const;  ///< of the undeformed field
