@@ -326,11 +326,13 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
 }  // namespace
 
 Model build_model(const Scene& scene) {
+  SUPPLE_EXPECTS(scene.duration > 0.0 && scene.frame_rate > 0.0);  // scenes need not come from a file
   Model model;
   ModelFaults faults(scene);
   model.smallest_length = std::numeric_limits<double>::infinity();
   for (const ObjectDesc& d : scene.objects) {
     const std::string key = "objects." + d.name;
+    SUPPLE_EXPECTS(d.particles.mass > 0.0);
     ObjectModel object;
     object.name = d.name;
     add_particles(scene, d, key, object, model, faults);

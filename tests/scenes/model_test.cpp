@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numbers>
 
 #include "supple/core/error.h"
@@ -129,6 +130,15 @@ TEST(Model, StartsAsARigidMotionAboutTheCentreOfMass) {
   EXPECT_NEAR((model.initial.velocity[1] - Vec3(1, 3, 0)).norm(), 0.0, 1e-15);
   EXPECT_NEAR((model.initial.angular_momentum[0] - Vec3(0, 0, 0.8 * 3)).norm(), 0.0, 1e-15);
   EXPECT_EQ(model.rest.velocity[0], Vec3(0, 0, 0));
+}
+
+TEST(Model, RefusesScenesMadeByHandThatNoFileCouldAskFor) {
+  const Scene scene = parse_scene(std::string(kHead) + kBall, "test.yaml", "");
+  for (const double wrong : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    Scene rate = scene, duration = scene, mass = scene;
+    rate.frame_rate = duration.duration = mass.objects[0].particles.mass = wrong;
+    for (const Scene* s : {&rate, &duration, &mass}) EXPECT_THROW((void)build_model(*s), ContractViolation) << wrong;
+  }
 }
 
 TEST(Model, DoesNotDependOnTheOrderOfObjectsInTheFile) {

@@ -87,6 +87,7 @@ struct Model {
 
 /// @throws Error{Scene} for what only the whole scene shows (a pair naming an absent object, an iso value that no kernel
 /// reaches, two particles at one place with a bond between them ...), with the key concerned.
+/// @pre duration, frame rate and masses are positive, as in every scene that was read
 [[nodiscard]] Model build_model(const Scene& scene);
 
 /// What has a surface of its own: a whole object, or a piece of one that broke. Contact bodies are these, by index.
