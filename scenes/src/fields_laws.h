@@ -93,7 +93,7 @@ void fields(Archive& archive, InteractionDesc& d) {
   archive.required("stretch", d.stretch, only(at_least(0.0, kStiffness), {BondFrame}), "k_s");
   archive.required("rotation", d.rotation, only(at_least(0.0, kTorque), {BondFrame}), "k_theta");
   archive.required("strength", d.strength, only(at_least(0.0, kBending), {Form, DirectedForm}),
-                   "k; a chain bends like a beam of EI = 2 k / spacing");
+                   "k; beside a law against shear, such as bond_frame, a chain bends like a beam of EI = 2 k / spacing");
   archive.required("strength", d.strength,
                    only(at_least(0.0, d.normalised ? kEnergy : kStiffness), {FormRadius, Coplanarity, CoCircularity}), "k");
   archive.required("strength", d.strength, only(at_least(0.0, kEnergy), {CoNormality}), "k");
