@@ -12,7 +12,7 @@ namespace {
 constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
 constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so that columns stay inside the rim
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
-constexpr double kOfLast = 0.2;          // of the bound of the rule before: the next may agree with it by chance
+constexpr double kOfLast = 0.3;          // of the bound of the rule before: the next may agree with it by chance
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
 constexpr double kEnough = 0.9;          // leaves room for Newton's method
@@ -482,7 +482,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
     difference = smooth   ? error_where_smooth(r, fine_, coarse_, rim_moved())
                  : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
                           : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
-    if (!parts && r > first + 2) difference = std::max(difference, kOfLast * last_difference);
+    if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kEnough * error));
     if (difference > kEnough * error && r < last) continue;
     estimate_ = (smooth ? bound_where_smooth(r, fine_, coarse_, rim_moved(), round) : difference) + algebraic_error();
     if (estimate_ > error && !any) return false;
