@@ -60,8 +60,10 @@ Reporter::Reporter(const RunOptions& options, int frame_count) : options_(option
 void Reporter::operator()(const std::string& stage, int frame, double done) {
   if (!options_.progress) return;
   const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
-  const double left = done > 0.02 ? elapsed * (1.0 - done) / done : -1.0;
-  options_.progress({stage, frame, frame_count_, elapsed, left});
+  if (!first_) first_ = done;
+  const double since = done - *first_;
+  const double left = since > 0.02 ? elapsed * (1.0 - done) / since : -1.0;
+  options_.progress({stage, frame, frame_count_, elapsed, left, since > 0.0 ? since * frame_count_ / elapsed : 0.0});
 }
 
 std::vector<std::string> image_names(const Scene& scene) {

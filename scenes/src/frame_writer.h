@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ class Reporter {
   const RunOptions& options_;
   int frame_count_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::optional<double> first_;  ///< share that was done at the first report
 };
 
 /// Stems of the pictures of a scene, one a camera.

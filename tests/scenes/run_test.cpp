@@ -158,6 +158,30 @@ TEST_F(Run, StopsAtASignalAndResumesToTheSameBits) {
   EXPECT_EQ(resumed.state_hash, whole.state_hash);
 }
 
+// A restart does not count what was done before it.
+TEST_F(Run, ReportsTheRateOfTheFramesThatItDid) {
+  RunOptions o = options();
+  o.simulate_only = true;
+  std::atomic<int> signal{0};
+  o.interrupt = &signal;
+  int frames_before = 0;
+  for (const int until : {3, 100}) {
+    std::vector<Progress> all;
+    signal = 0;
+    o.progress = [&](const Progress& p) {
+      all.push_back(p);
+      signal = p.frame >= until ? 15 : 0;
+    };
+    const RunResult result = run_scene(scene_, o);
+    ASSERT_GE(all.size(), 2u);
+    EXPECT_EQ(all.front().frames_per_s, 0.0);
+    EXPECT_GT(all.back().frames_per_s, 0.0);
+    for (const Progress& p : all) EXPECT_LE(p.frames_per_s * p.elapsed_s, (p.frame - frames_before) * (1.0 + 1e-12));
+    frames_before = result.frames;
+    o.resume = true;
+  }
+}
+
 TEST_F(Run, DrawsFramesAgainFromSavedStates) {
   (void)run_scene(scene_, options());
   const render::Image first = render::read_png(folder_ / "frames/drops.0004.png");

@@ -25,6 +25,7 @@ struct Progress {
   int frame_count = 0;
   double elapsed_s = 0.0;
   double left_s = -1.0;    ///< estimate; negative while unknown
+  double frames_per_s = 0.0;  ///< of the frames done since the first report; 0 while there is none
 };
 
 struct RunOptions {
