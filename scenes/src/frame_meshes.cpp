@@ -90,6 +90,9 @@ Error with_keys_of(const Error& failure, const ObjectModel* cell, const ObjectMo
   return with_scene_keys({failure.kind(), std::move(faults)});
 }
 
+/// Bodies in mirror image of each other meet in planes of a lattice about the origin, where triangles have no area. [cells]
+const Vec3 kOffPlanes(0.382, 0.236, 0.447);
+
 /// The surfaces of bodies that touch, by body. They are divided together, those that share a lattice; the ground divides
 /// nothing, it is flat and opaque. Pieces of one object are divided where they still overlap.
 void mesh_divided(const StageContext& context, const Division& division, StageProfile& profile, std::vector<Mesh>& surfaces) {
@@ -99,8 +102,8 @@ void mesh_divided(const StageContext& context, const Division& division, StagePr
     implicit::PolygoniseCounts counts;
     try {
       const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
-      std::vector<Mesh> parts = divide(context.model.meshing, error, views, {.origin = Vec3::Zero(), .cell = group.finest->cell},
-                                       context.executor, counts);
+      const double cell = group.finest->cell;
+      std::vector<Mesh> parts = divide(context.model.meshing, error, views, {.origin = cell * kOffPlanes, .cell = cell}, context.executor, counts);
       for (std::size_t k = 0; k < parts.size(); ++k) surfaces[division.body[group.member[k]]] = std::move(parts[k]);
     } catch (const Error& failure) {
       throw with_keys_of(failure, group.finest, group.strictest);

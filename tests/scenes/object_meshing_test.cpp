@@ -119,5 +119,29 @@ TEST(ObjectMeshing, IsNamedWhereItCannotBe) {
   }
 }
 
+// A contact in a plane of a lattice about the origin had triangles without area in it, and some that were turned over.
+TEST(ObjectMeshing, BodiesInMirrorImageMeetInTrianglesWithAnArea) {
+  const auto ball = [](const std::string& name, const std::string& x) {
+    return "  - name: " + name + "\n    particles: {at: [" + x + ", 0, 0], mass: 1}\n    contact: {modulus: 1e4}\n"
+           "    skeleton: [{shape: point, kernel: {radius: 0.5}}]\n";
+  };
+  constexpr double kCell = 0.02;
+  const std::vector<Mesh> meshes = meshes_of("schema: 1\nduration: 1\nobjects:\n" + ball("left", "-0.2") + ball("right", "0.2") +
+                                             "output: {mesh: ply, cell: 0.02}\n");
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double outwards = k == 0 ? 1.0 : -1.0;
+    std::size_t in_plane = 0;
+    for (const auto& t : meshes[k].triangle) {
+      const Vec3 &a = meshes[k].position[t[0]], &b = meshes[k].position[t[1]], &c = meshes[k].position[t[2]];
+      const Vec3 area = 0.5 * (b - a).cross(c - a);
+      EXPECT_GT(area.norm(), 1e-9 * kCell * kCell);
+      if (std::max({std::abs(a.x()), std::abs(b.x()), std::abs(c.x())}) > 1e-9) continue;
+      ++in_plane;
+      EXPECT_GT(outwards * area.x(), 0.0);
+    }
+    EXPECT_GT(in_plane, 100u);
+  }
+}
+
 }  // namespace
 }  // namespace supple::scenes
