@@ -23,8 +23,8 @@ using Node = std::array<std::int64_t, 3>;
 constexpr int kParts = kSearchParts;
 /// The smallest cubes along an edge of the finer lattice; they only tell whether something is there.
 constexpr int kShift = 2, kUnits = 1 << kShift;
-/// Cubes that are looked at in a cell before it counts as undecided.
-constexpr int kMostCubes = 10'000;
+/// Cubes that are looked at in a cell before it counts as undecided; without bounds of second order those of three halvings.
+constexpr int kMostCubes = 10'000, kMostByValues = 8 + 64 + 512;
 /// Nodes of the finer lattice in a piece before it counts as undecided.
 constexpr std::size_t kMostNodes = 4'000'000;
 /// Vertices stay this far from the nodes [finer cells].
@@ -113,7 +113,7 @@ class BlockSearch {
     corners_ = 0;
     for (unsigned c = 0; c < 8; ++c) corners_ |= (value[c] > 0.0 ? 1u : 0u) << c;
     cell_ = corner[0];
-    left_ = kMostCubes;
+    left_ = bounds.second_order ? kMostCubes : kMostByValues;
     undecided_ = !bounds.second_order && corners_ != 0 && corners_ != 255;
     if (!undecided_) search_parts(cell, kCell);
     counts_->undecided += undecided_ ? 1 : 0;

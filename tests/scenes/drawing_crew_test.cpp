@@ -97,6 +97,9 @@ TEST_F(DrawingCrew, IsNotMadeWhereFramesNeedOrderMemoryOrExactClocks) {
   scene = scene_of(kDrops);
   scene.output.samples = {TableName::Csv};
   EXPECT_EQ(run_scene(scene, options("samples", 3)).frames_at_once, 1);
+  scene = scene_of(kDrops);
+  scene.output.meshing.search = true;
+  EXPECT_EQ(run_scene(scene, options("search", 3)).frames_at_once, 1);
 }
 
 TEST_F(DrawingCrew, StopsAtASignalAndARestartDrawsTheRest) {
