@@ -3,7 +3,9 @@
 #include <cmath>
 #include <limits>
 
+#include "field_box_bounds.h"
 #include "field_index.h"
+#include "shortest_in_hull.h"
 
 namespace supple::implicit {
 namespace {
@@ -116,20 +118,6 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
   }
 }
 
-/// The shortest vector of the convex hull of some, nearly (Frank & Wolfe's method).
-Vec3 shortest_in_hull(std::span<const Vec3> vectors) {
-  Vec3 at = vectors[0];
-  for (int i = 0; i < 16; ++i) {
-    const Vec3* best = &vectors[0];
-    for (const Vec3& v : vectors) best = v.dot(at) < best->dot(at) ? &v : best;
-    const Vec3 step = *best - at;
-    const double length2 = step.squaredNorm();
-    if (length2 == 0.0) break;
-    at += std::clamp(-at.dot(step) / length2, 0.0, 1.0) * step;
-  }
-  return at;
-}
-
 /// A unit vector along which F may rise on all of the box, by the gradients at its centre; zero where there is none.
 Vec3 uphill(const BlendIndex& blend, std::span<const Expansion> nodes, std::span<const BlendIndex::NodeBound> bounds,
             std::span<const BlendIndex::Term> terms) {
@@ -210,22 +198,25 @@ Field::BoxBounds blended_box_bounds(const Field::Index& index, const Box& box, c
 
 Interval Field::tight_bound(const Box& box) const { return box_bounds(box).value; }
 
-Field::BoxBounds Field::box_bounds(const Box& box) const {
-  const Index& index = this->index();
-  const Interval plain = bound(box);
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {.value = plain};
-  if (index.blend.active()) return blended_box_bounds(index, box, plain);
+Field::BoxBounds Field::box_bounds(const Box& box) const { return bounds_with_gradient(*this, box); }
+
+GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
+  const Field::Index& index = field.index();
+  const Interval plain = field.bound(box);
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}};
+  if (index.blend.active()) return {blended_box_bounds(index, box, plain)};
   Expansion sum{.value = -index.iso, .scale = index.iso};
   bool known = true;
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (index.support[id].overlaps(box)) expand(index, id, box, sum, known);
   }
-  if (sum.terms == 0.0) return {.value = plain, .second_order = true};
+  if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, Vec3::Zero(), 0.0};
   const Vec3 half = 0.5 * box.extent();
-  BoxBounds out{.value = intersection(plain, sum.range(half)), .second_order = known};
+  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = known}};
   if (sum.sloped && half.maxCoeff() > 0.0) {
-    const double steepness = sum.gradient.norm() * (1.0 - 1e-12) - sum.round_off() / half.maxCoeff();
-    out.least_slope = std::max(steepness - sum.turn(half.norm()), 0.0);
+    out.gradient = sum.gradient;
+    out.turn = sum.turn(half.norm()) + sum.round_off() / half.maxCoeff();
+    out.least_slope = std::max(sum.gradient.norm() * (1.0 - 1e-12) - out.turn, 0.0);
   }
   return out;
 }

@@ -4,15 +4,19 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <tuple>
 #include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
+#include "claim_bounds.h"
 #include "march_cases.h"
-#include "polygonise_lattice.h"
+#include "polygonise_blocks.h"
+#include "polygonise_junctions.h"
+#include "polygonise_roots.h"
 #include "supple/core/error.h"
-#include "supple/implicit/project.h"
 
 namespace supple::implicit {
 namespace {
@@ -48,38 +52,52 @@ struct HashNode {
 };
 using NodeSet = std::unordered_set<Node, HashNode>;
 
-/// A node of the finer lattice, and whether it is inside, that may belong to a piece.
+using lattice::Label;
+
+/// A node of the finer lattice that may belong to a piece.
 struct Seed {
   Node node;
-  bool inside;
+  Label label;
 };
 
-class Signs {
+class Labels {
  public:
-  Signs(const Field& field, const Lattice& fine) : field_(field), fine_(fine) {}
-  /// Whether nodes are inside; valid until the next call.
-  const std::vector<double>& operator()(std::span<const Node> nodes) {
+  Labels(std::span<const Claim> claims, const Lattice& fine) : claims_(claims), fine_(fine) {}
+  /// Whose the nodes are; valid until the next call. @param candidates  ascending
+  const std::vector<Label>& operator()(std::span<const Node> nodes, std::span<const std::uint32_t> candidates) {
     points_.clear();
     for (const Node& n : nodes) points_.push_back(lattice::node_position(fine_, n[0], n[1], n[2]));
-    values_.resize(points_.size());
-    field_.evaluate(points_, values_);
-    return values_;
+    labels_.assign(nodes.size(), 0);
+    best_.assign(nodes.size(), 0.0);
+    values_.resize(nodes.size());
+    for (const std::uint32_t body : candidates) {
+      claims_[body].evaluate(points_, values_);
+      for (std::size_t i = 0; i < values_.size(); ++i) {
+        if (!(values_[i] > best_[i])) continue;
+        best_[i] = values_[i];
+        labels_[i] = body + 1;
+      }
+    }
+    return labels_;
   }
 
  private:
-  const Field& field_;
+  std::span<const Claim> claims_;
   const Lattice& fine_;
   std::vector<Vec3> points_;
-  std::vector<double> values_;
+  std::vector<double> values_, best_;
+  std::vector<Label> labels_;
 };
 
-/// Looks for the extrema of F in a block of 8^3 cells. Cubes are measured in the smallest of them.
+/// Looks for the extrema in a block of 8^3 cells. Cubes are measured in the smallest of them.
 class BlockSearch {
  public:
-  BlockSearch(const Field& field, const Lattice& fine)
-      : field_(field), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, signs_(field, fine) {}
+  BlockSearch(std::span<const Claim> claims, const Lattice& fine)
+      : unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine) {}
 
-  void search(const lattice::BlockCoord& block, std::vector<Seed>& seeds, MissedPieces& counts) {
+  /// @param candidates  bodies that may have a part of the block
+  void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> candidates, std::vector<Seed>& seeds, MissedPieces& counts) {
+    candidates_ = candidates;
     seeds_ = &seeds;
     counts_ = &counts;
     constexpr int kEdge = lattice::kCells * kCell;
@@ -98,23 +116,21 @@ class BlockSearch {
         continue;
       }
       ++counts_->cubes;
-      const Interval value = field_.bound(box_of(half, edge / 2));
-      if (value.lower <= 0.0 && value.upper > 0.0) halve(half, edge / 2);
+      if (!bounds_.certain(box_of(half, edge / 2), candidates_)) halve(half, edge / 2);
     }
   }
 
   void search_cell(const Node& cell) {
     ++counts_->cubes;
-    const Field::BoxBounds bounds = field_.box_bounds(box_of(cell, kCell));
-    if (excludes(bounds)) return;
+    const Verdict verdict = bounds_(box_of(cell, kCell), candidates_);
+    if (verdict.certain || verdict.flat) return;
     std::array<Node, 8> corner;
     for (unsigned c = 0; c < 8; ++c) corner[c] = node_near(corner_of(cell, c, kCell));
-    const std::vector<double>& value = signs_(corner);
-    corners_ = 0;
-    for (unsigned c = 0; c < 8; ++c) corners_ |= (value[c] > 0.0 ? 1u : 0u) << c;
+    const std::vector<Label>& label = labels_(corner, candidates_);
+    std::copy(label.begin(), label.end(), corners_.begin());
     cell_ = corner[0];
-    left_ = bounds.second_order ? kMostCubes : kMostByValues;
-    undecided_ = !bounds.second_order && corners_ != 0 && corners_ != 255;
+    left_ = verdict.second_order ? kMostCubes : kMostByValues;
+    undecided_ = !verdict.second_order && std::any_of(corners_.begin(), corners_.end(), [&](Label l) { return l != corners_[0]; });
     if (!undecided_) search_parts(cell, kCell);
     counts_->undecided += undecided_ ? 1 : 0;
   }
@@ -127,10 +143,10 @@ class BlockSearch {
       }
       ++counts_->cubes;
       const Node part = corner_of(at, c, edge / 2);
-      const Field::BoxBounds bounds = field_.box_bounds(box_of(part, edge / 2));
-      if (bounds.least_slope > 0.0) continue;
-      if (bounds.value.lower > 0.0 || bounds.value.upper <= 0.0) {
-        look_at(part, edge / 2, bounds.value.lower > 0.0);
+      const Verdict verdict = bounds_(box_of(part, edge / 2), candidates_);
+      if (verdict.flat) continue;
+      if (verdict.certain) {
+        look_at(part, edge / 2, verdict.label);
       } else if (edge / 2 > 1) {
         search_parts(part, edge / 2);
       } else {
@@ -140,12 +156,12 @@ class BlockSearch {
     }
   }
 
-  /// A part of the cell where F keeps its sign: it belongs to a piece unless it hangs together with a node of the lattice.
-  void look_at(const Node& part, int edge, bool inside) {
+  /// A part of the cell that is all one label's: it belongs to a piece unless it hangs together with a node of the lattice.
+  void look_at(const Node& part, int edge, Label label) {
     if (edge == kCell / 2) return;  // has one of its own
     const Node node = node_near(edge > kUnits ? stepped(part, edge / 2, edge / 2, edge / 2) : part);
-    if (edge >= kUnits || (signs_({&node, 1})[0] > 0.0) == inside) {
-      add_unless_joined(node, inside);
+    if (edge >= kUnits || labels_({&node, 1}, candidates_)[0] == label) {
+      add_unless_joined(node, label);
     } else {
       look_around(part);
       undecided_ = true;
@@ -156,8 +172,8 @@ class BlockSearch {
   void look_around(const Node& part) {
     std::array<Node, 8> corner;
     for (unsigned k = 0; k < 8; ++k) corner[k] = corner_of({part[0] >> kShift, part[1] >> kShift, part[2] >> kShift}, k, 1);
-    const std::vector<double> value = signs_(corner);
-    for (unsigned k = 0; k < 8; ++k) add_unless_joined(corner[k], value[k] > 0.0);
+    const std::vector<Label> label = labels_(corner, candidates_);
+    for (unsigned k = 0; k < 8; ++k) add_unless_joined(corner[k], label[k]);
   }
 
   /// The node of the finer lattice that is nearest to one of the smallest cubes' corners.
@@ -166,10 +182,10 @@ class BlockSearch {
     return at;
   }
 
-  /// By straight ways along the axes to corners of the cell with the same sign.
-  void add_unless_joined(const Node& node, bool inside) {
+  /// By straight ways along the axes to corners of the cell with the same label.
+  void add_unless_joined(const Node& node, Label own) {
     for (unsigned c = 0; c < 8; ++c) {
-      if ((corners_ >> c & 1u) != (inside ? 1u : 0u)) continue;
+      if (corners_[c] != own) continue;
       const Node to = corner_of(cell_, c, kParts);
       way_.assign(1, node);
       for (std::size_t k = 0; k < 3; ++k) {
@@ -179,39 +195,39 @@ class BlockSearch {
           way_.push_back(next);
         }
       }
-      const std::vector<double>& value = signs_(way_);
-      if (std::all_of(value.begin(), value.end(), [&](double v) { return (v > 0.0) == inside; })) return;
+      const std::vector<Label>& label = labels_(way_, candidates_);
+      if (std::all_of(label.begin(), label.end(), [&](Label l) { return l == own; })) return;
     }
-    seeds_->push_back({node, inside});
+    seeds_->push_back({node, own});
   }
 
-  /// Neither a piece nor a part of one has its extremum there.
-  static bool excludes(const Field::BoxBounds& bounds) {
-    return bounds.value.lower > 0.0 || bounds.value.upper <= 0.0 || bounds.least_slope > 0.0;
-  }
   [[nodiscard]] Box box_of(const Node& at, int edge) const {
     return {lattice::node_position(unit_, at[0], at[1], at[2]), lattice::node_position(unit_, at[0] + edge, at[1] + edge, at[2] + edge)};
   }
 
-  const Field& field_;
   Lattice unit_;
-  Signs signs_;
+  CubeBounds bounds_;
+  Labels labels_;
+  std::span<const std::uint32_t> candidates_;
   std::vector<Seed>* seeds_ = nullptr;
   MissedPieces* counts_ = nullptr;
   Node cell_{};
-  unsigned corners_ = 0;  ///< of the cell that are inside
+  std::array<Label, 8> corners_{};  ///< of the cell
   int left_ = 0;
   bool undecided_ = false;
   std::vector<Node> way_;
 };
 
-enum class Flood { Closed, Joined, Known, TooLarge };
+enum class Flood { Closed, Joined, Known, Several, TooLarge };
 
-/// The nodes of one sign that hang together with a seed: those inside along edges, those outside across faces of cells too, as in
+/// The nodes of one label that hang together with a seed: those of a body along edges, those outside across faces of cells too, as in
 /// march_cases.h. Ends at a node of the coarse lattice or of another part.
-Flood flood(const Seed& seed, const NodeSet& known, Signs& signs, NodeSet& part) {
+/// @param beyond  the label around them; Several where there are more
+Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels, NodeSet& part, Label& beyond) {
   std::vector<Node> front{seed.node}, next;
   NodeSet other;
+  bool several = false;
+  beyond = seed.label;
   part.insert(seed.node);
   while (!front.empty()) {
     next.clear();
@@ -221,54 +237,96 @@ Flood flood(const Seed& seed, const NodeSet& known, Signs& signs, NodeSet& part)
       for (int step = 0; step < 27; ++step) {
         const int x = step % 3 - 1, y = step / 3 % 3 - 1, z = step / 9 - 1;
         const int far = std::abs(x) + std::abs(y) + std::abs(z);
-        if (far == 0 || far > (seed.inside ? 1 : 2)) continue;
+        if (far == 0 || far > (seed.label != 0 ? 1 : 2)) continue;
         const Node to = stepped(node, x, y, z);
         if (!part.contains(to) && other.insert(to).second) next.push_back(to);
       }
     }
-    const std::vector<double>& value = signs(next);
+    const std::vector<Label>& label = labels(next, bodies);
     front.clear();
     for (std::size_t i = 0; i < next.size(); ++i) {
-      if ((value[i] > 0.0) != seed.inside) continue;
+      if (label[i] != seed.label) {
+        several = several || (beyond != seed.label && beyond != label[i]);
+        beyond = label[i];
+        continue;
+      }
       other.erase(next[i]);
       part.insert(next[i]);
       front.push_back(next[i]);
     }
     if (part.size() > kMostNodes) return Flood::TooLarge;
   }
-  return Flood::Closed;
+  return several ? Flood::Several : Flood::Closed;
 }
 
-/// Marching cubes around the nodes of one piece.
-void add_piece(const Field& field, const Lattice& fine, const NodeSet& part, bool inside, Mesh& mesh) {
+/// The crossed edges around one piece, as they are asked for, and the roots of its claim's difference to that around it.
+class PieceVertices {
+ public:
+  PieceVertices(const Lattice& fine, const FieldView& plus, const FieldView& minus) : fine_(fine), plus_(plus), minus_(minus) {}
+
+  std::uint32_t number(const Node& base, std::size_t axis) {
+    const auto [at, is_new] = number_[axis].try_emplace(base, static_cast<std::uint32_t>(edge_.size()));
+    if (is_new) edge_.emplace_back(base, axis);
+    return at->second;
+  }
+  void solve() {
+    std::vector<Vec3> ends;
+    for (const auto& [base, axis] : edge_) {
+      Node end = base;
+      ++end[axis];
+      for (const Node& n : {base, end}) ends.push_back(lattice::node_position(fine_, n[0], n[1], n[2]));
+    }
+    std::vector<double> value(ends.size()), less(ends.size());
+    plus_.evaluate(ends, value);
+    if (minus_) minus_.evaluate(ends, less);
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    double scale = 0.0;
+    for (std::size_t i = 0; i < ends.size(); i += 2) {
+      const double low = value[i] - less[i], high = value[i + 1] - less[i + 1];
+      scale = std::max({scale, std::abs(value[i]), std::abs(less[i]), std::abs(value[i + 1]), std::abs(less[i + 1])});
+      roots_.add(ends[i], ends[i + 1], low, high, lattice::guess_root(kNone, low, high, kNone));
+    }
+    roots_.solve(plus_, minus_, scale);
+  }
+  [[nodiscard]] std::size_t size() const { return edge_.size(); }
+  [[nodiscard]] Vec3 point(std::size_t i) const {
+    const auto& [base, axis] = edge_[i];
+    const auto k = static_cast<Eigen::Index>(axis);
+    const double low = lattice::node_position(fine_, base[0], base[1], base[2])[k];
+    Vec3 p = roots_.point(i);
+    p[k] = std::clamp(p[k], low + kLeast * fine_.cell, low + (1.0 - kLeast) * fine_.cell);
+    return p;
+  }
+  /// From `plus` to `minus`.
+  [[nodiscard]] Vec3 normal(std::size_t i, const Vec3& fallback) const {
+    const double slope = roots_.gradient(i).norm();
+    return slope > 0.0 ? Vec3(-roots_.gradient(i) / slope) : fallback;
+  }
+  [[nodiscard]] const std::pair<Node, std::size_t>& edge(std::size_t i) const { return edge_[i]; }
+
+ private:
+  const Lattice& fine_;
+  FieldView plus_, minus_;
+  std::array<std::unordered_map<Node, std::uint32_t, HashNode>, 3> number_;  // by axis
+  std::vector<std::pair<Node, std::size_t>> edge_;
+  lattice::EdgeRoots roots_;
+};
+
+/// Marching cubes around the nodes of one piece, for the bodies on both sides of it.
+void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet& part, Label own, Label beyond, std::span<Mesh> meshes) {
   std::vector<Node> cells;
   for (const Node& node : part) {
     for (unsigned c = 0; c < 8; ++c) cells.push_back(corner_of(node, c, -1));
   }
   std::sort(cells.begin(), cells.end(), before);
   cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
-  std::array<std::unordered_map<Node, std::uint32_t, HashNode>, 3> number;  // of vertices, by axis
-  const auto vertex = [&](const Node& base, std::size_t axis) {
-    const auto [at, is_new] = number[axis].try_emplace(base, static_cast<std::uint32_t>(mesh.vertex_count()));
-    if (!is_new) return at->second;
-    Node end = base;
-    ++end[axis];
-    const Vec3 a = lattice::node_position(fine, base[0], base[1], base[2]), b = lattice::node_position(fine, end[0], end[1], end[2]);
-    const auto k = static_cast<Eigen::Index>(axis);
-    Vec3 point = root_on_segment(field, a, b);
-    point[k] = std::clamp(point[k], a[k] + kLeast * fine.cell, b[k] - kLeast * fine.cell);
-    std::array<double, 1> value{};
-    std::array<Vec3, 1> gradient;
-    field.evaluate({&point, 1}, value, gradient);
-    const double slope = gradient[0].norm();
-    const bool outwards = part.contains(base) == inside;
-    mesh.position.push_back(point);
-    mesh.normal.push_back(slope > 0.0 ? Vec3(-gradient[0] / slope) : Vec3((outwards ? 1.0 : -1.0) * Vec3::Unit(k)));
-    return at->second;
-  };
+  const bool body = own != 0;  // or a cavity in one
+  const Label inner = body ? own : beyond, outer = body ? beyond : 0;
+  PieceVertices vertices(fine, claims[inner - 1], outer != 0 ? FieldView(claims[outer - 1]) : FieldView());
+  std::vector<std::array<std::uint32_t, 3>> triangles;
   for (const Node& cell : cells) {
     unsigned corners = 0;
-    for (unsigned c = 0; c < 8; ++c) corners |= (part.contains(corner_of(cell, c, 1)) == inside ? 1u : 0u) << c;
+    for (unsigned c = 0; c < 8; ++c) corners |= (part.contains(corner_of(cell, c, 1)) == body ? 1u : 0u) << c;
     const march::CellLoops& loops = march::kCellLoops[corners];
     for (std::size_t l = 0; l < loops.loops; ++l) {
       const march::Loop& loop = loops.loop[l];
@@ -276,42 +334,88 @@ void add_piece(const Field& field, const Lattice& fine, const NodeSet& part, boo
       const auto apex = static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(loop.apices)));
       for (std::size_t k = 0; k < loop.size; ++k) {
         const march::CellEdge edge = march::kCellEdge[loop.edge[(apex + k) % loop.size]];
-        ring[k] = vertex(corner_of(cell, edge.corner, 1), edge.axis);
+        ring[k] = vertices.number(corner_of(cell, edge.corner, 1), edge.axis);
       }
-      for (std::size_t k = 2; k < loop.size; ++k) mesh.triangle.push_back({ring[0], ring[k - 1], ring[k]});
+      for (std::size_t k = 2; k < loop.size; ++k) triangles.push_back({ring[0], ring[k - 1], ring[k]});
     }
   }
+  vertices.solve();
+  const auto add_to = [&](Mesh& mesh, bool outwards, Label contact) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertex_count());
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      const auto& [base, axis] = vertices.edge(i);
+      const double along = part.contains(base) == body ? 1.0 : -1.0;
+      const Vec3 normal = vertices.normal(i, along * Vec3::Unit(static_cast<Eigen::Index>(axis)));
+      mesh.position.push_back(vertices.point(i));
+      mesh.normal.push_back(outwards ? normal : Vec3(-normal));
+      for (auto& column : mesh.columns) column.values.push_back(static_cast<double>(contact));
+    }
+    for (const auto& t : triangles) {
+      mesh.triangle.push_back(outwards ? std::array{first + t[0], first + t[1], first + t[2]} : std::array{first + t[0], first + t[2], first + t[1]});
+    }
+  };
+  add_to(meshes[inner - 1], true, outer);
+  if (outer != 0) add_to(meshes[outer - 1], false, inner);
+}
+
+MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor, std::span<Mesh> meshes) {
+  const Lattice fine{.origin = lattice.origin, .cell = lattice.cell / kParts};
+  std::vector<Claim> claims;
+  std::vector<FieldView> views;
+  std::vector<Box> surface;
+  for (const SearchedBody& body : bodies) claims.emplace_back(body);
+  for (const Claim& claim : claims) {
+    views.emplace_back(claim);
+    surface.push_back(claim.surface_box());
+  }
+  PolygoniseCounts blocks_looked_at;
+  const lattice::BlockList blocks = lattice::find_label_blocks(views, surface, lattice, executor, lattice::kBlockLimit, blocks_looked_at);
+  std::vector<std::vector<Seed>> seeds(blocks.block.size());
+  std::vector<MissedPieces> counts(blocks.block.size());
+  executor.for_blocks(blocks.block.size(), 1, [&](std::size_t begin, std::size_t end) {
+    BlockSearch search(claims, fine);
+    for (std::size_t b = begin; b < end; ++b) {
+      search.search(blocks.block[b], std::span(blocks.candidate).subspan(blocks.offset[b], blocks.offset[b + 1] - blocks.offset[b]),
+                    seeds[b], counts[b]);
+    }
+  });
+  std::vector<std::uint32_t> all(bodies.size());
+  std::iota(all.begin(), all.end(), 0u);
+  MissedPieces found;
+  Labels labels(claims, fine);
+  NodeSet known;  // of parts that were looked at
+  for (std::size_t b = 0; b < blocks.block.size(); ++b) {
+    found.undecided += counts[b].undecided;
+    found.cubes += counts[b].cubes;
+    for (const Seed& seed : seeds[b]) {
+      NodeSet part;
+      Label beyond = 0;
+      const Flood end = flood(seed, known, all, labels, part, beyond);
+      if (end == Flood::Closed) add_piece(claims, fine, part, seed.label, beyond, meshes);
+      found.pieces += end == Flood::Closed ? 1 : 0;
+      found.joined += end == Flood::Joined ? 1 : 0;
+      found.undecided += end == Flood::TooLarge || end == Flood::Several ? 1 : 0;
+      known.merge(part);
+    }
+  }
+  return found;
 }
 
 }  // namespace
 
 MissedPieces add_missed_pieces(const Field& field, const Lattice& lattice, const Executor& executor, Mesh& mesh) {
   SUPPLE_EXPECTS(mesh.columns.empty());
-  const Lattice fine{.origin = lattice.origin, .cell = lattice.cell / kParts};
-  const auto blocks = find_surface_blocks(field, lattice, executor);
-  std::vector<std::vector<Seed>> seeds(blocks.size());
-  std::vector<MissedPieces> counts(blocks.size());
-  executor.for_blocks(blocks.size(), 1, [&](std::size_t begin, std::size_t end) {
-    BlockSearch search(field, fine);
-    for (std::size_t b = begin; b < end; ++b) search.search(blocks[b], seeds[b], counts[b]);
-  });
-  MissedPieces found;
-  Signs signs(field, fine);
-  NodeSet known;  // of parts that were looked at
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    found.undecided += counts[b].undecided;
-    found.cubes += counts[b].cubes;
-    for (const Seed& seed : seeds[b]) {
-      NodeSet part;
-      const Flood end = flood(seed, known, signs, part);
-      if (end == Flood::Closed) add_piece(field, fine, part, seed.inside, mesh);
-      found.pieces += end == Flood::Closed ? 1 : 0;
-      found.joined += end == Flood::Joined ? 1 : 0;
-      found.undecided += end == Flood::TooLarge ? 1 : 0;
-      known.merge(part);
-    }
+  const SearchedBody body{.field = &field};
+  return add_missed({&body, 1}, lattice, executor, {&mesh, 1});
+}
+
+MissedPieces add_missed_pieces(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor,
+                               std::span<Mesh> meshes) {
+  SUPPLE_EXPECTS(meshes.size() == bodies.size());
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    SUPPLE_EXPECTS(bodies[m].weight > 0.0 && meshes[m].columns.size() == 1 && meshes[m].columns[0].name == "contact");
   }
-  return found;
+  return add_missed(bodies, lattice, executor, meshes);
 }
 
 }  // namespace supple::implicit

@@ -251,6 +251,7 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
   }
   const BlockList list = find_label_blocks(fields, surface, lattice, executor, kBlockLimit, count);
   count.blocks_visited = list.block.size();
+  count.cell = lattice.cell;
 
   std::vector<PartitionVertices> parts((list.block.size() + kBlocksPerTask - 1) / kBlocksPerTask);
   executor.for_blocks(list.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {

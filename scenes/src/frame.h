@@ -34,7 +34,7 @@ struct LedSolid {
 /// What searches between the nodes of lattices found, of meshes of bodies.
 struct SearchCounts {
   implicit::MissedPieces found;
-  std::uint64_t unsearched = 0;  ///< meshes of bodies that touch others
+  std::uint64_t unsearched = 0;  ///< meshes of bodies that bulge around others
   void add(const SearchCounts& other) {
     found.pieces += other.found.pieces;
     found.undecided += other.found.undecided;

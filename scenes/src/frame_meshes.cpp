@@ -93,9 +93,22 @@ Error with_keys_of(const Error& failure, const ObjectModel* cell, const ObjectMo
 /// Bodies in mirror image of each other meet in planes of a lattice about the origin, where triangles have no area. [cells]
 const Vec3 kOffPlanes(0.382, 0.236, 0.447);
 
+/// Adds what the lattice misses of bodies that touch; bulges are no part of their fields.
+SearchCounts search_between(const StageContext& context, const Division& division, const DivisionGroup& group, const Frame& frame,
+                            const implicit::Lattice& lattice, std::span<Mesh> meshes) {
+  const collision::BulgeSettings& bulge = context.model.bulge;
+  if (bulge.attenuation > 0.0 || bulge.keep_volume) return {.found = {}, .unsearched = meshes.size()};
+  std::vector<implicit::SearchedBody> bodies;
+  for (const std::size_t k : group.member) {
+    const std::uint32_t i = division.body[k];
+    bodies.push_back({&frame.field[i], division.placed[i].material.modulus});
+  }
+  return {.found = implicit::add_missed_pieces(bodies, lattice, context.executor, meshes)};
+}
+
 /// The surfaces of bodies that touch, by body. They are divided together, those that share a lattice; the ground divides
 /// nothing, it is flat and opaque. Pieces of one object are divided where they still overlap.
-void mesh_divided(const StageContext& context, const Division& division, StageProfile& profile, std::vector<Mesh>& surfaces) {
+void mesh_divided(const StageContext& context, const Division& division, StageProfile& profile, Frame& frame, std::vector<Mesh>& surfaces) {
   for (const DivisionGroup& group : groups_of(context.model, context.bodies, division)) {
     std::vector<implicit::FieldView> views;
     for (const std::size_t k : group.member) views.emplace_back(division.claim[k]);
@@ -103,7 +116,11 @@ void mesh_divided(const StageContext& context, const Division& division, StagePr
     try {
       const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
       const double cell = group.finest->cell;
-      std::vector<Mesh> parts = divide(context.model.meshing, error, views, {.origin = cell * kOffPlanes, .cell = cell}, context.executor, counts);
+      const Vec3 origin = cell * kOffPlanes;
+      std::vector<Mesh> parts = divide(context.model.meshing, error, views, {.origin = origin, .cell = cell}, context.executor, counts);
+      if (context.model.meshing.search) {
+        frame.missed.add(search_between(context, division, group, frame, {.origin = origin, .cell = counts.cell}, parts));
+      }
       for (std::size_t k = 0; k < parts.size(); ++k) surfaces[division.body[group.member[k]]] = std::move(parts[k]);
     } catch (const Error& failure) {
       throw with_keys_of(failure, group.finest, group.strictest);
@@ -197,8 +214,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   std::vector<Mesh> surfaces(bodies.size());
   frame.missed = {};
   const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
-  mesh_divided(context, division, profile, surfaces);
-  if (model.meshing.search) frame.missed.unsearched = division.body.size();
+  mesh_divided(context, division, profile, frame, surfaces);
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {

@@ -109,7 +109,7 @@ void set_missed(const SearchCounts& all, std::vector<std::string>& warnings) {
   std::erase_if(warnings, [&](const std::string& warning) { return warning.starts_with(key); });
   warnings.push_back(key + "pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: " +
                      std::to_string(all.found.pieces) + "; cells where one may be missed: " + std::to_string(all.found.undecided) +
-                     "; meshes of bodies that touch others, which are not searched: " + std::to_string(all.unsearched));
+                     "; meshes of bodies that bulge, which are not searched: " + std::to_string(all.unsearched));
 }
 
 }  // namespace supple::scenes

@@ -67,11 +67,29 @@ TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodes) {
   ASSERT_EQ(searched.warnings().size(), 1u);
   EXPECT_EQ(searched.warnings()[0],
             "output.meshing.search: pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: 1; "
-            "cells where one may be missed: 0; meshes of bodies that touch others, which are not searched: 0");
-  Simulation touching = make("search: true", kTouching);
-  (void)touching.meshes();
-  ASSERT_EQ(touching.warnings().size(), 1u);
-  EXPECT_NE(touching.warnings()[0].find("are not searched: 2"), std::string::npos) << touching.warnings()[0];
+            "cells where one may be missed: 0; meshes of bodies that bulge, which are not searched: 0");
+}
+
+TEST(ObjectMeshing, SearchFindsACoinInAHouse) {
+  // Stiff, smaller than a cell, and wholly inside: no node of the lattice is the coin's.
+  const auto text_of = [](const std::string& search, const std::string& contact) {
+    std::string text = scene_of("", ", cell: 0.4, meshing: {" + search + '}', "[0.35, 0.3, 0.38]");
+    text.replace(text.find("{modulus: 1e4}"), 14, "{modulus: 1e6}");
+    return text.replace(text.find("duration"), 0, contact);
+  };
+  const auto make = [&](const std::string& search, const std::string& contact = "") {
+    return Simulation(parse_scene(text_of(search, contact), "test.yaml", "."));
+  };
+  Simulation plain = make(""), searched = make("search: true"), bulging = make("search: true", "contact: {bulge: 0.4}\n");
+  const std::vector<Mesh> without = plain.meshes(), with = searched.meshes();
+  EXPECT_EQ(without[0].triangle_count(), 0u);
+  ASSERT_GT(with[0].triangle_count(), 100u);
+  EXPECT_EQ(with[1].triangle_count(), without[1].triangle_count() + with[0].triangle_count());
+  EXPECT_TRUE(same(with[2], without[2]));
+  ASSERT_FALSE(searched.warnings().empty());
+  EXPECT_NE(searched.warnings().back().find("all frames: 1; cells where one may be missed: 0;"), std::string::npos) << searched.warnings().back();
+  (void)bulging.meshes();
+  EXPECT_NE(bulging.warnings().back().find("are not searched: 2"), std::string::npos) << bulging.warnings().back();
 }
 
 TEST(ObjectMeshing, ErrorIsOfTheObjectOrOfAllThatTouchIt) {

@@ -1,7 +1,9 @@
 /// @file supple/implicit/missed_pieces.h
-/// What a lattice misses of a surface: closed pieces around no node, cavities in the body and islands beside it that lie between
-/// the nodes. Inside each F has an extremum; so cubes are halved until bounds show that F keeps its sign on them or its gradient
-/// does not vanish, and what is left has pieces nearby or remains undecided.
+/// What a lattice misses of surfaces: closed pieces around no node, cavities in a body and islands beside it or in another body that
+/// lie between the nodes. Space belongs to the largest of the bodies' claims and 0 (outside); where a piece is, the difference of its claim and the
+/// next has an extremum. So cubes are halved until bounds show who has all of a cube, or that no such difference has an extremum in it: for a single
+/// body that its gradient does not vanish, for several that there is a direction along which the claim of each label that is possible
+/// rises more than all others. What is left has pieces nearby or remains undecided.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +19,7 @@ inline constexpr int kSearchParts = 16;
 struct MissedPieces {
   std::uint64_t pieces = 0;     ///< found and added
   std::uint64_t joined = 0;     ///< parts that hang together with what has nodes, by a way that the lattice does not resolve
-  std::uint64_t undecided = 0;  ///< cells where a piece may be that was not found
+  std::uint64_t undecided = 0;  ///< cells where a piece may be that was not found, and pieces that were not made
   std::uint64_t cubes = 0;      ///< whose bounds were looked at
   [[nodiscard]] bool complete() const noexcept { return undecided == 0; }
 };
@@ -29,5 +31,17 @@ struct MissedPieces {
 /// (Field::box_bounds) all cells that the surface passes count there. The result does not depend on the number of threads. Nodes
 /// have the signs of F in double precision. @throws Error{Limit} when the lattice has too many blocks, see find_surface_blocks.
 MissedPieces add_missed_pieces(const Field& field, const Lattice& lattice, const Executor& executor, Mesh& mesh);
+
+/// A body that divides space with others: it claims weight * F, and has what it claims most, above 0.
+struct SearchedBody {
+  const Field* field = nullptr;
+  double weight = 1.0;  ///< > 0
+};
+
+/// The same for meshes of polygonise_partition, by body: a piece between two bodies is added to both, with the same points. Pieces
+/// that meet two others or more are not made, nor are cells decided where a body with a blend (BlendRule) may meet another: they count as
+/// undecided.
+MissedPieces add_missed_pieces(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor,
+                               std::span<Mesh> meshes);
 
 }  // namespace supple::implicit

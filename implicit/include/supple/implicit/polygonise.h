@@ -26,6 +26,7 @@ struct PolygoniseCounts {
   std::uint64_t blocks_visited = 0;   ///< blocks evaluated
   std::uint64_t blocks_present = 0;   ///< blocks of the lattice inside the surface boxes
   std::uint64_t nodes = 0;            ///< field values taken
+  double cell = 0.0;                  ///< edge of the lattice's cells [m]
   double residual = 0.0;              ///< largest |F| at a vertex, |F_a - F_b| where two bodies touch
   std::uint64_t junctions = 0;        ///< points where three or more of bodies and outside meet
   std::uint64_t junctions_moved = 0;  ///< of these, not exact: the exact point lies beyond its simplex of the lattice

@@ -1,0 +1,81 @@
+#include "claim_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "shortest_in_hull.h"
+
+namespace supple::implicit {
+
+Claim::Claim(const SearchedBody& body) : field_(body.field), weight_(body.weight) {
+  const double bound = gradient_bound(surface_box());
+  if (bound > 0.0 && std::isfinite(bound)) steepness_ = bound;
+}
+
+GradientBounds Claim::bound_gradient(const Box& box) const {
+  GradientBounds bounds = bounds_with_gradient(*field_, box);
+  bounds.value = scaled(bounds.value);
+  bounds.least_slope *= weight_;
+  bounds.gradient *= weight_;
+  bounds.turn *= weight_;
+  return bounds;
+}
+
+bool CubeBounds::certain(const Box& box, std::span<const std::uint32_t> candidates) {
+  entry_.assign(1, outside());
+  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1, .bounds = {{.value = claims_[body].bound(box)}}});
+  return judge().certain;
+}
+
+Verdict CubeBounds::operator()(const Box& box, std::span<const std::uint32_t> candidates) {
+  entry_.assign(1, outside());
+  for (const std::uint32_t body : candidates) {
+    entry_.push_back({.label = body + 1, .steepness = claims_[body].steepness(), .bounds = claims_[body].bound_gradient(box)});
+  }
+  Verdict verdict = judge();
+  verdict.flat = std::all_of(entry_.begin(), entry_.end(), [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e); });
+  return verdict;
+}
+
+Verdict CubeBounds::judge() {
+  most_ = 0.0;
+  for (const Entry& e : entry_) most_ = std::max(most_, e.bounds.value.lower);
+  Verdict verdict;
+  int possible = 0;
+  for (const Entry& e : entry_) {
+    if (e.bounds.value.upper < most_ || (e.label != 0 && !(e.bounds.value.upper > 0.0))) continue;
+    ++possible;
+    verdict.label = e.label;
+    verdict.second_order = verdict.second_order && e.bounds.second_order;
+  }
+  verdict.certain = possible == 1;
+  return verdict;
+}
+
+bool CubeBounds::rises(const Entry& own) {
+  lead_.clear();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Entry& e : entry_) {
+    if (e.label == own.label) continue;
+    const double scale = 1.0 / (own.steepness + e.steepness);
+    const Interval &a = own.bounds.value, &b = e.bounds.value;
+    lead_.push_back({&e, {scale * (a.lower - b.upper), scale * (a.upper - b.lower)}});
+    least = std::min(least, lead_.back().value.upper);
+  }
+  std::erase_if(lead_, [&](const Lead& l) { return l.value.lower > least; });
+  // Of one claim alone more is known.
+  if (lead_.size() == 1 && (own.label == 0 || lead_[0].other->label == 0)) {
+    return (own.label != 0 ? own : *lead_[0].other).bounds.least_slope > 0.0;
+  }
+  over_.clear();
+  for (const Lead& l : lead_) over_.push_back(own.bounds.gradient - l.other->bounds.gradient);
+  const Vec3 along = shortest_in_hull(over_);
+  const double length = (1.0 + 1e-12) * along.norm();
+  for (std::size_t k = 0; k < lead_.size(); ++k) {
+    if (!(over_[k].dot(along) > (own.bounds.turn + lead_[k].other->bounds.turn) * length)) return false;
+  }
+  return true;
+}
+
+}  // namespace supple::implicit

@@ -1,0 +1,86 @@
+/// @file claim_bounds.h
+/// Bodies that divide space, and what bounds tell of who has a cube. Label 0 is outside, m + 1 is body m.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "field_box_bounds.h"
+#include "polygonise_junctions.h"
+#include "supple/implicit/missed_pieces.h"
+
+namespace supple::implicit {
+
+using lattice::Label;
+
+/// weight * F.
+class Claim {
+ public:
+  explicit Claim(const SearchedBody& body);
+  /// About how much it changes over a length near its surface, > 0.
+  [[nodiscard]] double steepness() const { return steepness_; }
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const {
+    field_->evaluate(points, values);
+    for (double& v : values) v *= weight_;
+  }
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+    field_->evaluate(points, values, gradients);
+    for (double& v : values) v *= weight_;
+    for (Vec3& g : gradients) g *= weight_;
+  }
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { field_->evaluate_parts(points, parts); }
+  [[nodiscard]] Interval bound(const Box& box) const { return scaled(field_->bound(box)); }
+  [[nodiscard]] double gradient_bound(const Box& box) const { return weight_ * field_->gradient_bound(box); }
+  [[nodiscard]] Box surface_box() const { return field_->surface_box(); }
+  [[nodiscard]] double feature_size() const { return field_->feature_size(); }
+  [[nodiscard]] GradientBounds bound_gradient(const Box& box) const;
+
+ private:
+  [[nodiscard]] Interval scaled(const Interval& value) const { return {weight_ * value.lower, weight_ * value.upper}; }
+  const Field* field_;
+  double weight_, steepness_ = 1.0;
+};
+
+/// What bounds tell of a cube.
+struct Verdict {
+  bool certain = false;  ///< all of it is `label`'s
+  Label label = 0;
+  bool flat = false;     ///< no claim's difference to the next has an extremum there
+  bool second_order = true;
+};
+
+/// Takes the bounds of the claims on cubes; outside claims 0.
+class CubeBounds {
+ public:
+  explicit CubeBounds(std::span<const Claim> claims) : claims_(claims) {}
+
+  /// By bounds of first order alone.
+  [[nodiscard]] bool certain(const Box& box, std::span<const std::uint32_t> candidates);
+  [[nodiscard]] Verdict operator()(const Box& box, std::span<const std::uint32_t> candidates);
+
+ private:
+  struct Entry {
+    Label label = 0;
+    double steepness = 0.0;
+    GradientBounds bounds;
+  };
+  /// How far a claim is ahead of another one.
+  struct Lead {
+    const Entry* other;
+    Interval value;  ///< [m], to first order
+  };
+  [[nodiscard]] static Entry outside() { return {.bounds = {{.second_order = true}, Vec3::Zero(), 0.0}}; }
+
+  [[nodiscard]] Verdict judge();
+  /// Whether there is a direction along which all leads rise that may be the least of a claim. They are divided by how steep their
+  /// claims are, so that in most cubes on an interface no lead over a third competes.
+  [[nodiscard]] bool rises(const Entry& own);
+
+  std::span<const Claim> claims_;
+  std::vector<Entry> entry_;
+  std::vector<Lead> lead_;
+  std::vector<Vec3> over_;
+  double most_ = 0.0;  ///< that the largest claim is everywhere
+};
+
+}  // namespace supple::implicit
