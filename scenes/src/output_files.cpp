@@ -87,7 +87,7 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
       if (file.ends_with(end)) fs::remove(entry.path(), ignored);
     }
   }
-  fs::remove(folder / "result.json", ignored);
+  for (const char* report : {"result.json", "render.json", "export.json"}) fs::remove(folder / report, ignored);
 }
 
 void write_grid_file(const fs::path& folder, const std::string& name, int frame, Simulation& simulation,

@@ -71,6 +71,24 @@ std::optional<int> last_saved_frame(const fs::path& folder, const std::string& n
   return std::nullopt;
 }
 
+/// A run is continued in its own folder only. @throws Error{Io} where there are states and none is of this name
+void check_continues(const fs::path& folder, const std::string& name) {
+  std::string other;
+  for (const auto& entry : fs::directory_iterator(folder / "states")) {
+    const std::string file = entry.path().filename().string();
+    if (!file.ends_with(".state")) continue;
+    const std::string owner = entry.path().stem().stem().string();  // NAME.0001.state
+    if (owner == name) return;
+    if (other.empty() || owner < other) other = owner;
+  }
+  if (other.empty()) return;
+  throw Error(ErrorKind::Io, Fault{.place = (folder / "states").string(),
+                                   .key = {},
+                                   .expected = "expected saved states of '" + name + "' to continue from",
+                                   .found = "those of '" + other + "'",
+                                   .hint = "resume the scene that was run here, or choose another --out"});
+}
+
 OutputRequest outputs_of(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = requested_outputs(scene);
   if (options.simulate_only) outputs.images = outputs.film = outputs.meshes = outputs.grids = outputs.samples = false;
@@ -329,6 +347,8 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
                                      .found = "a result.json",
                                      .hint = "use --overwrite to replace it, --resume to continue, or another --out"});
   }
+
+  if (options.resume) check_continues(options.folder, name);
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {

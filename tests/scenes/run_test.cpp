@@ -135,6 +135,29 @@ TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
   EXPECT_EQ(run_scene(scene_, o).outcome, "done");
 }
 
+TEST_F(Run, DoesNotResumeInTheFolderOfAnotherScene) {
+  RunOptions o = options();
+  o.simulate_only = true;
+  ASSERT_EQ(run_scene(scene_, o).outcome, "done");
+  const std::vector<std::byte> before = io::read_file(folder_ / "result.json", std::size_t{1} << 24);
+  Scene other = scene_;
+  other.source = "drops.again.yaml";  // begins alike
+  o.resume = true;
+  try {
+    (void)run_scene(other, o);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::Io);
+    EXPECT_NE(std::string(error.what()).find("expected saved states of 'drops.again' to continue from, found those of 'drops'"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(io::read_file(folder_ / "result.json", std::size_t{1} << 24), before);
+  EXPECT_FALSE(fs::exists(folder_ / "states/drops.again.0001.state"));
+
+  o.folder = folder_ / "fresh";  // where nothing was run a run begins
+  EXPECT_EQ(run_scene(other, o).outcome, "done");
+}
+
 TEST_F(Run, StopsAtASignalAndResumesToTheSameBits) {
   RunOptions o = options();
   o.simulate_only = true;
