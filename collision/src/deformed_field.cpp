@@ -432,4 +432,46 @@ double DeformedField::gradient_bound(const Box& box) const {
 Box DeformedField::surface_box() const { return own_.surface_box(); }
 double DeformedField::feature_size() const { return own_.feature_size(); }
 
+void DeformedDepth::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+  std::vector<Vec3> gradients(points.size());
+  evaluate(points, values, gradients);
+}
+
+void DeformedDepth::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+  const std::size_t n = points.size();
+  std::vector<double> own(n), other(n);
+  std::vector<Vec3> slope(n), other_slope(n);
+  own_.evaluate(points, own, slope);
+  std::fill(values.begin(), values.end(), kInfinity);
+  std::fill(gradients.begin(), gradients.end(), Vec3::Zero());
+  const auto take = [&](std::size_t i, double value, const Vec3& gradient) {
+    const double steepness = gradient.norm();
+    const double depth = value != 0.0 ? value / steepness : 0.0;
+    if (!(depth < values[i])) return;
+    values[i] = depth;
+    if (steepness > 0.0) gradients[i] = gradient / steepness;
+  };
+  for (std::size_t i = 0; i < n; ++i) take(i, own[i], slope[i]);
+  for (const ClaimField& claim : others_) {
+    claim.evaluate(points, other, other_slope);
+    for (std::size_t i = 0; i < n; ++i) take(i, own[i] - other[i], slope[i] - other_slope[i]);
+  }
+}
+
+Interval DeformedDepth::bound(const Box& box) const {
+  const Interval own = own_.bound(box);
+  const double own_slope = own_.gradient_bound(box);
+  Interval depth{kInfinity, kInfinity};
+  const auto take = [&depth](const Interval& value, double steepest) {
+    depth.lower = std::min(depth.lower, value.lower > 0.0 ? value.lower / steepest : -kInfinity);
+    if (value.upper < 0.0) depth.upper = std::min(depth.upper, value.upper / steepest);
+  };
+  take(own, own_slope);
+  for (const ClaimField& claim : others_) {
+    const Interval other = claim.bound(box);
+    take({own.lower - other.upper, own.upper - other.lower}, own_slope + claim.gradient_bound(box));
+  }
+  return depth;
+}
+
 }  // namespace supple::collision

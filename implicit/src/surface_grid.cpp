@@ -29,6 +29,7 @@ constexpr std::size_t kLeafVoxels = Leaf::SIZE;
 constexpr std::size_t kLeavesPerTask = 16;
 static_assert(Leaf::DIM == kCells, "a leaf holds the nodes that a block owns");
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr const char* kHashKey = "content_hash";
 
 Coord first_voxel(const BlockCoord& block) { return {kCells * block[0], kCells * block[1], kCells * block[2]}; }
@@ -441,6 +442,26 @@ const SurfaceGrid& GridUpdater::make(const Field& field, const GridOptions& opti
   self.usable = true;
   if (counts != nullptr) *counts = count;
   return self.result;
+}
+
+void DepthField::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+  std::vector<Vec3> gradients(points.size());
+  evaluate(points, values, gradients);
+}
+
+void DepthField::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+  field_.evaluate(points, values, gradients);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double slope = gradients[i].norm();
+    if (slope > 0.0) gradients[i] /= slope;
+    if (values[i] != 0.0) values[i] /= slope;
+  }
+}
+
+Interval DepthField::bound(const Box& box) const {
+  const Interval value = field_.bound(box);
+  const double steepest = field_.gradient_bound(box);
+  return {value.lower > 0.0 ? value.lower / steepest : -kInfinity, value.upper < 0.0 ? value.upper / steepest : kInfinity};
 }
 
 void UnitedField::evaluate(std::span<const Vec3> points, std::span<double> values) const {

@@ -93,40 +93,67 @@ Error with_keys_of(const Error& failure, const ObjectModel* cell, const ObjectMo
 /// Bodies in mirror image of each other meet in planes of a lattice about the origin, where triangles have no area. [cells]
 const Vec3 kOffPlanes(0.382, 0.236, 0.447);
 
-/// Adds what the lattice misses of bodies that touch; bulges are no part of their fields.
+/// Adds what the lattice misses of bodies that touch; bulges are no part of their fields, and what passes through another one is not
+/// searched.
 SearchCounts search_between(const StageContext& context, const Division& division, const DivisionGroup& group, const Frame& frame,
                             const implicit::Lattice& lattice, std::span<Mesh> meshes) {
   const collision::BulgeSettings& bulge = context.model.bulge;
-  if (bulge.attenuation > 0.0 || bulge.keep_volume) return {.found = {}, .unsearched = meshes.size()};
   std::vector<implicit::SearchedBody> bodies;
+  bool passes = false;
   for (const std::size_t k : group.member) {
     const std::uint32_t i = division.body[k];
     bodies.push_back({&frame.field[i], division.placed[i].material.modulus});
+    passes = passes || division.passes(k);
   }
+  if (bulge.attenuation > 0.0 || bulge.keep_volume || passes) return {.found = {}, .unsearched = meshes.size()};
   return {.found = implicit::add_missed_pieces(bodies, lattice, context.executor, meshes)};
+}
+
+/// The surfaces of some bodies of a group, in their order. @param lattice  whose cell becomes the one that was used
+std::vector<Mesh> divide_some(const StageContext& context, const Division& division, const DivisionGroup& group,
+                              std::span<const std::size_t> members, implicit::Lattice& lattice, StageProfile& profile) {
+  std::vector<implicit::FieldView> views;
+  for (const std::size_t k : members) views.emplace_back(division.claim[k]);
+  implicit::PolygoniseCounts counts;
+  const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
+  std::vector<Mesh> parts = divide(context.model.meshing, error, views, lattice, context.executor, counts);
+  lattice.cell = counts.cell;
+  profile.visited += counts.blocks_visited;
+  profile.present += counts.blocks_present;
+  return parts;
+}
+
+/// The surfaces of the bodies of a group: all at once, but for those that pass through another one.
+void mesh_group(const StageContext& context, const Division& division, const DivisionGroup& group, StageProfile& profile, Frame& frame,
+                std::vector<Mesh>& surfaces) {
+  const double cell = group.finest->cell;
+  const implicit::Lattice lattice{.origin = cell * kOffPlanes, .cell = cell};
+  implicit::Lattice used = lattice;
+  std::vector<Mesh> parts = divide_some(context, division, group, group.member, used, profile);
+  if (context.model.meshing.search) frame.missed.add(search_between(context, division, group, frame, used, parts));
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    const std::size_t k = group.member[n];
+    if (division.passes(k)) {
+      std::vector<std::size_t> members{k};
+      for (const std::size_t j : division.others_of(k)) {
+        if (std::binary_search(group.member.begin(), group.member.end(), j)) members.push_back(j);
+      }
+      implicit::Lattice own = lattice;
+      parts[n] = std::move(divide_some(context, division, group, members, own, profile).front());
+    }
+    surfaces[division.body[k]] = std::move(parts[n]);
+  }
 }
 
 /// The surfaces of bodies that touch, by body. They are divided together, those that share a lattice; the ground divides
 /// nothing, it is flat and opaque. Pieces of one object are divided where they still overlap.
 void mesh_divided(const StageContext& context, const Division& division, StageProfile& profile, Frame& frame, std::vector<Mesh>& surfaces) {
   for (const DivisionGroup& group : groups_of(context.model, context.bodies, division)) {
-    std::vector<implicit::FieldView> views;
-    for (const std::size_t k : group.member) views.emplace_back(division.claim[k]);
-    implicit::PolygoniseCounts counts;
     try {
-      const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
-      const double cell = group.finest->cell;
-      const Vec3 origin = cell * kOffPlanes;
-      std::vector<Mesh> parts = divide(context.model.meshing, error, views, {.origin = origin, .cell = cell}, context.executor, counts);
-      if (context.model.meshing.search) {
-        frame.missed.add(search_between(context, division, group, frame, {.origin = origin, .cell = counts.cell}, parts));
-      }
-      for (std::size_t k = 0; k < parts.size(); ++k) surfaces[division.body[group.member[k]]] = std::move(parts[k]);
+      mesh_group(context, division, group, profile, frame, surfaces);
     } catch (const Error& failure) {
       throw with_keys_of(failure, group.finest, group.strictest);
     }
-    profile.visited += counts.blocks_visited;
-    profile.present += counts.blocks_present;
   }
 }
 
@@ -176,6 +203,23 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, StageProfile& profil
   }
 }
 
+/// What must not touch may overlap, and divides nothing there.
+void find_strangers(const Model& model, const std::vector<Body>& bodies, Division& division) {
+  std::vector<std::vector<std::size_t>> stranger(division.body.size());
+  bool any = false;
+  for (std::size_t k = 0; k < stranger.size(); ++k) {
+    const std::uint32_t a = bodies[division.body[k]].object;
+    for (std::size_t j = k + 1; j < stranger.size(); ++j) {
+      const std::uint32_t b = bodies[division.body[j]].object;
+      if (a == b || model.rules.allowed(a, b) || !division.claim[k].surface_box().overlaps(division.claim[j].surface_box())) continue;
+      stranger[k].push_back(j);
+      stranger[j].push_back(k);
+      any = true;
+    }
+  }
+  if (any) division.stranger = std::move(stranger);
+}
+
 }  // namespace
 
 Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
@@ -202,7 +246,17 @@ Division division_of(const Model& model, const std::vector<Body>& bodies, std::s
   out.body.erase(std::unique(out.body.begin(), out.body.end()), out.body.end());
   out.claim.reserve(out.body.size());
   for (const std::uint32_t i : out.body) out.claim.emplace_back(out.placed, i, surface, model.bulge);
+  if (model.rules.allowed) find_strangers(model, bodies, out);
   return out;
+}
+
+std::vector<std::size_t> Division::others_of(std::size_t k) const {
+  std::vector<std::size_t> others;
+  for (std::size_t j = 0; j < claim.size(); ++j) {
+    if (j == k || !claim[j].surface_box().overlaps(claim[k].surface_box())) continue;
+    if (stranger.empty() || !std::binary_search(stranger[k].begin(), stranger[k].end(), j)) others.push_back(j);
+  }
+  return others;
 }
 
 std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,

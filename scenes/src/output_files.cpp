@@ -6,6 +6,7 @@
 #include <deque>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "frame.h"
@@ -25,15 +26,17 @@ constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
 constexpr int kSheetGap = 4;
 
-/// The field of a body that others divide. @param united  with its bulges, but what others claim is not taken off
-collision::DeformedField deformed_field(const Division& division, std::uint32_t body, bool united) {
-  const auto at = static_cast<std::size_t>(std::lower_bound(division.body.begin(), division.body.end(), body) - division.body.begin());
-  const collision::ClaimField& own = division.claim[at];
+/// The claim of a body that others divide, and those that may take of it.
+struct Claims {
+  collision::ClaimField own;
   std::vector<collision::ClaimField> others;
-  for (std::size_t k = 0; k < division.claim.size() && !united; ++k) {
-    if (k != at && division.claim[k].surface_box().overlaps(own.surface_box())) others.push_back(division.claim[k]);
-  }
-  return {own, std::move(others), division.placed[body].material.modulus};
+};
+
+Claims claims_of(const Division& division, std::uint32_t body) {
+  const auto at = static_cast<std::size_t>(std::lower_bound(division.body.begin(), division.body.end(), body) - division.body.begin());
+  Claims claims{division.claim[at], {}};
+  for (const std::size_t k : division.others_of(at)) claims.others.push_back(division.claim[k]);
+  return claims;
 }
 
 }  // namespace
@@ -103,28 +106,37 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   const Division division = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
   std::vector<const implicit::SurfaceGrid*> grids;
   std::deque<implicit::SurfaceGrid> deformed;  // of bodies that touch, which no updater knows
-  std::deque<collision::DeformedField> claims;
+  std::deque<collision::DeformedField> bulging;
+  std::deque<implicit::DepthField> depth;
   std::vector<implicit::FieldView> united;
+  const bool distance = options.content == implicit::GridContent::SignedDistance;
   updaters.resize(bodies.size());
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     options.name = bodies[i].name;
     options.lattice.cell = simulation.model().objects[bodies[i].object].cell;
     const bool apart = !std::binary_search(division.body.begin(), division.body.end(), i);
-    if (apart) {
-      united.emplace_back(fields[i]);
-    } else {
-      united.emplace_back(claims.emplace_back(deformed_field(division, i, true)));
+    const double modulus = division.placed[i].material.modulus;
+    std::optional<Claims> claims;
+    if (!apart) claims = claims_of(division, i);
+    if (gridding.of != GriddedName::Objects) {
+      // With its bulges, but without what others take: that is in the union.
+      const implicit::FieldView whole = apart ? implicit::FieldView(fields[i]) : bulging.emplace_back(claims->own, std::vector<collision::ClaimField>{}, modulus);
+      united.push_back(distance ? implicit::FieldView(depth.emplace_back(whole)) : whole);
     }
     if (gridding.of == GriddedName::Scene) continue;
     if (apart) {
       grids.push_back(&updaters[i].make(fields[i], options, executor));
+    } else if (distance) {
+      const collision::DeformedDepth deep(std::move(claims->own), std::move(claims->others));
+      grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(deep, options, executor)));
     } else {
-      grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(deformed_field(division, i, false), options, executor)));
+      const collision::DeformedField field(std::move(claims->own), std::move(claims->others), modulus);
+      grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(field, options, executor)));
     }
   }
   implicit::SurfaceGrid whole;
-  if (gridding.of != GriddedName::Objects && !united.empty()) {
+  if (!united.empty()) {
     options.name = "scene";
     options.lattice.cell = simulation.cell();
     whole = implicit::make_surface_grid(implicit::UnitedField(united), options, executor);

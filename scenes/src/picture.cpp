@@ -266,8 +266,7 @@ void ScenePictures::add_fields(Simulation& simulation) {
     }
     const auto k = static_cast<std::size_t>(at - division_.body.begin());
     Piece piece{.own = division_.claim[k], .scale = 1.0 / division_.placed[i].material.modulus, .others = {}};
-    for (std::size_t j = 0; j < division_.claim.size(); ++j)
-      if (j != k && division_.claim[j].surface_box().overlaps(division_.claim[k].surface_box())) piece.others.emplace_back(division_.claim[j]);
+    for (const std::size_t j : division_.others_of(k)) piece.others.emplace_back(division_.claim[j]);
     pieces[bodies[i].object].push_back(std::move(piece));
   }
   const std::vector<Mesh>& meshes = simulation.meshes();

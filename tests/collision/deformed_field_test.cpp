@@ -95,6 +95,46 @@ TEST(DeformedField, IsZeroOnTheContactSurfaceForBothBodies) {
   }
 }
 
+// Two balls of radius 1 whose pressures fall like distances meet in the plane x = 0; their undeformed surfaces end 0.3 beyond it.
+TEST(DeformedDepth, IsThatBehindTheContactSurfaceAlsoWhereTheOtherBodyClaimsNothing) {
+  const LinearSphere left{Vec3(-0.7, 0, 0), {}}, right{Vec3(0.7, 0, 0), {}};
+  Stage stage;
+  stage.add(left, {left.centre}, 1e4);
+  stage.add(right, {right.centre}, 1e4);
+  stage.solve({.error = 1e-4});
+  const auto claim = [&](std::uint32_t body) { return ClaimField(stage.bodies(), body, stage.surface, {.attenuation = 0.0}); };
+  const DeformedDepth depth(claim(0), {claim(1)});
+  const implicit::FieldView view(depth);
+  Vec3 slope;
+  for (const double x : {-0.6, -0.301, -0.299, -0.1, -1e-9, 1e-9, 0.1, 0.2}) {  // first order is exact on the axis
+    EXPECT_NEAR(view.value(Vec3(x, 0, 0), slope), -x, 1e-12);
+    EXPECT_NEAR((slope + Vec3::UnitX()).norm(), 0.0, 1e-12);
+  }
+  EXPECT_NEAR(view.value(Vec3(-0.9, 0, 0), slope), 0.8, 1e-12);
+  EXPECT_NEAR(view.value(Vec3(-2.0, 0, 0), slope), -0.3, 1e-12);
+  // Elsewhere the surface is a plane, a ball and their rim, whose true depth is none larger.
+  const std::vector<Vec3> points = random_points(3, 20000);
+  std::vector<double> value(points.size());
+  depth.evaluate(points, value);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double out = (points[i] - left.centre).norm() - 1.0, exact = -std::max(out, points[i].x());
+    if (std::abs(exact) > 0.15) continue;
+    ASSERT_EQ(value[i] > 0.0, exact > 0.0);
+    ASSERT_NEAR(value[i], exact, 0.5 * exact * exact + 1e-12) << points[i].transpose();
+  }
+  std::mt19937_64 engine(11);
+  const auto uniform = [&] { return static_cast<double>(engine() >> 11) * 0x1p-53; };
+  for (std::size_t k = 0; k < 200; ++k) {
+    const double half = std::ldexp(0.4, -static_cast<int>(6.0 * uniform()));
+    const Box box{points[k] - Vec3::Constant(half), points[k] + Vec3::Constant(half)};
+    const Interval bound = depth.bound(box);
+    for (int n = 0; n < 20; ++n) {
+      const double at = view.value(box.lower + 2.0 * half * Vec3(uniform(), uniform(), uniform()));
+      ASSERT_TRUE(bound.lower <= at && at <= bound.upper);
+    }
+  }
+}
+
 TEST(DeformedField, KeepsItsVolumeWhenAskedTo) {
   // Volume of {F >= 0} by midpoints of cells. The slopes of Wyvill kernels fall off beside the contact, where the bulge is,
   // so that it holds a quarter too much.

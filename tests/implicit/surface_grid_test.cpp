@@ -282,6 +282,27 @@ TEST(SurfaceGrid, OfUnitedBodiesHasTheDistanceToTheNearest) {
   }
 }
 
+// The field of the large ball falls off slowly: it is the larger one near the small ball, too.
+TEST(SurfaceGrid, OfUnitedDepthsHasTheDistanceToTheNearestWhateverTheKernels) {
+  const Body large = body_of({{wyvill_point(2.0), kOrigin}}), small = body_of({{wyvill_point(0.2), kOrigin + Vec3(1.05, 0, 0)}});
+  const DepthField depth_of_large(large.field), depth_of_small(small.field);
+  const UnitedField both({depth_of_large, depth_of_small});
+  const SurfaceGrid grid = make_surface_grid(both, options_of(GridContent::SignedDistance), Executor(1));
+  const SurfaceGrid one = make_surface_grid(large.field, options_of(GridContent::SignedDistance), Executor(1)),
+                    two = make_surface_grid(small.field, options_of(GridContent::SignedDistance), Executor(1));
+  int nearer_to_small = 0;
+  for (int k = -24; k < 24; ++k) {
+    for (int j = -24; j < 24; ++j) {
+      for (int i = -24; i < 36; ++i) {
+        const double a = one.value(i, j, k), b = two.value(i, j, k);
+        ASSERT_NEAR(grid.value(i, j, k), std::min(a, b), kFloatEps);
+        nearer_to_small += b < a ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(nearer_to_small, 20);
+}
+
 TEST(SurfaceGrid, BecomesAMeshNearTheSurfaceByOpenVdb) {
   const Body body = body_of({{wyvill_point(1.0), kOrigin}, {wyvill_point(0.8), kOrigin + Vec3(0.5, 0, 0)}});
   const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(1));

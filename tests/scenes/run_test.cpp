@@ -131,8 +131,10 @@ TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
     EXPECT_EQ(error.kind(), ErrorKind::Io);
     EXPECT_NE(std::string(error.what()).find("--overwrite"), std::string::npos);
   }
+  std::ofstream(folder_ / "export.json") << "{}";
   o.overwrite = true;
   EXPECT_EQ(run_scene(scene_, o).outcome, "done");
+  EXPECT_FALSE(fs::exists(folder_ / "export.json"));  // of what was replaced
 }
 
 TEST_F(Run, DoesNotResumeInTheFolderOfAnotherScene) {
@@ -519,6 +521,7 @@ TEST_F(Run, GridsOfBodiesThatTouchEndWhereTheyDo) {
     EXPECT_NEAR(right.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
     EXPECT_NEAR(left.interpolate(Vec3(-0.02, y, 0.0)), -0.02, 1e-3);
     EXPECT_NEAR(right.interpolate(Vec3(-0.02, y, 0.0)), 0.02, 1e-3);
+    EXPECT_NEAR(left.interpolate(Vec3(-0.04, y, 0.0)), -0.04, 2e-3);  // where the right drop claims nothing
     EXPECT_LT(both.interpolate(Vec3(0.0, y, 0.0)), -0.01);  // nothing parts their union
   }
 }

@@ -103,4 +103,25 @@ class DeformedField {
   double modulus_;
 };
 
+/// How deep a point lies in the body with its contacts, to first order [m]: the least of p^ / |grad p^| of its own claim and
+/// of (p^ - p^_j) / |grad (p^ - p^_j)| against every other's. Unlike F~ / |grad F~| it knows the contact surface also where the
+/// other claims nothing, and is no deeper there than that is far; > 0 inside, of slope 1.
+class DeformedDepth {
+ public:
+  /// @param others  claims of bodies that touch this one
+  DeformedDepth(ClaimField own, std::vector<ClaimField> others) : own_(std::move(own)), others_(std::move(others)) {}
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  /// Gradients are unit vectors, or 0 where none is.
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const { own_.evaluate_parts(points, parts); }
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& /*box*/) const { return 1.0; }
+  [[nodiscard]] Box surface_box() const { return own_.surface_box(); }
+  [[nodiscard]] double feature_size() const { return own_.feature_size(); }
+
+ private:
+  ClaimField own_;
+  std::vector<ClaimField> others_;
+};
+
 }  // namespace supple::collision

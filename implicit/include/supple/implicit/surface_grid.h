@@ -86,7 +86,27 @@ class GridUpdater {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Several bodies as one: the largest of their fields, so a signed distance is that to the nearest of them.
+/// A field as its own distance to first order: F / |grad F| [m], > 0 inside, of slope 1. What is nearest by it is nearest to
+/// first order, whatever the kernels of the fields that are compared.
+class DepthField {
+ public:
+  /// @param field  what it looks at must outlive this
+  explicit DepthField(FieldView field) : field_(field) {}
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
+  /// Gradients are unit vectors along grad F, or 0 where that is: values are infinite there, or 0 on the surface.
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { field_.evaluate_parts(points, parts); }
+  [[nodiscard]] Interval bound(const Box& box) const;
+  [[nodiscard]] double gradient_bound(const Box& /*box*/) const { return 1.0; }
+  [[nodiscard]] Box surface_box() const { return field_.surface_box(); }
+  [[nodiscard]] double feature_size() const { return field_.feature_size(); }
+
+ private:
+  FieldView field_;
+};
+
+/// Several bodies as one: the largest of their fields. Of `DepthField`s it is the depth in the union, so a signed distance is
+/// that to the nearest body.
 class UnitedField {
  public:
   /// @param fields  must outlive this
