@@ -94,7 +94,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("skeleton", d.skeleton, {}, "what they look like; without it the object has no surface");
   archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");
   archive("blend", d.blend, {}, "how the surfaces of its particles join; absent: as the sum");
-  archive("volume", d.volume, {}, "held by growing and shrinking the kernels (Desbrun & Gascuel 1995), whose work against what presses is in energy_error; absent: not held");
+  archive("volume", d.volume, {}, "held by growing and shrinking the kernels (Desbrun & Gascuel 1995), whose work against what presses counts as done from outside; absent: not held");
   archive("contact", d.contact, {}, "what the surface does on contact; absent or false: it touches nothing");
   archive("repulsion", d.repulsion, {}, "exponential repulsion from other objects that have it, where contact is off");
   archive("medium", d.medium, {}, "drag of a surrounding medium; absent: none");

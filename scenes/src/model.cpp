@@ -304,7 +304,7 @@ void stop_pinned(Model& model) {
   }
 }
 
-/// Limits of what is no divergence: where particles start and how fast, free flight through the film, and far more than
+/// Limits of what is no divergence: where particles start and how fast, free flight, also under the loads, and far more than
 /// the size of the objects on top.
 void set_believable(const Scene& scene, const Box& everything, Model& model) {
   double size = everything.extent().norm();
@@ -317,10 +317,14 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
   for (const FixedBody& body : model.fixed) {
     for (const ObstacleKeyDesc& key : body.motion.keys) start = std::max(start, key.at.norm());
   }
-  speed = std::max(speed, model.solid_speed);
-  const double gravity = scene.gravity.norm(), time = scene.duration;
-  model.believable_distance = kBelievable * size + start + (speed + 0.5 * gravity * time) * time;
-  model.believable_speed = kBelievable * size * scene.frame_rate + speed + gravity * time;
+  std::vector<double> pushed(model.particles.size(), 0.0);
+  for (const core::ExternalLoad& load : model.interactions.external) pushed[load.particle] += load.force.norm();
+  double acceleration = 0.0;
+  for (std::size_t i = 0; i < pushed.size(); ++i) acceleration = std::max(acceleration, pushed[i] / model.particles.mass[i]);
+  model.believable = {.size = kBelievable * size + start,
+                      .speed = std::max(speed, model.solid_speed),
+                      .margin = kBelievable * size * scene.frame_rate,
+                      .acceleration = scene.gravity.norm() + acceleration};
 }
 
 }  // namespace

@@ -336,8 +336,9 @@ struct Simulation::Impl {
     }
     ++state.steps;
     ++state.substep;
+    const double until = std::max(scene.duration, time());
     const core::Divergence divergence =
-        core::find_divergence(model.particles, state.particles, model.believable_distance, model.believable_speed);
+        core::find_divergence(model.particles, state.particles, model.believable.distance(until), model.believable.fastest(until));
     if (divergence.found) {
       const std::uint64_t step = state.steps;
       const double at = time();
@@ -348,7 +349,7 @@ struct Simulation::Impl {
     wake_touched();
     watch_pressing();
     update_links();
-    if (control_volumes(context(), state.particles, dt(), pulled, state.volumes)) scale_kernels(model, state.volumes, bodies);
+    hold_volumes();
     lay_to_sleep();
     if (state.substep == (1 << state.halvings)) {
       state.substep = 0;
@@ -389,6 +390,22 @@ struct Simulation::Impl {
     }
     watch.look(context(), frame, time(), state.record);
     if (barrier && hold_cores(context(), frame, state.particles, state.ledger, state.record)) state.kick.valid = false;
+  }
+
+  /// After a step: kernels grow and shrink, with the particles where they are. What that adds to the energy of contact is work done from outside.
+  void hold_volumes() {
+    std::vector<implicit::VolumeState> next = state.volumes;
+    if (!control_volumes(context(), state.particles, dt(), pulled, next)) return;
+    const bool same = std::equal(next.begin(), next.end(), state.volumes.begin(),
+                                 [](const auto& a, const auto& b) { return a.scale == b.scale; });
+    const double before = same ? 0.0 : contact_energy();
+    state.volumes = std::move(next);
+    if (same) return;
+    scale_kernels(model, state.volumes, bodies);
+    drop_results();
+    const double after = contact_energy();
+    state.ledger.external_work += after - before;
+    if (before > 0.0 || after > 0.0) state.kick.valid = false;  // it pushes from now on as it is now
   }
 
   void book_work(const core::StepReport& report) {
@@ -477,13 +494,19 @@ struct Simulation::Impl {
     return meshes;
   }
 
-  Energies energies() {
+  /// Of the present bodies as they touch now, without springs of friction [J]
+  double contact_energy() {
     pull_contacts();
+    double sum = 0.0;
+    for (const auto& s : pulled.surface.summary) sum += s.energy;
+    return sum;
+  }
+
+  Energies energies() {
     Energies e;
     e.kinetic = core::measure_motion(model.particles, state.particles).kinetic_energy;
     e.interaction = core::potential_energy(model.particles, state.particles, laws);
-    for (const auto& s : pulled.surface.summary) e.contact += s.energy;
-    e.contact += collision::stick_energy(model.reaction.stick, state.sticks);
+    e.contact = contact_energy() + collision::stick_energy(model.reaction.stick, state.sticks);
     return e;
   }
 

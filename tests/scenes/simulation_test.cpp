@@ -215,6 +215,46 @@ TEST(SceneDeterminism, RestartFromASavedStateGivesTheSameBits) {
   fs::remove(path);
 }
 
+// A load pushes the drop and gravity pulls it: far beyond what the first frame lets one believe.
+TEST(SceneDeterminism, StepsPastTheLastFrameAreThoseOfALongerScene) {
+  const std::string text = R"(
+schema: 1
+frame_rate: 1
+time_step: {substeps: 1}
+gravity: [0, 0, -1000]
+objects:
+  - name: drop
+    particles: {arrange: single, at: [0, 0, 0], mass: 0.001}
+    skeleton: [{shape: point, kernel: {radius: 1 cm}}]
+    loads: [{particle: 0, force: [1, 0, 0], from: 2 s, until: 4 s}]
+)";
+  Simulation brief(parse_scene(text + "duration: 1 s\n", "brief.yaml", ".")), lengthy(parse_scene(text + "duration: 30 s\n", "lengthy.yaml", "."));
+  ASSERT_EQ(brief.scene().frame_count(), 2);
+  run(brief, 31);
+  run(lengthy, 31);
+  EXPECT_EQ(brief.time(), 30.0);
+  EXPECT_EQ(brief.state_hash(), lengthy.state_hash());
+  const double fallen = 0.5 * 1000.0 * 30.0 * 30.0;
+  EXPECT_NEAR(brief.state().particles.position[0].z(), -fallen, 1e-12 * fallen);
+}
+
+// Ways of 10^4 of the drop's size, by a load alone.
+TEST(Simulation, WhatALoadDrivesFarIsNoDivergence) {
+  Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 4 s
+frame_rate: 10
+time_step: {substeps: 1}
+objects:
+  - name: drop
+    particles: {arrange: single, mass: 0.001}
+    skeleton: [{shape: point, kernel: {radius: 1 cm}}]
+    loads: [{particle: 0, force: [100, 0, 0]}]
+)", "driven.yaml", "."));
+  run(simulation, 41);
+  EXPECT_NEAR(simulation.state().particles.position[0].x(), 0.5 * 1e5 * 16.0, 1e-6);
+}
+
 TEST(SceneDeterminism, OrderOfObjectsInTheFileChangesNoBit) {
   const std::string head = "schema: 1\nduration: 1 s\nframe_rate: 10\nobjects:\n";
   const std::string left = R"(  - name: left
@@ -481,6 +521,64 @@ TEST(HeldVolume, OfEveryParticleStaysToo) {
     EXPECT_LT(held.scale, 0.99);
     EXPECT_NEAR(held.volume, 0.25 * start, 0.05 * start);  // four alike
   }
+}
+
+// Two balls that must not touch each other press on the ground and under a third one.
+TEST(Simulation, BodiesThatMustNotTouchPassThroughEachOtherWhateverElseTheyTouch) {
+  const auto surfaces = [](const std::string& collide) {
+    Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 1 s
+objects:
+  - {name: a, particles: {at: [-0.1, 0, 0.21]}, skeleton: [{shape: point, kernel: {radius: 0.5}}], contact: {modulus: 2e3}}
+  - {name: b, particles: {at: [0.1, 0, 0.21]}, skeleton: [{shape: point, kernel: {radius: 0.5}}], contact: {modulus: 2e3}}
+  - {name: c, particles: {at: [0, 0, 0.59]}, skeleton: [{shape: point, kernel: {radius: 0.5}}], contact: {modulus: 2e3}}
+pairs: [{objects: [a, b], collide: )" + collide + "}]\nground: {}\noutput: {mesh: ply, cell: 0.02}\n", "test.yaml", "."));
+    return simulation.meshes();
+  };
+  const double whole = 0.392496505 / 8.0;  // of one ball
+  const std::vector<Mesh> apart = surfaces("false"), touching = surfaces("true");
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_TRUE(inspect(apart[k]).closed) << k;
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_LT(inspect(touching[k]).volume, 0.85 * whole);  // half of where they overlap
+    EXPECT_GT(inspect(apart[k]).volume, 0.98 * whole);     // the third one takes little
+  }
+  EXPECT_NEAR(inspect(apart[2]).volume, inspect(touching[2]).volume, 1e-12);
+}
+
+/// A ball on the ground, a fifth of whose volume is yet to come.
+std::string growing(const std::string& keys) {
+  return R"(
+schema: 1
+duration: 1 s
+frame_rate: 50
+gravity: [0, 0, -9.81]
+objects:
+  - name: ball
+    particles: {at: [0, 0, 0.2], mass: 0.05}
+    skeleton: [{shape: point, kernel: {radius: 0.5}}]
+    contact: {modulus: 2e3}
+    volume: {rate: 10, target: 0.06}
+    )" + keys + "\nground: {modulus: 1e4}\ncontact: {error: 1e-6}\n";
+}
+
+// It cannot move: all that growing adds to the contact's energy is work.
+TEST(HeldVolume, BooksItsWorkAgainstWhatPresses) {
+  Simulation simulation(parse_scene(growing("pins: [{particle: 0}]"), "test.yaml", "."));
+  const double before = simulation.energies().contact;
+  run(simulation, 51);
+  const double grown = simulation.energies().contact - before;
+  EXPECT_GT(grown, before);
+  EXPECT_NEAR(simulation.state().ledger.external_work, grown, 1e-12 * grown);
+  EXPECT_LT(simulation.audits().energy_error, 1e-12);
+}
+
+// It jumps off the ground by what it grew.
+TEST(HeldVolume, KeepsTheBalanceOfEnergyWhileItPushesItselfUp) {
+  Simulation simulation(parse_scene(growing(""), "test.yaml", "."));
+  run(simulation, 51);
+  EXPECT_GT(simulation.state().volumes[0].scale, 1.02);
+  EXPECT_LT(simulation.audits().energy_error, 5e-3);
 }
 
 /// Two particles with a ball in the middle and one to the side each, which overlap.

@@ -62,6 +62,16 @@ struct FixedBody {
   }
 };
 
+/// How far and fast particles can have become by a time [s] but by divergence.
+struct Believable {
+  double size = 0.0;          ///< far more than that of the objects, or the distance of what starts or is led farther out [m]
+  double speed = 0.0;         ///< of particles at the start and of obstacles [m/s]
+  double margin = 0.0;        ///< far more than a size in a frame [m/s]
+  double acceleration = 0.0;  ///< by gravity and the loads on a particle [m/s^2]
+  [[nodiscard]] double distance(double time) const { return size + (speed + 0.5 * acceleration * time) * time; }  ///< from the origin [m]
+  [[nodiscard]] double fastest(double time) const { return margin + speed + acceleration * time; }  ///< [m/s]
+};
+
 struct Model {
   core::ParticleSet particles;
   core::ParticleState initial;
@@ -81,8 +91,7 @@ struct Model {
   double largest_dissipation = 0.0;       ///< d of all pairs that touch [s/m]
   double smallest_length = 0.0;           ///< what a step must resolve: nearest rest distance or iso radius [m]
   double solid_speed = 0.0;               ///< bound of the speed of obstacles that are led along [m/s]
-  double believable_distance = 0.0;       ///< farther from the origin no particle can have come but by divergence [m]
-  double believable_speed = 0.0;          ///< nor can it be faster [m/s]
+  Believable believable;
 };
 
 /// @throws Error{Scene} for what only the whole scene shows (a pair naming an absent object, an iso value that no kernel

@@ -86,9 +86,10 @@ class Simulation {
   [[nodiscard]] const core::StepReport& integration() const;
 
   /// One time step, frame time / 2^halvings; one that ends a frame books its audits. @throws Error{Diverged} naming particle, cause and value; the state is then
-  /// that of the last frame.
+  /// that of the last frame. Nothing ends at the scene's last frame, of which `scene().duration` tells runs and turntables only:
+  /// later steps are those of a scene that lasts longer, to the bit.
   void step();
-  /// Steps to the next frame.
+  /// Steps to the next frame, also past the last one of the scene.
   void step_frame();
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
