@@ -40,7 +40,8 @@ class Geometry {
   Geometry(const Geometry&) = delete;
   Geometry& operator=(const Geometry&) = delete;
 
-  /// Takes over the items of a picture. What is as it was keeps its hierarchy; what kept its triangles but moved refits it.
+  /// Takes over the items of a picture. The hierarchy of all is built anew unless everything is as it was: one that is refitted would
+  /// make a picture depend on those before it, in hits at one place.
   /// @param shutter  how long the picture is exposed [s]: vertices move by the columns velocity_x, velocity_y, velocity_z
   /// @param wire     radius of the edges of wireframes over their distance
   void set(std::span<const Item> items, const Vec3& origin, double shutter, float wire);
@@ -56,9 +57,9 @@ class Geometry {
   /// @param distance  to the light
   [[nodiscard]] LaneMask blocked(const RayBundle& rays, Lanes distance) const;
 
-  /// Hierarchies of the last `set`.
+  /// Items of the last `set`: new ones, ones whose vertices moved, ones as they were.
   struct Counts {
-    int built = 0, refitted = 0, kept = 0;
+    int built = 0, moved = 0, kept = 0;
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
