@@ -661,6 +661,29 @@ TEST(PathTracer, FilterKeepsTheDarkOfNarrowGaps) {
   EXPECT_LT(rms_difference(film, reference), 0.3 * before);
 }
 
+TEST(PathTracer, FilterKeepsNothingOfEarlierPictures) {
+  // Quiet light, the edge of a shadow, and background where the earlier picture had surfaces.
+  const Mesh floor = plate(1.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  const Mesh small = plate(0.3, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY()), shade = plate(0.2, Vec3(0, 0, 0.3), Vec3::UnitX(), Vec3::UnitY());
+  const std::array earlier = {matt(floor, 0.5)};
+  const std::array later = {matt(small, 0.5), matt(shade, 0.3)};
+  Studio studio;
+  studio.view.camera = {.from = Vec3(0, -2, 2), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.5};
+  studio.settings.width = studio.settings.height = 64;
+  studio.lights.above = Vec3f::Ones();
+  studio.lights.sun = {.to_light = Vec3f::UnitZ(), .irradiance = Vec3f::Ones(), .cosine = 0.999F};
+  const auto filter = [](path::Denoiser& denoiser, Film& film) {
+    denoiser.run(Vec3f(0, -2, 2), static_cast<float>(2.0 * std::tan(0.25) / 64.0), Executor(1), film);
+  };
+  path::Denoiser used, unused;
+  Film before = studio.trace(earlier), film = studio.trace(later), same = studio.trace(later);
+  filter(used, before);
+  filter(used, film);
+  filter(unused, same);
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) ASSERT_EQ(film.radiance.at(x, y), same.radiance.at(x, y)) << x << " " << y;
+}
+
 TEST(PathTracer, FollowsBundlesAsItFollowsRays) {
   const std::array meshes = {sphere(Vec3(-0.3, 0, 0), 0.4, 12), sphere(Vec3(0.3, 0.2, 0), 0.4, 12)};
   std::array items = {matt(meshes[0], 0.5), matt(meshes[1], 0.5)};

@@ -109,6 +109,14 @@ void Denoiser::Light::resize(int width, int height) {
   for (Plane* plane : {&variance, &bright}) plane->resize(width, height);
 }
 
+void Denoiser::Light::copy(const Light& from, std::ptrdiff_t at, bool is_there) {
+  const Vec3Lanes same = from.colour.load(at);
+  bright.store(at, luminance(same));
+  if (is_there) return;
+  colour.store(at, same);
+  variance.store(at, from.variance.load(at));
+}
+
 template <class Body>
 void Denoiser::rows(const Body& body) const {
   executor_->for_blocks(static_cast<std::size_t>(film_->height), 4, [&](std::size_t begin, std::size_t end) {
@@ -248,7 +256,7 @@ void Denoiser::smooth_block(int stride, std::ptrdiff_t at, const std::array<Lane
       }
     }
   sums[0].keep(signals_[0].light, at, quiet);
-  for (std::size_t k = 0; k < 2; ++k) sums[k].store(signals_[k].next, at, shown);
+  for (std::size_t k = first; k < 2; ++k) sums[k].store(signals_[k].next, at, shown);
 }
 
 void Denoiser::smooth(int stride) {
@@ -266,9 +274,18 @@ void Denoiser::smooth(int stride) {
         const LaneMask shown = film_->cover.load(at) > 0.0F;
         const std::array<Lanes, 2> large = noise(at);
         const LaneMask quiet = large[0] * (kQuiet * (signals_[0].guide.load(at) + 0.1F)) > 1.0F;
-        return any(both(shown, ~quiet)) ? smooth_block<true>(stride, at, large, shown, quiet)
-                                        : smooth_block<false>(stride, at, large, shown, quiet);
+        std::uint8_t& kept = kept_[block(at)];
+        if (any(both(shown, ~quiet))) {
+          smooth_block<true>(stride, at, large, shown, quiet);
+          kept = 0;
+          return;
+        }
+        smooth_block<false>(stride, at, large, shown, quiet);
+        signals_[0].next.copy(signals_[0].light, at, kept != 0);
+        kept = 1;
+        return;
       }
+      if (stride > 1) return;  // both planes have zeros there from the first level on
       for (Signal& signal : signals_) Sums{}.store(signal.next, at, LaneMask{});
     });
   });
@@ -331,6 +348,7 @@ void Denoiser::run(const Vec3f& eye, float footprint, const Executor& executor, 
   eye_ = eye;
   footprint_ = footprint;
   resize();
+  kept_.assign(block(film.cover.index(0, film.height)), 0);
   sort_paths();
   fill();
   for (int level = 0; level < kLevels; ++level) smooth(1 << level);

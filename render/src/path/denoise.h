@@ -44,6 +44,8 @@ class Denoiser {
     Plane variance;
     Plane bright;
     void resize(int width, int height);
+    /// @param is_there  but for round-off of its brightness
+    void copy(const Light& from, std::ptrdiff_t at, bool is_there);
   };
   /// A part of the light on its way through the filter.
   struct Signal {
@@ -70,6 +72,8 @@ class Denoiser {
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(film_->width) + static_cast<std::size_t>(x);
   }
+  /// Number of the block of eight pixels that begins there.
+  [[nodiscard]] static std::size_t block(std::ptrdiff_t at) { return static_cast<std::size_t>(at) / kLanes; }
   template <class Body>
   void rows(const Body& body) const;
   template <class Body>
@@ -85,6 +89,7 @@ class Denoiser {
   float footprint_ = 0.0F;
   Features f_;
   std::array<Signal, 2> signals_;     ///< direct, indirect
+  std::vector<std::uint8_t> kept_;    ///< 1: the last level left the direct light of that block, which so is in both planes
   std::vector<std::uint32_t> mixed_;  ///< of a pixel where surfaces meet, 1 + its place in parts_; 0: one surface
   std::vector<std::array<SurfacePart, 2>> parts_;
 };
