@@ -33,7 +33,7 @@ class TileFrame {
       const Bits face = first_of(step);
       for_bits(face & ~block.outside, [&](unsigned place) { word_[from + at(place)] = kAll; });
       for_bits(face & block.held & block.outside, [&](unsigned place) {
-        word_[from + at(place)] = block.tile[block.rank(place)].inside;
+        word_[from + at(place)] = block.inside_nodes[block.rank(place)];
       });
     }
   }
@@ -134,7 +134,7 @@ void count_held(BlockTable& table, std::size_t index) {
   Block& block = table.block[index];
   table.holds[index] = block.uniform() ? 0 : 1;
   if (block.uniform()) block.vertices = block.triangles = block.point_room = 0;
-  const Held held{block.tile.size(), sizeof(Block) + block.tile.capacity() * sizeof(Tile) +
+  const Held held{block.tile.size(), sizeof(Block) + block.inside_nodes.capacity() * sizeof(Bits) + block.tile.capacity() * sizeof(Tile) +
                                          block.values.capacity() * sizeof(float) + block.corners.capacity()};
   table.held.tiles += held.tiles - block.counted.tiles;
   table.held.bytes += held.bytes - block.counted.bytes;

@@ -47,7 +47,8 @@ Bits next_to_outside(const BlockTable& table, const Block& block, Bits tiles) {
         at = upwards == leaves ? at - (leaves ? last : unit) : at + (leaves ? last : unit);
         facing &= upwards ? first : first << last;
       }
-      if (blocks[owner] == nullptr || (~blocks[owner]->inside(at) & facing) != 0) found |= Bits{1} << place;
+      const Bits inside = blocks[owner] == nullptr ? Bits{0} : blocks[owner]->inside(at);
+      found |= Bits{(~inside & facing) != 0} << place;  // no jump: words that are far away are then waited for together
     });
   };
   for (unsigned step = 1; step < 8; ++step) look(above, tiles & steps.step[step], step, true);
@@ -170,7 +171,10 @@ class BlobSampler final : public Sampler {
         if (work.in_column) {
           grid_.gather_column(table.block[order[i]].base(), kBlockNodes, std::int64_t{kBlockNodes} * (top - low[2] + 1), work.column);
         }
-        for (std::size_t k = i; k < next; ++k) use(table.block[order[k]], work);
+        for (std::size_t k = i; k < next; ++k) {
+          if (k + 1 < end) fetch_ahead(&table.block[order[k + 1]], 1);
+          use(table.block[order[k]], work);
+        }
       }
     });
   }
@@ -367,7 +371,7 @@ class BlobSampler final : public Sampler {
       block.kernel_values += kTileNodes * sure.added;
       work.sure = sure.inside;
     }
-    work.changes.begin();
+    work.changes.begin(block);
     for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
       if ((block.changed & tiles_of(leaf)) != 0) sample_leaf(block, leaf, work);
     }
@@ -492,7 +496,7 @@ class BlobSampler final : public Sampler {
 
   void evaluate_needed(Block& block, Workspace& work) const {
     gather_to_sample(block, work);
-    work.changes.begin();
+    work.changes.begin(block);
     for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
       const Bits tiles = block.needed & tiles_of(leaf);
       if (tiles == 0 || select_leaf(leaf, work) != Verdict::Unknown) continue;

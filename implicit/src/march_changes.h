@@ -27,37 +27,54 @@ using blobs::kTileNodes;
 /// Gives a block tiles with values and takes them from it, all at once.
 class TileChanges {
  public:
-  void begin() { made_ = dropped_ = 0; }
+  void begin(const Block& block) {
+    made_ = dropped_ = 0;
+    to_ = block.values.data();
+    room_ = block.values.capacity();
+  }
   /// Room for the values of a tile.
   [[nodiscard]] float* room(unsigned place) { return values_.data() + std::size_t{kTileNodes} * place; }
   /// The values there are those of a tile.
   void make(unsigned place, Bits inside) {
     inside_[place] = inside;
     made_ |= Bits{1} << place;
+    // What apply() will write to is on its way by then.
+    constexpr std::size_t kLine = 64 / sizeof(float);
+    const std::size_t first = kTileNodes * static_cast<std::size_t>(std::popcount(made_) - 1);
+    for (std::size_t i = first; i < std::min(first + kTileNodes, room_); i += kLine) __builtin_prefetch(to_ + i, 1);
   }
   void drop(Bits tiles) { dropped_ |= tiles; }
 
   void apply(Block& block) {
     const Bits kept = block.held & ~dropped_ & ~made_, held = kept | made_;
     if (made_ == 0 && kept == block.held) return;
+    old_nodes_.clear();
     old_tiles_.clear();
     old_values_.clear();
     if (kept != 0) {
+      old_nodes_.swap(block.inside_nodes);
       old_tiles_.swap(block.tile);
       old_values_.swap(block.values);
     }
-    block.tile.clear();
+    const auto count = static_cast<std::size_t>(std::popcount(held));
+    block.inside_nodes.resize(count);
+    block.tile.assign(count, Tile{});
     block.values.clear();
-    block.tile.reserve(static_cast<std::size_t>(std::popcount(held)));
-    block.values.reserve(kTileNodes * static_cast<std::size_t>(std::popcount(held)));
+    block.values.reserve(kTileNodes * count);
+    std::size_t rank = 0;
     for_bits(held, [&](unsigned place) {
       const float* values = room(place);
+      Tile& tile = block.tile[rank];
       if ((made_ >> place & 1u) != 0) {
-        block.tile.push_back({.inside = inside_[place], .place = static_cast<std::uint8_t>(place)});
+        block.inside_nodes[rank] = inside_[place];
+        tile.place = static_cast<std::uint8_t>(place);
       } else {
-        block.tile.push_back(old_tiles_[block.rank(place)]);
-        values = old_values_.data() + kTileNodes * block.rank(place);
+        const std::size_t old = block.rank(place);
+        block.inside_nodes[rank] = old_nodes_[old];
+        tile = old_tiles_[old];
+        values = old_values_.data() + kTileNodes * old;
       }
+      ++rank;
       block.values.insert(block.values.end(), values, values + kTileNodes);
     });
     block.flipped |= block.held ^ held;
@@ -66,8 +83,11 @@ class TileChanges {
 
  private:
   Bits made_ = 0, dropped_ = 0;
+  const float* to_ = nullptr;  ///< where the block's values are, in that much room
+  std::size_t room_ = 0;
   std::array<Bits, 64> inside_{};
   alignas(64) std::array<float, 64 * kTileNodes> values_;  // by place
+  std::vector<Bits> old_nodes_;
   std::vector<float> old_values_;
   std::vector<Tile> old_tiles_;
 };

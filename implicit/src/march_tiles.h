@@ -66,7 +66,6 @@ struct Steps {
 
 /// One that holds values.
 struct Tile {
-  Bits inside = 0;                ///< F > 0
   Bits cells = 0;                 ///< crossed
   std::array<Bits, 3> edges{};    ///< crossed, by axis
   std::uint16_t first_vertex = 0, old_vertex = 0;      ///< in those of the block, and before they were last counted
@@ -121,7 +120,8 @@ struct alignas(64) Block {
   Bits early = 0;             ///< those inside by partial sums, whose values nobody needs yet
   Bits needed = 0;            ///< of these, those next to a node outside
   std::uint8_t decided = 0;   ///< leaves on which bounds show one sign
-  std::vector<Tile> tile;     ///< those that hold values, by place
+  std::vector<Bits> inside_nodes;  ///< of the tiles that hold values, by place: F > 0
+  std::vector<Tile> tile;     ///< these tiles
   std::vector<float> values;  ///< of these, F at kTileNodes nodes each, x fastest
   std::vector<std::uint8_t> corners;  ///< inside corners of the crossed cells, tile by tile
   std::uint64_t kernel_values = 0;    ///< taken in this call
@@ -130,6 +130,7 @@ struct alignas(64) Block {
 
   /// All outside, memory kept.
   void clear() {
+    inside_nodes.clear();
     tile.clear();
     values.clear();
     corners.clear();
@@ -149,7 +150,7 @@ struct alignas(64) Block {
   }
   /// The nodes of a tile with F > 0.
   [[nodiscard]] Bits inside(unsigned place) const {
-    if ((held >> place & 1u) != 0) return tile[rank(place)].inside;
+    if ((held >> place & 1u) != 0) return inside_nodes[rank(place)];
     return (outside >> place & 1u) != 0 ? Bits{0} : kAll;
   }
 };

@@ -63,7 +63,7 @@ class ViewSampler final : public Sampler {
       thread_local TileChanges changes;
       for (std::size_t b = begin; b < end; ++b) {
         if (leaves[b] == 0) continue;
-        changes.begin();
+        changes.begin(table.block[b]);
         for_bits(leaves[b], [&](unsigned leaf) { sample_leaf(table.block[b], leaf, changes); });
         changes.apply(table.block[b]);
       }
