@@ -89,6 +89,27 @@ bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
       edge.to_local = A;
       edge.to_local.row(2).setZero();
       out.push_back(edge);
+    } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Segment && shape.view.gain == 0.0) {
+      // With widths 1 + k t the nearest point leaves an end where 2 h x + k |x|^2 = 0 for x from that end, in units of its width: on a sphere.
+      constexpr double kStraight = 1e-7;  // below, the sphere is a plane but for rounding
+      const double h = shape.view.size.x(), k = shape.view.taper - 1.0;
+      const Mat3 back = A.inverse();
+      for (const double end : {-1.0, 1.0}) {
+        if (std::abs(k) < kStraight) {
+          plane(Vec3::UnitX(), end * h);
+          continue;
+        }
+        const double reach = h * (end < 0.0 ? 1.0 : 1.0 + k) / k;
+        Kink cap{.form = Kink::Form::Offset, .origin = kink.origin + back * Vec3(end * h - reach, 0.0, 0.0)};
+        cap.to_local = A;
+        cap.level = std::abs(reach);
+        out.push_back(cap);
+      }
+      levels = false;
+      // Levels of the kernel lie on cones.
+      const std::array<double, 2> level = levels_of(shape.kernel);
+      const bool inside = std::any_of(level.begin(), level.end(), [&](double at) { return at > 0.0 && at < farthest; });
+      complete = complete && index.size() == 1 && !inside;
     } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Directed) {
       for (int k = 0; k < 3; ++k) plane(Vec3::Unit(k), 0.0);
       levels = false;

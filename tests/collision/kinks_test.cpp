@@ -67,6 +67,10 @@ TEST(Kinks, PartEveryLineIntoPiecesOnWhichTheFieldIsSmooth) {
   Primitive directed = make(ShapeKind::Directed, Vec3(1.0, 1.2, 1.1), Kernel::wyvill(1.2));
   directed.control = {Vec3(1.3, 1.0, 1.4)};
   const Kernel wyvill = Kernel::wyvill(1.0);
+  Primitive narrows = make(ShapeKind::Segment, Vec3(0.3, 0, 0), wyvill), widens = make(ShapeKind::Segment, Vec3(0.2, 0, 0), Kernel::murakami(0.9));
+  narrows.taper = 0.7;
+  widens.taper = 1.25;
+  widens.stretch = Vec3(1.2, 0.9, 1.0);
   const std::vector<std::vector<Primitive>> bodies{
       {make(ShapeKind::Rectangle, Vec3(0.4, 0.3, 0), wyvill)},
       {make(ShapeKind::Segment, Vec3(0.4, 0, 0), wyvill)},
@@ -74,6 +78,8 @@ TEST(Kinks, PartEveryLineIntoPiecesOnWhichTheFieldIsSmooth) {
       {make(ShapeKind::Disc, Vec3(0.4, 0, 0), wyvill)},
       {triangle},
       {directed},
+      {narrows},
+      {widens},
       {make(ShapeKind::Point, Vec3::Zero(), Kernel::nishimura(1.8))},
       {make(ShapeKind::Point, Vec3::Zero(), Kernel::blanc_schlick(1.6, 0.5)),
        make(ShapeKind::Ellipsoid, Vec3(0.9, 0.7, 0.8), wyvill, Vec3(0.5, 0.1, 0))},
@@ -143,6 +149,9 @@ TEST(Kinks, HaveTheSlopeOfTheirFunctionAndStayOutOfALonePoint) {
   EXPECT_TRUE(kinks.empty());
   Primitive tapered = make(ShapeKind::Segment, Vec3(0.4, 0, 0), Kernel::wyvill(1.0));
   tapered.taper = 0.5;
+  EXPECT_TRUE(kinks_of(Body({tapered}).field, point.field.surface_box(), kinks));
+  EXPECT_FALSE(kinks_of(Body({tapered, tapered}).field, point.field.surface_box(), kinks));
+  tapered.kernel = Kernel::nishimura(1.0);
   EXPECT_FALSE(kinks_of(Body({tapered}).field, point.field.surface_box(), kinks));
 }
 
@@ -254,6 +263,31 @@ TEST(SplitRule, AcrossTheEdgesAndTheCornerOfAPlateKeepsItsBoundAndTheErrorAsked)
       last = error;
     }
     EXPECT_LT(last, 1e-8);
+  }
+}
+
+// On a flat face the pressure pushes across it alone, whatever the body: what is left along it is an error of the rule.
+TEST(SplitRule, PartsPatchesWhereTheCapOfATaperedSegmentBegins) {
+  Primitive p;
+  p.shape = ShapeKind::Segment;
+  p.size = Vec3(0.2, 0, 0);
+  p.taper = 0.6;
+  for (const double height : {0.25, 0.24, 0.22}) {
+    p.kernel = Kernel::murakami(0.5);
+    const Pose pose{Vec3(0, 0, height), Quat::Identity()};
+    const Body horn({p}, pose);
+    const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+    for (const double asked : {1e-3, 1e-6, 1e-8}) {
+      Stage stage;
+      stage.add(horn.field, {pose.position}, 2e3);
+      stage.add(plane, {}, 1e4).fixed = true;
+      const ContactSurface& s = stage.solve({.error = asked});
+      ASSERT_EQ(s.summary.size(), 1u);
+      EXPECT_EQ(s.summary[0].rule, ContactRule::Polar);
+      EXPECT_GE(s.summary[0].kinks, 1u) << height;
+      EXPECT_LE(s.summary[0].error_estimate, asked) << height;
+      EXPECT_LE(s.summary[0].force.head<2>().norm(), s.summary[0].error_estimate * s.summary[0].force.norm()) << height << ' ' << asked;
+    }
   }
 }
 
