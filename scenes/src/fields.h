@@ -132,7 +132,7 @@ void fields(Archive& archive, ObjectDesc& d) {
     if (kernel.type != KernelName::Gascuel || !kernel.slope || !kernel.thickness || kernel.radius <= 0.0) continue;
     const double width = kernel.radius - *kernel.thickness;
     archive.check(*kernel.slope * width <= 3.0 * d.iso, "skeleton[" + std::to_string(k) + "].kernel.slope",
-                  "expected slope (radius - thickness) <= 3 iso = " + number_text(3.0 * d.iso),
+                  "expected slope (radius - thickness) <= 3 iso = " + short_text(3.0 * d.iso),
                   short_text(*kernel.slope * width), "use a slope of at most " + short_text(3.0 * d.iso / width) + " [1/m]");
   }
 }

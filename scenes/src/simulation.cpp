@@ -186,7 +186,8 @@ struct Simulation::Impl {
     wake(pushed);
   }
 
-  /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces.
+  /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces. What their surfaces held that is
+  /// no longer there goes with the links.
   void update_links() {
     if (model.links.size() == 0) return;
     const bool fades = age_broken_links(model, dt(), state);
@@ -195,6 +196,16 @@ struct Simulation::Impl {
     if (change.any()) form_laws();
     if (change.any() || fades) state.kick.valid = false;
     if (change.broke == 0 && !fades) return;
+    const double held = contact_energy();
+    part_bodies();
+    drop_results();
+    const double lost = held - contact_energy();
+    state.ledger.dissipated += lost;
+    state.links.released += lost;
+  }
+
+  /// Bodies as the links that are left make them.
+  void part_bodies() {
     const std::vector<Body> before = std::move(bodies);
     form_bodies();
     if (scene.sleep) state.sleep.reset(bodies.size());

@@ -452,6 +452,29 @@ TEST(Pieces, FreshFromABreakDoNotPressOnEachOther) {
   EXPECT_EQ(simulation.state().apart.size(), 1u);
 }
 
+// Two balls whose fields add up spin apart while they press on the ground, which then meets two smaller bodies.
+TEST(Pieces, TakeAlongWhatTheirCommonSurfaceHeld) {
+  for (const std::string blend : {"sum", "graph, neighbours: 1, fade: 0.1 s"}) {
+    Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 0.5 s
+frame_rate: 20
+objects:
+  - name: pair
+    particles: {arrange: line, count: 2, spacing: 0.3, at: [0, 0, 0.2], mass: 0.1, spin: [0, 0, 8]}
+    interactions: [{law: bond_frame, stretch: 50, rotation: 0.1}]
+    breaking: {stretch: 0.05}
+    skeleton: [{shape: point, kernel: {radius: 0.5}}]
+    contact: {modulus: 2e3}
+    blend: {rule: )" + blend + "}\nground: {modulus: 1e4}\ncontact: {error: 1e-6}\n", "test.yaml", "."));
+    run(simulation, 11);
+    ASSERT_EQ(simulation.bodies().size(), 2u) << blend;
+    EXPECT_GT(simulation.state().links.released, 1.5 * 0.5 * 50.0 * 0.016 * 0.016) << blend;  // more than the bond held
+    EXPECT_LT(simulation.audits().energy_error, 2e-3) << blend;
+    EXPECT_EQ(simulation.audits().energy_returned, 0.0) << blend;
+  }
+}
+
 /// A bond that breaks at once and whose blend fades within 0.15 s.
 std::string fading_dumbbell() {
   return dumbbell("breaking: {stretch: 0.02}\n    blend: {rule: graph, neighbours: 1, fade: 0.15 s}", "0.7");
