@@ -743,6 +743,29 @@ TEST(PathTracer, MissesNothingInBundlesAlongTheFacesOfTheBoxOfAllItems) {
   EXPECT_EQ(hits_found, 2 * 25);
 }
 
+TEST(PathTracer, MissesNothingInBundlesThatComeFromAfarOrBeginInside) {
+  const Mesh ball = sphere(Vec3(3, 0, 0), 1.0, 16), other = sphere(Vec3(-3, 1, 0), 0.5, 16);
+  const std::array items = {matt(ball, 0.5), matt(other, 0.5)};
+  path::Geometry geometry;
+  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  int hits_found = 0;
+  for (const float away : {0.0F, 2.0F, 30.0F, 3000.0F})
+    for (int k = 0; k < 400; ++k) {
+      // At vertices, where the ball of all items is nearest, and at places beside them.
+      const Vec3f at = (1.0F + 0.001F * static_cast<float>(k % 3)) * ball.position[static_cast<std::size_t>(k) * ball.position.size() / 400].cast<float>();
+      const Vec3f direction = Vec3f(std::sin(1.7F * static_cast<float>(k)), std::cos(2.3F * static_cast<float>(k)), 0.4F).normalized();
+      const Vec3f from = at - away * direction;
+      const path::RayBundle rays{.from = path::Vec3Lanes(from), .direction = path::Vec3Lanes(direction), .time = {}, .who = path::first_lanes(1)};
+      std::array<path::Hit, path::kLanes> hits;
+      path::Hit alone;
+      const bool met = geometry.meet(from, direction, 0.0F, 0.0F, false, alone);
+      EXPECT_EQ(geometry.meet(rays, path::Lanes{}, false, hits)[0] != 0, met) << k << " from " << away;
+      EXPECT_EQ(geometry.blocked(rays)[0] != 0, geometry.blocked(from, direction, INFINITY, 0.0F)) << k << " from " << away;
+      hits_found += met ? 1 : 0;
+    }
+  EXPECT_GT(hits_found, 400);
+}
+
 // Eight rays scatter as one does: round-off of a few operations, where none cancels.
 TEST(Bsdf, IsTheSameForEightRaysAsForOne) {
   path::BsdfOf<path::Lanes> eight;

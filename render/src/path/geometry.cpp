@@ -187,6 +187,12 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
   const float margin = 1e-4F * (upper_ - lower_).norm();  // of round-off, and no ray along a face lies in it
   lower_.array() -= margin;
   upper_.array() += margin;
+  centre_ = 0.5F * (lower_ + upper_);
+  float furthest2 = 0.0F;
+  for (const auto& part : parts_)
+    for (const std::vector<float>* places : {&part->position, &part->position_end})
+      for (std::size_t at = 0; at < places->size(); at += 4) furthest2 = std::max(furthest2, (vector(&(*places)[at]) - centre_).squaredNorm());
+  radius_ = std::sqrt(furthest2) + margin;
 }
 
 /// Of a ray and a triangle.
@@ -342,8 +348,8 @@ RTCIntersectContext coherent() {
 
 }  // namespace
 
-/// Rays that cross the box of all items (Kay & Kajiya 1986), and at most a few others.
-LaneMask Geometry::cross_box(const RayBundle& rays) const {
+/// Rays that cross the box (Kay & Kajiya 1986) and the ball of all items, and at most a few others.
+LaneMask Geometry::cross_bounds(const RayBundle& rays) const {
   const auto between = [](float lower, float upper, Lanes from, Lanes direction) {
     const Lanes scale = 1.0F / direction, a = (lower - from) * scale, b = (upper - from) * scale;
     return Pair<Lanes>{smaller(a, b), larger(a, b)};
@@ -352,13 +358,17 @@ LaneMask Geometry::cross_box(const RayBundle& rays) const {
   const Pair<Lanes> y = between(lower_.y(), upper_.y(), rays.from.y(), rays.direction.y());
   const Pair<Lanes> z = between(lower_.z(), upper_.z(), rays.from.z(), rays.direction.z());
   const Lanes enter = larger(larger(x.x, y.x), z.x), leave = smaller(smaller(x.y, y.y), z.y);
-  constexpr float kRoundOff = 1.0F + 1e-5F;
-  return both(rays.who, ~((enter > kRoundOff * leave) | (leave < 0.0F)));
+  constexpr float kRoundOff = 1.0F + 1e-5F, kRoundOffAlong = 2e-6F;
+  const Vec3Lanes from_centre = rays.from - Vec3Lanes(centre_);
+  const Lanes along = from_centre.dot(rays.direction), reach = radius_ + kRoundOffAlong * magnitude(along);
+  const Vec3Lanes nearest = from_centre - along * rays.direction;  // to the centre, of the whole line
+  const LaneMask passes = nearest.dot(nearest) > reach * reach, ahead = both(along > 0.0F, from_centre.dot(from_centre) > reach * reach);
+  return both(rays.who, ~((enter > kRoundOff * leave) | (leave < 0.0F) | passes | ahead));
 }
 
 std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) const {
   std::array<Crossing, kLanes> out;
-  const LaneMask who = cross_box(rays);
+  const LaneMask who = cross_bounds(rays);
   if (!any(who)) return out;
   if (!rays.together) {
     for (std::size_t k = 0; k < kLanes; ++k)
@@ -389,7 +399,7 @@ LaneMask Geometry::meet(const RayBundle& rays, Lanes choice, bool exact, std::ar
 LaneMask Geometry::blocked(const RayBundle& rays) const { return blocked(rays, all_lanes(INFINITY)); }
 
 LaneMask Geometry::blocked(const RayBundle& rays, Lanes distance) const {
-  const LaneMask who = cross_box(rays);
+  const LaneMask who = cross_bounds(rays);
   if (!any(who)) return LaneMask{};
   if (!rays.together) {
     LaneMask out{};

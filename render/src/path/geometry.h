@@ -66,7 +66,7 @@ class Geometry {
  private:
   struct Part;
   struct Crossing;
-  [[nodiscard]] LaneMask cross_box(const RayBundle& rays) const;
+  [[nodiscard]] LaneMask cross_bounds(const RayBundle& rays) const;
   [[nodiscard]] std::array<Crossing, kLanes> crossed(const RayBundle& rays) const;
   [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const;
   [[nodiscard]] bool first_visible(Crossing crossing, const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact,
@@ -79,6 +79,8 @@ class Geometry {
   std::vector<Item> items_;
   Vec3 origin_ = Vec3::Zero();
   Vec3f lower_ = Vec3f::Zero(), upper_ = Vec3f::Zero();  ///< of the box of all items, relative to the origin [m]
+  Vec3f centre_ = Vec3f::Zero();  ///< of the ball of all items
+  float radius_ = 0.0F;
   float wire_ = 0.0F;
   bool scene_is_new_ = true;
   Counts counts_;
