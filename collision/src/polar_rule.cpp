@@ -42,19 +42,6 @@ double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums&
   }
 }
 
-/// What force, area and centre of rule r are off by at most there.
-double bound_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums& coarse, double moved, bool round) {
-  const double loose = error_where_smooth(r, fine, coarse, moved), relative = relative_difference(fine, coarse);
-  if (r == 1) {
-    // Two radii integrate the force of a paraboloid exactly, but make its spread a sixth too large.
-    const double difference = std::max(relative, std::abs(7.0 / 6.0 - coarse.spread / fine.spread) / 60.0);
-    return std::min(loose, difference * (0.005 + 15.0 * difference + (25.0 + 3600.0 * moved) * moved));
-  }
-  if (r != 2 || !round) return loose;
-  const double difference = std::max(relative, std::abs(1.0 - coarse.spread / fine.spread) / 25.0);
-  return std::min(loose, difference * (0.005 + 7.0 * std::sqrt(difference)));
-}
-
 }  // namespace
 
 void PolarRuleSolver::start_rim(const PolarRule& rule, bool first) {
@@ -484,8 +471,12 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
                           : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
     if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kEnough * error));
     if (difference > kEnough * error && r < last) continue;
-    estimate_ = (smooth ? bound_where_smooth(r, fine_, coarse_, rim_moved(), round) : difference) + algebraic_error();
+    estimate_ = difference + algebraic_error();
     if (estimate_ > error && !any) return false;
+    // Which rule is enough is not asked of this bound, as energies converge later.
+    if (r <= kFinestJudged && (smooth || (!any && third_.empty() && error < kSplitBelow && clear_of_kinks(pressure)))) {
+      estimate_ = std::min(estimate_, bound_by_ends(r, round) + 2.0 * algebraic_error());
+    }
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);
   }

@@ -20,6 +20,9 @@
 
 namespace supple::collision {
 
+/// The finest rule whose error is judged from the ends of its rays.
+inline constexpr std::size_t kFinestJudged = 3;
+
 /// The ground that a polar patch covers.
 struct PolarCover {
   PeakFrame frame;
@@ -82,6 +85,10 @@ class PolarRuleSolver {
   bool column_ends(PairPressure& pressure, int side, double tolerance);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double algebraic_error() const;
+  // Bounds on smooth patches: smooth_bound.cpp.
+  [[nodiscard]] double unseen_by_angles() const;
+  [[nodiscard]] double bound_by_ends(std::size_t r, bool round) const;
+  [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 
   // Patches that kinks cross: split_rule.cpp, cross_kinks.cpp.
@@ -231,6 +238,7 @@ class PolarRuleSolver {
   std::uint32_t parted_ = 0;
   std::vector<implicit::Kink> kinks_;
   Box smooth_;                         // no kink is in it
+  std::vector<implicit::Kink> near_kinks_;
   std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
   std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
