@@ -69,6 +69,21 @@ bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
       side.level = at / length;
       out.push_back(side);
     };
+    // Where the nearest point g(t) leaves an end: g'.x w + w' |x|^2 = 0 for x from that end and widths w. A plane, or a sphere.
+    const auto cap = [&](const Vec3& end, const Vec3& along, double width) {
+      constexpr double kStraight = 1e-7;  // below, the sphere is a plane but for rounding
+      const double growth = shape.view.taper - 1.0, steepness = along.norm();
+      if (!(steepness > 0.0)) return;
+      if (std::abs(growth) < kStraight) {
+        plane(along, along.dot(end));
+        return;
+      }
+      const Vec3 middle = end - 0.5 * width / growth * along;
+      Kink ball{.form = Kink::Form::Offset, .origin = kink.origin + A.inverse() * middle};
+      ball.to_local = A;
+      ball.level = 0.5 * width / std::abs(growth) * steepness;
+      out.push_back(ball);
+    };
     bool levels = true;
     if (shape.foot == PackedFoot::Slab) {
       kink.form = Kink::Form::Offset;
@@ -90,26 +105,19 @@ bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
       edge.to_local.row(2).setZero();
       out.push_back(edge);
     } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Segment && shape.view.gain == 0.0) {
-      // With widths 1 + k t the nearest point leaves an end where 2 h x + k |x|^2 = 0 for x from that end, in units of its width: on a sphere.
-      constexpr double kStraight = 1e-7;  // below, the sphere is a plane but for rounding
-      const double h = shape.view.size.x(), k = shape.view.taper - 1.0;
-      const Mat3 back = A.inverse();
-      for (const double end : {-1.0, 1.0}) {
-        if (std::abs(k) < kStraight) {
-          plane(Vec3::UnitX(), end * h);
-          continue;
-        }
-        const double reach = h * (end < 0.0 ? 1.0 : 1.0 + k) / k;
-        Kink cap{.form = Kink::Form::Offset, .origin = kink.origin + back * Vec3(end * h - reach, 0.0, 0.0)};
-        cap.to_local = A;
-        cap.level = std::abs(reach);
-        out.push_back(cap);
-      }
+      const double h = shape.view.size.x();
+      cap(Vec3(-h, 0.0, 0.0), Vec3(2.0 * h, 0.0, 0.0), 1.0);
+      cap(Vec3(h, 0.0, 0.0), Vec3(2.0 * h, 0.0, 0.0), shape.view.taper);
       levels = false;
       // Levels of the kernel lie on cones.
       const std::array<double, 2> level = levels_of(shape.kernel);
       const bool inside = std::any_of(level.begin(), level.end(), [&](double at) { return at > 0.0 && at < farthest; });
       complete = complete && index.size() == 1 && !inside;
+    } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Curve) {
+      const BezierPoint begin = bezier(shape.view.control, 0.0), end = bezier(shape.view.control, 1.0);
+      cap(begin.point, begin.first, 1.0);
+      cap(end.point, end.first, shape.view.taper);
+      levels = complete = false;
     } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Directed) {
       for (int k = 0; k < 3; ++k) plane(Vec3::Unit(k), 0.0);
       levels = false;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 
 #include "benchmarks/contact_shapes.h"
@@ -153,6 +154,27 @@ TEST(Kinks, HaveTheSlopeOfTheirFunctionAndStayOutOfALonePoint) {
   EXPECT_FALSE(kinks_of(Body({tapered, tapered}).field, point.field.surface_box(), kinks));
   tapered.kernel = Kernel::nishimura(1.0);
   EXPECT_FALSE(kinks_of(Body({tapered}).field, point.field.surface_box(), kinks));
+}
+
+// A curve along a line is a segment.
+TEST(Kinks, OfCurvesLieWhereTheirCapsBegin) {
+  for (const double taper : {1.0, 0.7, 1.4}) {
+    Primitive line = make(ShapeKind::Segment, Vec3(0.3, 0, 0), Kernel::wyvill(1.0)), curve = make(ShapeKind::Curve, Vec3::Zero(), Kernel::wyvill(1.0));
+    line.taper = curve.taper = taper;
+    curve.control = {Vec3(-0.3, 0, 0), Vec3(0, 0, 0), Vec3(0.3, 0, 0)};
+    const Body a({line}), b({curve});
+    std::vector<Kink> of_line, of_curve;
+    EXPECT_TRUE(kinks_of(a.field, a.field.surface_box(), of_line));
+    EXPECT_FALSE(kinks_of(b.field, b.field.surface_box(), of_curve));  // others are where two of its points are nearest
+    ASSERT_GE(of_line.size(), 2u);
+    ASSERT_EQ(of_curve.size(), 2u);
+    for (const Vec3& x : {Vec3(0.31, -0.47, 0.29), Vec3(-0.2, 0.1, 0.4)}) {
+      const std::array<double, 2> lines{std::abs(of_line[0].value(x)), std::abs(of_line[1].value(x))},
+          curves{std::abs(of_curve[0].value(x)), std::abs(of_curve[1].value(x))};
+      EXPECT_NEAR(std::min(lines[0], lines[1]), std::min(curves[0], curves[1]), 1e-12) << taper;
+      EXPECT_NEAR(std::max(lines[0], lines[1]), std::max(curves[0], curves[1]), 1e-12) << taper;
+    }
+  }
 }
 
 /// Integrals over z = 0 of [F]+, of its points and of the area of {F > 0}: along lines of y between rim and kinks by Gauss's
