@@ -1,5 +1,6 @@
 /// What a rule on a smooth patch is off by, from what is known of the patch besides its nodes: the peak, and pressures, slopes and
 /// normals at the rim. With them the integral along the radius has a far more exact value than Gauss's.
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -46,10 +47,11 @@ std::array<long double, 3> legendre(int degree, long double t) {
 }
 
 EndedRule make_ended(const GaussRule& gauss, const Known& known) {
-  std::vector<std::vector<long double>> rows;  // what each function is at the nodes and ends, and its integral
   const std::size_t size = gauss.node.size() + 1 + known.centre + known.centre_slope + known.centre_bend + known.rim_slope;
+  // What each function is at the nodes and ends, and its integral.
+  Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic> values(size, size);
+  Eigen::Matrix<long double, Eigen::Dynamic, 1> integral(size);
   for (std::size_t i = 0; i < size; ++i) {
-    std::vector<long double> row;
     // The value of the function and its derivatives in s.
     const auto at = [&](long double s) -> std::array<long double, 3> {
       const std::size_t powers = size - static_cast<std::size_t>(known.odd);
@@ -63,42 +65,26 @@ EndedRule make_ended(const GaussRule& gauss, const Known& known) {
       for (std::size_t k = 2; k < power; ++k) f *= s;
       return {f * s, static_cast<long double>(power) * f, 0.0L};
     };
-    for (const double s : gauss.node) row.push_back(at(s)[0]);
-    if (known.centre) row.push_back(at(0.0L)[0]);
-    if (known.centre_slope) row.push_back(at(0.0L)[1]);
-    if (known.centre_bend) row.push_back(at(0.0L)[2]);
-    row.push_back(at(1.0L)[0]);
-    if (known.rim_slope) row.push_back(at(1.0L)[1]);
+    const auto row = static_cast<Eigen::Index>(i);
+    Eigen::Index column = 0;
+    for (const double s : gauss.node) values(row, column++) = at(s)[0];
+    if (known.centre) values(row, column++) = at(0.0L)[0];
+    if (known.centre_slope) values(row, column++) = at(0.0L)[1];
+    if (known.centre_bend) values(row, column++) = at(0.0L)[2];
+    values(row, column++) = at(1.0L)[0];
+    if (known.rim_slope) values(row, column++) = at(1.0L)[1];
     const GaussRule& fine = gauss_rule(16);
-    long double sum = 0.0L;
-    for (std::size_t k = 0; k < fine.node.size(); ++k) sum += static_cast<long double>(fine.weight[k] * fine.node[k]) * at(fine.node[k])[0];
-    row.push_back(sum);
-    rows.push_back(std::move(row));
+    integral[row] = 0.0L;
+    for (std::size_t k = 0; k < fine.node.size(); ++k) integral[row] += static_cast<long double>(fine.weight[k] * fine.node[k]) * at(fine.node[k])[0];
   }
-  // Gauss's elimination.
-  for (std::size_t i = 0; i < size; ++i) {
-    std::size_t pivot = i;
-    for (std::size_t k = i; k < size; ++k) {
-      if (std::abs(rows[k][i]) > std::abs(rows[pivot][i])) pivot = k;
-    }
-    std::swap(rows[i], rows[pivot]);
-    for (std::size_t k = 0; k < size; ++k) {
-      if (k == i) continue;
-      const long double share = rows[k][i] / rows[i][i];
-      for (std::size_t j = i; j <= size; ++j) rows[k][j] -= share * rows[i][j];
-    }
-  }
+  const Eigen::Matrix<long double, Eigen::Dynamic, 1> weight = values.partialPivLu().solve(integral);
   EndedRule rule;
-  std::size_t column = 0;
-  const auto next = [&] {
-    const auto weight = static_cast<double>(rows[column][size] / rows[column][column]);
-    ++column;
-    return weight;
-  };
+  Eigen::Index column = 0;
+  const auto next = [&] { return static_cast<double>(weight[column++]); };
   for (std::size_t j = 0; j < gauss.node.size(); ++j) rule.node.push_back(next() / (gauss.weight[j] * gauss.node[j]));
   if (known.centre) rule.centre = next();
   if (known.centre_slope) rule.centre_slope = next();
-  if (known.centre_bend) next();
+  if (known.centre_bend) ++column;
   rule.rim = next();
   if (known.rim_slope) rule.rim_slope = next();
   return rule;
