@@ -155,5 +155,29 @@ TEST(PathTracer, FilterLeavesNoSpecklesWhereOneSeesThroughSomething) {
   EXPECT_LT(most, 6.0 * 0.035 * light);
 }
 
+TEST(PathTracer, FilterLeavesNoDotsWhereAFewPathsMeetSomethingDark) {
+  // A twentieth of an even sky is hidden behind a black plate: of two paths of a pixel hardly ever both end there.
+  const Mesh floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  const Mesh shade = plate(1.0, Vec3(0.0, 3.0, 2.0), Vec3::UnitX(), Vec3(0.0, 0.6, 0.8));
+  std::array items = {matt(floor, 0.5), matt(shade, 0.0)};
+  items[1].two_sided = true;
+  Studio studio;
+  studio.view.camera = {.from = Vec3(0, -5, 3), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.1};
+  studio.settings.width = studio.settings.height = 128;
+  studio.lights.above = Vec3f::Ones();
+  studio.settings.most_samples = 4;
+  Film film = studio.trace(items);
+  int dark = 0;
+  for (const auto& [x, y] : pixels_of(film)) dark += film.indirect.radiance.at(x, y).y() == 0.0F;
+  ASSERT_GT(dark, 0);
+  path::Denoiser{}.run(Vec3f(0, -5, 3), static_cast<float>(2.0 * std::tan(0.05) / 128.0), Executor(1), film);
+  for (int y = 1; y < 127; ++y)
+    for (int x = 1; x < 127; ++x) {
+      const auto light = [&](int px, int py) { return film.radiance.at(px, py).y(); };
+      const float around = 0.25F * (light(x - 1, y) + light(x + 1, y) + light(x, y - 1) + light(x, y + 1));
+      EXPECT_NEAR(light(x, y), around, 0.01F * around) << x << " " << y;
+    }
+}
+
 }  // namespace
 }  // namespace supple::render::test

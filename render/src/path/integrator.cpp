@@ -100,7 +100,8 @@ class Tile {
 
   /// @return mean over all pixels of their squared standard error over (luminance + 0.1) squared
   float estimate_errors() {
-    // One path a pixel knows nothing of its noise: at most what pixels differ by.
+    // One path a pixel knows nothing of its noise, which is at most what pixels differ by; a few know little, as where light is
+    // even but for rare dark paths: they count as if one of them were such a path.
     LightSum<Lanes> paths;
     for_rows([&](std::size_t, const Row& row) {
       const Sums<Lanes>& sum = row.sums;
@@ -114,9 +115,11 @@ class Tile {
       const Sums<Lanes>& sum = row.sums;
       const LaneMask shown = sum.cover > 0.0F;
       row.direct_variance = select(shown, select(sum.direct.count < 2.0F, bend(y), sum.direct.variance()), 0.0F);
-      row.indirect_variance = select(shown, select(sum.indirect.count < 2.0F, between, sum.indirect.variance()), 0.0F);
+      const Lanes own = sum.indirect.variance(), several = larger(sum.indirect.count, 1.0F);
+      row.indirect_variance = select(shown, (own * (several - 1.0F) + between / several) / several, 0.0F);
+      const Lanes error_of_paths = select(shown, select(sum.indirect.count < 2.0F, between, own), 0.0F);
       const Lanes scale = sum.direct.mean() + sum.indirect.mean() + 0.1F;
-      error2 += (row.direct_variance + row.indirect_variance) / (scale * scale);
+      error2 += (row.direct_variance + error_of_paths) / (scale * scale);
     });
     return path::total(error2) / static_cast<float>(window_.width() * window_.height());
   }
