@@ -14,5 +14,10 @@ check_package() {
   cmake -S "$supple_root/tests/package" -B "$scratch/build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
     -DCMAKE_PREFIX_PATH="$scratch/prefix" || return 1
   cmake --build "$scratch/build" || return 1
-  "$scratch/build/stranger" "$supple_root/tests/package/two_balls.yaml"
+  "$scratch/build/stranger" "$supple_root/tests/package/two_balls.yaml" || return 1
+  [[ -d $build/python ]] || return 0
+  local package
+  package=$(find "$scratch/prefix" -path '*/supple/__init__.py')
+  (cd / && PYTHONPATH=$(dirname "$(dirname "$package")") /usr/bin/python3 -B "$supple_root/tests/package/stranger.py" \
+    "$supple_root/tests/package/two_balls.yaml")
 }

@@ -27,10 +27,11 @@ small_film() {
 }
 
 logs=$supple_root/build/logs
-install_packages build run test
+install_packages build run test python
 
 part "planted defects have places" "$logs/mutate_check.log" "$here/mutate.sh" --check || true
-if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON; then
+if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON \
+  -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3; then
   part "tests (release)" "$logs/tests_release.log" run_tests release || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true
   part "small film" "$logs/small_film.log" small_film || true

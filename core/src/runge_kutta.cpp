@@ -193,7 +193,7 @@ class Stepper {
   }
   void accept(double dt, ParticleState& state, Ledger& ledger) {
     for (std::size_t s = 0; s < tableau_.b.size(); ++s) add(ledger, dt * tableau_.b[s], buffers_.stage[s].ledger);
-    std::swap(state, buffers_.trial);
+    state = buffers_.trial;  // a swap would move the arrays, which others view
   }
   /// The last stage of an accepted step is the first of the next.
   void hand_on() { std::swap(buffers_.stage[0], buffers_.stage[tableau_.c.size() - 1]); }

@@ -19,6 +19,32 @@
 #include "supple/core/parts.h"
 
 namespace supple::scenes {
+namespace {
+
+/// @throws Error{Usage} naming array and particle
+void check_particles(const core::ParticleState& particles, std::size_t n) {
+  const auto fail = [](const std::string& array, std::string expected, std::string found) {
+    throw Error(ErrorKind::Usage, Fault{.place = array, .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = {}});
+  };
+  const auto check = [&](const std::string& name, const auto& array, const auto& good, const char* what) {
+    if (array.size() != n) fail(name, "expected " + std::to_string(n) + " rows", std::to_string(array.size()));
+    const auto bad = std::find_if_not(array.begin(), array.end(), good);
+    if (bad != array.end()) fail(name, what, "others in row " + std::to_string(bad - array.begin()));
+  };
+  const auto finite = [](const Vec3& v) { return v.allFinite(); };
+  check("position", particles.position, finite, "expected finite numbers");
+  check("orientation", particles.orientation, [](const Quat& q) { return q.coeffs().allFinite() && q.norm() > 0.0; },
+        "expected finite quaternions of a length > 0");
+  check("velocity", particles.velocity, finite, "expected finite numbers");
+  check("angular_momentum", particles.angular_momentum, finite, "expected finite numbers");
+}
+
+bool same_motion(const core::ParticleState& a, const core::ParticleState& b, std::uint32_t p) {
+  return a.position[p] == b.position[p] && a.orientation[p].coeffs() == b.orientation[p].coeffs() && a.velocity[p] == b.velocity[p] &&
+         a.angular_momentum[p] == b.angular_momentum[p];
+}
+
+}  // namespace
 
 struct Simulation::Impl {
   Scene scene;
@@ -174,7 +200,10 @@ struct Simulation::Impl {
   }
 
   void take(State other) {
+    core::ParticleState arrays = std::move(state.particles);
+    arrays = other.particles;
     state = std::move(other);
+    state.particles = std::move(arrays);
     form_bodies();
     form_laws();
     SUPPLE_EXPECTS(state.samples.size() == bodies.size());
@@ -184,6 +213,35 @@ struct Simulation::Impl {
       if (state.sleep.asleep(i) && motion_of(bodies[i], particles, state.particles, laws).energy > 0.0) pushed.push_back(i);
     }
     wake(pushed);
+  }
+
+  void set_particles(core::ParticleState asked) {
+    check_particles(asked, state.particles.size());
+    std::vector<std::uint32_t> changed;
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+      const auto differs = [&](std::uint32_t p) { return !same_motion(asked, state.particles, p); };
+      if (std::any_of(bodies[i].particle.begin(), bodies[i].particle.end(), differs)) changed.push_back(i);
+    }
+    if (changed.empty()) return;
+    for (std::uint32_t p = 0; p < asked.size(); ++p) {
+      if (same_motion(asked, state.particles, p)) continue;
+      asked.orientation[p].normalize();
+      asked.velocity[p] = core::free_translation(model.particles.pinned[p], asked.velocity[p]);
+      asked.angular_momentum[p] = core::free_rotation(model.particles.pinned[p], asked.angular_momentum[p]);
+    }
+    const double energy = energies().total();
+    const core::Motion motion = core::measure_motion(model.particles, state.particles);
+    state.particles = asked;
+    state.kick.valid = false;
+    drop_results();
+    wake(changed);
+    if (scene.sleep) {
+      for (const std::uint32_t i : changed) state.sleep.quiet_for[i] = 0.0;
+    }
+    const core::Motion now = core::measure_motion(model.particles, state.particles);
+    state.ledger.external_impulse += now.momentum - motion.momentum;
+    state.ledger.external_angular_impulse += now.angular_momentum - motion.angular_momentum;
+    state.ledger.external_work += energies().total() - energy;
   }
 
   /// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces. What their surfaces held that is
@@ -544,10 +602,17 @@ double Simulation::time_step() const { return impl_->dt(); }
 std::uint64_t Simulation::state_hash() const { return impl_->state.hash(); }
 void Simulation::step() { impl_->step(); }
 
-void Simulation::step_frame() {
-  const int target = impl_->state.frame + 1;
-  while (impl_->state.frame < target) impl_->step();
+void Simulation::step_frame() { advance_to(impl_->state.frame + 1); }
+
+bool Simulation::advance_to(int frame, const std::function<bool()>& go_on) {
+  while (impl_->state.frame < frame) {
+    impl_->step();
+    if (impl_->state.frame < frame && go_on && !go_on()) return false;
+  }
+  return true;
 }
+
+void Simulation::set_particles(core::ParticleState particles) { impl_->set_particles(std::move(particles)); }
 
 void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 
@@ -66,6 +67,122 @@ objects:
     blend: {rule: graph}
 output: {mesh: ply, cell: 0.05, meshing: )" + meshing + "}\n");
   return simulation.meshes().front();
+}
+
+TEST(Advancing, EndsAtTheFrameOrWhereItIsTold) {
+  Simulation simulation = make(two_balls());
+  EXPECT_TRUE(simulation.advance_to(1, [] { return false; }));
+  EXPECT_EQ(simulation.state().steps, 0u);
+  int asked = 0;
+  EXPECT_FALSE(simulation.advance_to(3, [&] { return ++asked < 2; }));
+  EXPECT_EQ(simulation.state().steps, 2u);
+  EXPECT_TRUE(simulation.advance_to(3));
+  Simulation straight = make(two_balls());
+  run(straight, 3);
+  EXPECT_EQ(simulation.state_hash(), straight.state_hash());
+}
+
+class Arrays : public testing::TestWithParam<const char*> {};
+TEST_P(Arrays, StayWhereTheyAreInMemory) {
+  Simulation simulation = make(two_balls(std::string("integrator: {method: ") + GetParam() + "}\n"));
+  const core::ParticleState& particles = simulation.state().particles;
+  const auto places = [&] {
+    return std::array<const void*, 4>{particles.position.data(), particles.orientation.data(), particles.velocity.data(),
+                                      particles.angular_momentum.data()};
+  };
+  const auto before = places();
+  simulation.step();
+  EXPECT_EQ(places(), before) << "by a step";
+  simulation.restore(State(simulation.state()));
+  EXPECT_EQ(places(), before) << "by a state from elsewhere";
+  core::ParticleState other = particles;
+  other.position[0].x() -= 1.0;
+  simulation.set_particles(std::move(other));
+  EXPECT_EQ(places(), before) << "by other places";
+}
+INSTANTIATE_TEST_SUITE_P(Integrators, Arrays, testing::Values("symplectic", "rk4", "adaptive", "backward_euler", "implicit_midpoint"));
+
+TEST(SetParticles, WithTheSameMotionChangesNoBit) {
+  Simulation set = make(two_balls()), left = make(two_balls());
+  run(set, 3);
+  run(left, 3);
+  set.set_particles(set.state().particles);
+  EXPECT_EQ(set.state_hash(), left.state_hash());
+}
+
+TEST(SetParticles, IsAsIfTheSceneHadBegunThere) {
+  // Only the ledger tells the two apart, so what they do next is compared, to the bit.
+  Simulation set = make(two_balls());
+  Scene scene = set.scene();
+  scene.objects[0].particles.at = Vec3(-0.4, 0.1, 0.05);
+  scene.objects[1].particles.velocity = Vec3(-3, 0.5, 0);
+  Simulation born(scene);
+  set.set_particles(born.state().particles);
+  for (int k = 0; k < 20; ++k) {
+    set.step();
+    born.step();
+  }
+  EXPECT_EQ(set.state().particles.position, born.state().particles.position);
+  EXPECT_EQ(set.state().particles.angular_momentum, born.state().particles.angular_momentum);
+}
+
+TEST(SetParticles, KeepsTheAudits) {
+  // An impulse, a couple, a change of place and one of overlap in the middle of a contact: momenta stay exact, and energy as
+  // exact as the steps are without it.
+  const std::string fine = "time_step: {size: 1e-4 s}\n";
+  Simulation simulation = make(two_balls(fine)), undisturbed = make(two_balls(fine));
+  run(undisturbed, 8);
+  run(simulation, 4);
+  core::ParticleState particles = simulation.state().particles;
+  particles.position[1] += Vec3(0.0, 0.05, 0.02);
+  particles.velocity[0] += Vec3(0.5, -0.5, 1.0);
+  particles.angular_momentum[1] += Vec3(0.01, 0.02, -0.01);
+  simulation.set_particles(std::move(particles));
+  ASSERT_FALSE(simulation.contacts().summary.empty());
+  run(simulation, 8);
+  const Audits audits = simulation.audits();
+  EXPECT_LT(audits.momentum_error, 1e-13);
+  EXPECT_LT(audits.angular_momentum_error, 1e-13);
+  EXPECT_GT(std::abs(simulation.state().ledger.external_work), 0.1);
+  EXPECT_LT(audits.energy_error, 10.0 * std::max(undisturbed.audits().energy_error, 1e-6));
+}
+
+TEST(SetParticles, TakesNoVelocityOfWhatPinsHold) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+objects:
+  - name: chain
+    particles: {arrange: line, count: 3, spacing: 0.2, mass: 1}
+    interactions: [{law: bond_frame, stretch: 100, rotation: 1}]
+    pins: [{particle: 0}]
+)");
+  core::ParticleState particles = simulation.state().particles;
+  for (Vec3& v : particles.velocity) v = Vec3(0, 1, 0);
+  for (Quat& q : particles.orientation) q.coeffs() *= 3.0;
+  simulation.set_particles(particles);
+  EXPECT_EQ(simulation.state().particles.velocity[0], Vec3(Vec3::Zero()));
+  EXPECT_EQ(simulation.state().particles.velocity[2], Vec3(0, 1, 0));
+  for (const Quat& q : simulation.state().particles.orientation) EXPECT_DOUBLE_EQ(q.norm(), 1.0);
+}
+
+TEST(SetParticles, SaysWhatIsWrong) {
+  Simulation simulation = make(two_balls());
+  const auto message = [&](const auto& spoil) {
+    core::ParticleState particles = simulation.state().particles;
+    spoil(particles);
+    try {
+      simulation.set_particles(particles);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::Usage);
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(message([](auto& p) { p.position.pop_back(); }), "position: expected 2 rows, found 1");
+  EXPECT_EQ(message([](auto& p) { p.velocity[1].y() = std::nan(""); }), "velocity: expected finite numbers, found others in row 1");
+  EXPECT_EQ(message([](auto& p) { p.orientation[0].coeffs().setZero(); }),
+            "orientation: expected finite quaternions of a length > 0, found others in row 0");
 }
 
 TEST(Meshes, HaveCreasesWhereNodesOfAGraphUnite) {

@@ -222,6 +222,17 @@ TEST(Sleep, EndsByAnImpulse) {
   EXPECT_TRUE(asleep(simulation, "b_low"));
 }
 
+TEST(Sleep, EndsByAnotherPlace) {
+  Simulation simulation = make(sleeping(kGround, pairs()));
+  run_until(simulation, [&] { return all_asleep(simulation); });
+  core::ParticleState particles = simulation.state().particles;
+  particles.position[1].z() += 0.01;
+  simulation.set_particles(particles);
+  EXPECT_FALSE(asleep(simulation, "a_low"));
+  EXPECT_FALSE(asleep(simulation, "a_top"));
+  EXPECT_TRUE(asleep(simulation, "b_low"));
+}
+
 TEST(Sleep, TakesBodiesThatRepelEachOtherTogether) {
   // They touch by a law, not by surfaces: one of them alone may not rest.
   const auto particle = [](const std::string& name, double x, double speed) {

@@ -74,6 +74,8 @@ class Simulation {
 
   [[nodiscard]] const Scene& scene() const;
   [[nodiscard]] const Model& model() const;
+  /// The arrays of its particles stay where they are in memory for the life of this object, whatever steps, so that they can be
+  /// viewed.
   [[nodiscard]] const State& state() const;
   [[nodiscard]] const std::vector<Body>& bodies() const;         ///< objects, or the pieces they broke into
   [[nodiscard]] const core::Interactions& laws() const;          ///< those that nothing has broken
@@ -91,8 +93,16 @@ class Simulation {
   void step();
   /// Steps to the next frame, also past the last one of the scene.
   void step_frame();
+  /// Steps to a frame. @param go_on  asked after every step but the last: false ends the steps there; empty: nothing does
+  /// @return whether the frame is reached; true without a step where it has been already
+  bool advance_to(int frame, const std::function<bool()>& go_on = {});
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
+  /// Places and moves the particles as asked for, as an experiment does between two steps; orientations are normalised, and what
+  /// pins hold has no velocity. What this changes of momentum, angular momentum and energy is booked as given from outside, so that
+  /// the audits hold. Forces are found anew, and islands wake whose particles are not where they were.
+  /// @throws Error{Usage} for arrays of another shape, values that are not finite, and orientations of length 0
+  void set_particles(core::ParticleState particles);
 
   /// Surfaces of the current state, one an object in the order of the scene (empty without skeleton); deformed by
   /// contact, with columns "contact" and "pressure" [Pa]. Kept until the next step.

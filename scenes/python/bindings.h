@@ -1,0 +1,72 @@
+/// What the files of the Python module share: one function a topic, and a simulation as Python holds it.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "supple/scenes/simulation.h"
+
+namespace supple::python {
+
+namespace py = pybind11;
+
+void bind_errors(py::module_& module);
+void bind_scene(py::module_& module);
+void bind_simulation(py::module_& module);
+void bind_particles(py::module_& module);
+
+/// Threads pass one at a time, in the order in which they came.
+class Queue {
+ public:
+  void lock() {
+    std::unique_lock hold(mutex_);
+    const std::uint64_t mine = last_++;
+    passed_.wait(hold, [&] { return first_ == mine; });
+  }
+  void unlock() {
+    {
+      const std::lock_guard hold(mutex_);
+      ++first_;
+    }
+    passed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable passed_;
+  std::uint64_t first_ = 0, last_ = 0;
+};
+
+/// A simulation that several Python threads may use: calls wait for each other without holding the interpreter.
+class Handle {
+ public:
+  Handle(scenes::Scene scene, scenes::SimulationOptions options) : simulation_(std::move(scene), std::move(options)) {}
+
+  /// f(simulation), without the interpreter: f may not touch Python objects.
+  template <class F>
+  auto use(F&& f) {
+    const py::gil_scoped_release others_run;
+    const std::lock_guard turn(queue_);
+    return std::forward<F>(f)(simulation_);
+  }
+  /// For what never changes: the scene, and where arrays lie.
+  [[nodiscard]] const scenes::Simulation& fixed() const { return simulation_; }
+
+  std::atomic<bool> cancelled{false};
+
+ private:
+  scenes::Simulation simulation_;
+  Queue queue_;
+};
+
+/// The particles of a simulation.
+struct Particles {
+  std::shared_ptr<Handle> of;
+};
+
+}  // namespace supple::python

@@ -1,0 +1,83 @@
+#include "arrays.h"
+#include "supple/core/error.h"
+
+namespace supple::python {
+namespace {
+
+using core::ParticleSet;
+using core::ParticleState;
+
+/// Arrays stay where they are for the life of a simulation, so views need no turn.
+template <auto member>
+py::array state_view(const Particles& p) {
+  return view(p.of->fixed().state().particles.*member, keep(p.of));
+}
+template <auto member>
+py::array set_view(const Particles& p) {
+  return view(p.of->fixed().model().particles.*member, keep(p.of));
+}
+
+py::array angular_velocities(const Particles& p) {
+  return own(p.of->use([](scenes::Simulation& simulation) {
+    const ParticleSet& set = simulation.model().particles;
+    std::vector<Vec3> omega(set.size());
+    for (std::size_t i = 0; i < set.size(); ++i) omega[i] = core::angular_velocity(set, simulation.state().particles, i);
+    return omega;
+  }));
+}
+
+/// Rows of `width` numbers, in the order of C. @throws Error{Usage} naming the argument
+py::array_t<double> rows(const py::object& values, const char* argument, py::ssize_t width) {
+  using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+  const Array array = Array::ensure(values);
+  if (array && array.ndim() == 2 && array.shape(1) == width) return array;
+  PyErr_Clear();
+  const std::string found = array ? py::str(array.attr("shape")).cast<std::string>() : py::repr(py::type::of(values)).cast<std::string>();
+  throw Error(ErrorKind::Usage, Fault{.place = argument,
+                                      .key = {},
+                                      .expected = "expected an array of shape (n, " + std::to_string(width) + ")",
+                                      .found = array ? "shape " + found : found,
+                                      .hint = {}});
+}
+
+}  // namespace
+
+std::vector<Vec3> rows3(const py::object& values, const char* argument) {
+  const py::array_t<double> array = rows(values, argument, 3);
+  std::vector<Vec3> out(static_cast<std::size_t>(array.shape(0)));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Vec3>(array.data() + 3 * i);
+  return out;
+}
+
+std::vector<Quat> rows4(const py::object& values, const char* argument) {
+  const py::array_t<double> array = rows(values, argument, 4);
+  std::vector<Quat> out(static_cast<std::size_t>(array.shape(0)));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = Quat(Eigen::Map<const Eigen::Vector4d>(array.data() + 4 * i));
+  return out;
+}
+
+void bind_particles(py::module_& module) {
+  py::class_<Particles>(module, "Particles",
+                        "The particles of a simulation; row i is the same particle in every array. All arrays but angular_velocity are views:\n"
+                        "they cost nothing, follow the simulation and keep it alive, and cannot be written to (Simulation.set_particles does\n"
+                        "that). Copy what shall outlast the next step.")
+      .def_property_readonly("position", &state_view<&ParticleState::position>, "World position [m], shape (n, 3), a view.")
+      .def_property_readonly("orientation", &state_view<&ParticleState::orientation>,
+                             "Quaternion x, y, z, w, body to world, unit length, shape (n, 4), a view.")
+      .def_property_readonly("velocity", &state_view<&ParticleState::velocity>, "[m/s], shape (n, 3), a view.")
+      .def_property_readonly("angular_momentum", &state_view<&ParticleState::angular_momentum>,
+                             "About the particle's centre, world axes [kg m^2/s], shape (n, 3), a view.")
+      .def_property_readonly("angular_velocity", &angular_velocities, "World axes [rad/s], shape (n, 3), computed.")
+      .def_property_readonly("mass", &set_view<&ParticleSet::mass>, "[kg], shape (n,), a view.")
+      .def_property_readonly("inertia", &set_view<&ParticleSet::inertia>, "Principal moments, body axes [kg m^2], shape (n, 3), a view.")
+      .def_property_readonly("normal", &set_view<&ParticleSet::normal>, "The fixed unit vector of each particle, body axes, shape (n, 3), a view.")
+      .def_property_readonly("object", &set_view<&ParticleSet::object>, "Number of its object in Scene.objects, shape (n,), a view.")
+      .def_property_readonly("pinned", &set_view<&ParticleSet::pinned>,
+                             "Sum of 1: position held, 2: orientation held, 4: moves in its plane z = const; shape (n,), a view.")
+      .def("__len__", [](const Particles& p) { return p.of->fixed().model().particles.size(); })
+      .def("__repr__", [](const Particles& p) {
+        return "<supple.Particles, " + std::to_string(p.of->fixed().model().particles.size()) + ">";
+      });
+}
+
+}  // namespace supple::python

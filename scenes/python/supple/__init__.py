@@ -1,0 +1,23 @@
+"""Soft objects that touch exactly: scenes, simulations and their results as NumPy arrays.
+
+    import supple
+
+    scene = supple.read_scene("two_balls.yaml", {"objects.left.particles.mass": 0.3})
+    simulation = supple.Simulation(scene)
+    for frame in simulation.frames():
+        print(frame, simulation.time, simulation.particles.position[0])
+    print(simulation.audits(), simulation.state_hash)
+
+Units are SI. Vectors are rows of arrays of shape (n, 3), quaternions rows x, y, z, w that map body axes to world axes.
+Arrays that are called views show the library's own memory: they follow the simulation and cannot be written to.
+"""
+from supple import _supple
+from supple._errors import ContractViolation, Error, Fault
+from supple._supple import *
+from supple._supple import __version__
+
+__all__ = sorted(name for name in dir() if not name.startswith("_"))
+
+for _thing in (ContractViolation, Error, Fault, *vars(_supple).values()):
+    if isinstance(_thing, type):
+        _thing.__module__ = "supple"
