@@ -375,12 +375,15 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, 
   return true;
 }
 
-/// What the rim and the heights are off by, and what rounding of the coordinates does to so thin an overlap.
-double PolarRuleSolver::algebraic_error() const {
+/// What the heights are off by, and what rounding of the coordinates does to so thin an overlap.
+double PolarRuleSolver::placing_error() const {
   const double coordinates = frame_.origin.lpNorm<Eigen::Infinity>() + size_;
   const double rounding = 16.0 * kEpsilon * (1.0 + coordinates / frame_.thickness);
-  return 2.0 * rim_error_ + lift_ / std::sqrt(fine_.area) + rounding;
+  return lift_ / std::sqrt(fine_.area) + rounding;
 }
+
+/// The same, and what the rim is off by.
+double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + placing_error(); }
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                             const Regions& regions, double extent,
@@ -475,7 +478,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
     if (estimate_ > error && !any) return false;
     // Which rule is enough is not asked of this bound, as energies converge later.
     if (r <= kFinestJudged && (smooth || (!any && third_.empty() && error < kSplitBelow && clear_of_kinks(pressure)))) {
-      estimate_ = std::min(estimate_, bound_by_ends(r, round) + 2.0 * algebraic_error());
+      estimate_ = std::min(estimate_, bound_by_ends(r, round));
     }
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);

@@ -84,9 +84,10 @@ class PolarRuleSolver {
   bool add_columns(PairPressure& pressure, int column, int side, double error, Region region, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance);
   void start_rim(const PolarRule& rule, bool first);
+  [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
   // Bounds on smooth patches: smooth_bound.cpp.
-  [[nodiscard]] double unseen_by_angles() const;
+  [[nodiscard]] double unseen_by_angles(std::size_t r) const;
   [[nodiscard]] double bound_by_ends(std::size_t r, bool round) const;
   [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }

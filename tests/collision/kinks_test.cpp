@@ -512,13 +512,12 @@ TEST(SmoothPatches, HaveBoundsNearTheirErrorsBesideKinks) {
   }
 }
 
-TEST(SmoothPatches, HaveBoundsNearTheirErrorsWhereTheyAreNotRound) {
-  benchmarks::Rigid a(benchmarks::wyvill_shape(ShapeKind::Ellipsoid, Vec3(0.2, 0.3, 0.25), 0.2), 1e6, 0.03);
-  benchmarks::Rigid b(benchmarks::wyvill_shape(ShapeKind::Ellipsoid, Vec3(0.25, 0.2, 0.2), 0.2), 2e6, 0.03);
+/// Bounds over errors at 1e-3 and 1e-6, rising, of smooth patches between bodies pressed together by some share of `size`; no bound may be below its error.
+std::array<std::vector<double>, 2> bounds_over_errors(benchmarks::Rigid& a, benchmarks::Rigid& b, double size, int poses) {
   benchmarks::Draw draw(5);
-  std::vector<double> ratio[2];
-  for (int i = 0; i < 60; ++i) {
-    benchmarks::press(a, b, draw.logarithmic(0.01, 0.3) * 0.1, draw);
+  std::array<std::vector<double>, 2> ratio;
+  for (int i = 0; i < poses; ++i) {
+    benchmarks::press(a, b, draw.logarithmic(0.01, 0.3) * size, draw);
     const Executor executor(1);
     const std::array<ContactBody, 2> bodies{a.body(), b.body()};
     ContactCandidates candidates;
@@ -529,17 +528,32 @@ TEST(SmoothPatches, HaveBoundsNearTheirErrorsWhereTheyAreNotRound) {
       return surface.summary.at(0);
     };
     const ContactSurface::Summary fine = solve(1e-10);
-    for (const int which : {0, 1}) {
+    if (fine.kinks > 0) continue;
+    for (const std::size_t which : {0u, 1u}) {
       const ContactSurface::Summary s = solve(which == 0 ? 1e-3 : 1e-6);
       const double off = benchmarks::difference(s, {fine.force.norm(), fine.area, fine.centre_of_pressure});
       EXPECT_LE(off, s.error_estimate + fine.error_estimate) << i;
       if (off > 10.0 * fine.error_estimate) ratio[which].push_back(s.error_estimate / off);
     }
   }
-  for (std::vector<double>& some : ratio) {
-    ASSERT_GT(some.size(), 30u);
-    std::nth_element(some.begin(), some.begin() + static_cast<std::ptrdiff_t>(some.size() / 2), some.end());
-    EXPECT_LT(some[some.size() / 2], 20.0);  // 50 and 70 by what two rules differ by
+  for (std::vector<double>& some : ratio) std::sort(some.begin(), some.end());
+  return ratio;
+}
+
+TEST(SmoothPatches, HaveBoundsNearTheirErrorsWhereTheyAreNotRound) {
+  benchmarks::Rigid a(benchmarks::wyvill_shape(ShapeKind::Ellipsoid, Vec3(0.2, 0.3, 0.25), 0.2), 1e6, 0.03);
+  benchmarks::Rigid b(benchmarks::wyvill_shape(ShapeKind::Ellipsoid, Vec3(0.25, 0.2, 0.2), 0.2), 2e6, 0.03);
+  for (const std::vector<double>& ratio : bounds_over_errors(a, b, 0.1, 60)) {
+    ASSERT_GT(ratio.size(), 30u);
+    EXPECT_LT(ratio[ratio.size() / 2], 10.0);  // 50 and 70 by what two rules differ by, 11 by what Newton's last steps to the rim may leave
+  }
+}
+
+TEST(SmoothPatches, HaveBoundsNearTheirErrorsInsideTheSupportsOfManyBlobs) {
+  benchmarks::Rigid a(benchmarks::ten_blobs(1), 1e6, 0.03), b(benchmarks::ten_blobs(2), 2e6, 0.03);
+  for (const std::vector<double>& ratio : bounds_over_errors(a, b, 0.05, 600)) {
+    ASSERT_GT(ratio.size(), 10u);
+    EXPECT_LT(ratio[ratio.size() / 2], 30.0);  // 2,300 at 1e-3 where borders of supports near the patch are not known to leave it alone
   }
 }
 
