@@ -5,6 +5,7 @@
 
 #include "field_box_bounds.h"
 #include "field_index.h"
+#include "shape_curvature.h"
 #include "shortest_in_hull.h"
 
 namespace supple::implicit {
@@ -35,38 +36,15 @@ struct Expansion {
   }
 };
 
-/// Least second derivative of half the squared distance to a shape, at most 0; the largest is 1. Minus infinity where it has no
-/// bound. Convex shapes have 0, circles the 1 - r / rho of the direction around their axis.
-/// @param y, reach  centre and radius of a ball in the shape's frame that holds the box
-double least_bend(const PackedShape& shape, const Vec3& y, double reach) {
-  if (shape.foot == PackedFoot::Slab || shape.foot == PackedFoot::Disc || shape.view.kind == ShapeKind::Triangle ||
-      shape.view.kind == ShapeKind::Polygon) {
-    return 0.0;
-  }
-  const double rho = y.head<2>().norm() - reach;
-  if (!(rho > 0.0)) return -kInfinity;
-  // Opposite to its middle an arc's nearest point steps from one end to the other.
-  if (shape.view.kind == ShapeKind::Arc && y.x() <= reach && std::abs(y.y()) <= reach) return -kInfinity;
-  return std::min(1.0 - shape.view.size.x() / rho, 0.0);
-}
-
-/// Whether small enough boxes have bounds of second order almost everywhere.
-bool can_expand(const PackedShape& shape) {
-  const ShapeKind kind = shape.view.kind;
-  return shape.foot != PackedFoot::Scalar || kind == ShapeKind::Triangle || kind == ShapeKind::Polygon || kind == ShapeKind::Ring ||
-         kind == ShapeKind::Arc;
-}
-
-/// @param known  becomes false where a primitive has no bounds of second order on any box
-void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansion& sum, bool& known) {
+void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansion& sum) {
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const PackedPrimitive& p = index.primitive[id];
   const PackedShape& shape = index.shape[id];
   const double reach = 0.5 * box.extent().norm();
   sum.scale += shape.peak + shape.lipschitz * reach;
   sum.terms += 1.0;
-  const double stretch = shape.distance_scale * shape.distance_scale;
   const Eigen::Map<const RowMajor> A(shape.to_local.data());
+  const double metric2 = A.rowwise().squaredNorm().maxCoeff() * (1.0 + 4.0 * kEps);  // its rows are orthogonal
   const Vec3 y = A * (box.centre() - Vec3(p.position[0], p.position[1], p.position[2]));
   CurvatureRange curvature;
   Potential centre;
@@ -77,19 +55,15 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
     curvature = {shape.peak * curvature.lower, shape.peak * curvature.upper};
     centre = convolve(shape.view, shape.kernel, y);
     sum.scale += 1e4 * shape.peak;  // sums over edges cancel
-  } else if (can_expand(shape)) {
+  } else {
     const DistanceRange range = distance_range(index, id, box);
     const bool clipped = !(index.support[id].contains(box.lower) && index.support[id].contains(box.upper));
-    const double near = std::sqrt(range.near2), far = clipped ? shape.kernel.radius : std::sqrt(range.far2);
-    curvature = curvature_range(shape.kernel, near, far);
-    const double bend = least_bend(shape, y, shape.distance_scale * reach);
-    if (bend < 0.0) curvature.upper += bend * curvature.lower;
+    const double far = clipped ? shape.kernel.radius : std::min(std::sqrt(range.far2), shape.kernel.radius);
+    const ShapeBall ball{.centre = y, .reach = std::sqrt(metric2) * reach, .far = far};
+    curvature = shape_curvature(shape.view, ball, curvature_range(shape.kernel, std::sqrt(range.near2), far));
     const FootSample sample = foot(shape.view, y);
     const KernelSample kernel = supple::implicit::evaluate(shape.kernel, sample.q);
     centre = {kernel.value, 2.0 * kernel.slope * sample.half_gradient};
-  } else {
-    known = false;
-    curvature.upper = kInfinity;
   }
   if (!std::isfinite(curvature.lower) || !std::isfinite(curvature.upper)) {
     const PrimitiveBound one = bound_primitive(index, id, box, false);
@@ -99,13 +73,13 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
   }
   sum.value += centre.value;
   sum.gradient += A.transpose() * centre.gradient;
-  sum.curvature = {sum.curvature.lower + stretch * curvature.lower, sum.curvature.upper + stretch * curvature.upper};
+  sum.curvature = {sum.curvature.lower + metric2 * curvature.lower, sum.curvature.upper + metric2 * curvature.upper};
 }
 
 Interval intersection(const Interval& a, const Interval& b) { return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)}; }
 
 /// Expansions of the nodes of a blend that a box touches, in rising order.
-void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansion>& nodes, bool& known) {
+void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansion>& nodes) {
   nodes.clear();
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (!index.support[id].overlaps(box)) continue;
@@ -114,7 +88,7 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
     if (place == nodes.end() || place->node != node) place = nodes.insert(place, Expansion{.node = node});
     const PrimitiveBound one = bound_primitive(index, id, box, false);
     place->plain = {place->plain.lower + one.value.lower, place->plain.upper + one.value.upper};
-    expand(index, id, box, *place, known);
+    expand(index, id, box, *place);
   }
 }
 
@@ -167,8 +141,7 @@ Field::BoxBounds blended_box_bounds(const Field::Index& index, const Box& box, c
   thread_local std::vector<Expansion> nodes;
   thread_local std::vector<BlendIndex::NodeBound> bounds;
   thread_local std::vector<BlendIndex::Term> terms;
-  bool known = true;
-  expand_nodes(index, box, nodes, known);
+  expand_nodes(index, box, nodes);
   if (nodes.empty()) return {.value = plain, .second_order = true};
   const Vec3 half = 0.5 * box.extent();
   bounds.clear();
@@ -183,7 +156,7 @@ Field::BoxBounds blended_box_bounds(const Field::Index& index, const Box& box, c
   const Interval sum = index.blend.bound(bounds);
   const double n = static_cast<double>(nodes.size()), round_off = (32.0 + 4.0 * n * n) * kEps;
   Field::BoxBounds out{.value = intersection(plain, {sum.lower - index.iso - round_off * scale, sum.upper - index.iso + round_off * scale}),
-                       .second_order = known};
+                       .second_order = true};
   if (index.blend.rule() != BlendRule::Ricci && !index.blend.find_terms(bounds, terms)) return {.value = out.value};
   if (!sloped || half.isZero()) return out;
   const Vec3 direction = uphill(index.blend, nodes, bounds, terms);
@@ -206,13 +179,12 @@ GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}};
   if (index.blend.active()) return {blended_box_bounds(index, box, plain)};
   Expansion sum{.value = -index.iso, .scale = index.iso};
-  bool known = true;
   for (const std::uint32_t id : candidates_of(index, box)) {
-    if (index.support[id].overlaps(box)) expand(index, id, box, sum, known);
+    if (index.support[id].overlaps(box)) expand(index, id, box, sum);
   }
   if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, Vec3::Zero(), 0.0};
   const Vec3 half = 0.5 * box.extent();
-  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = known}};
+  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}};
   if (sum.sloped && half.maxCoeff() > 0.0) {
     out.gradient = sum.gradient;
     out.turn = sum.turn(half.norm()) + sum.round_off() / half.maxCoeff();

@@ -104,65 +104,108 @@ struct Curve {
 
 constexpr int kMostDegree = 6;
 
-/// Real roots of sum_i c_i t^i in (0, 1), in rising order: between two roots of the derivative the polynomial is monotone,
-/// so that a change of sign brackets exactly one.
-int roots_in_unit(const double* c, int degree, double* roots) noexcept {
-  while (degree > 0 && c[degree] == 0.0) --degree;
-  if (degree == 0) return 0;
-  if (degree == 1) {
-    const double t = -c[0] / c[1];
-    if (!(t > 0.0 && t < 1.0)) return 0;
-    roots[0] = t;
-    return 1;
-  }
-  double derivative[kMostDegree] = {};
-  for (int i = 0; i < degree; ++i) derivative[i] = (i + 1) * c[i + 1];
-  double knot[kMostDegree + 2] = {};
-  const int inner = roots_in_unit(derivative, degree - 1, knot + 1);
-  knot[0] = 0.0;
-  knot[inner + 1] = 1.0;
-  const auto at = [&](double t, double& slope) {
-    double value = c[degree];
+/// sum_i c_i t^i of a fixed degree.
+struct Polynomial {
+  std::array<double, kMostDegree + 1> c{};
+  int degree = kMostDegree;
+
+  [[nodiscard]] double at(double t, double& slope) const noexcept {
+    double value = coefficient(degree);
     slope = 0.0;
     for (int i = degree - 1; i >= 0; --i) {
       slope = slope * t + value;
-      value = value * t + c[i];
+      value = value * t + coefficient(i);
     }
     return value;
-  };
-  int count = 0;
-  double slope = 0.0;
-  double f_low = at(0.0, slope);
-  for (int k = 0; k <= inner; ++k) {
-    double low = knot[k], high = knot[k + 1];
-    const double f_high = at(high, slope);
-    const bool rises = f_high > f_low;
-    if ((f_low < 0.0 && f_high > 0.0) || (f_low > 0.0 && f_high < 0.0)) {
-      double t = low + (high - low) * (f_low / (f_low - f_high));
-      for (int i = 0; i < 60; ++i) {
-        if (!(t > low && t < high)) t = 0.5 * (low + high);
-        const double f = at(t, slope);
-        if (f == 0.0) break;
-        ((f < 0.0) == rises ? low : high) = t;
-        double next = t - f / slope;
-        // Newton from the bracket's bad side may crawl: every third step halves.
-        if (!(next > low && next < high) || i % 3 == 2) next = 0.5 * (low + high);
-        const double step = std::abs(next - t);
-        t = next;
-        if (step < 1e-15) break;
-      }
-      roots[count++] = t;
-    } else if (f_high == 0.0 && high < 1.0) {
-      roots[count++] = high;
-    }
-    f_low = f_high;
   }
-  return count;
+  [[nodiscard]] double coefficient(int i) const noexcept { return c[static_cast<std::size_t>(i)]; }
+};
+
+/// Where the polynomial rises through zero between low, where it is negative, and high: Newton's steps, or halves where those
+/// leave the bracket or do not shrink by half.
+double rising_root(const Polynomial& polynomial, double low, double high) noexcept {
+  double t = 0.5 * (low + high), before = high - low, step = before;
+  for (int i = 0; i < 120; ++i) {
+    double slope = 0.0;
+    const double f = polynomial.at(t, slope);
+    if (f == 0.0) break;
+    (f < 0.0 ? low : high) = t;
+    double next = t - f / slope;
+    if (!(next > low && next < high) || std::abs(next - t) > 0.5 * before) next = 0.5 * (low + high);
+    before = step;
+    step = std::abs(next - t);
+    t = next;
+    if (step < 1e-15) break;
+  }
+  return t;
 }
 
-/// q = min over t of |y - g(t)|^2 / w(t)^2, w = 1 + (taper - 1) t. As the minimum over t its gradient is that at fixed t.
-FootSample curve(std::span<const Vec3> control, double taper, const Vec3& y, Mat3* second) noexcept {
-  const Curve curve(control);
+/// Where a polynomial rises through zero in (0, 1), by the signs of its coefficients after Bernstein: without a change of sign there is
+/// no root, with one there is one, with more the interval is halved.
+class RisingRoots {
+ public:
+  explicit RisingRoots(const Polynomial& polynomial) noexcept : polynomial_(polynomial) {
+    const int n = polynomial.degree;
+    Coefficients b{};
+    for (int i = 0; i <= n; ++i) {
+      double share = 1.0;  // C(i, k) / C(n, k)
+      for (int k = 0; k <= i; ++k) {
+        b[static_cast<std::size_t>(i)] += share * polynomial.coefficient(k);
+        share *= static_cast<double>(i - k) / static_cast<double>(n - k);
+      }
+    }
+    search(b, 0.0, 1.0);
+  }
+  [[nodiscard]] std::span<const double> roots() const noexcept { return {roots_.data(), count_}; }
+
+ private:
+  using Coefficients = std::array<double, kMostDegree + 1>;
+
+  void search(Coefficients& b, double low, double high) noexcept {
+    const auto n = static_cast<std::size_t>(polynomial_.degree);
+    int changes = 0;
+    double last = 0.0;
+    bool rises = false;
+    for (std::size_t i = 0; i <= n; ++i) {
+      if (b[i] == 0.0) continue;
+      if (last * b[i] < 0.0) ++changes;
+      rises = b[i] > 0.0;
+      last = std::copysign(1.0, b[i]);
+    }
+    if (changes == 0 || count_ == roots_.size()) return;
+    if (changes == 1) {
+      if (rises) roots_[count_++] = rising_root(polynomial_, low, high);
+      return;
+    }
+    constexpr double kLeast = 0x1p-40;  // roots that lie nearer together count as one
+    if (high - low < kLeast) {
+      roots_[count_++] = 0.5 * (low + high);
+      return;
+    }
+    Coefficients left{};
+    for (std::size_t k = 0; k <= n; ++k) {  // de Casteljau's triangle: its sides are the coefficients of both halves
+      left[k] = b[0];
+      for (std::size_t i = 0; i < n - k; ++i) b[i] = 0.5 * (b[i] + b[i + 1]);
+    }
+    Coefficients& right = b;
+    const double middle = 0.5 * (low + high);
+    if (right[0] == 0.0 && count_ < roots_.size()) roots_[count_++] = middle;
+    search(left, low, middle);
+    search(right, middle, high);
+  }
+
+  const Polynomial& polynomial_;
+  std::array<double, kMostDegree + 1> roots_{};
+  std::size_t count_ = 0;
+};
+
+/// Derivative by t of what vanishes where |y - g|^2 / w^2 is stationary: (g - y).g' w - |g - y|^2 w'.
+double stationary_slope(const BezierPoint& p, const Vec3& gap, double w, double k) noexcept {
+  return w * (p.first.squaredNorm() - gap.dot(p.second)) + k * gap.dot(p.first);
+}
+
+/// Where |y - g(t)|^2 / w(t)^2 is least on [0, 1], w = 1 + (taper - 1) t.
+double nearest_parameter(const Curve& curve, double taper, const Vec3& y) noexcept {
   const double k = taper - 1.0;
   const int m = curve.degree;
   // Stationary: (g - y).g' w - |g - y|^2 w' = 0.
@@ -176,42 +219,44 @@ FootSample curve(std::span<const Vec3> control, double taper, const Vec3& y, Mat
       if (j > 0) along[i + j - 1] += j * product;
     }
   }
-  double c[kMostDegree + 2] = {};
+  Polynomial stationary{.degree = k != 0.0 ? 2 * m : 2 * m - 1};
   for (int i = 0; i <= 2 * m; ++i) {
-    c[i] += along[i] - k * square[i];
-    c[i + 1] += k * along[i];
+    const auto at = static_cast<std::size_t>(i);
+    stationary.c[at] += along[i] - k * square[i];
+    if (i < 2 * m) stationary.c[at + 1] += k * along[i];
   }
-  double candidate[kMostDegree + 2] = {0.0, 1.0};
-  const int count = 2 + roots_in_unit(c, std::min(2 * m, kMostDegree), candidate + 2);
   double least = std::numeric_limits<double>::infinity();
   double best = 0.0;
-  for (int i = 0; i < count; ++i) {
-    const double w = 1.0 + k * candidate[i];
-    const double q = (y - curve.at(candidate[i]).point).squaredNorm() / (w * w);
+  const auto consider = [&](double t) {
+    const double w = 1.0 + k * t, q = (y - curve.at(t).point).squaredNorm() / (w * w);
     if (q < least) {
       least = q;
-      best = candidate[i];
+      best = t;
     }
-  }
+  };
+  consider(0.0);
+  consider(1.0);
+  const RisingRoots rising(stationary);
+  for (const double t : rising.roots()) consider(t);
   // The polynomial's coefficients cancel; one Newton step on the geometry itself mends what that cost.
-  const bool interior = best > 0.0 && best < 1.0;
-  BezierPoint p = curve.at(best);
-  Vec3 gap = y - p.point;
-  double w = 1.0 + k * best;
-  const auto stationary_slope = [&] { return w * (p.first.squaredNorm() - gap.dot(p.second)) + k * gap.dot(p.first); };
-  if (interior) {
-    const double slope = stationary_slope();
-    if (slope > 0.0) {
-      const double t = std::clamp(best - (-gap.dot(p.first) * w - k * gap.squaredNorm()) / slope, 0.0, 1.0);
-      p = curve.at(t);
-      gap = y - p.point;
-      w = 1.0 + k * t;
-    }
-  }
+  if (!(best > 0.0 && best < 1.0)) return best;
+  const BezierPoint p = curve.at(best);
+  const Vec3 gap = y - p.point;
+  const double w = 1.0 + k * best, slope = stationary_slope(p, gap, w, k);
+  return slope > 0.0 ? std::clamp(best - (-gap.dot(p.first) * w - k * gap.squaredNorm()) / slope, 0.0, 1.0) : best;
+}
+
+/// q = min over t of |y - g(t)|^2 / w(t)^2. As the minimum over t its gradient is that at fixed t.
+FootSample curve(std::span<const Vec3> control, double taper, const Vec3& y, Mat3* second) noexcept {
+  const Curve curve(control);
+  const double k = taper - 1.0, t = nearest_parameter(curve, taper, y);
+  const BezierPoint p = curve.at(t);
+  const Vec3 gap = y - p.point;
+  const double w = 1.0 + k * t;
   if (second != nullptr) {
     *second = 2.0 / (w * w) * Mat3::Identity();
-    const double slope = stationary_slope();
-    if (interior && slope > 0.0) {
+    const double slope = stationary_slope(p, gap, w, k);
+    if (t > 0.0 && t < 1.0 && slope > 0.0) {
       // H = phi_yy - phi_yt phi_ty / phi_tt for phi = |y - g|^2 / w^2, phi_t = 2 / w^3 (what vanishes).
       const Vec3 mixed = -2.0 / (w * w) * (p.first + 2.0 * k / w * gap);
       *second -= mixed * mixed.transpose() / (2.0 * slope / (w * w * w));
@@ -313,6 +358,8 @@ FootSample directed(const ShapeView& shape, const Vec3& y, Mat3* second) noexcep
 }  // namespace
 
 BezierPoint bezier(std::span<const Vec3> control, double t) noexcept { return Curve(control).at(t); }
+
+double nearest_on_curve(const ShapeView& shape, const Vec3& y) noexcept { return nearest_parameter(Curve(shape.control), shape.taper, y); }
 
 ShapeView view_of(const Primitive& primitive) noexcept {
   ShapeView view{.kind = primitive.shape,

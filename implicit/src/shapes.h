@@ -43,6 +43,8 @@ struct BezierPoint {
   Vec3 point, first, second;
 };
 [[nodiscard]] BezierPoint bezier(std::span<const Vec3> control, double t) noexcept;
+/// Where a curve is nearest by distance over width, in [0, 1].
+[[nodiscard]] double nearest_on_curve(const ShapeView& shape, const Vec3& y) noexcept;
 
 /// Where a placed primitive is not zero, relative to its position, world axes.
 struct Support {

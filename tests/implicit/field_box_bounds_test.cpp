@@ -22,6 +22,7 @@ struct Case {
   bool convolved = false;
   BlendRule rule = BlendRule::Sum;
   std::uint32_t group = 1;  ///< parts in a node
+  double taper = 1.0;
 };
 std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
 
@@ -38,7 +39,7 @@ Body body_of_case(const Case& c) {
     p.convolved = c.convolved;
     p.size = 0.5 * Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1));
     testing::set_details(p, random, 0.5);
-    p.taper = 1.0;
+    p.taper = c.taper;
     if (c.convolved) p.stretch = Vec3::Ones();
     body.skeleton.primitive.push_back(p);
     body.parts.push_back({random.in_box(0.9), random.rotation()});
@@ -77,7 +78,7 @@ TEST_P(BoundsOnBoxes, HoldValuesAndGradientsAndAreOfUse) {
   std::vector<Vec3> points(32), gradients(32);
   std::vector<double> values(32);
   int violations = 0, crossed = 0, steep = 0;
-  for (int trial = 0; trial < 4000; ++trial) {
+  for (int trial = 0; trial < 6000; ++trial) {
     const double size = 0.3 * std::pow(10.0, -2.5 * random.uniform(0, 1));
     const Vec3 half = 0.5 * size * (Vec3::Ones() + 0.9 * random.in_box(1.0));
     Vec3 centre = random.in_box(1.1);
@@ -114,6 +115,12 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{.name = "rings", .shape = ShapeKind::Ring}, Case{.name = "arcs", .shape = ShapeKind::Arc},
                       Case{.name = "arcs_gascuel", .shape = ShapeKind::Arc, .kernel = kGascuel},
                       Case{.name = "triangles", .shape = ShapeKind::Triangle},
+                      Case{.name = "tapered_segments", .shape = ShapeKind::Segment, .taper = 1.5},
+                      Case{.name = "tapered_gascuel", .shape = ShapeKind::Segment, .kernel = kGascuel, .taper = 0.6},
+                      Case{.name = "curves", .shape = ShapeKind::Curve}, Case{.name = "tapered_curves", .shape = ShapeKind::Curve, .taper = 0.7},
+                      Case{.name = "superquadrics", .shape = ShapeKind::Superquadric},
+                      Case{.name = "directed", .shape = ShapeKind::Directed},
+                      Case{.name = "directed_gascuel", .shape = ShapeKind::Directed, .kernel = kGascuel},
                       Case{.name = "convolved_segments", .shape = ShapeKind::Segment, .convolved = true},
                       Case{.name = "convolved_arcs", .shape = ShapeKind::Arc, .kernel = Kernel::cauchy(0.5, 2.0), .convolved = true},
                       Case{.name = "convolved_triangles", .shape = ShapeKind::Triangle, .kernel = Kernel::murakami(0.5), .convolved = true},

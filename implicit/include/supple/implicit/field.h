@@ -39,14 +39,14 @@ class Field {
 
   /// Bounds of F on a box, never wider than `bound` and on small boxes with overlapping primitives far narrower: value and
   /// gradient at the centre and bounds of the second derivatives leave an error of second order in the box. Costs about
-  /// twice as much. Tapered segments, curves, superquadrics and directed shapes are bounded by their distances alone.
+  /// twice as much.
   [[nodiscard]] Interval tight_bound(const Box& box) const;
   /// The same, and what |grad F| is at least [1/m]: above 0 only on boxes so small that the gradient hardly turns. Where a
   /// blend has creases, all of Clarke's generalised gradient is meant: F has no extremum in a box where it is above 0.
   struct BoxBounds {
     Interval value{};
     double least_slope = 0.0;
-    bool second_order = false;  ///< false: the slope stays 0 on smaller boxes too, for some second derivative has no bound
+    bool second_order = false;  ///< false: the slope stays 0 on smaller boxes too, as where blends go by gradients
   };
   [[nodiscard]] BoxBounds box_bounds(const Box& box) const;
 

@@ -28,7 +28,7 @@ struct MissedPieces {
 /// oriented, with vertices on the surface and its normals. Pieces are told apart on a lattice of a 16th of the cell: where a
 /// way to a node is thinner, its end counts as a piece; what lies between its nodes alone is undecided, or one with a part of its
 /// sign that is nearer than its cell. With `undecided` zero no other piece is left; where fields have no bounds of second order
-/// (Field::box_bounds) all cells that the surface passes count there. The result does not depend on the number of threads. Nodes
+/// (Field::box_bounds: blends by gradients) all cells that the surface passes count there. The result does not depend on the number of threads. Nodes
 /// have the signs of F in double precision. @throws Error{Limit} when the lattice has too many blocks, see find_surface_blocks.
 MissedPieces add_missed_pieces(const Field& field, const Lattice& lattice, const Executor& executor, Mesh& mesh);
 
