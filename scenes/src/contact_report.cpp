@@ -33,4 +33,14 @@ ContactReport report_contacts(Simulation& simulation) {
   return report;
 }
 
+const char* rule_name(collision::ContactRule rule) {
+  switch (rule) {
+    case collision::ContactRule::Polar: return "polar";
+    case collision::ContactRule::Samples: return "samples";
+    case collision::ContactRule::March: return "march";
+    case collision::ContactRule::None: break;
+  }
+  return "none";
+}
+
 }  // namespace supple::scenes

@@ -288,8 +288,11 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
     implicit::add_motion(frame.field[i], parts, context.executor, surfaces[i]);
   }
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (!surfaces[i].position.empty())
-      add_look_columns(model, bodies[i], particles, laws, frame.field[i], frame.pose[i], context.executor, surfaces[i]);
+    if (surfaces[i].position.empty()) continue;
+    add_look_columns(model, bodies[i], particles, laws, frame.field[i], frame.pose[i], context.executor, surfaces[i]);
+    if (model.objects[bodies[i].object].look.colour_by == ColourByName::Pressure) {
+      add_pressure(frame.bodies, frame.surface, i, context.executor, surfaces[i]);
+    }
   }
   std::vector<Mesh> meshes(model.objects.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {

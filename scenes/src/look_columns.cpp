@@ -1,5 +1,7 @@
 #include "look_columns.h"
 
+#include <algorithm>
+
 #include "supple/core/parts.h"
 #include "supple/implicit/mesh_columns.h"
 
@@ -54,6 +56,27 @@ void add_look_columns(const Model& model, const Body& body, const core::Particle
       parts.push_back({.centre = places[k], .velocity = velocity[k], .angular_velocity = spin[k], .id = body.particle[k]});
     implicit::add_speed(field, parts, executor, mesh);
   }
+}
+
+void add_pressure(std::span<const collision::ContactBody> bodies, const collision::ContactSurface& surface, std::uint32_t body,
+                  const Executor& executor, Mesh& mesh) {
+  constexpr std::size_t kBlock = 1024;
+  std::vector<double> pressure(mesh.vertex_count(), 0.0);
+  for (const auto& s : surface.summary) {
+    if (s.bodies.a != body && s.bodies.b != body) continue;
+    const collision::ContactBody &own = bodies[body], &other = bodies[s.bodies.a == body ? s.bodies.b : s.bodies.a];
+    executor.for_blocks(pressure.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      const std::span<const Vec3> points = std::span(mesh.position).subspan(begin, end - begin);
+      std::vector<double> inside(points.size()), in_other(points.size());
+      own.field.evaluate(points, inside);
+      other.field.evaluate(points, in_other);
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        const double here = std::min(own.material.modulus * inside[k], other.material.modulus * in_other[k]);
+        pressure[begin + k] = std::max(pressure[begin + k], here);
+      }
+    });
+  }
+  mesh.columns.push_back({.name = "pressure", .values = std::move(pressure)});
 }
 
 }  // namespace supple::scenes

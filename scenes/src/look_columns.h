@@ -1,6 +1,7 @@
 /// Columns of a body's mesh that its look asks for: rest coordinates for textures, stretch of bonds, speed.
 #pragma once
 
+#include "supple/collision/contact_surface.h"
 #include "supple/core/executor.h"
 #include "supple/scenes/model.h"
 
@@ -10,5 +11,10 @@ namespace supple::scenes {
 void add_look_columns(const Model& model, const Body& body, const core::ParticleState& particles,
                       const core::Interactions& laws, const implicit::FieldView& field, std::span<const Pose> poses,
                       const Executor& executor, Mesh& mesh);
+
+/// Adds the column "pressure" [Pa]: min(p_A, p_B) where the body's surface is pressed in by another one, 0 elsewhere.
+/// @param bodies  as contact sees them   @param surface  where they touch
+void add_pressure(std::span<const collision::ContactBody> bodies, const collision::ContactSurface& surface, std::uint32_t body,
+                  const Executor& executor, Mesh& mesh);
 
 }  // namespace supple::scenes

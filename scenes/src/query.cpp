@@ -13,6 +13,8 @@
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"
 #include "supple/implicit/polygonise.h"
+#include "supple/scenes/contact_report.h"
+#include "supple/scenes/probe.h"
 
 namespace supple::scenes {
 namespace {
@@ -24,16 +26,6 @@ ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 std::string body_name(const Simulation& simulation, std::uint32_t body) {
   return body_name(simulation.model(), simulation.bodies(), body);
-}
-
-std::string rule_name(collision::ContactRule rule) {
-  switch (rule) {
-    case collision::ContactRule::Polar: return "polar";
-    case collision::ContactRule::Samples: return "samples";
-    case collision::ContactRule::March: return "march";
-    case collision::ContactRule::None: break;
-  }
-  return "none";
 }
 
 /// Why the rule was taken.
@@ -68,14 +60,9 @@ std::string query_forces(Simulation& simulation) {
   for (const ObjectModel& o : model.objects) objects.push_back({{"name", o.name}, {"first", o.first}, {"last", o.last}});
   json["objects"] = objects;
   ordered_json laws = ordered_json::array();
-  for (const core::LawReport& law :
-       core::report_laws(model.particles, simulation.state().particles, simulation.laws(), simulation.time())) {
+  for (const core::LawReport& law : report_forces(simulation)) {
     laws.push_back({{"name", law.name}, {"energy_j", law.energy}, {"particles", loads_json(law.loads)}});
   }
-  const collision::ContactSurface& surface = simulation.contacts();
-  double energy = 0.0;
-  for (const auto& s : surface.summary) energy += s.energy;
-  laws.push_back({{"name", "contact"}, {"energy_j", energy}, {"particles", loads_json(simulation.contact_loads())}});
   json["laws"] = laws;
   return text(json);
 }
@@ -253,7 +240,7 @@ std::string explain(Simulation& simulation) {
   for (std::size_t k = 0; k < std::min(pairs.size(), kMostShown); ++k) {
     const auto& s = pairs[k];
     line("  %s, %s: %s (%s), %llu points, error at most %.1e", body_name(simulation, s.bodies.a).c_str(),
-         body_name(simulation, s.bodies.b).c_str(), rule_name(s.rule).c_str(), reason_text(s.reason).c_str(),
+         body_name(simulation, s.bodies.b).c_str(), rule_name(s.rule), reason_text(s.reason).c_str(),
          static_cast<unsigned long long>(s.points), s.error_estimate);
   }
   if (pairs.size() > kMostShown) line("  and %zu more", pairs.size() - kMostShown);

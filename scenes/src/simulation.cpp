@@ -21,22 +21,38 @@
 namespace supple::scenes {
 namespace {
 
-/// @throws Error{Usage} naming array and particle
-void check_particles(const core::ParticleState& particles, std::size_t n) {
+/// `now` with what changes of it. @throws Error{Usage} naming the array, and the row where one is at fault
+core::ParticleState changed_particles(const ParticleChange& change, const core::ParticleSet& set, const core::ParticleState& now) {
   const auto fail = [](const std::string& array, std::string expected, std::string found) {
     throw Error(ErrorKind::Usage, Fault{.place = array, .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = {}});
   };
-  const auto check = [&](const std::string& name, const auto& array, const auto& good, const char* what) {
-    if (array.size() != n) fail(name, "expected " + std::to_string(n) + " rows", std::to_string(array.size()));
-    const auto bad = std::find_if_not(array.begin(), array.end(), good);
-    if (bad != array.end()) fail(name, what, "others in row " + std::to_string(bad - array.begin()));
+  const auto take = [&](const std::string& name, const auto& array, auto& to, const auto& good, const char* what) {
+    if (!array) return;
+    if (array->size() != now.size()) fail(name, "expected " + std::to_string(now.size()) + " rows", std::to_string(array->size()));
+    const auto bad = std::find_if_not(array->begin(), array->end(), good);
+    if (bad != array->end()) fail(name, what, "others in row " + std::to_string(bad - array->begin()));
+    to = *array;
   };
-  const auto finite = [](const Vec3& v) { return v.allFinite(); };
-  check("position", particles.position, finite, "expected finite numbers");
-  check("orientation", particles.orientation, [](const Quat& q) { return q.coeffs().allFinite() && q.norm() > 0.0; },
-        "expected finite quaternions of a length > 0");
-  check("velocity", particles.velocity, finite, "expected finite numbers");
-  check("angular_momentum", particles.angular_momentum, finite, "expected finite numbers");
+  const char* const finite = "expected finite numbers";
+  const auto is_finite = [](const Vec3& v) { return v.allFinite(); };
+  if (change.angular_momentum && change.angular_velocity) fail("angular_velocity", "expected it, or angular_momentum", "both");
+  core::ParticleState next = now;
+  take("position", change.position, next.position, is_finite, finite);
+  take("orientation", change.orientation, next.orientation, [](const Quat& q) { return q.coeffs().allFinite() && q.norm() > 0.0; },
+       "expected finite quaternions of a length > 0");
+  take("velocity", change.velocity, next.velocity, is_finite, finite);
+  take("angular_momentum", change.angular_momentum, next.angular_momentum, is_finite, finite);
+  take("angular_velocity", change.angular_velocity, next.angular_momentum, is_finite, finite);
+  for (std::size_t p = 0; p < next.size(); ++p) {
+    Quat& q = next.orientation[p];
+    if (q.coeffs() != now.orientation[p].coeffs()) q.normalize();
+    if (change.angular_velocity) {
+      next.angular_momentum[p] = q * set.inertia[p].cwiseProduct(q.conjugate() * (*change.angular_velocity)[p]);
+    }
+    next.velocity[p] = core::free_translation(set.pinned[p], next.velocity[p]);
+    next.angular_momentum[p] = core::free_rotation(set.pinned[p], next.angular_momentum[p]);
+  }
+  return next;
 }
 
 bool same_motion(const core::ParticleState& a, const core::ParticleState& b, std::uint32_t p) {
@@ -215,23 +231,17 @@ struct Simulation::Impl {
     wake(pushed);
   }
 
-  void set_particles(core::ParticleState asked) {
-    check_particles(asked, state.particles.size());
+  void set_particles(const ParticleChange& change) {
+    const core::ParticleState next = changed_particles(change, model.particles, state.particles);
     std::vector<std::uint32_t> changed;
     for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-      const auto differs = [&](std::uint32_t p) { return !same_motion(asked, state.particles, p); };
+      const auto differs = [&](std::uint32_t p) { return !same_motion(next, state.particles, p); };
       if (std::any_of(bodies[i].particle.begin(), bodies[i].particle.end(), differs)) changed.push_back(i);
     }
     if (changed.empty()) return;
-    for (std::uint32_t p = 0; p < asked.size(); ++p) {
-      if (same_motion(asked, state.particles, p)) continue;
-      asked.orientation[p].normalize();
-      asked.velocity[p] = core::free_translation(model.particles.pinned[p], asked.velocity[p]);
-      asked.angular_momentum[p] = core::free_rotation(model.particles.pinned[p], asked.angular_momentum[p]);
-    }
     const double energy = energies().total();
     const core::Motion motion = core::measure_motion(model.particles, state.particles);
-    state.particles = asked;
+    state.particles = next;
     state.kick.valid = false;
     drop_results();
     wake(changed);
@@ -612,7 +622,7 @@ bool Simulation::advance_to(int frame, const std::function<bool()>& go_on) {
   return true;
 }
 
-void Simulation::set_particles(core::ParticleState particles) { impl_->set_particles(std::move(particles)); }
+void Simulation::set_particles(const ParticleChange& change) { impl_->set_particles(change); }
 
 void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());

@@ -1,6 +1,8 @@
 // What scenes say about pictures: cameras that move, columns for colours, files of several cameras.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -238,6 +240,48 @@ TEST_F(Looks, ShowWhatEachKeyAsksFor) {
   EXPECT_NE(with("light: {intensity: 1}\n").pixels, plain.pixels);
   EXPECT_NE(first_picture(scene_with("colour_by: speed, range: [0, 2], scale_bar: false", kOneCamera)).pixels,
             first_picture(scene_with("colour_by: speed, range: [0, 2]", kOneCamera)).pixels);
+}
+
+TEST(Pressure, OfMeshesIsThatOfTheContactSurface) {
+  // Unlike balls on each other and one on the ground.
+  Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 1 s
+ground: {height: -0.3}
+objects:
+  - name: left
+    particles: {arrange: single, at: [-0.25, 0, 0], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 2e3}
+    look: {colour_by: pressure, range: [0, 1000]}
+  - name: right
+    particles: {arrange: single, at: [0.25, 0.1, 0.3], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 6e3}
+    look: {colour_by: pressure, range: [0, 1000]}
+)", "test.yaml", "."));
+  ASSERT_EQ(simulation.contacts().summary.size(), 2u);
+  const double largest = simulation.contacts().summary.front().largest_pressure;
+  const std::array<double, 2> modulus = {2e3, 6e3};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Mesh& mesh = simulation.meshes()[i];
+    const auto column = [&](const std::string& name) -> const std::vector<double>& {
+      return std::find_if(mesh.columns.begin(), mesh.columns.end(), [&](const auto& c) { return c.name == name; })->values;
+    };
+    std::vector<double> value(mesh.vertex_count());
+    simulation.fields()[i].evaluate(mesh.position, value);
+    double most = 0.0;
+    for (std::size_t v = 0; v < value.size(); ++v) {
+      const double pressure = column("pressure")[v];
+      most = std::max(most, pressure);
+      // Vertices are roots to 1e-10 in units of F.
+      const double expected = column("contact")[v] > 0.0 ? std::max(0.0, modulus[i] * value[v]) : 0.0;
+      EXPECT_NEAR(pressure, expected, 1e-9 * modulus[i]) << mesh.position[v].transpose();
+    }
+    // A vertex lies within a cell of the peak, about which the pressure falls by less than its second derivative over F, 6 / R^2, says.
+    EXPECT_LE(most, largest * (1.0 + 1e-9));
+    EXPECT_GE(most, largest - 6.0 / 0.64 * 2e3 * simulation.cell() * simulation.cell());
+  }
 }
 
 TEST_F(Looks, SpeedShowsTheColourOfItsValue) {

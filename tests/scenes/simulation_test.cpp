@@ -95,9 +95,9 @@ TEST_P(Arrays, StayWhereTheyAreInMemory) {
   EXPECT_EQ(places(), before) << "by a step";
   simulation.restore(State(simulation.state()));
   EXPECT_EQ(places(), before) << "by a state from elsewhere";
-  core::ParticleState other = particles;
-  other.position[0].x() -= 1.0;
-  simulation.set_particles(std::move(other));
+  std::vector<Vec3> elsewhere = particles.position;
+  elsewhere[0].x() -= 1.0;
+  simulation.set_particles({.position = elsewhere});
   EXPECT_EQ(places(), before) << "by other places";
 }
 INSTANTIATE_TEST_SUITE_P(Integrators, Arrays, testing::Values("symplectic", "rk4", "adaptive", "backward_euler", "implicit_midpoint"));
@@ -106,7 +106,8 @@ TEST(SetParticles, WithTheSameMotionChangesNoBit) {
   Simulation set = make(two_balls()), left = make(two_balls());
   run(set, 3);
   run(left, 3);
-  set.set_particles(set.state().particles);
+  const core::ParticleState& same = set.state().particles;
+  set.set_particles({.position = same.position, .orientation = same.orientation, .velocity = same.velocity, .angular_momentum = same.angular_momentum});
   EXPECT_EQ(set.state_hash(), left.state_hash());
 }
 
@@ -116,8 +117,10 @@ TEST(SetParticles, IsAsIfTheSceneHadBegunThere) {
   Scene scene = set.scene();
   scene.objects[0].particles.at = Vec3(-0.4, 0.1, 0.05);
   scene.objects[1].particles.velocity = Vec3(-3, 0.5, 0);
+  scene.objects[1].particles.spin = Vec3(1, 2, 3);
   Simulation born(scene);
-  set.set_particles(born.state().particles);
+  const core::ParticleState& there = born.state().particles;
+  set.set_particles({.position = there.position, .velocity = there.velocity, .angular_velocity = std::vector<Vec3>{Vec3(0, 1, 2), Vec3(1, 2, 3)}});
   for (int k = 0; k < 20; ++k) {
     set.step();
     born.step();
@@ -133,11 +136,13 @@ TEST(SetParticles, KeepsTheAudits) {
   Simulation simulation = make(two_balls(fine)), undisturbed = make(two_balls(fine));
   run(undisturbed, 8);
   run(simulation, 4);
-  core::ParticleState particles = simulation.state().particles;
-  particles.position[1] += Vec3(0.0, 0.05, 0.02);
-  particles.velocity[0] += Vec3(0.5, -0.5, 1.0);
-  particles.angular_momentum[1] += Vec3(0.01, 0.02, -0.01);
-  simulation.set_particles(std::move(particles));
+  ParticleChange change{.position = simulation.state().particles.position,
+                        .velocity = simulation.state().particles.velocity,
+                        .angular_momentum = simulation.state().particles.angular_momentum};
+  (*change.position)[1] += Vec3(0.0, 0.05, 0.02);
+  (*change.velocity)[0] += Vec3(0.5, -0.5, 1.0);
+  (*change.angular_momentum)[1] += Vec3(0.01, 0.02, -0.01);
+  simulation.set_particles(change);
   ASSERT_FALSE(simulation.contacts().summary.empty());
   run(simulation, 8);
   const Audits audits = simulation.audits();
@@ -157,10 +162,9 @@ objects:
     interactions: [{law: bond_frame, stretch: 100, rotation: 1}]
     pins: [{particle: 0}]
 )");
-  core::ParticleState particles = simulation.state().particles;
-  for (Vec3& v : particles.velocity) v = Vec3(0, 1, 0);
-  for (Quat& q : particles.orientation) q.coeffs() *= 3.0;
-  simulation.set_particles(particles);
+  Quat longer = Quat::Identity();
+  longer.coeffs() *= 3.0;
+  simulation.set_particles({.orientation = std::vector<Quat>(3, longer), .velocity = std::vector<Vec3>(3, Vec3(0, 1, 0))});
   EXPECT_EQ(simulation.state().particles.velocity[0], Vec3(Vec3::Zero()));
   EXPECT_EQ(simulation.state().particles.velocity[2], Vec3(0, 1, 0));
   for (const Quat& q : simulation.state().particles.orientation) EXPECT_DOUBLE_EQ(q.norm(), 1.0);
@@ -168,21 +172,22 @@ objects:
 
 TEST(SetParticles, SaysWhatIsWrong) {
   Simulation simulation = make(two_balls());
-  const auto message = [&](const auto& spoil) {
-    core::ParticleState particles = simulation.state().particles;
-    spoil(particles);
+  const auto message = [&](const ParticleChange& change) {
     try {
-      simulation.set_particles(particles);
+      simulation.set_particles(change);
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::Usage);
       return std::string(error.what());
     }
     return std::string("nothing");
   };
-  EXPECT_EQ(message([](auto& p) { p.position.pop_back(); }), "position: expected 2 rows, found 1");
-  EXPECT_EQ(message([](auto& p) { p.velocity[1].y() = std::nan(""); }), "velocity: expected finite numbers, found others in row 1");
-  EXPECT_EQ(message([](auto& p) { p.orientation[0].coeffs().setZero(); }),
+  const std::vector<Vec3> good(2, Vec3::Zero());
+  EXPECT_EQ(message({.position = std::vector<Vec3>(1, Vec3::Zero())}), "position: expected 2 rows, found 1");
+  EXPECT_EQ(message({.velocity = std::vector<Vec3>{Vec3::Zero(), Vec3(0, std::nan(""), 0)}}),
+            "velocity: expected finite numbers, found others in row 1");
+  EXPECT_EQ(message({.orientation = std::vector<Quat>(2, Quat(0, 0, 0, 0))}),
             "orientation: expected finite quaternions of a length > 0, found others in row 0");
+  EXPECT_EQ(message({.angular_momentum = good, .angular_velocity = good}), "angular_velocity: expected it, or angular_momentum, found both");
 }
 
 TEST(Meshes, HaveCreasesWhereNodesOfAGraphUnite) {

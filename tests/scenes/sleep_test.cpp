@@ -225,9 +225,9 @@ TEST(Sleep, EndsByAnImpulse) {
 TEST(Sleep, EndsByAnotherPlace) {
   Simulation simulation = make(sleeping(kGround, pairs()));
   run_until(simulation, [&] { return all_asleep(simulation); });
-  core::ParticleState particles = simulation.state().particles;
-  particles.position[1].z() += 0.01;
-  simulation.set_particles(particles);
+  std::vector<Vec3> position = simulation.state().particles.position;
+  position[1].z() += 0.01;
+  simulation.set_particles({.position = position});
   EXPECT_FALSE(asleep(simulation, "a_low"));
   EXPECT_FALSE(asleep(simulation, "a_top"));
   EXPECT_TRUE(asleep(simulation, "b_low"));

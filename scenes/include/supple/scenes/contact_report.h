@@ -37,4 +37,7 @@ struct ContactReport {
 };
 [[nodiscard]] ContactReport report_contacts(Simulation& simulation);
 
+/// "polar", "samples", "march" or "none", as the key `contact.rule` has them.
+[[nodiscard]] const char* rule_name(collision::ContactRule rule);
+
 }  // namespace supple::scenes

@@ -12,6 +12,7 @@
 #include <functional>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -63,6 +64,15 @@ struct Audits {
   double largest_overlap_share = 0.0;   ///< over the thickness of the thinner body [1]
 };
 
+/// What an experiment changes of the particles between two steps; what is absent stays. Shape [particles] each.
+struct ParticleChange {
+  std::optional<std::vector<Vec3>> position{};          ///< [m]
+  std::optional<std::vector<Quat>> orientation{};       ///< body to world, of any length > 0
+  std::optional<std::vector<Vec3>> velocity{};          ///< [m/s]
+  std::optional<std::vector<Vec3>> angular_momentum{};  ///< about the particle's centre, world axes [kg m^2/s]
+  std::optional<std::vector<Vec3>> angular_velocity{};  ///< instead of it, world axes [rad/s]
+};
+
 class Simulation {
  public:
   /// @throws Error{Scene} when the model cannot be built, Error{Limit} when the time step would need more than
@@ -98,14 +108,15 @@ class Simulation {
   bool advance_to(int frame, const std::function<bool()>& go_on = {});
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
-  /// Places and moves the particles as asked for, as an experiment does between two steps; orientations are normalised, and what
-  /// pins hold has no velocity. What this changes of momentum, angular momentum and energy is booked as given from outside, so that
-  /// the audits hold. Forces are found anew, and islands wake whose particles are not where they were.
-  /// @throws Error{Usage} for arrays of another shape, values that are not finite, and orientations of length 0
-  void set_particles(core::ParticleState particles);
+  /// Places and moves particles, as an experiment does between two steps; what pins hold keeps no velocity. What this changes of
+  /// momentum, angular momentum and energy is booked as given from outside, so that the audits hold. Forces are found anew, and
+  /// islands wake whose particles are changed.
+  /// @throws Error{Usage} for arrays of another shape, values that are not finite, orientations of length 0, and both angular arrays
+  void set_particles(const ParticleChange& change);
 
   /// Surfaces of the current state, one an object in the order of the scene (empty without skeleton); deformed by
-  /// contact, with columns "contact" and "pressure" [Pa]. Kept until the next step.
+  /// contact, with the column "contact" (implicit/polygonise.h) and those that looks show: "pressure" [Pa], "speed" [m/s],
+  /// "stretch" [1], "rest_x" ... [m]. Kept until the next step.
   [[nodiscard]] const std::vector<Mesh>& meshes();
   /// Contacts of the current state between `bodies()`, the ground being the last. Kept until the next step.
   [[nodiscard]] const collision::ContactSurface& contacts();
