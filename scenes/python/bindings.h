@@ -17,9 +17,7 @@ namespace py = pybind11;
 
 void bind_errors(py::module_& module);
 void bind_scene(py::module_& module);
-void bind_simulation(py::module_& module);
-void bind_particles(py::module_& module);
-
+void bind_runs(py::module_& module);
 /// Threads pass one at a time, in the order in which they came.
 class Queue {
  public:
@@ -64,9 +62,12 @@ class Handle {
   Queue queue_;
 };
 
-/// The particles of a simulation.
-struct Particles {
-  std::shared_ptr<Handle> of;
-};
+using Simulation = py::class_<Handle, std::shared_ptr<Handle>>;
+
+/// The class, and what it has by itself; topics add their calls to it.
+Simulation bind_simulation(py::module_& module);
+void bind_particles(py::module_& module, Simulation& simulation);
+void bind_contacts(py::module_& module, Simulation& simulation);
+void bind_surfaces(py::module_& module, Simulation& simulation);
 
 }  // namespace supple::python

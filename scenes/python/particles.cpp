@@ -7,6 +7,11 @@ namespace {
 using core::ParticleSet;
 using core::ParticleState;
 
+/// The particles of a simulation.
+struct Particles {
+  std::shared_ptr<Handle> of;
+};
+
 /// Arrays stay where they are for the life of a simulation, so views need no turn.
 template <auto member>
 py::array state_view(const Particles& p) {
@@ -40,6 +45,17 @@ py::array_t<double> rows(const py::object& values, const char* argument, py::ssi
                                       .hint = {}});
 }
 
+void set_particles(Handle& handle, const py::object& position, const py::object& orientation, const py::object& velocity,
+                   const py::object& angular_momentum, const py::object& angular_velocity) {
+  scenes::ParticleChange change;
+  if (!position.is_none()) change.position = rows3(position, "position");
+  if (!orientation.is_none()) change.orientation = rows4(orientation, "orientation");
+  if (!velocity.is_none()) change.velocity = rows3(velocity, "velocity");
+  if (!angular_momentum.is_none()) change.angular_momentum = rows3(angular_momentum, "angular_momentum");
+  if (!angular_velocity.is_none()) change.angular_velocity = rows3(angular_velocity, "angular_velocity");
+  handle.use([&](scenes::Simulation& simulation) { simulation.set_particles(change); });
+}
+
 }  // namespace
 
 std::vector<Vec3> rows3(const py::object& values, const char* argument) {
@@ -56,7 +72,7 @@ std::vector<Quat> rows4(const py::object& values, const char* argument) {
   return out;
 }
 
-void bind_particles(py::module_& module) {
+void bind_particles(py::module_& module, Simulation& simulation) {
   py::class_<Particles>(module, "Particles",
                         "The particles of a simulation; row i is the same particle in every array. All arrays but angular_velocity are views:\n"
                         "they cost nothing, follow the simulation and keep it alive, and cannot be written to (Simulation.set_particles does\n"
@@ -78,6 +94,14 @@ void bind_particles(py::module_& module) {
       .def("__repr__", [](const Particles& p) {
         return "<supple.Particles, " + std::to_string(p.of->fixed().model().particles.size()) + ">";
       });
+
+  simulation
+      .def_property_readonly("particles", [](std::shared_ptr<Handle> h) { return Particles{std::move(h)}; }, "The particles, as views.")
+      .def("set_particles", &set_particles, py::kw_only(), py::arg("position") = py::none(), py::arg("orientation") = py::none(),
+           py::arg("velocity") = py::none(), py::arg("angular_momentum") = py::none(), py::arg("angular_velocity") = py::none(),
+           "Places and moves the particles as asked for, between two steps; what is not given stays. Shapes and units are those of Particles;\n"
+           "orientations are normalised, angular_velocity may take the place of angular_momentum, and what pins hold keeps no velocity.\n\n"
+           "What this changes of momentum, angular momentum and energy is booked as given from outside, so that the audits hold.");
 }
 
 }  // namespace supple::python

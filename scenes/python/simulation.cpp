@@ -13,7 +13,6 @@ namespace supple::python {
 namespace {
 
 using scenes::Scene;
-using scenes::Simulation;
 using Shared = std::shared_ptr<Handle>;
 
 /// A state apart from its simulation, and which scene it belongs to.
@@ -32,14 +31,14 @@ bool in_slices(Handle& handle, const Slice& slice) {
   for (;;) {
     const auto end = Clock::now() + kSlice;
     const auto go_on = [&] { return !handle.cancelled && Clock::now() < end; };
-    const bool done = handle.use([&](Simulation& simulation) { return slice(simulation, go_on); });
+    const bool done = handle.use([&](scenes::Simulation& simulation) { return slice(simulation, go_on); });
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (done || handle.cancelled) return done;
   }
 }
 
 void step(Handle& handle, std::int64_t count) {
-  in_slices(handle, [&](Simulation& simulation, const auto& go_on) {
+  in_slices(handle, [&](scenes::Simulation& simulation, const auto& go_on) {
     while (count > 0) {
       simulation.step();
       if (--count > 0 && !go_on()) return false;
@@ -49,11 +48,11 @@ void step(Handle& handle, std::int64_t count) {
 }
 
 bool advance_to(Handle& handle, int frame) {
-  return in_slices(handle, [&](Simulation& simulation, const auto& go_on) { return simulation.advance_to(frame, go_on); });
+  return in_slices(handle, [&](scenes::Simulation& simulation, const auto& go_on) { return simulation.advance_to(frame, go_on); });
 }
 
 int frame_of(Handle& handle) {
-  return handle.use([](const Simulation& simulation) { return simulation.frame(); });
+  return handle.use([](const scenes::Simulation& simulation) { return simulation.frame(); });
 }
 
 /// What `for frame in simulation.frames()` goes through.
@@ -72,11 +71,11 @@ struct Frames {
 };
 
 SavedState copy_state(Handle& handle) {
-  return handle.use([](const Simulation& simulation) { return SavedState{simulation.state(), simulation.scene().content_hash}; });
+  return handle.use([](const scenes::Simulation& simulation) { return SavedState{simulation.state(), simulation.scene().content_hash}; });
 }
 
 void restore(Handle& handle, const SavedState& saved) {
-  handle.use([&](Simulation& simulation) {
+  handle.use([&](scenes::Simulation& simulation) {
     if (saved.scene != simulation.scene().content_hash) {
       throw Error(ErrorKind::Usage, Fault{.place = "state",
                                           .key = {},
@@ -149,9 +148,9 @@ void bind_results(py::module_& module) {
 
 }  // namespace
 
-void bind_simulation(py::module_& module) {
+Simulation bind_simulation(py::module_& module) {
   bind_results(module);
-  py::class_<Handle, Shared> simulation(
+  Simulation simulation(
       module, "Simulation",
       "A scene in motion. Asking for meshes, contacts, pictures or energies never changes a later state, and the number of threads changes\n"
       "no bit.\n\n"
@@ -167,25 +166,24 @@ void bind_simulation(py::module_& module) {
            "Raises Error where the scene cannot be simulated.")
       .def_property_readonly("scene", [](const Handle& h) -> const Scene& { return h.fixed().scene(); }, "What it was made from.")
       .def_property_readonly("frame", &frame_of, "The last frame reached; 1 at the start.")
-      .def_property_readonly("time", [](Handle& h) { return h.use([](const Simulation& s) { return s.time(); }); }, "[s]")
-      .def_property_readonly("time_step", [](Handle& h) { return h.use([](const Simulation& s) { return s.time_step(); }); },
+      .def_property_readonly("time", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.time(); }); }, "[s]")
+      .def_property_readonly("time_step", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.time_step(); }); },
                              "Of the current frame interval [s].")
-      .def_property_readonly("state_hash", [](Handle& h) { return to_hex(h.use([](const Simulation& s) { return s.state_hash(); })); },
+      .def_property_readonly("state_hash", [](Handle& h) { return to_hex(h.use([](const scenes::Simulation& s) { return s.state_hash(); })); },
                              "16 hexadecimal digits; equal states have equal hashes, and `supple run` reports the same ones.")
-      .def_property_readonly("particles", [](Shared h) { return Particles{std::move(h)}; }, "The particles, as views.")
       .def_property_readonly("objects", [](const Handle& h) {
              py::dict slices;
              for (const scenes::ObjectModel& o : h.fixed().model().objects) slices[py::str(o.name)] = py::slice(o.first, o.last, 1);
              return slices;
            }, "Which rows of the particles each object has: {name: slice}.")
       .def_property_readonly("bodies", [](Handle& h) {
-             return h.use([](const Simulation& s) {
+             return h.use([](const scenes::Simulation& s) {
                std::vector<std::string> names;
                for (const scenes::Body& body : s.bodies()) names.push_back(body.name);
                return names;
              });
            }, "Names of what has a surface of its own: objects, or the pieces that they broke into (\"plate.1\", ...).")
-      .def_property_readonly("warnings", [](Handle& h) { return h.use([](const Simulation& s) { return s.warnings(); }); },
+      .def_property_readonly("warnings", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.warnings(); }); },
                              "What is odd about the scene, as sentences.")
       .def_property_readonly("integrator", [](const Handle& h) { return h.fixed().integrator().reason; }, "How the scene is integrated, and why.")
 
@@ -204,26 +202,37 @@ void bind_simulation(py::module_& module) {
       .def("state", &copy_state, "A copy of the state, for restore() or to save.")
       .def("restore", &restore, py::arg("state"), "Continues from a state of the same scene, with the same bits as the run it is from.")
       .def("save", [](Handle& h, const std::filesystem::path& path) {
-             h.use([&](const Simulation& s) { scenes::save_state(path, s.state(), s.scene().content_hash); });
+             h.use([&](const scenes::Simulation& s) { scenes::save_state(path, s.state(), s.scene().content_hash); });
            }, py::arg("path"), "Writes a checkpoint file, the same as `supple run` leaves in states/.")
       .def("load", [](Handle& h, const std::filesystem::path& path) {
-             h.use([&](Simulation& s) { s.restore(scenes::load_state(path, s.scene().content_hash)); });
+             h.use([&](scenes::Simulation& s) { s.restore(scenes::load_state(path, s.scene().content_hash)); });
            }, py::arg("path"), "Continues from a checkpoint file. Raises Error of kind \"corrupt\" when it is not exactly what was written, or is of another scene.")
 
-      .def("energies", [](Handle& h) { return h.use([](Simulation& s) { return s.energies(); }); }, "Energies of the current state.")
-      .def("audits", [](Handle& h) { return h.use([](const Simulation& s) { return s.audits(); }); }, "How well momenta and energy are kept.")
-      .def("ledger", [](Handle& h) { return h.use([](const Simulation& s) { return s.state().ledger; }); },
+      .def("energies", [](Handle& h) { return h.use([](scenes::Simulation& s) { return s.energies(); }); }, "Energies of the current state.")
+      .def("audits", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.audits(); }); }, "How well momenta and energy are kept.")
+      .def("ledger", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.state().ledger; }); },
            "Work, heat and impulses that went in and out so far.")
       .def("motion", [](Handle& h) {
-             return h.use([](const Simulation& s) { return core::measure_motion(s.model().particles, s.state().particles); });
+             return h.use([](const scenes::Simulation& s) { return core::measure_motion(s.model().particles, s.state().particles); });
            }, "Kinetic energy and momenta of the current state.")
-      .def("explain", [](Handle& h) { return h.use([](Simulation& s) { return scenes::explain(s); }); },
+      .def("profile", [](Handle& h) {
+             const scenes::Profile profile = h.use([](const scenes::Simulation& s) { return s.profile(); });
+             py::dict stages;
+             for (const scenes::StageInfo& stage : scenes::stage_table()) {
+               const scenes::StageProfile& p = profile[static_cast<std::size_t>(stage.stage)];
+               stages[py::str(std::string(stage.name))] =
+                   py::dict(py::arg("calls") = p.calls, py::arg("cpu_s") = p.cpu_s, py::arg("visited") = p.visited, py::arg("present") = p.present);
+             }
+             return stages;
+           }, "Work by stage so far: calls, CPU time [s], and how many pairs, primitives, samples ... were looked at, of those present.")
+      .def("explain", [](Handle& h) { return h.use([](scenes::Simulation& s) { return scenes::explain(s); }); },
            "The stages of a step, each with the reason it runs or not, and the contacts of the current state, as text.")
       .def("__repr__", [](Handle& h) {
-        const auto [frame, time] = h.use([](const Simulation& s) { return std::pair(s.frame(), s.time()); });
+        const auto [frame, time] = h.use([](const scenes::Simulation& s) { return std::pair(s.frame(), s.time()); });
         return py::str("<supple.Simulation '{}', frame {} of {}, t = {:.6g} s>")
             .format(scenes::scene_name(h.fixed().scene()), frame, h.fixed().scene().frame_count(), time);
       });
+  return simulation;
 }
 
 }  // namespace supple::python

@@ -11,13 +11,8 @@
 Units are SI. Vectors are rows of arrays of shape (n, 3), quaternions rows x, y, z, w that map body axes to world axes.
 Arrays that are called views show the library's own memory: they follow the simulation and cannot be written to.
 """
-from supple import _supple
 from supple._errors import ContractViolation, Error, Fault
 from supple._supple import *
 from supple._supple import __version__
 
 __all__ = sorted(name for name in dir() if not name.startswith("_"))
-
-for _thing in (ContractViolation, Error, Fault, *vars(_supple).values()):
-    if isinstance(_thing, type):
-        _thing.__module__ = "supple"

@@ -31,3 +31,7 @@ class Error(ValueError):
 
 class ContractViolation(RuntimeError):
     """A condition of the library that no argument should be able to break; please report it."""
+
+
+for _type in (Fault, Error, ContractViolation):
+    _type.__module__ = "supple"

@@ -1,0 +1,126 @@
+#include <pybind11/functional.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <chrono>
+#include <csignal>
+#include <exception>
+#include <future>
+#include <variant>
+
+#include "bindings.h"
+#include "supple/core/hash.h"
+#include "supple/scenes/inspect.h"
+#include "supple/scenes/run.h"
+
+namespace supple::python {
+namespace {
+
+using scenes::Progress;
+using scenes::RunOptions;
+using scenes::RunResult;
+using scenes::Scene;
+using Path = std::filesystem::path;
+using Frames = std::variant<std::monostate, std::string, std::vector<int>>;
+
+std::set<int> frames_of(const Frames& frames) {
+  if (const auto* text = std::get_if<std::string>(&frames)) return scenes::parse_frames(*text);
+  if (const auto* list = std::get_if<std::vector<int>>(&frames)) return {list->begin(), list->end()};
+  return {};
+}
+
+/// Calls verb(scene, options) on a thread of its own, while this one sees to signals. What `progress` or a signal raises ends
+/// the run after its step and is raised here then.
+RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options, const py::object& progress) {
+  constexpr std::chrono::milliseconds kSlice(50);
+  std::atomic<int> interrupt{0};
+  std::exception_ptr raised;
+  const auto guarded = [&](const auto& body) {
+    try {
+      if (!raised) body();
+    } catch (const py::error_already_set&) {
+      raised = std::current_exception();
+      interrupt = SIGINT;
+    }
+  };
+  options.interrupt = &interrupt;
+  if (!progress.is_none()) {
+    options.progress = [&](const Progress& now) {
+      const py::gil_scoped_acquire hold;
+      guarded([&] { progress(now); });
+    };
+  }
+  std::future<RunResult> result = std::async(std::launch::async, verb, std::cref(scene), std::cref(options));
+  for (bool done = false; !done;) {
+    {
+      const py::gil_scoped_release others_run;
+      done = result.wait_for(kSlice) == std::future_status::ready;
+    }
+    guarded([] {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    });
+  }
+  if (raised) std::rethrow_exception(raised);
+  return result.get();
+}
+
+RunResult run(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, bool resume, bool simulate_only,
+              const py::object& progress) {
+  return call(&scenes::run_scene, scene,
+              {.folder = folder, .frames = frames_of(frames), .threads = threads, .overwrite = overwrite, .resume = resume, .simulate_only = simulate_only},
+              progress);
+}
+
+RunResult render(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, const py::object& progress) {
+  return call(&scenes::render_run, scene, {.folder = folder, .frames = frames_of(frames), .threads = threads, .overwrite = overwrite}, progress);
+}
+
+RunResult export_files(const Scene& scene, const Path& folder, const Frames& frames, int threads, const py::object& progress) {
+  return call(&scenes::export_run, scene, {.folder = folder, .frames = frames_of(frames), .threads = threads}, progress);
+}
+
+}  // namespace
+
+void bind_runs(py::module_& module) {
+  py::class_<Progress>(module, "Progress", "Where a run is.")
+      .def_readonly("stage", &Progress::stage, "\"simulate\", \"surface\", \"render\" or \"film\".")
+      .def_readonly("frame", &Progress::frame, "The frame at work.")
+      .def_readonly("frame_count", &Progress::frame_count, "Of so many.")
+      .def_readonly("elapsed_s", &Progress::elapsed_s, "Since the start [s].")
+      .def_readonly("left_s", &Progress::left_s, "Estimate [s]; negative while unknown.")
+      .def_readonly("frames_per_s", &Progress::frames_per_s, "0 while unknown [1/s].");
+  py::class_<RunResult>(module, "RunResult", "How a run ended and what it left behind.")
+      .def_readonly("outcome", &RunResult::outcome, "\"done\", \"diverged\", \"interrupted\", \"limit\", \"io\" or \"invalid\".")
+      .def_readonly("reason", &RunResult::reason, "Empty when done.")
+      .def_readonly("exit_code", &RunResult::exit_code, "What the command line tool would end with.")
+      .def_readonly("frames", &RunResult::frames, "The last frame reached.")
+      .def_property_readonly("state_hash", [](const RunResult& r) { return to_hex(r.state_hash); }, "Of the last state.")
+      .def_property_readonly("folder", [](const RunResult& r) { return r.folder; }, "Where everything went.")
+      .def_property_readonly("report", [](const RunResult& r) { return r.report; }, "result.json, render.json or export.json.")
+      .def_property_readonly("film", [](const RunResult& r) { return r.film.empty() ? std::optional<Path>() : r.film; }, "None: there is none.")
+      .def_property_readonly("warnings", [](const RunResult& r) { return r.warnings; }, "As sentences.")
+      .def("__repr__", [](const RunResult& r) {
+        return py::str("<supple.RunResult {}, {} frames in {}>").format(r.outcome, r.frames, r.folder.string());
+      });
+
+  constexpr const char* kCommon =
+      "\n\nframes    which to output, e.g. \"1-50,60,70-90:2\" or [1, 5, 9]; all unless given\n"
+      "threads   0: all the machine has; changes no bit\n"
+      "progress  called with a Progress now and then; what it raises ends the run after its step, as Control-C does\n\n"
+      "Returns a RunResult, also where the run diverged or met a limit: see its outcome. Raises Error where it could not begin.";
+  const std::string run_doc = std::string("A whole run from scene to files, as `supple run`: pictures, film, states, tables and result.json in `folder`.") + kCommon;
+  const std::string render_doc =
+      std::string("Draws the frames of an earlier run again from its saved states, as `supple render`; pictures that are up to date are kept\nunless overwrite.") +
+      kCommon;
+  const std::string export_doc =
+      std::string("Writes the files that the scene's `output` asks for from the saved states of a run, as `supple export`.") + kCommon;
+  module.def("run", &run, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
+             py::arg("overwrite") = false, py::arg("resume") = false, py::arg("simulate_only") = false, py::arg("progress") = py::none(), run_doc.c_str());
+  module.def("render", &render, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
+             py::arg("overwrite") = false, py::arg("progress") = py::none(), render_doc.c_str());
+  module.def("export", &export_files, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
+             py::arg("progress") = py::none(), export_doc.c_str());
+  module.def("info", &scenes::describe_run, py::arg("folder"), "What a run folder holds, for reading: outcome, audits, times, files.");
+}
+
+}  // namespace supple::python
