@@ -26,8 +26,10 @@ class Plane {
     pitch_ = (width + 2 * kMargin + static_cast<int>(kLanes) - 1) / static_cast<int>(kLanes) * static_cast<int>(kLanes);
     // Planes that lie one after the other begin at different places of their pages, as the sets of a cache go by those.
     const std::size_t lead = reinterpret_cast<std::uintptr_t>(this) / sizeof(Plane) % 64 * kCacheLine;
-    values_.assign(lead + static_cast<std::size_t>(pitch_ * (height + 2 * kMargin)), 0.0F);
-    first_ = values_.data() + lead + index(kMargin, kMargin);
+    values_.assign(lead + kCacheLine + static_cast<std::size_t>(pitch_ * (height + 2 * kMargin)), 0.0F);
+    // Eight pixels of a tile never lie in two lines.
+    const std::size_t off = reinterpret_cast<std::uintptr_t>(values_.data()) / sizeof(float) % kCacheLine;
+    first_ = values_.data() + (lead + kCacheLine - off) + index(kMargin, kMargin);
   }
   /// Of a pixel, or from one pixel to another; the same in all planes of one size.
   [[nodiscard]] std::ptrdiff_t index(int x, int y) const { return std::ptrdiff_t{y} * pitch_ + x; }
