@@ -105,6 +105,7 @@ TEST(SolveContact, KeepsItsBoundAtEveryError) {
     EXPECT_LE(found[0].error_estimate, error);
     EXPECT_LE((found[0].force - exact[0].force).norm(), (found[0].error_estimate + 1e-10) * exact[0].force.norm());
     EXPECT_LE(std::abs(found[0].area - exact[0].area), (found[0].error_estimate + 1e-10) * exact[0].area);
+    EXPECT_LT(found[0].evaluations, exact[0].evaluations);
     EXPECT_EQ(found[0].bodies, (collision::BodyPair{0, 1}));
   }
 }
@@ -132,7 +133,9 @@ TEST(SolveContact, OfBodiesApartIsEmptyAndChangesNothing) {
 }
 
 TEST(DrawPicture, IsTheFrameOfARun) {
-  const std::string text = kHead + ball("left", "[-0.25, 0, 0]") + ball("right", "[0.25, 0.1, 0]") + ball("far", "[0, 90, 0]") +
+  // What lies far below is in no picture, nor is its shadow.
+  const std::string text = "schema: 1\nduration: 1 s\nframe_rate: 8\nobjects:\n" + ball("left", "[-0.25, 0, 0]") +
+                           ball("right", "[0.25, 0.1, 0]") + ball("under", "[0, 0, -90]") +
                            "cameras:\n  - {name: front, from: [0, -4, 1], look_at: [0, 0, 0]}\n  - {name: side, from: [4, 0, 1], look_at: [0, 0, 0]}\n" +
                            "render: {pixel_error: 0.5}\noutput: {images: {size: [64, 48]}}\n";
   const Scene scene = parse_scene(text, "test.yaml", ".");
