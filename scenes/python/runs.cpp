@@ -107,7 +107,8 @@ void bind_runs(py::module_& module) {
       "\n\nframes    which to output, e.g. \"1-50,60,70-90:2\" or [1, 5, 9]; all unless given\n"
       "threads   0: all the machine has; changes no bit\n"
       "progress  called with a Progress now and then; what it raises ends the run after its step, as Control-C does\n\n"
-      "Returns a RunResult, also where the run diverged or met a limit: see its outcome. Raises Error where it could not begin.";
+      "Returns a RunResult however the run ended: see its outcome and reason. Raises Error where there can be no report: the folder cannot\n"
+      "be made, is in use, or holds an earlier result.";
   const std::string run_doc = std::string("A whole run from scene to files, as `supple run`: pictures, film, states, tables and result.json in `folder`.") + kCommon;
   const std::string render_doc =
       std::string("Draws the frames of an earlier run again from its saved states, as `supple render`; pictures that are up to date are kept\nunless overwrite.") +

@@ -196,11 +196,14 @@ Simulation bind_simulation(py::module_& module) {
              const int count = h->fixed().scene().frame_count();
              return Frames{std::move(h), last.value_or(count)};
            }, py::arg("last") = py::none(),
-           "for frame in simulation.frames(): the present frame, then each one reached, to `last` or the scene's last one.")
+           "for frame in simulation.frames(): the present frame, then each one reached, to `last` or the scene's last one. cancel() ends it.")
       .def("cancel", [](Handle& h) { h.cancelled = true; },
            "From another thread: ends the stepping call that is running, after the step it is at. Without one nothing happens.")
       .def("state", &copy_state, "A copy of the state, for restore() or to save.")
       .def("restore", &restore, py::arg("state"), "Continues from a state of the same scene, with the same bits as the run it is from.")
+      .def("adopt", [](Handle& h, const SavedState& saved) { h.use([&](scenes::Simulation& s) { s.adopt(saved.state); }); }, py::arg("state"),
+           "Continues from a state of a scene with other numbers (masses, stiffnesses, friction, loads), which act from now on; ledger and\n"
+           "audits begin here. Velocities and angular momenta are those of the state. The objects and their particles must be the same.")
       .def("save", [](Handle& h, const std::filesystem::path& path) {
              h.use([&](const scenes::Simulation& s) { scenes::save_state(path, s.state(), s.scene().content_hash); });
            }, py::arg("path"), "Writes a checkpoint file, the same as `supple run` leaves in states/.")
@@ -212,6 +215,23 @@ Simulation bind_simulation(py::module_& module) {
       .def("audits", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.audits(); }); }, "How well momenta and energy are kept.")
       .def("ledger", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.state().ledger; }); },
            "Work, heat and impulses that went in and out so far.")
+      .def("shape_errors", [](Handle& h) {
+             const scenes::RunRecord record = h.use([](const scenes::Simulation& s) { return s.state().record; });
+             py::dict out;
+             for (std::size_t i = 0; i < record.objects.size(); ++i) {
+               out[py::str(h.fixed().model().objects[i].name)] =
+                   py::make_tuple(record.objects[i].final_shape_error, record.objects[i].largest_deformation);
+             }
+             return out;
+           }, "{object: (now, largest)} at the frames so far: RMS of its particles after the best rigid fit over its diameter at rest [1].")
+      .def("overloads", [](Handle& h) {
+             py::list out;
+             for (const auto& o : h.use([](const scenes::Simulation& s) { return s.state().record.overloads; })) {
+               out.append(py::dict(py::arg("a") = o.a, py::arg("b") = o.b, py::arg("time") = o.time, py::arg("energy") = o.energy, py::arg("capacity") = o.capacity));
+             }
+             return out;
+           }, "Pairs that pressed harder than half of what they can hold, as dictionaries: bodies a and b, the first time [s], energy of\n"
+              "approach and contact at worst [J], and capacity [J].")
       .def("motion", [](Handle& h) {
              return h.use([](const scenes::Simulation& s) { return core::measure_motion(s.model().particles, s.state().particles); });
            }, "Kinetic energy and momenta of the current state.")

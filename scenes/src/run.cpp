@@ -112,11 +112,11 @@ std::string outcome_of(ErrorKind kind) {
 /// that the frames asked for are some of the scene's.
 /// @throws Error
 void check_needs(const Scene& scene, const RunOptions& options, const OutputRequest& outputs) {
-  if (!options.frames.empty() && *options.frames.begin() > scene.frame_count()) {
+  if (!options.frames.empty() && (*options.frames.begin() > scene.frame_count() || *options.frames.rbegin() < 1)) {
     throw Error(ErrorKind::Usage, Fault{.place = "--frames",
                                         .key = {},
                                         .expected = "expected a frame from 1 to " + std::to_string(scene.frame_count()),
-                                        .found = "none before " + std::to_string(*options.frames.begin()),
+                                        .found = *options.frames.rbegin() < 1 ? "none after 0" : "none before " + std::to_string(*options.frames.begin()),
                                         .hint = "frame n shows t = (n - 1) / frame_rate"});
   }
   if (!outputs.images) return;

@@ -231,6 +231,31 @@ struct Simulation::Impl {
     wake(pushed);
   }
 
+  void adopt(State other) {
+    const auto check = [](const char* what, std::size_t expected, std::size_t found) {
+      if (expected == found) return;
+      throw Error(ErrorKind::Usage, Fault{.place = "state",
+                                          .key = {},
+                                          .expected = "expected " + std::to_string(expected) + ' ' + what,
+                                          .found = std::to_string(found),
+                                          .hint = "the scenes must have the same objects"});
+    };
+    check("particles", state.particles.size(), other.particles.size());
+    check("bonds that can break or yield", model.links.size(), other.links.broken.size());
+    check("held volumes", state.volumes.size(), other.volumes.size());
+    other.kick = {};
+    other.ledger = {};
+    other.record = {};
+    other.samples.clear();
+    for (const Body& body : make_bodies(model, parted_links(model, other.links, other.broken_for))) other.samples.push_back(fresh_samples(body));
+    other.sleep = {};
+    if (scene.sleep) other.sleep.reset(other.samples.size());
+    if (!(model.reaction.stick.stiffness > 0.0)) other.sticks = {};
+    drop_results();
+    take(std::move(other));
+    book_audits();
+  }
+
   void set_particles(const ParticleChange& change) {
     const core::ParticleState next = changed_particles(change, model.particles, state.particles);
     std::vector<std::uint32_t> changed;
@@ -621,6 +646,8 @@ bool Simulation::advance_to(int frame, const std::function<bool()>& go_on) {
   }
   return true;
 }
+
+void Simulation::adopt(State state) { impl_->adopt(std::move(state)); }
 
 void Simulation::set_particles(const ParticleChange& change) { impl_->set_particles(change); }
 

@@ -67,6 +67,10 @@ class Runs(unittest.TestCase):
         with self.assertRaises(supple.Error) as caught:
             supple.run(two_drops(), self.folder, frames="5-1")
         self.assertEqual(caught.exception.kind, "usage")
+        for frames in [99], [0, -1]:
+            result = supple.run(two_drops(), self.folder, frames=frames)
+            self.assertEqual((result.outcome, result.exit_code), ("invalid", 2))
+            self.assertIn("expected a frame from 1 to 9", result.reason)
 
 
 if __name__ == "__main__":

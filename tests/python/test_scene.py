@@ -32,6 +32,10 @@ class Scenes(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "expected a mapping"):
             two_drops("gravity=[0, 0, 0]")
 
+    def test_refuse_overrides_that_are_no_data(self):
+        with self.assertRaisesRegex(TypeError, "expected numbers, texts, lists"):
+            two_drops({"gravity": object()})
+
     def test_look_for_files_in_their_folder(self):
         with tempfile.TemporaryDirectory() as folder:
             (pathlib.Path(folder) / "points.csv").write_text("x,y,z\n0,0,0\n0.1,0,0\n")

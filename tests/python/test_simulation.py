@@ -82,6 +82,37 @@ class Simulations(unittest.TestCase):
             other.restore(supple.Simulation(two_drops()).state())
         self.assertEqual((caught.exception.kind, caught.exception.place), ("usage", "state"))
 
+    def test_adopt_states_of_scenes_with_other_numbers(self):
+        first, other = supple.Simulation(two_drops()), supple.Simulation(two_drops({"objects.left.particles.mass": 1}))
+        first.advance_to(2)
+        other.adopt(first.state())
+        self.assertEqual((other.frame, other.time), (2, first.time))
+        np.testing.assert_array_equal(other.particles.velocity, first.particles.velocity)
+        other.advance_to(9)
+        self.assertLess(other.audits().momentum_error, 1e-13)
+        np.testing.assert_allclose(other.motion().momentum, [1, 0, 0], atol=1e-13)  # 1 kg at 1 m/s, not touching yet
+        with self.assertRaisesRegex(supple.Error, "expected 2 particles"):
+            other.adopt(supple.Simulation(library("figures/ball_hits_spiral")).state())
+
+    def test_tell_what_deforms_and_what_is_overloaded(self):
+        simulation = supple.Simulation(two_drops({"objects.left.particles.velocity": [30, 0, 0]}))
+        self.assertEqual((simulation.overloads(), simulation.shape_errors()), ([], {"left": (0, 0), "right": (0, 0)}))
+        simulation.advance_to(3)
+        overload, = simulation.overloads()
+        self.assertEqual((overload["a"], overload["b"]), ("left", "right"))
+        self.assertGreater(overload["energy"], overload["capacity"] / 2)
+        spiral = supple.Simulation(library("figures/ball_hits_spiral"))
+        spiral.advance_to(12)
+        now, largest = spiral.shape_errors()["spiral"]
+        self.assertGreaterEqual(largest, now)
+
+    def test_count_the_work_of_stages(self):
+        simulation = supple.Simulation(two_drops(), profile=True)
+        simulation.step(10)
+        profile = simulation.profile()
+        self.assertEqual(profile["advance"]["calls"], 10)
+        self.assertEqual(set(profile["advance"]), {"calls", "cpu_s", "visited", "present"})
+
     def test_keep_energy_and_momentum(self):
         simulation = supple.Simulation(two_drops())
         before = simulation.energies()

@@ -102,6 +102,57 @@ TEST_P(Arrays, StayWhereTheyAreInMemory) {
 }
 INSTANTIATE_TEST_SUITE_P(Integrators, Arrays, testing::Values("symplectic", "rk4", "adaptive", "backward_euler", "implicit_midpoint"));
 
+TEST(Adopting, OfTheSameSceneGoesOnWithTheSameBits) {
+  Simulation first = make(two_balls()), second = make(two_balls());
+  run(first, 4);
+  for (int k = 0; k < 3; ++k) first.step();
+  ASSERT_FALSE(first.contacts().summary.empty());
+  second.adopt(first.state());
+  EXPECT_EQ(second.time(), first.time());
+  run(first, 8);
+  run(second, 8);
+  EXPECT_EQ(second.state().particles.position, first.state().particles.position);
+  EXPECT_EQ(second.state().particles.angular_momentum, first.state().particles.angular_momentum);
+}
+
+TEST(Adopting, LetsOtherNumbersAct) {
+  // As if the motion had been set by hand in a scene of these numbers, but at its own frame.
+  Simulation first = make(two_balls());
+  run(first, 4);
+  Scene heavy = first.scene();
+  heavy.objects[0].particles.mass = 2.0;
+  heavy.objects[1].contact->friction = 0.5;
+  heavy.objects[0].contact->friction = 0.5;
+  Simulation adopted(heavy), set(heavy);
+  adopted.adopt(first.state());
+  const core::ParticleState& motion = first.state().particles;
+  set.set_particles({.position = motion.position, .orientation = motion.orientation, .velocity = motion.velocity, .angular_momentum = motion.angular_momentum});
+  EXPECT_EQ(adopted.frame(), 4);
+  run(adopted, 8);
+  run(set, 5);
+  EXPECT_EQ(adopted.state().particles.position, set.state().particles.position);
+  EXPECT_NE(adopted.state().particles.position, first.state().particles.position);
+  EXPECT_LT(adopted.audits().momentum_error, 1e-13);
+  EXPECT_LT(adopted.audits().energy_error, 1e-2);  // that of the automatic step; the jump to a fourfold mass is no part of it
+}
+
+TEST(Adopting, NeedsTheSameParticles) {
+  Simulation two = make(two_balls()), one = make(R"(
+schema: 1
+duration: 1 s
+objects:
+  - name: left
+    particles: {arrange: single, mass: 1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+)");
+  try {
+    two.adopt(one.state());
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "state: expected 2 particles, found 1; the scenes must have the same objects");
+  }
+}
+
 TEST(SetParticles, WithTheSameMotionChangesNoBit) {
   Simulation set = make(two_balls()), left = make(two_balls());
   run(set, 3);

@@ -30,7 +30,7 @@ class Error(ValueError):
 
 
 class ContractViolation(RuntimeError):
-    """A condition of the library that no argument should be able to break; please report it."""
+    """The calling code broke a condition of the library, such as a number of threads below 0."""
 
 
 for _type in (Fault, Error, ContractViolation):

@@ -16,4 +16,6 @@ def texts(overrides):
 
 def _plain(value):
     """Of NumPy arrays and scalars."""
+    if not hasattr(value, "tolist"):
+        raise TypeError(f"overrides: expected numbers, texts, lists and mappings, found {value!r}")
     return value.tolist()

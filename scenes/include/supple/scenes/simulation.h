@@ -108,6 +108,11 @@ class Simulation {
   bool advance_to(int frame, const std::function<bool()>& go_on = {});
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
+  /// Continues from a state of a scene with other numbers: masses, stiffnesses, friction, loads, looks. They act from now on: forces
+  /// and seeds of contacts are found anew, all bodies are awake, and ledger and audits begin here. Velocities and angular momenta are
+  /// those of the state; the frame stays, so that times do where the frame rate is the same.
+  /// @throws Error{Usage} for a state with another number of particles, breakable bonds or held volumes
+  void adopt(State state);
   /// Places and moves particles, as an experiment does between two steps; what pins hold keeps no velocity. What this changes of
   /// momentum, angular momentum and energy is booked as given from outside, so that the audits hold. Forces are found anew, and
   /// islands wake whose particles are changed.
