@@ -17,14 +17,16 @@ GradientBounds Claim::bound_gradient(const Box& box) const {
   GradientBounds bounds = bounds_with_gradient(*field_, box);
   bounds.value = scaled(bounds.value);
   bounds.least_slope *= weight_;
-  bounds.gradient *= weight_;
-  bounds.turn *= weight_;
+  for (GradientBounds::Ball& ball : bounds.hull) {
+    ball.gradient *= weight_;
+    ball.turn *= weight_;
+  }
   return bounds;
 }
 
 bool CubeBounds::certain(const Box& box, std::span<const std::uint32_t> candidates) {
   entry_.assign(1, outside());
-  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1, .bounds = {{.value = claims_[body].bound(box)}}});
+  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1, .bounds = {{.value = claims_[body].bound(box)}, {}}});
   return judge().certain;
 }
 
@@ -69,11 +71,20 @@ bool CubeBounds::rises(const Entry& own) {
     return (own.label != 0 ? own : *lead_[0].other).bounds.least_slope > 0.0;
   }
   over_.clear();
-  for (const Lead& l : lead_) over_.push_back(own.bounds.gradient - l.other->bounds.gradient);
+  turn_.clear();
+  for (const Lead& l : lead_) {
+    if (own.bounds.hull.empty() || l.other->bounds.hull.empty()) return false;
+    for (const GradientBounds::Ball& a : own.bounds.hull) {
+      for (const GradientBounds::Ball& b : l.other->bounds.hull) {
+        over_.push_back(a.gradient - b.gradient);
+        turn_.push_back(a.turn + b.turn);
+      }
+    }
+  }
   const Vec3 along = shortest_in_hull(over_);
   const double length = (1.0 + 1e-12) * along.norm();
-  for (std::size_t k = 0; k < lead_.size(); ++k) {
-    if (!(over_[k].dot(along) > (own.bounds.turn + lead_[k].other->bounds.turn) * length)) return false;
+  for (std::size_t k = 0; k < over_.size(); ++k) {
+    if (!(over_[k].dot(along) > turn_[k] * length)) return false;
   }
   return true;
 }

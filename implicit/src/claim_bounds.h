@@ -69,7 +69,7 @@ class CubeBounds {
     const Entry* other;
     Interval value;  ///< [m], to first order
   };
-  [[nodiscard]] static Entry outside() { return {.bounds = {{.second_order = true}, Vec3::Zero(), 0.0}}; }
+  [[nodiscard]] static Entry outside() { return {.bounds = {{.second_order = true}, {GradientBounds::Ball{}}}}; }
 
   [[nodiscard]] Verdict judge();
   /// Whether there is a direction along which all leads rise that may be the least of a claim. They are divided by how steep their
@@ -79,7 +79,8 @@ class CubeBounds {
   std::span<const Claim> claims_;
   std::vector<Entry> entry_;
   std::vector<Lead> lead_;
-  std::vector<Vec3> over_;
+  std::vector<Vec3> over_;      ///< gradients of the leads,
+  std::vector<double> turn_;    ///< and how far they turn
   double most_ = 0.0;  ///< that the largest claim is everywhere
 };
 

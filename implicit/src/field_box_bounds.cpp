@@ -92,57 +92,70 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
   }
 }
 
-/// A unit vector along which F may rise on all of the box, by the gradients at its centre; zero where there is none.
-Vec3 uphill(const BlendIndex& blend, std::span<const Expansion> nodes, std::span<const BlendIndex::NodeBound> bounds,
-            std::span<const BlendIndex::Term> terms) {
-  Vec3 along = Vec3::Zero();
+/// Length of the shortest vector of the hull of balls, at least; 0 where it is not known to be longer.
+double least_of_hull(std::span<const GradientBounds::Ball> hull) {
+  std::vector<Vec3> centres;
+  for (const GradientBounds::Ball& ball : hull) centres.push_back(ball.gradient);
+  if (centres.empty()) return 0.0;
+  const Vec3 along = shortest_in_hull(centres);
+  const double length = along.norm();
+  if (!(length > 0.0)) return 0.0;
+  double least = kInfinity;
+  for (const GradientBounds::Ball& ball : hull) least = std::min(least, ball.gradient.dot(along) / length * (1.0 - 1e-12) - ball.turn);
+  return std::max(least, 0.0);
+}
+
+/// Balls of gradients that F may have, from those of the nodes [1/m].
+/// @param reach  from the centre of the box to its corners  @param largest  half its largest edge
+void find_hull(const BlendIndex& blend, std::span<const Expansion> nodes, std::span<const BlendIndex::NodeBound> bounds,
+               std::span<const BlendIndex::Term> terms, double reach, double largest, std::vector<GradientBounds::Ball>& hull) {
+  using Ball = GradientBounds::Ball;
+  const auto ball = [&](std::size_t k) { return Ball{nodes[k].gradient, nodes[k].turn(reach) + nodes[k].round_off() / largest}; };
+  hull.clear();
   if (blend.rule() == BlendRule::Ricci) {
     const Interval all = blend.bound(bounds);
+    Ball sum;
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const Interval share = blend.share(bounds[k], all);
-      along += 0.5 * (share.lower + share.upper) * nodes[k].gradient;
+      const Ball one = ball(k);
+      sum.gradient += 0.5 * (share.lower + share.upper) * one.gradient;
+      sum.turn += share.upper * one.turn + 0.5 * (share.upper - share.lower) * one.gradient.norm();
     }
-  } else {
-    std::vector<Vec3> gradients;
-    for (std::size_t t = 0; t < terms.size(); ++t) {
-      const BlendIndex::Term& term = terms[t];
-      if (t == 0 || terms[t - 1].winner != term.winner) gradients.push_back(Vec3::Zero());
-      gradients.back() += term.weight * (term.or_winner ? Vec3(0.5 * (nodes[term.node].gradient + nodes[term.winner].gradient))
-                                                        : nodes[term.node].gradient);
-    }
-    if (!gradients.empty()) along = shortest_in_hull(gradients);
+    hull.push_back(sum);
+    return;
   }
-  const double length = along.norm();
-  return length > 0.0 ? Vec3(along / length) : Vec3::Zero();
-}
-
-/// What the derivative of F along a direction is at least, from those of the nodes; where two nodes win in turn, of either.
-double least_along(const BlendIndex& blend, std::span<const BlendIndex::NodeBound> nodes, std::span<const BlendIndex::Term> terms) {
-  if (blend.rule() == BlendRule::Ricci) {
-    const Interval all = blend.bound(nodes);
-    double sum = 0.0;
-    for (const BlendIndex::NodeBound& k : nodes) {
-      const Interval share = blend.share(k, all);
-      sum += std::min(share.lower * k.slope, share.upper * k.slope);
-    }
-    return sum;
-  }
-  double least = kInfinity, sum = 0.0;
+  constexpr std::size_t kMost = 8;  // sums with one winner; what may be either then counts as all in between
+  std::size_t first = 0;
   for (std::size_t t = 0; t < terms.size(); ++t) {
     const BlendIndex::Term& term = terms[t];
-    if (t == 0 || terms[t - 1].winner != term.winner) sum = 0.0;
-    sum += term.weight * (term.or_winner ? std::min(nodes[term.node].slope, nodes[term.winner].slope) : nodes[term.node].slope);
-    if (t + 1 == terms.size() || terms[t + 1].winner != term.winner) least = std::min(least, sum);
+    if (t == 0 || terms[t - 1].winner != term.winner) {
+      first = hull.size();
+      hull.push_back({});
+    }
+    Ball one = ball(term.node), other = one;
+    if (term.or_winner) other = ball(term.winner);
+    const std::size_t count = hull.size() - first;
+    if (term.or_winner && 2 * count > kMost) {
+      one = {0.5 * (one.gradient + other.gradient), std::max(one.turn, other.turn) + 0.5 * (one.gradient - other.gradient).norm()};
+    } else if (term.or_winner) {
+      for (std::size_t k = 0; k < count; ++k) {
+        const Ball& without = hull[first + k];
+        hull.push_back({without.gradient + term.weight * other.gradient, without.turn + term.weight * other.turn});
+      }
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      hull[first + k].gradient += term.weight * one.gradient;
+      hull[first + k].turn += term.weight * one.turn;
+    }
   }
-  return least;
 }
 
-Field::BoxBounds blended_box_bounds(const Field::Index& index, const Box& box, const Interval& plain) {
+GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, const Interval& plain) {
   thread_local std::vector<Expansion> nodes;
   thread_local std::vector<BlendIndex::NodeBound> bounds;
   thread_local std::vector<BlendIndex::Term> terms;
   expand_nodes(index, box, nodes);
-  if (nodes.empty()) return {.value = plain, .second_order = true};
+  if (nodes.empty()) return {{.value = plain, .second_order = true}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
   bounds.clear();
   double scale = index.iso, slopes = 0.0;
@@ -155,15 +168,13 @@ Field::BoxBounds blended_box_bounds(const Field::Index& index, const Box& box, c
   }
   const Interval sum = index.blend.bound(bounds);
   const double n = static_cast<double>(nodes.size()), round_off = (32.0 + 4.0 * n * n) * kEps;
-  Field::BoxBounds out{.value = intersection(plain, {sum.lower - index.iso - round_off * scale, sum.upper - index.iso + round_off * scale}),
-                       .second_order = true};
-  if (index.blend.rule() != BlendRule::Ricci && !index.blend.find_terms(bounds, terms)) return {.value = out.value};
+  GradientBounds out{{.value = intersection(plain, {sum.lower - index.iso - round_off * scale, sum.upper - index.iso + round_off * scale}),
+                      .second_order = true}, {}};
+  if (index.blend.rule() != BlendRule::Ricci && !index.blend.find_terms(bounds, terms)) return {{.value = out.value}, {}};
   if (!sloped || half.isZero()) return out;
-  const Vec3 direction = uphill(index.blend, nodes, bounds, terms);
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    bounds[k].slope = nodes[k].gradient.dot(direction) - nodes[k].turn(half.norm()) - nodes[k].round_off() / half.maxCoeff();
-  }
-  out.least_slope = std::max(least_along(index.blend, bounds, terms) - round_off * slopes, 0.0);
+  find_hull(index.blend, nodes, bounds, terms, half.norm(), half.maxCoeff(), out.hull);
+  for (GradientBounds::Ball& ball : out.hull) ball.turn += round_off * slopes;
+  out.least_slope = least_of_hull(out.hull);
   return out;
 }
 
@@ -176,19 +187,18 @@ Field::BoxBounds Field::box_bounds(const Box& box) const { return bounds_with_gr
 GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   const Field::Index& index = field.index();
   const Interval plain = field.bound(box);
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}};
-  if (index.blend.active()) return {blended_box_bounds(index, box, plain)};
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}, {}};
+  if (index.blend.active()) return blended_box_bounds(index, box, plain);
   Expansion sum{.value = -index.iso, .scale = index.iso};
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (index.support[id].overlaps(box)) expand(index, id, box, sum);
   }
-  if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, Vec3::Zero(), 0.0};
+  if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
-  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}};
+  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}, {}};
   if (sum.sloped && half.maxCoeff() > 0.0) {
-    out.gradient = sum.gradient;
-    out.turn = sum.turn(half.norm()) + sum.round_off() / half.maxCoeff();
-    out.least_slope = std::max(sum.gradient.norm() * (1.0 - 1e-12) - out.turn, 0.0);
+    out.hull.push_back({sum.gradient, sum.turn(half.norm()) + sum.round_off() / half.maxCoeff()});
+    out.least_slope = least_of_hull(out.hull);
   }
   return out;
 }

@@ -39,7 +39,7 @@ struct SearchedBody {
 };
 
 /// The same for meshes of polygonise_partition, by body: a piece between two bodies is added to both, with the same points. Pieces
-/// that meet two others or more are not made, nor are cells decided where a body with a blend (BlendRule) may meet another: they count as
+/// that meet two others or more are not made: they count as
 /// undecided.
 MissedPieces add_missed_pieces(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor,
                                std::span<Mesh> meshes);
