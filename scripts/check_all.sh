@@ -23,14 +23,15 @@ clang_build=$supple_root/build/clang
 
 configure_clang() {
   cmake -S "$supple_root" -B "$clang_build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=clang++ \
-    -DSUPPLE_WARNINGS_AS_ERRORS=ON -DSUPPLE_BUILD_TESTS=ON -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
+    -DSUPPLE_WARNINGS_AS_ERRORS=ON -DSUPPLE_BUILD_TESTS=ON -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \
+    -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3
 }
 build_clang() { configure_clang && cmake --build "$clang_build"; }
 test_clang() { ctest --test-dir "$clang_build" -j "$supple_jobs" --output-on-failure --no-tests=error; }
 
 analyse() {
   configure_clang &&
-    sed -n 's/^ *"file": "\(.*\)",*$/\1/p' "$clang_build/compile_commands.json" | grep -E '/(src|cli)/' | sort -u |
+    sed -n 's/^ *"file": "\(.*\)",*$/\1/p' "$clang_build/compile_commands.json" | grep -E '/(src|cli|python)/' | sort -u |
     xargs -P "$supple_jobs" -n 2 clang-tidy --quiet -p "$clang_build"
 }
 
@@ -39,7 +40,7 @@ test_tsan() {
     ctest --preset tsan -j "$supple_jobs" --no-tests=error
 }
 
-install_packages build run test check
+install_packages build run test python check
 
 if ! chose clang; then
   :

@@ -1,6 +1,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <tuple>
+
 #include "arrays.h"
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
@@ -49,9 +51,10 @@ py::tuple field(Handle& handle, const std::string& body, const py::object& point
 
 py::array picture(Handle& handle, const std::optional<std::filesystem::path>& path, const std::string& camera,
                   const std::optional<std::pair<int, int>>& size, int threads) {
-  const auto [width, height] = size.value_or(std::pair(0, 0));
+  scenes::PictureOptions options{.camera = camera, .threads = threads};
+  if (size) std::tie(options.width, options.height) = *size;
   const auto image = std::make_shared<const render::Image>(handle.use([&](scenes::Simulation& s) {
-    render::Image drawn = scenes::draw_picture(s, {.camera = camera, .width = width, .height = height, .threads = threads});
+    render::Image drawn = scenes::draw_picture(s, options);
     if (path) render::write_png(*path, drawn);
     return drawn;
   }));
