@@ -142,6 +142,7 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
       .def_property_readonly("dissipated_work", [](const Contacts& c) { return c.report->dissipated_work; },
                              "By all damping and friction since the start [J].")
       .def("__len__", [](const Contacts& c) { return c.report->pairs.size(); })
+      .def("__iter__", [](const py::object& self) { return py::iter(self.attr("pairs")); })
       .def("__getitem__", [](const Contacts& c, py::ssize_t k) {
         const py::ssize_t n = std::ssize(c.report->pairs);
         if (k < -n || k >= n) throw py::index_error("pair " + std::to_string(k) + " of " + std::to_string(n));
@@ -162,6 +163,11 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
       .def("contact", &contact, py::arg("a"), py::arg("b"), py::arg("error") = 1e-4,
            "The contact of two bodies as they are, as if there were no others, by their names (\"ground\" and obstacles have names, too).\n\n"
            "error  relative error asked for, from 1e-10 to 0.1; error_estimate of the answer is a bound of what is reached.")
+      .def("contact_capacity", [](Handle& h, const std::string& a, const std::string& b) {
+             return h.use([&](scenes::Simulation& s) { return scenes::contact_capacity(s, scenes::find_body(s, a), scenes::find_body(s, b)); });
+           }, py::arg("a"), py::arg("b"),
+           "The largest contact energy [J] that two touching bodies can reach when they are pushed on along their force; what approaches with\n"
+           "more kinetic energy passes.")
       .def("forces", [](Handle& h) {
              std::vector<std::shared_ptr<LawReport>> laws;
              for (LawReport& law : h.use([](scenes::Simulation& s) { return scenes::report_forces(s); })) {

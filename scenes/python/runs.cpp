@@ -122,6 +122,23 @@ void bind_runs(py::module_& module) {
   module.def("export", &export_files, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
              py::arg("progress") = py::none(), export_doc.c_str());
   module.def("info", &scenes::describe_run, py::arg("folder"), "What a run folder holds, for reading: outcome, audits, times, files.");
+
+  using scenes::Comparison;
+  using scenes::FrameComparison;
+  py::class_<FrameComparison>(module, "FrameComparison", "A frame of two runs.")
+      .def_readonly("frame", &FrameComparison::frame, "Its number.")
+      .def_readonly("psnr", &FrameComparison::psnr, "[dB], infinite for equal pictures.")
+      .def_readonly("largest", &FrameComparison::largest, "Difference of a channel, 0 to 255.");
+  py::class_<Comparison>(module, "Comparison", "Two runs, picture by picture.")
+      .def_property_readonly("frames", [](const Comparison& c) { return c.frames; }, "Those that both have, as FrameComparison, ascending.")
+      .def_readonly("only_first", &Comparison::only_first, "How many only the first one has.")
+      .def_readonly("only_second", &Comparison::only_second, "How many only the second one has.")
+      .def_property_readonly("film", [](const Comparison& c) { return c.film.empty() ? std::optional<Path>() : c.film; }, "None: there is none.");
+  module.def("compare", [](const Path& first, const Path& second, const Path& folder, double gain, bool film, const std::string& camera) {
+        const py::gil_scoped_release others_run;
+        return scenes::compare_runs({.first = first, .second = second, .folder = folder, .gain = gain, .film = film, .camera = camera});
+      }, py::arg("first"), py::arg("second"), py::arg("folder"), py::kw_only(), py::arg("gain") = 8.0, py::arg("film") = true, py::arg("camera") = "",
+      "Puts the frames of two run folders side by side with their difference, times gain, into folder/frames, compare.mp4 and compare.csv.");
 }
 
 }  // namespace supple::python

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "read_scene_faults.h"
+#include "supple/collision/approach.h"
 #include "supple/core/error.h"
 
 namespace supple::scenes {
@@ -22,6 +23,16 @@ std::size_t body_count(const Simulation& simulation) { return simulation.bodies(
 
 const std::string& name_of(const Simulation& simulation, std::size_t body) {
   return body_name(simulation.model(), simulation.bodies(), body);
+}
+
+/// Of all contacts that of two bodies; null where they do not touch. @throws Error{Usage} for one body twice
+const collision::ContactSurface::Summary* find_pair(Simulation& simulation, std::uint32_t a, std::uint32_t b) {
+  SUPPLE_EXPECTS(a < body_count(simulation) && b < body_count(simulation));
+  if (a == b) refuse("b", "expected two bodies", '\'' + name_of(simulation, a) + "' twice", "");
+  const collision::BodyPair pair{std::min(a, b), std::max(a, b)};
+  const auto& touching = simulation.contacts().summary;
+  const auto at = std::find_if(touching.begin(), touching.end(), [&](const auto& s) { return s.bodies == pair; });
+  return at == touching.end() ? nullptr : &*at;
 }
 
 }  // namespace
@@ -60,14 +71,12 @@ std::vector<core::LawReport> report_forces(Simulation& simulation) {
 }
 
 collision::ContactSurface solve_contact(Simulation& simulation, std::uint32_t a, std::uint32_t b, double error) {
-  SUPPLE_EXPECTS(a < body_count(simulation) && b < body_count(simulation));
   if (!(error >= 1e-10 && error <= 0.1)) refuse("error", "expected a relative error from 1e-10 to 0.1", short_text(error), "");
-  if (a == b) refuse("b", "expected two bodies", '\'' + name_of(simulation, a) + "' twice", "");
-  const collision::BodyPair pair{std::min(a, b), std::max(a, b)};
-  const auto& touching = simulation.contacts().summary;
+  const collision::ContactSurface::Summary* const found = find_pair(simulation, a, b);
   collision::ContactSurface alone;
-  if (std::none_of(touching.begin(), touching.end(), [&](const auto& s) { return s.bodies == pair; })) return alone;
+  if (found == nullptr) return alone;
 
+  const collision::BodyPair pair = found->bodies;
   const std::span<const collision::ContactBody> bodies = simulation.contact_bodies();
   const std::array two = {bodies[pair.a], bodies[pair.b]};
   const std::array one_pair = {collision::BodyPair{0, 1}};
@@ -79,6 +88,15 @@ collision::ContactSurface solve_contact(Simulation& simulation, std::uint32_t a,
   collision::solve_contact_surface(two, candidates, settings, executor, alone);
   for (auto& s : alone.summary) s.bodies = pair;
   return alone;
+}
+
+double contact_capacity(Simulation& simulation, std::uint32_t a, std::uint32_t b) {
+  const collision::ContactSurface::Summary* const found = find_pair(simulation, a, b);
+  if (found == nullptr || !(found->force.norm() > 0.0)) {
+    refuse("b", "expected a body that touches '" + name_of(simulation, a) + '\'', '\'' + name_of(simulation, b) + '\'', "");
+  }
+  const std::span<const collision::ContactBody> bodies = simulation.contact_bodies();
+  return collision::contact_capacity(bodies[found->bodies.a], bodies[found->bodies.b], -found->force.normalized());
 }
 
 }  // namespace supple::scenes

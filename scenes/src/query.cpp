@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "read_scene_faults.h"
-#include "supple/collision/approach.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -76,9 +75,6 @@ std::string query_contact(Simulation& simulation, bool samples) {
     cpu_s = std::min(cpu_s, process_cpu_seconds() - begin);
   }
   const collision::ContactSurface& surface = simulation.contacts();
-  const auto capacity = [bodies = simulation.contact_bodies()](const collision::ContactSurface::Summary& s) {
-    return collision::contact_capacity(bodies[s.bodies.a], bodies[s.bodies.b], -s.force.normalized());
-  };
   ordered_json json;
   json["time_s"] = simulation.time();
   json["cpu_us"] = 1e6 * cpu_s;
@@ -94,7 +90,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"area_m2", s.area},
                          {"centre_of_pressure_m", vector(s.centre_of_pressure)},
                          {"energy_j", s.energy},
-                         {"capacity_j", capacity(s)},
+                         {"capacity_j", s.force.norm() > 0.0 ? contact_capacity(simulation, s.bodies.a, s.bodies.b) : 0.0},
                          {"largest_pressure_pa", s.largest_pressure},
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},

@@ -92,6 +92,13 @@ class TwoBodies(unittest.TestCase):
             np.testing.assert_allclose(contact.centre_of_pressure, 0, atol=1e-8)
             np.testing.assert_allclose(contact.elastic_force / np.linalg.norm(contact.elastic_force), -across / 0.15, atol=2e-8)
 
+    def test_can_hold_so_much(self):
+        simulation = pressed()
+        capacity = simulation.contact_capacity("left", "right")
+        self.assertGreater(capacity, simulation.contacts()[0].energy)
+        with self.assertRaisesRegex(supple.Error, "expected a body that touches 'left'"):
+            supple.Simulation(two_drops()).contact_capacity("left", "right")
+
     def test_need_not_touch(self):
         contact = supple.Simulation(two_drops()).contact("left", "right")
         self.assertFalse(contact.touching)

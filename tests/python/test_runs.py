@@ -63,6 +63,17 @@ class Runs(unittest.TestCase):
         self.assertEqual((result.outcome, result.exit_code), ("limit", 6))
         self.assertIn("time_step", result.reason)
 
+    def test_are_compared(self):
+        other = self.folder.parent / "other"
+        for folder, colour in (self.folder, [1, 0, 0]), (other, [0, 0, 1]):
+            supple.run(two_drops({"duration": 0.125, "objects.left.colour": colour}), folder)
+        here = self.folder.parent / "both"
+        both = supple.compare(self.folder, other, here, film=False)
+        self.assertEqual([f.frame for f in both.frames], [1, 2])
+        self.assertTrue(all(f.largest > 50 and 0 < f.psnr < 60 for f in both.frames))
+        self.assertEqual((both.only_first, both.only_second, both.film), (0, 0, None))
+        self.assertTrue((here / "compare.csv").exists())
+
     def test_refuse_wrong_frames(self):
         with self.assertRaises(supple.Error) as caught:
             supple.run(two_drops(), self.folder, frames="5-1")

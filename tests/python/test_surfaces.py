@@ -1,6 +1,7 @@
 import gc
 import pathlib
 import tempfile
+import threading
 import unittest
 
 import numpy as np
@@ -98,6 +99,19 @@ class Pictures(unittest.TestCase):
         self.assertEqual(simulation.picture(size=(40, 30)).shape, (30, 40, 3))
         self.assertEqual(simulation.state_hash, other.state_hash)
         np.testing.assert_array_equal(simulation.meshes()["left"].position, other.meshes()["left"].position)
+
+    def test_are_the_same_from_every_thread(self):
+        simulation, other = touching(), touching()
+        here = simulation.picture()
+        drawn = []
+        threads = [threading.Thread(target=lambda s=s: drawn.append(s.picture())) for s in (simulation, other, simulation)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(len(drawn), 3)
+        for picture in drawn:
+            np.testing.assert_array_equal(picture, here)
 
     def test_refuse_what_is_no_camera_and_no_size(self):
         for arguments in {"camera": "side"}, {"size": (-1, 5)}:

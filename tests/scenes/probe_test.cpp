@@ -132,6 +132,15 @@ TEST(SolveContact, OfBodiesApartIsEmptyAndChangesNothing) {
             "error: expected a relative error from 1e-10 to 0.1, found 0.5");
 }
 
+TEST(ContactCapacity, HoldsTwiceTheEnergyOfTwiceTheModulus) {
+  // Pressures, and so energies, are proportional to the moduli. The sum over cells is the same up to round-off.
+  Simulation soft = make(), stiff = make("", {"objects.left.contact.modulus=4e3", "objects.right.contact.modulus=4e3"});
+  const double capacity = contact_capacity(soft, 0, 1);
+  EXPECT_GT(capacity, soft.contacts().summary.front().energy);
+  EXPECT_NEAR(contact_capacity(stiff, 1, 0) / capacity, 2.0, 1e-9);
+  EXPECT_EQ(message([&] { static_cast<void>(contact_capacity(soft, 0, 2)); }), "b: expected a body that touches 'left', found 'ground'");
+}
+
 TEST(DrawPicture, IsTheFrameOfARun) {
   // What lies far below is in no picture, nor is its shadow.
   const std::string text = "schema: 1\nduration: 1 s\nframe_rate: 8\nobjects:\n" + ball("left", "[-0.25, 0, 0]") +

@@ -30,4 +30,8 @@ void evaluate_field(Simulation& simulation, std::uint32_t body, std::span<const 
 /// @throws Error{Usage} for another error, or one body twice
 [[nodiscard]] collision::ContactSurface solve_contact(Simulation& simulation, std::uint32_t a, std::uint32_t b, double error);
 
+/// The largest contact energy [J] that two touching bodies can reach when they are pushed on along their force; what approaches with more
+/// kinetic energy passes (collision/approach.h). @throws Error{Usage} for bodies that do not touch
+[[nodiscard]] double contact_capacity(Simulation& simulation, std::uint32_t a, std::uint32_t b);
+
 }  // namespace supple::scenes
