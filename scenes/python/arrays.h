@@ -27,13 +27,13 @@ py::array view(const T* data, std::vector<py::ssize_t> shape, const py::handle& 
   array.attr("setflags")(py::arg("write") = false);
   return array;
 }
-inline py::array view(const std::vector<double>& v, const py::handle& base) { return view(v.data(), {std::ssize(v)}, base); }
-inline py::array view(const std::vector<std::uint8_t>& v, const py::handle& base) { return view(v.data(), {std::ssize(v)}, base); }
-inline py::array view(const std::vector<std::uint32_t>& v, const py::handle& base) { return view(v.data(), {std::ssize(v)}, base); }
-inline py::array view(const std::vector<Vec3>& v, const py::handle& base) {
+inline py::array view(std::span<const double> v, const py::handle& base) { return view(v.data(), {std::ssize(v)}, base); }
+inline py::array view(std::span<const std::uint8_t> v, const py::handle& base) { return view(v.data(), {std::ssize(v)}, base); }
+inline py::array view(std::span<const std::uint32_t> v, const py::handle& base) { return view(v.data(), {std::ssize(v)}, base); }
+inline py::array view(std::span<const Vec3> v, const py::handle& base) {
   return view(v.empty() ? nullptr : v.front().data(), {std::ssize(v), 3}, base);
 }
-inline py::array view(const std::vector<Quat>& v, const py::handle& base) {
+inline py::array view(std::span<const Quat> v, const py::handle& base) {
   return view(v.empty() ? nullptr : v.front().coeffs().data(), {std::ssize(v), 4}, base);
 }
 
@@ -41,7 +41,7 @@ inline py::array view(const std::vector<Quat>& v, const py::handle& base) {
 template <class T>
 py::array own(std::vector<T> values) {
   const auto owner = std::make_shared<std::vector<T>>(std::move(values));
-  return view(*owner, keep(owner));
+  return view(std::span<const T>(*owner), keep(owner));
 }
 
 /// Rows of three or four numbers from anything that NumPy can make an array of.

@@ -32,14 +32,10 @@ struct Contacts {
   Report report;
 };
 
-/// Rows [first, last) of a column of the report's points.
-py::array rows(const Pair& pair, const std::vector<Vec3>& column) {
-  const std::size_t first = pair.of().first, n = pair.of().last - first;
-  return view(n == 0 ? nullptr : column[first].data(), {static_cast<py::ssize_t>(n), 3}, keep(pair.report));
-}
-py::array rows(const Pair& pair, const std::vector<double>& column) {
-  const std::size_t first = pair.of().first, n = pair.of().last - first;
-  return view(n == 0 ? nullptr : &column[first], {static_cast<py::ssize_t>(n)}, keep(pair.report));
+/// The rows of a column of the report's points that are the pair's.
+template <class T>
+py::array rows(const Pair& pair, const std::vector<T>& column) {
+  return view(std::span<const T>(column).subspan(pair.of().first, pair.of().last - pair.of().first), keep(pair.report));
 }
 
 /// What a pair of a report and a contact of two bodies alone have in common.

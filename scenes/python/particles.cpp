@@ -12,10 +12,11 @@ struct Particles {
   std::shared_ptr<Handle> of;
 };
 
-/// Arrays stay where they are for the life of a simulation, so views need no turn.
+/// Arrays stay where they are for the life of a simulation; only to learn where, a call waits for its turn.
 template <auto member>
 py::array state_view(const Particles& p) {
-  return view(p.of->fixed().state().particles.*member, keep(p.of));
+  const auto rows = p.of->use([](const scenes::Simulation& simulation) { return std::span(simulation.state().particles.*member); });
+  return view(rows, keep(p.of));
 }
 template <auto member>
 py::array set_view(const Particles& p) {

@@ -84,6 +84,10 @@ class Errors(unittest.TestCase):
             supple.read_scene("absent.yaml")
         self.assertEqual((caught.exception.kind, caught.exception.exit_code, caught.exception.place), ("io", 4, "absent.yaml"))
 
+    def test_of_calling_code_are_exceptions_too(self):
+        with self.assertRaisesRegex(supple.ContractViolation, "threads >= 0"):
+            supple.Simulation(two_drops(), threads=-1)
+
     def test_survive_pickling(self):
         with self.assertRaises(supple.Error) as caught:
             supple.read_scene("absent.yaml")
