@@ -10,13 +10,20 @@ namespace {
 
 const char* kind_name(ErrorKind kind) {
   switch (kind) {
-    case ErrorKind::Usage: return "usage";
-    case ErrorKind::Scene: return "scene";
-    case ErrorKind::Io: return "io";
-    case ErrorKind::Diverged: return "diverged";
-    case ErrorKind::Limit: return "limit";
-    case ErrorKind::Corrupt: return "corrupt";
-    case ErrorKind::Internal: break;
+    case ErrorKind::Usage:
+      return "usage";
+    case ErrorKind::Scene:
+      return "scene";
+    case ErrorKind::Io:
+      return "io";
+    case ErrorKind::Diverged:
+      return "diverged";
+    case ErrorKind::Limit:
+      return "limit";
+    case ErrorKind::Corrupt:
+      return "corrupt";
+    case ErrorKind::Internal:
+      break;
   }
   return "internal";
 }
@@ -42,7 +49,8 @@ void bind_errors(py::module_& /*module*/) {
       for (const Fault& f : error.faults()) {
         faults.append(py::make_tuple(text(f.place), text(f.key), text(f.expected), text(f.found), text(f.hint)));
       }
-      raise("Error", py::make_tuple(text(error.what()), kind_name(error.kind()), static_cast<int>(error.kind()), faults));
+      raise("Error",
+            py::make_tuple(text(error.what()), kind_name(error.kind()), static_cast<int>(error.kind()), faults));
     } catch (const ContractViolation& error) {
       raise("ContractViolation", py::make_tuple(text(error.what())));
     } catch (const std::filesystem::filesystem_error& error) {

@@ -11,10 +11,12 @@ void check_numpy(const pybind11::module_& module) {
   constexpr bool kKnowsTwo = PYBIND11_VERSION_HEX >= 0x020C0000;
   module.attr("_numpy_versions") = kKnowsTwo ? "1 or later" : "1";
   if (kKnowsTwo || version.starts_with("1.")) return;
-  throw pybind11::import_error("supple was built with pybind11 " PYBIND11_TOSTRING(PYBIND11_VERSION_MAJOR) "." PYBIND11_TOSTRING(
-                                   PYBIND11_VERSION_MINOR) ", which knows NumPy 1 only; found NumPy " + version +
-                               ". Build it with pybind11 2.12 or later, or use a Python that has NumPy 1 "
-                               "(Debian 12: -DPython_EXECUTABLE=/usr/bin/python3).");
+  throw pybind11::import_error(
+      "supple was built with pybind11 " PYBIND11_TOSTRING(PYBIND11_VERSION_MAJOR) "." PYBIND11_TOSTRING(
+          PYBIND11_VERSION_MINOR) ", which knows NumPy 1 only; found NumPy " +
+      version +
+      ". Build it with pybind11 2.12 or later, or use a Python that has NumPy 1 "
+      "(Debian 12: -DPython_EXECUTABLE=/usr/bin/python3).");
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ struct Particles {
 /// Arrays stay where they are for the life of a simulation; only to learn where, a call waits for its turn.
 template <auto member>
 py::array state_view(const Particles& p) {
-  const auto rows = p.of->use([](const scenes::Simulation& simulation) { return std::span(simulation.state().particles.*member); });
+  const auto rows =
+      p.of->use([](const scenes::Simulation& simulation) { return std::span(simulation.state().particles.*member); });
   return view(rows, keep(p.of));
 }
 template <auto member>
@@ -27,7 +28,8 @@ py::array angular_velocities(const Particles& p) {
   return own(p.of->use([](scenes::Simulation& simulation) {
     const ParticleSet& set = simulation.model().particles;
     std::vector<Vec3> omega(set.size());
-    for (std::size_t i = 0; i < set.size(); ++i) omega[i] = core::angular_velocity(set, simulation.state().particles, i);
+    for (std::size_t i = 0; i < set.size(); ++i)
+      omega[i] = core::angular_velocity(set, simulation.state().particles, i);
     return omega;
   }));
 }
@@ -38,7 +40,8 @@ py::array_t<double> rows(const py::object& values, const char* argument, py::ssi
   const Array array = Array::ensure(values);
   if (array && array.ndim() == 2 && array.shape(1) == width) return array;
   PyErr_Clear();
-  const std::string found = array ? py::str(array.attr("shape")).cast<std::string>() : py::repr(py::type::of(values)).cast<std::string>();
+  const std::string found =
+      array ? py::str(array.attr("shape")).cast<std::string>() : py::repr(py::type::of(values)).cast<std::string>();
   throw Error(ErrorKind::Usage, Fault{.place = argument,
                                       .key = {},
                                       .expected = "expected an array of shape (n, " + std::to_string(width) + ")",
@@ -46,8 +49,8 @@ py::array_t<double> rows(const py::object& values, const char* argument, py::ssi
                                       .hint = {}});
 }
 
-void set_particles(Handle& handle, const py::object& position, const py::object& orientation, const py::object& velocity,
-                   const py::object& angular_momentum, const py::object& angular_velocity) {
+void set_particles(Handle& handle, const py::object& position, const py::object& orientation,
+                   const py::object& velocity, const py::object& angular_momentum, const py::object& angular_velocity) {
   scenes::ParticleChange change;
   if (!position.is_none()) change.position = rows3(position, "position");
   if (!orientation.is_none()) change.orientation = rows4(orientation, "orientation");
@@ -75,10 +78,13 @@ std::vector<Quat> rows4(const py::object& values, const char* argument) {
 
 void bind_particles(py::module_& module, Simulation& simulation) {
   py::class_<Particles>(module, "Particles",
-                        "The particles of a simulation; row i is the same particle in every array. All arrays but angular_velocity are views:\n"
-                        "they cost nothing, follow the simulation and keep it alive, and cannot be written to (Simulation.set_particles does\n"
+                        "The particles of a simulation; row i is the same particle in every array. All arrays but "
+                        "angular_velocity are views:\n"
+                        "they cost nothing, follow the simulation and keep it alive, and cannot be written to "
+                        "(Simulation.set_particles does\n"
                         "that). Copy what shall outlast the next step.")
-      .def_property_readonly("position", &state_view<&ParticleState::position>, "World position [m], shape (n, 3), a view.")
+      .def_property_readonly("position", &state_view<&ParticleState::position>,
+                             "World position [m], shape (n, 3), a view.")
       .def_property_readonly("orientation", &state_view<&ParticleState::orientation>,
                              "Quaternion x, y, z, w, body to world, unit length, shape (n, 4), a view.")
       .def_property_readonly("velocity", &state_view<&ParticleState::velocity>, "[m/s], shape (n, 3), a view.")
@@ -86,23 +92,32 @@ void bind_particles(py::module_& module, Simulation& simulation) {
                              "About the particle's centre, world axes [kg m^2/s], shape (n, 3), a view.")
       .def_property_readonly("angular_velocity", &angular_velocities, "World axes [rad/s], shape (n, 3), computed.")
       .def_property_readonly("mass", &set_view<&ParticleSet::mass>, "[kg], shape (n,), a view.")
-      .def_property_readonly("inertia", &set_view<&ParticleSet::inertia>, "Principal moments, body axes [kg m^2], shape (n, 3), a view.")
-      .def_property_readonly("normal", &set_view<&ParticleSet::normal>, "The fixed unit vector of each particle, body axes, shape (n, 3), a view.")
-      .def_property_readonly("object", &set_view<&ParticleSet::object>, "Number of its object in Scene.objects, shape (n,), a view.")
-      .def_property_readonly("pinned", &set_view<&ParticleSet::pinned>,
-                             "Sum of 1: position held, 2: orientation held, 4: moves in its plane z = const; shape (n,), a view.")
+      .def_property_readonly("inertia", &set_view<&ParticleSet::inertia>,
+                             "Principal moments, body axes [kg m^2], shape (n, 3), a view.")
+      .def_property_readonly("normal", &set_view<&ParticleSet::normal>,
+                             "The fixed unit vector of each particle, body axes, shape (n, 3), a view.")
+      .def_property_readonly("object", &set_view<&ParticleSet::object>,
+                             "Number of its object in Scene.objects, shape (n,), a view.")
+      .def_property_readonly(
+          "pinned", &set_view<&ParticleSet::pinned>,
+          "Sum of 1: position held, 2: orientation held, 4: moves in its plane z = const; shape (n,), a view.")
       .def("__len__", [](const Particles& p) { return p.of->fixed().model().particles.size(); })
       .def("__repr__", [](const Particles& p) {
         return "<supple.Particles, " + std::to_string(p.of->fixed().model().particles.size()) + ">";
       });
 
   simulation
-      .def_property_readonly("particles", [](std::shared_ptr<Handle> h) { return Particles{std::move(h)}; }, "The particles, as views.")
-      .def("set_particles", &set_particles, py::kw_only(), py::arg("position") = py::none(), py::arg("orientation") = py::none(),
-           py::arg("velocity") = py::none(), py::arg("angular_momentum") = py::none(), py::arg("angular_velocity") = py::none(),
-           "Places and moves the particles as asked for, between two steps; what is not given stays. Shapes and units are those of Particles;\n"
-           "orientations are normalised, angular_velocity may take the place of angular_momentum, and what pins hold keeps no velocity.\n\n"
-           "What this changes of momentum, angular momentum and energy is booked as given from outside, so that the audits hold.");
+      .def_property_readonly(
+          "particles", [](std::shared_ptr<Handle> h) { return Particles{std::move(h)}; }, "The particles, as views.")
+      .def("set_particles", &set_particles, py::kw_only(), py::arg("position") = py::none(),
+           py::arg("orientation") = py::none(), py::arg("velocity") = py::none(),
+           py::arg("angular_momentum") = py::none(), py::arg("angular_velocity") = py::none(),
+           "Places and moves the particles as asked for, between two steps; what is not given stays. Shapes and units "
+           "are those of Particles;\n"
+           "orientations are normalised, angular_velocity may take the place of angular_momentum, and what pins hold "
+           "keeps no velocity.\n\n"
+           "What this changes of momentum, angular momentum and energy is booked as given from outside, so that the "
+           "audits hold.");
 }
 
 }  // namespace supple::python

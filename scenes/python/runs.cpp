@@ -29,9 +29,10 @@ std::set<int> frames_of(const Frames& frames) {
   return {};
 }
 
-/// Calls verb(scene, options) on a thread of its own, while this one sees to signals. What `progress` or a signal raises ends
-/// the run after its step and is raised here then.
-RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options, const py::object& progress) {
+/// Calls verb(scene, options) on a thread of its own, while this one sees to signals. What `progress` or a signal
+/// raises ends the run after its step and is raised here then.
+RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options,
+               const py::object& progress) {
   constexpr std::chrono::milliseconds kSlice(50);
   std::atomic<int> interrupt{0};
   std::exception_ptr raised;
@@ -64,19 +65,28 @@ RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& 
   return result.get();
 }
 
-RunResult run(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, bool resume, bool simulate_only,
-              const py::object& progress) {
+RunResult run(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, bool resume,
+              bool simulate_only, const py::object& progress) {
   return call(&scenes::run_scene, scene,
-              {.folder = folder, .frames = frames_of(frames), .threads = threads, .overwrite = overwrite, .resume = resume, .simulate_only = simulate_only},
+              {.folder = folder,
+               .frames = frames_of(frames),
+               .threads = threads,
+               .overwrite = overwrite,
+               .resume = resume,
+               .simulate_only = simulate_only},
               progress);
 }
 
-RunResult render(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, const py::object& progress) {
-  return call(&scenes::render_run, scene, {.folder = folder, .frames = frames_of(frames), .threads = threads, .overwrite = overwrite}, progress);
+RunResult render(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite,
+                 const py::object& progress) {
+  return call(&scenes::render_run, scene,
+              {.folder = folder, .frames = frames_of(frames), .threads = threads, .overwrite = overwrite}, progress);
 }
 
-RunResult export_files(const Scene& scene, const Path& folder, const Frames& frames, int threads, const py::object& progress) {
-  return call(&scenes::export_run, scene, {.folder = folder, .frames = frames_of(frames), .threads = threads}, progress);
+RunResult export_files(const Scene& scene, const Path& folder, const Frames& frames, int threads,
+                       const py::object& progress) {
+  return call(&scenes::export_run, scene, {.folder = folder, .frames = frames_of(frames), .threads = threads},
+              progress);
 }
 
 }  // namespace
@@ -90,15 +100,22 @@ void bind_runs(py::module_& module) {
       .def_readonly("left_s", &Progress::left_s, "Estimate [s]; negative while unknown.")
       .def_readonly("frames_per_s", &Progress::frames_per_s, "0 while unknown [1/s].");
   py::class_<RunResult>(module, "RunResult", "How a run ended and what it left behind.")
-      .def_readonly("outcome", &RunResult::outcome, "\"done\", \"diverged\", \"interrupted\", \"limit\", \"io\" or \"invalid\".")
+      .def_readonly("outcome", &RunResult::outcome,
+                    "\"done\", \"diverged\", \"interrupted\", \"limit\", \"io\" or \"invalid\".")
       .def_readonly("reason", &RunResult::reason, "Empty when done.")
       .def_readonly("exit_code", &RunResult::exit_code, "What the command line tool would end with.")
       .def_readonly("frames", &RunResult::frames, "The last frame reached.")
-      .def_property_readonly("state_hash", [](const RunResult& r) { return to_hex(r.state_hash); }, "Of the last state.")
-      .def_property_readonly("folder", [](const RunResult& r) { return r.folder; }, "Where everything went.")
-      .def_property_readonly("report", [](const RunResult& r) { return r.report; }, "result.json, render.json or export.json.")
-      .def_property_readonly("film", [](const RunResult& r) { return r.film.empty() ? std::optional<Path>() : r.film; }, "None: there is none.")
-      .def_property_readonly("warnings", [](const RunResult& r) { return r.warnings; }, "As sentences.")
+      .def_property_readonly(
+          "state_hash", [](const RunResult& r) { return to_hex(r.state_hash); }, "Of the last state.")
+      .def_property_readonly(
+          "folder", [](const RunResult& r) { return r.folder; }, "Where everything went.")
+      .def_property_readonly(
+          "report", [](const RunResult& r) { return r.report; }, "result.json, render.json or export.json.")
+      .def_property_readonly(
+          "film", [](const RunResult& r) { return r.film.empty() ? std::optional<Path>() : r.film; },
+          "None: there is none.")
+      .def_property_readonly(
+          "warnings", [](const RunResult& r) { return r.warnings; }, "As sentences.")
       .def("__repr__", [](const RunResult& r) {
         return py::str("<supple.RunResult {}, {} frames in {}>").format(r.outcome, r.frames, r.folder.string());
       });
@@ -107,21 +124,32 @@ void bind_runs(py::module_& module) {
       "\n\nframes    which to output, e.g. \"1-50,60,70-90:2\" or [1, 5, 9]; all unless given\n"
       "threads   0: all the machine has; changes no bit\n"
       "progress  called with a Progress now and then; what it raises ends the run after its step, as Control-C does\n\n"
-      "Returns a RunResult however the run ended: see its outcome and reason. Raises Error where there can be no report: the folder cannot\n"
+      "Returns a RunResult however the run ended: see its outcome and reason. Raises Error where there can be no "
+      "report: the folder cannot\n"
       "be made, is in use, or holds an earlier result.";
-  const std::string run_doc = std::string("A whole run from scene to files, as `supple run`: pictures, film, states, tables and result.json in `folder`.") + kCommon;
-  const std::string render_doc =
-      std::string("Draws the frames of an earlier run again from its saved states, as `supple render`; pictures that are up to date are kept\nunless overwrite.") +
-      kCommon;
+  const std::string run_doc = std::string(
+                                  "A whole run from scene to files, as `supple run`: pictures, film, states, tables "
+                                  "and result.json in `folder`.") +
+                              kCommon;
+  const std::string render_doc = std::string(
+                                     "Draws the frames of an earlier run again from its saved states, as `supple "
+                                     "render`; pictures that are up to date are kept\nunless overwrite.") +
+                                 kCommon;
   const std::string export_doc =
-      std::string("Writes the files that the scene's `output` asks for from the saved states of a run, as `supple export`.") + kCommon;
-  module.def("run", &run, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
-             py::arg("overwrite") = false, py::arg("resume") = false, py::arg("simulate_only") = false, py::arg("progress") = py::none(), run_doc.c_str());
-  module.def("render", &render, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
-             py::arg("overwrite") = false, py::arg("progress") = py::none(), render_doc.c_str());
-  module.def("export", &export_files, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
-             py::arg("progress") = py::none(), export_doc.c_str());
-  module.def("info", &scenes::describe_run, py::arg("folder"), "What a run folder holds, for reading: outcome, audits, times, files.");
+      std::string(
+          "Writes the files that the scene's `output` asks for from the saved states of a run, as `supple export`.") +
+      kCommon;
+  module.def("run", &run, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(),
+             py::arg("threads") = 0, py::arg("overwrite") = false, py::arg("resume") = false,
+             py::arg("simulate_only") = false, py::arg("progress") = py::none(), run_doc.c_str());
+  module.def("render", &render, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(),
+             py::arg("threads") = 0, py::arg("overwrite") = false, py::arg("progress") = py::none(),
+             render_doc.c_str());
+  module.def("export", &export_files, py::arg("scene"), py::arg("folder"), py::kw_only(),
+             py::arg("frames") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
+             export_doc.c_str());
+  module.def("info", &scenes::describe_run, py::arg("folder"),
+             "What a run folder holds, for reading: outcome, audits, times, files.");
 
   using scenes::Comparison;
   using scenes::FrameComparison;
@@ -130,15 +158,25 @@ void bind_runs(py::module_& module) {
       .def_readonly("psnr", &FrameComparison::psnr, "[dB], infinite for equal pictures.")
       .def_readonly("largest", &FrameComparison::largest, "Difference of a channel, 0 to 255.");
   py::class_<Comparison>(module, "Comparison", "Two runs, picture by picture.")
-      .def_property_readonly("frames", [](const Comparison& c) { return c.frames; }, "Those that both have, as FrameComparison, ascending.")
+      .def_property_readonly(
+          "frames", [](const Comparison& c) { return c.frames; },
+          "Those that both have, as FrameComparison, ascending.")
       .def_readonly("only_first", &Comparison::only_first, "How many only the first one has.")
       .def_readonly("only_second", &Comparison::only_second, "How many only the second one has.")
-      .def_property_readonly("film", [](const Comparison& c) { return c.film.empty() ? std::optional<Path>() : c.film; }, "None: there is none.");
-  module.def("compare", [](const Path& first, const Path& second, const Path& folder, double gain, bool film, const std::string& camera) {
+      .def_property_readonly(
+          "film", [](const Comparison& c) { return c.film.empty() ? std::optional<Path>() : c.film; },
+          "None: there is none.");
+  module.def(
+      "compare",
+      [](const Path& first, const Path& second, const Path& folder, double gain, bool film, const std::string& camera) {
         const py::gil_scoped_release others_run;
-        return scenes::compare_runs({.first = first, .second = second, .folder = folder, .gain = gain, .film = film, .camera = camera});
-      }, py::arg("first"), py::arg("second"), py::arg("folder"), py::kw_only(), py::arg("gain") = 8.0, py::arg("film") = true, py::arg("camera") = "",
-      "Puts the frames of two run folders side by side with their difference, times gain, into folder/frames, compare.mp4 and compare.csv.");
+        return scenes::compare_runs(
+            {.first = first, .second = second, .folder = folder, .gain = gain, .film = film, .camera = camera});
+      },
+      py::arg("first"), py::arg("second"), py::arg("folder"), py::kw_only(), py::arg("gain") = 8.0,
+      py::arg("film") = true, py::arg("camera") = "",
+      "Puts the frames of two run folders side by side with their difference, times gain, into folder/frames, "
+      "compare.mp4 and compare.csv.");
 }
 
 }  // namespace supple::python

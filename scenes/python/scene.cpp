@@ -22,7 +22,8 @@ Scene read(const std::filesystem::path& path, const py::object& overrides) {
   return scenes::read_scene(path, texts);
 }
 
-Scene parse(const std::string& text, const py::object& overrides, const std::filesystem::path& folder, const std::string& name) {
+Scene parse(const std::string& text, const py::object& overrides, const std::filesystem::path& folder,
+            const std::string& name) {
   const std::vector<std::string> texts = override_texts(overrides);
   const py::gil_scoped_release others_run;
   return scenes::parse_scene(text, name, folder, texts);
@@ -49,34 +50,48 @@ std::vector<std::string> object_names(const Scene& scene) {
 }  // namespace
 
 void bind_scene(py::module_& module) {
-  py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", "What a scene file says, checked. It does not change; read it again with other values instead.")
+  py::class_<Scene, std::shared_ptr<Scene>>(
+      module, "Scene", "What a scene file says, checked. It does not change; read it again with other values instead.")
       .def_property_readonly("name", &scenes::scene_name, "File name without extension; what output files are called.")
-      .def_property_readonly("source", [](const Scene& s) { return s.source; }, "The file it was read from.")
-      .def_property_readonly("title", [](const Scene& s) { return s.title; }, "What the file calls it.")
-      .def_property_readonly("duration", [](const Scene& s) { return s.duration; }, "[s]")
-      .def_property_readonly("frame_rate", [](const Scene& s) { return s.frame_rate; }, "[1/s]")
-      .def_property_readonly("frame_count", &Scene::frame_count, "Frames 1 to frame_count; frame n shows t = (n - 1) / frame_rate.")
-      .def_property_readonly("gravity", [](const Scene& s) { return vector(s.gravity); }, "[m/s^2], shape (3,)")
-      .def_property_readonly("objects", &object_names, "Names of the objects, sorted; particles are numbered in this order.")
-      .def_property_readonly("content_hash", [](const Scene& s) { return to_hex(s.content_hash); },
-                             "Of all keys but those of looks, output and duration: what saved states belong to.")
+      .def_property_readonly(
+          "source", [](const Scene& s) { return s.source; }, "The file it was read from.")
+      .def_property_readonly(
+          "title", [](const Scene& s) { return s.title; }, "What the file calls it.")
+      .def_property_readonly(
+          "duration", [](const Scene& s) { return s.duration; }, "[s]")
+      .def_property_readonly(
+          "frame_rate", [](const Scene& s) { return s.frame_rate; }, "[1/s]")
+      .def_property_readonly("frame_count", &Scene::frame_count,
+                             "Frames 1 to frame_count; frame n shows t = (n - 1) / frame_rate.")
+      .def_property_readonly(
+          "gravity", [](const Scene& s) { return vector(s.gravity); }, "[m/s^2], shape (3,)")
+      .def_property_readonly("objects", &object_names,
+                             "Names of the objects, sorted; particles are numbered in this order.")
+      .def_property_readonly(
+          "content_hash", [](const Scene& s) { return to_hex(s.content_hash); },
+          "Of all keys but those of looks, output and duration: what saved states belong to.")
       .def("__repr__", [](const Scene& s) {
         return "<supple.Scene '" + scenes::scene_name(s) + "', " + std::to_string(s.objects.size()) + " objects, " +
                std::to_string(s.frame_count()) + " frames>";
       });
 
-  module.def("read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(),
-             "Reads and checks a scene file.\n\n"
-             "overrides  {\"objects.ball.particles.mass\": 2} or [\"objects.ball.particles.mass=2\"]: keys set before the checks, as by\n"
-             "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n\n"
-             "Raises Error with every fault of the file, each with place, key, expectation, finding and hint.");
-  module.def("parse_scene", &parse, py::arg("text"), py::arg("overrides") = py::none(), py::kw_only(), py::arg("folder") = ".",
-             py::arg("name") = "scene.yaml",
-             "The same from text. `name` stands for the file in messages, `folder` is where files that the scene names are looked for.");
+  module.def(
+      "read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(),
+      "Reads and checks a scene file.\n\n"
+      "overrides  {\"objects.ball.particles.mass\": 2} or [\"objects.ball.particles.mass=2\"]: keys set before the "
+      "checks, as by\n"
+      "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n\n"
+      "Raises Error with every fault of the file, each with place, key, expectation, finding and hint.");
+  module.def("parse_scene", &parse, py::arg("text"), py::arg("overrides") = py::none(), py::kw_only(),
+             py::arg("folder") = ".", py::arg("name") = "scene.yaml",
+             "The same from text. `name` stands for the file in messages, `folder` is where files that the scene names "
+             "are looked for.");
   module.def("check", &check, py::arg("scene"),
-             "Looks for what only a simulation or its pictures would miss. Returns warnings about the start, as sentences; raises Error\n"
+             "Looks for what only a simulation or its pictures would miss. Returns warnings about the start, as "
+             "sentences; raises Error\n"
              "where the scene cannot be simulated or drawn.");
-  module.def("explain", &explain, py::arg("scene"), "The stages of a step, each with the reason it runs or not, as text.");
+  module.def("explain", &explain, py::arg("scene"),
+             "The stages of a step, each with the reason it runs or not, as text.");
   module.def("scene_reference", &scenes::scene_reference, "All keys of scene files, as Markdown.");
   module.def("scene_json_schema", &scenes::scene_json_schema, "A JSON Schema of scene files, for editors.");
 }

@@ -15,7 +15,8 @@ namespace {
 using Shared = std::shared_ptr<Mesh>;
 
 py::array triangles(const Shared& mesh) {
-  return view(mesh->triangle.empty() ? nullptr : mesh->triangle.front().data(), {std::ssize(mesh->triangle), 3}, keep(mesh));
+  return view(mesh->triangle.empty() ? nullptr : mesh->triangle.front().data(), {std::ssize(mesh->triangle), 3},
+              keep(mesh));
 }
 
 py::dict columns(const Shared& mesh) {
@@ -29,7 +30,11 @@ void write_mesh(const Mesh& mesh, const std::filesystem::path& path) {
   const py::gil_scoped_release others_run;
   if (path.extension() == ".ply") return io::write_ply(path, mesh);
   if (path.extension() == ".obj") return io::write_obj(path, mesh);
-  throw Error(ErrorKind::Usage, Fault{.place = "path", .key = {}, .expected = "expected a .ply or .obj file", .found = '\'' + path.string() + '\'', .hint = {}});
+  throw Error(ErrorKind::Usage, Fault{.place = "path",
+                                      .key = {},
+                                      .expected = "expected a .ply or .obj file",
+                                      .found = '\'' + path.string() + '\'',
+                                      .hint = {}});
 }
 
 py::dict meshes(Handle& handle) {
@@ -45,7 +50,8 @@ py::tuple field(Handle& handle, const std::string& body, const py::object& point
   const std::vector<Vec3> at = rows3(points, "points");
   std::vector<double> values(at.size());
   std::vector<Vec3> gradients(at.size());
-  handle.use([&](scenes::Simulation& s) { scenes::evaluate_field(s, scenes::find_body(s, body), at, values, gradients); });
+  handle.use(
+      [&](scenes::Simulation& s) { scenes::evaluate_field(s, scenes::find_body(s, body), at, values, gradients); });
   return py::make_tuple(own(std::move(values)), own(std::move(gradients)));
 }
 
@@ -71,43 +77,63 @@ void bind_surfaces(py::module_& module, Simulation& simulation) {
       .def_readonly("components", &MeshReport::components, "Connected parts.")
       .def_readonly("area", &MeshReport::area, "[m^2]")
       .def_readonly("volume", &MeshReport::volume, "[m^3], of a closed and oriented mesh.");
-  py::class_<Mesh, Shared>(module, "Mesh", "Triangles of a surface, counter-clockwise seen from outside. Arrays are views of it.")
-      .def_property_readonly("position", [](const Shared& m) { return view(m->position, keep(m)); }, "[m], shape (vertices, 3).")
-      .def_property_readonly("normal", [](const Shared& m) { return view(m->normal, keep(m)); }, "Unit, outward, shape (vertices, 3).")
+  py::class_<Mesh, Shared>(module, "Mesh",
+                           "Triangles of a surface, counter-clockwise seen from outside. Arrays are views of it.")
+      .def_property_readonly(
+          "position", [](const Shared& m) { return view(m->position, keep(m)); }, "[m], shape (vertices, 3).")
+      .def_property_readonly(
+          "normal", [](const Shared& m) { return view(m->normal, keep(m)); }, "Unit, outward, shape (vertices, 3).")
       .def_property_readonly("triangle", &triangles, "Vertex numbers, shape (triangles, 3).")
-      .def_property_readonly("columns", &columns,
-                             "More about the vertices, {name: array of shape (vertices,)}: of a body that touches \"contact\", > 0 on a contact surface,\n"
-                             "and what its look shows, e.g. \"pressure\" [Pa] for objects.NAME.look.colour_by=pressure.")
-      .def("inspect", [](const Mesh& m) {
-             const py::gil_scoped_release others_run;
-             return inspect(m);
-           }, "Whether it is closed, its area and volume, as a MeshReport.")
+      .def_property_readonly(
+          "columns", &columns,
+          "More about the vertices, {name: array of shape (vertices,)}: of a body that touches \"contact\", > 0 on a "
+          "contact surface,\n"
+          "and what its look shows, e.g. \"pressure\" [Pa] for objects.NAME.look.colour_by=pressure.")
+      .def(
+          "inspect",
+          [](const Mesh& m) {
+            const py::gil_scoped_release others_run;
+            return inspect(m);
+          },
+          "Whether it is closed, its area and volume, as a MeshReport.")
       .def("write", &write_mesh, py::arg("path"), "Writes a .ply or .obj file.")
       .def("__repr__", [](const Mesh& m) {
-        return "<supple.Mesh, " + std::to_string(m.vertex_count()) + " vertices, " + std::to_string(m.triangle_count()) + " triangles>";
+        return "<supple.Mesh, " + std::to_string(m.vertex_count()) + " vertices, " +
+               std::to_string(m.triangle_count()) + " triangles>";
       });
 
   simulation
       .def("meshes", &meshes,
-           "Surfaces of the current state, {object: Mesh}, deformed by contact; empty of an object without a skeleton. Where two objects touch,\n"
+           "Surfaces of the current state, {object: Mesh}, deformed by contact; empty of an object without a skeleton. "
+           "Where two objects touch,\n"
            "both have the same vertices.")
-      .def_property("cell", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.cell(); }); },
-                    [](Handle& h, double cell) {
-                      if (!(cell > 0.0)) throw py::value_error("cell: expected a length > 0 [m]");
-                      h.use([&](scenes::Simulation& s) { s.set_cell(cell); });
-                    },
-                    "Edge of a lattice cell of meshes() [m], of objects that ask for none of their own. May be set.")
-      .def("set_cells", [](Handle& h, int cells) {
-             if (cells <= 0) throw py::value_error("cells: expected a number > 0");
-             h.use([&](scenes::Simulation& s) { s.set_cells(cells); });
-           }, py::arg("cells"), "Sets the cell of all objects, by a number of cells along the longest side of all surfaces.")
+      .def_property(
+          "cell", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.cell(); }); },
+          [](Handle& h, double cell) {
+            if (!(cell > 0.0)) throw py::value_error("cell: expected a length > 0 [m]");
+            h.use([&](scenes::Simulation& s) { s.set_cell(cell); });
+          },
+          "Edge of a lattice cell of meshes() [m], of objects that ask for none of their own. May be set.")
+      .def(
+          "set_cells",
+          [](Handle& h, int cells) {
+            if (cells <= 0) throw py::value_error("cells: expected a number > 0");
+            h.use([&](scenes::Simulation& s) { s.set_cells(cells); });
+          },
+          py::arg("cells"),
+          "Sets the cell of all objects, by a number of cells along the longest side of all surfaces.")
       .def("field", &field, py::arg("body"), py::arg("points"),
-           "The undeformed field of a body at points [m], shape (n, 3): values (> 0 inside), shape (n,), and gradients [1/m], shape (n, 3).\n"
+           "The undeformed field of a body at points [m], shape (n, 3): values (> 0 inside), shape (n,), and gradients "
+           "[1/m], shape (n, 3).\n"
            "The outward normal is -gradient / |gradient|.")
-      .def("picture", &picture, py::arg("path") = py::none(), py::kw_only(), py::arg("camera") = "", py::arg("size") = py::none(), py::arg("threads") = 1,
-           "Draws the current state as `supple run` would: 8-bit sRGB, shape (height, width, 3), rows from top to bottom.\n\n"
-           "path     a PNG file to write, too\ncamera   name of one of the scene's cameras; the first one unless given\n"
-           "size     (width, height) [pixel]; that of output.images unless given\nthreads  of the path tracer; 0: all the machine has");
+      .def(
+          "picture", &picture, py::arg("path") = py::none(), py::kw_only(), py::arg("camera") = "",
+          py::arg("size") = py::none(), py::arg("threads") = 1,
+          "Draws the current state as `supple run` would: 8-bit sRGB, shape (height, width, 3), rows from top to "
+          "bottom.\n\n"
+          "path     a PNG file to write, too\ncamera   name of one of the scene's cameras; the first one unless given\n"
+          "size     (width, height) [pixel]; that of output.images unless given\nthreads  of the path tracer; 0: all "
+          "the machine has");
 }
 
 }  // namespace supple::python

@@ -81,6 +81,7 @@ class Simulations(unittest.TestCase):
         with self.assertRaises(supple.Error) as caught:
             other.restore(supple.Simulation(two_drops()).state())
         self.assertEqual((caught.exception.kind, caught.exception.place), ("usage", "state"))
+        self.assertIn("adopt()", caught.exception.hint)
 
     def test_adopt_states_of_scenes_with_other_numbers(self):
         first, other = supple.Simulation(two_drops()), supple.Simulation(two_drops({"objects.left.particles.mass": 1}))
