@@ -99,7 +99,7 @@ class PolarRuleSolver {
     double begin = 0.0, end = 0.0;  // angles, or places along `sectors_`: i to i + 1 is sector i
     std::size_t first = 0, last = 0;  // of `kept_`
     std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
-    PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with fewer radii besides
+    PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with other radii besides
     std::array<PatchSums, 4> highest;  // as a polynomial of the angle, its coefficients of the highest degrees, falling
     double by_angle = 0.0, by_radius = 0.0;  // what the finest sums may be off by, for either reason
     double by_rim = 0.0;                     // its area, as the rim was left
@@ -255,7 +255,7 @@ class PolarRuleSolver {
   std::vector<Sector> sectors_;
   std::vector<Walk> walks_;
   std::vector<Sheet> sheets_;
-  std::vector<std::size_t> ray_nodes_, ray_fewer_;  // first node of a ray, and of those with fewer radii
+  std::vector<std::size_t> ray_nodes_, ray_check_;  // first node of a ray, and of those to compare with
   /// Columns of kept nodes, each with that of the nodes at hand.
   template <class Body>
   void for_columns(const Body& body) {

@@ -28,16 +28,17 @@ constexpr double kLeastSight = 0.1;      // cosine between a ray and the normal 
 constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-/// Points of the Gauss rule on a piece of a ray, of which there are `radial` on a whole one. @param fewer  to compare with
-int nodes_on(int radial, double share, int fewer) {
+/// Points of the Gauss rule on a piece of a ray, of which there are `radial` on a whole one.
+int nodes_on(int radial, double share) {
   const int least = share < kShort ? 2 : 3;
-  const auto points = [=](int n) { return std::clamp(static_cast<int>(std::ceil(n * (0.35 + 0.65 * share))), least, kMostRadial); };
-  const int all = points(radial);
-  return fewer == 0 ? all : std::clamp(points(radial - fewer), 2, std::max(2, all - 1));
+  return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), least, kMostRadial);
 }
 
-/// Points that are compared with n.
-int check_of(int n) { return n > 4 ? n - 2 : n - 1; }
+/// Points that are compared with n: one more, so that what they differ by is what n are off by.
+int check_of(int n) { return n < kMostRadial ? n + 1 : n - 2; }
+
+/// The same on faces, where pieces have polynomials on them: fewer.
+int check_on_faces(int n) { return n > 4 ? n - 2 : n - 1; }
 
 /// Kinks so near to another, to the peak or to the rim are left out: the error is of the square.
 double shortest_piece(double error) { return 3e-3 * std::sqrt(error); }
@@ -54,15 +55,16 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
   return std::max({force, area, first.norm() / (all.load * std::sqrt(all.area))});
 }
 
-/// What the finer of two rules is off by at most, as shares of their difference. Of panels all of whose rays meet the same kinks in the
+/// What the finer of two rules of angles is off by at most, as shares of their difference. Of panels all of whose rays meet the same kinks in the
 /// same order it converges faster than the coarser one, and the more so the less they differ, as in QUADPACK (Piessens et al. 1983,
-/// sec. 2.2.4.1). Where rays meet other kinks from some angle on, a derivative jumps there, and two rules say little; less so on
-/// faces, where the pressure is nearly the same on both sides. The shares come from the errors of 27,000 panels of a disc on a box,
-/// boxes, plates and blobs (docs/reports/contact_speed.md, "Bounds across kinks").
-constexpr double kRegular = 2000.0, kRegularCoarse = 400.0;
-constexpr double kLeastShare = 0.02, kHalf = 0.5;
-constexpr double kOnFaces = 0.2;
-constexpr double kRadial = 0.05, kRadialCoarse = 0.1, kSlowRadial = 1.2;
+/// sec. 2.2.4.1); less so of panels that were halved because they did not. Where rays meet other kinks from some angle on, a derivative jumps
+/// there, and two rules say little; less so on faces, where the pressure is nearly the same on both sides. The shares come from the errors of
+/// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs (docs/reports/contact_speed.md, "Bounds across kinks").
+constexpr double kRegular = 6.7, kRegularCoarse = 2.0;  // times the root of the difference
+constexpr double kLeastFine = 0.005, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5;
+constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kLeavesFaces = 0.2;
+/// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
+constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.015, kSlowOnFaces = 0.4;
 constexpr std::size_t kFine = 15;  // rays
 
 }  // namespace
@@ -117,7 +119,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   height_.clear();
   weight_.clear();
   ray_nodes_.clear();
-  ray_fewer_.clear();
+  ray_check_.clear();
   std::size_t next = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Panel& panel = panels_[first + i / per_panel];
@@ -125,14 +127,15 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
     const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
     const std::size_t crossing_begin = next;
     while (next < crossings_.size() && crossings_[next].ray == i) ++next;
-    const auto nodes = [&](int fewer, double angle) {
+    const auto nodes = [&](bool check, double angle) {
       double left = 0.0, lift_left = 0.0;
       for (std::size_t c = crossing_begin; c <= next; ++c) {
         const double right = c < next ? crossings_[c].radius : 1.0;
         const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
         if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
         // On faces it is the short last piece on which the pressure falls.
-        const GaussRule& gauss = gauss_rule(about_middle_ ? panel.nodes - fewer : nodes_on(panel.nodes, right - left, fewer));
+        const int all = about_middle_ ? panel.nodes : nodes_on(panel.nodes, right - left);
+        const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
         for (std::size_t j = 0; j < gauss.node.size(); ++j) {
           const double along = gauss.node[j], r = left + (right - left) * along;
           foot_.push_back(frame_.origin + (r * rim) * e);
@@ -144,9 +147,9 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
       }
     };
     ray_nodes_.push_back(foot_.size());
-    nodes(0, rule.weight[i % per_panel]);
-    ray_fewer_.push_back(foot_.size());
-    if (rule.gauss_weight[i % per_panel] > 0.0) nodes(panel.nodes - check_of(panel.nodes), rule.gauss_weight[i % per_panel]);
+    nodes(false, rule.weight[i % per_panel]);
+    ray_check_.push_back(foot_.size());
+    if (rule.gauss_weight[i % per_panel] > 0.0) nodes(true, rule.gauss_weight[i % per_panel]);
   }
   ray_nodes_.push_back(foot_.size());
   node_.resize(foot_.size());
@@ -186,7 +189,7 @@ bool PolarRuleSolver::rim_joins(std::size_t first, std::size_t last, bool closed
 /// last step, times the second derivatives of the pressures, which the slopes at the rim and at the last node before it tell. The other has
 /// its rate from the steps of rays that took two or more.
 double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
-  const std::size_t i = ray_fewer_[ray] - 1;
+  const std::size_t i = ray_check_[ray] - 1;
   const Vec3 &a = rim_batch_.slope_a[ray], &b = rim_batch_.slope_b[ray], reach = rays_.radius[ray] * direction(rays_.cosine[ray], rays_.sine[ray]);
   const double at = a.dot(frame_.axis), bt = b.dot(frame_.axis), fall = b.dot(reach) * at - a.dot(reach) * bt;
   const double turn = (a - node_.slope_a[i]).norm() * bt - (b - node_.slope_b[i]).norm() * at;
@@ -205,7 +208,7 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
   }
   for (std::size_t k = 0; k < rule.node.size(); ++k) {
     PatchSums along;
-    for (std::size_t i = ray_nodes_[ray + k]; i < ray_fewer_[ray + k]; ++i) {
+    for (std::size_t i = ray_nodes_[ray + k]; i < ray_check_[ray + k]; ++i) {
       const Vec3 x = node_.point[i] - frame_.origin;
       weigh(panel.fine, x, normal_[i], area_[i], pressure_[i]);
       weigh(along, x, normal_[i], area_[i], pressure_[i]);
@@ -217,9 +220,9 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
     whole += area;
     for_columns([&](auto& kept, const auto& node) {
       kept.insert(kept.end(), node.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
-                  node.begin() + static_cast<std::ptrdiff_t>(ray_fewer_[ray + k]));
+                  node.begin() + static_cast<std::ptrdiff_t>(ray_check_[ray + k]));
     });
-    for (std::size_t i = ray_fewer_[ray + k]; i < ray_nodes_[ray + k + 1]; ++i) {
+    for (std::size_t i = ray_check_[ray + k]; i < ray_nodes_[ray + k + 1]; ++i) {
       weigh(panel.radial, node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
     }
   }
@@ -240,8 +243,8 @@ double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
   std::array<double, 4> size;
   for (std::size_t d = 0; d < size.size(); ++d) size[d] = share_of_difference(panel.highest[d], {}, all);
   const double high = std::sqrt(size[0] * size[0] + size[1] * size[1]), low = std::sqrt(size[2] * size[2] + size[3] * size[3]);
-  const double fall = high < low ? high / low : 1.0;
-  return high * std::min(fall, 10.0 * fall * fall * fall);
+  const double fall = high < low ? high / low : 1.0, cube = fall * fall * fall;
+  return high * std::min(fall, (panel.rays >= kFine ? 5.0 : 50.0) * cube * fall);
 }
 
 /// What the sums of a panel are off by at most, over those of `all`.
@@ -255,18 +258,25 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
     panel.by_radius *= share;
     return;
   }
+  const double on_faces = panel.leaves ? kLeavesFaces : panel.halved ? kOnFacesHalved : kOnFaces;
   if (!panel.even()) {
-    panel.by_angle *= about_middle_ && !panel.lost ? kOnFaces : kHalf;
-  } else if (fine) {
-    panel.by_angle *= std::clamp(std::sqrt(kRegular * panel.by_angle), kLeastShare, 1.0);
+    panel.by_angle *= about_middle_ && !panel.lost ? on_faces : kHalf;
   } else {
-    const double difference = panel.by_angle;
-    panel.by_angle *= about_middle_ ? kOnFaces : std::clamp(kRegularCoarse * difference, kLeastShare, kHalf);
+    const double root = std::sqrt(panel.by_angle);
+    if (fine) {
+      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeastFine, 1.0);
+    } else {
+      panel.by_angle *= about_middle_ ? on_faces : std::clamp(kRegularCoarse * root, cut_ || panel.halved ? kLeastHalved : kLeast, kHalf);
+    }
     panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
   }
+  if (!about_middle_) {
+    panel.by_radius *= kRadial;
+    return;
+  }
   const double relative = panel.fine.area > 0.0 ? panel.by_radius * all.area / panel.fine.area : 0.0;
-  const double slow = kSlowRadial * std::sqrt(std::sqrt(relative));
-  panel.by_radius *= panel.lost ? kHalf : fine ? kRadial : std::clamp(slow, kRadialCoarse, kHalf);
+  const double slow = kSlowOnFaces * std::sqrt(std::sqrt(relative));
+  panel.by_radius *= panel.lost ? kHalf : fine ? kRadialOnFacesFine : std::clamp(slow, kRadialOnFaces, kHalf);
 }
 
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
