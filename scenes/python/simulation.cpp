@@ -179,7 +179,7 @@ Simulation bind_simulation(py::module_& module) {
                         "state, and the number of threads changes\n"
                         "no bit.\n\n"
                         "Long calls let other Python threads run, and calls from several threads wait for each other, "
-                        "between two steps at the latest.\n"
+                        "which those that step let happen between two steps.\n"
                         "Control-C ends a call at a step; the simulation can go on from there.");
   simulation
       .def(py::init([](const Scene& scene, int threads, bool profile) {
@@ -220,6 +220,14 @@ Simulation bind_simulation(py::module_& module) {
             });
           },
           "Names of what has a surface of its own: objects, or the pieces that they broke into (\"plate.1\", ...).")
+      .def_property_readonly(
+          "fixed_bodies",
+          [](const Handle& h) {
+            std::vector<std::string> names;
+            for (const scenes::FixedBody& body : h.fixed().model().fixed) names.push_back(body.name);
+            return names;
+          },
+          "Names of what objects touch and nothing moves: \"ground\", if it collides, and the obstacles.")
       .def_property_readonly(
           "warnings", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.warnings(); }); },
           "What is odd about the scene, as sentences.")

@@ -104,6 +104,16 @@ class TwoBodies(unittest.TestCase):
         self.assertFalse(contact.touching)
         self.assertEqual((contact.area, contact.rule, contact.point.shape), (0.0, "none", (0, 3)))
 
+    def test_may_be_fixed(self):
+        simulation = supple.Simulation(two_drops({"ground": {"height": -0.2}}))
+        self.assertEqual((simulation.bodies, simulation.fixed_bodies), (["left", "right"], ["ground"]))
+        contact = simulation.contact("ground", "left", error=1e-8)
+        self.assertEqual((contact.a, contact.b), ("left", "ground"))
+        # The ground is even, so the force points up, through the middle of the ball.
+        self.assertGreater(contact.elastic_force[2], 0)
+        np.testing.assert_allclose(contact.elastic_force[:2], 0, atol=1e-8 * contact.load)
+        np.testing.assert_allclose(contact.centre_of_pressure[:2], [-0.3, 0], atol=1e-8)
+
     def test_are_named(self):
         with self.assertRaises(supple.Error) as caught:
             pressed().contact("left", "rigth")

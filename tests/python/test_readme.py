@@ -34,7 +34,7 @@ class Readme(unittest.TestCase):
 class PythonPage(unittest.TestCase):
     def test_has_examples_that_run(self):
         examples = re.findall(r"```python\n(.*?)```", (SOURCE / "docs/python.md").read_text(), re.DOTALL)
-        self.assertEqual(len(examples), 3)
+        self.assertEqual(len(examples), 4)
         for example in examples:
             self.assertTrue(output_of(example, "docs/python.md") or "assert" in example)
 
