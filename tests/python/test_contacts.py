@@ -152,6 +152,26 @@ class Experiments(unittest.TestCase):
         self.assertLess(simulation.audits().momentum_error, 1e-13)
         self.assertLess(simulation.audits().angular_momentum_error, 1e-13)
 
+    def test_turn_bodies_by_quaternions_x_y_z_w(self):
+        # A quarter turn about z, of any length: x becomes y.
+        simulation = supple.Simulation(two_drops())
+        half = np.sqrt(0.5)
+        simulation.set_particles(orientation=[[0, 0, 3, 3], [0, 0, 0, 1]])
+        np.testing.assert_allclose(simulation.particles.orientation, [[0, 0, half, half], [0, 0, 0, 1]], atol=1e-15)
+        elongated = supple.Simulation(supple.parse_scene("""
+schema: 1
+duration: 1 s
+objects:
+  - name: egg
+    particles: {arrange: single, mass: 1}
+    skeleton: [{shape: ellipsoid, semi_axes: [0.4, 0.2, 0.2], kernel: {type: wyvill}}]
+"""))
+        points = np.array([[0.13, 0, 0], [0, 0.13, 0]])  # the surface is at 0.18 and 0.09
+        before = elongated.field("egg", points)[0]
+        self.assertTrue(before[0] > 0 > before[1])
+        elongated.set_particles(orientation=[[0, 0, 1, 1]])
+        np.testing.assert_allclose(elongated.field("egg", points)[0], before[::-1], atol=1e-12)
+
     def test_say_what_is_wrong_with_arrays(self):
         simulation = supple.Simulation(two_drops())
         for change, message in (
