@@ -17,6 +17,7 @@ constexpr double kOfLast = 0.3;          // of the bound of the rule before: the
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
 constexpr double kEnough = 0.9;          // leaves room for Newton's method
 constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
+constexpr std::size_t kMostCoarse = 3;   // the finest rule for others
 constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
@@ -397,19 +398,19 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     points.back_to(before);
     return true;
   };
-  if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, points)) return true;
-  if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
   // Samples of flat faces are near enough to a coarse error, and change more evenly as the faces lean.
   const bool peaked = !frame.flat && (faces == nullptr || settings.error < kSplitBelow);
+  if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, peaked, points)) return true;
+  if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
   if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, points)) return true;
-  if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, points)) return true;
+  if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, false, points)) return true;
   points.back_to(before);
   return false;
 }
 
-/// @param any  whatever the error, and without regard to kinks of the fields
+/// @param any  whatever the error, and without regard to kinks of the fields   @param star  whether a rule about a star is tried after this one
 bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                       const Regions& regions, bool round, bool any, PatchPoints& points) {
+                                       const Regions& regions, bool round, bool any, bool star, PatchPoints& points) {
   const double error = settings.error;
   cut_ = false;
   about_middle_ = false;
@@ -418,13 +419,15 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   estimate_ = 1.0;
   const std::span<const PolarRule> rules = polar_rules();
-  const std::size_t last = std::min<std::size_t>(rules.size() - 1, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
+  const bool parts = error < kSplitBelow || !third_.empty();
+  // Patches that need more at coarse errors are uneven: there two rules agree by chance.
+  const std::size_t most = parts || !star ? rules.size() - 1 : kMostCoarse;
+  const std::size_t last = std::min<std::size_t>(most, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
   // Fine accuracies do not ask the coarsest rules.
   const auto first_of = [&](bool smooth) {
     if (smooth) return std::min<std::size_t>(error < 1e-7 ? 2 : error < 1e-3 ? 1 : 0, last - 1);
     return std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
   };
-  const bool parts = error < kSplitBelow || !third_.empty();
   bool parted = any && third_.empty();
   parted_ = 0;
   polygon_.clear();

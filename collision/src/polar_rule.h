@@ -71,7 +71,7 @@ class PolarRuleSolver {
     [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
   };
   bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                        const Regions& regions, bool round, bool any, PatchPoints& points);
+                        const Regions& regions, bool round, bool any, bool star, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
