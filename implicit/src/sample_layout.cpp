@@ -15,11 +15,13 @@ namespace supple::implicit {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+/// Directions of one sphere that are looked at for a box.
+constexpr double kMostNear = 1 << 18;
 
 /// Smallest multiple of `step` that is at least x and at least `least`.
 int count_for(double x, int step, int least) {
   const double steps = std::ceil(std::max(x, static_cast<double>(least)) / step);
-  SUPPLE_EXPECTS(steps < 1e6);
+  SUPPLE_EXPECTS(steps < 1e8);
   return step * static_cast<int>(steps);
 }
 
@@ -215,14 +217,19 @@ class LayoutBuilder {
   }
 
   /// Cells of an m x m grid over a hemisphere that are at most spacing_^2 large on a sphere of radius r.
-  [[nodiscard]] int sphere_count(double r) const { return count_for(std::sqrt(2.0 * kPi) * r / spacing_, 2, 4); }
+  [[nodiscard]] int sphere_count(double r, const Cone& cone = {}) const {
+    double count = std::sqrt(2.0 * kPi) * r / spacing_;
+    // In a box near the centre of a far larger sphere the seeds of all of it would meet: fewer stand for them.
+    if (near_ != nullptr) count = std::min(count, std::sqrt(kMostNear / (1.0 - math::sin_cos(cone.half_angle).cos)));
+    return count_for(count, 2, 4);
+  }
 
   void slab(const Vec3& half) {
     const double R = primitive_->kernel.radius;
-    const int m = sphere_count(rho_);
+    const int m = sphere_count(rho_, near_cone(half.norm()));
     for_directions(m, half.norm(), [&](const Vec3& u) {
       const Vec3 corner(std::copysign(half.x(), u.x()), std::copysign(half.y(), u.y()), std::copysign(half.z(), u.z()));
-      add(corner, u, R, {0.0, 0.0, 2.0 * kPi / (m * m)});
+      add(corner, u, R, {0.0, 0.0, 2.0 * kPi / (static_cast<double>(m) * m)});
     });
     for (int k = 0; k < 3; ++k) {  // edges along axis k
       if (!(half[k] > 0.0)) continue;
@@ -273,7 +280,7 @@ class LayoutBuilder {
       for (int j = 0; j < m; ++j) {
         for (int i = 0; i < m; ++i) {
           const Eigen::Vector2d d = r * concentric((2.0 * i + 1.0) / m - 1.0, (2.0 * j + 1.0) / m - 1.0);
-          add({d.x(), d.y(), 0.0}, {0.0, 0.0, side}, R, {kPi * r * r / (m * m), 0.0, 0.0});
+          add({d.x(), d.y(), 0.0}, {0.0, 0.0, side}, R, {kPi * r * r / (static_cast<double>(m) * m), 0.0, 0.0});
         }
       }
     }
@@ -298,18 +305,19 @@ class LayoutBuilder {
     const double R = primitive_->kernel.radius;
     Vec3 size = primitive_->size;
     if (primitive_->shape == ShapeKind::Directed) size = 0.5 * (size + primitive_->control[0]);
-    const int m = sphere_count(rho_ / R * size.maxCoeff());
+    const Cone cone = near_ == nullptr ? Cone{} : Cone::towards(near_centre_.cwiseQuotient(size), near_radius_ / size.minCoeff(), 0.0);
+    const int m = sphere_count(rho_ / R * size.maxCoeff(), cone);
     const auto use = [&](const Vec3& s) {
       // x = D s maps solid angles by abc / |D s|^3.
       const Vec3 x = size.cwiseProduct(s);
       const double length = x.norm();
       const double reach = length * R / std::sqrt(foot(view_, x).q);  // u is homogeneous of degree one
-      add(Vec3::Zero(), x / length, reach, {0.0, 0.0, 2.0 * kPi / (m * m) * size.prod() / (length * length * length)});
+      add(Vec3::Zero(), x / length, reach, {0.0, 0.0, 2.0 * kPi / (static_cast<double>(m) * m) * size.prod() / (length * length * length)});
     };
     if (near_ == nullptr) {
       for_sphere(m, use);
     } else {
-      for_sphere(m, Cone::towards(near_centre_.cwiseQuotient(size), near_radius_ / size.minCoeff(), 0.0), use);
+      for_sphere(m, cone, use);
     }
   }
 
@@ -329,7 +337,7 @@ class LayoutBuilder {
     const Mat3 frame = frame_of(outward);
     const int m = sphere_count(rho_ * reach / primitive_->kernel.radius);
     for_sphere(m, [&](const Vec3& u) {
-      if (u.z() > 0.0) add(end, frame * u, reach, {0.0, 0.0, 2.0 * kPi / (m * m)});
+      if (u.z() > 0.0) add(end, frame * u, reach, {0.0, 0.0, 2.0 * kPi / (static_cast<double>(m) * m)});
     });
   }
 
@@ -424,7 +432,7 @@ class LayoutBuilder {
       }
       // Every direction has one corner that lies farthest along it.
       for_sphere(m, [&](const Vec3& u) {
-        if (u.dot(ahead) <= 0.0 && u.dot(behind) < 0.0) add(here, u, R, {0.0, 0.0, 2.0 * kPi / (m * m)});
+        if (u.dot(ahead) <= 0.0 && u.dot(behind) < 0.0) add(here, u, R, {0.0, 0.0, 2.0 * kPi / (static_cast<double>(m) * m)});
       });
     }
   }

@@ -295,6 +295,20 @@ void confine_to_plane(Model& model, ModelFaults& faults) {
   }
 }
 
+/// Far from the origin numbers cannot tell points of a thin object apart.
+void expect_resolved(const Model& model, ModelFaults& faults) {
+  constexpr double kFurthest = 1e8;  // kernel radii, of which round-off is then 1e-8
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    const ObjectModel& object = model.objects[model.particles.object[i]];
+    double radius = std::numeric_limits<double>::infinity();
+    for (const implicit::Primitive& p : object.skeleton.primitive) radius = std::min(radius, p.kernel.radius);
+    const double away = model.initial.position[i].norm();
+    if (away <= kFurthest * radius) continue;
+    faults.add_once("objects." + object.name + ".particles", "expected positions within 1e8 kernel radii of the origin",
+                    short_text(away) + " m away with a radius of " + short_text(radius) + " m", "move the scene nearer to the origin");
+  }
+}
+
 /// Pinned particles begin at rest, or the pin would take their momentum in the first step.
 void stop_pinned(Model& model) {
   for (std::size_t i = 0; i < model.particles.size(); ++i) {
@@ -359,6 +373,7 @@ Model build_model(const Scene& scene) {
   for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
   if (scene.planar) confine_to_plane(model, faults);
   stop_pinned(model);
+  expect_resolved(model, faults);
 
   model.interactions.gravity = scene.gravity;
   std::vector<core::LinkRule> link_rules;

@@ -57,6 +57,20 @@ struct Lone {
   std::vector<Vec3> control = {};
 };
 
+// All rays of a large sphere pass through a box about its centre: a few stand for them, with the whole solid angle.
+TEST(SurfaceSamples, OfALargeSphereAreFewForASmallBoxAboutItsCentre) {
+  const Body body = body_of({{wyvill_point(1e6), Vec3::Zero()}});
+  SampleLayout layout;
+  const Vec3 half = Vec3::Constant(0.4), centre(0.1, 0.2, 0.3);
+  const std::size_t seen = make_sample_layout(body.skeleton, 0.05, body.parts, {centre - half, centre + half}, layout);
+  EXPECT_GT(seen, 1u << 17);
+  EXPECT_LT(seen, 1u << 19);
+  ASSERT_EQ(layout.size(), seen);
+  double solid_angle = 0.0;
+  for (const Vec3& s : layout.spread) solid_angle += s.z();
+  EXPECT_NEAR(solid_angle, 4.0 * 3.14159265358979323846, 1e-8);
+}
+
 TEST(SurfaceSamples, OfALonePrimitiveCoverItsRoundedShapeExactly) {
   const double rho = iso_distance(Kernel::wyvill(1.0), 0.5);
   const double sphere = 4.0 * kPi * rho * rho;
