@@ -60,11 +60,12 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 /// sec. 2.2.4.1); less so of panels that were halved because they did not. Where rays meet other kinks from some angle on, a derivative jumps
 /// there, and two rules say little; less so on faces, where the pressure is nearly the same on both sides. The shares come from the errors of
 /// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs (docs/reports/contact_speed.md, "Bounds across kinks").
-constexpr double kRegular = 6.7, kRegularCoarse = 2.0;  // times the root of the difference
-constexpr double kLeastFine = 0.005, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5;
-constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kLeavesFaces = 0.2;
+constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
+constexpr double kRound = 6e5;  // times its square
+constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
+constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
-constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.015, kSlowOnFaces = 0.4;
+constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 constexpr std::size_t kFine = 15;  // rays
 
 }  // namespace
@@ -258,15 +259,18 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
     panel.by_radius *= share;
     return;
   }
-  const double on_faces = panel.leaves ? kLeavesFaces : panel.halved ? kOnFacesHalved : kOnFaces;
+  const double on_faces = fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
   if (!panel.even()) {
-    panel.by_angle *= about_middle_ && !panel.lost ? on_faces : kHalf;
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf;
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {
       panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeastFine, 1.0);
     } else {
-      panel.by_angle *= about_middle_ ? on_faces : std::clamp(kRegularCoarse * root, cut_ || panel.halved ? kLeastHalved : kLeast, kHalf);
+      // Rays nearly touch kinks that are round.
+      const bool flat = std::all_of(sheets_.begin(), sheets_.end(), [](const Sheet& sheet) { return sheet.flat; });
+      const double share = std::max(kRegularCoarse * root, flat ? 0.0 : kRound * panel.by_angle * panel.by_angle);
+      panel.by_angle *= about_middle_ ? on_faces : std::clamp(share, cut_ || panel.halved ? kLeastHalved : kLeast, kHalf);
     }
     panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
   }
