@@ -419,7 +419,7 @@ TEST_P(BlendedTouch, HasNoPiecesBesideThoseFoundOrLeftUndecided) {
   expect_touch_decided(a, b);
 }
 
-INSTANTIATE_TEST_SUITE_P(MissedPieces, BlendedTouch, ::testing::Range(1, 5));
+INSTANTIATE_TEST_SUITE_P(MissedPieces, BlendedTouch, ::testing::Values(2, 4));
 
 }  // namespace
 }  // namespace supple::implicit
