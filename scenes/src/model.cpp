@@ -298,10 +298,13 @@ void confine_to_plane(Model& model, ModelFaults& faults) {
 /// Far from the origin numbers cannot tell points of a thin object apart.
 void expect_resolved(const Model& model, ModelFaults& faults) {
   constexpr double kFurthest = 1e8;  // kernel radii, of which round-off is then 1e-8
+  std::vector<double> thinnest(model.objects.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < thinnest.size(); ++k) {
+    for (const implicit::Primitive& p : model.objects[k].skeleton.primitive) thinnest[k] = std::min(thinnest[k], p.kernel.radius);
+  }
   for (std::size_t i = 0; i < model.particles.size(); ++i) {
     const ObjectModel& object = model.objects[model.particles.object[i]];
-    double radius = std::numeric_limits<double>::infinity();
-    for (const implicit::Primitive& p : object.skeleton.primitive) radius = std::min(radius, p.kernel.radius);
+    const double radius = thinnest[model.particles.object[i]];
     const double away = model.initial.position[i].norm();
     if (away <= kFurthest * radius) continue;
     faults.add_once("objects." + object.name + ".particles", "expected positions within 1e8 kernel radii of the origin",
