@@ -216,8 +216,8 @@ TEST(FacesOnFaces, AreThoseOfTheBodiesInTheOtherOrderWhereAKinkHardlyReachesTheP
   };
   const implicit::Skeleton box = benchmarks::linear_shape(implicit::ShapeKind::Box, Vec3(0.1, 0.08, 0.05), 0.02);
   benchmarks::Rigid lower(box, 2e6, 0.03), upper(box, 4e6, 0.03);
-  // Poses 538 and 810 of `contact_poses 1000 face_on_face auto 11`, 668 of 1234.
-  const std::array<Case, 3> cases{
+  // Poses 538 and 810 of `contact_poses 1000 face_on_face auto 11`, 668 of 1234, one of 12.
+  const std::array<Case, 4> cases{
       Case{{{0.19383072678592747, -0.14324537839124687, -0.086591207575401924},
             Quat(0.84976361575034554, -0.29478550927463554, 0.3950106727818638, -0.18700232420216648)},
            {{0.29320356971281847, -0.11539260782724162, 0.006859642634236704},
@@ -232,7 +232,12 @@ TEST(FacesOnFaces, AreThoseOfTheBodiesInTheOtherOrderWhereAKinkHardlyReachesTheP
             Quat(0.997943662822251, 0.040001144788434813, 0.0010886012657959699, -0.050071640634277534)},
            {{-0.064388538436487008, 0.023400786534364629, 0.10771980858720893},
             Quat(0.68175778573065771, 0.026625277638498687, -0.02987258321227141, 0.73048274788562217)},
-           1e-6}};
+           1e-6},
+      Case{{{-0.086937718425003904, 0.26077834592051369, 0.43008962102929305},
+            Quat(0.9111916501841546, -0.39922739602244683, -0.070430685768743659, 0.073394696006987545)},
+           {{-0.16228148525333091, 0.32609879699046174, 0.54634900060978253},
+            Quat(0.6504213616524962, -0.3509669314758152, 0.20289210985932779, 0.64234652413895232)},
+           1e-10}};
   for (const Case& c : cases) {
     lower.put(c.lower);
     upper.put(c.upper);
