@@ -66,10 +66,6 @@ bool CubeBounds::rises(const Entry& own) {
     least = std::min(least, lead_.back().value.upper);
   }
   std::erase_if(lead_, [&](const Lead& l) { return l.value.lower > least; });
-  // Of one claim alone more is known.
-  if (lead_.size() == 1 && (own.label == 0 || lead_[0].other->label == 0)) {
-    return (own.label != 0 ? own : *lead_[0].other).bounds.least_slope > 0.0;
-  }
   over_.clear();
   turn_.clear();
   for (const Lead& l : lead_) {

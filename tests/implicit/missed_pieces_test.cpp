@@ -200,22 +200,29 @@ std::size_t count_missed(std::span<const SearchedBody> bodies, const Lattice& la
   return missed;
 }
 
+/// A search of one body against all nodes of the finer lattice.
+Searched expect_none_beside_found(const Body& body, const Lattice& lattice) {
+  Box box;
+  for (const Box& support : body.placed.support) box = box.united(support);
+  Searched s = search(body, lattice);
+  const SearchedBody one{.field = &body.field};
+  const std::size_t missed = count_missed({&one, 1}, lattice, box);
+  EXPECT_LE(s.found.pieces, missed);
+  EXPECT_GE(s.found.pieces + s.found.undecided, missed);
+  EXPECT_EQ(inspect(s.coarse).components + s.found.pieces, expect_closed(s.mesh).components);
+  ::testing::Test::RecordProperty("missed", static_cast<int>(missed));
+  ::testing::Test::RecordProperty("pieces", static_cast<int>(s.found.pieces));
+  ::testing::Test::RecordProperty("undecided", static_cast<int>(s.found.undecided));
+  return s;
+}
+
 class RandomSum : public ::testing::TestWithParam<int> {};
 
 TEST_P(RandomSum, HasNoPiecesBesideThoseFoundOrLeftUndecided) {
   const Body body = random_body({.seed = static_cast<std::uint64_t>(GetParam()), .parts = 60, .half_width = 0.7, .least_radius = 0.15,
                                  .largest_radius = 0.5, .only_points = true});
-  Box box;
-  for (const Box& support : body.placed.support) box = box.united(support);
-  const Searched s = search(body, lattice_of(0.35));
-  const SearchedBody one{.field = &body.field};
-  const std::size_t missed = count_missed({&one, 1}, lattice_of(0.35), box);
-  EXPECT_LE(s.found.pieces, missed);
-  EXPECT_GE(s.found.pieces + s.found.undecided, missed);
+  const Searched s = expect_none_beside_found(body, lattice_of(0.35));
   EXPECT_LE(s.found.undecided, 3u);
-  EXPECT_EQ(inspect(s.coarse).components + s.found.pieces, expect_closed(s.mesh).components);
-  RecordProperty("missed", static_cast<int>(missed));
-  RecordProperty("undecided", static_cast<int>(s.found.undecided));
   EXPECT_EQ(hash_of(search(body, lattice_of(0.35), 1).mesh), hash_of(s.mesh));
 }
 
@@ -227,17 +234,7 @@ class RandomShapes : public ::testing::TestWithParam<int> {};
 TEST_P(RandomShapes, HaveNoPiecesBesideThoseFoundOrLeftUndecided) {
   const Body body = random_body({.seed = static_cast<std::uint64_t>(GetParam()), .parts = 14, .half_width = 0.5, .least_radius = 0.1,
                                  .largest_radius = 0.3, .every_shape = true});
-  Box box;
-  for (const Box& support : body.placed.support) box = box.united(support);
-  const Searched s = search(body, lattice_of(0.25));
-  const SearchedBody one{.field = &body.field};
-  const std::size_t missed = count_missed({&one, 1}, lattice_of(0.25), box);
-  EXPECT_LE(s.found.pieces, missed);
-  EXPECT_GE(s.found.pieces + s.found.undecided, missed);
-  EXPECT_EQ(inspect(s.coarse).components + s.found.pieces, expect_closed(s.mesh).components);
-  RecordProperty("missed", static_cast<int>(missed));
-  RecordProperty("pieces", static_cast<int>(s.found.pieces));
-  RecordProperty("undecided", static_cast<int>(s.found.undecided));
+  expect_none_beside_found(body, lattice_of(0.25));
 }
 
 INSTANTIATE_TEST_SUITE_P(MissedPieces, RandomShapes, ::testing::Range(1, 4));
