@@ -13,6 +13,8 @@ namespace {
 using blobs::Cells;
 
 constexpr std::size_t kBlocksPerTask = 8;
+/// Leaves with surface, of about 7 kB each with their part of the mesh.
+constexpr std::uint64_t kMostLeaves = 1'000'000;
 /// Vertices stay this far from the nodes [cells].
 constexpr double kLeast = 0x1p-17;
 
@@ -31,7 +33,7 @@ class ViewSampler final : public Sampler {
 
   void prepare(const Executor& executor, BlockTable& table) override {
     PolygoniseCounts counts;
-    leaves_ = lattice::surface_blocks(field_, lattice_, executor, lattice::kBlockLimit, counts);
+    leaves_ = lattice::surface_blocks(field_, lattice_, executor, kMostLeaves, counts);
     if (leaves_.block.empty()) {
       table = {};
       return;

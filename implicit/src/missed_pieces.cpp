@@ -369,7 +369,7 @@ MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lat
     surface.push_back(claim.surface_box());
   }
   PolygoniseCounts blocks_looked_at;
-  const lattice::BlockList blocks = lattice::find_label_blocks(views, surface, lattice, executor, lattice::kBlockLimit, blocks_looked_at);
+  const lattice::BlockList blocks = lattice::find_label_blocks(views, surface, lattice, executor, kMostBlocks, blocks_looked_at);
   std::vector<std::vector<Seed>> seeds(blocks.block.size());
   std::vector<MissedPieces> counts(blocks.block.size());
   executor.for_blocks(blocks.block.size(), 1, [&](std::size_t begin, std::size_t end) {

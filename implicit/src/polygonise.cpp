@@ -205,7 +205,7 @@ void emit_triangles(std::span<const Crossed> blocks, std::size_t self, Mesh& mes
 Mesh polygonise(const FieldView& field, const Lattice& lattice, const Executor& executor, PolygoniseCounts* counts) {
   PolygoniseCounts local;
   PolygoniseCounts& count = counts != nullptr ? *counts : local;
-  const std::vector<BlockCoord> coords = find_surface_blocks(field, lattice, executor, kBlockLimit, &count);
+  const std::vector<BlockCoord> coords = find_surface_blocks(field, lattice, executor, kMostBlocks, &count);
 
   std::vector<TaskPart> parts((coords.size() + kBlocksPerTask - 1) / kBlocksPerTask);
   executor.for_blocks(coords.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {

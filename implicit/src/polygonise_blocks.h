@@ -66,8 +66,6 @@ struct RefineOptions {
 [[nodiscard]] BlockList refine_blocks(const BlockRange& range, const Lattice& lattice, std::uint32_t bodies,
                                       const Executor& executor, const RefineOptions& options, const Decide& decide);
 
-inline constexpr std::uint64_t kBlockLimit = 4'000'000;
-
 /// Blocks where the label "largest positive field, or outside" can change, with the fields that can be it, and `inside`. Unbounded
 /// fields count only where a bounded one can be positive.
 /// @param surface  surface_box() of each field

@@ -249,7 +249,7 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
   if (!fields.empty() && std::count(has_mesh.begin(), has_mesh.end(), 1) == 0) {
     (void)block_range(surface.front(), lattice, 1);  // refuses it
   }
-  const BlockList list = find_label_blocks(fields, surface, lattice, executor, kBlockLimit, count);
+  const BlockList list = find_label_blocks(fields, surface, lattice, executor, kMostBlocks, count);
   count.blocks_visited = list.block.size();
   count.cell = lattice.cell;
 

@@ -231,7 +231,8 @@ BlockList find_label_blocks(std::span<const FieldView> fields, std::span<const B
     for (const Candidate& c : found) left.push_back(c.body);
     return Verdict::Keep;
   };
-  return refine_blocks(range, lattice, static_cast<std::uint32_t>(fields.size()), executor, {.limit = limit, .keep_inside = true}, decide);
+  return refine_blocks(range, lattice, static_cast<std::uint32_t>(fields.size()), executor,
+                       {.limit = limit, .look_factor = 4, .keep_inside = true}, decide);
 }
 
 BlockList surface_blocks(const FieldView& field, const Lattice& lattice, const Executor& executor, std::uint64_t limit,

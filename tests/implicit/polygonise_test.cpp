@@ -251,7 +251,7 @@ TEST(Polygonise, RefusesWhatWouldNotEndWithAMessageThatNamesTheCell) {
   const Executor executor(1);
   const FunctionField ball = sphere(Vec3::Zero(), 0.5);
   expect_message([&] { (void)polygonise(ball, lattice_of(1e-6), executor); }, ErrorKind::Limit,
-                 {"lattice.cell", "4000000 blocks", "1e-06 m", "use cells of at least"});
+                 {"lattice.cell", "250000 blocks", "1e-06 m", "use cells of at least"});
   expect_message([&] { (void)polygonise(ball, lattice_of(1e-12), executor); }, ErrorKind::Limit,
                  {"lattice.cell", "node numbers", "use cells of at least"});
   expect_message([&] { (void)polygonise(below(0.0), lattice_of(0.1), executor); }, ErrorKind::Usage,

@@ -35,12 +35,15 @@ struct PolygoniseCounts {
   std::uint64_t gaps = 0;             ///< edges across a gap between two bodies that is thinner than a cell
 };
 
+/// Blocks of a mesh: a block takes 25 kB while one is made, 50 kB where bodies touch, 12 GB in all.
+inline constexpr std::uint64_t kMostBlocks = 250'000;
+
 /// Coordinates (lowest node / 8) of the 8^3-cell blocks whose bounds admit a sign change of F, in z, y, x order.
-/// @throws Error{Limit} when more than `limit` blocks would have to be looked at.
+/// @throws Error{Limit} when these are more than `limit`.
 [[nodiscard]] std::vector<std::array<std::int32_t, 3>> find_surface_blocks(const FieldView& field,
                                                                            const Lattice& lattice,
                                                                            const Executor& executor,
-                                                                           std::uint64_t limit = 4'000'000,
+                                                                           std::uint64_t limit = kMostBlocks,
                                                                            PolygoniseCounts* counts = nullptr);
 
 /// Stage 9 for one body: the closed surface F = 0, outward oriented, with analytic normals.
