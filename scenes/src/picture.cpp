@@ -7,6 +7,7 @@
 
 #include "look_columns.h"
 #include "scene_places.h"
+#include "supple/collision/sleep.h"
 #include "supple/render/glyphs.h"
 
 namespace supple::scenes {
@@ -245,58 +246,100 @@ void ScenePictures::add_objects(Simulation& simulation) {
   }
 }
 
-/// Zero where the mesh of an object should be: of a body that touches, F~ = (p - max(p_j, 0)) / P of the claims p, and of
-/// several pieces the largest.
+namespace {
+
+/// The surface of a body: F, or F~ = (p - max(p_j, 0)) / P of the claims p where it touches others.
+struct Piece {
+  struct Other {
+    implicit::FieldView claim;
+    Box positive;
+  };
+  implicit::FieldView own;
+  double scale = 1.0;
+  std::vector<Other> others;
+
+  double value(const Vec3& at, Vec3& gradient) const {
+    double value = own.value(at, gradient), taken = 0.0;
+    Vec3 slope = Vec3::Zero();
+    for (const Other& other : others) {
+      if (!other.positive.contains(at)) continue;
+      Vec3 steepness;
+      const double claim = other.claim.value(at, steepness);
+      if (claim <= taken) continue;
+      taken = claim;
+      slope = steepness;
+    }
+    gradient = scale * (gradient - slope);
+    return scale * (value - taken);
+  }
+};
+
+/// The bodies of an object: the largest F~ of those whose surface may be within reach.
+struct Pieces {
+  std::vector<Piece> piece;
+  collision::BoxTree near;
+
+  void find_boxes(double reach) {
+    std::vector<Box> boxes(piece.size());
+    std::vector<std::uint32_t> all(piece.size());
+    for (std::uint32_t k = 0; k < piece.size(); ++k) {
+      boxes[k] = piece[k].own.surface_box().inflated(reach);
+      all[k] = k;
+    }
+    near.build(boxes, all);
+  }
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+    thread_local std::vector<std::uint32_t> found;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      found.clear();
+      near.find({points[i], points[i]}, found);
+      std::sort(found.begin(), found.end());  // of equal ones the first
+      values[i] = -std::numeric_limits<double>::infinity();
+      gradients[i] = Vec3::Zero();
+      for (const std::uint32_t k : found) {
+        Vec3 gradient;
+        const double value = piece[k].value(points[i], gradient);
+        if (value <= values[i]) continue;
+        values[i] = value;
+        gradients[i] = gradient;
+      }
+    }
+  }
+};
+
+}  // namespace
+
+/// Zero where the mesh of an object should be.
 void ScenePictures::add_fields(Simulation& simulation) {
   const std::vector<Body>& bodies = simulation.bodies();
   const std::vector<implicit::Field>& fields = simulation.fields();
   division_ = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
-  struct Piece {
-    implicit::FieldView own;
-    double scale = 1.0;
-    std::vector<implicit::FieldView> others;
-  };
-  std::vector<std::vector<Piece>> pieces(scene_.objects.size());
+  std::vector<Pieces> pieces(scene_.objects.size());
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
+    std::vector<Piece>& of_object = pieces[bodies[i].object].piece;
     const auto at = std::lower_bound(division_.body.begin(), division_.body.end(), i);
     if (at == division_.body.end() || *at != i) {
-      pieces[bodies[i].object].push_back({.own = fields[i], .scale = 1.0, .others = {}});
+      of_object.push_back({.own = fields[i], .scale = 1.0, .others = {}});
       continue;
     }
     const auto k = static_cast<std::size_t>(at - division_.body.begin());
     Piece piece{.own = division_.claim[k], .scale = 1.0 / division_.placed[i].material.modulus, .others = {}};
-    for (const std::size_t j : division_.others_of(k)) piece.others.emplace_back(division_.claim[j]);
-    pieces[bodies[i].object].push_back(std::move(piece));
+    for (const std::size_t j : division_.others_of(k)) {
+      const implicit::FieldView claim = division_.claim[j];
+      piece.others.push_back({claim, claim.surface_box()});
+    }
+    of_object.push_back(std::move(piece));
   }
   const std::vector<Mesh>& meshes = simulation.meshes();
   for (render::Item& item : items_) {
     const auto object = static_cast<std::size_t>(item.mesh - meshes.data());
-    if (item.mesh < meshes.data() || object >= meshes.size() || pieces[object].empty()) continue;
-    item.field = [parts = std::move(pieces[object])](std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) {
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        const std::span<const Vec3> point = points.subspan(i, 1);
-        values[i] = -std::numeric_limits<double>::infinity();
-        for (const Piece& part : parts) {
-          double value = 0.0, taken = 0.0;
-          Vec3 gradient = Vec3::Zero(), slope = Vec3::Zero();
-          part.own.evaluate(point, std::span(&value, 1), std::span(&gradient, 1));
-          for (const implicit::FieldView& other : part.others) {
-            double claim = 0.0;
-            Vec3 steepness = Vec3::Zero();
-            other.evaluate(point, std::span(&claim, 1), std::span(&steepness, 1));
-            if (claim <= taken) continue;
-            taken = claim;
-            slope = steepness;
-          }
-          value = part.scale * (value - taken);
-          if (value <= values[i]) continue;
-          values[i] = value;
-          gradients[i] = part.scale * (gradient - slope);
-        }
-      }
-    };
+    if (item.mesh < meshes.data() || object >= meshes.size() || pieces[object].piece.empty()) continue;
     item.field_reach = simulation.model().objects[object].cell;
+    pieces[object].find_boxes(2.0 * item.field_reach);  // from a hit's triangle to the surface, and as far again
+    item.field = [parts = std::move(pieces[object])](std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) {
+      parts.evaluate(points, values, gradients);
+    };
   }
 }
 

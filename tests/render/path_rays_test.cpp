@@ -174,6 +174,88 @@ TEST(PathTracer, MeetsEachTriangleWhetherOrNotItJoinsTheNextOne) {
   }
 }
 
+/// What a ray meets, alone and in a bundle.
+std::array<path::Hit, 2> both_ways(const path::Geometry& geometry, const Vec3f& from, const Vec3f& direction) {
+  std::array<path::Hit, 2> out;
+  const path::RayBundle rays{.from = path::Vec3Lanes(from), .direction = path::Vec3Lanes(direction), .time = {},
+                             .who = path::first_lanes(1), .together = true};
+  std::array<path::Hit, path::kLanes> hits;
+  EXPECT_NE(geometry.meet(rays, path::Lanes{}, false, hits)[0], 0);
+  EXPECT_TRUE(geometry.meet(from, direction, 0.0F, 0.0F, false, out[0]));
+  out[1] = hits[0];
+  return out;
+}
+
+TEST(PathTracer, MeetsFrontsBeforeBacksAtOnePlace) {
+  const Mesh ball = sphere(Vec3::Zero(), 1.0, 12);
+  Mesh turned = ball;
+  for (auto& t : turned.triangle) std::swap(t[0], t[1]);
+  for (const bool first : {false, true}) {
+    const std::array items = {matt(first ? ball : turned, 0.5), matt(first ? turned : ball, 0.5)};
+    path::Geometry geometry;
+    geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+    for (int k = 0; k < 500; ++k) {
+      const Vec3f from = Vec3f(std::sin(1.7F * static_cast<float>(k)), std::cos(2.3F * static_cast<float>(k)), 0.9F).normalized();
+      for (const path::Hit& hit : both_ways(geometry, 4.0F * from, -from)) {
+        EXPECT_EQ(hit.item, first ? 0u : 1u);
+        EXPECT_NEAR(hit.distance, 3.0, 0.02);
+      }
+    }
+  }
+}
+
+TEST(PathTracer, MeetsTheSameWhateverItsHierarchy) {
+  // Balls that lie in each other, so that rays at vertices, edges and between items meet several triangles at one place.
+  constexpr int kFrames = 6;
+  const auto moved = [](int frame) {
+    std::array<Mesh, 3> meshes = {sphere(Vec3::Zero(), 1.0, 12), sphere(Vec3(0.5, 0, 0), 1.0, 12), sphere(Vec3::Zero(), 1.0, 12)};
+    for (std::size_t m = 0; m < 3; ++m)
+      for (Vec3& p : meshes[m].position) p += 0.03 * frame * Vec3(std::sin(3.0 * p.y()), std::cos(2.0 * p.z()), std::sin(4.0 * p.x()));
+    return meshes;
+  };
+  const auto items_of = [](const std::array<Mesh, 3>& meshes) { return std::array{matt(meshes[0], 0.5), matt(meshes[1], 0.5), matt(meshes[2], 0.5)}; };
+  path::Geometry refitted, fresh;
+  std::array<Mesh, 3> meshes;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    meshes = moved(frame);
+    refitted.set(items_of(meshes), Vec3::Zero(), 0.0, 0.0F);
+    EXPECT_EQ(refitted.counts().refitted, frame == 0 ? 0 : 3);
+  }
+  fresh.set(items_of(meshes), Vec3::Zero(), 0.0, 0.0F);
+  EXPECT_EQ(fresh.counts().built, 3);
+  const Mesh& mesh = meshes[0];
+  for (const auto& t : mesh.triangle)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f a = mesh.position[t[k]].cast<float>(), b = mesh.position[t[(k + 1) % 3]].cast<float>();
+      for (const float share : {0.0F, 0.25F, 0.5F}) {
+        const Vec3f at = a + share * (b - a), direction = -at.normalized();
+        const auto one = both_ways(refitted, at - 3.0F * direction, direction), other = both_ways(fresh, at - 3.0F * direction, direction);
+        for (std::size_t way = 0; way < 2; ++way) {
+          EXPECT_EQ(one[way].item, other[way].item);
+          EXPECT_EQ(one[way].distance, other[way].distance);
+          EXPECT_EQ(one[way].point, other[way].point);
+          EXPECT_EQ(one[way].face_normal, other[way].face_normal);
+        }
+      }
+    }
+}
+
+TEST(PathTracer, BuildsAnewWhatHasLeftItsHierarchy) {
+  Mesh ball = sphere(Vec3::Zero(), 1.0, 24);
+  const Item item = matt(ball, 0.5);
+  path::Geometry geometry;
+  const auto set = [&] { geometry.set(std::span(&item, 1), Vec3::Zero(), 0.0, 0.0F); };
+  set();
+  EXPECT_EQ(geometry.counts().built, 1);
+  const Mat3 turn = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  for (Vec3& p : ball.position) p = 2.0 * (turn * p) + Vec3::UnitX();
+  set();  // a body that turns, grows and goes
+  EXPECT_EQ(geometry.counts().refitted, 1);
+  for (std::size_t i = 0; i < ball.position.size(); i += 2) ball.position[i] = Vec3(2, 0, 0) - ball.position[i];
+  set();
+  EXPECT_EQ(geometry.counts().built, 1);
+}
+
 TEST(PathTracer, KeepsItemsAndMovesVertices) {
   Mesh a = sphere(Vec3::Zero(), 0.5, 8), b = sphere(Vec3::UnitX(), 0.3, 8);
   const std::array items = {matt(a, 0.5), matt(b, 0.5)};
@@ -185,7 +267,7 @@ TEST(PathTracer, KeepsItemsAndMovesVertices) {
   for (Vec3& p : b.position) p += Vec3(0.5, 0, 0);
   geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
   EXPECT_EQ(geometry.counts().kept, 1);
-  EXPECT_EQ(geometry.counts().moved, 1);
+  EXPECT_EQ(geometry.counts().refitted, 1);
   // The moved one is met where it is now.
   path::Hit hit;
   EXPECT_TRUE(geometry.meet(Vec3f(1.5F, -2, 0), Vec3f::UnitY(), 0.0F, 0.0F, false, hit));

@@ -371,40 +371,76 @@ TEST_F(Looks, AbsentTexturesAndFilmMakersAreNamedBeforeAnythingIsRemoved) {
   EXPECT_TRUE(fs::exists(folder_ / "frames/looks.0001.png"));
 }
 
-TEST_F(Looks, CoarseMeshesOfBallsThatTouchLookLikeFineOnesWhenRaysMeetTheField) {
-  // Pressed together by a quarter of a radius, a third one beside them; many samples and no filter, so that shapes alone differ.
-  const auto scene = [&](const char* cell, const char* exact) {
-    return parse_scene(std::string(R"(
+/// Two balls pressed together by a quarter of a radius; many samples and no filter, so that shapes alone differ.
+Scene balls_that_touch(const std::string& look_of_b, const std::string& camera, const std::string& cell, bool exact) {
+  return parse_scene(R"(
 schema: 1
 duration: 0.1 s
 frame_rate: 10
 gravity: [0, 0, 0]
 objects:
   - {name: a, particles: {arrange: single, at: [-0.3, 0, 0]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 1000}}
-  - {name: b, particles: {arrange: single, at: [0.05, 0, 0.05]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 2000}}
+  - {name: b, particles: {arrange: single, at: [0.05, 0, 0.05]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 2000}, look: {)" +
+                         look_of_b + R"(}}
 light: {direction: [-0.2, 1, -0.4], softness_deg: 0}
-camera: {from: [0, -2, 0.4], look_at: [-0.1, 0, 0], field_of_view_deg: 30}
-render: {renderer: path, noise: 0, most_samples: 64, denoise: false, exact_surface: )") + exact + "}\noutput: {images: {size: [96, 72]}, cell: " + cell + "}\n",
-                       "looks.yaml", ".");
-  };
+camera: )" + camera + R"(
+render: {renderer: path, noise: 0, most_samples: 64, denoise: false, exact_surface: )" + (exact ? "true" : "false") +
+                         "}\noutput: {images: {size: [96, 72]}, cell: " + cell + "}\n",
+                     "looks.yaml", ".");
+}
+
+render::Image part_of(const render::Image& whole, int left, int top, int width, int height) {
+  render::Image part{.width = width, .height = height, .pixels = {}};
+  for (std::ptrdiff_t y = top; y < top + height; ++y) {
+    const auto row = whole.pixels.begin() + 3 * (y * whole.width + left);
+    part.pixels.insert(part.pixels.end(), row, row + 3 * std::ptrdiff_t{width});
+  }
+  return part;
+}
+
+TEST_F(Looks, CoarseMeshesOfBallsThatTouchLookLikeFineOnesWhenRaysMeetTheField) {
+  const std::string camera = "{from: [0, -2, 0.4], look_at: [-0.1, 0, 0], field_of_view_deg: 30}";
   if (!render::has_path_tracer()) {
-    EXPECT_NE(run_scene(scene("0.08", "true"), {.folder = folder_, .threads = 1}).reason.find("Embree"), std::string::npos);
+    EXPECT_NE(run_scene(balls_that_touch("", camera, "0.08", true), {.folder = folder_, .threads = 1}).reason.find("Embree"), std::string::npos);
     return;
   }
   // The middle, with the crease between the two: outlines stay those of the mesh.
-  const auto middle = [&](const char* cell, const char* exact) {
-    const render::Image whole = first_picture(scene(cell, exact));
-    render::Image part{.width = 34, .height = 12, .pixels = {}};
-    for (std::ptrdiff_t y = 28; y < 28 + part.height; ++y) {
-      const auto row = whole.pixels.begin() + 3 * (y * whole.width + 30);
-      part.pixels.insert(part.pixels.end(), row, row + 3 * part.width);
-    }
-    return part;
-  };
-  const render::Image fine = middle("0.01", "false");
-  const double plain = render::compare(middle("0.08", "false"), fine, 1.0).psnr;
-  const double met = render::compare(middle("0.08", "true"), fine, 1.0).psnr;
+  const auto middle = [&](const char* cell, bool exact) { return part_of(first_picture(balls_that_touch("", camera, cell, exact)), 30, 28, 34, 12); };
+  const render::Image fine = middle("0.01", false);
+  const double plain = render::compare(middle("0.08", false), fine, 1.0).psnr;
+  const double met = render::compare(middle("0.08", true), fine, 1.0).psnr;
   EXPECT_GT(met, plain + 3.0);
+}
+
+TEST_F(Looks, DentsAreSeenThroughATransparentBodyThatMadeThem) {
+  if (!render::has_path_tracer()) return;  // the test before this one says what is then refused
+  const auto dent = [&](const char* cell, bool exact) {
+    return part_of(first_picture(balls_that_touch("opacity: 0.05", "{from: [2, -0.3, 0.4], look_at: [-0.2, 0, 0], field_of_view_deg: 20}", cell, exact)), 36, 24, 24, 24);
+  };
+  const render::Image fine = dent("0.01", false);
+  const double plain = render::compare(dent("0.08", false), fine, 1.0).psnr;
+  EXPECT_GT(plain, 30.0);  // 21 where rays pass through the face that both have
+  EXPECT_GT(render::compare(dent("0.08", true), fine, 1.0).psnr, plain + 3.0);
+}
+
+TEST_F(Looks, SeparateBodiesMeetRaysAsObjectsOfTheirOwnDo) {
+  if (!render::has_path_tracer()) return;  // the test before this one says what is then refused
+  const std::string keys = ", skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}], contact: {modulus: 1000}, colour: [0.8, 0.4, 0.2]";
+  const auto picture = [&](const std::string& objects) {
+    return first_picture(parse_scene("schema: 1\nduration: 0.1 s\nframe_rate: 10\ngravity: [0, 0, 0]\nobjects:\n" + objects + R"(
+light: {direction: [-0.2, 1, -0.4]}
+camera: {from: [0, -3, 0.4], look_at: [0, 0, 0], field_of_view_deg: 40}
+render: {renderer: path, noise: 0, most_samples: 16, denoise: false}
+output: {images: {size: [96, 72]}, cell: 0.08}
+)", "looks.yaml", "."));
+  };
+  std::string apart;
+  int number = 0;
+  for (const char* at : {"[-0.5, 0, 0]", "[-0.125, 0, 0]", "[0.25, 0, 0]"}) {
+    apart += "  - {name: body_" + std::to_string(number++) + ", particles: {arrange: single, at: " + at + "}" + keys + "}\n";
+  }
+  const render::Image one_object = picture("  - {name: bodies, separate: true, particles: {arrange: line, count: 3, spacing: 0.375, at: [-0.125, 0, 0]}" + keys + "}\n");
+  EXPECT_EQ(one_object.pixels, picture(apart).pixels);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstring>
 #include <limits>
+#include <tuple>
+#include <type_traits>
 
 #include "../draw_list.h"
 #include "../lighting.h"
@@ -57,6 +59,35 @@ std::vector<Quadrangle> joined(const std::vector<std::array<std::uint32_t, 3>>& 
   return out;
 }
 
+/// How far corners of quadrangles that follow each other lie from their middles, over how far all do: squares, which turning, moving
+/// and scaling leave as they are.
+float spread_of(const std::vector<Quadrangle>& quadrangles, const std::vector<float>& position) {
+  constexpr std::size_t kTogether = 64;
+  const Vec3f origin = vector(&position[4 * std::size_t{quadrangles[0][0]}]);
+  Vec3f total = Vec3f::Zero();
+  float squares = 0.0F, apart = 0.0F;
+  for (std::size_t first = 0; first < quadrangles.size(); first += kTogether) {
+    const std::size_t last = std::min(first + kTogether, quadrangles.size());
+    const auto count = 4.0F * static_cast<float>(last - first);
+    const Vec3f near = vector(&position[4 * std::size_t{quadrangles[first][0]}]);
+    Vec3f sum = Vec3f::Zero();
+    float own_squares = 0.0F;
+    for (std::size_t i = first; i < last; ++i)
+      for (const std::uint32_t corner : quadrangles[i]) {
+        const Vec3f d = vector(&position[4 * std::size_t{corner}]) - near;
+        sum += d;
+        own_squares += d.squaredNorm();
+      }
+    const float own = std::max(0.0F, own_squares - sum.squaredNorm() / count);
+    const Vec3f middle = near + sum / count - origin;
+    apart += own;
+    squares += own + count * middle.squaredNorm();
+    total += count * middle;
+  }
+  const float all = squares - total.squaredNorm() / (4.0F * static_cast<float>(quadrangles.size()));
+  return apart / std::max(all, std::numeric_limits<float>::min());
+}
+
 }  // namespace
 
 /// What of an item stays between pictures.
@@ -68,12 +99,14 @@ struct Geometry::Part {
   std::vector<float> position_end;
   std::vector<Vec3f> normal;
   std::vector<Quadrangle> quadrangle;
+  float spread = 0.0F;  ///< when its hierarchy was built
   PaintSource paint;
 };
 
 Geometry::Geometry() : device_(rtcNewDevice("set_affinity=0")) {
   scene_ = rtcNewScene(device_);
-  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+  rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_LOW);  // a hierarchy for each item and one of them all: others are not refitted
   check(device_);
 }
 
@@ -144,8 +177,15 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
                     part.position_end.size() * sizeof(float));
         rtcUpdateGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, 1);
       }
+      constexpr float kWorn = 1.5F;  // boxes grow with it, and with them what rays cost
+      const float spread = spread_of(part.quadrangle, part.position);
+      const bool worn = spread > kWorn * part.spread;
+      if (worn) {
+        rtcUpdateGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_INDEX, 0);  // which has Embree build anew
+        part.spread = spread;
+      }
       rtcCommitGeometry(part.geometry);
-      ++counts_.moved;
+      ++(worn ? counts_.built : counts_.refitted);
       continue;
     }
     if (part.geometry != nullptr) {
@@ -158,7 +198,9 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
     if (part.quadrangle.empty()) continue;
     for (const auto& triangle : mesh.triangle)
       for (const std::uint32_t v : triangle) SUPPLE_EXPECTS(v < n);
+    part.spread = spread_of(part.quadrangle, part.position);
     part.geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+    rtcSetGeometryBuildQuality(part.geometry, RTC_BUILD_QUALITY_REFIT);
     if (moving) rtcSetGeometryTimeStepCount(part.geometry, 2);
     const auto fill = [&](unsigned slot, const std::vector<float>& from) {
       void* to = rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, slot, RTC_FORMAT_FLOAT3, 4 * sizeof(float), n);
@@ -176,8 +218,7 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
     rtcAttachGeometryByID(scene_, part.geometry, part.id);
     ++counts_.built;
   }
-  // By one thread, so that the hierarchy, and with it the choice between triangles that a ray meets at one place, is always
-  // the same. A device with threads=1 would limit the threads of the whole process.
+  // By the thread that draws: others draw other pictures. A device with threads=1 would limit the threads of the whole process.
   if (changed) Executor(1).run([this] { rtcJoinCommitScene(scene_); });
   RTCBounds box;
   rtcGetSceneBounds(scene_, &box);
@@ -197,22 +238,56 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
 
 /// Of a ray and a triangle.
 struct Geometry::Crossing {
-  float distance = 0.0F;
+  float distance = std::numeric_limits<float>::infinity();
   unsigned item = RTC_INVALID_GEOMETRY_ID;
   unsigned quadrangle = 0;
   float u = 0.0F, v = 0.0F;
 };
 
-Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const {
+/// The first crossings of rays. Of several at one place Embree would keep the one that its hierarchy came to last; here it is the first
+/// in a fixed order, fronts before backs, so that a picture depends on no hierarchy and bodies behind a face that they share with a
+/// transparent one are seen.
+struct Geometry::Query {
+  /// Distances that differ by less are one place, to Embree a few times as much: it compares before it divides.
+  static constexpr float kOnePlace = 4.0F * std::numeric_limits<float>::epsilon();
+
   RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  std::array<Crossing, kLanes> first;
+
+  explicit Query(RTCIntersectContextFlags flags) {
+    rtcInitIntersectContext(&context);
+    context.flags = flags;
+    context.filter = look_at;
+  }
+
+  /// Embree's call for every crossing up to the reach of its ray, which ends beyond all at the place of the first one.
+  static void look_at(const RTCFilterFunctionNArguments* of) {
+    static_assert(std::is_standard_layout_v<Query>);
+    auto& query = *reinterpret_cast<Query*>(of->context);
+    for (unsigned k = 0; k < of->N; ++k) {
+      if (of->valid[k] != -1) continue;
+      const Vec3f direction(RTCRayN_dir_x(of->ray, of->N, k), RTCRayN_dir_y(of->ray, of->N, k), RTCRayN_dir_z(of->ray, of->N, k));
+      const Vec3f normal(RTCHitN_Ng_x(of->hit, of->N, k), RTCHitN_Ng_y(of->hit, of->N, k), RTCHitN_Ng_z(of->hit, of->N, k));
+      float& reach = RTCRayN_tfar(of->ray, of->N, k);
+      Crossing& first = query.first[k];
+      const Crossing found{.distance = normal.dot(direction) > 0.0F ? reach * (1.0F + kOnePlace) : reach,
+                           .item = RTCHitN_geomID(of->hit, of->N, k), .quadrangle = RTCHitN_primID(of->hit, of->N, k),
+                           .u = RTCHitN_u(of->hit, of->N, k), .v = RTCHitN_v(of->hit, of->N, k)};
+      if (std::tie(found.distance, found.item, found.quadrangle) < std::tie(first.distance, first.item, first.quadrangle)) first = found;
+      reach = first.distance * (1.0F + 2.0F * kOnePlace);
+    }
+  }
+};
+
+Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const {
+  Query query(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   RTCRayHit ray{};
   ray.ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = near_end,
              .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
              .tfar = std::numeric_limits<float>::infinity(), .mask = 1u, .id = 0, .flags = 0};
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene_, &context, &ray);
-  return {.distance = ray.ray.tfar, .item = ray.hit.geomID, .quadrangle = ray.hit.primID, .u = ray.hit.u, .v = ray.hit.v};
+  rtcIntersect1(scene_, &query.context, &ray);
+  return query.first[0];
 }
 
 bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
@@ -339,13 +414,6 @@ RTCRay8 packet(const RayBundle& rays, Lanes distance, unsigned mask) {
   return to;
 }
 
-RTCIntersectContext coherent() {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  return context;
-}
-
 }  // namespace
 
 /// Rays that cross the box (Kay & Kajiya 1986) and the ball of all items, and at most a few others.
@@ -378,12 +446,9 @@ std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) 
   RTCRayHit8 bundle;
   bundle.ray = packet(rays, all_lanes(INFINITY), 1u);
   std::fill_n(bundle.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
-  RTCIntersectContext context = coherent();
-  rtcIntersect8(reinterpret_cast<const int*>(&who), scene_, &context, &bundle);
-  for (std::size_t k = 0; k < kLanes; ++k)
-    out[k] = {.distance = bundle.ray.tfar[k], .item = bundle.hit.geomID[k], .quadrangle = bundle.hit.primID[k], .u = bundle.hit.u[k],
-              .v = bundle.hit.v[k]};
-  return out;
+  Query query(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  rtcIntersect8(reinterpret_cast<const int*>(&who), scene_, &query.context, &bundle);
+  return query.first;
 }
 
 LaneMask Geometry::meet(const RayBundle& rays, Lanes choice, bool exact, std::array<Hit, kLanes>& hits) const {
@@ -408,7 +473,9 @@ LaneMask Geometry::blocked(const RayBundle& rays, Lanes distance) const {
     return out;
   }
   RTCRay8 bundle = packet(rays, distance, 2u);
-  RTCIntersectContext context = coherent();
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcOccluded8(reinterpret_cast<const int*>(&who), scene_, &context, &bundle);
   return both(who, _mm256_load_ps(bundle.tfar) < 0.0F);
 }

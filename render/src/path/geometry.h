@@ -40,8 +40,8 @@ class Geometry {
   Geometry(const Geometry&) = delete;
   Geometry& operator=(const Geometry&) = delete;
 
-  /// Takes over the items of a picture. The hierarchy of all is built anew unless everything is as it was: one that is refitted would
-  /// make a picture depend on those before it, in hits at one place.
+  /// Takes over the items of a picture. The hierarchy of an item is kept where nothing moved, refitted where its vertices did, and built
+  /// anew where its triangles are others or have left each other; no picture depends on that.
   /// @param shutter  how long the picture is exposed [s]: vertices move by the columns velocity_x, velocity_y, velocity_z
   /// @param wire     radius of the edges of wireframes over their distance
   void set(std::span<const Item> items, const Vec3& origin, double shutter, float wire);
@@ -57,15 +57,16 @@ class Geometry {
   /// @param distance  to the light
   [[nodiscard]] LaneMask blocked(const RayBundle& rays, Lanes distance) const;
 
-  /// Items of the last `set`: new ones, ones whose vertices moved, ones as they were.
+  /// Hierarchies of items in the last `set`: new, with vertices that moved, as they were.
   struct Counts {
-    int built = 0, moved = 0, kept = 0;
+    int built = 0, refitted = 0, kept = 0;
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
  private:
   struct Part;
   struct Crossing;
+  struct Query;
   [[nodiscard]] LaneMask cross_bounds(const RayBundle& rays) const;
   [[nodiscard]] std::array<Crossing, kLanes> crossed(const RayBundle& rays) const;
   [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const;
