@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "polar_rule.h"
 #include "supple/core/math.h"
@@ -349,22 +350,29 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
   sheets_.clear();
   for (const std::size_t k : crossing_) {
     Sheet sheet;
-    sheet.flat = k < kinks_.size() && kinks_[k].form == implicit::Kink::Form::Plane;
-    if (sheet.flat) sheet.value = kinks_[k].value(frame_.origin, sheet.slope);
+    const implicit::Kink* kink = k < kinks_.size() ? &kinks_[k] : nullptr;
+    sheet.flat = kink != nullptr && kink->form == implicit::Kink::Form::Plane;
+    const bool round = kink != nullptr && kink->form == implicit::Kink::Form::Offset && kink->half.isZero(0.0);
+    sheet.told = sheet.flat || round;
+    if (sheet.told) sheet.value = kink->value(frame_.origin, sheet.slope);
+    if (round) sheet.bend = 0.5 / kink->level * (kink->to_local.transpose() * kink->to_local);
     sheets_.push_back(sheet);
   }
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
-    const auto place = [&](double share) -> Vec3 { return frame_.origin + share * reach + model_height(i, share) * frame_.axis; };
     std::array<double, kSamples + 1> height;
     for (int j = 0; j <= kSamples; ++j) height[static_cast<std::size_t>(j)] = model_height(i, static_cast<double>(j) / kSamples);
     for (std::size_t c = 0; c < crossing_.size(); ++c) {
       const std::size_t k = crossing_[c];
       const Sheet& sheet = sheets_[c];
-      const double along = sheet.flat ? sheet.slope.dot(reach) : 0.0, up = sheet.flat ? sheet.slope.dot(frame_.axis) : 0.0;
-      const auto side = [&](double share) {
-        return sheet.flat ? sheet.value + along * share + up * model_height(i, share) : side_of(k, pressure, place(share));
+      const Vec3 bend_along = sheet.bend * reach, bend_up = sheet.bend * frame_.axis;
+      const double along = sheet.slope.dot(reach), up = sheet.slope.dot(frame_.axis);
+      const double square = bend_along.dot(reach), mixed = 2.0 * bend_along.dot(frame_.axis), up_square = bend_up.dot(frame_.axis);
+      const auto side_at = [&](double share, double rise) {
+        if (!sheet.told) return side_of(k, pressure, frame_.origin + share * reach + rise * frame_.axis);
+        return sheet.value + share * (along + square * share + mixed * rise) + rise * (up + up_square * rise);
       };
+      const auto side = [&](double share) { return side_at(share, model_height(i, share)); };
       const std::size_t others = crossings_.size();
       const auto between = [&](double left, double s_left, double right, double s_right) {
         double share = left + (right - left) * s_left / (s_left - s_right);
@@ -386,9 +394,7 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
       };
       std::array<double, kSamples + 1> s;
       for (std::size_t j = 0; j < s.size(); ++j) {
-        const double share = static_cast<double>(j) / kSamples;
-        s[j] = sheet.flat ? sheet.value + along * share + up * height[j]
-                          : side_of(k, pressure, frame_.origin + share * reach + height[j] * frame_.axis);
+        s[j] = side_at(static_cast<double>(j) / kSamples, height[j]);
       }
       if (k >= kinks_.size() && cross_imprints(pressure, i, k, s)) continue;
       for (std::size_t j = 0; j < kSamples; ++j) {
@@ -412,18 +418,18 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
   }
   PressureBatch& batch = crossing_batch_;
   batch.resize(crossings_.size());
-  std::size_t open = crossings_.size();
-  for (int step = 0; step < kCrossingSteps && open > 0; ++step) {
-    for (std::size_t c = 0; c < crossings_.size(); ++c) {
+  open_.resize(crossings_.size());
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
+  for (int step = 0; step < kCrossingSteps && !open_.empty(); ++step) {
+    for (const std::size_t c : open_) {
       const Crossing& x = crossings_[c];
       batch.point[c] = frame_.origin + (x.radius * rays_.radius[x.ray]) * direction(rays_.cosine[x.ray], rays_.sine[x.ray]) +
                        x.height * frame_.axis;
     }
-    pressure.evaluate(batch);
+    pressure.evaluate(batch, open_, some_);
     evaluate_thirds(batch.point);
-    for (std::size_t c = 0; c < crossings_.size(); ++c) {
+    std::erase_if(open_, [&](std::size_t c) {
       Crossing& x = crossings_[c];
-      if (x.good) continue;
       const Vec3 e = rays_.radius[x.ray] * direction(rays_.cosine[x.ray], rays_.sine[x.ray]);
       Vec3 slope;
       const double s = side_of(x.kink, batch, c, slope), gap = batch.a[c] - batch.b[c];
@@ -431,15 +437,15 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
       const double gr = across.dot(e), gt = across.dot(frame_.axis), sr = slope.dot(e), st = slope.dot(frame_.axis);
       const double determinant = gr * st - gt * sr;
       const double radius = x.radius + (gt * s - st * gap) / determinant;
-      if (!std::isfinite(radius)) continue;
+      if (!std::isfinite(radius)) return false;
       const double next = std::clamp(radius, x.left, x.right);  // two that lie close must not change places
       const double moved = next - x.radius;
       x.height -= (gap + gr * moved) / gt;
       x.radius = next;
       // Relative to the piece between kink and rim on faces, whose share of the ray may be small.
       x.good = std::abs(moved) <= enough * (about_middle_ ? std::abs(1.0 - next) : 1.0) && next == radius;
-      if (x.good) --open;
-    }
+      return x.good;
+    });
   }
   std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& x, const Crossing& y) {
     return x.ray != y.ray ? x.ray < y.ray : x.radius != y.radius ? x.radius < y.radius : x.kink < y.kink;

@@ -430,8 +430,9 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
       panels_.push_back(panel);
     }
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
-    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr)) return false;
-    if (!fine || !add_missed_kinks()) return true;
+    const std::size_t crossing = crossing_.size();
+    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr, fine)) return false;
+    if (crossing_.size() == crossing) return true;
   }
 }
 

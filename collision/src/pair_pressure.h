@@ -40,6 +40,20 @@ class PairPressure {
     evaluate(0, batch.point, batch.a, batch.slope_a);
     evaluate(1, batch.point, batch.b, batch.slope_b);
   }
+  /// The same at the points `which` alone. @param some  room for them
+  void evaluate(PressureBatch& batch, std::span<const std::size_t> which, PressureBatch& some) {
+    if (which.size() == batch.size()) return evaluate(batch);
+    some.resize(which.size());
+    for (std::size_t k = 0; k < which.size(); ++k) some.point[k] = batch.point[which[k]];
+    evaluate(some);
+    for (std::size_t k = 0; k < which.size(); ++k) {
+      const std::size_t i = which[k];
+      batch.a[i] = some.a[k];
+      batch.b[i] = some.b[k];
+      batch.slope_a[i] = some.slope_a[k];
+      batch.slope_b[i] = some.slope_b[k];
+    }
+  }
   /// Values of both bodies.
   void evaluate_values(PressureBatch& batch) {
     evaluate(0, batch.point, batch.a);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "supple/core/math.h"
 
@@ -179,25 +180,31 @@ bool PolarRuleSolver::solve_heights(PairPressure& pressure, double error) {
   const double round_off = 4.0 * kEpsilon * pressure.largest_modulus();
   const double enough = std::max(round_off, std::min(1e-11 * pressure.largest_modulus(), 1e-3 * error * frame_.peak));
   const Vec3 axis = frame_.axis;
+  open_.resize(n);
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
+  residual_ = 0.0;
   for (int iteration = 0; iteration < kHeightSteps; ++iteration) {
-    for (std::size_t i = 0; i < n; ++i) node_.point[i] = foot_[i] + height_[i] * axis;
-    pressure.evaluate(node_);
-    residual_ = 0.0;
-    bool moved = false;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (const std::size_t i : open_) node_.point[i] = foot_[i] + height_[i] * axis;
+    pressure.evaluate(node_, open_, some_);
+    double off = 0.0;
+    std::size_t left = 0;
+    for (const std::size_t i : open_) {
       const double gap = node_.a[i] - node_.b[i];
-      residual_ = std::max(residual_, std::abs(gap));
-      if (std::abs(gap) <= enough) continue;
-      const double rate = (node_.slope_b[i] - node_.slope_a[i]).dot(axis);
-      if (!(rate > 0.0)) return false;
-      const double step = gap / rate;
+      const double rate = (node_.slope_b[i] - node_.slope_a[i]).dot(axis), step = gap / rate;
       // A step below the round-off of the coordinates cannot help.
-      if (std::abs(step) <= 2.0 * kEpsilon * node_.point[i].lpNorm<Eigen::Infinity>()) continue;
+      if (std::abs(gap) <= enough || std::abs(step) <= 2.0 * kEpsilon * node_.point[i].lpNorm<Eigen::Infinity>()) {
+        residual_ = std::max(residual_, std::abs(gap));
+        continue;
+      }
+      if (!(rate > 0.0)) return false;
+      off = std::max(off, std::abs(gap));
       height_[i] += step;
-      moved = true;
       if (!(std::abs(height_[i]) <= extent_)) return false;
+      open_[left++] = i;
     }
-    if (!moved) return true;
+    open_.resize(left);
+    if (left == 0) return true;
+    if (iteration + 1 == kHeightSteps) residual_ = std::max(residual_, off);
   }
   return residual_ <= 1e-6 * frame_.peak;
 }

@@ -116,11 +116,12 @@ class PolarRuleSolver {
     /// angle from where it touches it: as a polynomial, when the angle grows as a square.
     [[nodiscard]] std::array<double, 2> bend(double x) const;
   };
-  /// A kink, and s at the origin with its slope where it is a plane.
+  /// A kink as seen from the origin: of planes and spheres s = value + slope . d + d . bend d, which others are asked for.
   struct Sheet {
     double value = 0.0;
     Vec3 slope = Vec3::Zero();
-    bool flat = true;
+    Mat3 bend = Mat3::Zero();
+    bool flat = true, told = true;
   };
   struct Crossing {
     std::size_t ray, kink;
@@ -148,6 +149,7 @@ class PolarRuleSolver {
   void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
   static void follow_signs(std::span<const double> values, std::vector<double>& places);
   bool add_missed_kinks();
+  bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
@@ -191,7 +193,7 @@ class PolarRuleSolver {
   void make_sectors(std::span<const RimPoint> corners);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
-  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger);
+  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger, bool look);
 
   // About a point that sees the whole rim: star_rule.cpp.
   bool solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Regions& regions,
@@ -215,6 +217,8 @@ class PolarRuleSolver {
   std::vector<double> low_, high_;
   std::vector<std::uint8_t> done_;
   PressureBatch rim_batch_, crossing_batch_, node_;
+  PressureBatch some_;              // points of one of these at which Newton's method has not ended
+  std::vector<std::size_t> open_;   // which they are
   std::vector<double> height_, weight_, area_, pressure_, end_[2], reached_;
   std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
   std::vector<double> line_value_;

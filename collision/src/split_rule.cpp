@@ -70,8 +70,8 @@ constexpr std::size_t kFine = 15;  // rays
 
 }  // namespace
 
-/// Sums of the panels from `first` on.
-bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
+/// Rays of the panels from `first` on, as far as the rim. @return false where it is not found, or leads from a ray to what no ray sees
+bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   const std::size_t count = (panels_.size() - first) * per_panel;
   for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &fourth_}) {
@@ -97,6 +97,21 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   const double rim_error = rim_error_;
   if (!solve_rim(pressure, rays_, error)) return false;
   rim_error_ = std::max(rim_error_, rim_error);
+  for (std::size_t p = first; p < panels_.size(); ++p) {
+    Panel& panel = panels_[p];
+    panel.rim = kept_rim_.size();
+    for (std::size_t i = (p - first) * per_panel; i < (p - first + 1) * per_panel; ++i) {
+      kept_rim_.push_back({rays_.radius[i] * Vec2(rays_.cosine[i], rays_.sine[i]), rays_.height[i], rays_.outward[i]});
+    }
+    panel.rim_end = kept_rim_.size();
+    if (!about_middle_ && !rim_joins(panel.rim, panel.rim_end, false)) return false;
+  }
+  return true;
+}
+
+/// Sums of the panels from `first` on, whose rays are known.
+bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
+  const std::size_t per_panel = rule.node.size(), count = rays_.size();
   for (std::size_t i = 0; i < count; ++i) {
     const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
     if (about_star_) {
@@ -230,11 +245,6 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
   panel.by_rim = rim / whole;
   panel.rays = rule.node.size();
   panel.last = kept_.point.size();
-  panel.rim = kept_rim_.size();
-  for (std::size_t i = ray; i < ray + rule.node.size(); ++i) {
-    kept_rim_.push_back({rays_.radius[i] * Vec2(rays_.cosine[i], rays_.sine[i]), rays_.height[i], rays_.outward[i]});
-  }
-  panel.rim_end = kept_rim_.size();
 }
 
 /// What the coefficients of the highest degrees say that a panel's sums are off by, over those of `all`: nothing to speak of where they fall
@@ -328,8 +338,9 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
         panels_.push_back(panel);
       }
     }
-    if (!solve_all_panels(pressure, settings, rule, nullptr)) return false;
-    if (!add_missed_kinks()) return true;
+    const std::size_t crossing = crossing_.size();
+    if (!solve_all_panels(pressure, settings, rule, nullptr, true)) return false;
+    if (crossing_.size() == crossing) return true;
   }
 }
 
@@ -351,10 +362,11 @@ bool PolarRuleSolver::add_missed_kinks() {
   return true;
 }
 
-/// Halves panels until the estimate is low enough; then nodes and sums of all are in place.
+/// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew.
 /// @param larger  rule that panels get before they are halved, or null
+/// @param look  whether kinks that cross the rim of all rays are added
 bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first,
-                                       const KronrodRule* larger) {
+                                       const KronrodRule* larger, bool look) {
   const KronrodRule* rule = &first;
   const double error = settings.error;
   kept_.resize(0);
@@ -369,10 +381,9 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   PatchSums all;
   const bool beside = about_middle_ && cut_;
   for (;;) {
+    if (!find_rays(pressure, *rule, error, begin)) return false;
+    if (begin == 0 && look && add_missed_kinks()) return true;
     if (!solve_panels(pressure, *rule, error, begin)) return false;
-    for (std::size_t p = begin; p < panels_.size() && !about_middle_; ++p) {
-      if (!rim_joins(panels_[p].rim, panels_[p].rim_end, false)) return false;
-    }
     all = {};
     for (const Panel& panel : panels_) all.add(panel.fine);
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
@@ -444,6 +455,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
                        kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim_end));
   }
   kept_rim_.swap(sorted_rim_);
+  if (look && add_missed_kinks()) return true;
   if (!about_middle_) {
     if (!rim_joins(0, kept_rim_.size(), true)) return false;
     polygon_ = kept_rim_;
