@@ -223,7 +223,7 @@ Junction root_between(std::span<const FieldView> fields, Label a, Label b, const
     return f;
   };
   Vec3 gradient;
-  double low = 0.0, high = 1.0, t = 0.5;
+  double low = 0.0, high = 1.0, t = 0.5, last_step = 1.0;
   const double f_low = difference(from, gradient);
   Junction result{.point = from, .residual = std::abs(f_low), .exact = false};
   for (int i = 0; i < 200 && result.residual > 0.0 && high - low > std::numeric_limits<double>::epsilon(); ++i) {
@@ -233,10 +233,11 @@ Junction root_between(std::span<const FieldView> fields, Label a, Label b, const
     result.residual = std::abs(f);
     if (std::abs(f) <= root_tolerance(scale, p, gradient)) break;
     ((f > 0.0) == (f_low > 0.0) ? low : high) = t;
-    const double next = t - f / gradient.dot(to - from);
-    // Newton where it stays well inside the bracket, else halve it.
-    const double width = high - low;
-    t = next > low + 0.01 * width && next < high - 0.01 * width ? next : 0.5 * (low + high);
+    // Newton inside the bracket while its steps halve, else halve it.
+    double next = t - f / gradient.dot(to - from);
+    if (!(next > low && next < high) || std::abs(next - t) > 0.5 * last_step) next = 0.5 * (low + high);
+    last_step = std::abs(next - t);
+    t = next;
   }
   return result;
 }

@@ -9,6 +9,7 @@
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
+#include "polygonise_junctions.h"
 #include "support/mesh_distance.h"
 #include "supple/core/error.h"
 #include "supple/implicit/polygonise.h"
@@ -505,6 +506,41 @@ TEST(PolygonisePartition, OfBodiesApartIsTheirOwnMeshes) {
 
 TEST(PolygonisePartition, OfNothingIsEmpty) {
   EXPECT_TRUE(polygonise_partition({}, lattice_of(0.1), Executor(1)).empty());
+}
+
+// Newton's method doubles the digits that are right: from the middle of a segment six steps reach round-off where values bend little.
+TEST(RootBetween, TakesFewValuesFromWhicheverSideItComes) {
+  std::size_t values = 0;
+  const auto counted = [&values](FunctionField field) {
+    field.function = [&values, inner = field.function](const Vec3& p, Vec3& gradient) {
+      ++values;
+      return inner(p, gradient);
+    };
+    return field;
+  };
+  // F = 1/r^2 - |x - c|^2 / r^4 bends along the way, up or down by whose it is.
+  const auto bent = [](const Vec3& centre, double radius) {
+    FunctionField field = sphere(centre, radius);
+    field.function = [=](const Vec3& p, Vec3& gradient) {
+      const Vec3 d = p - centre;
+      gradient = -2.0 / std::pow(radius, 4) * d;
+      return 1.0 / (radius * radius) - d.squaredNorm() / std::pow(radius, 4);
+    };
+    return field;
+  };
+  const std::array bodies{counted(bent(Vec3(-0.4, 0, 0), 0.5)), counted(bent(Vec3(0.45, 0.1, 0), 0.6))};
+  const std::array<FieldView, 2> fields{bodies[0], bodies[1]};
+  std::size_t roots = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Vec3 aside = 0.1 * Vec3(0, std::sin(1.7 * k), std::cos(2.3 * k));
+    const Vec3 a = Vec3(-0.2, 0, 0) + aside, b = Vec3(0.2 + 0.001 * k, 0.05, 0.02) - aside;
+    const lattice::Junction root = lattice::root_between(fields, 1, 2, a, b, 10.0);
+    const lattice::Junction own = lattice::root_between(fields, 1, 0, a, Vec3(0.3, 0.2, 0) + aside, 10.0);
+    EXPECT_LT(root.residual, 1e-11);
+    EXPECT_LT(own.residual, 1e-11);
+    roots += 2;
+  }
+  EXPECT_LT(values, 14 * roots);  // of two fields for one, of one for the other: seven steps and the start
 }
 
 }  // namespace
