@@ -343,21 +343,23 @@ bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, st
   return true;
 }
 
+PolarRuleSolver::Sheet PolarRuleSolver::sheet_of(const implicit::Kink& kink) const {
+  using Form = implicit::Kink::Form;
+  Sheet sheet;
+  sheet.flat = kink.form == Form::Plane;
+  const bool round = kink.form == Form::Offset && kink.half.isZero(0.0);
+  sheet.told = sheet.flat || round;
+  if (sheet.told) sheet.value = kink.value(frame_.origin, sheet.slope);
+  if (round) sheet.bend = 0.5 / kink.level * (kink.to_local.transpose() * kink.to_local);
+  return sheet;
+}
+
 /// Where the rays cross kinks: first on the heights as the curvature at the peak and the rim give them, then on Sigma.
 void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
   crossings_.clear();
   sheets_.clear();
-  for (const std::size_t k : crossing_) {
-    Sheet sheet;
-    const implicit::Kink* kink = k < kinks_.size() ? &kinks_[k] : nullptr;
-    sheet.flat = kink != nullptr && kink->form == implicit::Kink::Form::Plane;
-    const bool round = kink != nullptr && kink->form == implicit::Kink::Form::Offset && kink->half.isZero(0.0);
-    sheet.told = sheet.flat || round;
-    if (sheet.told) sheet.value = kink->value(frame_.origin, sheet.slope);
-    if (round) sheet.bend = 0.5 / kink->level * (kink->to_local.transpose() * kink->to_local);
-    sheets_.push_back(sheet);
-  }
+  for (const std::size_t k : crossing_) sheets_.push_back(k < kinks_.size() ? sheet_of(kinks_[k]) : Sheet{});
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
     std::array<double, kSamples + 1> height;

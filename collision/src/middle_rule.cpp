@@ -66,9 +66,8 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
   pressure.evaluate(batch);
   sheets_.clear();
   for (const implicit::Kink& kink : kinks_) {
-    Sheet sheet;
-    sheet.value = kink.value(origin, sheet.slope);
-    if (kink.form == implicit::Kink::Form::Plane) sheets_.push_back(sheet);
+    const Sheet sheet = sheet_of(kink);
+    if (sheet.told) sheets_.push_back(sheet);
   }
   const double first = frame_.thickness;
   double middle = 0.0;  // pressure there
@@ -93,9 +92,15 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
   }
   const auto look_ahead = [&](Walk& walk) {
     double kink = kInfinity;
-    for (const Sheet& sheet : sheets_) {
-      const double r = -sheet.value / sheet.slope.dot(walk.along);
+    const auto meet = [&](double r) {
       if (r > walk.passed * (1.0 + kSameCorner) && r > kFirst && r * walk.along.norm() < 0.5 * extent_) kink = std::min(kink, r);
+    };
+    for (const Sheet& sheet : sheets_) {
+      // The roots of value + along r + square r^2, not numbers where there are none.
+      const double along = sheet.slope.dot(walk.along), square = walk.along.dot(sheet.bend * walk.along);
+      const double half = -0.5 * (along + std::copysign(std::sqrt(along * along - 4.0 * square * sheet.value), along));
+      meet(sheet.value / half);
+      if (square > 0.0) meet(half / square);
     }
     const double falls = -walk.slope, square = falls * falls - 2.0 * walk.bend * walk.pressure;
     double step = falls > 0.0 ? walk.pressure / falls : kInfinity;

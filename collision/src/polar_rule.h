@@ -116,12 +116,12 @@ class PolarRuleSolver {
     /// angle from where it touches it: as a polynomial, when the angle grows as a square.
     [[nodiscard]] std::array<double, 2> bend(double x) const;
   };
-  /// A kink as seen from the origin: of planes and spheres s = value + slope . d + d . bend d, which others are asked for.
+  /// A kink as seen from the origin: of planes, spheres and cylinders s = value + slope . d + d . bend d, which others are asked for.
   struct Sheet {
     double value = 0.0;
     Vec3 slope = Vec3::Zero();
     Mat3 bend = Mat3::Zero();
-    bool flat = true, told = true;
+    bool flat = false, told = false;
   };
   struct Crossing {
     std::size_t ray, kink;
@@ -129,6 +129,7 @@ class PolarRuleSolver {
     double left, right;     // it lies between these
     bool good;
   };
+  [[nodiscard]] Sheet sheet_of(const implicit::Kink& kink) const;
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);

@@ -61,13 +61,14 @@ double difference(const ContactSurface::Summary& s, const Vec3& force, double ar
                    (s.centre_of_pressure - centre).norm() / std::sqrt(area)});
 }
 
-TEST(FacesOnFaces, OfABoxOnACompliantPlaneAreTheClosedForm) {
-  const double a = kCore.x(), b = kCore.y(), r = kEdge, e = 0.5, k = 80.0;
+/// A box or a disc flat on a plane. @param core  half-widths, or the disc's radius   @param face, border  area and length of the core's outline
+void expect_closed_form(implicit::ShapeKind shape, const Vec3& core, double face, double border, std::uint32_t kinks) {
+  const double r = kEdge, e = 0.5, k = 80.0;
   for (const double depth : {0.01, 0.1, 0.3}) {
-    // Isobars are rectangles with round corners: at p the core is d = r (1 - p / e) away, z = h + p / k of it along the normal, and
-    // the corners have the radius (d^2 - z^2)^(1/2). Simpson's rule in t, p = p_max cos^2 t, in which that radius is smooth.
+    // Isobars are the core's outline moved outwards by w, with area face + border w + pi w^2 (Steiner): at p the core is d = r (1 - p / e)
+    // away, z = h + p / k of it along the normal, and w = (d^2 - z^2)^(1/2). Simpson's rule in t, p = p_max cos^2 t, in which w is smooth.
     const double h = r * (1.0 - depth), p_max = (r - h) / (r / e + 1.0 / k);
-    double force = 4.0 * a * b * p_max, area = 4.0 * a * b, load = p_max * area, first = load * (h + p_max / k);
+    double force = face * p_max, area = face, load = p_max * area, first = load * (h + p_max / k);
     constexpr int kNodes = 2000;
     for (int i = 0; i <= kNodes; ++i) {
       const double t = 0.5 * std::numbers::pi * i / kNodes;
@@ -76,24 +77,56 @@ TEST(FacesOnFaces, OfABoxOnACompliantPlaneAreTheClosedForm) {
       const double p = p_max * c * c, dp = 2.0 * p_max * s * c, z = h + p / k, d = r * (1.0 - p / e);
       const double root = std::sqrt((d + z) * (r - h)), width = s * root;
       const double widens = (d * r / e + z / k) * 2.0 * p_max * c / root;
-      force += (4.0 * (a + b) * width + std::numbers::pi * width * width) * dp * weight;
-      const double ring = (4.0 * (a + b) + 2.0 * std::numbers::pi * width) * std::hypot(widens, dp / k) * weight;
+      force += (border * width + std::numbers::pi * width * width) * dp * weight;
+      const double ring = (border + 2.0 * std::numbers::pi * width) * std::hypot(widens, dp / k) * weight;
       area += ring;
       load += p * ring;
       first += p * z * ring;
     }
     const Pose pose{Vec3(0.3, -0.2, 0.4), Quat(0.5, 0.1, 0.7, -0.3).normalized()};
-    const RoundBox box(kCore, r, pose);
-    const Vec3 up = pose.orientation * Vec3::UnitZ(), face = pose.position - kCore.z() * up;
-    const implicit::HalfSpace plane{face - h * up, up, 1.0};
+    const RoundBox body(core, r, pose, shape);
+    const Vec3 up = pose.orientation * Vec3::UnitZ(), middle = pose.position - core.z() * up;
+    const implicit::HalfSpace plane{middle - h * up, up, 1.0};
     for (const double asked : {1e-2, 1e-3, 1e-6, 1e-8}) {
-      const ContactSurface::Summary s = solve(box.field, pose.position, plane, Vec3::Zero(), k, asked);
-      ASSERT_EQ(s.rule, ContactRule::Polar);
-      EXPECT_EQ(s.kinks, 4u);
+      const ContactSurface::Summary s = solve(body.field, pose.position, plane, Vec3::Zero(), k, asked);
+      ASSERT_EQ(s.rule, ContactRule::Polar) << depth << " " << asked;
+      EXPECT_EQ(s.kinks, kinks);
       EXPECT_LE(s.error_estimate, asked);
-      EXPECT_LE(difference(s, force * up, area, face - first / load * up), s.error_estimate) << depth << " " << asked;
+      EXPECT_LE(difference(s, force * up, area, middle - first / load * up), s.error_estimate) << depth << " " << asked;
       EXPECT_NEAR(s.largest_pressure, p_max, 1e-9 * p_max);
       EXPECT_NEAR(s.largest_overlap, r - h, 1e-6 * r);
+    }
+  }
+}
+
+TEST(FacesOnFaces, OfABoxOnACompliantPlaneAreTheClosedForm) {
+  const double a = kCore.x(), b = kCore.y();
+  expect_closed_form(implicit::ShapeKind::Box, kCore, 4.0 * a * b, 4.0 * (a + b), 4);
+}
+
+TEST(FacesOnFaces, OfADiscOnACompliantPlaneAreTheClosedForm) {
+  const double a = kCore.x();
+  expect_closed_form(implicit::ShapeKind::Disc, Vec3(a, 0, 0), std::numbers::pi * a * a, 2.0 * std::numbers::pi * a, 1);
+}
+
+TEST(FacesOnFaces, OfDiscsKeepTheirBoundsWhereTheyReachOverTheEdgeOfABox) {
+  // Against the rule at 1e-8 with the bodies in the other order.
+  for (int i = 0; i < 60; ++i) {
+    const auto part = [i](double step) { return std::fmod(0.37 + step * i, 1.0); };
+    const double lean = i % 4 == 0 ? 0.0 : std::pow(10.0, -6.0 + 4.5 * part(0.618));
+    const RoundBox below(kCore, kEdge, {Vec3(0.1, 0.2, -0.3), Quat(0.5, 0.1, 0.7, -0.3).normalized()});
+    const Vec3 at(2.0 * kCore.x() * (part(0.732) - 0.5), 2.0 * kCore.y() * (part(0.236) - 0.5),
+                  kCore.z() + (2.0 - 0.02 - 0.2 * part(0.414)) * kEdge);
+    const Quat turn = turned(lean, Vec3(part(0.1) - 0.5, part(0.3) - 0.5, 0.0));
+    const RoundBox disc(Vec3(0.08, 0, 0), kEdge, {below.pose.to_world(at), below.pose.orientation * turn}, implicit::ShapeKind::Disc);
+    const ContactSurface::Summary exact = solve(disc.field, disc.pose.position, below.field, below.pose.position, 1.0, 1e-8);
+    ASSERT_EQ(exact.rule, ContactRule::Polar) << i;
+    for (const double asked : {1e-2, 1e-3, 1e-4, 1e-6}) {
+      const ContactSurface::Summary s = solve(below.field, below.pose.position, disc.field, disc.pose.position, 1.0, asked);
+      ASSERT_EQ(s.rule, ContactRule::Polar) << i << " " << asked;
+      EXPECT_LE(s.error_estimate, asked) << i;
+      EXPECT_LE(difference(s, -exact.force, exact.area, exact.centre_of_pressure), s.error_estimate + exact.error_estimate)
+          << i << " lean " << lean << " " << asked;
     }
   }
 }
