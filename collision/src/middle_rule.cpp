@@ -22,6 +22,7 @@ constexpr std::size_t kFewRays = 8, kManyRays = 16;
 constexpr double kRough = 0.05, kFine = 1e-2;  // of the radius, to find the middle and the corners
 constexpr int kHiddenRounds = 3;
 constexpr int kSteps = 8;
+constexpr double kClear = 0.1;             // of the radius, from kinks to the middle
 constexpr double kWidest = 1.7;            // sector [rad] in units of u and v
 constexpr double kSameCorner = 1e-6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -170,6 +171,22 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
   return true;
 }
 
+/// The frame's origin goes along the axis to Sigma, in `rim_batch_`, too. @return whether both press there
+bool PolarRuleSolver::lift_to_sigma(PairPressure& pressure) {
+  PressureBatch& batch = rim_batch_;
+  batch.resize(1);
+  for (int step = 0; step < kSteps; ++step) {
+    batch.point[0] = frame_.origin;
+    pressure.evaluate(batch);
+    const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame_.axis);
+    if (!(rate > 0.0)) return false;
+    const double lift = (batch.a[0] - batch.b[0]) / rate;
+    frame_.origin += lift * frame_.axis;
+    if (std::abs(lift) <= 1e-9 * frame_.thickness) break;
+  }
+  return std::min(batch.a[0], batch.b[0]) > 0.0;
+}
+
 /// The frame goes to the centroid of the outline, with axes in which the outline is as wide as it is long.
 bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
   const double lu = frame_.u.norm(), lv = frame_.v.norm();
@@ -192,24 +209,32 @@ bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
   if (!(axes.second > 0.0)) return false;
   const Vec3 along = frame_.u / lu, across = frame_.v / lv;
   frame_.origin += centre.x() * along + centre.y() * across;
-  PressureBatch& batch = rim_batch_;
-  batch.resize(1);
-  for (int step = 0; step < kSteps; ++step) {
-    batch.point[0] = frame_.origin;
-    pressure.evaluate(batch);
-    const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame_.axis);
-    if (!(rate > 0.0)) return false;
-    const double lift = (batch.a[0] - batch.b[0]) / rate;
-    frame_.origin += lift * frame_.axis;
-    if (std::abs(lift) <= 1e-9 * frame_.thickness) break;
-  }
-  if (!(std::min(batch.a[0], batch.b[0]) > 0.0)) return false;
+  if (!lift_to_sigma(pressure)) return false;
   // An ellipse has a quarter of the squares of its half axes as its second moments.
   const Vec3 u = axes.cosine * along + axes.sine * across;
-  frame_.axis = (batch.slope_b[0] - batch.slope_a[0]).normalized();
+  frame_.axis = (rim_batch_.slope_b[0] - rim_batch_.slope_a[0]).normalized();
   frame_.u = 2.0 * std::sqrt(axes.first) * (u - u.dot(frame_.axis) * frame_.axis).normalized();
   frame_.v = 2.0 * std::sqrt(axes.second) * frame_.axis.cross(frame_.u).normalized();
   return true;
+}
+
+/// Where a kink passes close to the middle, its crossings of rays nearly along it go from there to the rim within so small an angle that rules
+/// agree without having seen it: the middle keeps away.
+bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
+  double least = kClear;
+  Vec2 away = Vec2::Zero();
+  for (const implicit::Kink& kink : kinks_) {
+    Vec3 slope;
+    const double value = kink.value(frame_.origin, slope);
+    const Vec2 rise(slope.dot(frame_.u), slope.dot(frame_.v));
+    const double distance = std::abs(value) / rise.norm();
+    if (!(distance < least)) continue;
+    least = distance;
+    away = std::copysign(kClear - distance, value) / rise.norm() * rise;
+  }
+  if (least == kClear) return true;
+  frame_.origin += direction(away.x(), away.y());
+  return lift_to_sigma(pressure);
 }
 
 /// A side of the outline may hide between two rays: then a kink passes beyond both, but not beyond where their tangents meet.
@@ -406,6 +431,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     outline_.clear();
     if (!follow_outline(pressure, round < 2 ? few : many, round < 2 ? kRough : kFine, outline_)) return false;
     if (round < 2 && !move_to_middle(pressure)) return false;
+    if (round == 1 && !move_off_kinks(pressure)) return false;
   }
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   add_rays_at_hidden_sides(pressure);

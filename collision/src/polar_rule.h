@@ -187,7 +187,9 @@ class PolarRuleSolver {
                           const Regions& regions, const Box& faces, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Box& faces);
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
+  bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
+  bool move_off_kinks(PairPressure& pressure);
   void add_rays_at_hidden_sides(PairPressure& pressure);
   void follow_tangents();
   void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
