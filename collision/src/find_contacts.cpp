@@ -77,6 +77,12 @@ std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRu
 
 namespace {
 
+/// Whether samples tell where the surface of a body is near others.
+bool is_sampled(const ContactBody& body) {
+  return body.samples != nullptr && !body.samples->point.empty() &&
+         (body.samples->visited == 0 || body.samples->failures < body.samples->visited);
+}
+
 /// Mean distance of the samples of a body [m]; 0 without samples.
 double sample_spacing(const ContactBody& body) {
   if (body.samples == nullptr) return 0.0;
@@ -313,7 +319,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
         collect(a, b, near, job.spacing[job.pairs[k].a], scratch, slot.seed);
         collect(b, a, near, job.spacing[job.pairs[k].b], scratch, slot.seed);
       }
-      slot.kept = !slot.seed.empty() || (!slot.convex && !(slot.spacing > 0.0));
+      slot.kept = !slot.seed.empty() || (!slot.convex && !is_sampled(a) && !is_sampled(b));
       size.pairs += slot.kept ? 1 : 0;
       size.seeds += slot.seed.size();
     }

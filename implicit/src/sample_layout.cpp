@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "shapes.h"
+#include "ray_box.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 #include "supple/implicit/surface_samples.h"
@@ -175,18 +176,7 @@ class LayoutBuilder {
   /// Whether the stretch [0, reach] of a ray in the part's frame meets the box.
   [[nodiscard]] bool meets_near(const Vec3& foot, const Vec3& direction, double reach) const {
     const Pose& pose = parts_[primitive_->part];
-    const Vec3 from = pose.to_world(foot), along = pose.orientation * direction;
-    double low = 0.0, high = reach;
-    for (int k = 0; k < 3; ++k) {
-      const double first = (near_->lower[k] - from[k]) / along[k], second = (near_->upper[k] - from[k]) / along[k];
-      if (along[k] == 0.0) {
-        if (from[k] < near_->lower[k] || from[k] > near_->upper[k]) return false;
-        continue;
-      }
-      low = std::max(low, std::min(first, second));
-      high = std::min(high, std::max(first, second));
-    }
-    return low <= high;
+    return ray_meets(*near_, pose.to_world(foot), pose.orientation * direction, reach);
   }
 
   /// A seed of the unstretched shape.

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
+#include "ray_box.h"
 #include "supple/core/error.h"
 
 namespace supple::implicit {
@@ -76,8 +78,13 @@ struct Task {
   std::span<const Pose> parts;
   const FieldView& field;
   std::span<const std::uint8_t> active;
+  std::span<const Box> near;
   SampleState& state;
   SurfaceSamples& out;
+
+  [[nodiscard]] bool is_near(const Vec3& from, const Vec3& along, double reach) const {
+    return near.empty() || std::any_of(near.begin(), near.end(), [&](const Box& box) { return ray_meets(box, from, along, reach); });
+  }
 };
 
 class BlockProjector {
@@ -93,10 +100,12 @@ class BlockProjector {
       task_.out.valid[s] = 0;
       if (!task_.active.empty() && task_.active[task_.layout.part[s]] == 0) continue;
       const Pose& pose = task_.parts[task_.layout.part[s]];
+      const Vec3 origin = pose.to_world(task_.layout.foot[s]), direction = pose.orientation * task_.layout.direction[s];
+      if (!task_.is_near(origin, direction, task_.layout.reach[s])) continue;
       Seed& seed = scratch_.seeds[count_++];
       seed.id = s;
-      seed.origin = pose.to_world(task_.layout.foot[s]);
-      seed.direction = pose.orientation * task_.layout.direction[s];
+      seed.origin = origin;
+      seed.direction = direction;
       seed.exit_count = 0;
       seed.next_exit = 0;
       seed.first_t = -1.0;
@@ -117,6 +126,11 @@ class BlockProjector {
       check_territories();
     }
     for (std::size_t i = 0; i < count_; ++i) finish(scratch_.seeds[i]);
+  }
+  [[nodiscard]] std::size_t visited() const { return count_; }
+  [[nodiscard]] std::size_t failures() const {
+    return static_cast<std::size_t>(std::count_if(scratch_.seeds.begin(), scratch_.seeds.begin() + static_cast<std::ptrdiff_t>(count_),
+                                                  [&](const Seed& seed) { return task_.state.distance[seed.id] < 0.0; }));
   }
 
  private:
@@ -206,10 +220,10 @@ class BlockProjector {
           next = 0.5 * (exit.low + exit.high);
         }
         seed.last_step = std::abs(next - seed.t);
+        // A step this small is round-off: not taken, so that a root that is kept is found again bit by bit.
+        if (!(seed.last_step > 4.0 * kEps * task_.layout.reach[seed.id])) continue;
         seed.t = next;
-        // A step this small moves the point by round-off; the gradient of the last point is that of the root.
-        const bool moves = seed.last_step > 4.0 * kEps * task_.layout.reach[seed.id];
-        if (moves) scratch_.searching[left++] = scratch_.searching[k];
+        scratch_.searching[left++] = scratch_.searching[k];
       }
       scratch_.searching.resize(left);
     }
@@ -293,8 +307,8 @@ void SampleState::load(StateReader& in) { in.read(distance); }
 void SampleState::hash(Hasher& hasher) const { hasher.add(std::span<const double>(distance)); }
 
 void sample_surface(const Skeleton& skeleton, const SampleLayout& layout, std::span<const Pose> parts,
-                    const FieldView& field, std::span<const std::uint8_t> active, const Executor& executor,
-                    SampleState& state, SurfaceSamples& out) {
+                    const FieldView& field, std::span<const std::uint8_t> active, std::span<const Box> near,
+                    const Executor& executor, SampleState& state, SurfaceSamples& out) {
   SUPPLE_EXPECTS(parts.size() == skeleton.part_count);
   SUPPLE_EXPECTS(active.empty() || active.size() == parts.size());
   const std::size_t n = layout.size();
@@ -303,18 +317,20 @@ void sample_surface(const Skeleton& skeleton, const SampleLayout& layout, std::s
   out.normal.resize(n);
   out.area.resize(n);
   out.valid.resize(n);
-  const Task task{skeleton, layout, parts, field, active, state, out};
-  executor.for_blocks(n, kBlock, [&task](std::size_t begin, std::size_t end) {
+  const Task task{skeleton, layout, parts, field, active, near, state, out};
+  struct Job {
+    const Task& task;
+    std::atomic<std::uint64_t> visited{0}, failures{0};
+  } job{task};
+  executor.for_blocks(n, kBlock, [&job](std::size_t begin, std::size_t end) {
     thread_local Scratch scratch;
-    BlockProjector(task, scratch).project(begin, end);
+    BlockProjector block(job.task, scratch);
+    block.project(begin, end);
+    job.visited += block.visited();
+    job.failures += block.failures();
   });
-  out.visited = 0;
-  out.failures = 0;
-  for (std::size_t s = 0; s < n; ++s) {
-    if (!active.empty() && active[layout.part[s]] == 0) continue;
-    ++out.visited;
-    out.failures += state.distance[s] < 0.0;
-  }
+  out.visited = job.visited;
+  out.failures = job.failures;
 }
 
 }  // namespace supple::implicit

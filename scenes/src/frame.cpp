@@ -208,37 +208,51 @@ void find_reaching(const StageContext& context, Frame& frame) {
   });
 }
 
-/// Flags the bodies whose supports reach another body, and the parts that do: the only ones that are sampled, unless
-/// both bodies are convex, which need no samples to find each other. A rule on State alone, so it decides which kept
-/// distances move on.
-void flag_active_parts(const StageContext& context, Frame& frame) {
+/// Flags the bodies whose supports reach another body.
+void flag_reached(const StageContext& context, Frame& frame) {
   const std::size_t moving = context.bodies.size();
-  for (const std::uint32_t i : frame.reached) {
-    frame.near[i] = 0;
-    frame.active[i].clear();
-  }
+  for (const std::uint32_t i : frame.reached) frame.near[i] = 0;
   frame.reached.clear();
   find_reaching(context, frame);
-  const auto flag = [&](std::size_t i, const Box& other, bool sampled) {
-    if (i >= moving || (frame.near[i] != 0 && !sampled)) return;
-    if (frame.active[i].empty()) frame.active[i].assign(context.bodies[i].particle.size(), 0);
-    for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
-      if (!frame.placed[i].support[k].overlaps(other)) continue;
-      if (frame.near[i] == 0) frame.reached.push_back(static_cast<std::uint32_t>(i));
-      frame.near[i] = 1;
-      if (sampled) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
-    }
+  const auto flag = [&](std::size_t i, const Box& other) {
+    if (i >= moving || frame.near[i] != 0) return;
+    const std::vector<Box>& support = frame.placed[i].support;
+    if (std::none_of(support.begin(), support.end(), [&](const Box& box) { return box.overlaps(other); })) return;
+    frame.reached.push_back(static_cast<std::uint32_t>(i));
+    frame.near[i] = 1;
   };
   for (const collision::BodyPair& pair : frame.reaching) {
-    const bool sampled = frame.convex[pair.a] == 0 || frame.convex[pair.b] == 0;
-    flag(pair.a, frame.reach[pair.b], sampled);
-    flag(pair.b, frame.reach[pair.a], sampled);
+    flag(pair.a, frame.reach[pair.b]);
+    flag(pair.b, frame.reach[pair.a]);
   }
   std::sort(frame.reached.begin(), frame.reached.end());
 }
 
-bool any_active(const std::vector<std::uint8_t>& flags) {
-  return std::find(flags.begin(), flags.end(), 1) != flags.end();
+/// Where the surfaces of a pair may meet, and the parts that reach there: the only ones that are sampled, unless both bodies are
+/// convex, which need no samples to find each other. A rule on State alone, so it decides which kept distances move on.
+void flag_sampled(const StageContext& context, Frame& frame) {
+  for (const std::uint32_t i : frame.reached) {
+    frame.active[i].clear();
+    frame.shared[i].clear();
+  }
+  const auto spacing_of = [&](std::size_t i) {
+    return i < context.bodies.size() ? context.model.objects[context.bodies[i].object].sample_spacing : 0.0;
+  };
+  for (const collision::BodyPair& pair : frame.pairs) {
+    const auto reaches = [&](std::size_t i) { return i >= context.bodies.size() || frame.near[i] != 0; };
+    if ((frame.convex[pair.a] != 0 && frame.convex[pair.b] != 0) || !reaches(pair.a) || !reaches(pair.b)) continue;
+    // Samples look as far as they lie apart, which blends and slopes widen.
+    const double margin = 2.0 * std::max(spacing_of(pair.a), spacing_of(pair.b));
+    const Box shared = frame.surface_box[pair.a].intersection(frame.surface_box[pair.b]).inflated(margin);
+    for (const std::uint32_t i : {pair.a, pair.b}) {
+      if (i >= context.bodies.size()) continue;
+      frame.shared[i].push_back(shared);
+      frame.active[i].resize(context.bodies[i].particle.size());
+      for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
+        if (frame.placed[i].support[k].overlaps(shared)) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -256,6 +270,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
       convex(reach.size(), 0),
       near(all.size(), 0),
       active(all.size()),
+      shared(all.size()),
       samples(all.size()),
       led(model.fixed.size()),
       bodies(reach.size()),
@@ -328,7 +343,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     for_awake_at_once(context, [&](std::size_t i) { place(context, particles, i, frame); });
     for_awake(context, [&](std::size_t i) { profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size(); });
     profile(Stage::PlaceSkeleton).present += frame.primitives_present;
-    flag_active_parts(context, frame);
+    flag_reached(context, frame);
   }
   // Bodies whose supports reach no other body cannot touch: their fields are not even indexed.
   const bool near = !frame.reached.empty();
@@ -355,20 +370,6 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   if (context.skip && !near) return nothing_touches();
   {
     StageTimer timer(profile(Stage::SampleSurface), context.every_call);
-    profile(Stage::SampleSurface).present += frame.samples_present;
-    for (const std::uint32_t i : frame.reached) {
-      if (!any_active(frame.active[i])) {
-        frame.samples[i] = {};
-        continue;
-      }
-      const Body& body = bodies[i];
-      implicit::sample_surface(body.skeleton, body.samples, frame.pose[i], frame.field[i], frame.active[i],
-                               context.executor, samples[i], frame.samples[i]);
-      profile(Stage::SampleSurface).visited += frame.samples[i].visited;
-    }
-  }
-  {
-    StageTimer timer(profile(Stage::FindContacts), context.every_call);
     const auto usable = [&](std::uint32_t i) {
       return i >= bodies.size() || frame.near[i] != 0 || (!context.skip && collides(context, bodies[i]));
     };
@@ -377,6 +378,21 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
       if (!usable(pair.a) || !usable(pair.b)) continue;
       if (frame.surface_box[pair.a].overlaps(frame.surface_box[pair.b])) frame.pairs.push_back(pair);
     }
+    flag_sampled(context, frame);
+    profile(Stage::SampleSurface).present += frame.samples_present;
+    for (const std::uint32_t i : frame.reached) {
+      if (frame.shared[i].empty()) {
+        frame.samples[i] = {};
+        continue;
+      }
+      const Body& body = bodies[i];
+      implicit::sample_surface(body.skeleton, body.samples, frame.pose[i], frame.field[i], frame.active[i],
+                               frame.shared[i], context.executor, samples[i], frame.samples[i]);
+      profile(Stage::SampleSurface).visited += frame.samples[i].visited;
+    }
+  }
+  {
+    StageTimer timer(profile(Stage::FindContacts), context.every_call);
     if (!frame.pairs_present) frame.pairs_present = count_present_pairs(context);
     profile(Stage::FindContacts).present += *frame.pairs_present;
     profile(Stage::FindContacts).visited += frame.pairs.size();

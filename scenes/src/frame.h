@@ -64,6 +64,7 @@ struct Frame {
   collision::OverlapList reach_list;          ///< what finds them
   // sample_surface, by body
   std::vector<std::vector<std::uint8_t>> active;
+  std::vector<std::vector<Box>> shared;               ///< with others: where its rays look
   std::vector<implicit::SurfaceSamples> samples;
   std::vector<LedSolid> led;                          ///< shape [fixed bodies]
   // find_contacts, solve_contact_surface, react

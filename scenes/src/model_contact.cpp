@@ -360,6 +360,7 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
                  "ask for a larger sample_spacing, or for fewer or thicker parts");
       continue;
     }
+    object.sample_spacing = spacing;
     object.samples = implicit::make_sample_layout(object.skeleton, spacing);
   }
 }

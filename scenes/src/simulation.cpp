@@ -246,8 +246,12 @@ struct Simulation::Impl {
     other.kick = {};
     other.ledger = {};
     other.record = {};
-    other.samples.clear();
-    for (const Body& body : make_bodies(model, parted_links(model, other.links, other.broken_for))) other.samples.push_back(fresh_samples(body));
+    // Distances of samples go on from where they are, if there are as many.
+    const std::vector<Body> parted = make_bodies(model, parted_links(model, other.links, other.broken_for));
+    other.samples.resize(parted.size());
+    for (std::size_t i = 0; i < parted.size(); ++i) {
+      if (other.samples[i].distance.size() != parted[i].samples.size()) other.samples[i] = fresh_samples(parted[i]);
+    }
     other.sleep = {};
     if (scene.sleep) other.sleep.reset(other.samples.size());
     if (!(model.reaction.stick.stiffness > 0.0)) other.sticks = {};

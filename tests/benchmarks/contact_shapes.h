@@ -59,7 +59,7 @@ class Rigid {
       : skeleton_(std::move(skeleton)), modulus_(modulus), layout_(implicit::make_sample_layout(skeleton_, spacing)) {
     put({});
     implicit::SampleState kept;
-    implicit::sample_surface(skeleton_, layout_, {&pose_, 1}, field_, {}, Executor(1), kept, rest_);
+    implicit::sample_surface(skeleton_, layout_, {&pose_, 1}, field_, {}, {}, Executor(1), kept, rest_);
   }
   void put(const Pose& pose) {
     pose_ = pose;

@@ -33,7 +33,7 @@ struct Sampled {
   }
   void again(const Body& body, int threads = 1, std::span<const std::uint8_t> active = {}) {
     const Executor executor(threads);
-    sample_surface(body.skeleton, layout, body.parts, body.field, active, executor, state, samples);
+    sample_surface(body.skeleton, layout, body.parts, body.field, active, {}, executor, state, samples);
   }
   [[nodiscard]] double area() const { return std::accumulate(samples.area.begin(), samples.area.end(), 0.0); }
   [[nodiscard]] std::size_t valid() const {
@@ -285,7 +285,7 @@ TEST_P(SampledBody, AllocateNothingOnceWarm) {
   const auto step = [&] {
     place_skeleton(body_.skeleton, body_.parts, placed);
     index_field(body_.skeleton, placed, field);
-    sample_surface(body_.skeleton, sampled.layout, body_.parts, field, {}, executor, sampled.state, sampled.samples);
+    sample_surface(body_.skeleton, sampled.layout, body_.parts, field, {}, {}, executor, sampled.state, sampled.samples);
     static_cast<void>(field.bound(body_.placed.support[0]));
     static_cast<void>(field.surface_box());
   };
@@ -331,7 +331,7 @@ TEST(SurfaceSamples, SeeANarrowGapBetweenTwoParts) {
   SampleState state;
   SurfaceSamples samples;
   const Executor executor(1);
-  sample_surface(body.skeleton, layout, body.parts, body.field, {}, executor, state, samples);
+  sample_surface(body.skeleton, layout, body.parts, body.field, {}, {}, executor, state, samples);
   EXPECT_EQ(samples.valid[0], 1);
   EXPECT_NEAR(state.distance[0], facing, 1e-14);
 }
@@ -364,6 +364,38 @@ TEST(SurfaceSamples, CountSeedsWithoutARoot) {
   EXPECT_EQ(sampled.samples.failures, sampled.layout.size());
   EXPECT_EQ(sampled.valid(), 0u);
   for (const double t : sampled.state.distance) EXPECT_LT(t, 0.0);
+}
+
+// Near a box the samples are those of the whole body, bit by bit; others keep their distance.
+TEST(SurfaceSamples, NearABoxAreThoseOfAllThatLieThere) {
+  const Body body = body_of({{wyvill_point(1.0), Vec3(-0.4, 0, 0)}, {wyvill_point(0.8), Vec3(0.4, 0.1, 0)}});
+  const SampleLayout layout = make_sample_layout(body.skeleton, 0.05);
+  const Executor executor(2);
+  SampleState all_state, near_state;
+  SurfaceSamples all, some;
+  sample_surface(body.skeleton, layout, body.parts, body.field, {}, {}, executor, all_state, all);
+  EXPECT_EQ(all.visited, layout.size());
+  const std::vector<double> found = all_state.distance;
+  sample_surface(body.skeleton, layout, body.parts, body.field, {}, {}, executor, all_state, all);
+  EXPECT_EQ(all_state.distance, found);  // again, from where they are
+  const std::array boxes{Box{Vec3(0.3, -0.2, 0.1), Vec3(0.9, 0.3, 0.9)}, Box{Vec3(-1, -1, -0.1), Vec3(-0.7, 0, 0)}};
+  sample_surface(body.skeleton, layout, body.parts, body.field, {}, boxes, executor, near_state, some);
+  std::size_t inside = 0, outside = 0;
+  for (std::size_t s = 0; s < layout.size(); ++s) {
+    if (all.valid[s] == 0) continue;
+    if (std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) { return box.contains(all.point[s]); })) {
+      EXPECT_EQ(some.valid[s], 1);
+      EXPECT_EQ(some.point[s], all.point[s]);
+      EXPECT_EQ(some.area[s], all.area[s]);
+      ++inside;
+    } else if (some.valid[s] == 0) {
+      EXPECT_LT(near_state.distance[s], 0.0);  // never looked for
+      ++outside;
+    }
+  }
+  EXPECT_GT(inside, 20u);
+  EXPECT_GT(outside, 2 * inside);
+  EXPECT_LT(some.visited, all.visited / 2);
 }
 
 TEST(SampleState, SurvivesSavingAndLoading) {

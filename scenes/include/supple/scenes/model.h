@@ -28,6 +28,7 @@ struct ObjectModel {
   std::uint32_t last = 0;
   implicit::Skeleton skeleton;            ///< empty: the object has no surface
   implicit::SampleLayout samples;         ///< empty unless it can touch something, itself or that not convex
+  double sample_spacing = 0.0;            ///< of these at most, where bodies are alone [m]
   collision::ContactMaterial material;
   bool collides = false;                  ///< has `contact` and a surface
   bool hinges_join = false;               ///< the laws act between two hinges
