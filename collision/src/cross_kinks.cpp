@@ -49,7 +49,7 @@ void PolarRuleSolver::find_kinks(PairPressure& pressure) {
     box.include(frame_.origin + reach);
   }
   for (const Vec3& x : node_.point) box.include(x);
-  pressure.kinks(box, kinks_);
+  all_kinks_ = pressure.kinks(box, kinks_);
   double square = 0.0;
   for (const Vec3& x : rim_batch_.point) square = std::max(square, (x - frame_.origin).squaredNorm());
   constexpr double kMargin = 1.2;  // what finer rules may find the rim to reach beyond
@@ -489,6 +489,7 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
     if (!x.good) panels_[first + x.ray / per_panel].lost = true;
   }
   std::erase_if(crossings_, [](const Crossing& x) { return !x.good || x.radius >= 1.0; });
+  if (mild_) return;
   const auto same = [](const Crossing& x, const Crossing& y) { return x.kink == y.kink; };
   std::size_t next = 0;
   for (std::size_t p = first; p < panels_.size(); ++p) {

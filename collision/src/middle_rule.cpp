@@ -298,7 +298,8 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
 }
 
 /// Sectors between corners of the outline, and between others of its points where these are too far apart.
-void PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
+/// @param widest  as seen from the middle [rad]   @param most_bend  of the outline within one [rad]   @return whether rays through them turn one way
+bool PolarRuleSolver::make_sectors(std::span<const RimPoint> corners, double widest, double most_bend) {
   // A polygon of all points known; of those that lie on one ray, corners are kept.
   struct Mark {
     RimPoint point;
@@ -363,11 +364,15 @@ void PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
   while (from < n) {
     // As far as the next corner, or as wide as a sector may be.
     std::size_t to = from + 1;
-    double turn = 0.0;
+    double turn = 0.0, bend = 0.0;
     for (;; ++to) {
       const Vec2 &a = marks[(begin + to - 1) % n].point.at, &b = marks[(begin + to) % n].point.at;
       turn += math::atan2(cross(a, b), a.dot(b));
-      if (to > from + 1 && turn > kWidest) {
+      if (to > from + 1) {
+        const Vec2 before = a - marks[(begin + to - 2) % n].point.at, edge = b - a;
+        bend += std::abs(math::atan2(cross(before, edge), before.dot(edge)));
+      }
+      if (to > from + 1 && (turn > widest || bend > most_bend)) {
         --to;
         break;
       }
@@ -378,6 +383,23 @@ void PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
     sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height},
                         marks[(begin + from) % n].touch, marks[(begin + to) % n].touch});
     from = to;
+  }
+  return std::all_of(sectors_.begin(), sectors_.end(), [](const Sector& sector) {
+    return cross(sector.at[0], sector.at[1]) > 0.0 && cross(sector.at[1], sector.at[2]) > 0.0;
+  });
+}
+
+/// A panel for each sector. @param nodes  on a ray
+void PolarRuleSolver::start_sectors(int nodes) {
+  panels_.clear();
+  for (std::size_t k = 0; k < sectors_.size(); ++k) {
+    Panel panel;
+    panel.begin = static_cast<double>(k);
+    panel.end = static_cast<double>(k + 1);
+    panel.touch_begin = sectors_[k].touch_begin;
+    panel.touch_end = sectors_[k].touch_end;
+    panel.nodes = nodes;
+    panels_.push_back(panel);
   }
 }
 
@@ -440,26 +462,15 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   if (crossing_.empty()) return false;
   cut_ = !third_.empty();
   follow_tangents();
-  about_middle_ = true;
+  about_middle_ = by_sectors_ = true;
+  mild_ = false;
   const double error = settings.error;
   const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
   for (;;) {
     std::vector<RimPoint> corners;
     find_outline_corners(pressure, corners);
-    make_sectors(corners);
-    for (const Sector& sector : sectors_) {
-      if (!(cross(sector.at[0], sector.at[1]) > 0.0) || !(cross(sector.at[1], sector.at[2]) > 0.0)) return false;
-    }
-    panels_.clear();
-    for (std::size_t k = 0; k < sectors_.size(); ++k) {
-      Panel panel;
-      panel.begin = static_cast<double>(k);
-      panel.end = static_cast<double>(k + 1);
-      panel.touch_begin = sectors_[k].touch_begin;
-      panel.touch_end = sectors_[k].touch_end;
-      panel.nodes = error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8;
-      panels_.push_back(panel);
-    }
+    if (!make_sectors(corners, kWidest, kInfinity)) return false;
+    start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8);
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
     const std::size_t crossing = crossing_.size();
     if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr, fine)) return false;

@@ -161,15 +161,16 @@ void PolarRuleSolver::place_nodes(const PolarRule& rule) {
   for (std::size_t k = 0; k < angles; ++k) {
     const double c = rule.cosine[k], s = rule.sine[k], rim = rim_.radius[k];
     const Vec3 e = c * frame_.u + s * frame_.v;
-    // Through the curvature at the origin and the rim.
-    const double square =
-        0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
-    const double fourth = rim_.height[k] - square;
+    // Through the curvature at the origin and the rim; about a star through the slope there.
+    const double linear = about_star_ ? rim * rise_.dot(e) : 0.0;
+    const double square = about_star_ ? rim_.height[k] - linear
+                                      : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+    const double fourth = rim_.height[k] - linear - square;
     for (std::size_t j = 0; j < radii; ++j) {
       const std::size_t i = k * radii + j;
       const double r = gauss.node[j], r2 = r * r;
       foot_[i] = frame_.origin + (r * rim) * e;
-      height_[i] = r2 * (square + r2 * fourth);
+      height_[i] = r * linear + r2 * (square + r2 * fourth);
       weight_[i] = sector * gauss.weight[j] * rim * rim * r * jacobian_;
     }
   }
@@ -399,6 +400,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   extent_ = extent;
   third_ = third;
   imprints_.clear();
+  uneven_ = false;
   peak_ = frame.origin;
   const PatchPoints::Mark before = points.mark();
   const auto anew = [&] {
@@ -410,6 +412,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, peaked, points)) return true;
   if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
   if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, points)) return true;
+  if (uneven_ && anew() && solve_about_peak(pressure, frame, settings, regions, round, false, false, points)) return true;
   if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, false, points)) return true;
   points.back_to(before);
   return false;
@@ -420,7 +423,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
                                        const Regions& regions, bool round, bool any, bool star, PatchPoints& points) {
   const double error = settings.error;
   cut_ = false;
-  about_middle_ = false;
+  about_middle_ = by_sectors_ = mild_ = false;
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
@@ -471,6 +474,12 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
     }
     if (!parted && parts && kinks_cross(pressure)) {
       parted = true;
+      if (star && error >= kLeastMild && only_mild_kinks()) {
+        const bool fits = solve_mild(pressure, error) && finish(pressure, column_of(error), regions, error, nullptr, points);
+        about_star_ = false;
+        uneven_ = !fits;
+        return fits;
+      }
       if (solve_split(pressure, settings)) {
         parted_ = static_cast<std::uint32_t>(crossing_.size());
         return finish(pressure, column_of(error), regions, error, nullptr, points);

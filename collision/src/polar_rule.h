@@ -1,8 +1,9 @@
 /// @file polar_rule.h
 /// Spectral quadrature on a smooth patch of Sigma: Gauss-Legendre in the radius times the trapezoid rule in the angle
 /// about the point of largest pressure, both exponentially convergent because the integrand is smooth, periodic and
-/// vanishes at the rim. Where kinks of a field cross the patch, radii are parted at them, and angles where kinks meet the rim
-/// and as finely as the error asks. Where faces lie on faces the pressure has no peak that says anything: there the patch is parted
+/// vanishes at the rim. Where mild kinks of a field cross the patch, the same rules about its middle converge with the fourth
+/// power of their points; where others do, radii are parted at them, and angles where kinks meet the rim and as finely as the
+/// error asks. Where faces lie on faces the pressure has no peak that says anything: there the patch is parted
 /// about its middle. Columns along the axis carry the integrals over the squeezed regions.
 #pragma once
 
@@ -22,6 +23,9 @@ namespace supple::collision {
 
 /// The finest rule whose error is judged from the ends of its rays.
 inline constexpr std::size_t kFinestJudged = 3;
+
+/// Errors asked for down to which mild kinks may be left alone; finer ones are reached by parting.
+inline constexpr double kLeastMild = 1e-6;
 
 /// The ground that a polar patch covers.
 struct PolarCover {
@@ -75,6 +79,7 @@ class PolarRuleSolver {
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
+  void start_outline(const PolarRule& rule);
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
@@ -91,6 +96,13 @@ class PolarRuleSolver {
   [[nodiscard]] double bound_by_ends(std::size_t r, bool round) const;
   [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
+
+  // Patches that mild kinks cross: mild_rule.cpp.
+  [[nodiscard]] bool only_mild_kinks() const;
+  bool solve_mild(PairPressure& pressure, double error);
+  bool refine_rings(PairPressure& pressure, double error);
+  bool solve_mild_sectors(PairPressure& pressure, const ContactSettings& settings);
+  [[nodiscard]] double half_the_rays(std::size_t radial) const;
 
   // Patches that kinks cross: split_rule.cpp, cross_kinks.cpp.
   /// Gauss points through a squeezed region.
@@ -156,6 +168,7 @@ class PolarRuleSolver {
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
   static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all) const;
+  [[nodiscard]] double largest_to_leave(double most) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   // About the middle: middle_rule.cpp.
@@ -193,7 +206,8 @@ class PolarRuleSolver {
   void add_rays_at_hidden_sides(PairPressure& pressure);
   void follow_tangents();
   void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
-  void make_sectors(std::span<const RimPoint> corners);
+  [[nodiscard]] bool make_sectors(std::span<const RimPoint> corners, double widest, double most_bend);
+  void start_sectors(int nodes);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
   bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger, bool look);
@@ -245,6 +259,7 @@ class PolarRuleSolver {
   PolarCover cover_;
   std::uint32_t parted_ = 0;
   std::vector<implicit::Kink> kinks_;
+  bool all_kinks_ = false;             // these are all of both fields
   Box smooth_;                         // no kink is in it
   std::vector<implicit::Kink> near_kinks_;
   std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
@@ -257,6 +272,9 @@ class PolarRuleSolver {
   std::vector<double> changes_;          // where within a panel rays begin to meet other kinks, or in another order
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;
+  bool by_sectors_ = false;              // rays go through `sectors_`
+  bool mild_ = false;                    // kinks that cross part no angles
+  bool uneven_ = false;                  // mild kinks cross, but the outline takes more rings than it is worth
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;

@@ -20,7 +20,7 @@ constexpr double kShort = 0.03;          // share of a ray on which two points a
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
-constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
+constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSameTurn = 1e-7;       // [rad]
 constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
@@ -32,6 +32,11 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 int nodes_on(int radial, double share) {
   const int least = share < kShort ? 2 : 3;
   return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), least, kMostRadial);
+}
+
+/// The same between mild kinks, which are many and leave little on a piece.
+int nodes_between_mild(int radial, double share) {
+  return std::clamp(static_cast<int>(std::ceil(radial * (0.2 + 0.8 * share))), 2, kMostRadial);
 }
 
 /// Points that are compared with n: one more, so that what they differ by is what n are off by.
@@ -66,6 +71,8 @@ constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf =
 constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
+/// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
+constexpr double kMildAngle = 0.15, kMildRadius = 2.0;
 constexpr std::size_t kFine = 15;  // rays
 
 }  // namespace
@@ -77,7 +84,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
   for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &fourth_}) {
     column->resize(count);
   }
-  if (about_middle_) {
+  if (by_sectors_) {
     place_rays(rule, first);
   } else {
     for (std::size_t i = 0; i < count; ++i) {
@@ -150,7 +157,9 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
         const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
         if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
         // On faces it is the short last piece on which the pressure falls.
-        const int all = about_middle_ ? panel.nodes : nodes_on(panel.nodes, right - left);
+        const int all = about_middle_ ? panel.nodes
+                        : mild_       ? nodes_between_mild(panel.nodes, right - left)
+                                      : nodes_on(panel.nodes, right - left);
         const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
         for (std::size_t j = 0; j < gauss.node.size(); ++j) {
           const double along = gauss.node[j], r = left + (right - left) * along;
@@ -263,6 +272,11 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   const bool fine = panel.rays >= kFine;
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
+  if (mild_) {
+    panel.by_angle = std::max(kMildAngle * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kMildRadius;
+    return;
+  }
   if (about_middle_ && cut_) {
     const double share = kBesideThirds * (panel.halved ? kHalf : 1.0);
     panel.by_angle *= share;
@@ -300,7 +314,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
   const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;
   const double widest = fine ? kWidest : kWidestCoarse;
-  about_middle_ = false;
+  about_middle_ = by_sectors_ = mild_ = false;
   for (;;) {
     std::vector<Vec3> corners;
     find_corners(pressure, corners);
@@ -362,6 +376,20 @@ bool PolarRuleSolver::add_missed_kinks() {
   return true;
 }
 
+/// What a panel may be off by in angle or radius so that all those which are not off by more are so by `most` together.
+double PolarRuleSolver::largest_to_leave(double most) const {
+  std::vector<double> off;
+  for (const Panel& panel : panels_) off.insert(off.end(), {panel.by_angle, panel.by_radius});
+  std::sort(off.begin(), off.end());
+  double sum = 0.0, largest = 0.0;
+  for (const double x : off) {
+    sum += x;
+    if (sum > most) break;
+    largest = x;
+  }
+  return largest;
+}
+
 /// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew.
 /// @param larger  rule that panels get before they are halved, or null
 /// @param look  whether kinks that cross the rim of all rays are added
@@ -380,6 +408,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
   const bool beside = about_middle_ && cut_;
+  const std::size_t most = beside ? kMostBesideThirds : mild_ ? kMostMild : kMostPanels;
   for (;;) {
     if (!find_rays(pressure, *rule, error, begin)) return false;
     if (begin == 0 && look && add_missed_kinks()) return true;
@@ -396,10 +425,10 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     // Rules agree by chance where panels do not begin at the rim's corners.
     const auto unseen = [&](const Panel& panel) { return panel.leaves && !panel.halved && panel.rays >= kFine && !beside; };
     const bool enough = estimate_ <= kEnough * error;
-    if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= (beside ? kMostBesideThirds : kMostPanels)) break;
+    if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
-    const double share = 0.5 * error / count;
+    const double share = mild_ ? largest_to_leave(0.75 * error) : 0.5 * error / count;
     std::vector<Panel> finer;
     bool by_angle = false;
     std::erase_if(panels_, [&](const Panel& panel) {
@@ -418,7 +447,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       };
       next.touch_begin = panel.touch_begin;
       next.halved = panel.halved || (part && (larger == nullptr || unseen(panel)));
-      if (part && panel.change < panel.change_end && !beside) {
+      if (part && panel.change < panel.change_end && !beside && !mild_) {
         for (std::size_t c = panel.change; c < panel.change_end; ++c) end_at(changes_[c]);
       } else if (part && larger == nullptr) {
         end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end));

@@ -219,7 +219,7 @@ void PolarRuleSolver::cross_star(PairPressure& pressure) {
   const Vec3 grown = 0.5 * kMargin * box.extent(), centre = box.centre();
   box = {centre - grown, centre + grown};
   kinks_.clear();
-  pressure.kinks(box, kinks_);
+  all_kinks_ = pressure.kinks(box, kinks_);
   crossing_.clear();
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
@@ -261,10 +261,11 @@ bool PolarRuleSolver::solve_about_star(PairPressure& pressure, const PeakFrame& 
   about_star_ = follow_rim_curve(pressure) && move_to_star(pressure);
   if (!about_star_) return false;
   cross_star(pressure);
-  const bool fits = solve_split(pressure, settings);
+  const bool mild = settings.error >= kLeastMild && only_mild_kinks() && solve_mild_sectors(pressure, settings);
+  const bool fits = mild || solve_split(pressure, settings);
   about_star_ = false;
   if (!fits) return false;
-  parted_ = static_cast<std::uint32_t>(crossing_.size());
+  parted_ = mild ? 0 : static_cast<std::uint32_t>(crossing_.size());
   polygon_ = outline_;
   return finish(pressure, column_of(settings.error), regions, settings.error, nullptr, points);
 }

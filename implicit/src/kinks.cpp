@@ -47,6 +47,9 @@ std::array<double, 2> levels_of(const Kernel& kernel) noexcept {
   }
 }
 
+/// Derivatives below this order go over a level without a jump: (1 - rho^2)^3 ends with two of them, the others with one.
+int order_of(const Kernel& kernel) noexcept { return kernel.kind == KernelKind::Wyvill ? 3 : 2; }
+
 }  // namespace
 
 bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
@@ -141,6 +144,7 @@ bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
     }
     if (!levels) continue;
     kink.to_local = A;
+    kink.order = order_of(shape.kernel);
     for (const double level : levels_of(shape.kernel)) {
       if (!(level > 0.0) || level >= farthest) continue;
       kink.level = level;

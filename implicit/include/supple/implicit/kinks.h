@@ -24,6 +24,7 @@ struct Kink {
   Mat3 to_local = Mat3::Identity();
   Vec3 half = Vec3::Zero();             ///< [m]
   double level = 0.0;                   ///< [m]; > 0 but for planes
+  int order = 2;                        ///< of the lowest derivative of the field that jumps there, at least
 
   /// s [m], a signed distance to first order where `to_local` does not stretch, and its gradient [1].
   [[nodiscard]] double value(const Vec3& x, Vec3& gradient) const noexcept;
