@@ -165,14 +165,14 @@ PairSolver::Patch PairSolver::add_patch(const PatchJob& job, const Vec3& hill, b
   std::optional<PeakFrame> frame;
   if (axis_ && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *axis_, hill, job.extent);
   const bool on_axis = frame.has_value();
-  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr);
+  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, job.faces != nullptr);
   if (!frame || covered(frame->origin)) return Patch::Known;
   const auto solve = [&] {
     return polar_.solve(job.pressure, *frame, job.settings, regions_, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };
   if (!solve()) {
     if (!frame->flat) return Patch::Unfit;
-    frame = finder_.climb(job.pressure, hill, job.extent);
+    frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, false);
     if (!frame || covered(frame->origin)) return Patch::Known;
     if (!solve()) return Patch::Unfit;
   }
@@ -422,7 +422,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
       march(pressure, bodies, overlap, settings, out);
     } else if (!fits) {
       begin_anew(bodies, overlap, out);
-      const auto touches = [&](const Vec3& hill) { return finder_.climb(pressure, hill, extent).has_value(); };
+      const auto touches = [&](const Vec3& hill) { return finder_.climb(pressure, hill, extent, convex, false).has_value(); };
       if (std::any_of(starts_.hill.begin(), starts_.hill.end(), touches)) out.summary.error_estimate = 1.0;
     }
   }

@@ -104,7 +104,26 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(batch_.point[order_[n]]);
 }
 
-std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& start, double extent, bool stop_on_faces) {
+/// Newton's method along the gradient of p_A - p_B.
+Vec3 PeakFinder::foot_on_sigma(PairPressure& pressure, Vec3 x, double reach) {
+  constexpr int kSteps = 4;
+  batch_.resize(1);
+  for (int step = 0; step < kSteps; ++step) {
+    batch_.point[0] = x;
+    pressure.evaluate(batch_);
+    const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
+    const double square = slope.squaredNorm();
+    if (!(square > 0.0)) break;
+    Vec3 move = ((batch_.b[0] - batch_.a[0]) / square) * slope;
+    const double length = move.norm();
+    if (length > reach) move *= reach / length;
+    x += move;
+  }
+  batch_.resize(5);
+  return x;
+}
+
+std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& start, double extent, bool convex, bool stop_on_faces) {
   const double reach = std::min(0.5 * pressure.feature_size(), extent);  // longest step
   const double h = 1e-4 * reach;
   PeakFrame frame;
@@ -112,6 +131,7 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
   double before = -std::numeric_limits<double>::infinity();  // min(p_A, p_B) and |p_A - p_B| at the last point kept
   double gap_before = 0.0, level_before = 0.0;
   Vec3 kept = start, step = Vec3::Zero();
+  bool lifted = false;
   batch_.resize(5);
   for (int iteration = 0; iteration < kMostSteps; ++iteration) {
     // The tangents come from the normal at the last point; they need not be exact.
@@ -145,10 +165,17 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     // Neither up nor nearer to Sigma; along a bent Sigma every good step leaves it a little, but its foot is higher.
     const bool higher = lower >= before || (level > level_before && gap <= kNearSigma * level);
     if (!higher && gap > 0.5 * gap_before && step.norm() > 1e-12 * reach) {
-      step *= 0.5;
-      x = kept + step;
+      // A long step along a bent Sigma is a good one from where its end has a foot.
+      if (!lifted && !convex) {
+        x = foot_on_sigma(pressure, x, reach);
+      } else {
+        step *= 0.5;
+        x = kept + step;
+      }
+      lifted = !lifted;
       continue;
     }
+    lifted = false;
     kept = x;
     before = lower;
     gap_before = gap;

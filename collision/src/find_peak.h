@@ -53,13 +53,16 @@ class PeakFinder {
   void start_from_scan(PairPressure& pressure, const Box& overlap, StartPoints& out);
   /// Newton's method for the largest p on Sigma (Lagrange function with Hessian by differences of gradients).
   /// @param extent  longest half axis of a patch that is believed [m]
+  /// @param convex  both bodies are: Sigma bends little over their contact
   /// @param stop_on_faces  ends where the pressure is flat along some direction, with a frame that says so
   /// @return nothing where no point with p > 0 was found
-  [[nodiscard]] std::optional<PeakFrame> climb(PairPressure& pressure, const Vec3& start, double extent, bool stop_on_faces = false);
+  [[nodiscard]] std::optional<PeakFrame> climb(PairPressure& pressure, const Vec3& start, double extent, bool convex, bool stop_on_faces);
   /// The same where the peak lies on the common axis. @return nothing also where a pressure rises towards the other body
   [[nodiscard]] std::optional<PeakFrame> find_on_axis(PairPressure& pressure, const CommonAxis& axis, const Vec3& start, double extent);
 
  private:
+  Vec3 foot_on_sigma(PairPressure& pressure, Vec3 x, double reach);
+
   PressureBatch batch_;
   std::vector<std::uint32_t> order_;
   std::vector<double> score_;

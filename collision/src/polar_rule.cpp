@@ -411,7 +411,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   const bool peaked = !frame.flat && (faces == nullptr || settings.error < kSplitBelow);
   if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, peaked, points)) return true;
   if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
-  if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, points)) return true;
+  if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, follow, points)) return true;
   if (uneven_ && anew() && solve_about_peak(pressure, frame, settings, regions, round, false, false, points)) return true;
   if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, false, points)) return true;
   points.back_to(before);
@@ -424,6 +424,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   const double error = settings.error;
   cut_ = false;
   about_middle_ = by_sectors_ = mild_ = false;
+  rise_.setZero();
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
@@ -542,6 +543,7 @@ void PolarRuleSolver::cover(PolarCover& out) const {
   out.frame = frame_;
   out.corner.clear();
   out.thickness = thickness_;
+  out.rise = rise_;
   if (!polygon_.empty()) {
     out.height.clear();
     out.rim.clear();
@@ -562,7 +564,7 @@ void PolarRuleSolver::cover(PolarCover& out) const {
 
 PolarCover::Reach PolarCover::reach(const Vec2& at) const {
   const double c = at.x(), s = at.y();
-  double far = 0.0, rise = 0.0;  // rho over that of the rim; height of the rim
+  double far = 0.0, height_there = 0.0;  // rho over that of the rim; height of the rim
   if (corner.empty()) {
     const auto n = static_cast<double>(radius.size());
     double turn = math::atan2(s, c) / (2.0 * std::numbers::pi);
@@ -571,25 +573,26 @@ PolarCover::Reach PolarCover::reach(const Vec2& at) const {
     const double below = std::floor(place), share = place - below;
     const std::size_t k = static_cast<std::size_t>(below) % radius.size(), next = (k + 1) % radius.size();
     far = std::sqrt(c * c + s * s) / ((1.0 - share) * radius[k] + share * radius[next]);
-    rise = (1.0 - share) * height[k] + share * height[next];
+    height_there = (1.0 - share) * height[k] + share * height[next];
   } else {
     for (std::size_t k = 0; k < corner.size(); ++k) {
       const Vec2 &a = corner[k], &b = corner[(k + 1) % corner.size()];
       const double beyond_a = a.x() * s - a.y() * c, beyond_b = c * b.y() - s * b.x(), whole = beyond_a + beyond_b;
       if (!(beyond_a >= 0.0) || !(beyond_b >= 0.0) || !(whole > 0.0)) continue;
       far = whole / (a.x() * b.y() - a.y() * b.x());
-      rise = (beyond_b * height[k] + beyond_a * height[(k + 1) % corner.size()]) / whole;
+      height_there = (beyond_b * height[k] + beyond_a * height[(k + 1) % corner.size()]) / whole;
       break;
     }
   }
-  return {far, rise};
+  return {far, height_there};
 }
 
 bool PolarCover::contains(const Vec3& x, double slack) const {
   const Vec3 d = x - frame.origin;
-  const auto [far, rise] = reach(Vec2(d.dot(frame.u) / frame.u.squaredNorm(), d.dot(frame.v) / frame.v.squaredNorm()));
+  const auto [far, height_there] = reach(Vec2(d.dot(frame.u) / frame.u.squaredNorm(), d.dot(frame.v) / frame.v.squaredNorm()));
   if (far > 1.0 + slack) return false;
-  return std::abs(d.dot(frame.axis) - rise * far * far) <= 2.0 * thickness + 0.5 * std::abs(rise);
+  const double up = d.dot(frame.axis), linear = rise.dot(d - up * frame.axis), curved = height_there * far * far - linear * far;
+  return std::abs(up - linear - curved) <= 2.0 * thickness + 0.5 * std::abs(height_there);
 }
 
 }  // namespace supple::collision

@@ -34,6 +34,7 @@ struct PolarCover {
   std::vector<Vec2> corner;            ///< of an outline about the origin, by angle, in units of u and v
   std::vector<Vec3> rim;               ///< its points
   double thickness = 0.0;
+  Vec3 rise = Vec3::Zero();            ///< of Sigma at the origin, over a step across the axis; about the peak there is none
   /// Along the ray from the origin through a point, in units of u and v: the distance of the point over that of the rim, 0 where no
   /// corner is near the ray, and the height of the rim there.
   struct Reach {
@@ -214,10 +215,10 @@ class PolarRuleSolver {
 
   // About a point that sees the whole rim: star_rule.cpp.
   bool solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Regions& regions,
-                        PatchPoints& points);
+                        bool fine, PatchPoints& points);
   bool move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step);
   bool walk_to_rim(PairPressure& pressure, const Vec3& along, double step, Vec3& x);
-  bool follow_rim_curve(PairPressure& pressure);
+  bool follow_rim_curve(PairPressure& pressure, bool fine);
   static std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
   bool move_to_star(PairPressure& pressure);
   void cross_star(PairPressure& pressure);
@@ -275,7 +276,7 @@ class PolarRuleSolver {
   bool by_sectors_ = false;              // rays go through `sectors_`
   bool mild_ = false;                    // kinks that cross part no angles
   bool uneven_ = false;                  // mild kinks cross, but the outline takes more rings than it is worth
-  Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis
+  Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;
   std::vector<Walk> walks_;

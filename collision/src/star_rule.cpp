@@ -15,7 +15,7 @@ constexpr double kWalk = 0.25;          // first step to the rim, in radii of th
 constexpr int kWalkSteps = 200;
 constexpr int kRimSteps = 8;            // Newton's method
 constexpr std::size_t kMostPoints = 400;
-constexpr double kLongest = 0.5, kShortest = 1e-3;  // steps along the rim, in radii
+constexpr double kLongest = 0.5, kLongestFine = 0.1, kShortest = 1e-3;  // steps along the rim, in radii
 constexpr double kMostTurn = 0.35, kLittleTurn = 0.15;  // of the rim within a step [rad]
 constexpr double kClose = 1e-3;         // of Newton's method at the rim, in steps
 constexpr double kLeastCosine = 0.2;    // of Sigma's normal to the axis
@@ -78,15 +78,15 @@ bool PolarRuleSolver::walk_to_rim(PairPressure& pressure, const Vec3& along, dou
   return false;
 }
 
-/// The rim as a polygon in `outline_`, counterclockwise about the axis.
-bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure) {
+/// The rim as a polygon in `fine_rim_`, counterclockwise about the axis. @param fine  in steps that do not leap over the neck of a lobe
+bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure, bool fine) {
   const double radius = std::sqrt(2.0 * frame_.peak) * std::min(frame_.u.norm(), frame_.v.norm());
   Vec3 x, tangent;
   if (!walk_to_rim(pressure, frame_.v.normalized(), kWalk * radius, x)) return false;
   if (!move_to_rim(pressure, x, tangent, radius)) return false;
   fine_rim_.clear();
   const Vec3 first = x;
-  double step = kWalk * radius;
+  double step = (fine ? kLongestFine : kWalk) * radius;
   bool left = false;  // far enough from the first point to come back to it
   for (;;) {
     fine_rim_.push_back(x);
@@ -101,7 +101,7 @@ bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure) {
       if (turn <= kMostTurn && (next - x).dot(tangent) > 0.5 * step) {
         x = next;
         tangent = there;
-        if (turn < kLittleTurn) step = std::min(2.0 * step, kLongest * radius);
+        if (turn < kLittleTurn) step = std::min(2.0 * step, (fine ? kLongestFine : kLongest) * radius);
         break;
       }
       step *= 0.5;
@@ -252,13 +252,13 @@ std::array<double, 2> PolarRuleSolver::outline_at(double cosine, double sine) co
   return {0.0, 0.0};
 }
 
-/// @param frame  of the peak   @return false where no point sees the whole rim
+/// @param frame  of the peak   @param fine  the steps along the rim   @return false where no point sees the whole rim
 bool PolarRuleSolver::solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                       const Regions& regions, PatchPoints& points) {
+                                       const Regions& regions, bool fine, PatchPoints& points) {
   frame_ = frame;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   about_middle_ = false;
-  about_star_ = follow_rim_curve(pressure) && move_to_star(pressure);
+  about_star_ = follow_rim_curve(pressure, fine) && move_to_star(pressure);
   if (!about_star_) return false;
   cross_star(pressure);
   const bool mild = settings.error >= kLeastMild && only_mild_kinks() && solve_mild_sectors(pressure, settings);

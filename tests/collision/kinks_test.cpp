@@ -391,7 +391,7 @@ TEST(StarRule, FindsAllOfThePatchesOfTwoLumps) {
     solve_contact_surface(bodies, candidates, {.error = error, .only = only}, executor, surface);
     return surface.summary.at(0);
   };
-  for (const Case& c : {Case{2026, {67, 160, 478, 588}}, Case{11, {335, 432}}, Case{12, {139, 187, 864}}}) {
+  for (const Case& c : {Case{2026, {67, 160, 478, 588}}, Case{11, {335, 432}}, Case{12, {139, 187, 864}}, Case{77, {17}}, Case{6, {151}}}) {
     benchmarks::Rigid a(benchmarks::ten_blobs(1), 1e6, 0.03), b(benchmarks::ten_blobs(2), 2e6, 0.03);
     benchmarks::Draw draw(c.seed);
     for (int pose = 0; pose <= c.poses.back(); ++pose) {
