@@ -292,7 +292,7 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
 
 double PolarRuleSolver::model_height(std::size_t ray, double share) const {
   const double square = share * share;
-  return share * linear_[ray] + square * (square_[ray] + square * fourth_[ray]);
+  return share * linear_[ray] + square * (square_[ray] + (about_star_ ? share : square) * rest_[ray]);
 }
 
 /// Where a ray crosses the border of a third body whose imprint may lie between two of its samples s. @return false where they show it

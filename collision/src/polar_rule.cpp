@@ -161,16 +161,16 @@ void PolarRuleSolver::place_nodes(const PolarRule& rule) {
   for (std::size_t k = 0; k < angles; ++k) {
     const double c = rule.cosine[k], s = rule.sine[k], rim = rim_.radius[k];
     const Vec3 e = c * frame_.u + s * frame_.v;
-    // Through the curvature at the origin and the rim; about a star through the slope there.
-    const double linear = about_star_ ? rim * rise_.dot(e) : 0.0;
-    const double square = about_star_ ? rim_.height[k] - linear
-                                      : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
-    const double fourth = rim_.height[k] - linear - square;
+    // Through slope and curvature at the origin, where the peak has no slope, and the rim.
+    const double linear = rim * rise_.dot(e);
+    const double square =
+        0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+    const double rest = rim_.height[k] - linear - square;
     for (std::size_t j = 0; j < radii; ++j) {
       const std::size_t i = k * radii + j;
       const double r = gauss.node[j], r2 = r * r;
       foot_[i] = frame_.origin + (r * rim) * e;
-      height_[i] = r * linear + r2 * (square + r2 * fourth);
+      height_[i] = r * linear + r2 * (square + (about_star_ ? r : r2) * rest);
       weight_[i] = sector * gauss.weight[j] * rim * rim * r * jacobian_;
     }
   }

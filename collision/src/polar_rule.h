@@ -221,6 +221,7 @@ class PolarRuleSolver {
   bool follow_rim_curve(PairPressure& pressure, bool fine);
   static std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
   bool move_to_star(PairPressure& pressure);
+  void bend_at_star(PairPressure& pressure, double rate);
   void cross_star(PairPressure& pressure);
   [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
 
@@ -268,7 +269,7 @@ class PolarRuleSolver {
   std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
   std::vector<Vec3> fine_rim_;
   Rays rays_;
-  std::vector<double> linear_, square_, fourth_;  // heights along a ray: s linear + s^2 (square + s^2 fourth)
+  std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)
   std::vector<Crossing> crossings_;
   std::vector<double> changes_;          // where within a panel rays begin to meet other kinks, or in another order
   std::vector<double> turn_;             // what the weight of the angle is multiplied by

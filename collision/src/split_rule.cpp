@@ -81,7 +81,7 @@ constexpr std::size_t kFine = 15;  // rays
 bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   const std::size_t count = (panels_.size() - first) * per_panel;
-  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &fourth_}) {
+  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &rest_}) {
     column->resize(count);
   }
   if (by_sectors_) {
@@ -121,17 +121,11 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   const std::size_t per_panel = rule.node.size(), count = rays_.size();
   for (std::size_t i = 0; i < count; ++i) {
     const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
-    if (about_star_) {
-      linear_[i] = rim * rise_.dot(direction(c, s));
-      square_[i] = rays_.height[i] - linear_[i];
-      fourth_[i] = 0.0;
-      continue;
-    }
-    linear_[i] = 0.0;
+    linear_[i] = rim * rise_.dot(direction(c, s));
     // Faces are flat about the middle.
     square_[i] = about_middle_ ? 0.0
                                : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
-    fourth_[i] = rays_.height[i] - square_[i];
+    rest_[i] = rays_.height[i] - linear_[i] - square_[i];
   }
   find_crossings(pressure, error);
   find_changes(pressure, rule, first);

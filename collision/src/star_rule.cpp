@@ -3,6 +3,7 @@
 /// kernel of the polygon that the rim is in the plane across the axis; the patch is star-shaped where there are some (Preparata &
 /// Shamos 1985, sec. 7.2.6). The rest is that of patches that kinks cross.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "polar_rule.h"
@@ -151,6 +152,24 @@ std::optional<Vec2> PolarRuleSolver::point_that_sees(std::span<const Vec2> polyg
   return centre;
 }
 
+/// Second derivatives of Sigma's height at the origin, by differences along its tangents. @param rate  that p_B - p_A rises at, along the axis
+void PolarRuleSolver::bend_at_star(PairPressure& pressure, double rate) {
+  constexpr double kStep = 1e-3;  // of the radius
+  const std::array<Vec3, 2> tangent{frame_.u + rise_.dot(frame_.u) * frame_.axis, frame_.v + rise_.dot(frame_.v) * frame_.axis};
+  PressureBatch& batch = rim_batch_;
+  batch.resize(4);
+  for (std::size_t i = 0; i < 4; ++i) batch.point[i] = frame_.origin + (i % 2 == 0 ? kStep : -kStep) * tangent[i / 2];
+  pressure.evaluate(batch);
+  const auto second = [&](std::size_t along, std::size_t across) {
+    const std::size_t i = 2 * along;
+    const Vec3 change = (batch.slope_a[i] - batch.slope_b[i]) - (batch.slope_a[i + 1] - batch.slope_b[i + 1]);
+    return change.dot(tangent[across]) / (2.0 * kStep * rate);
+  };
+  frame_.height_uu = second(0, 0);
+  frame_.height_uv = 0.5 * (second(0, 1) + second(1, 0));
+  frame_.height_vv = second(1, 1);
+}
+
 /// The frame goes to a point that sees the rim, with axes in which the rim is as wide as it is long.
 bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   const Vec3 along = frame_.u.normalized(), across = frame_.v.normalized();
@@ -203,6 +222,7 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame_.axis);
   rise_ = (batch.slope_a[0] - batch.slope_b[0]) / rate;
+  bend_at_star(pressure, rate);
   outline_.clear();
   for (const Vec3& rim : fine_rim_) {
     const Vec3 d = rim - frame_.origin;

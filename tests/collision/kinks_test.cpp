@@ -418,10 +418,10 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
   // two kinks in another order than the next one; a kink that lies elsewhere on Sigma than the guess of its heights says; a kink that the
   // first rim does not reach, but that of more rays; pieces of rays on which rules of three and of four points put the same two, twice; a
   // kink that leaves the patch between two rays and is not parted exactly there; rules without kinks that agree by chance. Of capsules: such
-  // rules; Newton's method to the rim where the pressure bends there; a kink that leaves the patch between two rays. Of blobs: an angle at which the rim nearly goes along the ray; many short pieces; the two
-  // coarsest rules; short pieces with two points; fine
-  // rules that agree by chance at a coarse error.
-  enum class Shapes : std::uint8_t { DiscOnBox, Capsules, Blobs };
+  // rules; Newton's method to the rim where the pressure bends there; a kink that leaves the patch between two rays. Of blobs: an
+  // angle at which the rim nearly goes along the ray; many short pieces; the two coarsest rules; short pieces with two points; fine
+  // rules that agree by chance at a coarse error; radii that are compared with too few.
+  enum class Shapes : std::uint8_t { DiscOnBox, Capsules, Blobs, Murakami };
   struct Case {
     Shapes shapes;
     std::uint64_t seed;
@@ -443,13 +443,21 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
                         Case{Shapes::DiscOnBox, 11, 6, 1e-4}, Case{Shapes::DiscOnBox, 1234, 69, 1e-4}, Case{Shapes::DiscOnBox, 1234, 134, 1e-6},
                         Case{Shapes::DiscOnBox, 102, 519, 1e-2}, Case{Shapes::DiscOnBox, 6103, 156, 1e-8}, Case{Shapes::Capsules, 204, 777, 1e-2}, Case{Shapes::Capsules, 1234, 265, 1e-6}, Case{Shapes::Capsules, 77, 967, 1e-5},
                         Case{Shapes::Capsules, 101, 852, 1e-5}, Case{Shapes::Blobs, 1234, 227, 1e-3}, Case{Shapes::Blobs, 102, 767, 1e-3},
-                        Case{Shapes::Blobs, 1234, 898, 1e-2}, Case{Shapes::Blobs, 831, 178, 1e-4}, Case{Shapes::Blobs, 901, 4, 1e-2}}) {
-    const bool disc = c.shapes == Shapes::DiscOnBox, blobs = c.shapes == Shapes::Blobs;
+                        Case{Shapes::Blobs, 1234, 898, 1e-2}, Case{Shapes::Blobs, 831, 178, 1e-4}, Case{Shapes::Blobs, 901, 4, 1e-2},
+                        Case{Shapes::Murakami, 1, 451, 1e-6}, Case{Shapes::Murakami, 5, 696, 1e-4}}) {
+    const bool disc = c.shapes == Shapes::DiscOnBox, blobs = c.shapes == Shapes::Blobs || c.shapes == Shapes::Murakami;
+    const auto ten = [&](std::uint64_t seed) {
+      implicit::Skeleton skeleton = benchmarks::ten_blobs(seed);
+      for (Primitive& p : skeleton.primitive) {
+        if (c.shapes == Shapes::Murakami) p.kernel = Kernel::murakami(p.kernel.radius);
+      }
+      return skeleton;
+    };
     benchmarks::Rigid a = disc    ? shape(ShapeKind::Disc, Vec3(0.15, 0, 0), 0.15, 1e6)
-                          : blobs ? benchmarks::Rigid(benchmarks::ten_blobs(1), 1e6, 0.03)
+                          : blobs ? benchmarks::Rigid(ten(1), 1e6, 0.03)
                                   : shape(ShapeKind::Segment, Vec3(0.2, 0, 0), 0.2, 1e6);
     benchmarks::Rigid b = disc    ? shape(ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15, 2e6)
-                          : blobs ? benchmarks::Rigid(benchmarks::ten_blobs(2), 2e6, 0.03)
+                          : blobs ? benchmarks::Rigid(ten(2), 2e6, 0.03)
                                   : shape(ShapeKind::Segment, Vec3(0.1, 0, 0), 0.25, 3e6);
     const double size = disc ? 0.07 : blobs ? 0.05 : 0.1;
     benchmarks::Draw draw(c.seed);
