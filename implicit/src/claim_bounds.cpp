@@ -8,7 +8,8 @@
 
 namespace supple::implicit {
 
-Claim::Claim(const SearchedBody& body) : field_(body.field), weight_(body.weight) {
+Claim::Claim(const SearchedBody& body, bool alone) : field_(body.field), weight_(body.weight) {
+  if (alone) return;
   const double bound = gradient_bound(surface_box());
   if (bound > 0.0 && std::isfinite(bound)) steepness_ = bound;
 }

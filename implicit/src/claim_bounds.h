@@ -16,8 +16,9 @@ using lattice::Label;
 /// weight * F.
 class Claim {
  public:
-  explicit Claim(const SearchedBody& body);
-  /// About how much it changes over a length near its surface, > 0.
+  /// @param alone  without others, to whose claims its own would be compared
+  Claim(const SearchedBody& body, bool alone);
+  /// About how much it changes over a length near its surface, > 0; 1 where it is alone.
   [[nodiscard]] double steepness() const { return steepness_; }
   void evaluate(std::span<const Vec3> points, std::span<double> values) const {
     field_->evaluate(points, values);

@@ -37,7 +37,7 @@ float value_at(const BlockTable& table, const Block& block, int x, int y, int z)
   return owner->values[kTileNodes * owner->rank(tile) + static_cast<std::size_t>((x & 3) | (y & 3) << 2 | (z & 3) << 4)];
 }
 
-void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const Lattice& lattice) {
+void expect_nodes(const Cells& lower, const Cells& upper, const Lattice& lattice) {
   constexpr double kLargestNode = 1 << 30;
   double nodes = 1.0;
   double far = 0.0;
@@ -61,6 +61,10 @@ void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const La
     refuse("expected at most " + std::to_string(kMarchNodes) + " lattice nodes around the body",
            "about " + lattice::three_digits(nodes), std::cbrt(nodes / static_cast<double>(kMarchNodes)));
   }
+}
+
+void lay_out(BlockTable& table, const Cells& lower, const Cells& upper, const Lattice& lattice) {
+  expect_nodes(lower, upper, lattice);
   std::size_t blocks = 1;
   BlockCoord first{}, count{};
   for (std::size_t k = 0; k < 3; ++k) {

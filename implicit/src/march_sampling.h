@@ -46,6 +46,9 @@ class Sampler {
 /// F at a node of the block or of one beyond its upper faces, 0 where only the sign is known. @pre 0 <= x, y, z <= 16
 [[nodiscard]] float value_at(const BlockTable& table, const Block& block, int x, int y, int z);
 
+/// @throws Error{Limit} when these nodes are too many
+void expect_nodes(const blobs::Cells& lower, const blobs::Cells& upper, const Lattice& lattice);
+
 /// Lays out the table for the nodes [lower, upper]; blocks that stay are kept.
 void lay_out(BlockTable& table, const blobs::Cells& lower, const blobs::Cells& upper, const Lattice& lattice);
 

@@ -13,6 +13,7 @@
 
 #include "claim_bounds.h"
 #include "march_cases.h"
+#include "missed_blobs.h"
 #include "polygonise_blocks.h"
 #include "polygonise_junctions.h"
 #include "polygonise_roots.h"
@@ -100,12 +101,25 @@ class BlockSearch {
     candidates_ = candidates;
     seeds_ = &seeds;
     counts_ = &counts;
-    constexpr int kEdge = lattice::kCells * kCell;
-    halve({std::int64_t{kEdge} * block[0], std::int64_t{kEdge} * block[1], std::int64_t{kEdge} * block[2]}, kEdge);
+    halve(lowest_of(block), kEdge);
+  }
+
+  /// The same for some of its cells, of a single body.
+  void search(const OpenCells& open, std::vector<Seed>& seeds, MissedPieces& counts) {
+    static constexpr std::uint32_t kOnly = 0;
+    candidates_ = {&kOnly, 1};
+    seeds_ = &seeds;
+    counts_ = &counts;
+    const Node low = lowest_of(open.block);
+    for (const auto& [x, y, z] : open.cell) search_cell(stepped(low, kCell * x, kCell * y, kCell * z));
   }
 
  private:
-  static constexpr int kCell = kParts * kUnits;
+  static constexpr int kCell = kParts * kUnits, kEdge = lattice::kCells * kCell;
+
+  static Node lowest_of(const lattice::BlockCoord& block) {
+    return {std::int64_t{kEdge} * block[0], std::int64_t{kEdge} * block[1], std::int64_t{kEdge} * block[2]};
+  }
 
   /// @param edge  of a cube of several cells
   void halve(const Node& at, int edge) {
@@ -116,7 +130,8 @@ class BlockSearch {
         continue;
       }
       ++counts_->cubes;
-      if (!bounds_.certain(box_of(half, edge / 2), candidates_)) halve(half, edge / 2);
+      const Verdict verdict = bounds_(box_of(half, edge / 2), candidates_);
+      if (!verdict.certain && !verdict.flat) halve(half, edge / 2);
     }
   }
 
@@ -358,36 +373,63 @@ void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet
   if (outer != 0) add_to(meshes[outer - 1], false, inner);
 }
 
-MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor, std::span<Mesh> meshes) {
-  const Lattice fine{.origin = lattice.origin, .cell = lattice.cell / kParts};
-  std::vector<Claim> claims;
+/// What the searches of blocks found.
+struct BlockSeeds {
+  std::vector<Seed> seeds;
+  MissedPieces counts;
+};
+
+/// Block by block, cubes one at a time.
+std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Lattice& lattice, const Lattice& fine, const Executor& executor) {
   std::vector<FieldView> views;
   std::vector<Box> surface;
-  for (const SearchedBody& body : bodies) claims.emplace_back(body);
   for (const Claim& claim : claims) {
     views.emplace_back(claim);
     surface.push_back(claim.surface_box());
   }
   PolygoniseCounts blocks_looked_at;
   const lattice::BlockList blocks = lattice::find_label_blocks(views, surface, lattice, executor, kMostBlocks, blocks_looked_at);
-  std::vector<std::vector<Seed>> seeds(blocks.block.size());
-  std::vector<MissedPieces> counts(blocks.block.size());
-  executor.for_blocks(blocks.block.size(), 1, [&](std::size_t begin, std::size_t end) {
+  std::vector<BlockSeeds> found(blocks.block.size());
+  executor.for_blocks(found.size(), 1, [&](std::size_t begin, std::size_t end) {
     BlockSearch search(claims, fine);
     for (std::size_t b = begin; b < end; ++b) {
       search.search(blocks.block[b], std::span(blocks.candidate).subspan(blocks.offset[b], blocks.offset[b + 1] - blocks.offset[b]),
-                    seeds[b], counts[b]);
+                    found[b].seeds, found[b].counts);
     }
   });
+  return found;
+}
+
+/// The same for a sum of Wyvill points: what many cubes at a time leave open.
+std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> claims, const Lattice& lattice, const Lattice& fine,
+                                     const Executor& executor) {
+  std::uint64_t cubes = 0;
+  const std::vector<OpenCells> open = find_open_cells(field, lattice, executor, cubes);
+  std::vector<BlockSeeds> found(open.size() + 1);
+  found.back().counts.cubes = cubes;
+  executor.for_blocks(open.size(), 1, [&](std::size_t begin, std::size_t end) {
+    BlockSearch search(claims, fine);
+    for (std::size_t b = begin; b < end; ++b) search.search(open[b], found[b].seeds, found[b].counts);
+  });
+  return found;
+}
+
+MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor, std::span<Mesh> meshes) {
+  const Lattice fine{.origin = lattice.origin, .cell = lattice.cell / kParts};
+  std::vector<Claim> claims;
+  for (const SearchedBody& body : bodies) claims.emplace_back(body, bodies.size() == 1);
+  const bool blobs = bodies.size() == 1 && is_sum_of_blobs(*bodies[0].field);
+  const std::vector<BlockSeeds> blocks =
+      blobs ? search_blobs(*bodies[0].field, claims, lattice, fine, executor) : search_blocks(claims, lattice, fine, executor);
   std::vector<std::uint32_t> all(bodies.size());
   std::iota(all.begin(), all.end(), 0u);
   MissedPieces found;
   Labels labels(claims, fine);
   NodeSet known;  // of parts that were looked at
-  for (std::size_t b = 0; b < blocks.block.size(); ++b) {
-    found.undecided += counts[b].undecided;
-    found.cubes += counts[b].cubes;
-    for (const Seed& seed : seeds[b]) {
+  for (const BlockSeeds& block : blocks) {
+    found.undecided += block.counts.undecided;
+    found.cubes += block.counts.cubes;
+    for (const Seed& seed : block.seeds) {
       NodeSet part;
       Label beyond = 0;
       const Flood end = flood(seed, known, all, labels, part, beyond);
