@@ -18,6 +18,8 @@ GradientBounds Claim::bound_gradient(const Box& box) const {
   GradientBounds bounds = bounds_with_gradient(*field_, box);
   bounds.value = scaled(bounds.value);
   bounds.least_slope *= weight_;
+  bounds.curved.curvature = {weight_ * bounds.curved.curvature.lower, weight_ * bounds.curved.curvature.upper};
+  bounds.curved.round_off *= weight_;
   for (GradientBounds::Ball& ball : bounds.hull) {
     ball.gradient *= weight_;
     ball.turn *= weight_;
@@ -27,7 +29,7 @@ GradientBounds Claim::bound_gradient(const Box& box) const {
 
 bool CubeBounds::certain(const Box& box, std::span<const std::uint32_t> candidates) {
   entry_.assign(1, outside());
-  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1, .bounds = {{.value = claims_[body].bound(box)}, {}}});
+  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1, .bounds = {{.value = claims_[body].bound(box)}, {}, {}}});
   return judge().certain;
 }
 
@@ -37,7 +39,39 @@ Verdict CubeBounds::operator()(const Box& box, std::span<const std::uint32_t> ca
     entry_.push_back({.label = body + 1, .steepness = claims_[body].steepness(), .bounds = claims_[body].bound_gradient(box)});
   }
   Verdict verdict = judge();
-  verdict.flat = std::all_of(entry_.begin(), entry_.end(), [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e); });
+  verdict.flat = is_flat();
+  return verdict;
+}
+
+bool CubeBounds::is_flat() {
+  return std::all_of(entry_.begin(), entry_.end(), [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e); });
+}
+
+std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
+  std::array<Verdict, 8> verdict;
+  for (const Entry& e : entry_) {
+    if (e.label != 0 && !e.bounds.curved.known) return verdict;
+  }
+  const Vec3 half = 0.25 * box.extent();
+  const double reach = half.norm(), largest = half.maxCoeff();
+  std::array<Vec3, 8> middle;
+  for (unsigned c = 0; c < 8; ++c) {
+    for (unsigned k = 0; k < 3; ++k) middle[c][k] = box.lower[k] + ((c >> k & 1u) != 0 ? 3.0 : 1.0) * half[k];
+  }
+  value_.resize(entry_.size());
+  slope_.resize(entry_.size());
+  for (std::size_t i = 1; i < entry_.size(); ++i) claims_[entry_[i].label - 1].evaluate(middle, value_[i], slope_[i]);
+  for (unsigned c = 0; c < 8; ++c) {
+    for (std::size_t i = 1; i < entry_.size(); ++i) {
+      GradientBounds& bounds = entry_[i].bounds;
+      const auto& [lower, upper] = bounds.curved.curvature;
+      const double first = slope_[i][c].cwiseAbs().dot(half) + bounds.curved.round_off, second = 0.5 * reach * reach;
+      bounds.value = {value_[i][c] - first + second * lower, value_[i][c] + first + second * upper};
+      bounds.hull[0] = {slope_[i][c], std::max(-lower, upper) * reach + bounds.curved.round_off / largest};
+    }
+    verdict[c] = judge();
+    verdict[c].flat = is_flat();
+  }
   return verdict;
 }
 

@@ -2,6 +2,7 @@
 /// Bodies that divide space, and what bounds tell of who has a cube. Label 0 is outside, m + 1 is body m.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -58,6 +59,9 @@ class CubeBounds {
   /// By bounds of first order alone.
   [[nodiscard]] bool certain(const Box& box, std::span<const std::uint32_t> candidates);
   [[nodiscard]] Verdict operator()(const Box& box, std::span<const std::uint32_t> candidates);
+  /// The same on the eighths of the box that was looked at last, x + 2 y + 4 z: by its bounds of second derivatives and by values and
+  /// gradients at their middles. Undecided where some claim is no sum.
+  [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:
   struct Entry {
@@ -70,15 +74,18 @@ class CubeBounds {
     const Entry* other;
     Interval value;  ///< [m], to first order
   };
-  [[nodiscard]] static Entry outside() { return {.bounds = {{.second_order = true}, {GradientBounds::Ball{}}}}; }
+  [[nodiscard]] static Entry outside() { return {.bounds = {{.second_order = true}, {}, {GradientBounds::Ball{}}}}; }
 
   [[nodiscard]] Verdict judge();
+  [[nodiscard]] bool is_flat();
   /// Whether there is a direction along which all leads rise that may be the least of a claim. They are divided by how steep their
   /// claims are, so that in most cubes on an interface no lead over a third competes.
   [[nodiscard]] bool rises(const Entry& own);
 
   std::span<const Claim> claims_;
   std::vector<Entry> entry_;
+  std::vector<std::array<double, 8>> value_;  ///< by entry, at the middles of eighths,
+  std::vector<std::array<Vec3, 8>> slope_;    ///< and gradients
   std::vector<Lead> lead_;
   std::vector<Vec3> over_;      ///< gradients of the leads,
   std::vector<double> turn_;    ///< and how far they turn

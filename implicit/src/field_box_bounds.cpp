@@ -155,7 +155,7 @@ GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, con
   thread_local std::vector<BlendIndex::NodeBound> bounds;
   thread_local std::vector<BlendIndex::Term> terms;
   expand_nodes(index, box, nodes);
-  if (nodes.empty()) return {{.value = plain, .second_order = true}, {GradientBounds::Ball{}}};
+  if (nodes.empty()) return {{.value = plain, .second_order = true}, {}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
   bounds.clear();
   double scale = index.iso, slopes = 0.0;
@@ -169,8 +169,8 @@ GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, con
   const Interval sum = index.blend.bound(bounds);
   const double n = static_cast<double>(nodes.size()), round_off = (32.0 + 4.0 * n * n) * kEps;
   GradientBounds out{{.value = intersection(plain, {sum.lower - index.iso - round_off * scale, sum.upper - index.iso + round_off * scale}),
-                      .second_order = true}, {}};
-  if (index.blend.rule() != BlendRule::Ricci && !index.blend.find_terms(bounds, terms)) return {{.value = out.value}, {}};
+                      .second_order = true}, {}, {}};
+  if (index.blend.rule() != BlendRule::Ricci && !index.blend.find_terms(bounds, terms)) return {{.value = out.value}, {}, {}};
   if (!sloped || half.isZero()) return out;
   find_hull(index.blend, nodes, bounds, terms, half.norm(), half.maxCoeff(), out.hull);
   for (GradientBounds::Ball& ball : out.hull) ball.turn += round_off * slopes;
@@ -187,18 +187,19 @@ Field::BoxBounds Field::box_bounds(const Box& box) const { return bounds_with_gr
 GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   const Field::Index& index = field.index();
   const Interval plain = field.bound(box);
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}, {}};
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}, {}, {}};
   if (index.blend.active()) return blended_box_bounds(index, box, plain);
   Expansion sum{.value = -index.iso, .scale = index.iso};
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (index.support[id].overlaps(box)) expand(index, id, box, sum);
   }
-  if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, {GradientBounds::Ball{}}};
+  if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, {}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
-  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}, {}};
+  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}, {}, {}};
   if (sum.sloped && half.maxCoeff() > 0.0) {
     out.hull.push_back({sum.gradient, sum.turn(half.norm()) + sum.round_off() / half.maxCoeff()});
     out.least_slope = least_of_hull(out.hull);
+    out.curved = {true, sum.curvature, sum.round_off()};
   }
   return out;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "supple/implicit/field.h"
+#include "supple/implicit/kernel.h"
 
 namespace supple::implicit {
 
@@ -13,6 +14,13 @@ struct GradientBounds : Field::BoxBounds {
     Vec3 gradient = Vec3::Zero();  ///< [1/m]
     double turn = 0.0;             ///< radius [1/m]
   };
+  /// Of a sum all of whose second derivatives are bounded: what bounds on parts of the box take besides value and gradient at their middles.
+  struct Curved {
+    bool known = false;
+    CurvatureRange curvature{};  ///< on the box [1/m^2]
+    double round_off = 0.0;      ///< of values [1]
+  };
+  Curved curved;
   std::vector<Ball> hull;  ///< of these balls holds Clarke's gradients of F on all of the box; several where parts win in turn, empty: not known
 };
 

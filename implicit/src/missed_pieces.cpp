@@ -30,6 +30,8 @@ constexpr int kParts = kSearchParts;
 constexpr int kShift = 2, kUnits = 1 << kShift;
 /// Cubes that are looked at in a cell before it counts as undecided; without bounds of second order those of three halvings.
 constexpr int kMostCubes = 10'000, kMostByValues = 8 + 64 + 512;
+/// Smallest cubes of a cell that may stay undecided before the rest of it is given up, too.
+constexpr int kMostOpen = 64;
 /// Nodes of the finer lattice in a piece before it counts as undecided.
 constexpr std::size_t kMostNodes = 4'000'000;
 /// Vertices stay this far from the nodes [finer cells].
@@ -41,6 +43,13 @@ Node corner_of(const Node& node, unsigned corner, int edge) {
 }
 /// Of the coarse lattice too.
 bool is_coarse(const Node& node) { return (node[0] | node[1] | node[2]) % kParts == 0; }
+/// Along the axes, to the nearest of the coarse lattice.
+constexpr std::size_t kFarthest = 3 * kParts / 2;
+std::size_t steps_to_coarse(const Node& node) {
+  std::int64_t steps = 0;
+  for (const std::int64_t i : node) steps += std::min(i & (kParts - 1), -i & (kParts - 1));
+  return static_cast<std::size_t>(steps);
+}
 bool before(const Node& a, const Node& b) {
   return std::tie(a[2], a[1], a[0]) < std::tie(b[2], b[1], b[0]);
 }
@@ -101,7 +110,7 @@ class BlockSearch {
     candidates_ = candidates;
     seeds_ = &seeds;
     counts_ = &counts;
-    halve(lowest_of(block), kEdge);
+    for (unsigned c = 0; c < 8; ++c) search_cells(corner_of(lowest_of(block), c, kEdge / 2), kEdge / 2);
   }
 
   /// The same for some of its cells, of a single body.
@@ -122,16 +131,16 @@ class BlockSearch {
   }
 
   /// @param edge  of a cube of several cells
-  void halve(const Node& at, int edge) {
+  void search_cells(const Node& at, int edge) {
+    ++counts_->cubes;
+    const Box box = box_of(at, edge);
+    const Verdict verdict = bounds_(box, candidates_);
+    if (verdict.certain || verdict.flat) return;
+    const std::array<Verdict, 8> eighth = bounds_.eighths(box);
     for (unsigned c = 0; c < 8; ++c) {
+      if (eighth[c].certain || eighth[c].flat) continue;
       const Node half = corner_of(at, c, edge / 2);
-      if (edge / 2 == kCell) {
-        search_cell(half);
-        continue;
-      }
-      ++counts_->cubes;
-      const Verdict verdict = bounds_(box_of(half, edge / 2), candidates_);
-      if (!verdict.certain && !verdict.flat) halve(half, edge / 2);
+      edge / 2 == kCell ? search_cell(half) : search_cells(half, edge / 2);
     }
   }
 
@@ -145,28 +154,36 @@ class BlockSearch {
     std::copy(label.begin(), label.end(), corners_.begin());
     cell_ = corner[0];
     left_ = verdict.second_order ? kMostCubes : kMostByValues;
+    open_ = kMostOpen;
     undecided_ = !verdict.second_order && std::any_of(corners_.begin(), corners_.end(), [&](Label l) { return l != corners_[0]; });
-    if (!undecided_) search_parts(cell, kCell);
+    if (!undecided_) {
+      const std::array<Verdict, 8> eighth = bounds_.eighths(box_of(cell, kCell));
+      search_parts(cell, kCell, eighth);
+    }
     counts_->undecided += undecided_ ? 1 : 0;
   }
 
-  void search_parts(const Node& at, int edge) {
+  /// @param eighth  what is known of its eighths already: only those that are flat need not be looked at themselves
+  void search_parts(const Node& at, int edge, const std::array<Verdict, 8>& eighth) {
     for (unsigned c = 0; c < 8; ++c) {
       if (--left_ < 0) {
         undecided_ = true;
         return;
       }
+      if (eighth[c].flat) continue;
       ++counts_->cubes;
       const Node part = corner_of(at, c, edge / 2);
-      const Verdict verdict = bounds_(box_of(part, edge / 2), candidates_);
+      const Box box = box_of(part, edge / 2);
+      const Verdict verdict = bounds_(box, candidates_);
       if (verdict.flat) continue;
       if (verdict.certain) {
         look_at(part, edge / 2, verdict.label);
       } else if (edge / 2 > 1) {
-        search_parts(part, edge / 2);
+        search_parts(part, edge / 2, bounds_.eighths(box));
       } else {
         undecided_ = true;
         look_around(part);
+        if (--open_ == 0) left_ = 0;
       }
     }
   }
@@ -228,7 +245,7 @@ class BlockSearch {
   MissedPieces* counts_ = nullptr;
   Node cell_{};
   std::array<Label, 8> corners_{};  ///< of the cell
-  int left_ = 0;
+  int left_ = 0, open_ = 0;
   bool undecided_ = false;
   std::vector<Node> way_;
 };
@@ -237,18 +254,30 @@ enum class Flood { Closed, Joined, Known, Several, TooLarge };
 
 /// The nodes of one label that hang together with a seed: those of a body along edges, those outside across faces of cells too, as in
 /// march_cases.h. Ends at a node of the coarse lattice or of another part.
-/// @param beyond  the label around them; Several where there are more
-Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels, NodeSet& part, Label& beyond) {
-  std::vector<Node> front{seed.node}, next;
+/// @param beyond  the label around them; Several where there are more  @param end  the node of the coarse lattice
+Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels, NodeSet& part, Label& beyond,
+            Node& end) {
+  std::array<std::vector<Node>, kFarthest + 1> front;  // by steps to the nearest node of the coarse lattice: those near it first
+  std::vector<Node> from, next;
   NodeSet other;
   bool several = false;
   beyond = seed.label;
   part.insert(seed.node);
-  while (!front.empty()) {
+  front[steps_to_coarse(seed.node)].push_back(seed.node);
+  for (auto nearest = front.begin(); nearest != front.end();) {
+    if (nearest->empty()) {
+      ++nearest;
+      continue;
+    }
+    from.clear();
+    from.swap(*nearest);
     next.clear();
-    for (const Node& node : front) {
+    for (const Node& node : from) {
       if (known.contains(node)) return Flood::Known;
-      if (is_coarse(node)) return Flood::Joined;
+      if (is_coarse(node)) {
+        end = node;
+        return Flood::Joined;
+      }
       for (int step = 0; step < 27; ++step) {
         const int x = step % 3 - 1, y = step / 3 % 3 - 1, z = step / 9 - 1;
         const int far = std::abs(x) + std::abs(y) + std::abs(z);
@@ -258,7 +287,6 @@ Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_
       }
     }
     const std::vector<Label>& label = labels(next, bodies);
-    front.clear();
     for (std::size_t i = 0; i < next.size(); ++i) {
       if (label[i] != seed.label) {
         several = several || (beyond != seed.label && beyond != label[i]);
@@ -267,8 +295,9 @@ Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_
       }
       other.erase(next[i]);
       part.insert(next[i]);
-      front.push_back(next[i]);
+      front[steps_to_coarse(next[i])].push_back(next[i]);
     }
+    nearest = front.begin();
     if (part.size() > kMostNodes) return Flood::TooLarge;
   }
   return several ? Flood::Several : Flood::Closed;
@@ -425,17 +454,19 @@ MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lat
   std::iota(all.begin(), all.end(), 0u);
   MissedPieces found;
   Labels labels(claims, fine);
-  NodeSet known;  // of parts that were looked at
+  NodeSet known;   // of parts that were looked at
+  NodeSet joined;  // where they met the coarse lattice
   for (const BlockSeeds& block : blocks) {
     found.undecided += block.counts.undecided;
     found.cubes += block.counts.cubes;
     for (const Seed& seed : block.seeds) {
       NodeSet part;
       Label beyond = 0;
-      const Flood end = flood(seed, known, all, labels, part, beyond);
+      Node node{};
+      const Flood end = flood(seed, known, all, labels, part, beyond, node);
       if (end == Flood::Closed) add_piece(claims, fine, part, seed.label, beyond, meshes);
       found.pieces += end == Flood::Closed ? 1 : 0;
-      found.joined += end == Flood::Joined ? 1 : 0;
+      found.joined += end == Flood::Joined && joined.insert(node).second ? 1 : 0;
       found.undecided += end == Flood::TooLarge || end == Flood::Several ? 1 : 0;
       known.merge(part);
     }

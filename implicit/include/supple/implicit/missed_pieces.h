@@ -18,7 +18,7 @@ inline constexpr int kSearchParts = 16;
 
 struct MissedPieces {
   std::uint64_t pieces = 0;     ///< found and added
-  std::uint64_t joined = 0;     ///< parts around an extremum that hang together with what has nodes, by a way that the lattice does not resolve
+  std::uint64_t joined = 0;     ///< nodes with which parts around an extremum hang together, by ways that the lattice does not resolve
   std::uint64_t undecided = 0;  ///< cells where a piece may be that was not found, and pieces that were not made
   std::uint64_t cubes = 0;      ///< whose bounds were looked at
   [[nodiscard]] bool complete() const noexcept { return undecided == 0; }
