@@ -21,7 +21,7 @@ struct Expansion {
   Vec3 gradient = Vec3::Zero();
   CurvatureRange curvature{};     ///< of its second derivatives on the box
   Interval rest{0.0, 0.0};        ///< of what is not
-  Interval plain{0.0, 0.0};       ///< of all, from distances alone; only with a blend
+  Interval plain{0.0, 0.0};       ///< of all, from distances alone
   bool sloped = true;             ///< nothing is left for the rest
   double scale = 0.0;             ///< of round-off [1]
   double terms = 0.0;
@@ -36,6 +36,8 @@ struct Expansion {
   }
 };
 
+Interval added(const Interval& a, const Interval& b) { return {a.lower + b.lower, a.upper + b.upper}; }
+
 void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansion& sum) {
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const PackedPrimitive& p = index.primitive[id];
@@ -48,7 +50,9 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
   const Vec3 y = A * (box.centre() - Vec3(p.position[0], p.position[1], p.position[2]));
   CurvatureRange curvature;
   Potential centre;
+  Interval plain;
   if (shape.foot == PackedFoot::Convolved) {
+    plain = bound_primitive(index, id, box, false).value;
     // The peak is the measure of the shape times that of the kernel, which is 1.
     const double near = std::max(std::sqrt(foot(shape.view, y).q) - shape.distance_scale * reach, 0.0);
     curvature = curvature_range(shape.kernel, near, shape.kernel.radius);
@@ -57,6 +61,7 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
     sum.scale += 1e4 * shape.peak;  // sums over edges cancel
   } else {
     const DistanceRange range = distance_range(index, id, box);
+    plain = {evaluate(shape.kernel, range.far2).value, evaluate(shape.kernel, range.near2).value};
     const bool clipped = !(index.support[id].contains(box.lower) && index.support[id].contains(box.upper));
     const double far = clipped ? shape.kernel.radius : std::min(std::sqrt(range.far2), shape.kernel.radius);
     const ShapeBall ball{.centre = y, .reach = std::sqrt(metric2) * reach, .far = far};
@@ -65,9 +70,9 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
     const KernelSample kernel = supple::implicit::evaluate(shape.kernel, sample.q);
     centre = {kernel.value, 2.0 * kernel.slope * sample.half_gradient};
   }
+  sum.plain = added(sum.plain, plain);
   if (!std::isfinite(curvature.lower) || !std::isfinite(curvature.upper)) {
-    const PrimitiveBound one = bound_primitive(index, id, box, false);
-    sum.rest = {sum.rest.lower + one.value.lower, sum.rest.upper + one.value.upper};
+    sum.rest = added(sum.rest, plain);
     sum.sloped = false;
     return;
   }
@@ -86,8 +91,6 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
     const std::uint32_t node = index.blend.node_of(index.primitive[id].part);
     auto place = std::lower_bound(nodes.begin(), nodes.end(), node, [](const Expansion& a, std::uint32_t b) { return a.node < b; });
     if (place == nodes.end() || place->node != node) place = nodes.insert(place, Expansion{.node = node});
-    const PrimitiveBound one = bound_primitive(index, id, box, false);
-    place->plain = {place->plain.lower + one.value.lower, place->plain.upper + one.value.upper};
     expand(index, id, box, *place);
   }
 }
@@ -182,18 +185,24 @@ GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, con
 
 Interval Field::tight_bound(const Box& box) const { return box_bounds(box).value; }
 
-Field::BoxBounds Field::box_bounds(const Box& box) const { return bounds_with_gradient(*this, box); }
+Field::BoxBounds Field::box_bounds(const Box& box) const {
+  BoxBounds bounds = bounds_with_gradient(*this, box);
+  bounds.value = intersection(bounds.value, bound(box));  // never wider, by no rounding either
+  return bounds;
+}
 
 GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   const Field::Index& index = field.index();
-  const Interval plain = field.bound(box);
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = plain}, {}, {}};
-  if (index.blend.active()) return blended_box_bounds(index, box, plain);
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = field.bound(box)}, {}, {}};
+  if (index.blend.active()) return blended_box_bounds(index, box, field.bound(box));
   Expansion sum{.value = -index.iso, .scale = index.iso};
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (index.support[id].overlaps(box)) expand(index, id, box, sum);
   }
-  if (sum.terms == 0.0) return {{.value = plain, .second_order = true}, {}, {GradientBounds::Ball{}}};
+  // As Field::bound has them.
+  const double round_off = (16.0 + sum.terms) * kEps * sum.scale;
+  const Interval plain{std::max(sum.plain.lower - index.iso - round_off, -index.iso), sum.plain.upper - index.iso + round_off};
+  if (sum.terms == 0.0) return {{.value = {-index.iso, -index.iso}, .second_order = true}, {}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
   GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}, {}, {}};
   if (sum.sloped && half.maxCoeff() > 0.0) {
