@@ -34,7 +34,7 @@ void fields(Archive& archive, MeshingDesc& d) {
   archive("angle_deg", d.angle, only(degrees(1.0, 30.0)), "least angle of a triangle");
   archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
   archive("distance", d.distance, only(above(0.0, kLength).or_auto()), "from a triangle's circumcentre to that point; auto: a tenth of the size");
-  archive("search", d.search, {}, "looks for cavities and islands between the nodes of the lattice and adds them, but not to bodies that touch others and bulge; never by way of a grid; a warning counts what was found and where some may be missed still (where parts of a curve, both ends of an arc or all of a ring are as near as each other, blends by gradients, where three bodies meet); takes far longer where many primitives overlap");
+  archive("search", d.search, {}, "looks for cavities and islands between the nodes of the lattice and adds them, but not to bodies that touch others and bulge; never by way of a grid; a warning counts what was found and where some may be missed still (where parts of a curve, both ends of an arc or all of a ring are as near as each other, blends by gradients, where three bodies meet); takes longer than the mesh itself where supports span few cells, bodies touch in many places or cells stay open");
   archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
   archive.check(!d.error || d.method == Auto || d.method == Cubes, "error", "expected method auto or cubes with an error",
                 std::string(name_of(d.method)), "leave out 'method'");
