@@ -29,7 +29,8 @@ GradientBounds Claim::bound_gradient(const Box& box) const {
 
 bool CubeBounds::certain(const Box& box, std::span<const std::uint32_t> candidates) {
   entry_.assign(1, outside());
-  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1, .bounds = {{.value = claims_[body].bound(box)}, {}, {}}});
+  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1,
+      .bounds = {{.value = claims_[body].bound(box)}, {}, {}}});
   return judge().certain;
 }
 
@@ -44,7 +45,8 @@ Verdict CubeBounds::operator()(const Box& box, std::span<const std::uint32_t> ca
 }
 
 bool CubeBounds::is_flat() {
-  return std::all_of(entry_.begin(), entry_.end(), [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e); });
+  return std::all_of(entry_.begin(), entry_.end(),
+      [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e); });
 }
 
 std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {

@@ -59,8 +59,8 @@ class CubeBounds {
   /// By bounds of first order alone.
   [[nodiscard]] bool certain(const Box& box, std::span<const std::uint32_t> candidates);
   [[nodiscard]] Verdict operator()(const Box& box, std::span<const std::uint32_t> candidates);
-  /// The same on the eighths of the box that was looked at last, x + 2 y + 4 z: by its bounds of second derivatives and by values and
-  /// gradients at their middles. Undecided where some claim is no sum.
+  /// The same on the eighths of the box that was looked at last, x + 2 y + 4 z: by its bounds of second derivatives and
+  /// by values and gradients at their middles. Undecided where some claim is no sum.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:

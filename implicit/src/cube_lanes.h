@@ -1,6 +1,6 @@
 /// @file cube_lanes.h
-/// What bounds tell of a sum of Wyvill points on small cubes: in single precision, a cube in each lane, as in blob_lanes.h. What they tell is
-/// certain, round-off included.
+/// What bounds tell of a sum of Wyvill points on small cubes: in single precision, a cube in each lane, as in
+/// blob_lanes.h. What they tell is certain, round-off included.
 #pragma once
 
 #include <cstddef>
@@ -35,9 +35,10 @@ struct CubeRoundOff {
 };
 [[nodiscard]] CubeRoundOff cube_round_off(const BlobList& list, float iso);
 
-/// Whether F keeps its sign on cubes. @param half  of their edges, <= 1/2  @param drop  those on which it does are left out, and sums
-/// inside end early @pre round_off.bounded
-void bound_values(const BlobList& list, float iso, const CubeRoundOff& round_off, float half, bool drop, CubeBatch& cubes);
+/// Whether F keeps its sign on cubes. @param half of their edges, <= 1/2 @param drop those on which it does are left
+/// out, and sums inside end early @pre round_off.bounded
+void bound_values(const BlobList& list, float iso, const CubeRoundOff& round_off, float half, bool drop,
+    CubeBatch& cubes);
 
 /// Drops the cubes on which F rises along one direction everywhere. @pre bound_values with the same list and `half`
 void drop_sloped(const BlobList& list, const CubeRoundOff& round_off, float half, CubeBatch& cubes);

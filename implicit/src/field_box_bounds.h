@@ -14,7 +14,8 @@ struct GradientBounds : Field::BoxBounds {
     Vec3 gradient = Vec3::Zero();  ///< [1/m]
     double turn = 0.0;             ///< radius [1/m]
   };
-  /// Of a sum all of whose second derivatives are bounded: what bounds on parts of the box take besides value and gradient at their middles.
+  /// Of a sum all of whose second derivatives are bounded: what bounds on parts of the box take besides value and
+  /// gradient at their middles.
   struct Curved {
     bool known = false;
     CurvatureRange curvature{};  ///< on the box [1/m^2]

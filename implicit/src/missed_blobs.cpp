@@ -20,29 +20,34 @@ constexpr int kHalvings = 4;
 
 std::array<float, 3> middle_of(const std::array<int, 3>& corner, int edge) {
   const float half = 0.5F * static_cast<float>(edge);
-  return {static_cast<float>(corner[0]) + half, static_cast<float>(corner[1]) + half, static_cast<float>(corner[2]) + half};
+  return {static_cast<float>(corner[0]) + half, static_cast<float>(corner[1]) + half,
+      static_cast<float>(corner[2]) + half};
 }
 /// One of the eight cubes of `edge` at `corner`.
 std::array<int, 3> part_of(const std::array<int, 3>& corner, int part, int edge) {
   return {corner[0] + edge * (part & 1), corner[1] + edge * (part >> 1 & 1), corner[2] + edge * (part >> 2)};
 }
 
-/// Blocks of 16^3 cells, cut into leaves of 8^3, tiles of 4^3 and groups of 2^3 cells, each with the blobs that reach it.
+/// Blocks of 16^3 cells, cut into leaves of 8^3, tiles of 4^3 and groups of 2^3 cells, each with the blobs that reach
+/// it.
 class BlobSearch {
  public:
   BlobSearch(const blobs::BlobGrid& grid, float iso) : grid_(grid), iso_(iso) {}
 
   void search(const BlockCoord& block, std::vector<OpenCells>& open) {
-    grid_.gather({std::int64_t{kBlock} * block[0], std::int64_t{kBlock} * block[1], std::int64_t{kBlock} * block[2]}, kBlock, 0, block_);
+    grid_.gather({std::int64_t{kBlock} * block[0], std::int64_t{kBlock} * block[1], std::int64_t{kBlock} * block[2]},
+        kBlock, 0, block_);
     if (block_.count == 0) return;
     for (int l = 0; l < 8; ++l) {
       leaf_corner_ = part_of({0, 0, 0}, l, kLeaf);
-      if (settled(blobs::select_near_first(block_, middle_of(leaf_corner_, kLeaf), 0.5F * kLeaf, leaf_, far_))) continue;
+      const auto middle = middle_of(leaf_corner_, kLeaf);
+      if (settled(blobs::select_near_first(block_, middle, 0.5F * kLeaf, leaf_, far_))) continue;
       found_.block = {2 * block[0] + (l & 1), 2 * block[1] + (l >> 1 & 1), 2 * block[2] + (l >> 2)};
       found_.cell.clear();
       for (int t = 0; t < 8; ++t) {
         const std::array<int, 3> tile = part_of(leaf_corner_, t, kTile);
-        if (!settled(blobs::select_near_first(leaf_, middle_of(tile, kTile), 0.5F * kTile, tile_, far_))) search_tile(tile);
+        const auto middle_of_tile = middle_of(tile, kTile);
+        if (!settled(blobs::select_near_first(leaf_, middle_of_tile, 0.5F * kTile, tile_, far_))) search_tile(tile);
       }
       if (!found_.cell.empty()) open.push_back(found_);
     }
@@ -51,7 +56,9 @@ class BlobSearch {
   [[nodiscard]] std::uint64_t cubes() const { return cubes_; }
 
  private:
-  [[nodiscard]] bool settled(const blobs::PotentialBounds& bounds) const { return bounds.upper <= iso_ || bounds.lower > iso_; }
+  [[nodiscard]] bool settled(const blobs::PotentialBounds& bounds) const {
+    return bounds.upper <= iso_ || bounds.lower > iso_;
+  }
 
   void search_tile(const std::array<int, 3>& tile) {
     cells_.reserve(blobs::kTileNodes);
@@ -80,7 +87,8 @@ class BlobSearch {
     }
   }
   [[nodiscard]] std::array<int, 3> group_at(std::size_t cell) const {
-    return {static_cast<int>(cells_.x[cell]) & -kGroup, static_cast<int>(cells_.y[cell]) & -kGroup, static_cast<int>(cells_.z[cell]) & -kGroup};
+    return {static_cast<int>(cells_.x[cell]) & -kGroup, static_cast<int>(cells_.y[cell]) & -kGroup,
+        static_cast<int>(cells_.z[cell]) & -kGroup};
   }
 
   /// Halves the cells of a group that are left.
@@ -91,7 +99,8 @@ class BlobSearch {
       half *= 0.5F;
       halve(half);
       cubes_ += parts_.count;
-      // An eighth of a cell holds one of its nodes: where F keeps its sign on it nothing is missed there. Smaller parts must have a way.
+      // An eighth of a cell holds one of its nodes: where F keeps its sign on it nothing is missed there. Smaller parts
+      // must have a way.
       const bool has_node = halving == 1;
       blobs::bound_values(group_, iso_, round_off_, half, has_node, parts_);
       blobs::drop_sloped(group_, round_off_, half, parts_);
@@ -151,8 +160,11 @@ class BlobSearch {
   /// The cells that hold the parts left.
   void add_cells() {
     for (std::size_t i = 0; i < parts_.count; ++i) {
-      const auto in_leaf = [](float at, int corner) { return static_cast<std::uint8_t>(static_cast<int>(at) - corner); };
-      const std::array cell{in_leaf(parts_.x[i], leaf_corner_[0]), in_leaf(parts_.y[i], leaf_corner_[1]), in_leaf(parts_.z[i], leaf_corner_[2])};
+      const auto in_leaf = [](float at, int corner) {
+        return static_cast<std::uint8_t>(static_cast<int>(at) - corner);
+      };
+      const std::array cell{in_leaf(parts_.x[i], leaf_corner_[0]), in_leaf(parts_.y[i], leaf_corner_[1]),
+          in_leaf(parts_.z[i], leaf_corner_[2])};
       if (found_.cell.empty() || found_.cell.back() != cell) found_.cell.push_back(cell);
     }
   }
@@ -171,10 +183,12 @@ class BlobSearch {
 
 bool is_sum_of_blobs(const Field& field) {
   const Field::Index& index = field.packed();
-  return index.size() > 0 && index.uniform && index.primitive[0].kind == PackedKind::PointWyvill && !index.blend.active();
+  return index.size() > 0 && index.uniform && index.primitive[0].kind == PackedKind::PointWyvill &&
+      !index.blend.active();
 }
 
-std::vector<OpenCells> find_open_cells(const Field& field, const Lattice& lattice, const Executor& executor, std::uint64_t& cubes) {
+std::vector<OpenCells> find_open_cells(const Field& field, const Lattice& lattice, const Executor& executor,
+    std::uint64_t& cubes) {
   const Field::Index& index = field.packed();
   blobs::BlobGrid grid;
   grid.build(index.primitive, lattice);
@@ -198,7 +212,8 @@ std::vector<OpenCells> find_open_cells(const Field& field, const Lattice& lattic
     BlobSearch search(grid, static_cast<float>(index.iso));
     Part& part = parts[begin / kPerTask];
     for (std::size_t b = begin; b < end; ++b) {
-      search.search({low[0] + static_cast<std::int32_t>(b % count[0]), low[1] + static_cast<std::int32_t>(b / count[0] % count[1]),
+      search.search({low[0] + static_cast<std::int32_t>(b % count[0]),
+          low[1] + static_cast<std::int32_t>(b / count[0] % count[1]),
                      low[2] + static_cast<std::int32_t>(b / count[0] / count[1])}, part.open);
     }
     part.cubes = search.cubes();
@@ -208,7 +223,8 @@ std::vector<OpenCells> find_open_cells(const Field& field, const Lattice& lattic
     cubes += part.cubes;
     for (OpenCells& cells : part.open) open.push_back(std::move(cells));
   }
-  std::sort(open.begin(), open.end(), [](const OpenCells& a, const OpenCells& b) { return lattice::before(a.block, b.block); });
+  std::sort(open.begin(), open.end(),
+      [](const OpenCells& a, const OpenCells& b) { return lattice::before(a.block, b.block); });
   return open;
 }
 

@@ -255,9 +255,10 @@ enum class Flood { Closed, Joined, Known, Several, TooLarge };
 /// The nodes of one label that hang together with a seed: those of a body along edges, those outside across faces of cells too, as in
 /// march_cases.h. Ends at a node of the coarse lattice or of another part.
 /// @param beyond  the label around them; Several where there are more  @param end  the node of the coarse lattice
-Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels, NodeSet& part, Label& beyond,
-            Node& end) {
-  std::array<std::vector<Node>, kFarthest + 1> front;  // by steps to the nearest node of the coarse lattice: those near it first
+Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels,
+    NodeSet& part, Label& beyond, Node& end) {
+  // by steps to the nearest node of the coarse lattice: those near it first
+  std::array<std::vector<Node>, kFarthest + 1> front;
   std::vector<Node> from, next;
   NodeSet other;
   bool several = false;
@@ -409,7 +410,8 @@ struct BlockSeeds {
 };
 
 /// Block by block, cubes one at a time.
-std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Lattice& lattice, const Lattice& fine, const Executor& executor) {
+std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Lattice& lattice, const Lattice& fine,
+    const Executor& executor) {
   std::vector<FieldView> views;
   std::vector<Box> surface;
   for (const Claim& claim : claims) {
@@ -430,8 +432,8 @@ std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Latti
 }
 
 /// The same for a sum of Wyvill points: what many cubes at a time leave open.
-std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> claims, const Lattice& lattice, const Lattice& fine,
-                                     const Executor& executor) {
+std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> claims, const Lattice& lattice,
+    const Lattice& fine, const Executor& executor) {
   std::uint64_t cubes = 0;
   const std::vector<OpenCells> open = find_open_cells(field, lattice, executor, cubes);
   std::vector<BlockSeeds> found(open.size() + 1);
@@ -449,7 +451,8 @@ MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lat
   for (const SearchedBody& body : bodies) claims.emplace_back(body, bodies.size() == 1);
   const bool blobs = bodies.size() == 1 && is_sum_of_blobs(*bodies[0].field);
   const std::vector<BlockSeeds> blocks =
-      blobs ? search_blobs(*bodies[0].field, claims, lattice, fine, executor) : search_blocks(claims, lattice, fine, executor);
+      blobs ? search_blobs(*bodies[0].field, claims, lattice, fine, executor)
+          : search_blocks(claims, lattice, fine, executor);
   std::vector<std::uint32_t> all(bodies.size());
   std::iota(all.begin(), all.end(), 0u);
   MissedPieces found;

@@ -50,7 +50,8 @@ struct Blobs {
   }
 };
 
-/// One to thirty points whose supports reach the middle of a cell somewhere in a block: all around it or, as below a surface, on one side.
+/// One to thirty points whose supports reach the middle of a cell somewhere in a block: all around it or, as below a
+/// surface, on one side.
 Blobs random_blobs(Random& random, const Vec3& middle) {
   Blobs blobs;
   const int count = 1 + static_cast<int>(random.below(3) == 0 ? random.below(30) : random.below(4));
@@ -105,7 +106,8 @@ bool is_sloped(const Blobs& blobs, const Vec3& middle, double half) {
   return cubes.count == 0;
 }
 
-// The iso values between which the sign is not known, by bisection, hold all values on the cube; and they are not far from them.
+// The iso values between which the sign is not known, by bisection, hold all values on the cube; and they are not far
+// from them.
 TEST(CubeLanes, BoundValuesOfSums) {
   Random random(11);
   double excess = 0.0, spread = 0.0;
@@ -142,7 +144,8 @@ TEST(CubeLanes, BoundValuesOfSums) {
   EXPECT_LT(excess, 1.3 * spread);
 }
 
-// The largest cube that counts as sloped, by bisection, has no point where F does not rise along the gradient of its middle.
+// The largest cube that counts as sloped, by bisection, has no point where F does not rise along the gradient of its
+// middle.
 TEST(CubeLanes, FindWhereSumsRise) {
   Random random(12);
   int found = 0;
@@ -175,7 +178,8 @@ TEST(CubeLanes, FindWhereSumsRise) {
 
 /// Blobs whose supports are a cell of kLattice and a little more: some six pieces between its nodes.
 Body small_blobs(std::uint64_t seed) {
-  return random_body({.seed = seed, .parts = 150, .half_width = 1.0, .least_radius = 0.24, .largest_radius = 0.312, .only_points = true});
+  return random_body({.seed = seed, .parts = 150, .half_width = 1.0, .least_radius = 0.24, .largest_radius = 0.312,
+      .only_points = true});
 }
 const Lattice kLattice{.origin = Vec3(0.013, 0.021, 0.017), .cell = 0.24};
 
@@ -218,7 +222,8 @@ std::vector<Piece> pieces_of(const Mesh& mesh, std::size_t first_vertex) {
     for (const auto& t : mesh.triangle) {
       if (find(t[0]) == r) volume += mesh.position[t[0]].cross(mesh.position[t[1]]).dot(mesh.position[t[2]]) / 6.0;
     }
-    pieces.push_back({box.lower.x(), box.lower.y(), box.lower.z(), box.upper.x(), box.upper.y(), box.upper.z(), volume, count});
+    pieces.push_back({box.lower.x(), box.lower.y(), box.lower.z(), box.upper.x(), box.upper.y(), box.upper.z(),
+        volume, count});
   }
   std::sort(pieces.begin(), pieces.end());
   return pieces;
@@ -241,7 +246,8 @@ TEST_P(ManyBlobs, HaveTheSamePiecesOneCubeAtATime) {
   EXPECT_EQ(hash_of(alone), hash_of(mesh));
   EXPECT_LE(found.undecided, expected.undecided);
   EXPECT_EQ(found.pieces, expected.pieces);
-  const std::vector<Piece> own = pieces_of(mesh, coarse.vertex_count()), others = pieces_of(reference, coarse.vertex_count());
+  const std::vector<Piece> own = pieces_of(mesh, coarse.vertex_count()),
+      others = pieces_of(reference, coarse.vertex_count());
   ASSERT_EQ(own.size(), others.size());
   for (std::size_t i = 0; i < own.size(); ++i) {
     for (std::size_t k = 0; k < own[i].size(); ++k) EXPECT_NEAR(own[i][k], others[i][k], 1e-9);
@@ -253,7 +259,8 @@ TEST_P(ManyBlobs, HaveTheSamePiecesOneCubeAtATime) {
 
 INSTANTIATE_TEST_SUITE_P(MissedBlobs, ManyBlobs, ::testing::Range(1, 7));
 
-// Each extremum whose sign is not that of the corners of its cell lies in an open cell: sought by Newton's method from all over the body.
+// Each extremum whose sign is not that of the corners of its cell lies in an open cell: sought by Newton's method from
+// all over the body.
 TEST(MissedBlobs, AreOpenWhereAnExtremumIs) {
   int open_ones = 0;
   for (std::uint64_t seed = 1; seed <= 16; ++seed) {
@@ -261,7 +268,10 @@ TEST(MissedBlobs, AreOpenWhereAnExtremumIs) {
     std::uint64_t cubes = 0;
     std::vector<std::array<int, 3>> open;
     for (const OpenCells& cells : find_open_cells(body.field, kLattice, Executor(2), cubes)) {
-      for (const auto& at : cells.cell) open.push_back({8 * cells.block[0] + at[0], 8 * cells.block[1] + at[1], 8 * cells.block[2] + at[2]});
+      const auto& block = cells.block;
+      for (const auto& at : cells.cell) {
+        open.push_back({8 * block[0] + at[0], 8 * block[1] + at[1], 8 * block[2] + at[2]});
+      }
     }
     const FieldView field(body.field);
     Random random(100 + seed);
@@ -284,10 +294,13 @@ TEST(MissedBlobs, AreOpenWhereAnExtremumIs) {
       }
       if (!(gradient.norm() < 1e-9)) continue;
       std::array<int, 3> cell{};
-      for (int k = 0; k < 3; ++k) cell[static_cast<std::size_t>(k)] = static_cast<int>(std::floor((x[k] - kLattice.origin[k]) / kLattice.cell));
+      for (int k = 0; k < 3; ++k) {
+        cell[static_cast<std::size_t>(k)] = static_cast<int>(std::floor((x[k] - kLattice.origin[k]) / kLattice.cell));
+      }
       bool other_sign = true;
       for (unsigned c = 0; c < 8; ++c) {
-        const Vec3 node = kLattice.origin + kLattice.cell * Vec3(cell[0] + static_cast<int>(c & 1u), cell[1] + static_cast<int>(c >> 1 & 1u), cell[2] + static_cast<int>(c >> 2));
+        const Vec3 node = kLattice.origin + kLattice.cell * Vec3(cell[0] + static_cast<int>(c & 1u),
+            cell[1] + static_cast<int>(c >> 1 & 1u), cell[2] + static_cast<int>(c >> 2));
         other_sign = other_sign && (field.value(node) > 0.0) != (value > 0.0);
       }
       if (!other_sign) continue;
@@ -301,7 +314,8 @@ TEST(MissedBlobs, AreOpenWhereAnExtremumIs) {
 // Cavities of a hundredth to a quarter of a cell, anywhere in a cell.
 TEST(MissedBlobs, AreOpenAroundTheSmallestCavities) {
   Random random(5);
-  const double g = 0.5 * (1.0 + std::sqrt(5.0)), closed = std::sqrt(1.0 - std::cbrt(0.5 / 12.0));  // F = 0 at the origin
+  // F = 0 at the origin
+  const double g = 0.5 * (1.0 + std::sqrt(5.0)), closed = std::sqrt(1.0 - std::cbrt(0.5 / 12.0));
   for (int round = 0; round < 60; ++round) {
     Body body;
     const double distance = closed + 0.011 * std::pow(random.uniform(0.02, 1.0), 2);
