@@ -441,7 +441,7 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
   };
   for (const Case& c : {Case{Shapes::DiscOnBox, 12, 306, 1e-6}, Case{Shapes::DiscOnBox, 12, 437, 1e-10}, Case{Shapes::DiscOnBox, 11, 48, 1e-5},
                         Case{Shapes::DiscOnBox, 11, 6, 1e-4}, Case{Shapes::DiscOnBox, 1234, 69, 1e-4}, Case{Shapes::DiscOnBox, 1234, 134, 1e-6},
-                        Case{Shapes::DiscOnBox, 102, 519, 1e-2}, Case{Shapes::DiscOnBox, 6103, 156, 1e-8}, Case{Shapes::Capsules, 204, 777, 1e-2}, Case{Shapes::Capsules, 1234, 265, 1e-6}, Case{Shapes::Capsules, 77, 967, 1e-5},
+                        Case{Shapes::DiscOnBox, 102, 519, 1e-2}, Case{Shapes::DiscOnBox, 6103, 156, 1e-8}, Case{Shapes::DiscOnBox, 77, 464, 1e-6}, Case{Shapes::Capsules, 204, 777, 1e-2}, Case{Shapes::Capsules, 1234, 265, 1e-6}, Case{Shapes::Capsules, 77, 967, 1e-5},
                         Case{Shapes::Capsules, 101, 852, 1e-5}, Case{Shapes::Blobs, 1234, 227, 1e-3}, Case{Shapes::Blobs, 102, 767, 1e-3},
                         Case{Shapes::Blobs, 1234, 898, 1e-2}, Case{Shapes::Blobs, 831, 178, 1e-4}, Case{Shapes::Blobs, 901, 4, 1e-2},
                         Case{Shapes::Murakami, 1, 451, 1e-6}, Case{Shapes::Murakami, 5, 696, 1e-4}}) {
