@@ -9,19 +9,30 @@
 
 namespace supple::implicit {
 
+namespace {
+
+/// From the core, in its own axes.
+Vec3 off_core(const Kink& kink, const Vec3& x) noexcept {
+  const Vec3 y = kink.to_local * (x - kink.origin);
+  if (kink.form != Kink::Form::Disc) return y - y.cwiseMax(-kink.half).cwiseMin(kink.half);
+  const double rho = std::sqrt(y.x() * y.x() + y.y() * y.y());
+  const double share = rho > kink.half.x() ? (rho - kink.half.x()) / rho : 0.0;
+  return {share * y.x(), share * y.y(), y.z()};
+}
+
+}  // namespace
+
+double Kink::value(const Vec3& x) const noexcept {
+  if (form == Form::Plane) return to_local.row(0).transpose().dot(x - origin) - level;
+  return 0.5 * (off_core(*this, x).squaredNorm() / level - level);
+}
+
 double Kink::value(const Vec3& x, Vec3& gradient) const noexcept {
-  const Vec3 d = x - origin;
   if (form == Form::Plane) {
     gradient = to_local.row(0);
-    return gradient.dot(d) - level;
+    return gradient.dot(x - origin) - level;
   }
-  const Vec3 y = to_local * d;
-  Vec3 v = y - y.cwiseMax(-half).cwiseMin(half);
-  if (form == Form::Disc) {
-    const double rho = std::sqrt(y.x() * y.x() + y.y() * y.y());
-    const double share = rho > half.x() ? (rho - half.x()) / rho : 0.0;
-    v = {share * y.x(), share * y.y(), y.z()};
-  }
+  const Vec3 v = off_core(*this, x);
   gradient = to_local.transpose() * v / level;
   return 0.5 * (v.squaredNorm() / level - level);
 }

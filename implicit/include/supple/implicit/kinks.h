@@ -28,11 +28,7 @@ struct Kink {
 
   /// s [m], a signed distance to first order where `to_local` does not stretch, and its gradient [1].
   [[nodiscard]] double value(const Vec3& x, Vec3& gradient) const noexcept;
-  [[nodiscard]] double value(const Vec3& x) const noexcept {
-    if (form == Form::Plane) return to_local.row(0).transpose().dot(x - origin) - level;
-    Vec3 unused;
-    return value(x, unused);
-  }
+  [[nodiscard]] double value(const Vec3& x) const noexcept;
   /// What s changes by at most within a distance of x [m].
   [[nodiscard]] double change(const Vec3& x, double distance) const noexcept;
 };
