@@ -99,6 +99,7 @@ TEST(MildKinks, AreCrossedByRingsWithinTheErrorAskedAndNearTheirBounds) {
   std::array<std::vector<double>, 4> ratio;
   constexpr std::array<double, 4> kAsked{1e-3, 1e-4, 1e-5, 1e-6};
   constexpr std::array<std::size_t, 4> kMostPoints{700, 1500, 3000, 6000};
+  std::vector<std::size_t> points;
   int crossed = 0;
   for (int pose = 0; pose < 80; ++pose) {
     blobs.next();
@@ -110,6 +111,7 @@ TEST(MildKinks, AreCrossedByRingsWithinTheErrorAskedAndNearTheirBounds) {
       EXPECT_EQ(s.rule, ContactRule::Polar);
       EXPECT_EQ(s.kinks, 0u) << pose << ' ' << kAsked[k];  // none was parted at
       EXPECT_LE(s.points, kMostPoints[k]) << pose;
+      if (k == 0) points.push_back(s.points);
       EXPECT_LE(s.error_estimate, kAsked[k]) << pose;
       const double off = off_by(s, exact);
       EXPECT_LE(off, s.error_estimate) << pose << ' ' << kAsked[k];
@@ -118,6 +120,8 @@ TEST(MildKinks, AreCrossedByRingsWithinTheErrorAskedAndNearTheirBounds) {
     }
   }
   EXPECT_GT(crossed, 60);
+  std::sort(points.begin(), points.end());
+  EXPECT_LE(points.at(points.size() / 2), 48u);  // rings of twelve rays; sectors have 200 and more
   for (std::vector<double>& some : ratio) {
     std::sort(some.begin(), some.end());
     EXPECT_LT(some.at(some.size() / 2), 30.0);
