@@ -256,7 +256,7 @@ void PolarRuleSolver::move_to_corners(PairPressure& pressure, std::span<const st
 }
 
 /// Where a kink meets the rim, begun between points of `fine_rim_`.
-void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& corners) {
+void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Corner>& corners) {
   const std::vector<Vec3>& rim = fine_rim_;
   const std::size_t n = rim.size();
   std::vector<std::size_t> kink;
@@ -286,7 +286,7 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Vec3>& co
     const auto same = [&](std::size_t j) { return kink[j] == kink[i] && (batch.point[j] - batch.point[i]).norm() <= 1e-6 * extent_; };
     bool found = last[i] <= 1e-6 * extent_;  // the panels find others by being parted
     for (std::size_t j = 0; j < i && found; ++j) found = !same(j);
-    if (found) corners.push_back(batch.point[i]);
+    if (found) corners.push_back({batch.point[i], kink[i]});
   }
 }
 
@@ -482,6 +482,21 @@ std::optional<double> PolarRuleSolver::corner_between(PairPressure& pressure, st
   return exact > 0.0 && exact < 1.0 ? exact : share;
 }
 
+/// A kink that one of two neighbouring rays meets twice where the other does not, while they meet the same ones besides.
+std::optional<PolarRuleSolver::Touch> PolarRuleSolver::touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const {
+  const auto same = [](const Crossing& x, const Crossing& y) { return x.kink == y.kink; };
+  const std::span<const Crossing> more = before.size() > here.size() ? before : here, less = before.size() > here.size() ? here : before;
+  if (more.size() != less.size() + 2) return std::nullopt;
+  const auto [there, at] = std::mismatch(more.begin(), more.end(), less.begin(), less.end(), same);
+  const Crossing& x = *there;
+  // Those between the two, which the other ray may meet at the same places of the order.
+  const auto after = std::find_if(there + 1, more.end(), [&](const Crossing& y) { return same(x, y); });
+  if (after == more.end() || x.kink >= kinks_.size()) return std::nullopt;
+  if (!std::equal(there + 1, after, at, at + (after - there - 1), same)) return std::nullopt;
+  if (!std::equal(after + 1, more.end(), at + (after - there - 1), less.end(), same)) return std::nullopt;
+  return Touch{x.kink, 0.0, 0.5 * (x.radius + after->radius) * rays_.radius[x.ray], 0.5 * (x.height + after->height), 0.0, 0.0};
+}
+
 /// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
 void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
@@ -495,6 +510,7 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
   for (std::size_t p = first; p < panels_.size(); ++p) {
     Panel& panel = panels_[p];
     const double half = 0.5 * (panel.end - panel.begin);
+    const auto place_at = [&](double x) { return panel.touches() ? panel.bend(x)[0] : panel.begin + half * (1.0 + x); };
     panel.change = changes_.size();
     std::span<const Crossing> before;
     for (std::size_t k = 0; k < per_panel; ++k) {
@@ -502,8 +518,9 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
       while (next < crossings_.size() && crossings_[next].ray == (p - first) * per_panel + k) ++next;
       const std::span<const Crossing> here = std::span(crossings_).subspan(begin, next - begin);
       const auto differ = std::mismatch(before.begin(), before.end(), here.begin(), here.end(), same);
-      const bool change = differ.first != before.end() || differ.second != here.end();
-      if (k > 0 && change) {
+      const bool changes = differ.first != before.end() || differ.second != here.end();
+      if (k > 0 && changes) {
+        Change change;
         double share = 0.5;
         const auto at = static_cast<std::size_t>(differ.first - before.begin());
         if (before.size() == here.size() && at + 1 < here.size() && same(before[at], here[at + 1]) && same(before[at + 1], here[at])) {
@@ -517,9 +534,16 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
             share = *corner;
             panel.leaves = true;
           }
+        } else if (!by_sectors_) {
+          change.touch = touch_between(before, here);
+          if (change.touch) {
+            change.touch->angle = place_at(rule.node[before.size() > here.size() ? k - 1 : k]);
+            change.touch->from = place_at(rule.node[k - 1]);
+            change.touch->to = place_at(rule.node[k]);
+          }
         }
-        const double places = 1.0 + rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1]);
-        changes_.push_back(panel.touches() ? panel.bend(places - 1.0)[0] : panel.begin + half * places);
+        change.place = place_at(rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1]));
+        changes_.push_back(change);
       }
       before = here;
     }

@@ -288,10 +288,10 @@ void PolarRuleSolver::follow_tangents() {
 
 /// Where kinks meet the rim, p_A = p_B = s = 0, begun on `fine_rim_`.
 void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners) {
-  std::vector<Vec3> found;
+  std::vector<Corner> found;
   find_corners(pressure, found);
-  for (const Vec3& x : found) {
-    const Vec3 d = x - frame_.origin;
+  for (const Corner& corner : found) {
+    const Vec3 d = corner.at - frame_.origin;
     const Vec2 at(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
     corners.push_back({at, d.dot(frame_.axis), Vec2::Zero()});
   }

@@ -20,6 +20,7 @@ constexpr double kEnough = 0.9;         // leaves room for Newton's method
 constexpr std::array<double, kFinestRings + 1> kFall{1.0, 0.1, 0.14, 0.13, 0.28, 0.19};
 /// Over what that, and the rule two before, say; over what half the rays are off by.
 constexpr double kSafety = 12.0, kHalves = 0.5;
+constexpr double kUnseen = 5e-3;        // of the error asked for: two rules agree by chance, seldom to much less than that
 constexpr double kPartedBelow = 5e-5;   // errors for which rays of sectors are parted
 constexpr double kWide = 1.2, kNarrow = 0.7;  // sectors, and the bend of the rim within one [rad]
 
@@ -102,7 +103,7 @@ bool PolarRuleSolver::refine_rings(PairPressure& pressure, double error) {
     const double half = half_the_rays(static_cast<std::size_t>(rules[r].radial));
     const double doubt = std::max(kSafety * std::max(off, kFall[r] * last), kHalves * half);
     last = off;
-    estimate_ = doubt + algebraic_error();
+    estimate_ = doubt + kUnseen * error + algebraic_error();
     kept_rim_.clear();
     for (std::size_t k = 0; k < rim_.size(); ++k) {
       kept_rim_.push_back({rim_.radius[k] * Vec2(rim_.cosine[k], rim_.sine[k]), rim_.height[k], rim_.outward[k]});

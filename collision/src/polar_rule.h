@@ -113,7 +113,7 @@ class PolarRuleSolver {
     std::size_t first = 0, last = 0;  // of `kept_`
     std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
     PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with other radii besides
-    std::array<PatchSums, 4> highest;  // as a polynomial of the angle, its coefficients of the highest degrees, falling
+    std::array<PatchSums, 6> highest;  // as a polynomial of the angle, its coefficients of the highest degrees, falling
     double by_angle = 0.0, by_radius = 0.0;  // what the finest sums may be off by, for either reason
     double by_rim = 0.0;                     // its area, as the rim was left
     int nodes = 0;                    // on a ray that no kink crosses
@@ -136,6 +136,21 @@ class PolarRuleSolver {
     Mat3 bend = Mat3::Zero();
     bool flat = false, told = false;
   };
+  /// Near where a ray touches a kink.
+  struct Touch {
+    std::size_t kink;
+    double angle, radius, height;  // radius in units of u and v
+    double from, to;               // angles that it lies between
+  };
+  /// Where within a panel rays begin to meet other kinks, or in another order.
+  struct Change {
+    double place = 0.0;
+    std::optional<Touch> touch;    // a kink that rays meet twice before it, or after it, and then not at all
+  };
+  struct Corner {
+    Vec3 at;                       // on the rim
+    std::size_t kink;              // that meets it
+  };
   struct Crossing {
     std::size_t ray, kink;
     double radius, height;  // radius over that of the rim
@@ -156,11 +171,12 @@ class PolarRuleSolver {
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
   void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
-  void find_corners(PairPressure& pressure, std::vector<Vec3>& corners);
+  void find_corners(PairPressure& pressure, std::vector<Corner>& corners);
   [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
   void find_crossings(PairPressure& pressure, double error);
   bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
   void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
+  [[nodiscard]] std::optional<Touch> touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const;
   static void follow_signs(std::span<const double> values, std::vector<double>& places);
   bool add_missed_kinks();
   bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
@@ -171,6 +187,16 @@ class PolarRuleSolver {
   void doubt(Panel& panel, const PatchSums& all) const;
   [[nodiscard]] double largest_to_leave(double most) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
+
+  // Rays that touch kinks: touch_kinks.cpp.
+  /// A kink along a ray on Sigma, and the ray's turning.
+  struct Along {
+    double s = 0.0, by_radius = 0.0, by_angle = 0.0;  // s at Sigma above a place near it, and its derivatives there
+    double height = 0.0, rise = 0.0, rise_across = 0.0;  // of Sigma there, and its derivatives
+  };
+  [[nodiscard]] Along along_ray(const PressureBatch& at, std::size_t i, std::size_t kink, double angle, double radius) const;
+  std::optional<double> touching_angle(PairPressure& pressure, const Touch& near);
+  void find_hidden_touches(PairPressure& pressure, std::span<const Corner> corners, std::vector<double>& angles);
 
   // About the middle: middle_rule.cpp.
   struct RimPoint {
@@ -271,7 +297,7 @@ class PolarRuleSolver {
   Rays rays_;
   std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)
   std::vector<Crossing> crossings_;
-  std::vector<double> changes_;          // where within a panel rays begin to meet other kinks, or in another order
+  std::vector<Change> changes_;
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;
   bool by_sectors_ = false;              // rays go through `sectors_`

@@ -57,7 +57,7 @@ void add_highest(KronrodRule& rule) {
     for (double& value : next) value /= length;
     all.push_back(std::move(next));
   }
-  for (std::size_t d = 0; d < rule.highest.size(); ++d) rule.highest[d] = all[n - 1 - d];
+  for (std::size_t d = 0; d < rule.highest.size(); ++d) rule.highest[d] = d < n ? all[n - 1 - d] : std::vector<double>(n, 0.0);
 }
 
 /// Weight of an even number n of equally spaced angles in the trigonometric interpolant, at distance x from an angle:

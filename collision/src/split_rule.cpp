@@ -23,6 +23,7 @@ constexpr double kEnough = 0.9;          // leaves room for that and for Newton'
 constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSameTurn = 1e-7;       // [rad]
+constexpr double kSliversBelow = 1e-6;   // errors at which those between a corner of the rim and the first ray after it matter
 constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
 constexpr double kLeastSight = 0.1;      // cosine between a ray and the normal of the rim: nearer to grazing, rays begin elsewhere
 constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
@@ -254,11 +255,14 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
 /// from one pair of degrees to the next, as the larger rule is exact to far higher ones; as much as they are where they hardly fall.
 /// Such coefficients are the null rules of Berntsen & Espelid 1991, ACM TOMS 17(2).
 double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
-  std::array<double, 4> size;
-  for (std::size_t d = 0; d < size.size(); ++d) size[d] = share_of_difference(panel.highest[d], {}, all);
-  const double high = std::sqrt(size[0] * size[0] + size[1] * size[1]), low = std::sqrt(size[2] * size[2] + size[3] * size[3]);
-  const double fall = high < low ? high / low : 1.0, cube = fall * fall * fall;
-  return high * std::min(fall, (panel.rays >= kFine ? 5.0 : 50.0) * cube * fall);
+  std::array<double, 3> size;  // of pairs
+  for (std::size_t d = 0; d < size.size(); ++d) {
+    size[d] = std::hypot(share_of_difference(panel.highest[2 * d], {}, all), share_of_difference(panel.highest[2 * d + 1], {}, all));
+  }
+  const double high = size[0];
+  const bool fine = panel.rays >= kFine;
+  const double fall = std::min(1.0, std::max(high / size[1], fine ? size[1] / size[2] : 0.0)), cube = fall * fall * fall;
+  return high * std::min(fall, (fine ? 5.0 : 50.0) * cube * fall);
 }
 
 /// What the sums of a panel are off by at most, over those of `all`.
@@ -279,7 +283,8 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   }
   const double on_faces = fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
   if (!panel.even()) {
-    panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf;
+    const auto changes = static_cast<double>(panel.change_end - panel.change);
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {
@@ -310,7 +315,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   const double widest = fine ? kWidest : kWidestCoarse;
   about_middle_ = by_sectors_ = mild_ = false;
   for (;;) {
-    std::vector<Vec3> corners;
+    std::vector<Corner> corners;
     find_corners(pressure, corners);
     struct Turn {
       double angle;
@@ -321,9 +326,14 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
       const double turn = math::atan2(y, x);
       turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
     };
-    for (const Vec3& x : corners) {
-      const Vec3 d = x - frame_.origin;
+    for (const Corner& corner : corners) {
+      const Vec3 d = corner.at - frame_.origin;
       add(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm(), false);
+    }
+    if (error < kSliversBelow) {
+      std::vector<double> hidden;
+      find_hidden_touches(pressure, corners, hidden);
+      for (const double angle : hidden) turns.push_back({angle < 0.0 ? angle + kTurn : angle, true});
     }
     for (const Imprint& imprint : imprints_) {
       for (const Vec2& x : imprint.touches) add(x.x(), x.y(), true);
@@ -432,19 +442,23 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       Panel next;
       next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
       next.begin = panel.begin;
-      const auto end_at = [&](double place) {
+      const auto end_at = [&](double place, bool touch) {
         if (!(place - next.begin > kSameTurn) || !(panel.end - place > kSameTurn)) return;
         next.end = place;
+        next.touch_end = touch;
         finer.push_back(next);
         next.begin = next.end;
-        next.touch_begin = false;
+        next.touch_begin = touch;
       };
       next.touch_begin = panel.touch_begin;
       next.halved = panel.halved || (part && (larger == nullptr || unseen(panel)));
       if (part && panel.change < panel.change_end && !beside && !mild_) {
-        for (std::size_t c = panel.change; c < panel.change_end; ++c) end_at(changes_[c]);
+        for (std::size_t c = panel.change; c < panel.change_end; ++c) {
+          const std::optional<double> touch = changes_[c].touch ? touching_angle(pressure, *changes_[c].touch) : std::nullopt;
+          end_at(touch.value_or(changes_[c].place), touch.has_value());
+        }
       } else if (part && larger == nullptr) {
-        end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end));
+        end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end), false);
       } else {
         by_angle = by_angle || part;
       }
