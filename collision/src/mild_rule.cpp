@@ -21,7 +21,7 @@ constexpr std::array<double, kFinestRings + 1> kFall{1.0, 0.1, 0.14, 0.13, 0.28,
 /// Over what that, and the rule two before, say; over what half the rays are off by.
 constexpr double kSafety = 12.0, kHalves = 0.5;
 constexpr double kUnseen = 5e-3;        // of the error asked for: two rules agree by chance, seldom to much less than that
-constexpr double kPartedBelow = 5e-5;   // errors for which rays of sectors are parted
+constexpr double kFine = 5e-6;           // errors for which rays have more points
 constexpr double kWide = 1.2, kNarrow = 0.7;  // sectors, and the bend of the rim within one [rad]
 
 /// The coarsest rule that is believed: two that are coarse agree by chance where much is asked for.
@@ -68,13 +68,13 @@ bool PolarRuleSolver::solve_mild(PairPressure& pressure, double error) {
 /// fine errors rays are parted at kinks; angles need not be, as the integral along a ray has one more smooth derivative where
 /// a kink leaves the patch or touches the ray.
 bool PolarRuleSolver::solve_mild_sectors(PairPressure& pressure, const ContactSettings& settings) {
-  const bool parted = settings.error < kPartedBelow;
+  const bool parted = settings.error < kMildPartedBelow;
   const std::vector<std::size_t> crossing = crossing_;
   if (!parted) crossing_.clear();
   const double width = parted ? kNarrow : kWide;
   bool fits = make_sectors({}, width, width);
   if (fits) {
-    start_sectors(parted ? 6 : 5);
+    start_sectors(!parted ? 5 : settings.error < kFine ? 8 : 7);
     by_sectors_ = mild_ = true;
     cut_ = false;
     fits = solve_all_panels(pressure, settings, kronrod_rule(3), nullptr, false) && estimate_ <= settings.error;

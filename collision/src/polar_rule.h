@@ -26,6 +26,8 @@ inline constexpr std::size_t kFinestJudged = 3;
 
 /// Errors asked for down to which mild kinks may be left alone; finer ones are reached by parting.
 inline constexpr double kLeastMild = 1e-6;
+/// Errors below which rays are parted at mild kinks, though angles are not.
+inline constexpr double kMildPartedBelow = 5e-5;
 
 /// The ground that a polar patch covers.
 struct PolarCover {
@@ -248,6 +250,7 @@ class PolarRuleSolver {
   static std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
   bool move_to_star(PairPressure& pressure);
   void bend_at_star(PairPressure& pressure, double rate);
+  void find_star_kinks(PairPressure& pressure);
   void cross_star(PairPressure& pressure);
   [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
 

@@ -221,6 +221,7 @@ double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
 void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
   panel.fine = panel.angular = panel.radial = {};
   panel.highest = {};
+  const std::size_t highest = rule.node.size() >= kFine ? panel.highest.size() : panel.highest.size() - 2;
   panel.first = kept_.point.size();
   double rim = 0.0, whole = 0.0, rate = 0.0;
   for (std::size_t k = ray; k < ray + rule.node.size(); ++k) {
@@ -234,7 +235,7 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       weigh(along, x, normal_[i], area_[i], pressure_[i]);
     }
     panel.angular.add(along, rule.gauss_weight[k] / rule.weight[k]);
-    for (std::size_t d = 0; d < panel.highest.size(); ++d) panel.highest[d].add(along, rule.highest[d][k]);
+    for (std::size_t d = 0; d < highest; ++d) panel.highest[d].add(along, rule.highest[d][k]);
     const double area = rule.weight[k] * turn_[ray + k] * rays_.radius[ray + k] * rays_.radius[ray + k];
     rim += area * rim_error(ray + k, rate);
     whole += area;
@@ -256,11 +257,12 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
 /// Such coefficients are the null rules of Berntsen & Espelid 1991, ACM TOMS 17(2).
 double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
   std::array<double, 3> size;  // of pairs
-  for (std::size_t d = 0; d < size.size(); ++d) {
-    size[d] = std::hypot(share_of_difference(panel.highest[2 * d], {}, all), share_of_difference(panel.highest[2 * d + 1], {}, all));
+  const bool fine = panel.rays >= kFine;
+  for (std::size_t d = 0; d < (fine ? size.size() : 2); ++d) {
+    const double one = share_of_difference(panel.highest[2 * d], {}, all), other = share_of_difference(panel.highest[2 * d + 1], {}, all);
+    size[d] = std::sqrt(one * one + other * other);
   }
   const double high = size[0];
-  const bool fine = panel.rays >= kFine;
   const double fall = std::min(1.0, std::max(high / size[1], fine ? size[1] / size[2] : 0.0)), cube = fall * fall * fall;
   return high * std::min(fall, (fine ? 5.0 : 50.0) * cube * fall);
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "polar_rule.h"
 #include "supple/core/math.h"
@@ -232,14 +233,18 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   return true;
 }
 
-/// Kinks that have points of rays to the rim on the other side than the centre; third bodies may all cross.
-void PolarRuleSolver::cross_star(PairPressure& pressure) {
+/// The kinks near the rim and what it encloses.
+void PolarRuleSolver::find_star_kinks(PairPressure& pressure) {
   Box box;
   for (const Vec3& x : fine_rim_) box.include(x);
   const Vec3 grown = 0.5 * kMargin * box.extent(), centre = box.centre();
   box = {centre - grown, centre + grown};
   kinks_.clear();
   all_kinks_ = pressure.kinks(box, kinks_);
+}
+
+/// Those of them that have points of rays to the rim on the other side than the centre; third bodies may all cross.
+void PolarRuleSolver::cross_star(PairPressure& pressure) {
   crossing_.clear();
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
@@ -280,8 +285,13 @@ bool PolarRuleSolver::solve_about_star(PairPressure& pressure, const PeakFrame& 
   about_middle_ = false;
   about_star_ = follow_rim_curve(pressure, fine) && move_to_star(pressure);
   if (!about_star_) return false;
-  cross_star(pressure);
+  find_star_kinks(pressure);
+  crossing_.resize(kinks_.size());
+  std::iota(crossing_.begin(), crossing_.end(), std::size_t{0});
+  const bool any = settings.error >= kMildPartedBelow && only_mild_kinks();  // which of them cross is not asked: they part nothing
+  if (!any) cross_star(pressure);
   const bool mild = settings.error >= kLeastMild && only_mild_kinks() && solve_mild_sectors(pressure, settings);
+  if (any && !mild) cross_star(pressure);
   const bool fits = mild || solve_split(pressure, settings);
   about_star_ = false;
   if (!fits) return false;
