@@ -11,6 +11,14 @@ constexpr std::size_t kMostHills = 16;
 constexpr int kMostSteps = 40;
 constexpr double kNearSigma = 0.1;  // gap over the level, where the level is believed
 
+/// What slopes along the axis say. A body so deep in the other that its pressure hardly falls, or rises, from Sigma on has the extent.
+void set_depths(PeakFrame& frame, double fall, double rise, double extent) {
+  const auto depth = [&](double slope) { return slope * extent > frame.peak ? frame.peak / slope : extent; };
+  frame.depth[0] = depth(fall);
+  frame.depth[1] = depth(rise);
+  frame.thickness = frame.depth[0] + frame.depth[1];
+}
+
 }  // namespace
 
 Principal principal(double xx, double xy, double yy) {
@@ -212,14 +220,12 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     frame.axis = axis;
     frame.flat = flat && on_sigma;
     if (frame.flat || (on_sigma && at_top) || iteration + 1 == kMostSteps) {
-      if (level <= noise || !on_sigma || !(fall > 0.0) || !(rise > 0.0)) return std::nullopt;
+      if (level <= noise || !on_sigma) return std::nullopt;
       frame.origin = x;
       frame.peak = level;
       frame.u = first / std::sqrt(c1);
       frame.v = other / std::sqrt(c2);
-      frame.depth[0] = level / fall;
-      frame.depth[1] = level / rise;
-      frame.thickness = frame.depth[0] + frame.depth[1];
+      set_depths(frame, fall, rise, extent);
       // Sigma: (p_A - p_B)(x) = 0 with slope -steepness along the axis.
       const double cs = p.cosine, sn = p.sine;
       const double d_uu = (a_uu - b_uu) / steepness, d_uv = (a_uv - b_uv) / steepness, d_vv = (a_vv - b_vv) / steepness;
@@ -247,7 +253,7 @@ std::optional<PeakFrame> PeakFinder::find_on_axis(PairPressure& pressure, const 
     pressure.evaluate(batch_);
     const double a = batch_.a[0], b = batch_.b[0];
     const double fall = -batch_.slope_a[0].dot(frame.axis), rise = batch_.slope_b[0].dot(frame.axis), steepness = fall + rise;
-    if (!(fall > 0.0) || !(rise > 0.0)) return std::nullopt;
+    if (!(steepness > 0.0)) return std::nullopt;
     const double noise = 16.0 * std::numeric_limits<double>::epsilon() *
                          std::max(pressure.largest_modulus(), steepness * frame.origin.lpNorm<Eigen::Infinity>());
     const double level = (a * rise + b * fall) / steepness;  // p at the foot on Sigma, to first order
@@ -265,9 +271,7 @@ std::optional<PeakFrame> PeakFinder::find_on_axis(PairPressure& pressure, const 
     frame.peak = level;
     frame.u = u / std::sqrt(curvature);
     frame.v = frame.axis.cross(frame.u);
-    frame.depth[0] = level / fall;
-    frame.depth[1] = level / rise;
-    frame.thickness = frame.depth[0] + frame.depth[1];
+    set_depths(frame, fall, rise, extent);
     frame.height_uu = frame.height_vv = (a_uu - b_uu) / (steepness * curvature);
     return frame;
   }

@@ -11,9 +11,11 @@ namespace supple::collision {
 namespace {
 
 constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
-constexpr double kLeastOverhang = 0.1;   // of a body's normal to the axis, so that columns stay inside the rim
+constexpr double kUpright = 0.3;         // cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it
+constexpr double kLeastSight = 0.1;      // of the same to the ray
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
 constexpr double kOfLast = 0.3;          // of the bound of the rule before: the next may agree with it by chance
+constexpr double kOfLastWhereSmooth = 1e-3;
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
 constexpr double kEnough = 0.9;          // leaves room for Newton's method
@@ -23,7 +25,9 @@ constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer on
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
-constexpr int kEndSteps = 14;
+constexpr int kEndSteps = 40;
+constexpr int kMostOnColumn = 6;
+constexpr double kLeastOfBound = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// What tells whether rule r is enough where no kink is near; far above what force, area and centre are off by, as energies converge later. Its difference from rule r - 1 says so: both converge exponentially, the
@@ -132,8 +136,9 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       moved_[k] = step * step * e.squaredNorm() + lift * lift;
       const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
       if (near && settled) {
-        // Both bodies must fall away from the axis beyond the rim, or their squeezed regions reach over it.
-        if (!(-at > kLeastOverhang * ga.norm()) || !(bt > kLeastOverhang * gb.norm())) return false;
+        const double norm_a = ga.norm(), norm_b = gb.norm();
+        if (!(-at > kUpright * norm_a) && !widen_columns(0, ga / -norm_a, radius * e)) return false;
+        if (!(bt > kUpright * norm_b) && !widen_columns(1, gb / -norm_b, radius * e)) return false;
         done_[k] = 1;
         --open;
         rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
@@ -147,6 +152,16 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
     }
   }
   return open == 0;
+}
+
+/// Columns that hold the squeezed region of a body so deep that it is wider beyond Sigma spread so far that it falls away from them at the rim.
+/// @param outward  normal of the body at the rim   @param across  from the axis to the rim
+bool PolarRuleSolver::widen_columns(int side, const Vec3& outward, const Vec3& across) {
+  const double cosine = (side == 0 ? 1.0 : -1.0) * outward.dot(frame_.axis);
+  const double far = across.norm(), sight = outward.dot(across) / far, aim = std::min(kUpright, 0.5 * sight);
+  if (!(sight > kLeastSight)) return cosine > kLeastSight;
+  spread_[side] = std::max(spread_[side], (aim - cosine) / ((sight - aim) * far));
+  return true;
 }
 
 void PolarRuleSolver::place_nodes(const PolarRule& rule) {
@@ -285,88 +300,109 @@ void PolarRuleSolver::turn(const PolarRule& rule, bool slopes) {
   rim_.height.assign(angles, rim_.height.front());
 }
 
-/// Distance from Sigma, along +axis for A and -axis for B, to where the body's pressure vanishes; the last entry is the
+/// Distance from Sigma along the columns of a side, by their ways, to where the body's pressure vanishes; the last entry is the
 /// column through the peak.
-bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double tolerance) {
+/// @param tolerance  of the last step, over the thickness   @param inside  the same of steps from where there is pressure
+bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double tolerance, double inside) {
   const std::size_t n = node_.size() + 1;
-  const double sign = side == 0 ? 1.0 : -1.0;
   std::vector<double>& end = end_[side];
   end.resize(n);
   line_point_.resize(n);
   line_value_.resize(n);
   line_slope_.resize(n);
+  low_.assign(n, 0.0);
+  high_.assign(n, extent_);
   const double floor = 16.0 * kEpsilon * pressure.modulus(side);
   for (std::size_t i = 0; i + 1 < n; ++i) {
     const Vec3& g = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
-    const double fall = -sign * g.dot(frame_.axis);
-    if (!(fall > 0.0)) return false;
-    end[i] = pressure_[i] / fall;
+    const double fall = -g.dot(column(i).way);
+    end[i] = fall * frame_.depth[side] > 0.5 * pressure_[i] ? pressure_[i] / fall : 2.0 * frame_.depth[side];
   }
   end[n - 1] = frame_.depth[side];
   for (int iteration = 0; iteration < kEndSteps; ++iteration) {
     reached_ = end;
-    for (std::size_t i = 0; i + 1 < n; ++i) line_point_[i] = node_.point[i] + (sign * end[i]) * frame_.axis;
-    line_point_[n - 1] = peak_ + (sign * end[n - 1]) * frame_.axis;
+    for (std::size_t i = 0; i < n; ++i) line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
     pressure.evaluate(side, line_point_, line_value_, line_slope_);
     bool moved = false;
     for (std::size_t i = 0; i < n; ++i) {
-      const double fall = -sign * line_slope_[i].dot(frame_.axis);
-      if (!(fall > kLeastOverhang * line_slope_[i].norm())) {
-        if (!(line_value_[i] < 0.0)) return false;
-        end[i] *= 0.5;  // so far beyond the surface that the support may have ended
-        moved = true;
-        continue;
-      }
-      const double step = line_value_[i] / fall;
-      if (std::abs(step) > tolerance * frame_.thickness && std::abs(line_value_[i]) > floor) moved = true;
-      end[i] = std::max(end[i] + step, 0.0);
-      if (!(end[i] <= extent_)) return false;
+      const double fall = -line_slope_[i].dot(column(i).way), newton = end[i] + line_value_[i] / fall;
+      (line_value_[i] > 0.0 ? low_[i] : high_[i]) = end[i];
+      // Where a body is deep its pressure rises first; far beyond its surface the support may have ended.
+      const double next = fall > 0.0 && newton >= low_[i] && newton <= high_[i] ? newton : 0.5 * (low_[i] + high_[i]);
+      const double enough = line_value_[i] >= 0.0 ? inside : tolerance;
+      if (std::abs(next - end[i]) > enough * frame_.thickness && std::abs(line_value_[i]) > floor) moved = true;
+      end[i] = next;
     }
     if (!moved) return true;
   }
   return false;
 }
 
-/// @param column  Gauss points, or as many as would be as exact
-bool PolarRuleSolver::add_columns(PairPressure& pressure, int column, int side, double error, Region region, PatchPoints& points) {
+/// Ways of the columns of a side, and how what they enclose widens; the last one is that through the peak. @return false where two of them meet
+bool PolarRuleSolver::start_columns(int side) {
+  const std::size_t n = node_.size();
+  const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
+  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, 0.0, 1.0});
+  if (spread == 0.0) return true;
+  for (std::size_t i = 0; i <= n; ++i) {
+    const Vec3 d = (i < n ? node_.point[i] : peak_) - frame_.origin, across = d - d.dot(frame_.axis) * frame_.axis;
+    Column& along = column_[i];
+    along.way += spread * across;
+    along.spread = spread;
+    if (i < n) along.narrow = 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis);
+    if (!(along.narrow > 0.0)) return false;
+  }
+  return true;
+}
+
+/// @param nodes  of Gauss along a column, or as many as would be as exact
+bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
   const bool from_ends = region == Region::Sums && !cut_;
-  // The slope there is off by as much as the place, as a kernel may change its formula at the surface; the length by its square.
-  if (!column_ends(pressure, side, std::min(1e-3, from_ends ? error : 0.1 * std::sqrt(error)))) return false;
+  if (!start_columns(side)) return false;
+  if (spread_[side] > 0.0) nodes = kMostOnColumn;
+  // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
+  const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
+  if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
   const std::size_t n = node_.size();
   thickness_ += end_[side][summit_];
-  const double sign = side == 0 ? 1.0 : -1.0;
-  for (std::size_t i = 0; i < n; ++i) points.displaced[side] += weight_[i] * end_[side][i];
+  for (std::size_t i = 0; i < n; ++i) points.displaced[side] += weight_[i] * column(i).volume(end_[side][i]);
   // Pressures and slopes at both ends are known, but third bodies may press harder somewhere between.
   if (from_ends) {
-    const TwoEndRule& rule = two_end_rule(column - 2);
+    const TwoEndRule& rule = two_end_rule(nodes - 2);
     const std::size_t between = rule.node.size();
-    const Vec3 axis = frame_.axis;
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
-      const double length = reached_[i], last = line_value_[i], slope = sign * line_slope_[i].dot(axis);
+      const Column& along = column(i);
+      const double length = reached_[i], last = line_value_[i], slope = line_slope_[i].dot(along.way);
       const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
-      const double sum = rule.end * (pressure_[i] + last) + rule.slope * length * (sign * begins.dot(axis) - slope);
-      points.energy += weight_[i] * (length * sum + rest);
+      const double width = along.width(0.0), width_there = along.width(length);
+      const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.widens(0.0);
+      const double last_slope = slope * width_there + last * along.widens(length);
+      const double sum = rule.end * (pressure_[i] * width + last * width_there) + rule.slope * length * (first_slope - last_slope);
+      points.energy += weight_[i] * (length * sum + rest * width_there);
     }
     if (between == 0) return true;
     line_point_.resize(n * between);
     line_value_.resize(n * between);
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < between; ++j) line_point_[i * between + j] = node_.point[i] + (sign * reached_[i] * rule.node[j]) * axis;
+      for (std::size_t j = 0; j < between; ++j) line_point_[i * between + j] = node_.point[i] + (reached_[i] * rule.node[j]) * column(i).way;
     }
     pressure.evaluate(side, line_point_, line_value_);
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < between; ++j) points.energy += weight_[i] * reached_[i] * rule.weight[j] * line_value_[i * between + j];
+      for (std::size_t j = 0; j < between; ++j) {
+        const double width = column(i).width(reached_[i] * rule.node[j]);
+        points.energy += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
+      }
     }
     return true;
   }
-  const GaussRule& gauss = gauss_rule(column);
+  const GaussRule& gauss = gauss_rule(nodes);
   const std::size_t begin = points.volume_point.size();
   for (std::size_t i = 0; i < n; ++i) {
     const double length = end_[side][i];
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
-      points.volume_point.push_back(node_.point[i] + (sign * length * gauss.node[j]) * frame_.axis);
-      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j]);
+      points.volume_point.push_back(node_.point[i] + (length * gauss.node[j]) * column(i).way);
+      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).width(length * gauss.node[j]));
       points.volume_side.push_back(static_cast<std::uint8_t>(side));
     }
   }
@@ -425,6 +461,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   cut_ = false;
   about_middle_ = by_sectors_ = mild_ = false;
   rise_.setZero();
+  spread_ = {};
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
@@ -489,16 +526,18 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
     }
     if (r == first) continue;
     const double last_difference = difference;
-    difference = smooth   ? error_where_smooth(r, fine_, coarse_, rim_moved())
+    difference = smooth   ? std::max(error_where_smooth(r, fine_, coarse_, rim_moved()), kOfLastWhereSmooth * last_difference)
                  : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
                           : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
     if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kEnough * error));
     if (difference > kEnough * error && r < last) continue;
     estimate_ = difference + algebraic_error();
     if (estimate_ > error && !any) return false;
-    // Which rule is enough is not asked of this bound, as energies converge later.
+    // Which rule is enough is not asked of this bound, as energies converge later; but two rules agree by chance where it is far above what they say.
     if (r <= kFinestJudged && (smooth || (!any && third_.empty() && error < kSplitBelow && clear_of_kinks(pressure)))) {
-      estimate_ = std::min(estimate_, bound_by_ends(r, round));
+      const double bound = bound_by_ends(r, round), least = (r == kFinestJudged ? kLeastOfFinest : kLeastOfBound) * bound;
+      if (least > error && r < last) continue;
+      estimate_ = std::min(std::max(estimate_, least), bound);
     }
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);

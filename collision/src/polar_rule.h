@@ -83,14 +83,16 @@ class PolarRuleSolver {
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
   void start_outline(const PolarRule& rule);
+  bool widen_columns(int side, const Vec3& outward, const Vec3& across);
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
   void keep_along_axis(PatchSums& sums) const;
   void turn(const PolarRule& rule, bool slopes);
   bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
-  bool add_columns(PairPressure& pressure, int column, int side, double error, Region region, PatchPoints& points);
-  bool column_ends(PairPressure& pressure, int side, double tolerance);
+  bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
+  bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
+  bool start_columns(int side);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
@@ -254,7 +256,20 @@ class PolarRuleSolver {
   void cross_star(PairPressure& pressure);
   [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
 
+  /// A line from a node through a squeezed region. Where columns spread, X = node + t way, across from the axis by 1 + t spread times as far as the
+  /// node, and t has the area of the node's foot times (1 + t spread)(narrow + t spread).
+  struct Column {
+    Vec3 way;  // of length 1 along the axis
+    double spread = 0.0, narrow = 1.0;
+    [[nodiscard]] double width(double t) const { return (1.0 + spread * t) * (narrow + spread * t); }
+    [[nodiscard]] double widens(double t) const { return spread * (1.0 + narrow + 2.0 * spread * t); }
+    [[nodiscard]] double volume(double t) const { return t * (narrow + spread * t * (0.5 * (1.0 + narrow) + spread * t / 3.0)); }
+  };
+
   PeakFrame frame_;
+  std::array<double, 2> spread_{};  // of the columns of each side, across over along [1/m], a metre from the axis
+  std::vector<Column> column_;  // by node, and that through the peak; one for all where they do not spread
+  [[nodiscard]] const Column& column(std::size_t i) const { return column_[column_.size() == 1 ? 0 : i]; }
   Vec3 peak_ = Vec3::Zero();
   double largest_ = 0.0;
   std::size_t summit_ = 0;  // node where it is; their number: at the peak
