@@ -43,6 +43,7 @@ std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::sp
                                        std::span<const BodyPair> joined, SleepState& state) {
   const auto count = static_cast<std::uint32_t>(state.island.size());
   SUPPLE_EXPECTS(motion.size() == count && rule.speed > 0.0 && rule.time > 0.0);
+  const double time = std::max(rule.time, 2.0 * dt);  // only after a whole step it shows whether the load is carried
   bool any = false;
   for (std::uint32_t i = 0; i < count; ++i) {
     if (state.asleep(i)) continue;
@@ -52,10 +53,9 @@ std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::sp
       continue;
     }
     if (state.quiet_for[i] == 0.0) state.quiet_from[i] = now.velocity;
-    state.quiet_for[i] = std::min(state.quiet_for[i] + dt, rule.time);
-    if (state.quiet_for[i] < rule.time) continue;
-    const double watched = std::max(rule.time - dt, 0.0);
-    if ((now.velocity - state.quiet_from[i]).dot(now.load) > kGivesWay * now.load.squaredNorm() * watched) {
+    state.quiet_for[i] = std::min(state.quiet_for[i] + dt, time);
+    if (state.quiet_for[i] < time) continue;
+    if ((now.velocity - state.quiet_from[i]).dot(now.load) > kGivesWay * now.load.squaredNorm() * (time - dt)) {
       state.quiet_for[i] = 0.0;
     } else {
       any = true;
@@ -76,7 +76,7 @@ std::vector<std::uint32_t> fall_asleep(const SleepRule& rule, double dt, std::sp
   }
   std::vector<std::uint8_t> restless(count, 0);
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (!state.asleep(i) && state.quiet_for[i] < rule.time) restless[find(i)] = 1;
+    if (!state.asleep(i) && state.quiet_for[i] < time) restless[find(i)] = 1;
   }
   std::vector<std::uint32_t> slept;
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -404,8 +404,9 @@ double ExternalLoad::factor(double time) const {
 }
 
 bool ExternalLoad::changes(double from, double to) const {
+  const double since = from - 4.0 * std::numeric_limits<double>::epsilon() * std::abs(from);
   const double steady = end - begin > 2.0 * ramp ? ramp : 0.5 * (end - begin);
-  return (from < begin + steady && to >= begin) || (from < end && to >= end - steady);
+  return (since <= begin + steady && to >= begin) || (since <= end && to >= end - steady);
 }
 
 double ExternalLoad::mean(double from, double to) const {

@@ -103,7 +103,6 @@ implicit::FieldView lead(const FixedBody& body, double time, LedSolid& led) {
   led.pose = place.pose;
   led.velocity = place.velocity;
   led.spin = place.spin;
-  led.moves = place.moves;
   if (const auto* plane = std::get_if<implicit::HalfSpace>(&body.solid)) {
     led.solid = implicit::HalfSpace{place.pose.position, plane->normal, plane->slope};
   } else if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) {
@@ -314,13 +313,17 @@ void place_and_index_all(const StageContext& context, const core::ParticleState&
   }
 }
 
-std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, double until, Frame& frame) {
   std::vector<std::uint32_t> stirred;
-  view_fixed_bodies(context.model, context.time, false, frame);
-  for (std::size_t k = 0; k < frame.led.size(); ++k) {
-    if (!frame.led[k].moves) continue;
-    place_resting(context, particles, frame);
-    frame.resting_boxes.find(frame.reach[context.bodies.size() + k], stirred);
+  const std::vector<FixedBody>& fixed = context.model.fixed;
+  const auto led_along = [&](const FixedBody& body) { return moves(body.motion, context.time, until); };
+  if (std::none_of(fixed.begin(), fixed.end(), led_along)) return stirred;
+  place_resting(context, particles, frame);
+  for (const double time : {context.time, until}) {
+    view_fixed_bodies(context.model, time, false, frame);
+    for (std::size_t k = 0; k < fixed.size(); ++k) {
+      if (led_along(fixed[k])) frame.resting_boxes.find(frame.reach[context.bodies.size() + k], stirred);
+    }
   }
   return stirred;
 }

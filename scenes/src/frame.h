@@ -28,7 +28,6 @@ struct LedSolid {
   Pose pose;
   Vec3 velocity = Vec3::Zero();
   Vec3 spin = Vec3::Zero();
-  bool moves = false;
 };
 
 /// What searches between the nodes of lattices found, of meshes of bodies.
@@ -127,8 +126,8 @@ void place_and_index(const StageContext& context, const core::ParticleState& par
 /// The same for every body with a surface.
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 
-/// Bodies that rest whose supports reach a fixed body that moves, at context.time.
-[[nodiscard]] std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles,
+/// Bodies that rest whose supports reach a fixed body that is led along in [context.time, until], where it is at either end [s].
+[[nodiscard]] std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, double until,
                                                       Frame& frame);
 
 /// Stages 2 to 6: from particles to the contact surface, with its energy if asked for. Warm starts are read from and written to `samples`.

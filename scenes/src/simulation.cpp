@@ -368,7 +368,7 @@ struct Simulation::Impl {
     if (!scene.sleep) return;
     std::vector<std::uint32_t> loaded = newly_loaded(bodies, laws, time(), time() + dt());
     if (awake.size() < bodies.size()) {
-      const std::vector<std::uint32_t> stirred = find_stirred(context(), state.particles, frame);
+      const std::vector<std::uint32_t> stirred = find_stirred(context(), state.particles, time() + dt(), frame);
       loaded.insert(loaded.end(), stirred.begin(), stirred.end());
     }
     wake(loaded);

@@ -64,7 +64,6 @@ SolidPlace place_at(const SolidMotion& motion, double time) {
   SUPPLE_EXPECTS(!motion.keys.empty());
   const std::vector<ObstacleKeyDesc>& keys = motion.keys;
   Row row = row_of(keys.front()), rate = Row::Zero();
-  bool moves = false;
   if (time >= keys.back().time) {
     row = row_of(keys.back());
   } else if (time >= keys.front().time) {
@@ -74,12 +73,18 @@ SolidPlace place_at(const SolidMotion& motion, double time) {
     const double s = time - keys[k].time;
     row = p.c0 + s * (p.c1 + s * (p.c2 + s * p.c3));
     rate = p.c1 + s * (2.0 * p.c2 + s * 3.0 * p.c3);
-    moves = row_of(keys[k]) != row_of(keys[k + 1]);
   }
   return {.pose = {row.head<3>(), core::rotation_exp(row[3] * motion.axis)},
           .velocity = rate.head<3>(),
-          .spin = rate[3] * motion.axis,
-          .moves = moves};
+          .spin = rate[3] * motion.axis};
+}
+
+bool moves(const SolidMotion& motion, double from, double to) {
+  const std::vector<ObstacleKeyDesc>& keys = motion.keys;
+  for (std::size_t k = 0; k + 1 < keys.size(); ++k) {
+    if (keys[k].time <= to && keys[k + 1].time >= from && row_of(keys[k]) != row_of(keys[k + 1])) return true;
+  }
+  return false;
 }
 
 double largest_speed(const SolidMotion& motion, double radius) {

@@ -35,7 +35,9 @@ TEST(Islands, FallAsleepWhenAllOfThemHaveBeenQuietLongEnough) {
 TEST(Islands, AreNotQuietAtOrAboveTheSpeed) {
   SleepState state = awake(2);
   const double limit = 0.5 * kRule.speed * kRule.speed;
-  EXPECT_EQ(fall_asleep(kRule, 0.25, std::vector<BodyMotion>{{.energy = 0.99 * limit}, {.energy = limit}}, {}, state), (Bodies{0}));
+  const std::vector<BodyMotion> motion{{.energy = 0.99 * limit}, {.energy = limit}};
+  fall_asleep(kRule, 0.125, motion, {}, state);
+  EXPECT_EQ(fall_asleep(kRule, 0.125, motion, {}, state), (Bodies{0}));
 }
 
 TEST(Islands, DoNotRestWhileTheyGiveWayToTheirLoad) {
@@ -52,15 +54,28 @@ TEST(Islands, DoNotRestWhileTheyGiveWayToTheirLoad) {
   EXPECT_EQ(slept, (Bodies{2}));
 }
 
+TEST(Islands, FallForAWholeStepAtLeastBeforeTheyAreTakenToRest) {
+  // Steps longer than the rule's time: the body falls slowly, and is never held.
+  SleepState state = awake(1);
+  const double dt = 1.0, weight = 0.01;
+  for (int step = 1; step <= 8; ++step) {
+    const double v = weight * dt * step;
+    EXPECT_TRUE(fall_asleep(kRule, dt, std::vector<BodyMotion>{{.energy = 0.5 * v * v, .velocity = Vec3(0, 0, -v), .load = Vec3(0, 0, -weight)}}, {}, state)
+                    .empty());
+  }
+}
+
 TEST(Islands, AreNotJoinedByWhatIsFixed) {
   SleepState state = awake(2);
   const std::vector<BodyPair> joined{{0, 2}, {1, 2}};  // 2: the ground
-  EXPECT_EQ(fall_asleep(kRule, 1.0, std::vector<BodyMotion>{kStill, kFast}, joined, state), (Bodies{0}));
+  const std::vector<BodyMotion> motion{kStill, kFast};
+  fall_asleep(kRule, 1.0, motion, joined, state);
+  EXPECT_EQ(fall_asleep(kRule, 1.0, motion, joined, state), (Bodies{0}));
 }
 
 TEST(Islands, WakeWhole) {
   SleepState state = awake(4);
-  fall_asleep(kRule, 1.0, std::vector<BodyMotion>(4, kStill), std::vector<BodyPair>{{1, 3}}, state);
+  for (int step = 0; step < 2; ++step) fall_asleep(kRule, 1.0, std::vector<BodyMotion>(4, kStill), std::vector<BodyPair>{{1, 3}}, state);
   EXPECT_EQ(wake(Bodies{3}, state), (Bodies{1, 3}));
   EXPECT_FALSE(state.asleep(1));
   EXPECT_TRUE(state.asleep(0));

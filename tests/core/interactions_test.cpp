@@ -405,6 +405,18 @@ TEST(ExternalLoads, MeansOverStepsHoldTheWholeImpulse) {
   EXPECT_FALSE(ramped.changes(0.33, 0.61));
 }
 
+TEST(ExternalLoads, ChangeInTheStepThatFirstFeelsThem) {
+  // Steps whose times meet up to rounding, loads that begin or end just there: the next step never takes the factor that was.
+  for (int n = 1; n < 200; ++n) {
+    const double end = (n - 1) * (1.0 / 24) + 1.0 / 24, next = n * (1.0 / 24), later = next + 1.0 / 24;
+    for (const double at : {n / 24.0, end, next, 0.5 * (end + next)}) {
+      if (at < std::min(end, next) || at > std::max(end, next)) continue;
+      EXPECT_TRUE((ExternalLoad{.begin = at, .end = 100.0}.changes(next, later))) << n;
+      EXPECT_TRUE((ExternalLoad{.end = at}.changes(next, later))) << n;
+    }
+  }
+}
+
 TEST(ExternalLoads, AndGravityAreKeptApartFromInternalLoads) {
   Crowd crowd = make_crowd(10, 38);
   const Evaluated inside = evaluate_loads(crowd.p, crowd.interactions, Executor(1), 0.5);

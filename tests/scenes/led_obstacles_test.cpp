@@ -30,12 +30,14 @@ TEST(SolidMotion, PassesItsKeysAndStandsStillBeyondThem) {
       EXPECT_NEAR((place_at(motion, key.time).pose.position - key.at).norm(), 0, 1e-14);
       EXPECT_NEAR((place_at(motion, key.time - 1e-9).pose.position - key.at).norm(), 0, 1e-9 * largest_speed(motion, 0.0) + 1e-14);
     }
-    for (const double time : {0.0, 0.999, 6.0, 9.0, 4.5}) {
-      EXPECT_FALSE(place_at(motion, time).moves) << time;
+    for (const double time : {0.0, 0.999, 6.001, 9.0, 4.5}) {
+      EXPECT_FALSE(moves(motion, time, time == 4.5 ? 4.6 : time)) << time;
       EXPECT_EQ(place_at(motion, time).velocity, Vec3::Zero().eval()) << time;
     }
     EXPECT_EQ(place_at(motion, 4.5).pose.position.x(), 6.0);
-    EXPECT_TRUE(place_at(motion, 1.5).moves);
+    EXPECT_TRUE(moves(motion, 1.5, 1.5));
+    EXPECT_TRUE(moves(motion, 0.9, 1.1));
+    EXPECT_TRUE(moves(motion, 0.0, 9.0));
   }
 }
 
@@ -184,6 +186,27 @@ objects:
   EXPECT_TRUE(simulation.state().sleep.asleep(0));
   EXPECT_NEAR(simulation.state().particles.position[0].z(), -0.8, 5e-3);
   EXPECT_LT(simulation.audits().momentum_error, 1e-11);
+}
+
+TEST(LedObstacles, WakeWhatTheyReachInAMotionWithinOneStep) {
+  // The wall comes from beyond the ball's support into its surface between two steps, and stands.
+  Simulation simulation = make(R"(
+schema: 1
+duration: 4 s
+frame_rate: 20
+time_step: {substeps: 1}
+sleep: {speed: 0.01, time: 0.2}
+obstacles: [{name: wall, shape: box, half_sizes: [0.1, 1, 1], modulus: 1e4, between: linear, keys: [{time: 1.01, at: [-0.3, 0, 0]}, {time: 1.04, at: [-0.18, 0, 0]}]}]
+objects:
+  - name: ball
+    particles: {at: [0, 0, 0], mass: 2}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]
+    contact: {modulus: 1e3}
+)");
+  while (simulation.time() < 0.99) simulation.step_frame();
+  EXPECT_TRUE(simulation.state().sleep.asleep(0));
+  while (simulation.time() < 3.9) simulation.step_frame();
+  EXPECT_GT(simulation.state().particles.position[0].x(), 0.02);
 }
 
 }  // namespace

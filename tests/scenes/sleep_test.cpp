@@ -5,6 +5,9 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <iomanip>
+#include <limits>
+#include <sstream>
 
 #include "rest.h"
 #include "supple/scenes/read_scene.h"
@@ -209,6 +212,26 @@ TEST(Sleep, EndsWhenALoadChanges) {
   EXPECT_FALSE(asleep(simulation, "rod"));
   EXPECT_GT(simulation.state().particles.position[0].x(), 0.3);
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(simulation.state().particles.position[i], awake.state().particles.position[i]);
+}
+
+TEST(Sleep, EndsWhenALoadBeginsAtTheTimeOfAFrame) {
+  // At all of these times; a twenty-fourth of a second is no binary fraction, so steps meet up to rounding only.
+  for (int frame = 12; frame <= 60; ++frame) {
+    std::ostringstream from;
+    from << std::setprecision(17) << frame / 24.0;
+    const std::string head = "schema: 1\nduration: 4 s\nframe_rate: 24\n", object =
+        "objects:\n  - name: a\n    particles: {arrange: single, mass: 0.2, inertia_radius: 0.1}\n    loads: [{particle: 0, force: [5, 0, 0], from: " +
+        from.str() + " s}]\n";
+    Simulation simulation = make(head + "sleep: {speed: 0.02, time: 0.2}\n" + object), awake = make(head + object);
+    while (simulation.frame() < frame) simulation.step_frame();
+    EXPECT_TRUE(asleep(simulation, "a"));
+    simulation.advance_to(73);
+    awake.advance_to(73);
+    EXPECT_EQ(simulation.state().particles.position[0].x(), awake.state().particles.position[0].x()) << frame;
+    const double t = 3.0 - frame / 24.0, way = 0.5 * 25.0 * t * t;
+    const double rounding = static_cast<double>(awake.state().steps) * std::numeric_limits<double>::epsilon();
+    EXPECT_NEAR(awake.state().particles.position[0].x(), way, rounding * way) << frame;
+  }
 }
 
 TEST(Sleep, EndsByAnImpulse) {

@@ -1,8 +1,8 @@
 /// @file supple/collision/sleep.h
 /// Bodies that rest need not be moved. A body is quiet while its kinetic energy over its mass is below speed^2 / 2; it rests
-/// when it has been quiet for long enough and something carried its load meanwhile. What touches, directly or through others,
-/// is an island. An island all of whose bodies rest falls asleep, and wakes as a whole when one of them is woken. Solids that
-/// stand still join nothing.
+/// when it has been quiet for long enough, two steps at least, and something carried its load meanwhile. What touches,
+/// directly or through others, is an island. An island all of whose bodies rest falls asleep, and wakes as a whole when one of
+/// them is woken. Solids that stand still join nothing.
 #pragma once
 
 #include <cstdint>

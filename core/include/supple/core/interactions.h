@@ -98,7 +98,8 @@ struct ExternalLoad {
   [[nodiscard]] double factor(double time) const;  ///< in [0, 1]
   /// Mean of the factor over [from, to], from < to: a step that is given it holds the whole impulse, however short the load.
   [[nodiscard]] double mean(double from, double to) const;
-  /// Whether the factor changes after `from`, up to and at `to`.
+  /// Whether the factor changes in [from, to]; a change at either end counts, and one that rounding puts just before `from`: of
+  /// steps that follow each other, the one that ends as the load begins and the one that first feels it both say so.
   [[nodiscard]] bool changes(double from, double to) const;
 };
 
