@@ -27,7 +27,8 @@ Motion measure_motion(const ParticleSet& set, const ParticleState& state) {
     motion.momentum += momentum;
     motion.angular_momentum += state.position[i].cross(momentum) + spin_momentum;
     motion.momentum_scale += momentum.norm();
-    motion.angular_momentum_scale += (state.position[i] - centre).norm() * momentum.norm() + spin_momentum.norm();
+    const double gyration = std::sqrt(0.5 * set.inertia[i].sum() / set.mass[i]);
+    motion.angular_momentum_scale += ((state.position[i] - centre).norm() + gyration) * momentum.norm() + spin_momentum.norm();
   }
   return motion;
 }

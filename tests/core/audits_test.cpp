@@ -24,7 +24,7 @@ TEST(Motion, OfARigidRotationIsKnown) {
   EXPECT_EQ(motion.momentum, Vec3::Zero());
   EXPECT_EQ(motion.angular_momentum, Vec3(0, 0, 2 * 6.0 + 3.0));
   EXPECT_DOUBLE_EQ(motion.momentum_scale, 12.0);
-  EXPECT_DOUBLE_EQ(motion.angular_momentum_scale, 15.0);
+  EXPECT_DOUBLE_EQ(motion.angular_momentum_scale, 15.0 + 12.0 * std::sqrt(0.5 * 3 * 0.5 / 2.0));
 }
 
 TEST(ShapeError, VanishesForEveryRigidMotion) {

@@ -288,6 +288,27 @@ TEST(SeparateBodies, TouchEachOther) {
   EXPECT_EQ(one.bodies().size(), 2u);
 }
 
+// What stops it has a lever about the origin, and it neither turns nor is there anything else: the scale is not that of its spin.
+TEST(Obstacles, ThatStopASingleBallLeaveTheBalanceOfAngularMomentum) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 0.5 s
+frame_rate: 20
+gravity: [0, 0, -9.81]
+contact: {error: 1e-2}
+obstacles: [{name: table, shape: box, half_sizes: [0.5, 0.5, 0.05]}]
+objects:
+  - name: ball
+    particles: {at: [0.03, 0.02, 0.3], velocity: [0, 0, -3], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.3}}]
+    contact: {modulus: 2e5}
+)");
+  run(simulation, 11);
+  EXPECT_GT(simulation.state().particles.velocity[0].z(), 0.0);
+  EXPECT_LT(simulation.audits().angular_momentum_error, 1e-12);
+  EXPECT_LT(simulation.audits().momentum_error, 1e-12);
+}
+
 // Six that move make 15 pairs, and each of them two with what stands still.
 TEST(SeparateBodies, AreCountedAsPairsOneByOne) {
   Simulation simulation = make(row_of_balls(true) + "ground: {height: -1}\nobstacles: [{name: end, shape: plane, at: [3, 0, 0], normal: [-1, 0, 0]}]\n");

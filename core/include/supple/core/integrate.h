@@ -82,7 +82,9 @@ struct Motion {
   Vec3 momentum = Vec3::Zero();
   Vec3 angular_momentum = Vec3::Zero();
   double momentum_scale = 0.0;          ///< sum m |v| [N s]
-  double angular_momentum_scale = 0.0;  ///< sum |x - c| m |v| + |L| [N m s], c the centre of mass
+  /// Sum of (|x - c| + k) m |v| + |L| [N m s]: c is the centre of mass, k the root mean square distance of a particle's own mass
+  /// from its centre, 2 k^2 = tr I / m. Without k a single particle that does not turn would have none.
+  double angular_momentum_scale = 0.0;
 };
 [[nodiscard]] Motion measure_motion(const ParticleSet& set, const ParticleState& state);
 
