@@ -301,7 +301,7 @@ int parse_and_call(int argc, char** argv) {
 
   CLI::App* run_verb = app.add_subcommand("run", "simulate, surface, render and film a scene");
   run_flags(run_verb, a);
-  run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder");
+  run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, of whatever scene");
   run_verb->add_flag("--resume", a.resume, "continue from the last saved state in the folder");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
   drawing_flags(run_verb, a);

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "frame.h"
@@ -20,11 +21,35 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kParts = {"states", "frames", "meshes", "grids", "contacts", "particles", "samples"};
+/// A subfolder of results; its files are NAME.0001.EXTENSION, or NAME.WHAT.0001.EXTENSION.
+struct Part {
+  const char* folder;
+  bool of_several;  ///< cameras, objects, or tables of pairs
+  std::array<std::string_view, 2> extensions;
+};
+constexpr std::array kParts = {Part{"states", false, {".state"}},        Part{"frames", true, {".png", ".exr"}},
+                               Part{"meshes", true, {".ply", ".obj"}},   Part{"grids", false, {".vdb"}},
+                               Part{"contacts", true, {".csv", ".vtp"}}, Part{"particles", false, {".csv", ".vtp"}},
+                               Part{"samples", false, {".csv", ".vtp"}}};
 constexpr int kSheetColumns = 4;
 constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
 constexpr int kSheetGap = 4;
+
+/// "NAME" of "NAME.0001.EXTENSION" with an extension of the part; empty: no file that frames have there.
+std::string stem_of_frame(const Part& part, const fs::path& file) {
+  const std::string extension = file.extension().string();
+  const std::string numbered = file.stem().string(), number = file.stem().extension().string();
+  if (extension.empty() || std::find(part.extensions.begin(), part.extensions.end(), extension) == part.extensions.end()) return {};
+  if (number.size() < 5 || number.find_first_not_of("0123456789", 1) != std::string::npos) return {};
+  return numbered.substr(0, numbered.size() - number.size());
+}
+
+template <class Use>
+void for_each_file(const fs::path& folder, const Use& use) {
+  std::error_code absent;
+  for (const auto& entry : fs::directory_iterator(folder, absent)) use(entry.path());
+}
 
 /// The claim of a body that others divide, and those that may take of it.
 struct Claims {
@@ -60,37 +85,46 @@ fs::path frame_path(const fs::path& folder, const std::string& name, int frame) 
 
 void remove_temporaries(const fs::path& folder, const std::string& name) {
   std::vector<fs::path> left;
-  const auto look = [&](const fs::path& in) {
-    std::error_code absent;
-    for (const auto& entry : fs::directory_iterator(in, absent)) {
-      const std::string file = entry.path().filename().string();
-      const bool ours = file.starts_with('.' + name + '.') || file.starts_with('.' + name + '_') ||
-                        file.starts_with(".result.json.") || file.starts_with(".render.json.") || file.starts_with(".export.json.");
-      if (ours && file.ends_with(".tmp")) left.push_back(entry.path());
-    }
+  const auto look = [&](const fs::path& path) {
+    const std::string file = path.filename().string();
+    const bool ours = file.starts_with('.' + name + '.') || file.starts_with('.' + name + '_') ||
+                      file.starts_with(".result.json.") || file.starts_with(".render.json.") || file.starts_with(".export.json.");
+    if (ours && file.ends_with(".tmp")) left.push_back(path);
   };
-  look(folder);
-  for (const char* part : kParts) look(folder / part);
+  for_each_file(folder, look);
+  for (const Part& part : kParts) for_each_file(folder / part.folder, look);
   std::error_code ignored;
   for (const fs::path& path : left) fs::remove(path, ignored);
 }
 
+std::set<std::string> saved_scenes(const fs::path& folder) {
+  std::set<std::string> names;
+  const Part& states = kParts[0];
+  for_each_file(folder / states.folder, [&](const fs::path& path) {
+    const std::string stem = stem_of_frame(states, path.filename());
+    if (!stem.empty()) names.insert(stem);
+  });
+  return names;
+}
+
 void remove_outputs(const fs::path& folder, const std::string& name) {
+  std::vector<fs::path> old;
+  std::set<std::string> shown{name};  // as films are called
+  for (const Part& part : kParts) {
+    for_each_file(folder / part.folder, [&](const fs::path& path) {
+      const std::string stem = stem_of_frame(part, path.filename());
+      if (stem != name && !(part.of_several && stem.starts_with(name + '.'))) return;
+      old.push_back(path);
+      if (part.folder == std::string_view("frames")) shown.insert(stem);
+    });
+  }
+  for (const std::string& stem : shown) {
+    for (const char* end : {".mp4", "_sheet.png"}) old.push_back(folder / (stem + end));
+  }
+  for (const char* end : {".usda", "_particles.pvd", "_contacts.pvd", "_pairs.pvd", "_samples.pvd"}) old.push_back(folder / (name + end));
+  for (const char* report : {"result.json", "render.json", "export.json"}) old.push_back(folder / report);
   std::error_code ignored;
-  for (const char* part : kParts) {
-    if (!fs::is_directory(folder / part)) continue;
-    for (const auto& entry : fs::directory_iterator(folder / part)) {
-      if (entry.path().filename().string().starts_with(name + ".")) fs::remove(entry.path(), ignored);
-    }
-  }
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string file = entry.path().filename().string();
-    if (!file.starts_with(name + '.') && !file.starts_with(name + '_')) continue;
-    for (const char* end : {".mp4", "_sheet.png", ".usda", "_particles.pvd", "_contacts.pvd", "_pairs.pvd", "_samples.pvd"}) {
-      if (file.ends_with(end)) fs::remove(entry.path(), ignored);
-    }
-  }
-  for (const char* report : {"result.json", "render.json", "export.json"}) fs::remove(folder / report, ignored);
+  for (const fs::path& path : old) fs::remove(path, ignored);
 }
 
 void write_grid_file(const fs::path& folder, const std::string& name, int frame, Simulation& simulation,

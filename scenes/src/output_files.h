@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,7 +18,11 @@ namespace supple::scenes {
 [[nodiscard]] std::filesystem::path state_path(const std::filesystem::path& folder, const std::string& name, int frame);
 [[nodiscard]] std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame);
 
-/// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result).
+/// Names of the scenes whose states lie in the folder.
+[[nodiscard]] std::set<std::string> saved_scenes(const std::filesystem::path& folder);
+
+/// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result), and nothing that a run
+/// does not write.
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
 /// Removes files of an interrupted run of this scene that never got their names.

@@ -73,19 +73,12 @@ std::optional<int> last_saved_frame(const fs::path& folder, const std::string& n
 
 /// A run is continued in its own folder only. @throws Error{Io} where there are states and none is of this name
 void check_continues(const fs::path& folder, const std::string& name) {
-  std::string other;
-  for (const auto& entry : fs::directory_iterator(folder / "states")) {
-    const std::string file = entry.path().filename().string();
-    if (!file.ends_with(".state")) continue;
-    const std::string owner = entry.path().stem().stem().string();  // NAME.0001.state
-    if (owner == name) return;
-    if (other.empty() || owner < other) other = owner;
-  }
-  if (other.empty()) return;
+  const std::set<std::string> saved = saved_scenes(folder);
+  if (saved.empty() || saved.contains(name)) return;
   throw Error(ErrorKind::Io, Fault{.place = (folder / "states").string(),
                                    .key = {},
                                    .expected = "expected saved states of '" + name + "' to continue from",
-                                   .found = "those of '" + other + "'",
+                                   .found = "those of '" + *saved.begin() + "'",
                                    .hint = "resume the scene that was run here, or choose another --out"});
 }
 
@@ -353,6 +346,9 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
   std::optional<Simulation> simulation;
   return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {
     check_needs(scene, options, outputs);
+    if (options.overwrite && !options.resume) {
+      for (const std::string& earlier : saved_scenes(options.folder)) remove_outputs(options.folder, earlier);
+    }
     if (!options.resume) remove_outputs(options.folder, name);
     const double before = resident_bytes();
     simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});

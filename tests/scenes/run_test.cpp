@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
+#include <sstream>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -135,6 +137,37 @@ TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
   o.overwrite = true;
   EXPECT_EQ(run_scene(scene_, o).outcome, "done");
   EXPECT_FALSE(fs::exists(folder_ / "export.json"));  // of what was replaced
+}
+
+TEST_F(Run, ReplacesTheResultOfAnotherSceneAndNoFileThatItDidNotWrite) {
+  const auto run = [&](const std::string& name, const std::string& output) {
+    Scene scene = parse_scene("schema: 1\nduration: 0.1 s\nframe_rate: 20\n" + output +
+                                  "objects: [{name: b, particles: {arrange: single}, skeleton: [{shape: point, kernel: {radius: 0.3}}]}]\n",
+                              name + ".yaml", ".");
+    RunOptions o{.folder = folder_, .threads = 1};
+    o.overwrite = true;
+    ASSERT_EQ(run_scene(scene, o).outcome, "done");
+  };
+  run("pile", "output: {particles: [csv, vtk], contacts: vtk, mesh: [ply, usd]}\n");
+  for (const char* written : {"particles/pile.0002.csv", "contacts/pile.pairs.0001.vtp", "meshes/pile.b.0003.ply", "pile.usda", "pile_pairs.pvd"}) {
+    EXPECT_TRUE(fs::exists(folder_ / written)) << written;
+  }
+  const std::vector<std::string> kept{"particles/pile.notes.csv", "contacts/pile.csv", "meshes/pile.b.0001.stl", "particles/pile.b.0001.csv",
+                                      "meshes/pile.b.01.ply",     "pile_final.mp4",    "pile.html",              "notes.txt"};
+  for (const std::string& own : kept) std::ofstream(folder_ / own) << "mine";
+  run("drop", "output: {contacts: csv}\n");
+  std::set<std::string> found;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
+    if (entry.is_regular_file()) found.insert(entry.path().lexically_relative(folder_).string());
+  }
+  found.erase(".lock");  // of whoever runs in the folder
+  std::set<std::string> expected(kept.begin(), kept.end());
+  for (const char* frame : {"0001", "0002", "0003"}) {
+    expected.insert(std::string("states/drop.") + frame + ".state");
+    for (const char* table : {"contacts/drop.", "contacts/drop.pairs."}) expected.insert(std::string(table) + frame + ".csv");
+  }
+  expected.insert("result.json");
+  EXPECT_EQ(found, expected);
 }
 
 TEST_F(Run, DoesNotResumeInTheFolderOfAnotherScene) {
