@@ -29,7 +29,7 @@ constexpr std::array<Group, 12> kGroups{{
     {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
     {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)"},
     {"implicit/mesh", "mesh_bench", "surface meshes beside their error (w1/64 to w4/512)"},
-    {"collision", "contact_bench", "one contact query: time, points and error"},
+    {"collision", "contact_bench", "one contact query: time, points and error; a file name after it: that of collision/rules, too"},
     {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; after it: poses, case"},
     {"collision/rules", "contact_rules", "time against error of the rules of the contact surface; a file name after it: plot (SVG)"},
     {"collision/stability", "contact_stress", "contact tried hard; after it: --seed N, file name of a map (SVG)"},

@@ -2,10 +2,15 @@
 /// Time of contact queries beside their error, one JSON object a line: broad phase, candidates and contact surface with
 /// its estimate, of indexed fields with their samples, no state from another pose. The error is the estimate; beside it
 /// stands that of the force against the closed form (for the plane limited by its stiffness, 1e9).
+///   contact_bench [FILE.svg]
+/// With a file name contact_rules follows, which draws time against error of all rules of the contact surface there.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -104,7 +109,13 @@ void measure(const std::string& name, const std::vector<collision::ContactBody>&
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  namespace fs = std::filesystem;
+  const fs::path plot = argc > 1 ? argv[1] : "";
+  if (argc > 2 || (argc > 1 && plot.extension() != ".svg")) {
+    std::fprintf(stderr, "error: contact_bench: expected nothing, or the name of a plot FILE.svg; found '%s'\n", argv[argc - 1]);
+    return 2;
+  }
   const double none = std::numeric_limits<double>::quiet_NaN();
   const Ball ball(Vec3(0.013, 0.021, 0.40), 1.0), equal(Vec3(0.013, 0.021, -0.40), 1.0);
   const Ball small(Vec3(0.3, 0.2, -0.16), 0.5);
@@ -123,5 +134,12 @@ int main() {
     measure("sphere_sphere_equal", {ball.body(), equal.body()}, error, wyvill_force(1.0, 0.40));
     measure("sphere_sphere_unequal", {ball.body(), small.body()}, error, none);
   }
-  return 0;
+  if (plot.empty()) {
+    std::fprintf(stderr, "plot of time against error, all rules: supple bench collision FILE.svg\n");
+    return 0;
+  }
+  const std::string rules = fs::read_symlink("/proc/self/exe").replace_filename("contact_rules");
+  execl(rules.c_str(), rules.c_str(), argv[1], static_cast<char*>(nullptr));
+  std::fprintf(stderr, "error: %s: expected it beside this program; build the target benchmarks\n", rules.c_str());
+  return 4;
 }

@@ -139,6 +139,21 @@ TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
   EXPECT_FALSE(fs::exists(folder_ / "export.json"));  // of what was replaced
 }
 
+TEST_F(Run, WritesNoColumnThatTheDocumentsDoNotDescribe) {
+  Scene scene = parse_scene(std::string(small::kTwoDrops) + "duration: 0.1 s\noutput: {contacts: csv, particles: csv, samples: csv}\n", "drops.yaml", ".");
+  ASSERT_EQ(run_scene(scene, options()).outcome, "done");
+  std::ifstream file(fs::path(SUPPLE_SOURCE_DIR) / "docs/results.md");
+  const std::string described{std::istreambuf_iterator<char>(file), {}};
+  for (const char* table : {"contacts/drops.0001.csv", "contacts/drops.pairs.0001.csv", "particles/drops.0001.csv", "samples/drops.0001.csv"}) {
+    std::ifstream rows(folder_ / table);
+    std::string head, column;
+    ASSERT_TRUE(std::getline(rows, head)) << table;
+    for (std::istringstream names(head); std::getline(names, column, ',');) {
+      EXPECT_NE(described.find('`' + column + '`'), std::string::npos) << table << ": " << column;
+    }
+  }
+}
+
 TEST_F(Run, ReplacesTheResultOfAnotherSceneAndNoFileThatItDidNotWrite) {
   const auto run = [&](const std::string& name, const std::string& output) {
     Scene scene = parse_scene("schema: 1\nduration: 0.1 s\nframe_rate: 20\n" + output +
