@@ -219,6 +219,38 @@ TEST(Incline, SlidesByGravityLessFrictionAndStaysBelowTheFrictionAngle) {
   EXPECT_LT(std::abs(way(1)), 0.01);
 }
 
+/// T61: where friction mu f(v) N with f = y (2 - y), y = v / slow, carries what gravity drives, y = 1 - sqrt(1 - tan / mu).
+TEST(Incline, CreepsBySolvingTheFadingFrictionAndBelowTheFrictionSpeedInFineSteps) {
+  const double sine = 0.342020143, cosine = 0.939692621, mu = 0.5, friction_speed = 1e-3;
+  for (const int substeps : {64, 512}) {
+    // A ball that may not turn.
+    Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+frame_rate: 24
+time_step: {substeps: )" + std::to_string(substeps) + R"(}
+gravity: [0, 0, -9.81]
+obstacles: [{name: slope, shape: plane, normal: [0.342020143, 0, 0.939692621], friction: 0.2, modulus: 1e9}]
+objects:
+  - name: block
+    particles: {at: [0.0342020143, 0, 0.0939692621], mass: 0.5}
+    pins: [{particle: 0, position: false}]
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]
+    contact: {modulus: 5e4, friction: 1.25, dissipation: 2}
+)");
+    const auto place = [&] { return simulation.state().particles.position[0].dot(Vec3(cosine, 0.0, -sine)); };
+    simulation.advance_to(19);  // by then it has come to rest on the slope
+    const double before = place();
+    simulation.advance_to(25);
+    const double creep = (place() - before) / 0.25;
+    // What a step can hold: it takes 1.6 times the slip at most, where friction rises by 2 mu N / slow and the block has m.
+    const double held = 2.0 / 1.6 * mu * 9.81 * cosine / (24.0 * substeps);
+    const double slow = std::max(friction_speed, held);
+    EXPECT_NEAR(creep, slow * (1.0 - std::sqrt(1.0 - sine / cosine / mu)), 0.01 * creep) << substeps;
+    EXPECT_EQ(creep < friction_speed, substeps == 512);
+  }
+}
+
 /// Down a slope of ten degrees along x, `substeps` a frame of a 24th of a second.
 std::string rolling(int substeps, const std::string& dissipation) {
   return R"(
