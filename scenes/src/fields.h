@@ -127,14 +127,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",
                 "add 'skeleton' or remove 'contact'");
   check_particles(archive, d);
-  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
-    const KernelDesc& kernel = d.skeleton[k].kernel;
-    if (kernel.type != KernelName::Gascuel || !kernel.slope || !kernel.thickness || kernel.radius <= 0.0) continue;
-    const double width = kernel.radius - *kernel.thickness;
-    archive.check(*kernel.slope * width <= 3.0 * d.iso, "skeleton[" + std::to_string(k) + "].kernel.slope",
-                  "expected slope (radius - thickness) <= 3 iso = " + short_text(3.0 * d.iso),
-                  short_text(*kernel.slope * width), "use a slope of at most " + short_text(3.0 * d.iso / width) + " [1/m]");
-  }
+  check_slopes(archive, d.skeleton, d.iso);
 }
 
 /// Names of objects and obstacles are unique, none is "ground", and pairs name what is there.

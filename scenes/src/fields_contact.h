@@ -6,6 +6,7 @@
 #include <string>
 
 #include "fields_rules.h"
+#include "fields_shapes.h"
 #include "read_scene_faults.h"
 
 namespace supple::scenes {
@@ -81,7 +82,7 @@ template <class Archive>
 void fields(Archive& archive, ObstacleKeyDesc& d) {
   archive.required("time", d.time, at_least(0.0, kTime), "when it is there");
   archive("at", d.at, any(kLength), "as of the obstacle");
-  archive("turn_deg", d.turn, degrees(-36000.0, 36000.0), "of boxes and meshes, about turn_axis");
+  archive("turn_deg", d.turn, degrees(-36000.0, 36000.0), "of boxes, meshes and implicit ones, about turn_axis");
 }
 
 template <class Archive>
@@ -89,32 +90,42 @@ void fields(Archive& archive, ObstacleDesc& d) {
   using enum ObstacleName;
   const auto only = [&d](const Rule& rule, std::initializer_list<ObstacleName> shapes) { return rule.only("shape", d.shape, shapes); };
   archive.required("name", d.name, identifier(), "unique, also among the objects");
-  archive("shape", d.shape, {}, "plane, box, heights over x and y, or a closed mesh");
-  archive("at", d.at, any(kLength), "a point of the plane, the middle of the box, added to heights and meshes");
+  archive("shape", d.shape, {}, "plane, box, heights over x and y, a closed mesh, or primitives as objects have them");
+  archive("at", d.at, any(kLength), "a point of the plane, the middle of the box, added to heights, meshes and primitives");
   archive("normal", d.normal, only(direction(), {Plane}), "out of the solid");
   archive("extent", d.extent, only(above(0.0, kLength), {Plane}), "half the edge of the square that is drawn");
   archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength), {Box}), "along its x, y, z");
   archive("rounding", d.rounding, only(at_least(0.0, kLength), {Box}), "radius of its edges in contact");
-  archive("turn_axis", d.turn_axis, only(direction(), {Box, ObstacleName::Mesh}), "with turn_deg");
-  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh}), "rotation");
+  archive("turn_axis", d.turn_axis, only(direction(), {Box, ObstacleName::Mesh, Implicit}), "with turn_deg");
+  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh, Implicit}), "rotation");
   archive("keys", d.keys, {}, "places at times; before the first and after the last it stands still; absent: always");
   archive("between", d.between, {}, "how keys are joined; smooth: at rest wherever it turns back, so that it never goes beyond a key");
   archive.required("file", d.file, only({}, {Heights, ObstacleName::Mesh}), "CSV of x, y, z [m] on a regular grid; a mesh as OBJ or PLY [m]; relative to the scene's folder");
   archive("voxel", d.voxel, only(above(0.0, kLength).or_auto(), {ObstacleName::Mesh}), "cell of the lattice that keeps its distances, about which edges are rounded; auto: a 64th of its longest side");
+  archive.required("skeleton", d.skeleton, only({}, {Implicit}), "primitives that sum, about 'at'");
+  archive("iso", d.iso, only(inside(0.0, 1.0, kNumber), {Implicit}), "value of the field on its surface");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive("texture", d.texture, {}, "by the obstacle's own axes from 'at'; absent: none");
   archive("visible", d.visible, {}, "drawn");
-  archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is modulus times slope times depth");
-  archive("slope", d.slope, above(0.0, kSlope), "of its field");
+  archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is modulus times slope times depth, or times what the field of an implicit one is above iso");
+  archive("slope", d.slope, only(above(0.0, kSlope), {Plane, Box, Heights, ObstacleName::Mesh}), "of its field");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
   for (std::size_t k = 0; k < d.keys.size(); ++k) {
     const std::string key = "keys[" + std::to_string(k) + ']';
     archive.check(k == 0 || d.keys[k - 1].time < d.keys[k].time, key + ".time", "expected a later time than the key before",
                   number_text(d.keys[k].time), "");
-    archive.check(d.keys[k].turn == 0.0 || d.shape == Box || d.shape == ObstacleName::Mesh, key + ".turn_deg",
-                  "expected a box or a mesh that turns", std::string(name_of(d.shape)), "");
+    const bool turns = d.shape == Box || d.shape == ObstacleName::Mesh || d.shape == Implicit;
+    archive.check(d.keys[k].turn == 0.0 || turns, key + ".turn_deg", "expected a box, a mesh or an implicit obstacle that turns",
+                  std::string(name_of(d.shape)), "");
   }
+  archive.check(d.shape != Implicit || !d.skeleton.empty(), "skeleton", "expected a primitive", "none", "");
+  for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
+    const std::string key = "skeleton[" + std::to_string(k) + ']';
+    archive.check(d.skeleton[k].particles.empty(), key + ".particles", "expected none: an obstacle has no particles", "some", "");
+    archive.check(!d.skeleton[k].volume, key + ".volume", "expected none: an obstacle holds no volume", "one", "");
+  }
+  check_slopes(archive, d.skeleton, d.iso);
   archive.check(d.keys.empty() || !(archive.given("at") || archive.given("turn_deg")), "keys", "expected either keys or at and turn_deg",
                 "both", "");
   archive.check(d.shape != Box || d.rounding <= d.half_sizes.minCoeff(), "rounding", "expected at most the least half size",

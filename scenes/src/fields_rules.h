@@ -46,7 +46,7 @@ template <> struct EnumNames<ShapeName> {
                                                           "arc",       "curve",    "superquadric", "directed"};
 };
 template <> struct EnumNames<ObstacleName> {
-  static constexpr std::array<std::string_view, 4> names{"plane", "box", "heights", "mesh"};
+  static constexpr std::array<std::string_view, 5> names{"plane", "box", "heights", "mesh", "implicit"};
 };
 template <> struct EnumNames<LeadName> {
   static constexpr std::array<std::string_view, 2> names{"smooth", "linear"};

@@ -116,6 +116,19 @@ void fields(Archive& archive, SkeletonDesc& d) {
                 "this key is required");
 }
 
+/// Of the primitives under the key 'skeleton': kernels of a given slope rise to no more than their largest value.
+template <class Archive>
+void check_slopes(Archive& archive, const std::vector<SkeletonDesc>& skeleton, double iso) {
+  for (std::size_t k = 0; k < skeleton.size(); ++k) {
+    const KernelDesc& kernel = skeleton[k].kernel;
+    if (kernel.type != KernelName::Gascuel || !kernel.slope || !kernel.thickness || kernel.radius <= 0.0) continue;
+    const double width = kernel.radius - *kernel.thickness;
+    archive.check(*kernel.slope * width <= 3.0 * iso, "skeleton[" + std::to_string(k) + "].kernel.slope",
+                  "expected slope (radius - thickness) <= 3 iso = " + short_text(3.0 * iso),
+                  short_text(*kernel.slope * width), "use a slope of at most " + short_text(3.0 * iso / width) + " [1/m]");
+  }
+}
+
 template <class Archive>
 void fields(Archive& archive, BlendGroupDesc& d) {
   archive.required("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},

@@ -136,7 +136,11 @@ void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& 
     body.angular_velocity = {&led.spin, 1};
     body.fixed = true;
     const Box box = body.field.surface_box();
-    if (box.lower.allFinite() && box.upper.allFinite()) body.core_value = body.field.value(box.centre());
+    if (fixed.core_value) {
+      body.core_value = *fixed.core_value;
+    } else if (box.lower.allFinite() && box.upper.allFinite()) {
+      body.core_value = body.field.value(box.centre());
+    }
     frame.reach[first + k] = frame.surface_box[first + k] = box;
     frame.convex[first + k] = body.field.core_point(Vec3::Zero()) ? 1 : 0;
   }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "model_skeleton.h"
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
 #include "supple/core/io/read_mesh.h"
@@ -129,6 +131,27 @@ void add_mesh(const Scene& scene, const ObstacleDesc& d, const std::string& key,
   faults.add(key + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
 }
 
+/// Primitives that sum; refused ones leave a fault and `body` as it is.
+void add_primitives(const ObstacleDesc& d, const std::string& key, ModelFaults& faults, FixedBody& body) {
+  ObjectDesc carried;
+  carried.skeleton = d.skeleton;
+  carried.iso = d.iso;
+  std::vector<double> volume;
+  const implicit::Skeleton skeleton = build_skeleton(carried, key, 1, volume, faults);
+  if (skeleton.primitive.empty()) return;
+  const Pose pose{d.at, core::rotation_exp(d.turn * d.turn_axis.normalized())};
+  implicit::PlacedSkeleton placed;
+  implicit::place_skeleton(skeleton, {&pose, 1}, placed);
+  const auto field = std::make_shared<implicit::Field>();
+  implicit::index_field(skeleton, placed, *field);
+  body.solid = FixedBody::Primitives(field);
+  body.core_value = std::numeric_limits<double>::infinity();
+  for (const implicit::Primitive& primitive : skeleton.primitive) {
+    body.core_value = std::min(*body.core_value, implicit::peak(primitive.kernel) - skeleton.iso);
+    body.iso_radius = std::min(body.iso_radius, scenes::iso_radius(primitive, skeleton.iso));
+  }
+}
+
 void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
   if (scene.ground && scene.ground->collides) {
     const GroundDesc& d = *scene.ground;
@@ -148,6 +171,8 @@ void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
       body.solid = height_field(scene, d, "obstacles." + d.name, faults);
     } else if (d.shape == ObstacleName::Mesh) {
       add_mesh(scene, d, "obstacles." + d.name, faults, body);
+    } else if (d.shape == ObstacleName::Implicit) {
+      add_primitives(d, "obstacles." + d.name, faults, body);
     }
     if (body.led()) {
       const Box box = body.field().surface_box();
@@ -353,7 +378,9 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
                                        std::hypot(contact_frequency(object, model.particles),
                                                   stick_frequency(object, model.particles, model.reaction.stick)));
     if (!needs_samples) continue;
-    const double spacing = scene.contact.sample_spacing.value_or(2.0 * object.iso_radius / kSamplesAcross);
+    double thinnest = object.iso_radius;  // obstacles have no samples: those of the object see the thinnest of their shapes
+    for (const FixedBody& body : model.fixed) thinnest = std::min(thinnest, body.iso_radius);
+    const double spacing = scene.contact.sample_spacing.value_or(2.0 * thinnest / kSamplesAcross);
     if (!seeds_fit(object, model.rest, spacing)) {
       faults.add("contact.sample_spacing", "expected surface samples that memory holds",
                  "those of '" + object.name + "' " + short_text(spacing) + " m apart",

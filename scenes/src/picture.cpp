@@ -19,6 +19,12 @@ Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
   if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) return box->mesh();
   if (const auto* heights = std::get_if<implicit::HeightField>(&body.solid)) return heights->mesh(kFiner);
   if (const auto* solid = std::get_if<implicit::MeshSolid>(&body.solid)) return solid->mesh();
+  if (const auto* primitives = std::get_if<FixedBody::Primitives>(&body.solid)) {
+    constexpr double kAcross = 24.0;  // cells of a feature of the field
+    implicit::MarchOptions options;
+    options.lattice.cell = (*primitives)->feature_size() / kAcross;
+    return implicit::march_cubes(**primitives, options, Executor(1));
+  }
   const Vec3 normal = d.normal.normalized(), u = d.extent * normal.unitOrthogonal(), v = normal.cross(u);
   Mesh mesh;
   add_quadrangle(mesh, d.at - u - v, d.at + u - v, d.at + u + v, d.at - u + v);

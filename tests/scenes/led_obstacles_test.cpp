@@ -92,14 +92,16 @@ TEST(LedObstacles, OfEveryShapePressABallBetweenThemAndTheGround) {
   }
   slab << "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
   slab.close();
-  // From 0.25 m to 0.18 m above the ground: as a plane that looks down, a box, a box that was turned over, a mesh.
+  // From 0.25 m to 0.18 m above the ground: as a plane that looks down, a box, a box that was turned over, a mesh, a thick plate.
   const std::string plane = "shape: plane, normal: [0, 0, -1], keys: [{time: 0.2, at: [0, 0, 0.25]}, {time: 1, at: [0, 0, 0.18]}]";
   const std::string box = "shape: box, half_sizes: [2, 2, 0.5], keys: [{time: 0.2, at: [0, 0, 0.75]}, {time: 1, at: [0, 0, 0.68]}]";
   const std::string turned = "shape: box, half_sizes: [2, 0.5, 2], turn_axis: [2, 0, 0], keys: [{time: 0.2, at: [0, 0, 0.75], turn_deg: 90}, "
                              "{time: 1, at: [0, 0, 0.68], turn_deg: 90}]";
   const std::string mesh = "shape: mesh, file: slab.obj, keys: [{time: 0.2, at: [0, 0, 0.75]}, {time: 1, at: [0, 0, 0.68]}]";
+  const std::string plate = "shape: implicit, skeleton: [{shape: rectangle, half_sizes: [2, 2], kernel: {type: gascuel, radius: 0.6, thickness: 0.5, slope: 1}}], "
+                            "keys: [{time: 0.2, at: [0, 0, 0.75]}, {time: 1, at: [0, 0, 0.68]}]";
   double force = 0.0;
-  for (const std::string& ceiling : {plane, box, turned, mesh}) {
+  for (const std::string& ceiling : {plane, box, turned, mesh, plate}) {
     Simulation simulation = make(pressed(ceiling), folder);
     while (simulation.time() < 2.5) simulation.step_frame();
     ASSERT_EQ(simulation.contacts().summary.size(), 2u) << ceiling;

@@ -2,7 +2,11 @@
 /// A scene turned into what the modules work on: particles, laws, skeletons, contact bodies. Const during a run.
 #pragma once
 
+#include <limits>
+#include <memory>
+#include <optional>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -54,12 +58,20 @@ struct ObjectModel {
 /// keys they lead it, and `solid` is where its place is the origin.
 struct FixedBody {
   std::string name;
-  std::variant<implicit::HalfSpace, implicit::SolidBox, implicit::HeightField, implicit::MeshSolid> solid;
+  using Primitives = std::shared_ptr<const implicit::Field>;
+  std::variant<implicit::HalfSpace, implicit::SolidBox, implicit::HeightField, implicit::MeshSolid, Primitives> solid;
   collision::ContactMaterial material;
   SolidMotion motion{};
+  std::optional<double> core_value{};  ///< of primitives: F where it is deepest, or less; others are deepest in their middle
+  double iso_radius = std::numeric_limits<double>::infinity();  ///< of primitives: the smallest iso distance [m]
   [[nodiscard]] bool led() const { return !motion.keys.empty(); }
   [[nodiscard]] implicit::FieldView field() const {
-    return std::visit([](const auto& s) { return implicit::FieldView(s); }, solid);
+    return std::visit(
+        []<class Solid>(const Solid& s) -> implicit::FieldView {
+          if constexpr (std::is_same_v<Solid, Primitives>) return *s;
+          else return s;
+        },
+        solid);
   }
 };
 

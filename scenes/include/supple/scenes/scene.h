@@ -326,7 +326,7 @@ struct GroundDesc {
   double friction = 0.5;
 };
 
-enum class ObstacleName : std::uint8_t { Plane, Box, Heights, Mesh };
+enum class ObstacleName : std::uint8_t { Plane, Box, Heights, Mesh, Implicit };
 
 enum class LeadName : std::uint8_t { Smooth, Linear };
 
@@ -346,12 +346,14 @@ struct ObstacleDesc {
   double extent = 2.0;                ///< plane: half the edge of the square that is drawn [m]
   Vec3 half_sizes = Vec3::Zero();     ///< box [m]
   double rounding = 0.0;              ///< box: radius of its edges [m]
-  Vec3 turn_axis = Vec3::UnitZ();     ///< box, mesh, with turn
-  double turn = 0.0;                  ///< box, mesh [rad] (key turn_deg)
+  Vec3 turn_axis = Vec3::UnitZ();     ///< box, mesh, implicit, with turn
+  double turn = 0.0;                  ///< box, mesh, implicit [rad] (key turn_deg)
   std::vector<ObstacleKeyDesc> keys;  ///< instead of `at` and `turn`, rising in time
   LeadName between = LeadName::Smooth;
   std::string file;                   ///< heights: CSV of x, y, z on a regular grid; mesh: OBJ or PLY; beside the scene
   std::optional<double> voxel;        ///< mesh [m]; absent: a 64th of its longest side
+  std::vector<SkeletonDesc> skeleton; ///< implicit: about `at`
+  double iso = 0.5;                   ///< implicit
   Vec3 colour = Vec3(0.72, 0.74, 0.78);  ///< sRGB
   double roughness = 0.6;
   std::optional<TextureDesc> texture;
