@@ -139,6 +139,7 @@ int main(int argc, char** argv) {
     return 0;
   }
   const std::string rules = fs::read_symlink("/proc/self/exe").replace_filename("contact_rules");
+  std::fflush(stdout);
   execl(rules.c_str(), rules.c_str(), argv[1], static_cast<char*>(nullptr));
   std::fprintf(stderr, "error: %s: expected it beside this program; build the target benchmarks\n", rules.c_str());
   return 4;
