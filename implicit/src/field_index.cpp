@@ -92,15 +92,6 @@ void pack(const Primitive& p, const Vec3* control, const Vec3& position, const M
   }
 }
 
-double feature_of(const Primitive& p) noexcept {
-  const Kernel& k = p.kernel;
-  // The slope of Wyvill's kernel sets what counts as a feature of the others.
-  const double kernel = k.kind == KernelKind::Gascuel  ? std::min(k.thickness, k.radius - k.thickness)
-                        : k.kind == KernelKind::Wyvill ? k.radius
-                                                       : std::min(k.radius, 1.717300207 / lipschitz(k));
-  return kernel / distance_scale(p);
-}
-
 /// The ten bits of x, two zeros between each and the next.
 std::uint32_t spread_bits(std::uint32_t x) noexcept {
   x = (x | (x << 16)) & 0x030000ffu;
@@ -117,6 +108,15 @@ void set_box(NodePack& pack, std::size_t slot, const Box& box) noexcept {
 }
 
 }  // namespace
+
+double feature_of(const Primitive& p) noexcept {
+  const Kernel& k = p.kernel;
+  // The slope of Wyvill's kernel sets what counts as a feature of the others.
+  const double kernel = k.kind == KernelKind::Gascuel  ? std::min(k.thickness, k.radius - k.thickness)
+                        : k.kind == KernelKind::Wyvill ? k.radius
+                                                       : std::min(k.radius, 1.717300207 / lipschitz(k));
+  return kernel / distance_scale(p);
+}
 
 void Field::Index::pack_balls() {
   if (ball_radius.empty()) return;

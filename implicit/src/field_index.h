@@ -118,6 +118,9 @@ struct Field::Index {
   void build_levels();
 };
 
+/// Length on which the kernel falls, where level sets are closest [m].
+[[nodiscard]] double feature_of(const Primitive& p) noexcept;
+
 /// Rows of the parts' sums, whatever the blend.
 void part_rows(const Field::Index& index, std::span<const Vec3> points, FieldParts& parts);
 /// Ids of the primitives whose supports may meet a box, in rising order; valid until the thread evaluates again.

@@ -34,11 +34,11 @@ void fields(Archive& archive, MeshingDesc& d) {
   archive("angle_deg", d.angle, only(degrees(1.0, 30.0)), "least angle of a triangle");
   archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
   archive("distance", d.distance, only(above(0.0, kLength).or_auto()), "from a triangle's circumcentre to that point; auto: a tenth of the size");
-  archive("search", d.search, {}, "looks for cavities and islands between the nodes of the lattice and adds them, but not to bodies that touch others and bulge; never by way of a grid; a warning counts what was found and where some may be missed still (where parts of a curve, both ends of an arc or all of a ring are as near as each other, blends by gradients, where three bodies meet); takes longer than the mesh itself where supports span few cells, bodies touch in many places or cells stay open");
+  archive("search", d.search, Rule{}.or_auto(), "looks for cavities and islands between the nodes of the lattice and adds them, but not to bodies that touch others and bulge; never by way of a grid. true: all others, though it takes longer than the mesh itself where supports span few cells, bodies touch in many places or cells stay open; a warning counts what was found and where some may be missed still (where parts of a curve, both ends of an arc or all of a ring are as near as each other, blends by gradients, where three bodies meet). auto: those whose search takes by counts at most twice as long as the mesh, or next to nothing, and leaves no cells open along blends by gradients or tight bends of curves; 'search' in the report counts the others");
   archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
   archive.check(!d.error || d.method == Auto || d.method == Cubes, "error", "expected method auto or cubes with an error",
                 std::string(name_of(d.method)), "leave out 'method'");
-  archive.check(!d.search || d.method == Auto || d.method == Cubes, "search", "expected method auto or cubes with a search",
+  archive.check(!d.search.value_or(false) || d.method == Auto || d.method == Cubes, "search", "expected method auto or cubes with a search",
                 std::string(name_of(d.method)), "leave out 'method'");
 }
 

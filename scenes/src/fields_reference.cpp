@@ -63,7 +63,9 @@ Json value_schema(const FieldInfo& info) {
   switch (info.type) {
     case FieldType::Number: return number_schema(info.rule, false);
     case FieldType::Whole: return number_schema(info.rule, true);
-    case FieldType::Boolean: return {{"type", "boolean"}};
+    case FieldType::Boolean:
+      if (info.rule.automatic) return {{"anyOf", Json::array({{{"type", "boolean"}}, {{"const", "auto"}}})}};
+      return {{"type", "boolean"}};
     case FieldType::Text:
       return info.rule.name ? Json{{"type", "string"}, {"pattern", "^[A-Za-z_][A-Za-z0-9_.-]*$"}} : Json{{"type", "string"}};
     case FieldType::Choice: return {{"enum", info.choices}};

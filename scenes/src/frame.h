@@ -15,8 +15,8 @@
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/march_cubes.h"
-#include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/solids.h"
+#include "supple/scenes/mesh_search.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/simulation.h"
 
@@ -28,17 +28,6 @@ struct LedSolid {
   Pose pose;
   Vec3 velocity = Vec3::Zero();
   Vec3 spin = Vec3::Zero();
-};
-
-/// What searches between the nodes of lattices found, of meshes of bodies.
-struct SearchCounts {
-  implicit::MissedPieces found;
-  std::uint64_t unsearched = 0;  ///< meshes of bodies that bulge around others
-  void add(const SearchCounts& other) {
-    found.pieces += other.found.pieces;
-    found.undecided += other.found.undecided;
-    unsearched += other.unsearched;
-  }
 };
 
 struct Frame {

@@ -1,16 +1,19 @@
 // Stage 9: from fields and the contact surface to meshes.
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <utility>
 
 #include "frame.h"
 #include "look_columns.h"
+#include "search_choice.h"
 #include "supple/collision/deformed_field.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 #include "supple/implicit/creases.h"
 #include "supple/implicit/mesh_motion.h"
 #include "supple/implicit/mesh_routes.h"
+#include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/implicit/surface_grid.h"
 
@@ -93,20 +96,64 @@ Error with_keys_of(const Error& failure, const ObjectModel* cell, const ObjectMo
 /// Bodies in mirror image of each other meet in planes of a lattice about the origin, where triangles have no area. [cells]
 const Vec3 kOffPlanes(0.382, 0.236, 0.447);
 
-/// Adds what the lattice misses of bodies that touch; bulges are no part of their fields, and what passes through another one is not
-/// searched.
-SearchCounts search_between(const StageContext& context, const Division& division, const DivisionGroup& group, const Frame& frame,
-                            const implicit::Lattice& lattice, std::span<Mesh> meshes) {
+/// Books a mesh that is not searched.
+void leave_unsearched(const StageContext& context, std::uint32_t body, Unsearched why, SearchCounts& counts) {
+  ++counts.unsearched[context.model.objects[context.bodies[body].object].name][static_cast<std::size_t>(why)];
+}
+
+void add_found(const implicit::MissedPieces& found, SearchCounts& counts) {
+  counts.pieces += found.pieces;
+  counts.undecided += found.undecided;
+}
+
+/// The pairs of a group that touch or overlap, each once, by place in it.
+std::vector<std::array<std::size_t, 2>> pairs_within(const Division& division, const DivisionGroup& group) {
+  const auto place = [&](std::uint32_t body) {
+    const auto k = static_cast<std::size_t>(std::lower_bound(division.body.begin(), division.body.end(), body) - division.body.begin());
+    const auto at = std::lower_bound(group.member.begin(), group.member.end(), k);
+    return at != group.member.end() && *at == k ? static_cast<std::size_t>(at - group.member.begin()) : group.member.size();
+  };
+  std::vector<std::array<std::size_t, 2>> pairs;
+  for (const collision::BodyPair& pair : division.pair) {
+    const std::size_t a = place(pair.a), b = place(pair.b);
+    if (std::max(a, b) < group.member.size()) pairs.push_back({std::min(a, b), std::max(a, b)});
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+/// Why the bodies of a group are not searched: bulges are no part of their fields, nor is what they leave to bodies that they pass through.
+std::optional<Unsearched> why_unsearched(const StageContext& context, const Division& division, const DivisionGroup& group,
+                                         const Frame& frame, double cell) {
+  const MeshingDesc& d = context.model.meshing;
   const collision::BulgeSettings& bulge = context.model.bulge;
+  if (d.method != MeshingName::Auto && d.method != MeshingName::Cubes) return Unsearched::Mesher;
+  const bool passes = std::any_of(group.member.begin(), group.member.end(), [&](std::size_t k) { return division.passes(k); });
+  if (bulge.attenuation > 0.0 || bulge.keep_volume || passes) return Unsearched::Bulges;
+  if (d.search) return std::nullopt;
+  std::vector<implicit::DividingBody> bodies;
+  for (const std::size_t k : group.member) {
+    const std::uint32_t i = division.body[k];
+    bodies.push_back({&context.bodies[i].skeleton, frame.placed[i].support});
+  }
+  return why_left_out(implicit::estimate_search(bodies, pairs_within(division, group), cell), 1);
+}
+
+/// Adds what the lattice misses of bodies that touch.
+void search_between(const StageContext& context, const Division& division, const DivisionGroup& group, const implicit::Lattice& lattice,
+                    Frame& frame, std::span<Mesh> meshes) {
+  if (search_is_off(context.model.meshing)) return;
+  if (const auto why = why_unsearched(context, division, group, frame, lattice.cell)) {
+    for (const std::size_t k : group.member) leave_unsearched(context, division.body[k], *why, frame.missed);
+    return;
+  }
   std::vector<implicit::SearchedBody> bodies;
-  bool passes = false;
   for (const std::size_t k : group.member) {
     const std::uint32_t i = division.body[k];
     bodies.push_back({&frame.field[i], division.placed[i].material.modulus});
-    passes = passes || division.passes(k);
   }
-  if (bulge.attenuation > 0.0 || bulge.keep_volume || passes) return {.found = {}, .unsearched = meshes.size()};
-  return {.found = implicit::add_missed_pieces(bodies, lattice, context.executor, meshes)};
+  add_found(implicit::add_missed_pieces(bodies, lattice, context.executor, meshes), frame.missed);
 }
 
 /// The surfaces of some bodies of a group, in their order. @param lattice  whose cell becomes the one that was used
@@ -130,7 +177,7 @@ void mesh_group(const StageContext& context, const Division& division, const Div
   const implicit::Lattice lattice{.origin = cell * kOffPlanes, .cell = cell};
   implicit::Lattice used = lattice;
   std::vector<Mesh> parts = divide_some(context, division, group, group.member, used, profile);
-  if (context.model.meshing.search) frame.missed.add(search_between(context, division, group, frame, used, parts));
+  search_between(context, division, group, used, frame, parts);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     const std::size_t k = group.member[n];
     if (division.passes(k)) {
@@ -157,44 +204,62 @@ void mesh_divided(const StageContext& context, const Division& division, StagePr
   }
 }
 
-/// The surface of a body that touches no other.
-Mesh mesh_alone(const StageContext& context, std::size_t i, StageProfile& profile, Frame& frame) {
+/// The surface of a body that touches no other, by way of another mesher than marching cubes.
+/// @pre method is not cubes
+Mesh mesh_otherwise(const StageContext& context, std::size_t i, const implicit::Lattice& lattice, StageProfile& profile, Frame& frame) {
+  const MeshingDesc& d = context.model.meshing;
+  const implicit::Field& field = frame.field[i];
+  if (!search_is_off(d)) leave_unsearched(context, static_cast<std::uint32_t>(i), Unsearched::Mesher, frame.missed);
+  if (d.method == MeshingName::Tetrahedra) {
+    implicit::PolygoniseCounts counts;
+    Mesh mesh = implicit::polygonise(field, lattice, context.executor, &counts);
+    profile.visited += counts.blocks_visited;
+    profile.present += counts.blocks_present;
+    return mesh;
+  }
+  if (d.method == MeshingName::Delaunay) {
+    const double size = d.size.value_or(2.0 * lattice.cell);
+    implicit::DelaunayReport report;
+    Mesh mesh = (*context.delaunay)(
+        field, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell}, &report);
+    profile.visited += report.seeds + report.inserted;
+    profile.present += report.seeds + report.inserted;
+    return mesh;
+  }
+  return implicit::mesh_of(implicit::make_surface_grid(field, {.lattice = lattice}, context.executor), field, context.executor);
+}
+
+/// Adds what the lattice misses of a body that touches no other. @param bodies  that its object has
+void search_alone(const StageContext& context, std::size_t i, double cell, std::size_t bodies, Frame& frame, Mesh& mesh) {
+  const MeshingDesc& d = context.model.meshing;
+  if (search_is_off(d)) return;
+  std::optional<Unsearched> why;
+  if (!d.search) why = why_left_out(implicit::estimate_search(context.bodies[i].skeleton, frame.placed[i].support, cell), bodies);
+  if (why) {
+    leave_unsearched(context, static_cast<std::uint32_t>(i), *why, frame.missed);
+  } else {
+    add_found(implicit::add_missed_pieces(frame.field[i], {.origin = Vec3::Zero(), .cell = cell}, context.executor, mesh), frame.missed);
+  }
+}
+
+/// The surface of a body that touches no other. @param bodies  that its object has
+Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, StageProfile& profile, Frame& frame) {
   const MeshingDesc& d = context.model.meshing;
   const ObjectModel& object = context.model.objects[context.bodies[i].object];
   const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = object.cell};
   const implicit::Field& field = frame.field[i];
   try {
-    if (d.method == MeshingName::Tetrahedra) {
-      implicit::PolygoniseCounts counts;
-      Mesh mesh = implicit::polygonise(field, lattice, context.executor, &counts);
-      profile.visited += counts.blocks_visited;
-      profile.present += counts.blocks_present;
-      return mesh;
-    }
-    if (d.method == MeshingName::Delaunay) {
-      const double size = d.size.value_or(2.0 * object.cell);
-      implicit::DelaunayReport report;
-      Mesh mesh = (*context.delaunay)(
-          field, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = object.cell}, &report);
-      profile.visited += report.seeds + report.inserted;
-      profile.present += report.seeds + report.inserted;
-      return mesh;
-    }
     const bool automatic = d.method == MeshingName::Auto && !object.mesh_error;
-    if (d.method == MeshingName::OpenVdb ||
-        (automatic && !d.search && !implicit::estimate_routes(context.bodies[i].skeleton, frame.placed[i].support, object.cell).prefers_cubes())) {
-      return implicit::mesh_of(implicit::make_surface_grid(field, {.lattice = lattice}, context.executor), field, context.executor);
-    }
+    const bool cubes = automatic ? d.search.value_or(false) ||
+                                       implicit::estimate_routes(context.bodies[i].skeleton, frame.placed[i].support, object.cell).prefers_cubes()
+                                 : d.method == MeshingName::Auto || d.method == MeshingName::Cubes;
+    if (!cubes) return mesh_otherwise(context, i, lattice, profile, frame);
     implicit::MarchCounts marched;
     Mesh mesh = automatic && implicit::has_creases(field)
                     ? implicit::march_creases(field, lattice, context.executor, &marched)
                     : frame.mesher[i].make(field, {.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip},
                                            context.executor, &marched);
-    if (d.search) {
-      const implicit::MissedPieces found =
-          implicit::add_missed_pieces(field, {.origin = Vec3::Zero(), .cell = marched.cell}, context.executor, mesh);
-      frame.missed.add({.found = found});
-    }
+    search_alone(context, i, marched.cell, bodies, frame, mesh);
     profile.visited += marched.tiles;
     profile.present += 64 * marched.blocks;
     return mesh;
@@ -269,12 +334,14 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   frame.missed = {};
   const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
   mesh_divided(context, division, profile, frame, surfaces);
+  std::vector<std::size_t> pieces(model.objects.size());
+  for (const Body& body : bodies) ++pieces[body.object];
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {
       profile.present += 1;
     } else {
-      surfaces[i] = mesh_alone(context, i, profile, frame);
+      surfaces[i] = mesh_alone(context, i, pieces[bodies[i].object], profile, frame);
     }
   }
   for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {

@@ -5,6 +5,7 @@
 
 #include "frame_tables.h"
 #include "output_files.h"
+#include "search_files.h"
 #include "program_identity.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
@@ -113,6 +114,7 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
   }
   if (draws) draw(simulation, report, done);
   const StageClock clock(simulation.profile(Stage::Export));
+  if (meshes != nullptr) write_searches(options_.folder, name_, frame, simulation.searches());
   if (animation_) add_to_animation(simulation, *meshes);
   if (!files) return;
   if (outputs_.meshes) write_meshes(simulation, *meshes);

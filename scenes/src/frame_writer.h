@@ -44,8 +44,8 @@ class FrameWriter {
 
   /// Whether frames have files of their own or share one.
   [[nodiscard]] bool writes_frames() const;
-  /// Whether frames must come one after the other, to one writer; searches of meshes are counted over all frames.
-  [[nodiscard]] bool needs_order() const { return samples_ || animation_ || scene_.output.meshing.search; }
+  /// Whether frames must come one after the other, to one writer.
+  [[nodiscard]] bool needs_order() const { return samples_ || animation_; }
   /// Whether a frame that was written before must be seen again: for a file over all frames or for samples, or because a file of its
   /// own is absent or its picture one of another scene or state.
   [[nodiscard]] bool renews(int frame, std::uint64_t state_hash) const;

@@ -78,6 +78,22 @@ std::string files_text(const fs::path& folder) {
   return text;
 }
 
+/// Empty where there is nothing to tell.
+std::string searches_text(const ordered_json& searches) {
+  std::string text;
+  for (const auto& [key, what] : {std::pair{"pieces", "added to meshes"}, {"undecided", "cells where one may be missed"}}) {
+    if (number_at(searches, key) > 0.0) text += line("  %-34s %8.0f", what, number_at(searches, key));
+  }
+  if (searches.contains("unsearched")) {
+    for (const auto& [object, meshes] : searches["unsearched"].items()) {
+      for (const auto& [why, count] : meshes.items()) {
+        if (count.is_number()) text += line("  %-34s %8.0f", ("meshes of " + object + " not searched, " + why).c_str(), count.get<double>());
+      }
+    }
+  }
+  return text.empty() ? text : "pieces between the nodes of the lattice\n" + text;
+}
+
 struct FrameName {
   std::string name;
   int frame = 0;
@@ -143,6 +159,7 @@ std::string describe_run(const fs::path& folder) {
                    number_at(object, "final_shape_error"));
     }
   }
+  if (report.contains("searches")) text += searches_text(report["searches"]);
   if (report.contains("stages")) {
     text += "stages                                  calls      cpu s\n";
     for (const auto& [name, stage] : report["stages"].items()) {

@@ -28,9 +28,9 @@ struct Part {
   std::array<std::string_view, 2> extensions;
 };
 constexpr std::array kParts = {Part{"states", false, {".state"}},        Part{"frames", true, {".png", ".exr"}},
-                               Part{"meshes", true, {".ply", ".obj"}},   Part{"grids", false, {".vdb"}},
-                               Part{"contacts", true, {".csv", ".vtp"}}, Part{"particles", false, {".csv", ".vtp"}},
-                               Part{"samples", false, {".csv", ".vtp"}}};
+                               Part{"meshes", true, {".ply", ".obj"}},   Part{"searches", false, {".json"}},
+                               Part{"grids", false, {".vdb"}},           Part{"contacts", true, {".csv", ".vtp"}},
+                               Part{"particles", false, {".csv", ".vtp"}}, Part{"samples", false, {".csv", ".vtp"}}};
 constexpr int kSheetColumns = 4;
 constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;

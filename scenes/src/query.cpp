@@ -4,13 +4,16 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "read_scene_faults.h"
+#include "search_choice.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"
+#include "supple/implicit/mesh_routes.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/scenes/contact_report.h"
 #include "supple/scenes/probe.h"
@@ -199,6 +202,54 @@ std::string cells_text(const Model& model) {
   return text + "; of objects that touch the smallest holds for all of them";
 }
 
+/// Whether the mesh of an object that touches no other is searched for what its lattice misses, and why.
+std::string search_text(const Simulation& simulation, std::size_t object) {
+  const MeshingDesc& d = simulation.model().meshing;
+  if (d.search) return "searched: the scene asks for it";
+  if (d.method != MeshingName::Auto && d.method != MeshingName::Cubes) return "not searched: only marching cubes are";
+  const ObjectModel& model = simulation.model().objects[object];
+  const core::ParticleState& particles = simulation.state().particles;
+  const auto bodies = static_cast<std::size_t>(
+      std::count_if(simulation.bodies().begin(), simulation.bodies().end(), [&](const Body& b) { return b.object == object; }));
+  implicit::SearchEstimate sum;
+  std::optional<Unsearched> why;
+  bool by_grid = false;
+  for (const Body& body : simulation.bodies()) {
+    if (body.object != object) continue;
+    std::vector<Pose> poses;
+    for (const std::uint32_t p : body.particle) poses.push_back({particles.position[p], particles.orientation[p]});
+    implicit::PlacedSkeleton placed;
+    implicit::place_skeleton(body.skeleton, poses, placed);
+    const implicit::SearchEstimate one = implicit::estimate_search(body.skeleton, placed.support, model.cell);
+    sum.search_ms += one.search_ms;
+    sum.mesh_ms += one.mesh_ms;
+    if (const auto left_out = why_left_out(one, bodies)) why = left_out;
+    by_grid = by_grid || (d.method == MeshingName::Auto && !model.mesh_error &&
+                          !implicit::estimate_routes(body.skeleton, placed.support, model.cell).prefers_cubes());
+  }
+  if (by_grid) return "not searched: made by way of OpenVDB";
+  if (why == Unsearched::Undecided) return "not searched: cells along blends by gradients or tight bends would stay undecided";
+  const std::string times = "by counts " + short_text(std::round(100.0 * sum.search_ms / std::max(sum.mesh_ms, 1e-9)) / 100.0) +
+                            " times as long as its mesh";
+  return why ? "not searched: " + times + "; output.meshing.search: true does it" : "searched: " + times;
+}
+
+/// One line an object that gets a mesh.
+std::string searches_text(const Simulation& simulation) {
+  const Model& model = simulation.model();
+  const OutputRequest outputs = requested_outputs(simulation.scene());
+  if (!outputs.images && !outputs.meshes) return "";
+  if (search_is_off(model.meshing)) return "pieces between the nodes of the lattice are not looked for: the scene asks for none\n";
+  std::string text;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    if (!model.objects[i].skeleton.primitive.empty()) text += "  " + model.objects[i].name + " is " + search_text(simulation, i) + '\n';
+  }
+  if (text.empty()) return text;
+  const bool bulges = model.bulge.attenuation > 0.0 || model.bulge.keep_volume;
+  return "pieces between the nodes of the lattice, where nothing touches (what does is " +
+         std::string(bulges ? "not searched, as it bulges" : "searched together, by counts of each frame") + ")\n" + text;
+}
+
 }  // namespace
 
 std::string explain(Simulation& simulation) {
@@ -223,6 +274,7 @@ std::string explain(Simulation& simulation) {
   line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
        scene.time_step.size || scene.time_step.substeps ? ", fixed by the scene" : ", by the stability limits at frame 1");
   if (model.cell > 0.0) line("surface lattice cell %s", cells_text(model).c_str());
+  out += searches_text(simulation);
   out += "\n";
   const StepPlan plan = plan_step(scene, model, requested_outputs(scene));
   for (const PlannedStage& planned : plan.stages) {

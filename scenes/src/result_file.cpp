@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "search_files.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 
@@ -85,6 +86,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
                          {"final_shape_error", record.final_shape_error}};
     }
     json["objects"] = objects;
+    json["searches"] = json_of(result.searches);
     const Profile profile = simulation->profile();
     ordered_json stages = ordered_json::object();
     for (const StageInfo& stage : stage_table()) {

@@ -23,6 +23,8 @@
 #include "frame_writer.h"
 #include "output_files.h"
 #include "result_file.h"
+#include "search_files.h"
+#include "warnings.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 
@@ -168,6 +170,8 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   if (simulation) {
     result.state_hash = simulation->state_hash();
     result.warnings.insert(result.warnings.begin(), simulation->warnings().begin(), simulation->warnings().end());
+    result.searches = read_searches(options.folder, scene_name(scene), options.frames, result.frames);
+    set_missed(scene.output.meshing, result.searches, result.warnings);
     const auto& overloads = simulation->state().record.overloads;
     for (std::size_t k = 0; k < std::min(overloads.size(), kMostOverloads); ++k) result.warnings.push_back(overload_text(overloads[k]));
     if (overloads.size() > kMostOverloads) {

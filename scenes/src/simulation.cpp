@@ -96,7 +96,8 @@ struct Simulation::Impl {
   bool pulled_meshes = false;
   std::function<bool(const Box&)> shown;
   std::vector<std::string> warnings;
-  SearchCounts missed;  ///< by all meshes so far
+  SearchCounts searches;      ///< of the meshes of this state,
+  SearchCounts all_searches;  ///< and of all so far
 
   Impl(Scene s, SimulationOptions o)
       : scene(std::move(s)),
@@ -559,6 +560,7 @@ struct Simulation::Impl {
   void drop_results() {
     pulled_contacts = pulled_fields = pulled_meshes = false;
     meshes.clear();
+    searches = {};
   }
 
   void pull_contacts() {
@@ -593,8 +595,9 @@ struct Simulation::Impl {
     if (shown) wanted.shown = &shown;
     try {
       meshes = polygonise_objects(wanted, state.particles, laws, pulled);
-      missed.add(pulled.missed);
-      set_missed(missed, warnings);
+      searches.add(pulled.missed);
+      all_searches.add(pulled.missed);
+      set_missed(scene.output.meshing, all_searches, warnings);
     } catch (const Error& error) {
       rethrow_with_places(scene, error);
     }
@@ -735,6 +738,8 @@ void Simulation::set_shown(std::function<bool(const Box&)> shown) {
 Energies Simulation::energies() { return impl_->energies(); }
 
 const std::vector<std::string>& Simulation::warnings() const { return impl_->warnings; }
+
+const SearchCounts& Simulation::searches() const { return impl_->searches; }
 
 Audits Simulation::audits() const { return audits_of(impl_->state.record); }
 

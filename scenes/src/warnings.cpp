@@ -5,6 +5,7 @@
 
 #include "fields_rules.h"
 #include "read_scene_faults.h"
+#include "search_choice.h"
 
 namespace supple::scenes {
 namespace {
@@ -72,7 +73,8 @@ void add_without_surface(const StageContext& context, const core::ParticleState&
 }
 
 void add_missed(const Model& model, std::vector<std::string>& warnings) {
-  if (model.meshing.search) return;
+  const MeshingDesc& d = model.meshing;
+  if (!search_is_off(d) && (d.method == MeshingName::Auto || d.method == MeshingName::Cubes)) return;
   for (const ObjectModel& object : model.objects) {
     const double thickness = 2.0 * object.iso_radius;
     if (!(object.cell > thickness && thickness > 0.0)) continue;
@@ -103,13 +105,23 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
   }
 }
 
-void set_missed(const SearchCounts& all, std::vector<std::string>& warnings) {
-  if (all.found.pieces + all.found.undecided + all.unsearched == 0) return;
+void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings) {
   const std::string key = "output.meshing.search: ";
   std::erase_if(warnings, [&](const std::string& warning) { return warning.starts_with(key); });
-  warnings.push_back(key + "pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: " +
-                     std::to_string(all.found.pieces) + "; cells where one may be missed: " + std::to_string(all.found.undecided) +
-                     "; meshes of bodies that bulge, which are not searched: " + std::to_string(all.unsearched));
+  std::string text;
+  const auto add = [&](bool told, const char* what, std::uint64_t count) {
+    if (told) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
+  };
+  const std::uint64_t bulges = all.not_searched(Unsearched::Bulges);
+  const bool asked = meshing.search.value_or(false) && all.pieces + all.undecided + bulges > 0;
+  add(asked || all.pieces > 0, "pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames", all.pieces);
+  add(asked || all.undecided > 0, "cells where one may be missed", all.undecided);
+  add(asked || bulges > 0, "meshes of bodies that bulge, which are not searched", bulges);
+  for (const auto& [why, what] : {std::pair{Unsearched::Undecided, "meshes that auto does not search, as cells along blends by gradients or tight bends would stay undecided"},
+                                  std::pair{Unsearched::Cost, "meshes that auto does not search, as that would take far longer than to make them"}}) {
+    add(all.not_searched(why) > 0, what, all.not_searched(why));
+  }
+  if (!text.empty()) warnings.push_back(std::move(text));
 }
 
 }  // namespace supple::scenes

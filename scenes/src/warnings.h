@@ -17,6 +17,7 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
                     std::vector<std::string>& warnings);
 
 /// What searches for missed pieces of meshes found in all frames, in one sentence that takes the place of the last; none for none.
-void set_missed(const SearchCounts& all, std::vector<std::string>& warnings);
+/// Other meshers than those that are searched are left to the report: the scene asks for them.
+void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings);
 
 }  // namespace supple::scenes

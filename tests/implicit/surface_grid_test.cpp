@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -332,6 +333,77 @@ TEST(MeshRoutes, CostByCountsAndCubesCostLess) {
   EXPECT_GT(blended.cubes_ms, blobs.cubes_ms);
   EXPECT_EQ(blended.openvdb_ms, blobs.openvdb_ms);
   EXPECT_EQ(estimate_routes({}, {}, 0.05).leaves, 0.0);
+}
+
+TEST(MeshRoutes, EstimateSearchesByTheCellsThatSupportsSpan) {
+  Body ball;
+  ball.skeleton.part_count = 1;
+  ball.skeleton.primitive.emplace_back().kernel = Kernel::wyvill(1.0);
+  ball.parts = {Pose{}};
+  ball.place();
+  const auto times = [](const SearchEstimate& e) { return e.search_ms / e.mesh_ms; };
+  const auto of = [](const Body& body, double cell) { return estimate_search(body.skeleton, body.placed.support, cell); };
+  EXPECT_NEAR(times(of(ball, 0.02)), 0.5, 0.01);
+  EXPECT_LT(times(of(ball, 0.3)), 1.0);
+  EXPECT_GT(times(of(ball, 1.5)), 5.0);
+  EXPECT_LT(of(ball, 100.0).search_ms, 1.1);  // a thousand cubes
+  EXPECT_TRUE(of(ball, 0.02).decides);
+  const Body many = random_body({.seed = 8, .parts = 60, .half_width = 0.5, .only_points = true});
+  EXPECT_GT(times(of(many, 0.1)), times(of(ball, 0.2)));  // where many overlap
+  const std::array<DividingBody, 2> two{{{&ball.skeleton, ball.placed.support}, {&ball.skeleton, ball.placed.support}}};
+  const std::array<std::array<std::size_t, 2>, 1> pair{{{0, 1}}};
+  const SearchEstimate apart = estimate_search(two, {}, 0.1), touching = estimate_search(two, pair, 0.1);
+  EXPECT_GT(touching.search_ms, apart.search_ms + 1.0);
+  EXPECT_GT(touching.mesh_ms, apart.mesh_ms);
+}
+
+TEST(MeshRoutes, EstimateLongerSearchesOfShapesThatTurnWithinTheirSupport) {
+  const auto search_ms = [](ShapeKind shape, double size, double exponent) {
+    Body body;
+    body.skeleton.part_count = 1;
+    Primitive& p = body.skeleton.primitive.emplace_back();
+    p.shape = shape;
+    p.size = Vec3::Constant(size);
+    p.exponent = {exponent, exponent};
+    p.kernel = Kernel::wyvill(1.0);
+    body.parts = {Pose{}};
+    body.place();
+    return estimate_search(body.skeleton, body.placed.support, 0.05).search_ms;
+  };
+  EXPECT_GT(search_ms(ShapeKind::Superquadric, 1.0, 0.3), 1.1 * search_ms(ShapeKind::Superquadric, 1.0, 1.0));
+  EXPECT_GT(search_ms(ShapeKind::Ring, 0.3, 1.0), 1.1 * search_ms(ShapeKind::Disc, 0.3, 1.0));
+}
+
+TEST(MeshRoutes, KnowBySkeletonsWhatASearchCannotDecide) {
+  const auto decides = [](std::vector<Primitive> primitives, Blend blend) {
+    Body body;
+    body.skeleton.part_count = 2;
+    body.skeleton.primitive = std::move(primitives);
+    body.skeleton.blend = std::move(blend);
+    for (Primitive& p : body.skeleton.primitive) p.kernel = Kernel::wyvill(0.3);
+    body.parts = {Pose{}, Pose{}};
+    body.place();
+    return estimate_search(body.skeleton, body.placed.support, 0.05).decides;
+  };
+  std::vector<Primitive> points(2);
+  points[1].part = 1;
+  EXPECT_TRUE(decides(points, {}));
+  EXPECT_TRUE(decides(points, {.rule = BlendRule::Ricci}));
+  EXPECT_FALSE(decides(points, {.rule = BlendRule::Gradient}));
+  EXPECT_FALSE(decides(points, {.rule = BlendRule::Gradient, .node = {0, 1}}));
+  EXPECT_TRUE(decides(points, {.rule = BlendRule::Gradient, .node = {0, 0}}));
+  // Surfaces lie 0.136 m from curves, whose least radius of curvature is 0.25 m^2 / height.
+  const auto bow = [](double height, double taper) {
+    Primitive p;
+    p.shape = ShapeKind::Curve;
+    p.control = {Vec3(-0.5, 0, 0), Vec3(0, height, 0), Vec3(0.5, 0, 0)};
+    p.taper = taper;
+    return std::vector<Primitive>{p};
+  };
+  EXPECT_TRUE(decides(bow(0.0, 1.0), {}));
+  EXPECT_TRUE(decides(bow(1.6, 1.0), {}));
+  EXPECT_FALSE(decides(bow(2.1, 1.0), {}));
+  EXPECT_FALSE(decides(bow(1.6, 2.0), {}));
 }
 
 TEST(SurfaceGrid, IsReadByTheToolsOfOpenVdb) {

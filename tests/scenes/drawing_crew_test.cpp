@@ -97,9 +97,61 @@ TEST_F(DrawingCrew, IsNotMadeWhereFramesNeedOrderMemoryOrExactClocks) {
   scene = scene_of(kDrops);
   scene.output.samples = {TableName::Csv};
   EXPECT_EQ(run_scene(scene, options("samples", 3)).frames_at_once, 1);
-  scene = scene_of(kDrops);
-  scene.output.meshing.search = true;
-  EXPECT_EQ(run_scene(scene, options("search", 3)).frames_at_once, 1);
+}
+
+/// Islands between the nodes in some of the frames, and a body that is never searched.
+const std::string kCoins = R"(
+schema: 1
+frame_rate: 8
+duration: 0.75 s
+objects:
+  - name: coin
+    particles: {at: [0.3, 0.3, 0.3], velocity: [1, -0.5, -0.5], mass: 0.5}
+    skeleton: [{shape: point, kernel: {radius: 0.5}}]
+    meshing: {cell: 0.9}
+  - name: row
+    particles: {arrange: line, count: 3, spacing: 0.4, at: [0, 2, 0], mass: 0.5}
+    skeleton: [{shape: point, kernel: {radius: 0.5}}]
+    blend: {rule: gradient}
+camera: {from: [0, -3, 1], look_at: [0, 0, 0]}
+output: {images: {size: [96, 64], samples: 1}, mesh: ply, cell: 0.1}
+)";
+
+TEST_F(DrawingCrew, CountsSearchesOfAllFramesWhoeverDrawsThem) {
+  const Scene scene = scene_of(kCoins);
+  const RunResult alone = run_scene(scene, options("alone", 1)), beside = run_scene(scene, options("beside", 3));
+  ASSERT_EQ(beside.frames_at_once, 3);
+  EXPECT_GT(alone.searches.pieces, 1u);
+  EXPECT_LT(alone.searches.pieces, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(alone.searches.not_searched(Unsearched::Undecided), static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(beside.searches.pieces, alone.searches.pieces);
+  EXPECT_EQ(beside.searches.unsearched, alone.searches.unsearched);
+  EXPECT_EQ(beside.warnings, alone.warnings);
+  ASSERT_EQ(alone.warnings.size(), 1u);
+  EXPECT_TRUE(alone.warnings[0].starts_with("output.meshing.search: pieces of surfaces")) << alone.warnings[0];
+  std::atomic<int> signal{0};
+  for (const int at_once : {1, 3}) {
+    const std::string part = "stopped" + std::to_string(at_once);
+    RunOptions o = options(part.c_str(), at_once);
+    o.interrupt = &signal;
+    o.progress = [&](const Progress& p) {
+      if (p.stage == "render" && p.frame >= 4) signal = 15;
+    };
+    EXPECT_EQ(run_scene(scene, o).outcome, "interrupted");
+    signal = 0;
+    o.progress = nullptr;
+    o.resume = true;
+    const RunResult resumed = run_scene(scene, o);
+    EXPECT_EQ(resumed.warnings, alone.warnings);
+    EXPECT_EQ(resumed.searches.pieces, alone.searches.pieces);
+    EXPECT_EQ(resumed.searches.unsearched, alone.searches.unsearched);
+    expect_same_files("alone", part.c_str(), kFrames * (1 + 2 + 1 + 1) + 1);  // picture, meshes, searches, state; sheet
+  }
+  Scene off = scene_of(kCoins);
+  off.output.meshing.search = false;
+  const RunResult none = run_scene(off, options("off", 3));
+  EXPECT_TRUE(none.searches.empty());
+  EXPECT_FALSE(fs::exists(folder_ / "off/searches"));
 }
 
 TEST_F(DrawingCrew, StopsAtASignalAndARestartDrawsTheRest) {

@@ -179,7 +179,10 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   const auto sunk = warnings_of("objects:\n  - {name: a, particles: {at: [0, 0, -0.1]}, skeleton: [{shape: point, " + ball);
   ASSERT_EQ(sunk.size(), 1u);
   EXPECT_NE(sunk[0].find("'a' and 'ground' begin so deep"), std::string::npos) << sunk[0];
-  const auto coarse = warnings_of("output: {cell: 5}\nobjects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: [{shape: point, " + ball);
+  const std::string small = "objects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: [{shape: point, " + ball;
+  EXPECT_TRUE(warnings_of("output: {cell: 5}\n" + small).empty());  // is searched
+  EXPECT_EQ(warnings_of("output: {cell: 5, meshing: {method: tetrahedra}}\n" + small).size(), 1u);
+  const auto coarse = warnings_of("output: {cell: 5, meshing: {search: false}}\n" + small);
   ASSERT_EQ(coarse.size(), 1u);
   EXPECT_NE(coarse[0].find("cells of 5 m may miss 'a'"), std::string::npos) << coarse[0];
   const auto thin = warnings_of(

@@ -51,26 +51,32 @@ TEST(ObjectMeshing, SmallestCellHoldsForObjectsThatTouch) {
   EXPECT_TRUE(same(wished[0], coarse[0]) && same(wished[1], coarse[1]));
 }
 
-TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodes) {
+constexpr const char* kFoundOne = "output.meshing.search: pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: 1";
+
+TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodesUnlessItIsOff) {
   const auto make = [](const std::string& search, const std::string& at) {
     return Simulation(parse_scene(scene_of("cell: 0.9", ", cell: 0.1, meshing: {" + search + '}', at), "test.yaml", "."));
   };
   const std::string between = "[3.1, 0.4, 0.4]";  // 0.7 m from the nearest node
-  Simulation plain = make("", between), searched = make("search: true", between);
-  const std::vector<Mesh> without = plain.meshes(), with = searched.meshes();
+  Simulation plain = make("search: false", between), searched = make("search: true", between), automatic = make("", between);
+  const std::vector<Mesh> without = plain.meshes(), with = searched.meshes(), unasked = automatic.meshes();
   EXPECT_EQ(without[0].triangle_count(), 0u);
   EXPECT_GT(with[0].triangle_count(), 100u);
   for (const Vec3& x : with[0].position) EXPECT_NEAR((x - Vec3(3.1, 0.4, 0.4)).norm(), 0.5 * 0.454202019, 1e-6);
   EXPECT_TRUE(same(with[1], without[1]) && same(with[2], without[2]));
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_TRUE(same(unasked[k], with[k])) << k;
   ASSERT_EQ(plain.warnings().size(), 1u);
   EXPECT_NE(plain.warnings()[0].find("cells of 0.9 m may miss 'coin'"), std::string::npos) << plain.warnings()[0];
   ASSERT_EQ(searched.warnings().size(), 1u);
   EXPECT_EQ(searched.warnings()[0],
-            "output.meshing.search: pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: 1; "
-            "cells where one may be missed: 0; meshes of bodies that bulge, which are not searched: 0");
+            std::string(kFoundOne) + "; cells where one may be missed: 0; meshes of bodies that bulge, which are not searched: 0");
+  ASSERT_EQ(automatic.warnings().size(), 1u);
+  EXPECT_EQ(automatic.warnings()[0], kFoundOne);
+  EXPECT_EQ(automatic.searches().pieces, 1u);
+  EXPECT_TRUE(automatic.searches().unsearched.empty() && plain.searches().empty());
 }
 
-TEST(ObjectMeshing, SearchFindsACoinInAHouse) {
+TEST(ObjectMeshing, SearchFindsACoinInAHouseUnlessItIsOff) {
   // Stiff, smaller than a cell, and wholly inside: no node of the lattice is the coin's.
   const auto text_of = [](const std::string& search, const std::string& contact) {
     std::string text = scene_of("", ", cell: 0.4, meshing: {" + search + '}', "[0.35, 0.3, 0.38]");
@@ -80,7 +86,7 @@ TEST(ObjectMeshing, SearchFindsACoinInAHouse) {
   const auto make = [&](const std::string& search, const std::string& contact = "") {
     return Simulation(parse_scene(text_of(search, contact), "test.yaml", "."));
   };
-  Simulation plain = make(""), searched = make("search: true"), bulging = make("search: true", "contact: {bulge: 0.4}\n");
+  Simulation plain = make("search: false"), searched = make("search: true"), bulging = make("search: true", "contact: {bulge: 0.4}\n");
   const std::vector<Mesh> without = plain.meshes(), with = searched.meshes();
   EXPECT_EQ(without[0].triangle_count(), 0u);
   ASSERT_GT(with[0].triangle_count(), 100u);
@@ -90,6 +96,72 @@ TEST(ObjectMeshing, SearchFindsACoinInAHouse) {
   EXPECT_NE(searched.warnings().back().find("all frames: 1; cells where one may be missed: 0;"), std::string::npos) << searched.warnings().back();
   (void)bulging.meshes();
   EXPECT_NE(bulging.warnings().back().find("are not searched: 2"), std::string::npos) << bulging.warnings().back();
+  Simulation automatic = make("");
+  const std::vector<Mesh> unasked = automatic.meshes();
+  EXPECT_EQ(automatic.warnings().back(), kFoundOne);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_TRUE(same(unasked[k], with[k])) << k;
+}
+
+/// One object of this skeleton and blend, and how it is meshed.
+std::string lone(const std::string& particles, const std::string& skeleton, const std::string& output) {
+  return "schema: 1\nduration: 1\nobjects:\n  - name: thing\n    particles: {" + particles + "}\n    skeleton: [" + skeleton + "]\n" +
+         output;
+}
+
+TEST(ObjectMeshing, SearchIsLeftOutWhereItsSkeletonSaysThatItDecidesNothing) {
+  const std::string row = "arrange: line, count: 3, spacing: 0.4", ball = "{shape: point, kernel: {radius: 0.5}}";
+  const std::string bend = "{shape: curve, points: [[-0.25, -0.1, 0], [-0.1, 0.55, 0], [0.1, -0.55, 0], [0.25, 0.1, 0]], kernel: {radius: 0.28}}";
+  for (const std::string& text : {lone(row, ball, "    blend: {rule: gradient}\n"), lone("at: [0, 0, 0]", bend, "")}) {
+    const auto make = [&](const std::string& search) {
+      return Simulation(parse_scene(text + "output: {mesh: ply, cell: 0.05, meshing: {search: " + search + "}}\n", "test.yaml", "."));
+    };
+    Simulation automatic = make("auto"), off = make("false");
+    ASSERT_GT(automatic.meshes()[0].triangle_count(), 100u);
+    EXPECT_TRUE(same(automatic.meshes()[0], off.meshes()[0]));
+    EXPECT_EQ(automatic.searches().undecided, 0u);
+    EXPECT_EQ(automatic.searches().not_searched(Unsearched::Undecided), 1u);
+    ASSERT_EQ(automatic.warnings().size(), 1u);
+    EXPECT_EQ(automatic.warnings()[0], "output.meshing.search: meshes that auto does not search, as cells along blends by gradients or tight bends "
+                                       "would stay undecided: 1");
+    EXPECT_NE(explain(automatic).find("thing is not searched: cells along blends by gradients or tight bends would stay undecided"),
+              std::string::npos) << explain(automatic);
+    EXPECT_TRUE(off.warnings().empty());
+    EXPECT_NE(explain(off).find("pieces between the nodes of the lattice are not looked for: the scene asks for none"), std::string::npos);
+  }
+}
+
+TEST(ObjectMeshing, SearchIsLeftOutWhereItWouldTakeFarLongerThanTheMesh) {
+  const auto make = [](const std::string& cell, const std::string& meshing) {
+    return Simulation(parse_scene(lone("arrange: grid, columns: 12, rows: 12, spacing: 0.15", "{shape: square, half_size: 0.06, kernel: {radius: 0.3}}",
+                                       "output: {mesh: ply, cell: " + cell + ", meshing: {" + meshing + "}}\n"), "test.yaml", "."));
+  };
+  Simulation coarse = make("0.1", ""), off = make("0.1", "search: false"), fine = make("0.02", ""), other = make("0.1", "method: tetrahedra");
+  EXPECT_TRUE(same(coarse.meshes()[0], off.meshes()[0]));
+  EXPECT_EQ(coarse.searches().not_searched(Unsearched::Cost), 1u);
+  EXPECT_EQ(coarse.searches().unsearched.at("thing"), (SearchCounts::Meshes{0, 0, 1, 0}));
+  ASSERT_EQ(coarse.warnings().size(), 1u);
+  EXPECT_EQ(coarse.warnings()[0], "output.meshing.search: meshes that auto does not search, as that would take far longer than to make them: 1");
+  EXPECT_NE(explain(coarse).find(" times as long as its mesh; output.meshing.search: true does it"), std::string::npos) << explain(coarse);
+  (void)fine.meshes();
+  EXPECT_TRUE(fine.searches().empty() && fine.warnings().empty());
+  EXPECT_NE(explain(fine).find("thing is searched: by counts "), std::string::npos) << explain(fine);
+  // The scene asks for another mesher, which needs no warning.
+  (void)other.meshes();
+  EXPECT_EQ(other.searches().not_searched(Unsearched::Mesher), 1u);
+  EXPECT_TRUE(other.warnings().empty());
+}
+
+TEST(ObjectMeshing, SearchOfBodiesThatTouchInManyPlacesIsLeftOutUnlessAsked) {
+  const auto make = [](const std::string& search) {
+    return Simulation(parse_scene(lone("arrange: line, count: 8, spacing: 0.4, mass: 1", "{shape: point, kernel: {radius: 0.5}}",
+                                       "    separate: true\n    contact: {modulus: 1e4}\noutput: {mesh: ply, cell: 0.1, meshing: {search: " + search + "}}\n"),
+                                  "test.yaml", "."));
+  };
+  Simulation automatic = make("auto"), asked = make("true"), off = make("false");
+  EXPECT_TRUE(same(automatic.meshes()[0], off.meshes()[0]));
+  EXPECT_EQ(automatic.searches().not_searched(Unsearched::Cost), 8u);
+  (void)asked.meshes();
+  EXPECT_TRUE(asked.searches().unsearched.empty());
 }
 
 TEST(ObjectMeshing, ErrorIsOfTheObjectOrOfAllThatTouchIt) {

@@ -568,6 +568,10 @@ void add_files(std::vector<Option>& all) {
                         {.skeleton = "{shape: point, kernel: {radius: 0.08}}",
                          .scene = "output: {cell: 0.1, mesh: ply, meshing: {search: $}}", .timing = "duration: 0.1\nframe_rate: 20\n"},
                         "false", "true"));
+  all.push_back(differs("output.meshing.search=auto", In::Files,
+                        {.skeleton = "{shape: point, kernel: {radius: 0.08}}",
+                         .scene = "output: {cell: 0.1, mesh: ply, meshing: {search: $}}", .timing = "duration: 0.1\nframe_rate: 20\n"},
+                        "false", "auto"));
   file("meshing.motion", "cell: 0.1, mesh: ply, meshing: {motion: $}", "false", "true");
   for (const char* of : {"scene", "both"}) file("gridding.of=" + std::string(of), "cell: 0.1, grid: vdb, gridding: {of: $}", "objects", of);
   file("gridding.content=field", "cell: 0.1, grid: vdb, gridding: {content: $}", "distance", "field");

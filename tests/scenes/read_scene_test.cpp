@@ -265,6 +265,8 @@ TEST(SceneReference, SchemaSaysWhatIsRequiredAndForWhich) {
                     condition["then"]["required"] == nlohmann::json({"radius"}));
   }
   EXPECT_TRUE(ring);
+  const auto& search = schema["properties"]["output"]["properties"]["meshing"]["properties"]["search"];
+  EXPECT_EQ(search["anyOf"], nlohmann::json::parse(R"([{"type": "boolean"}, {"const": "auto"}])"));
 }
 
 TEST(SceneHashes, KnowWhatIsInTheFilesThatAreNamed) {

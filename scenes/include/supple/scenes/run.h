@@ -74,6 +74,7 @@ struct RunResult {
   std::filesystem::path report; ///< result.json, render.json or export.json
   std::filesystem::path film;   ///< empty: none
   std::vector<std::string> warnings;
+  SearchCounts searches;    ///< of the meshes of all frames, those that were kept too
   PictureTimes pictures;
 };
 
@@ -82,7 +83,7 @@ struct RunResult {
 void check_pictures(const Scene& scene);
 
 /// Simulates, surfaces, renders and films a scene into options.folder:
-/// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, NAME.usda, grids/, contacts/,
+/// frames/NAME.0001.png, NAME.mp4, NAME_sheet.png, states/NAME.0001.state, meshes/, searches/, NAME.usda, grids/, contacts/,
 /// particles/, samples/, NAME_contacts.pvd, NAME_particles.pvd, NAME_samples.pvd as asked for, and always result.json, also when the run failed. Files appear under their names when they are complete.
 /// @throws Error{Io} when not even the folder can be made or is in use, Error{Usage}
 [[nodiscard]] RunResult run_scene(const Scene& scene, const RunOptions& options);

@@ -384,7 +384,7 @@ struct MeshingDesc {
   double angle = 0.5235987755982988;       ///< Delaunay: least angle of a triangle [rad]
   std::optional<double> size;              ///< Delaunay: largest radius of a surface ball [m]; absent: two cells
   std::optional<double> distance;          ///< Delaunay: from circumcentre to surface [m]; absent: a tenth of the size
-  bool search = false;                     ///< Auto, Cubes: for closed pieces between the nodes of the lattice
+  std::optional<bool> search;              ///< Auto, Cubes: for closed pieces between the nodes of the lattice; absent: where it costs little beside the mesh
   bool motion = false;                     ///< columns of velocity and owner
 };
 

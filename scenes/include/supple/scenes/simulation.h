@@ -19,6 +19,7 @@
 
 #include "supple/core/mesh.h"
 #include "supple/implicit/delaunay.h"
+#include "supple/scenes/mesh_search.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/plan.h"
 #include "supple/scenes/state.h"
@@ -148,8 +149,10 @@ class Simulation {
 
   [[nodiscard]] Energies energies();
   [[nodiscard]] Audits audits() const;
-  /// What is odd about the start of the scene, as sentences.
+  /// What is odd about the start of the scene and what searches of all meshes so far tell, as sentences.
   [[nodiscard]] const std::vector<std::string>& warnings() const;
+  /// What searches found for all meshes made of the present state, and which were not searched.
+  [[nodiscard]] const SearchCounts& searches() const;
   /// Work by stage; the time of `advance` is without the force evaluations inside it.
   [[nodiscard]] Profile profile() const;
   /// Where a stage outside the simulation (render, export) books its work.

@@ -1,0 +1,45 @@
+/// @file supple/scenes/mesh_search.h
+/// What searches for the pieces that meshes miss (implicit/missed_pieces.h) found, and which meshes were not searched.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+namespace supple::scenes {
+
+/// Why a mesh is not searched.
+enum class Unsearched : std::uint8_t {
+  Bulges,      ///< contact deforms the body by what is no part of its field, or it passes through another one
+  Undecided,   ///< cells along its blends or bends would stay undecided
+  Cost,        ///< it would take far longer than the mesh
+  Mesher,      ///< another one than marching cubes made it
+};
+inline constexpr std::array<std::string_view, 4> kUnsearchedNames{"bulges", "undecided", "cost", "mesher"};
+
+/// Of the meshes of one state, or of several.
+struct SearchCounts {
+  using Meshes = std::array<std::uint64_t, kUnsearchedNames.size()>;  ///< by reason
+  std::uint64_t pieces = 0;     ///< found and added
+  std::uint64_t undecided = 0;  ///< cells where one may be missed
+  std::map<std::string, Meshes> unsearched;  ///< by object, where there are any
+
+  [[nodiscard]] bool empty() const { return pieces == 0 && undecided == 0 && unsearched.empty(); }
+  [[nodiscard]] std::uint64_t not_searched(Unsearched why) const {
+    std::uint64_t sum = 0;
+    for (const auto& [object, meshes] : unsearched) sum += meshes[static_cast<std::size_t>(why)];
+    return sum;
+  }
+  void add(const SearchCounts& other) {
+    pieces += other.pieces;
+    undecided += other.undecided;
+    for (const auto& [object, meshes] : other.unsearched) {
+      for (std::size_t k = 0; k < meshes.size(); ++k) unsearched[object][k] += meshes[k];
+    }
+  }
+};
+
+}  // namespace supple::scenes

@@ -1,0 +1,69 @@
+#include "search_files.h"
+
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "output_files.h"
+#include "supple/core/io/atomic_file.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr const char* kFolder = "searches";
+
+std::uint64_t count_at(const ordered_json& object, std::string_view key) {
+  const auto at = object.find(key);
+  return at != object.end() && at->is_number_unsigned() ? at->get<std::uint64_t>() : 0;
+}
+
+SearchCounts searches_of(const ordered_json& json) {
+  SearchCounts counts{.pieces = count_at(json, "pieces"), .undecided = count_at(json, "undecided"), .unsearched = {}};
+  const auto unsearched = json.find("unsearched");
+  if (unsearched == json.end() || !unsearched->is_object()) return counts;
+  for (const auto& [object, meshes] : unsearched->items()) {
+    if (!meshes.is_object()) continue;
+    for (std::size_t k = 0; k < kUnsearchedNames.size(); ++k) counts.unsearched[object][k] = count_at(meshes, kUnsearchedNames[k]);
+  }
+  return counts;
+}
+
+}  // namespace
+
+ordered_json json_of(const SearchCounts& counts) {
+  ordered_json unsearched = ordered_json::object();
+  for (const auto& [object, meshes] : counts.unsearched) {
+    for (std::size_t k = 0; k < meshes.size(); ++k) {
+      if (meshes[k] > 0) unsearched[object][std::string(kUnsearchedNames[k])] = meshes[k];
+    }
+  }
+  return {{"pieces", counts.pieces}, {"undecided", counts.undecided}, {"unsearched", unsearched}};
+}
+
+void write_searches(const fs::path& folder, const std::string& name, int frame, const SearchCounts& counts) {
+  const fs::path path = folder / kFolder / numbered(name, frame, ".json");
+  if (counts.empty()) {
+    std::error_code absent;
+    fs::remove(path, absent);
+    return;
+  }
+  io::make_writable_folder(path.parent_path());
+  io::write_atomically(path, std::string_view(json_of(counts).dump() + "\n"));
+}
+
+SearchCounts read_searches(const fs::path& folder, const std::string& name, const std::set<int>& frames, int last) {
+  SearchCounts all;
+  for (int frame = 1; frame <= last; ++frame) {
+    const fs::path path = folder / kFolder / numbered(name, frame, ".json");
+    if (!(frames.empty() || frames.contains(frame)) || !fs::exists(path)) continue;
+    std::ifstream file(path);
+    const ordered_json json = ordered_json::parse(file, nullptr, false);
+    if (json.is_object()) all.add(searches_of(json));
+  }
+  return all;
+}
+
+}  // namespace supple::scenes
