@@ -46,7 +46,7 @@ Verdict CubeBounds::operator()(const Box& box, std::span<const std::uint32_t> ca
 
 bool CubeBounds::is_flat() {
   return std::all_of(entry_.begin(), entry_.end(),
-      [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e); });
+      [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e) || (e.label == 0 && passes_round_bodies()); });
 }
 
 std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
@@ -90,6 +90,13 @@ Verdict CubeBounds::judge() {
   }
   verdict.certain = possible == 1;
   return verdict;
+}
+
+bool CubeBounds::passes_round_bodies() const {
+  return lead_.size() <= 3 && std::all_of(lead_.begin(), lead_.end(), [](const Lead& l) {
+    const GradientBounds& bounds = l.other->bounds;
+    return bounds.round && bounds.hull.size() == 1 && bounds.hull[0].gradient.norm() > (1.0 + 1e-12) * bounds.hull[0].turn;
+  });
 }
 
 bool CubeBounds::rises(const Entry& own) {

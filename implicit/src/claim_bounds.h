@@ -81,6 +81,9 @@ class CubeBounds {
   /// Whether there is a direction along which all leads rise that may be the least of a claim. They are divided by how steep their
   /// claims are, so that in most cubes on an interface no lead over a third competes.
   [[nodiscard]] bool rises(const Entry& own);
+  /// Whether space outside has no maximum of its least lead: over one, two or three round bodies. Where no direction leads away from
+  /// all, their normals lie in a plane, and along its normal all of them fall. @pre rises(outside) was looked at last
+  [[nodiscard]] bool passes_round_bodies() const;
 
   std::span<const Claim> claims_;
   std::vector<Entry> entry_;

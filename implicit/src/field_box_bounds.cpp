@@ -196,8 +196,11 @@ GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = field.bound(box)}, {}, {}};
   if (index.blend.active()) return blended_box_bounds(index, box, field.bound(box));
   Expansion sum{.value = -index.iso, .scale = index.iso};
+  bool round = true;
   for (const std::uint32_t id : candidates_of(index, box)) {
-    if (index.support[id].overlaps(box)) expand(index, id, box, sum);
+    if (!index.support[id].overlaps(box)) continue;
+    expand(index, id, box, sum);
+    round = index.shape[id].view.kind == ShapeKind::Point;
   }
   // As Field::bound has them.
   const double round_off = (16.0 + sum.terms) * kEps * sum.scale;
@@ -205,6 +208,7 @@ GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   if (sum.terms == 0.0) return {{.value = {-index.iso, -index.iso}, .second_order = true}, {}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
   GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}, {}, {}};
+  out.round = round && sum.terms == 1.0;  // a lone ball or ellipsoid
   if (sum.sloped && half.maxCoeff() > 0.0) {
     out.hull.push_back({sum.gradient, sum.turn(half.norm()) + sum.round_off() / half.maxCoeff()});
     out.least_slope = least_of_hull(out.hull);

@@ -22,7 +22,8 @@ struct GradientBounds : Field::BoxBounds {
     double round_off = 0.0;      ///< of values [1]
   };
   Curved curved;
-  std::vector<Ball> hull;  ///< of these balls holds Clarke's gradients of F on all of the box; several where parts win in turn, empty: not known
+  std::vector<Ball> hull{};  ///< of these balls holds Clarke's gradients of F on all of the box; several where parts win in turn, empty: not known
+  bool round = false;  ///< {F >= F(x)} is strictly convex for each point x of the box where the gradient is not 0
 };
 
 [[nodiscard]] GradientBounds bounds_with_gradient(const Field& field, const Box& box);

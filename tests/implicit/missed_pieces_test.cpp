@@ -361,6 +361,35 @@ TEST(MissedPieces, BetweenTwoBodiesBelongToBoth) {
   EXPECT_NEAR(expect_closed(d.mesh[1]).volume - inspect(d.coarse[1]).volume, hole, 1e-12);
 }
 
+/// Balls of radius 0.454 m around these centres. @return pieces, undecided cells and cubes between them
+MissedPieces search_balls(std::span<const Vec3> centres) {
+  std::vector<Body> balls;
+  for (const Vec3& centre : centres) balls.push_back(body_of({{wyvill_point(1.0), centre}}));
+  std::vector<SearchedBody> bodies;
+  for (const Body& ball : balls) bodies.push_back({&ball.field, 1.0});
+  return search_divided(bodies, lattice_around({0.382, 0.236, 0.447})).found;
+}
+
+TEST(MissedPieces, AreDecidedWhereRoundBodiesHardlyTouchOrPass) {
+  for (const double gap : {-2e-3, -2e-5, 2e-5, 2e-3}) {
+    const double d = 0.908404038 + gap;  // of two
+    const Vec3 turned = d * Vec3(0.6, 0.48, 0.64), across = d * Vec3(-0.8, 0.36, 0.48);
+    const std::array<Vec3, 3> centres{Vec3::Zero(), turned, 0.5 * turned + std::sqrt(0.75) * across};
+    for (const std::size_t count : {2u, 3u}) {
+      const MissedPieces found = search_balls(std::span(centres).first(count));
+      EXPECT_TRUE(found.complete() && found.pieces == 0) << gap;
+      EXPECT_LT(found.cubes, count * 5000) << gap;
+    }
+  }
+}
+
+TEST(MissedPieces, AreLeftOpenWhereFourRoundBodiesEncloseThem) {
+  const double d = 0.454202019 / 0.59;  // a pocket, which opens at 0.577 and closes at 0.612
+  const std::array<Vec3, 4> centres{0.5 * d * Vec3(1, 0, -std::sqrt(0.5)), 0.5 * d * Vec3(-1, 0, -std::sqrt(0.5)),
+                                    0.5 * d * Vec3(0, 1, std::sqrt(0.5)), 0.5 * d * Vec3(0, -1, std::sqrt(0.5))};
+  EXPECT_FALSE(search_balls(centres).complete());
+}
+
 void expect_touch_decided(const Body& a, const Body& b) {
   const std::array bodies{SearchedBody{&a.field, 1.0}, SearchedBody{&b.field, 1.7}};
   Box box;
