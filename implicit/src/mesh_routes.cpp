@@ -98,9 +98,9 @@ constexpr double kLeastHalved = 1.0;
 constexpr double kOtherShapes = 2.5;
 /// Of tetrahedra: of a leaf, and of the rim of a contact [ms].
 constexpr double kDividedLeaf = 0.04, kRim = 0.8;
-/// Of two bodies that touch, for some thousand cubes where gap or overlap is thinner than a cell [ms]: the lengths of those shrink with the
-/// number of primitives that overlap, and each takes as many.
-constexpr double kContact = 4.0;
+/// Of two bodies that touch, for some thousand cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
+/// there, of balls and of shapes with edges.
+constexpr double kContact = 2.0, kMoreBalls = 1.0, kMoreShapes = 170.0;
 
 /// CPU time of marching cubes [ms].
 double cubes_ms(const Skeleton& skeleton, std::span<const Box> supports, double cell) {
@@ -157,16 +157,16 @@ SearchEstimate estimate_search(const Skeleton& skeleton, std::span<const Box> su
 
 SearchEstimate estimate_search(std::span<const DividingBody> bodies, std::span<const std::array<std::size_t, 2>> pairs, double cell) {
   SearchEstimate all;
-  std::vector<double> overlap;
+  std::vector<double> more_ms;  // by body, of each of its contacts
   for (const DividingBody& body : bodies) {
-    overlap.push_back(local_overlap(body.supports));
+    const double overlap = local_overlap(body.supports);
+    more_ms.push_back((is_blobs(*body.skeleton) ? kMoreBalls : kMoreShapes) * std::max(overlap - 1.0, 0.0));
     all.decides = all.decides && decides(*body.skeleton);
-    all.search_ms += search_ms(kSumSearch, *body.skeleton, overlap.back(), cubes_ms(*body.skeleton, body.supports, cell), cell);
+    all.search_ms += search_ms(kSumSearch, *body.skeleton, overlap, cubes_ms(*body.skeleton, body.supports, cell), cell);
     all.mesh_ms += kDividedLeaf * estimate_routes(*body.skeleton, body.supports, cell).leaves;
   }
   for (const auto& [a, b] : pairs) {
-    const double most = std::max(overlap[a], overlap[b]);
-    all.search_ms += kContact * most * most * most;
+    all.search_ms += kContact + std::max(more_ms[a], more_ms[b]);
     all.mesh_ms += kRim;
   }
   return all;
