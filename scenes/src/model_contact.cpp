@@ -148,7 +148,7 @@ void add_primitives(const ObstacleDesc& d, const std::string& key, ModelFaults& 
   body.core_value = std::numeric_limits<double>::infinity();
   for (const implicit::Primitive& primitive : skeleton.primitive) {
     body.core_value = std::min(*body.core_value, implicit::peak(primitive.kernel) - skeleton.iso);
-    body.iso_radius = std::min(body.iso_radius, scenes::iso_radius(primitive, skeleton.iso));
+    body.iso_radius = std::min(body.iso_radius, iso_radius(primitive, skeleton.iso));
   }
 }
 
