@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -19,6 +20,7 @@ implicit::Blend take_blend(const implicit::Blend& all, std::span<const std::uint
   std::vector<std::uint32_t> present = blend.node;  // nodes that the piece has particles of, rising
   std::sort(present.begin(), present.end());
   present.erase(std::unique(present.begin(), present.end()), present.end());
+  if (present.size() == 1) return {};  // it sums, and sums are cheaper without the rule
   const auto renumbered = [&](std::uint32_t node) {
     const auto place = std::lower_bound(present.begin(), present.end(), node);
     return place != present.end() && *place == node ? static_cast<std::uint32_t>(place - present.begin()) : kElsewhere;
@@ -148,35 +150,48 @@ void fade_blends(const Model& model, const core::LinkState& links, std::span<con
   }
 }
 
+Meeting meeting_of(const ObjectModel& object, const BodyOrigin& a, const BodyOrigin& b) {
+  if (object.separate) return Meeting::Always;
+  if (a.component == b.component) return Meeting::OnceApart;
+  const auto listed = [&](const std::vector<collision::BodyPair>& pairs) {
+    const auto [low, high] = std::minmax(a.component, b.component);
+    return std::binary_search(pairs.begin(), pairs.end(), collision::BodyPair{low, high});
+  };
+  if (listed(object.bonded)) return a.piece == b.piece ? Meeting::Never : Meeting::OnceApart;
+  return listed(object.overlapping) ? Meeting::OnceApart : Meeting::Always;
+}
+
 std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) {
   std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, links);
   for (const ObjectModel& object : model.objects) {
     if (object.separate) std::iota(piece.begin() + object.first, piece.begin() + object.last, object.first);
   }
-  std::vector<std::size_t> body_of(piece.size());  // by the particle that names the piece, its smallest
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> body_of;  // by piece and component, of one object
   std::vector<Body> bodies;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const ObjectModel& object = model.objects[o];
     const std::size_t begin = bodies.size();
+    body_of.clear();
     for (std::uint32_t i = object.first; i < object.last; ++i) {
-      if (piece[i] == i) {
-        body_of[i] = bodies.size();
-        bodies.push_back({.object = o, .name = object.name, .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
+      const BodyOrigin origin{piece[i], object.component.empty() ? 0 : object.component[i - object.first]};
+      const auto [place, fresh] = body_of.try_emplace({origin.piece, origin.component}, bodies.size());
+      if (fresh) {
+        bodies.push_back({.object = o, .origin = origin, .name = object.name, .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
       }
-      Body& body = bodies[body_of[piece[i]]];
+      Body& body = bodies[place->second];
       body.particle.push_back(i);
       const core::ParticleSet& set = model.particles;
       body.yield.push_back({core::free_translation(set.pinned[i], Vec3::Constant(1.0 / set.mass[i])).maxCoeff(),
                             core::free_rotation(set.pinned[i], Vec3::Constant(1.0 / set.inertia[i].minCoeff())).maxCoeff()});
     }
-    const std::size_t pieces = bodies.size() - begin;
+    const std::size_t count = bodies.size() - begin;
     const std::size_t particles = object.last - object.first;
     const auto& primitive = object.skeleton.primitive;
     const Carried primitives(particles, primitive.size(), [&](std::size_t k) { return primitive[k].part; });
     const Carried seeds(particles, object.samples.size(), [&](std::size_t s) { return object.samples.part[s]; });
-    for (std::size_t k = 0; k < pieces; ++k) {
+    for (std::size_t k = 0; k < count; ++k) {
       Body& body = bodies[begin + k];
-      if (pieces > 1) body.name += '.' + std::to_string(k + 1);
+      if (count > 1) body.name += '.' + std::to_string(k + 1);
       take_part(object, primitives, seeds, body);
     }
   }
@@ -186,11 +201,11 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
 collision::ContactRules make_body_rules(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
   const auto count = static_cast<std::uint32_t>(bodies.size() + model.fixed.size());
   std::vector<std::uint32_t> object(count), leader(count, kElsewhere);
-  std::vector<std::uint8_t> separate(count, 0);
+  std::vector<BodyOrigin> origin;
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     object[k] = bodies[k].object;
     leader[k] = bodies[k].particle.front();
-    separate[k] = model.objects[object[k]].separate ? 1 : 0;
+    origin.push_back(bodies[k].origin);
   }
   for (std::size_t k = bodies.size(); k < count; ++k) {
     object[k] = static_cast<std::uint32_t>(model.objects.size() + k - bodies.size());
@@ -208,9 +223,11 @@ collision::ContactRules make_body_rules(const Model& model, const std::vector<Bo
   }
   std::sort(rules.overrides.begin(), rules.overrides.end(),
             [](const auto& x, const auto& y) { return x.pair < y.pair; });
-  rules.allowed = [&allowed = model.rules.allowed, object, leader, separate, apart](std::uint32_t a, std::uint32_t b) {
+  rules.allowed = [&allowed = model.rules.allowed, &objects = model.objects, object, leader, origin, apart](std::uint32_t a,
+                                                                                                       std::uint32_t b) {
     if (object[a] != object[b]) return !allowed || allowed(object[a], object[b]);
-    if (separate[a] != 0) return true;
+    const Meeting meeting = meeting_of(objects[object[a]], origin[a], origin[b]);
+    if (meeting != Meeting::OnceApart) return meeting == Meeting::Always;
     return std::binary_search(apart.begin(), apart.end(),
                               collision::BodyPair{std::min(leader[a], leader[b]), std::max(leader[a], leader[b])});
   };

@@ -16,6 +16,7 @@ void fields(Archive& archive, MaterialDesc& d) {
   archive("modulus", d.modulus, above(0.0, kPressure), "P0: pressure is P0 (f - iso)");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient; a pair has sqrt(mu_A mu_B)");
   archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "Hunt & Crossley d; 1/d is the largest speed of a bounce");
+  archive("self", d.self, {}, "whether parts of the object that its blending graph does not join touch each other, as bodies of their own; not those that a bond ties, and those that overlap at the start only once they have been apart; absent: unless it holds its volume");
 }
 
 template <class Archive>

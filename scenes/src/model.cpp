@@ -280,6 +280,15 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
   return rule;
 }
 
+/// Components of the blending graph of an object that touches itself become bodies of their own.
+void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
+  if (!d.contact->self.value_or(true)) return;
+  BlendComponents components = blend_components(object.skeleton.blend, object.last - object.first);
+  const bool several = std::any_of(components.first.begin(), components.first.end(), [](std::uint32_t first) { return first != 0; });
+  object.passes_itself = !components.direct || (several && d.volume);
+  if (several && !d.volume) object.component = std::move(components.first);
+}
+
 /// All particles move in one plane z = const.
 void confine_to_plane(Model& model, ModelFaults& faults) {
   const double z = model.initial.position.front().z();
@@ -362,9 +371,10 @@ Model build_model(const Scene& scene) {
       object.collides = !object.skeleton.primitive.empty();
       object.breaks = d.breaking.has_value();
     }
+    object.separate = d.separate;
+    if (object.collides && !object.separate) divide_by_blend(d, object);
     set_kinds(d, key, object, model, faults);
     object.hinges_join = d.hinges_join;
-    object.separate = d.separate;
     add_pins_and_loads(d, key, object, model, faults);
     model.objects.push_back(std::move(object));
   }

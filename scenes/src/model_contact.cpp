@@ -278,14 +278,30 @@ void add_own_repulsion(const Scene& scene, Model& model) {
 /// Whether every body of an object, now and later, is convex by construction: such bodies find each other without samples.
 bool only_convex(const ObjectModel& object) {
   if (object.breaks) return false;
-  if (!object.separate) return implicit::has_convex_core(object.skeleton);
+  if (!object.separate && object.component.empty()) return implicit::has_convex_core(object.skeleton);
   implicit::Skeleton one{.primitive = std::vector<implicit::Primitive>(1), .part_count = 1, .iso = object.skeleton.iso, .blend = {}};
-  for (std::size_t k = 0; k < object.skeleton.primitive.size(); ++k) {
-    one.primitive[0] = object.skeleton.primitive[k];
-    if (k > 0 && one.primitive[0].part == object.skeleton.primitive[k - 1].part) return false;
-    if (!implicit::has_convex_core(one)) return false;
+  std::vector<std::uint8_t> taken(object.last - object.first, 0);  // by the first particle of a body
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    std::uint8_t& other = taken[object.separate ? primitive.part : object.component[primitive.part]];
+    one.primitive[0] = primitive;
+    if (other != 0 || !implicit::has_convex_core(one)) return false;
+    other = 1;
   }
   return true;
+}
+
+/// Components of an object with a bond between them.
+void find_bonded_components(Model& model) {
+  for (const auto& [p, q] : core::bonded_pairs(model.interactions)) {
+    ObjectModel& object = model.objects[model.particles.object[p]];
+    if (object.component.empty() || model.particles.object[q] != model.particles.object[p]) continue;
+    const auto [a, b] = std::minmax(object.component[p - object.first], object.component[q - object.first]);
+    if (a != b) object.bonded.push_back({a, b});
+  }
+  for (ObjectModel& object : model.objects) {
+    std::sort(object.bonded.begin(), object.bonded.end());
+    object.bonded.erase(std::unique(object.bonded.begin(), object.bonded.end()), object.bonded.end());
+  }
 }
 
 /// Whether the seeds of an object's surface, by the boxes of its supports, stay within what memory holds.
@@ -314,6 +330,18 @@ double iso_radius(const implicit::Primitive& primitive, double iso) {
 double solid_half_size(const implicit::Primitive& primitive) {
   if (primitive.shape != implicit::ShapeKind::Box) return 0.0;
   return primitive.size.cwiseProduct(primitive.stretch).minCoeff();
+}
+
+std::size_t own_contacts(const ObjectModel& object) {
+  if (object.breaks) return 2;
+  if (object.separate) return object.last > object.first + 1 ? 2 : 0;
+  if (object.component.empty()) return 0;
+  std::vector<std::uint8_t> solid(object.component.size(), 0);  // components that have a surface
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) solid[object.component[primitive.part]] = 1;
+  const auto bodies = static_cast<std::size_t>(std::count(solid.begin(), solid.end(), 1));
+  const auto tied = std::count_if(object.bonded.begin(), object.bonded.end(),
+                                  [&](const BodyPair& pair) { return solid[pair.a] != 0 && solid[pair.b] != 0; });
+  return bodies * (bodies - 1) / 2 > static_cast<std::size_t>(tied) ? bodies : 0;
 }
 
 double dissipation_for(double restitution, double speed) {
@@ -357,6 +385,7 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   for (const auto& pair : model.rules.overrides) {
     model.largest_dissipation = std::max(model.largest_dissipation, pair.material.dissipation);
   }
+  find_bonded_components(model);
   const auto count = static_cast<std::uint32_t>(model.objects.size());
   std::vector<std::uint8_t> convex;
   for (const ObjectModel& object : model.objects) convex.push_back(only_convex(object) ? 1 : 0);
@@ -364,7 +393,7 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   for (std::uint32_t i = 0; i < count; ++i) {
     ObjectModel& object = model.objects[i];
     if (!object.collides) continue;
-    bool touches = object.breaks || object.separate;
+    bool touches = own_contacts(object) > 0;
     bool needs_samples = convex[i] == 0;
     for (std::uint32_t j = 0; j < count + model.fixed.size() && !(touches && needs_samples); ++j) {
       const bool other = j >= count || (j != i && model.objects[j].collides);

@@ -15,6 +15,9 @@ namespace supple::scenes {
 /// d v - ln(1 + d v) + d e v + ln(1 - d e v) = 0 (docs/notation.md, restitution). @pre 0 < e <= 1, speed > 0
 [[nodiscard]] double dissipation_for(double restitution, double speed);
 
+/// Bodies of an object that may touch each other, by what is known at the start; of those that may break off it counts two.
+[[nodiscard]] std::size_t own_contacts(const ObjectModel& object);
+
 void build_contact(const Scene& scene, Model& model, ModelFaults& faults);
 
 }  // namespace supple::scenes

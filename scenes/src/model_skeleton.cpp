@@ -269,6 +269,32 @@ implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<c
   return blend;
 }
 
+BlendComponents blend_components(const implicit::Blend& blend, std::uint32_t parts) {
+  BlendComponents out;
+  out.first.assign(parts, 0);
+  if (blend.rule != implicit::BlendRule::Graph) return out;
+  const std::uint32_t nodes = blend.node.empty() ? 0 : *std::max_element(blend.node.begin(), blend.node.end()) + 1;
+  std::vector<std::uint32_t> root(nodes);
+  std::iota(root.begin(), root.end(), 0U);
+  const auto root_of = [&root](std::uint32_t k) {
+    while (root[k] != k) k = root[k] = root[root[k]];
+    return k;
+  };
+  for (const implicit::BlendEdge& e : blend.edge) root[root_of(e.a)] = root_of(e.b);
+  std::vector<std::uint32_t> first(nodes, parts);
+  for (std::uint32_t i = 0; i < parts; ++i) {
+    std::uint32_t& least = first[root_of(blend.node[i])];
+    least = std::min(least, i);
+    out.first[i] = least;
+  }
+  std::vector<std::size_t> size(nodes, 0);
+  for (std::uint32_t k = 0; k < nodes; ++k) ++size[root_of(k)];
+  std::size_t pairs = 0;
+  for (const std::size_t n : size) pairs += n * (n - std::min<std::size_t>(n, 1)) / 2;
+  out.direct = blend.edge.size() == pairs;
+  return out;
+}
+
 CarriedSolid carried_solid(const implicit::Skeleton& object, std::uint32_t part, bool own_axes) {
   const auto before = [](const implicit::Primitive& a, std::uint32_t b) { return a.part < b; };
   implicit::Skeleton own{.primitive = {}, .part_count = 1, .iso = object.iso, .blend = {}};

@@ -23,6 +23,14 @@ namespace supple::scenes {
 /// How the particles of an object blend. @param rest  their places
 [[nodiscard]] implicit::Blend blend_of(const BlendDesc& d, const std::string& key, std::span<const Vec3> rest, ModelFaults& faults);
 
+/// What a blending graph joins.
+struct BlendComponents {
+  std::vector<std::uint32_t> first;  ///< of each part: the first part that it blends with, directly or by way of others
+  bool direct = true;                ///< no two nodes are joined only by way of others
+};
+/// @param parts  of the blend's body
+[[nodiscard]] BlendComponents blend_components(const implicit::Blend& blend, std::uint32_t parts);
+
 /// The ellipsoid that has the second moments of a solid about the origin of its particle.
 struct CarriedSolid {
   Vec3 axes = Vec3::Zero();        ///< semi-axes [m]

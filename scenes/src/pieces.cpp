@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "warnings.h"
+
 namespace supple::scenes {
 
 bool age_broken_links(const Model& model, double dt, State& state) {
@@ -48,6 +50,59 @@ std::vector<implicit::SampleState> inherited_samples(const std::vector<Body>& be
 
 implicit::SampleState fresh_samples(const Body& body) { return {.distance = std::vector<double>(body.samples.size(), -1.0)}; }
 
+bool note_overlapping(const std::vector<Body>& bodies, const Frame& frame, Model& model) {
+  bool any = false;
+  const auto note = [&](const collision::BodyPair& pair) {
+    if (pair.b >= bodies.size() || bodies[pair.a].object != bodies[pair.b].object) return;
+    const auto [a, b] = std::minmax(bodies[pair.a].origin.component, bodies[pair.b].origin.component);
+    ObjectModel& object = model.objects[bodies[pair.a].object];
+    if (a == b || object.component.empty()) return;
+    object.overlapping.push_back({a, b});
+    any = true;
+  };
+  for (const auto& s : frame.surface.summary) note(s.bodies);
+  for (const collision::BodyPair& pair : frame.reaching) {
+    if (begins_deep(bodies, frame, pair)) note(pair);
+  }
+  for (ObjectModel& object : model.objects) {
+    std::vector<collision::BodyPair>& pairs = object.overlapping;
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  }
+  return any;
+}
+
+namespace {
+
+/// Bodies of one object that meet once they have been apart, but for those that have been.
+std::vector<collision::BodyPair> pairs_to_part(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
+  std::vector<collision::BodyPair> pairs;
+  const auto add = [&](std::uint32_t i, std::uint32_t j) {
+    if (meeting_of(model.objects[bodies[i].object], bodies[i].origin, bodies[j].origin) != Meeting::OnceApart) return;
+    if (bodies[i].skeleton.primitive.empty() || bodies[j].skeleton.primitive.empty()) return;
+    if (std::binary_search(apart.begin(), apart.end(), collision::BodyPair{bodies[i].particle.front(), bodies[j].particle.front()})) return;
+    pairs.push_back({i, j});
+  };
+  const auto body_of = [&](std::uint32_t particle) {  // whose smallest it is
+    const auto before = [](const Body& body, std::uint32_t p) { return body.particle.front() < p; };
+    return static_cast<std::uint32_t>(std::lower_bound(bodies.begin(), bodies.end(), particle, before) - bodies.begin());
+  };
+  for (const ObjectModel& object : model.objects) {
+    if (!object.collides || object.separate) continue;
+    if (!object.breaks) {  // bodies are its components, and few of their pairs overlapped
+      for (const collision::BodyPair& pair : object.overlapping) add(body_of(object.first + pair.a), body_of(object.first + pair.b));
+      continue;
+    }
+    const std::uint32_t end = body_of(object.last);
+    for (std::uint32_t i = body_of(object.first); i < end; ++i) {
+      for (std::uint32_t j = i + 1; j < end; ++j) add(i, j);
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
 bool note_apart(const StageContext& context, const core::ParticleState& particles, Frame& frame, ApartPairs& apart) {
   const std::vector<Body>& bodies = context.bodies;
   ApartPairs fresh;
@@ -57,14 +112,9 @@ bool note_apart(const StageContext& context, const core::ParticleState& particle
     placed[i] = 1;
     return frame.field[i].surface_box();
   };
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const ObjectModel& object = context.model.objects[bodies[i].object];
-    if (!object.collides || object.separate || bodies[i].skeleton.primitive.empty()) continue;
-    for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-      const collision::BodyPair pair{bodies[i].particle.front(), bodies[j].particle.front()};
-      if (bodies[j].skeleton.primitive.empty() || std::binary_search(apart.begin(), apart.end(), pair)) continue;
-      if (!surface_box(i).overlaps(surface_box(j))) fresh.push_back(pair);
-    }
+  for (const collision::BodyPair& pair : pairs_to_part(context.model, bodies, apart)) {
+    if (surface_box(pair.a).overlaps(surface_box(pair.b))) continue;
+    fresh.push_back({bodies[pair.a].particle.front(), bodies[pair.b].particle.front()});
   }
   if (fresh.empty()) return false;
   apart.insert(apart.end(), fresh.begin(), fresh.end());

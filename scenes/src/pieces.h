@@ -23,7 +23,12 @@ bool age_broken_links(const Model& model, double dt, State& state);
 /// Warm starts of a body that has none.
 [[nodiscard]] implicit::SampleState fresh_samples(const Body& body);
 
-/// Adds pieces of one object whose surfaces are in separate boxes: they touch from then on. @return whether there are any new ones
+/// Notes components of one object that overlap at the start. @param frame  of the contacts there, of bodies that all touch each other
+/// @return whether there are any
+bool note_overlapping(const std::vector<Body>& bodies, const Frame& frame, Model& model);
+
+/// Adds bodies of one object that meet once they have been apart and whose surfaces are in separate boxes: they touch from then on.
+/// @return whether there are any new ones
 bool note_apart(const StageContext& context, const core::ParticleState& particles, Frame& frame, ApartPairs& apart);
 
 }  // namespace supple::scenes

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "fields_rules.h"
+#include "model_contact.h"
 #include "read_scene_faults.h"
 #include "supple/implicit/mesh_routes.h"
 
@@ -43,7 +44,7 @@ std::string list(std::initializer_list<std::pair<bool, const char*>> items) {
   return text;
 }
 
-/// Objects and fixed bodies that may touch another one; two for an object that may touch itself.
+/// Objects and fixed bodies that may touch another one; several for an object that may touch itself.
 std::size_t contact_body_count(const Model& model) {
   const auto n = static_cast<std::uint32_t>(model.objects.size());
   const auto count = static_cast<std::uint32_t>(n + model.fixed.size());
@@ -56,8 +57,7 @@ std::size_t contact_body_count(const Model& model) {
       partner = b != a && collides(b) && !(a >= n && b >= n) &&
                 (!model.rules.allowed || model.rules.allowed(std::min(a, b), std::max(a, b)));
     }
-    const bool itself = a < n && (model.objects[a].breaks || (model.objects[a].separate && model.objects[a].last > model.objects[a].first + 1));
-    bodies += itself ? 2 : partner ? 1 : 0;
+    bodies += std::max<std::size_t>(a < n ? own_contacts(model.objects[a]) : 0, partner ? 1 : 0);
   }
   return bodies;
 }

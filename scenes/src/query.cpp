@@ -8,6 +8,7 @@
 
 #include "read_scene_faults.h"
 #include "search_choice.h"
+#include "warnings.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -250,6 +251,24 @@ std::string searches_text(const Simulation& simulation) {
          std::string(bulges ? "not searched, as it bulges" : "searched together, by counts of each frame") + ")\n" + text;
 }
 
+/// Which parts of an object touch each other, in a sentence; empty: it is one body.
+std::string self_contact_text(const ObjectModel& object) {
+  std::string text;
+  if (!object.component.empty()) {
+    std::size_t parts = 0;
+    for (std::uint32_t i = 0; i < object.component.size(); ++i) parts += object.component[i] == i ? 1 : 0;
+    text = std::to_string(parts) + " parts that do not blend are bodies that touch each other";
+    const auto except = [&](const std::vector<collision::BodyPair>& pairs, const char* which) {
+      if (pairs.empty()) return;
+      text += "; not " + std::to_string(pairs.size()) + (pairs.size() == 1 ? " pair " : " pairs ") + which;
+    };
+    except(object.bonded, "with a bond");
+    except(object.overlapping, "that overlap at the start, until they have been apart");
+  }
+  if (object.passes_itself) text += (text.empty() ? "" : "; ") + passing_text(object);
+  return text;
+}
+
 }  // namespace
 
 std::string explain(Simulation& simulation) {
@@ -270,6 +289,7 @@ std::string explain(Simulation& simulation) {
     const std::size_t primitives = o.skeleton.primitive.size();
     line("  %-16s %u particle%s, %zu primitive%s, %zu surface samples%s", o.name.c_str(), o.last - o.first,
          plural(o.last - o.first), primitives, plural(primitives), o.samples.size(), o.collides ? "" : ", no contact");
+    if (const std::string text = self_contact_text(o); !text.empty()) line("  %-16s %s", "", text.c_str());
   }
   line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
        scene.time_step.size || scene.time_step.substeps ? ", fixed by the scene" : ", by the stability limits at frame 1");

@@ -132,6 +132,7 @@ struct Simulation::Impl {
     if (scene.sleep) state.sleep.reset(bodies.size());
     form_awake();
     state.halvings = first_halvings(scene, model, integrator, laws, state);
+    leave_overlapping();
     book_audits();
     place_cameras();
     warnings = find_odd_start(context(), state.particles, pulled);
@@ -181,6 +182,16 @@ struct Simulation::Impl {
     rules = make_body_rules(model, bodies, state.apart);
     frame = Frame(model, bodies);
     pulled = Frame(model, bodies);
+  }
+
+  /// Components of one object that overlap at the start would be driven apart: they meet once they have been apart.
+  void leave_overlapping() {
+    if (std::all_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.component.empty(); })) return;
+    pull_contacts();
+    if (!note_overlapping(bodies, pulled, model)) return;
+    divide_anew();
+    pulled = Frame(model, bodies);
+    drop_results();
   }
 
   /// The laws that are left, and what is made from them.
@@ -317,7 +328,7 @@ struct Simulation::Impl {
     divide_anew();
   }
 
-  /// Other pieces of one object are apart now.
+  /// Other bodies of one object touch now.
   void divide_anew() {
     rules = make_body_rules(model, bodies, state.apart);
     frame.pairs_present.reset();

@@ -35,21 +35,25 @@ Vec3 middle_of(const implicit::Primitive& primitive, const Pose& carrier) {
   return carrier.position + carrier.orientation * at;
 }
 
-/// Bodies so deep in another that contact need not push them out: the middle of a primitive lies in the other.
 void add_deep(const StageContext& context, const Frame& frame, std::vector<std::string>& warnings) {
-  const auto seen = [&](std::uint32_t i) {
-    return i >= context.bodies.size() || std::binary_search(frame.reached.begin(), frame.reached.end(), i);
-  };
-  const auto lies_in = [&](std::uint32_t inner, std::uint32_t outer) {
-    if (inner >= context.bodies.size()) return false;
-    const auto& primitives = context.bodies[inner].skeleton.primitive;
-    return std::any_of(primitives.begin(), primitives.end(), [&](const implicit::Primitive& primitive) {
-      return frame.bodies[outer].field.value(middle_of(primitive, frame.pose[inner][primitive.part])) > 0.0;
-    });
-  };
   for (const collision::BodyPair& pair : frame.reaching) {
-    if (!seen(pair.a) || !seen(pair.b) || !(lies_in(pair.a, pair.b) || lies_in(pair.b, pair.a))) continue;
+    if (!begins_deep(context.bodies, frame, pair)) continue;
     warnings.push_back(names_of(context, pair) + " begin so deep in one another that contact may not part them");
+  }
+}
+
+/// Parts of one object that its blending graph does not join, and that nevertheless do not touch.
+void add_passing(const Model& model, std::vector<std::string>& warnings) {
+  for (const ObjectModel& object : model.objects) {
+    const std::string key = "objects." + object.name + ".contact: ";
+    const std::size_t pairs = object.overlapping.size();
+    if (pairs > 0) {
+      const collision::BodyPair& one = object.overlapping.front();
+      warnings.push_back(key + "parts that do not blend overlap at the start, and touch once they have been apart: " + std::to_string(pairs) +
+                         (pairs == 1 ? " pair" : " pairs") + ", the first with particles " + std::to_string(one.a) + " and " +
+                         std::to_string(one.b));
+    }
+    if (object.passes_itself) warnings.push_back(key + passing_text(object) + "; 'self: false' says that it may");
   }
 }
 
@@ -86,9 +90,29 @@ void add_missed(const Model& model, std::vector<std::string>& warnings) {
 
 }  // namespace
 
+bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair) {
+  const auto seen = [&](std::uint32_t i) {
+    return i >= bodies.size() || std::binary_search(frame.reached.begin(), frame.reached.end(), i);
+  };
+  const auto lies_in = [&](std::uint32_t inner, std::uint32_t outer) {
+    if (inner >= bodies.size()) return false;
+    const auto& primitives = bodies[inner].skeleton.primitive;
+    return std::any_of(primitives.begin(), primitives.end(), [&](const implicit::Primitive& primitive) {
+      return frame.bodies[outer].field.value(middle_of(primitive, frame.pose[inner][primitive.part])) > 0.0;
+    });
+  };
+  return seen(pair.a) && seen(pair.b) && (lies_in(pair.a, pair.b) || lies_in(pair.b, pair.a));
+}
+
+std::string passing_text(const ObjectModel& object) {
+  return object.holds_volume ? "it holds its volume, so it stays one body and passes through itself where it does not blend"
+                             : "what its blending graph joins only by way of others does not blend, but passes through itself";
+}
+
 std::vector<std::string> find_odd_start(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   std::vector<std::string> warnings;
   add_deep(context, frame, warnings);
+  add_passing(context.model, warnings);
   add_without_surface(context, particles, frame, warnings);
   add_missed(context.model, warnings);
   return warnings;

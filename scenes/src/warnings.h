@@ -8,7 +8,15 @@
 
 namespace supple::scenes {
 
-/// What is odd about the start: bodies deep in one another, objects without a surface, cells that miss objects.
+/// Whether bodies are so deep in one another that contact need not push them out: the middle of a primitive lies in the other.
+/// @param frame  of the contacts at the start
+[[nodiscard]] bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair);
+
+/// Of an object that passes through itself: what does, and why.
+[[nodiscard]] std::string passing_text(const ObjectModel& object);
+
+/// What is odd about the start: bodies deep in one another, parts of an object that pass through each other, objects without a
+/// surface, cells that miss objects.
 /// @param frame  of the contacts at the start
 [[nodiscard]] std::vector<std::string> find_odd_start(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 

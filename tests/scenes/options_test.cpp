@@ -226,6 +226,10 @@ void add_object_rules(std::vector<Option>& all) {
   all.push_back(differs("objects.separate", In::State,
                         {.particles = "arrange: line, count: 2, spacing: 0.2", .interactions = "", .object = "separate: $\n    contact: {modulus: 1000}"},
                         "false", "true"));
+  all.push_back(differs("objects.contact.self", In::State,
+                        {.particles = "arrange: line, count: 2, spacing: 0.4, spin: [0, 9, 0], mass: 0.1", .interactions = "",
+                         .object = "blend: {rule: graph}\n    contact: {modulus: 1000, self: $}\n    loads: [{particle: 0, force: [40, 0, 0]}]"},
+                        "false", "true"));
   in_object("repulsion.own", "repulsion: {force: 1, distance: 0.2, length: 0.1, own: $}", "false", "true");
   in_object("repulsion.force", "repulsion: {force: $, distance: 0.2, length: 0.1, own: true}", "1", "2");
   in_object("repulsion.distance", "repulsion: {force: 1, distance: $, length: 0.1, own: true}", "0.2", "0.3");

@@ -38,6 +38,13 @@ struct ObjectModel {
   bool hinges_join = false;               ///< the laws act between two hinges
   bool breaks = false;                    ///< has `breaking`, so it may fall into pieces
   bool separate = false;                  ///< each particle is a body of its own
+  /// Of each particle, the first one that its blending graph joins it with, directly or by way of others, counted from the
+  /// object's first; such components are bodies of their own. Empty: it is not divided by them.
+  std::vector<std::uint32_t> component{};
+  std::vector<collision::BodyPair> bonded{};       ///< components with a bond between them, sorted: they never touch while it holds
+  std::vector<collision::BodyPair> overlapping{};  ///< others that overlap at the start, sorted: they touch once they have been apart
+  /// Some of it passes through what it does not blend with: its graph joins them by way of others, or a held volume keeps it one body.
+  bool passes_itself = false;
   double fade = 0.0;                      ///< how long a broken bond's blend fades [s]
   bool holds_volume = false;              ///< kernels are scaled by State::volumes
   VolumeOfName volume_of = VolumeOfName::Object;
@@ -112,18 +119,34 @@ struct Model {
 /// @pre duration, frame rate and masses are positive, as in every scene that was read
 [[nodiscard]] Model build_model(const Scene& scene);
 
-/// What has a surface of its own: a whole object, or a piece of one that broke. Contact bodies are these, by index.
+/// Where in its object a body is from.
+struct BodyOrigin {
+  std::uint32_t piece = 0;      ///< the smallest particle of what links join it with
+  std::uint32_t component = 0;  ///< of ObjectModel::component; 0 where that is empty
+};
+
+/// What has a surface of its own: a whole object, a component of its blending graph, or a piece of one that broke. Contact
+/// bodies are these, by index.
 struct Body {
   std::uint32_t object = 0;
-  std::string name;                        ///< of the object; of several pieces "name.1", "name.2" ...
+  BodyOrigin origin;
+  std::string name;                        ///< of the object; of several bodies "name.1", "name.2" ...
   std::vector<std::uint32_t> particle;     ///< its parts are these, ascending
   std::vector<collision::PartYield> yield; ///< of its parts
   implicit::Skeleton skeleton;
   implicit::SampleLayout samples;
 };
 
-/// Pieces of one object that have been apart from each other, named by their smallest particles, sorted; only these
-/// touch each other: a fresh crack must first open. Part of State.
+/// When two bodies of one object touch.
+enum class Meeting : std::uint8_t {
+  Always,
+  OnceApart,  ///< pieces, as a fresh crack must first open, and components that overlap at the start
+  Never,      ///< components with a bond between them
+};
+[[nodiscard]] Meeting meeting_of(const ObjectModel& object, const BodyOrigin& a, const BodyOrigin& b);
+
+/// Bodies of one object that meet OnceApart and have been apart from each other, named by their smallest particles, sorted.
+/// Part of State.
 using ApartPairs = std::vector<collision::BodyPair>;
 
 /// Name of a contact body: of a body, or of a fixed one.

@@ -151,6 +151,7 @@ struct MaterialDesc {
   double modulus = 1e4;               ///< P0 [Pa]
   double friction = 0.0;
   double dissipation = 0.0;           ///< d [s/m]
+  std::optional<bool> self;           ///< absent: where the object does not hold its volume
 };
 
 /// objects[].kinds[]: hinges join what is around them, standard particles of different types only repel

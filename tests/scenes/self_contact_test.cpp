@@ -1,0 +1,251 @@
+// Parts of one object that do not blend touch each other.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "run_scenes.h"
+#include "supple/core/mesh.h"
+#include "supple/scenes/query.h"
+
+namespace supple::scenes {
+namespace {
+
+const char* const kBall = "{shape: point, kernel: {radius: 0.3}}";
+const char* const kTwin = "{shape: point, at: [0, 0.06, 0], kernel: {radius: 0.3}}, {shape: point, at: [0.02, -0.08, 0.03], kernel: {radius: 0.25}}";
+const std::string kHead = "schema: 1\nduration: 1 s\nframe_rate: 20\ntime_step: {substeps: 64}\ncontact: {bulge: 0.4}\noutput: {cell: 0.03}\nobjects:\n";
+
+/// Two bodies that turn, and loads that press them together: as groups of one object, or as two objects.
+Simulation two_bodies(const std::string& skeleton, bool groups, SimulationOptions options = {}) {
+  const std::string body = "inertia_radius: 0.1, mass: 0.1, ", rest = "    skeleton: [" + skeleton +
+                                                                      "]\n    contact: {modulus: 2e4, friction: 0.3, dissipation: 0.1}\n";
+  const std::string left = "force: [0.6, 0.05, 0], torque: [0, 0, 2e-4]}", right = "force: [-0.6, 0, 0.05]}";
+  if (groups) {
+    return make(kHead + "  - name: pair\n    particles: {arrange: line, count: 2, spacing: 0.5, " + body + "}\n" + rest +
+                    "    blend: {rule: graph}\n    loads: [{particle: 0, " + left + ", {particle: 1, " + right + "]\n",
+                options);
+  }
+  const auto one = [&](const std::string& name, const std::string& x, const std::string& load) {
+    return "  - name: " + name + "\n    particles: {at: [" + x + ", 0, 0], " + body + "}\n" + rest + "    loads: [{particle: 0, " + load + "]\n";
+  };
+  return make(kHead + one("a", "-0.25", left) + one("b", "0.25", right), options);
+}
+
+TEST(SelfContact, OfTwoGroupsHasTheBitsOfTwoObjects) {
+  for (const char* skeleton : {kBall, kTwin}) {
+    Simulation groups = two_bodies(skeleton, true), objects = two_bodies(skeleton, false);
+    ASSERT_EQ(groups.bodies().size(), 2u);
+    EXPECT_EQ(groups.bodies()[1].name, "pair.2");
+    run(groups, 4);
+    run(objects, 4);
+    int touched = 0;
+    while (groups.frame() < 13) {
+      groups.step();
+      objects.step();
+      ASSERT_EQ(groups.state().particles.position, objects.state().particles.position) << groups.time();
+      ASSERT_EQ(groups.state().particles.angular_momentum, objects.state().particles.angular_momentum) << groups.time();
+      const auto &own = groups.contacts().summary, &other = objects.contacts().summary;
+      ASSERT_EQ(own.size(), other.size()) << groups.time();
+      if (own.empty()) continue;
+      ++touched;
+      EXPECT_EQ(own[0].energy, other[0].energy);
+      EXPECT_EQ(own[0].force, other[0].force);
+    }
+    EXPECT_GT(touched, 10);
+    EXPECT_LT(groups.audits().momentum_error, 1e-13);
+    EXPECT_LT(groups.audits().angular_momentum_error, 1e-13);
+    EXPECT_EQ(groups.audits().energy_error, objects.audits().energy_error);
+  }
+}
+
+// Divided by their contact, with its bulge, as objects are.
+TEST(SelfContact, MeshesAreThoseOfTwoObjects) {
+  Simulation groups = two_bodies(kTwin, true), objects = two_bodies(kTwin, false);
+  while (groups.contacts().summary.empty()) groups.step_frame();
+  run(objects, groups.frame());
+  ASSERT_EQ(groups.meshes().size(), 1u);
+  ASSERT_EQ(objects.meshes().size(), 2u);
+  const Mesh& both = groups.meshes()[0];
+  std::vector<Vec3> apart = objects.meshes()[0].position;
+  apart.insert(apart.end(), objects.meshes()[1].position.begin(), objects.meshes()[1].position.end());
+  EXPECT_EQ(both.position, apart);
+  const MeshReport report = inspect(both);
+  EXPECT_TRUE(report.closed && report.oriented);
+  EXPECT_EQ(report.components, 2u);
+}
+
+TEST(SelfContact, HasTheSameBitsForAnyThreadsAndWithoutSkipsAndFromASavedState) {
+  const auto hash = [](SimulationOptions options) {
+    Simulation simulation = two_bodies(kTwin, true, options);
+    run(simulation, 13);
+    return simulation.state_hash();
+  };
+  const std::uint64_t one = hash({.threads = 1});
+  EXPECT_EQ(hash({.threads = 3}), one);
+  EXPECT_EQ(hash({.threads = 1, .skip = false}), one);
+  Simulation first = two_bodies(kTwin, true), second = two_bodies(kTwin, true);
+  while (first.contacts().summary.empty()) first.step_frame();
+  first.step();
+  second.restore(first.state());
+  run(second, 13);
+  EXPECT_EQ(second.state_hash(), one);
+}
+
+/// Balls in a row that do not blend.
+std::string row(int count, const std::string& spacing, const std::string& keys, const std::string& contact = "{modulus: 2e4}") {
+  return "schema: 1\nduration: 2 s\nframe_rate: 20\nobjects:\n  - name: row\n    particles: {arrange: line, count: " + std::to_string(count) +
+         ", spacing: " + spacing + ", mass: 0.1}\n    skeleton: [" + kBall + "]\n    blend: {rule: graph}\n    contact: " + contact +
+         "\n    " + keys + '\n';
+}
+
+TEST(SelfContact, CanBeSwitchedOff) {
+  Simulation simulation = make(row(2, "0.5", "loads: [{particle: 0, force: [0.5, 0, 0]}]", "{modulus: 2e4, self: false}"));
+  ASSERT_EQ(simulation.bodies().size(), 1u);
+  EXPECT_TRUE(simulation.warnings().empty());
+  run(simulation, 15);
+  const auto& x = simulation.state().particles.position;
+  EXPECT_GT(x[0].x(), x[1].x());  // it went through
+  EXPECT_EQ(x[1], Vec3(0.25, 0.0, 0.0));
+}
+
+// Bonds are joints: what lies on both sides of one may overlap, the others may not.
+TEST(SelfContact, IsNotBetweenBondedParts) {
+  const std::string bonds = "interactions: [{law: bond_frame, stretch: 5, rotation: 0.1}, {law: friction, linear: 0.5}]\n    ";
+  Simulation simulation = make(row(4, "0.3", bonds + "loads: [{particle: 0, force: [2.5, 0, 0]}, {particle: -1, force: [-2.5, 0, 0]}]"));
+  EXPECT_EQ(simulation.model().objects[0].bonded.size(), 3u);
+  EXPECT_TRUE(simulation.warnings().empty());
+  std::vector<collision::BodyPair> met;
+  double nearest = 1.0;
+  for (int frame = 2; frame < 25; ++frame) {
+    run(simulation, frame);
+    for (const auto& s : simulation.contacts().summary) met.push_back(s.bodies);
+    const auto& x = simulation.state().particles.position;
+    for (int k = 0; k < 3; ++k) nearest = std::min(nearest, (x[k + 1] - x[k]).norm());
+  }
+  EXPECT_LT(nearest, 0.2);  // of 0.27 at which free balls touch
+  ASSERT_FALSE(met.empty());
+  for (const collision::BodyPair& pair : met) EXPECT_GT(pair.b - pair.a, 1u);
+
+  Simulation two = make(row(2, "0.3", bonds));
+  EXPECT_NE(explain(two).find("off  find_contacts"), std::string::npos) << explain(two);
+}
+
+TEST(SelfContact, OfPartsThatOverlapAtTheStartBeginsOnceTheyHaveBeenApart) {
+  Simulation simulation = make(row(2, "0.2", "loads: [{particle: 0, force: [-1, 0, 0], from: 0.2, until: 0.4}, {particle: 1, force: [1, 0, 0], from: 0.2, "
+                                             "until: 0.4}, {particle: 0, force: [2, 0, 0], from: 0.4, until: 0.7}, {particle: 1, force: [-2, 0, 0], from: 0.4, until: 0.7}]"));
+  ASSERT_EQ(simulation.warnings().size(), 1u);
+  EXPECT_EQ(simulation.warnings()[0],
+            "objects.row.contact: parts that do not blend overlap at the start, and touch once they have been apart: 1 pair, the first "
+            "with particles 0 and 1");
+  const std::vector<Vec3> start = simulation.state().particles.position;
+  run(simulation, 4);
+  EXPECT_EQ(simulation.state().particles.position, start);  // nothing drives them apart
+  EXPECT_EQ(simulation.energies().total(), 0.0);
+  EXPECT_TRUE(simulation.state().apart.empty());
+  run(simulation, 9);
+  EXPECT_EQ(simulation.state().apart, (ApartPairs{{0, 1}}));
+  double nearest = 1.0;
+  while (simulation.frame() < 30) {
+    simulation.step();
+    const auto& x = simulation.state().particles.position;
+    nearest = std::min(nearest, x[1].x() - x[0].x());
+  }
+  EXPECT_GT(nearest, 0.05);
+  EXPECT_LT(nearest, 0.27);
+  EXPECT_GT(simulation.state().particles.velocity[1].x(), 0.1);  // and they flew apart again
+  EXPECT_LT(simulation.audits().energy_error, 1e-2);
+}
+
+// Balls in one place press on each other along no direction, until they are moved a little.
+TEST(SelfContact, LeavesPartsInOnePlaceAlone) {
+  const std::string text = R"(
+schema: 1
+duration: 1 s
+frame_rate: 20
+objects:
+  - name: twins
+    particles: {arrange: line, count: 2, spacing: 0.5, mass: 0.1}
+    skeleton: [{shape: point, at: [0.25, 0, 0], particles: [0], kernel: {radius: 0.3}}, {shape: point, at: [-0.25, 0, 0], particles: [1], kernel: {radius: 0.3}}]
+    blend: {rule: graph}
+    contact: {modulus: 2e4}
+    loads: [{particle: 0, force: [0, 0.01, 0]}]
+)";
+  Simulation simulation = make(text);
+  EXPECT_EQ(simulation.model().objects[0].overlapping.size(), 1u);
+  run(simulation, 5);
+  EXPECT_EQ(simulation.energies().contact, 0.0);
+}
+
+// Bonded parts are pieces when their bond breaks, and touch once the crack has opened.
+TEST(SelfContact, BeginsWhenABondBreaks) {
+  Simulation simulation = make(row(2, "0.3", R"(interactions: [{law: bond_frame, stretch: 200, rotation: 1}]
+    breaking: {stretch: 0.2}
+    loads: [{particle: 0, force: [-15, 0, 0], until: 0.04}, {particle: 1, force: [15, 0, 0], until: 0.04}, {particle: 0, force: [2, 0, 0], from: 0.2}, {particle: 1, force: [-2, 0, 0], from: 0.2}]
+    medium: {linear: 5})"));
+  ASSERT_EQ(simulation.bodies().size(), 2u);
+  simulation.step();
+  EXPECT_TRUE(simulation.state().apart.empty());  // their boxes are, but a bond joins them
+  run(simulation, 5);
+  EXPECT_EQ(simulation.state().links.broken, (std::vector<std::uint8_t>{1}));
+  EXPECT_EQ(simulation.state().apart.size(), 1u);
+  double nearest = 1.0;
+  while (simulation.frame() < 35) {
+    simulation.step();
+    const auto& x = simulation.state().particles.position;
+    nearest = std::min(nearest, x[1].x() - x[0].x());
+  }
+  EXPECT_GT(nearest, 0.05);
+  EXPECT_LT(nearest, 0.27);
+}
+
+/// Least distance of head and tail of the worm until frame 20.
+double nearest_ends(const std::vector<std::string>& overrides) {
+  Simulation worm(library_scene("contacts/worm_curls_up", overrides));
+  double nearest = 2.0;
+  while (worm.frame() < 20) {
+    worm.step_frame();
+    const auto& x = worm.state().particles.position;
+    nearest = std::min(nearest, x.back().x() - x.front().x());
+  }
+  return nearest;
+}
+
+TEST(SelfContact, StopsAWormThatCurlsUp) {
+  EXPECT_GT(nearest_ends({"contact.error=0.01"}), 0.15);  // of 0.27 at which they touch
+  EXPECT_LT(nearest_ends({"contact.error=0.01", "objects.worm.contact.self=false"}), 0.0);
+}
+
+TEST(SelfContact, IsExplained) {
+  Simulation free = make(row(3, "0.5", "loads: []"));
+  EXPECT_NE(explain(free).find("3 parts that do not blend are bodies that touch each other\n"), std::string::npos) << explain(free);
+  EXPECT_NE(explain(free).find("find_contacts            collision  3 bodies may touch\n"), std::string::npos) << explain(free);
+  Simulation mixed = make(row(4, "0.2", "interactions: [{law: bond_frame, stretch: 5, rotation: 0.1}]"));
+  EXPECT_NE(explain(mixed).find("4 parts that do not blend are bodies that touch each other; not 3 pairs with a bond\n"), std::string::npos)
+      << explain(mixed);
+  Simulation overlapping = make(row(3, "0.2", "loads: []"));
+  EXPECT_NE(explain(overlapping).find("; not 2 pairs that overlap at the start, until they have been apart\n"), std::string::npos)
+      << explain(overlapping);
+}
+
+// Where a graph joins stretches by way of others, they are one body; that is said, unless it is meant.
+TEST(SelfContact, SaysWhatPassesThroughItself) {
+  const auto chain = [](const std::string& blend, const std::string& contact) {
+    return make("schema: 1\nduration: 1\nobjects:\n  - name: chain\n    particles: {arrange: line, count: 4, spacing: 0.2, mass: 0.1}\n    skeleton: [" +
+                std::string(kBall) + "]\n    blend: {rule: graph, " + blend + "}\n    contact: " + contact + '\n');
+  };
+  const std::string text = "what its blending graph joins only by way of others does not blend, but passes through itself";
+  Simulation part = chain("neighbours: 1", "{}");
+  ASSERT_EQ(part.warnings().size(), 1u);
+  EXPECT_NE(part.warnings()[0].find("objects.chain.contact: " + text), std::string::npos) << part.warnings()[0];
+  EXPECT_NE(explain(part).find("but passes through itself"), std::string::npos) << explain(part);
+  Simulation held = chain("neighbours: 3", "{}\n    volume: {rate: 1}");
+  EXPECT_TRUE(held.warnings().empty());
+  Simulation parts = chain("within: 0.1", "{}\n    volume: {rate: 1}");
+  EXPECT_EQ(parts.bodies().size(), 1u);
+  ASSERT_EQ(parts.warnings().size(), 1u);
+  EXPECT_NE(parts.warnings()[0].find("objects.chain.contact: it holds its volume"), std::string::npos) << parts.warnings()[0];
+  EXPECT_TRUE(chain("neighbours: 3", "{}").warnings().empty());  // all blend
+  EXPECT_TRUE(chain("neighbours: 1", "{self: false}").warnings().empty());
+}
+
+}  // namespace
+}  // namespace supple::scenes
