@@ -26,34 +26,49 @@ bool collides(const StageContext& context, const Body& body) {
   return has_surface(body) && context.model.objects[body.object].collides;
 }
 
-/// Pairs that may ever touch. The particles of a `separate` object are alike to the rules, so the first two stand for all.
+/// Pairs of components of an object that may not touch each other, of those that its list names.
+std::uint64_t count_never(const StageContext& context, const ObjectModel& object, const std::vector<collision::BodyPair>& pairs) {
+  const std::vector<Body>& bodies = context.bodies;
+  std::uint64_t never = 0;
+  for (const collision::BodyPair& pair : pairs) {
+    const std::uint32_t i = body_led_by(bodies, object.first + pair.a), j = body_led_by(bodies, object.first + pair.b);
+    if (collides(context, bodies[i]) && collides(context, bodies[j]) && !context.rules.allowed(i, j)) ++never;
+  }
+  return never;
+}
+
+/// Pairs that may ever touch. The particles of a `separate` object are alike to the rules, and so are components that do not break
+/// but for the pairs listed, so the first stands for all.
 std::uint64_t count_present_pairs(const StageContext& context) {
   struct Kind {
-    std::uint32_t first = 0, second = 0;
+    std::uint32_t first = 0;
     std::uint64_t count = 0;
   };
   const std::vector<Body>& bodies = context.bodies;
   std::vector<Kind> kinds;
-  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of separate ones
+  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of those whose bodies are alike
   const auto count = static_cast<std::uint32_t>(bodies.size() + context.model.fixed.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     if (i < bodies.size()) {
       if (!collides(context, bodies[i])) continue;
-      if (context.model.objects[bodies[i].object].separate) {
+      const ObjectModel& object = context.model.objects[bodies[i].object];
+      if (object.separate || (!object.component.empty() && !object.breaks)) {
         std::size_t& kind = kind_of[bodies[i].object];
         if (kind < kinds.size()) {
-          if (kinds[kind].count++ == 1) kinds[kind].second = i;
+          ++kinds[kind].count;
           continue;
         }
         kind = kinds.size();
       }
     }
-    kinds.push_back({.first = i, .second = i, .count = 1});
+    kinds.push_back({.first = i, .count = 1});
   }
   std::uint64_t pairs = 0;
   for (std::size_t a = 0; a < kinds.size(); ++a) {
-    if (kinds[a].count > 1 && context.rules.allowed(kinds[a].first, kinds[a].second)) {
+    if (kinds[a].count > 1) {
+      const ObjectModel& object = context.model.objects[bodies[kinds[a].first].object];
       pairs += kinds[a].count * (kinds[a].count - 1) / 2;
+      pairs -= count_never(context, object, object.bonded) + count_never(context, object, object.overlapping);
     }
     for (std::size_t b = a + 1; b < kinds.size(); ++b) {
       const bool moves = kinds[a].first < bodies.size() || kinds[b].first < bodies.size();
@@ -300,6 +315,11 @@ StageTimer::~StageTimer() {
   if (timed_) (p.timed++ == 0 ? p.first_s : p.later_s) += process_cpu_seconds() - begin_;
   p.cpu_s = p.first_s;
   if (p.timed > 1) p.cpu_s += p.later_s * static_cast<double>(p.calls - 1) / static_cast<double>(p.timed - 1);
+}
+
+std::uint32_t body_led_by(const std::vector<Body>& bodies, std::uint32_t particle) {
+  const auto before = [](const Body& body, std::uint32_t p) { return body.particle.front() < p; };
+  return static_cast<std::uint32_t>(std::lower_bound(bodies.begin(), bodies.end(), particle, before) - bodies.begin());
 }
 
 bool rests(const StageContext& context, std::size_t body) {

@@ -106,6 +106,9 @@ struct StageContext {
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
 };
 
+/// The body whose smallest particle this is; or the first one after it.
+[[nodiscard]] std::uint32_t body_led_by(const std::vector<Body>& bodies, std::uint32_t particle);
+
 /// Whether a body is none of those that move.
 [[nodiscard]] bool rests(const StageContext& context, std::size_t body);
 

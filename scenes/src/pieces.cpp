@@ -83,10 +83,7 @@ std::vector<collision::BodyPair> pairs_to_part(const Model& model, const std::ve
     if (std::binary_search(apart.begin(), apart.end(), collision::BodyPair{bodies[i].particle.front(), bodies[j].particle.front()})) return;
     pairs.push_back({i, j});
   };
-  const auto body_of = [&](std::uint32_t particle) {  // whose smallest it is
-    const auto before = [](const Body& body, std::uint32_t p) { return body.particle.front() < p; };
-    return static_cast<std::uint32_t>(std::lower_bound(bodies.begin(), bodies.end(), particle, before) - bodies.begin());
-  };
+  const auto body_of = [&](std::uint32_t particle) { return body_led_by(bodies, particle); };
   for (const ObjectModel& object : model.objects) {
     if (!object.collides || object.separate) continue;
     if (!object.breaks) {  // bodies are its components, and few of their pairs overlapped

@@ -197,6 +197,18 @@ TEST(SelfContact, BeginsWhenABondBreaks) {
   EXPECT_LT(nearest, 0.27);
 }
 
+// Of five parts, four pairs are bonded, and each part has one more with the ground; of three that overlap in a row, one pair may touch.
+TEST(SelfContact, CountsItsPairsOneByOne) {
+  const auto present = [](Simulation simulation) {
+    simulation.step();
+    const StageProfile found = simulation.profile()[static_cast<std::size_t>(Stage::FindContacts)];
+    EXPECT_GT(found.calls, 0u);
+    return static_cast<double>(found.present) / static_cast<double>(found.calls);
+  };
+  EXPECT_EQ(present(make(row(5, "0.3", "interactions: [{law: bond_frame, stretch: 5, rotation: 0.1}]\nground: {height: -0.13}"))), 6 + 5);
+  EXPECT_EQ(present(make(row(3, "0.2", "loads: []\nground: {height: -0.13}"))), 1 + 3);
+}
+
 /// Least distance of head and tail of the worm until frame 20.
 double nearest_ends(const std::vector<std::string>& overrides) {
   Simulation worm(library_scene("contacts/worm_curls_up", overrides));
