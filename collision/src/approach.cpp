@@ -92,6 +92,18 @@ Approach measure_approach(std::span<const ContactBody> bodies, const ContactSurf
   return approach;
 }
 
+double approach_inverse_mass(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
+                             const ContactSurface::Summary& summary) {
+  const Vec3 normal = -summary.force.normalized();
+  double sum = 0.0;
+  thread_local Handle handle;
+  for (const std::uint32_t body : {summary.bodies.a, summary.bodies.b}) {
+    handle.take(bodies[body], summary.centre_of_pressure, normal, &mobility[body]);
+    sum += handle.inverse_mass();
+  }
+  return sum;
+}
+
 double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, int cells) {
   SUPPLE_EXPECTS(cells > 0);
   const Box box = overlap_of(a, b, shift);

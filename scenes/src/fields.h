@@ -34,8 +34,9 @@ inline constexpr double kMostSubsteps = 1048576.0;
 
 template <class Archive>
 void fields(Archive& archive, TimeStepDesc& d) {
-  archive("size", d.size, above(0.0, kTime).or_auto(), "largest step; a step is always frame / 2^k");
-  archive("substeps", d.substeps, between(1.0, kMostSubsteps, kNumber).or_auto(), "steps a frame, a power of two");
+  archive("size", d.size, above(0.0, kTime).or_auto(), "largest step; a step is always frame / 2^k, k as stability asks for");
+  archive("substeps", d.substeps, between(1.0, kMostSubsteps, kNumber).or_auto(),
+          "exactly so many steps a frame, or to each of `size`, a power of two; where contacts cannot be followed by these the run ends with exit code 5");
   archive("max_substeps", d.max_substeps, between(1.0, kMostSubsteps, kNumber), "automatic steps finer than this are refused");
   if (d.substeps) {
     const int n = *d.substeps;
@@ -220,8 +221,10 @@ void fields(Archive& archive, Scene& d) {
   archive("output", d.output, {}, "what is written");
   archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",
                 number_text(std::floor(d.duration * d.frame_rate)), "");
-  archive.check(!d.time_step.size || *d.time_step.size * d.frame_rate * kMostSubsteps >= 1.0, "time_step.size",
-                "expected at least " + short_text(1.0 / (d.frame_rate * kMostSubsteps)) + " s, a frame's time over 2^20",
+  const int given = d.time_step.substeps.value_or(1);
+  archive.check(!d.time_step.size || *d.time_step.size * d.frame_rate * kMostSubsteps >= given, "time_step.size",
+                "expected at least " + short_text(given / (d.frame_rate * kMostSubsteps)) + " s, " +
+                    (given > 1 ? std::to_string(given) + " substeps of " : "") + "a frame's time over 2^20",
                 d.time_step.size ? number_text(*d.time_step.size) : "", "");
   for (std::size_t i = 0; i < d.objects.size(); ++i) {
     const Vec3& axes = d.objects[i].particles.inertia_axes;

@@ -352,6 +352,12 @@ std::vector<std::uint32_t> find_stirred(const StageContext& context, const core:
   return stirred;
 }
 
+void place_contact_bodies(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+  view_fixed_bodies(context.model, context.time, false, frame);
+  place_resting(context, particles, frame);
+  for_awake_at_once(context, [&](std::size_t i) { place(context, particles, i, frame); });
+}
+
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
                           std::vector<implicit::SampleState>& samples, Frame& frame, bool energy) {
   const Model& model = context.model;
@@ -365,9 +371,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   };
   {
     StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
-    view_fixed_bodies(model, context.time, false, frame);
-    place_resting(context, particles, frame);
-    for_awake_at_once(context, [&](std::size_t i) { place(context, particles, i, frame); });
+    place_contact_bodies(context, particles, frame);
     for_awake(context, [&](std::size_t i) { profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size(); });
     profile(Stage::PlaceSkeleton).present += frame.primitives_present;
     flag_reached(context, frame);

@@ -118,6 +118,9 @@ void place_and_index(const StageContext& context, const core::ParticleState& par
 /// The same for every body with a surface.
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame);
 
+/// Stage 2 for the bodies that collide, and the places of fixed ones at context.time.
+void place_contact_bodies(const StageContext& context, const core::ParticleState& particles, Frame& frame);
+
 /// Bodies that rest whose supports reach a fixed body that is led along in [context.time, until], where it is at either end [s].
 [[nodiscard]] std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, double until,
                                                       Frame& frame);

@@ -10,7 +10,15 @@ namespace {
 
 constexpr int kCoarseCells = 12;  // of energies that only tell whether to look closer
 
-/// Mass of a whole body [kg]; infinite when a pin holds it.
+/// Bodies that are alike hold alike: particles of one object that are bodies of their own count as one kind.
+std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
+  constexpr std::uint32_t kAlike = 0x80000000;
+  if (body >= context.bodies.size() || !context.model.objects[context.bodies[body].object].separate) return body;
+  return kAlike | context.bodies[body].object;
+}
+
+}  // namespace
+
 double mass_of(const StageContext& context, std::uint32_t body) {
   if (body >= context.bodies.size()) return std::numeric_limits<double>::infinity();
   double mass = 0.0;
@@ -21,14 +29,6 @@ double mass_of(const StageContext& context, std::uint32_t body) {
   return mass;
 }
 
-/// Bodies that are alike hold alike: particles of one object that are bodies of their own count as one kind.
-std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
-  constexpr std::uint32_t kAlike = 0x80000000;
-  if (body >= context.bodies.size() || !context.model.objects[context.bodies[body].object].separate) return body;
-  return kAlike | context.bodies[body].object;
-}
-
-/// What moves the parts of the bodies that touch, by contact body; fixed ones stay empty.
 void find_mobility(const StageContext& context, const core::ParticleState& particles, const Frame& frame,
                    std::vector<collision::PartMobility>& mobility) {
   const core::ParticleSet& set = context.model.particles;
@@ -48,8 +48,6 @@ void find_mobility(const StageContext& context, const core::ParticleState& parti
     }
   }
 }
-
-}  // namespace
 
 void OverloadWatch::forget() {
   capacity_.clear();

@@ -27,6 +27,13 @@ class OverloadWatch {
   std::map<collision::BodyPair, double> worst_;     ///< energy when the capacity was last measured [J]
 };
 
+/// Mass of a whole body [kg]; infinite when a pin holds it, and of a fixed one.
+[[nodiscard]] double mass_of(const StageContext& context, std::uint32_t body);
+
+/// What moves the parts of the bodies that touch, by contact body; fixed ones stay empty.
+void find_mobility(const StageContext& context, const core::ParticleState& particles, const Frame& frame,
+                   std::vector<collision::PartMobility>& mobility);
+
 /// Turns back what approaches beyond its core (`collision::hold_cores`); books what pins and fixed bodies take, and what
 /// sweeps that only stopped an approach took away. @return whether any velocity changed
 bool hold_cores(const StageContext& context, Frame& frame, core::ParticleState& particles, core::Ledger& ledger,

@@ -197,7 +197,7 @@ core::StepLimits step_limits(const Scene& scene, const Model& model, double freq
 
 IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   using core::Integrator;
-  const double frame = 1.0 / scene.frame_rate;
+  const double frame = 1.0 / scene.frame_rate, longest = std::min(frame, scene.time_step.size.value_or(frame));
   const core::Speeds speeds = core::largest_speeds(model.particles, model.initial);
   IntegratorPlan plan;
   plan.pair_frequency = core::largest_frequency(model.particles, model.rest, model.interactions);
@@ -205,11 +205,11 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   const auto steps_a_frame = [&](double frequency) {
     const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
     if (!(step > 0.0)) return std::numeric_limits<double>::infinity();
-    return step < frame ? std::ldexp(1.0, core::halvings(frame, step)) : 1.0;
+    return std::ldexp(1.0, core::halvings(frame, std::min(step, longest)));
   };
   const double explicit_steps = steps_a_frame(all);
   const double implicit_steps = steps_a_frame(model.contact_frequency);
-  const bool fixed = scene.time_step.size || scene.time_step.substeps;
+  const bool fixed = scene.time_step.substeps.has_value();
 
   plan.settings.rotation = scene.integrator.rotation == RotationName::Splitting ? core::RotationUpdate::Splitting
                                                                                : core::RotationUpdate::Exponential;
@@ -226,12 +226,13 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
       const bool implicit = plan.chosen && energies && !fluid && (refused || dearer);
       plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
       const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet a frame";
+      const std::string size = longest < frame ? " (time_step.size: none longer than " + number_text(longest) + " s)" : "";
       if (fixed) {
         plan.reason = "symplectic: the scene fixes the step";
       } else if (!implicit) {
-        plan.reason = "symplectic: " + counts + " at the start";
+        plan.reason = "symplectic: " + counts + " at the start" + size;
       } else {
-        plan.reason = "backward_euler: in place of " + counts + ", " + number_text(implicit_steps) +
+        plan.reason = "backward_euler: in place of " + counts + ", " + number_text(implicit_steps) + size +
                       (refused ? "; more than time_step.max_substeps" : "; it damps what it does not resolve");
       }
       break;

@@ -292,7 +292,9 @@ std::string explain(Simulation& simulation) {
     if (const std::string text = self_contact_text(o); !text.empty()) line("  %-16s %s", "", text.c_str());
   }
   line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
-       scene.time_step.size || scene.time_step.substeps ? ", fixed by the scene" : ", by the stability limits at frame 1");
+       scene.time_step.substeps ? ", fixed by the scene"
+                                : scene.time_step.size ? ", by time_step.size and the stability limits at frame 1"
+                                                       : ", by the stability limits at frame 1");
   if (model.cell > 0.0) line("surface lattice cell %s", cells_text(model).c_str());
   out += searches_text(simulation);
   out += "\n";

@@ -5,6 +5,7 @@
 
 #include "audits.h"
 #include "camera.h"
+#include "fixed_step.h"
 #include "frame.h"
 #include "held_volumes.h"
 #include "model_faults.h"
@@ -71,6 +72,7 @@ struct Simulation::Impl {
   Profile profile{};
   State state;
   State last_frame;
+  core::ParticleState step_begin;  ///< of the last step, where the scene fixes it
   // What State::links and State::apart leave of the model.
   core::Interactions laws;
   // What State::sleep leaves of these: particles that rest are pinned, and nothing is computed between them.
@@ -98,6 +100,7 @@ struct Simulation::Impl {
   std::vector<std::string> warnings;
   SearchCounts searches;      ///< of the meshes of this state,
   SearchCounts all_searches;  ///< and of all so far
+  bool coarse_noted = false;  ///< in the warnings
 
   Impl(Scene s, SimulationOptions o)
       : scene(std::move(s)),
@@ -429,8 +432,13 @@ struct Simulation::Impl {
     if (state.substep == 0) {
       last_frame = state;
       state.halvings = first_halvings(scene, model, integrator, laws, state);
+      note_coarse_steps();
     } else {
       refine_step();
+    }
+    if (fixes_step(scene)) {
+      step_begin = state.particles;
+      if (!state.kick.valid) check_fixed_push();  // else the step before has done so
     }
     if (bodies.size() != model.objects.size() && note_apart(context(), state.particles, pulled, state.apart)) divide_anew();
     wake_loaded();
@@ -465,6 +473,7 @@ struct Simulation::Impl {
       if (last_frame.record.valid) take(last_frame);
       throw_diverged(divergence, step, at);
     }
+    check_fixed_step();
     commit_friction();
     wake_touched();
     watch_pressing();
@@ -476,6 +485,74 @@ struct Simulation::Impl {
       ++state.frame;
       book_audits();
     }
+  }
+
+  /// At the start of a frame: steps that the scene fixes may be far beyond those known to be stable, which the run says once.
+  void note_coarse_steps() {
+    constexpr double kProven = 5.0;  // automatic steps have margins of five to seven to what their bounds prove
+    if (!fixes_step(scene) || coarse_noted) return;
+    const double step = automatic_step(scene, model, integrator, laws, state.particles);
+    if (dt() <= kProven * step) return;
+    coarse_noted = true;
+    warnings.push_back("time_step.substeps: steps of " + short_text(dt()) + " s may be too coarse, automatic ones would be of " +
+                       short_text(step) + " s (at frame " + std::to_string(state.frame) + "); see energy_error");
+  }
+
+  /// After a step that the scene fixes: what contact it missed, or made energy by. @throws Error{Diverged}
+  void check_fixed_step() {
+    if (!fixes_step(scene) || awake.empty() || !contact_on()) return;
+    Profile unused{};
+    const StageContext quiet = quiet_context(unused);
+    const TakenStep step{.before = step_begin, .after = state.particles, .end = time(), .size = dt()};
+    const auto found = find_missed_contact(quiet, step, state.samples, seen_contacts(quiet), pulled);
+    if (found) throw_too_coarse(*found);
+    check_fixed_push();
+  }
+
+  /// Where pairs are pushed by forces of the present state. @throws Error{Diverged}
+  void check_fixed_push() {
+    const core::Integrator method = integrator.settings.method;
+    // The adaptive method takes as many steps within one as contacts ask for.
+    if (method == core::Integrator::Adaptive || !contact_on() || contact_bounds_hold(model, step_begin, dt())) return;
+    Profile unused{};
+    const StageContext quiet = quiet_context(unused);
+    const TakenStep step{.before = step_begin, .after = state.particles, .end = time(), .size = dt()};
+    const double limit = method == core::Integrator::RungeKutta4 ? 8.0 : 4.0;
+    const auto found =
+        find_unstable_contact(quiet, step, state.samples, seen_contacts(quiet), limit, core::is_implicit(method), pulled);
+    if (found) throw_too_coarse(*found);
+  }
+
+  /// For looks that are no part of a step.
+  StageContext quiet_context(Profile& unused) {
+    StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
+    quiet.time = time();
+    return quiet;
+  }
+
+  /// The contacts of the present state: the last step's of velocity Verlet, of other methods they are found anew.
+  const Frame& seen_contacts(const StageContext& quiet) {
+    if (integrator.settings.method == core::Integrator::Symplectic && state.kick.valid) return frame;
+    std::vector<implicit::SampleState> trial = state.samples;
+    find_contact_surface(quiet, state.particles, trial, pulled, false);
+    return pulled;
+  }
+
+  [[noreturn]] void throw_too_coarse(const TooCoarse& found) {
+    const double needed = automatic_step(scene, model, integrator, laws, step_begin);
+    const double substeps = needed > 0.0 ? frame_time() / needed : 0.0;
+    const bool refused = !(needed > 0.0) || substeps > scene.time_step.max_substeps;
+    const Error error(ErrorKind::Diverged,
+                      Fault{.place = place_of(scene, "time_step.substeps"),
+                            .key = "time_step.substeps",
+                            .expected = "expected steps that contacts can be followed by: at t = " + short_text(time()) + " s '" +
+                                        body_name(model, bodies, found.bodies.a) + "' and '" +
+                                        body_name(model, bodies, found.bodies.b) + '\'' + found.how,
+                            .found = "steps of " + short_text(dt()) + " s, automatic ones would be of " + short_text(needed) + " s",
+                            .hint = "let substeps be auto" +
+                                    (refused ? ", and max_substeps at least " + number_text(substeps) : std::string())});
+    if (last_frame.record.valid) take(last_frame);
+    throw error;
   }
 
   /// After a step: springs of friction yield and follow their contacts. What the dissipative loads put into them is not lost.
@@ -563,8 +640,8 @@ struct Simulation::Impl {
                       .expected = "diverged at step " + std::to_string(step_number) + " (t = " + std::to_string(at) +
                                   " s): " + divergence.cause + " of " + particle,
                       .found = std::to_string(divergence.value) + ", believable up to " + std::to_string(divergence.limit),
-                      .hint = scene.time_step.size || scene.time_step.substeps
-                                  ? "the scene fixes its own time step; let it be auto"
+                      .hint = fixes_step(scene)
+                                  ? "the scene fixes its own time step; let time_step.substeps be auto"
                                   : "check stiffness, mass and strength of the objects concerned"});
   }
 

@@ -30,24 +30,47 @@ std::string what_needs(const core::StepLimits& limits, double damping) {
   return "soften the stiffest interaction or contact, or make the lightest particle heavier";
 }
 
+/// Damping d v p takes at most d v w of its speed in a second, w the contact's frequency: by how much that is faster than w.
+double damping_of(const Model& model, const core::Speeds& speeds) {
+  return std::max(1.0, kDampedShare * model.largest_dissipation * (speeds.linear + model.solid_speed));
+}
+
+bool is_explicit(const IntegratorPlan& integrator) {
+  const core::Integrator method = integrator.settings.method;
+  return method == core::Integrator::Symplectic || method == core::Integrator::RungeKutta4;
+}
+
+/// Of the present state.
+core::StepLimits limits_of(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
+                           const core::ParticleState& particles) {
+  const core::Speeds speeds = core::largest_speeds(model.particles, particles);
+  double frequency = integrator.limiting_frequency;
+  if (is_explicit(integrator)) {
+    const double contact = model.contact_frequency * damping_of(model, speeds);
+    frequency = std::max(frequency, std::hypot(core::largest_frequency(model.particles, particles, laws), contact));
+  }
+  return step_limits(scene, model, frequency, speeds);
+}
+
+/// Of the longest steps that the scene lets be taken.
+int least_halvings(const Scene& scene) {
+  const TimeStepDesc& desc = scene.time_step;
+  return (desc.size ? core::halvings(1.0 / scene.frame_rate, *desc.size) : 0) + (desc.substeps ? log2_of(*desc.substeps) : 0);
+}
+
 /// Of the coarsest step that is stable now.
 int stable_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                     const State& state) {
   const double frame_time = 1.0 / scene.frame_rate;
-  const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
-  double frequency = integrator.limiting_frequency, damping = 1.0;
-  const core::Integrator method = integrator.settings.method;
-  if (method == core::Integrator::Symplectic || method == core::Integrator::RungeKutta4) {
-    // Damping d v p takes at most d v w of its speed in a second, w the contact's frequency: fast where d v is large.
-    damping = std::max(1.0, kDampedShare * model.largest_dissipation * (speeds.linear + model.solid_speed));
-    frequency = std::max(frequency, std::hypot(core::largest_frequency(model.particles, state.particles, laws), model.contact_frequency * damping));
-  }
-  const core::StepLimits limits = step_limits(scene, model, frequency, speeds);
+  const core::StepLimits limits = limits_of(scene, model, integrator, laws, state.particles);
   const double step = core::stable_step(limits);
   const bool possible = step > 0.0;
-  const int k = possible && step < frame_time ? core::halvings(frame_time, step) : 0;
+  const int least = least_halvings(scene);
+  const int k = std::max(least, possible && step < frame_time ? core::halvings(frame_time, step) : 0);
   const int most = scene.time_step.max_substeps;
-  if (!possible || k > log2_of(most)) {
+  if (!possible || (k > least && k > log2_of(most))) {
+    const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
+    const double damping = is_explicit(integrator) ? damping_of(model, speeds) : 1.0;
     throw Error(ErrorKind::Limit,
                 Fault{.place = place_of(scene, "time_step.max_substeps"),
                       .key = "time_step.max_substeps",
@@ -63,17 +86,24 @@ int stable_halvings(const Scene& scene, const Model& model, const IntegratorPlan
 
 int first_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                    const State& state) {
-  const TimeStepDesc& desc = scene.time_step;
-  if (desc.substeps) return log2_of(*desc.substeps);
-  if (desc.size) return core::halvings(1.0 / scene.frame_rate, *desc.size);
-  return stable_halvings(scene, model, integrator, laws, state);
+  return fixes_step(scene) ? least_halvings(scene) : stable_halvings(scene, model, integrator, laws, state);
 }
 
 int next_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                   const State& state) {
-  const bool fixed = scene.time_step.substeps || scene.time_step.size;
-  if (fixed || state.steps % kStepsPerRefinement != 0) return state.halvings;
+  if (fixes_step(scene) || state.steps % kStepsPerRefinement != 0) return state.halvings;
   return std::max(state.halvings, stable_halvings(scene, model, integrator, laws, state));
+}
+
+double automatic_step(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
+                      const core::ParticleState& particles) {
+  const double frame_time = 1.0 / scene.frame_rate, step = core::stable_step(limits_of(scene, model, integrator, laws, particles));
+  return step > 0.0 && step < frame_time ? std::ldexp(frame_time, -core::halvings(frame_time, step)) : std::min(step, frame_time);
+}
+
+bool contact_bounds_hold(const Model& model, const core::ParticleState& particles, double step) {
+  const core::Speeds speeds = core::largest_speeds(model.particles, particles);
+  return step <= core::stable_step({.frequency = model.contact_frequency * damping_of(model, speeds)});
 }
 
 }  // namespace supple::scenes

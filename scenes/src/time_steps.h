@@ -8,8 +8,11 @@
 
 namespace supple::scenes {
 
-/// k of the first step of a frame: as the scene fixes it, or the coarsest that is stable.
-/// @throws Error{Limit} when that is more than time_step.max_substeps
+/// Whether the scene fixes the step (`time_step.substeps`), rather than at most its largest size.
+[[nodiscard]] inline bool fixes_step(const Scene& scene) { return scene.time_step.substeps.has_value(); }
+
+/// k of the first step of a frame: as the scene fixes it, or the coarsest that is stable and no longer than time_step.size.
+/// @throws Error{Limit} when a stable one takes more than time_step.max_substeps
 [[nodiscard]] int first_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                                  const State& state);
 
@@ -17,5 +20,12 @@ namespace supple::scenes {
 /// they stay on its grid.
 [[nodiscard]] int next_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                                 const State& state);
+
+/// What an automatic step would be, whatever the scene says of steps [s]; 0: none is fine enough.
+[[nodiscard]] double automatic_step(const Scene& scene, const Model& model, const IntegratorPlan& integrator,
+                                    const core::Interactions& laws, const core::ParticleState& particles);
+
+/// Whether a step [s] keeps the bounds of automatic ones as to how stiff contacts are and how they damp.
+[[nodiscard]] bool contact_bounds_hold(const Model& model, const core::ParticleState& particles, double step);
 
 }  // namespace supple::scenes

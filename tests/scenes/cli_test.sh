@@ -20,11 +20,11 @@ printf '%s\nobjects:\n%s\n    colur: [1, 0, 0]\n' "$head_text" "$ball" > unknown
 sed 's/radius: 0.5/radius: -0.5/' good.yaml > negative_radius.yaml
 sed 's/mass: 1/mass: .nan/' good.yaml > nan.yaml
 printf '%s\npairs: [{objects: [ball, cube], collide: false}]\n' "$(cat good.yaml)" > missing_object.yaml
-printf '%s\ntime_step: {size: 0.1 s}\nobjects:\n  - name: chain\n' "$head_text" > diverges.yaml
+printf '%s\ntime_step: {substeps: 1}\nobjects:\n  - name: chain\n' "$head_text" > diverges.yaml
 printf '    particles: {arrange: line, count: 3, spacing: 0.2, spin: [0, 0, 3], mass: 0.01}\n' >> diverges.yaml
 printf '    interactions: [{law: bond_frame, stretch: 1e6, rotation: 10}]\n' >> diverges.yaml
 sed -i 's/duration: 0.2 s/duration: 20 s/' diverges.yaml
-sed 's/time_step: {size: 0.1 s}/time_step: {max_substeps: 2}/' diverges.yaml > too_fine.yaml
+sed 's/time_step: {substeps: 1}/time_step: {max_substeps: 2}/' diverges.yaml > too_fine.yaml
 echo 'a plain file' > plain_file
 
 # expect CODE WORDS COMMAND...: exit code and words that standard error must hold.
@@ -58,6 +58,10 @@ expect 0 '' bench --list
 expect 2 '--list' bench cores
 expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
+printf 'schema: 1\nduration: 5 ms\nframe_rate: 1000\nground: {modulus: 1e9}\ntime_step: {substeps: 1}\nobjects:\n' > passes.yaml
+printf '  - name: ball\n    particles: {at: [0, 0, 0.2], velocity: [0, 0, -600], mass: 0.001}\n' >> passes.yaml
+printf '    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]\n    contact: {modulus: 1e8}\n' >> passes.yaml
+expect 5 "at t = 0.001 s 'ball' and 'ground' go" run passes.yaml --out passes --progress none
 printf 'x' >> good/states/good.0002.state
 expect 7 'checksum' query forces good.yaml --state good/states/good.0002.state
 

@@ -494,7 +494,7 @@ TEST(Simulation, TakesASmallBodyFarFromTheOriginForWhatItIs) {
 schema: 1
 duration: 3 s
 frame_rate: 20
-time_step: {size: 1 ms}
+time_step: {substeps: 64}
 gravity: [0, 0, -9.81]
 objects:
   - name: bead

@@ -25,6 +25,10 @@ struct Approach {
 };
 /// @param summary  of a pair with a force that is not zero
 [[nodiscard]] Approach measure_approach(std::span<const ContactBody> bodies, const ContactSurface::Summary& summary);
+/// By how much a unit impulse along the normal, shared out by contributions, changes that speed [1/kg].
+/// @param mobility  of both, by body
+[[nodiscard]] double approach_inverse_mass(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
+                                           const ContactSurface::Summary& summary);
 
 /// Integral of [min(p_A, p_B)]+ dV [J] with A moved by `shift`, by midpoints of `cells` cubed cells of the overlap box.
 [[nodiscard]] double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, int cells);

@@ -82,7 +82,7 @@ struct StepPlan {
 struct IntegratorPlan {
   core::IntegratorSettings settings;
   double pair_frequency = 0.0;  ///< largest of the pair laws about rest [rad/s]
-  bool chosen = false;          ///< by the cost model: `integrator.method` is auto and the step is not fixed
+  bool chosen = false;          ///< by the cost model: `integrator.method` is auto and the scene does not fix the step
   std::string reason;
   /// Frequency that limits the step [rad/s]: implicit methods leave out the pair laws, the adaptive one finds its own.
   double limiting_frequency = 0.0;

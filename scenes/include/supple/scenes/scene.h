@@ -19,7 +19,7 @@ namespace supple::scenes {
 /// Time that the frame grid decides (`auto`) or that the scene fixes.
 struct TimeStepDesc {
   std::optional<double> size;        ///< [s]; absent: auto
-  std::optional<int> substeps;       ///< steps a frame, a power of two; absent: auto
+  std::optional<int> substeps;       ///< exactly so many steps a frame, or to each of `size`, a power of two; absent: auto
   int max_substeps = 4096;           ///< refuse to go finer than this
 };
 
