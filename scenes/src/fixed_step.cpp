@@ -8,6 +8,7 @@
 #include "overload.h"
 #include "read_scene_faults.h"
 #include "supple/core/integrate.h"
+#include "supple/scenes/solid_motion.h"
 
 namespace supple::scenes {
 namespace {
@@ -91,6 +92,11 @@ void measure_way(const Body& body, const TakenStep& step, std::span<const Box> s
   }
 }
 
+/// Whether a fixed body is led along within a step.
+bool led_within(const StageContext& context, const TakenStep& step, std::size_t fixed) {
+  return moves(context.model.fixed[fixed].motion, step.end - step.size, step.end);
+}
+
 /// Of all contact bodies.
 std::vector<Way> ways_of(const StageContext& context, const TakenStep& step, Frame& frame) {
   StageContext then = context;
@@ -105,7 +111,7 @@ std::vector<Way> ways_of(const StageContext& context, const TakenStep& step, Fra
     way.end = frame.reach[i];
     if (i < context.bodies.size()) {
       if (!way.end.empty()) measure_way(context.bodies[i], step, frame.placed[i].support, way);
-    } else if (frame.led[i - context.bodies.size()].moves) {
+    } else if (led_within(context, step, i - context.bodies.size())) {
       way.spread = context.model.solid_speed * step.size;
     }
   }
@@ -160,15 +166,14 @@ std::vector<FastPair> fast_pairs(const StageContext& context, const TakenStep& s
 }
 
 /// Kinetic energy of the motion of two bodies against each other [J]; without bound where one is led.
-/// @param frame  with fixed bodies after the step
-double energy_of_motion(const StageContext& context, const TakenStep& step, const Frame& frame, const collision::BodyPair& pair) {
+double energy_of_motion(const StageContext& context, const TakenStep& step, const collision::BodyPair& pair) {
   const core::ParticleSet& set = context.model.particles;
   double mass = 0.0;
   Vec3 together = Vec3::Zero();  // momentum, then velocity of their centre
   for (const std::uint32_t body : {pair.a, pair.b}) {
     mass += mass_of(context, body);
     if (body >= context.bodies.size()) {
-      if (frame.led[body - context.bodies.size()].moves) return std::numeric_limits<double>::infinity();
+      if (led_within(context, step, body - context.bodies.size())) return std::numeric_limits<double>::infinity();
       continue;
     }
     for (const std::uint32_t i : context.bodies[body].particle) together += set.mass[i] / step.size * moved(step, i);
@@ -205,7 +210,7 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
   for (std::size_t k = 0; k < fast.size(); ++k) at_ends[k] = energy_of(trial, fast[k].bodies);
   look(1.0);
   for (std::size_t k = 0; k < fast.size(); ++k) {
-    const double energy = energy_of(trial, fast[k].bodies), motion = energy_of_motion(context, step, trial, fast[k].bodies);
+    const double energy = energy_of(trial, fast[k].bodies), motion = energy_of_motion(context, step, fast[k].bodies);
     if (energy - at_ends[k] > kSurely * motion) {
       return TooCoarse{fast[k].bodies, " go deeper into each other within one than they can: their contact gains " +
                                            short_text(energy - at_ends[k]) + " J, their motion has " + short_text(motion) + " J"};
