@@ -5,6 +5,7 @@
 // the angle.
 
 #include <algorithm>
+#include <atomic>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "patch_surface.h"
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/polygonise.h"
 
@@ -36,13 +38,42 @@ void measure(const PatchSurface& surface, const DelaunayOptions& options, const 
   }
 }
 
+/// A field whose evaluation is a way out of all loops over it.
+class HeedingField {
+ public:
+  HeedingField(const FieldView& field, const std::atomic<int>* interrupt) : field_(field), interrupt_(interrupt) {}
+
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const {
+    heed(interrupt_);
+    field_.evaluate(points, values);
+  }
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+    heed(interrupt_);
+    field_.evaluate(points, values, gradients);
+  }
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { field_.evaluate_parts(points, parts); }
+  [[nodiscard]] Interval bound(const Box& box) const {
+    heed(interrupt_);
+    return field_.bound(box);
+  }
+  [[nodiscard]] double gradient_bound(const Box& box) const { return field_.gradient_bound(box); }
+  [[nodiscard]] Box surface_box() const { return field_.surface_box(); }
+  [[nodiscard]] double feature_size() const { return field_.feature_size(); }
+  [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const { return field_.core_point(place); }
+
+ private:
+  FieldView field_;
+  const std::atomic<int>* interrupt_;
+};
+
 /// @return false where the bodies are divided in a way that it does not untangle; their meshes are then of no use
-bool make_delaunay(std::span<const FieldView> fields, const DelaunayOptions& options, PatchComplex& complex, DelaunayReport& report) {
+bool make_delaunay(std::span<const FieldView> fields, const DelaunayOptions& options, const DelaunayEstimate& estimate,
+                   PatchComplex& complex, DelaunayReport& report) {
   const PatchSurface surface(fields);
   coarsen_patches(surface, options, complex);
   if (surface.is_folded(complex, 0.0)) return false;
   for (Vertex v = 0; v < complex.vertex_count(); ++v) report.seeds += complex.star(v).empty() ? 0 : 1;
-  if (!refine_patches(surface, options, complex, report) || surface.is_folded(complex, 0.2)) return false;
+  if (!refine_patches(surface, options, estimate, complex, report) || surface.is_folded(complex, 0.2)) return false;
   measure(surface, options, complex, report);
   return report.largest_radius <= options.size && report.largest_distance <= options.distance;
 }
@@ -111,15 +142,16 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, const DelaunayOption
                          DelaunayReport& report) {
   // Bodies often lie symmetrically around the origin; a lattice that does not meets them in general position. What is tangled on one
   // lattice may be plain on another.
+  const auto lattice_of = [](double cell) { return Lattice{.origin = cell * Vec3(0.137, 0.291, 0.419), .cell = cell}; };
+  const DelaunayEstimate estimate = estimate_delaunay(polygonise_partition(fields, lattice_of(options.cell), executor), options);
+  check_estimate(estimate, options);
   const double coarsest = std::min(options.cell, 0.5 * options.size);
   std::optional<std::vector<Mesh>> best;
   for (const double share : {1.0, 0.75, 0.5}) {
-    const double cell = share * coarsest;
-    const Lattice lattice{.origin = cell * Vec3(0.137, 0.291, 0.419), .cell = cell};
-    std::vector<Mesh> meshes = polygonise_partition(fields, lattice, executor);
+    std::vector<Mesh> meshes = polygonise_partition(fields, lattice_of(share * coarsest), executor);
     PatchComplex complex(fields, meshes);
     DelaunayReport found{.least_angle = std::numbers::pi};
-    if (!make_delaunay(fields, options, complex, found) || (best && found.sharp >= report.sharp)) continue;
+    if (!make_delaunay(fields, options, estimate, complex, found) || (best && found.sharp >= report.sharp)) continue;
     for (std::size_t m = 0; m < meshes.size(); ++m) {
       if (!meshes[m].triangle.empty()) meshes[m] = extract(fields, complex, static_cast<std::uint32_t>(m));
     }
@@ -153,8 +185,9 @@ std::vector<Mesh> delaunay_partition(std::span<const FieldView> fields, const De
   std::vector<Mesh> meshes(fields.size());
   DelaunayReport all{.least_angle = std::numbers::pi};
   for (const std::vector<std::uint32_t>& group : groups) {
-    std::vector<FieldView> members;
-    for (const std::uint32_t m : group) members.push_back(fields[m]);
+    std::vector<HeedingField> heeding;
+    for (const std::uint32_t m : group) heeding.emplace_back(fields[m], options.interrupt);
+    const std::vector<FieldView> members(heeding.begin(), heeding.end());
     DelaunayReport found;
     std::vector<Mesh> divided = divide(members, options, executor, found);
     for (std::size_t k = 0; k < group.size(); ++k) {

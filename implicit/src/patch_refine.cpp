@@ -5,12 +5,10 @@
 #include <cmath>
 #include <optional>
 #include <queue>
-#include <string>
 #include <tuple>
 #include <vector>
 
 #include "patch_flips.h"
-#include "supple/core/error.h"
 
 namespace supple::implicit {
 namespace {
@@ -27,8 +25,8 @@ bool encroaches(const Vec3& p, const Vec3& a, const Vec3& b) { return (a - p).do
 
 class Refiner {
  public:
-  Refiner(const PatchSurface& surface, const DelaunayOptions& options, PatchComplex& complex)
-      : surface_(surface), options_(options), complex_(complex) {}
+  Refiner(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex)
+      : surface_(surface), options_(options), estimate_(estimate), complex_(complex) {}
 
   [[nodiscard]] bool run(DelaunayReport& report) {
     for (std::uint32_t t = 0; t < complex_.triangles().size(); ++t) {
@@ -37,7 +35,7 @@ class Refiner {
     const std::size_t before = complex_.vertex_count();
     const std::uint64_t most_tiny = 100 + report.seeds;
     for (;;) {
-      if (complex_.vertex_count() > options_.most_vertices) refuse("more");
+      if (complex_.vertex_count() > options_.most_vertices) refuse_more_vertices(estimate_, options_);
       if (tiny_ > most_tiny) return false;
       if (!encroached_.empty()) {
         const auto [a, b] = encroached_.back();
@@ -271,15 +269,9 @@ class Refiner {
     if (at && length > 2.0 * kShortest * options_.size) after_insertion(complex_.split(v[k], v[(k + 1) % 3], *at));
   }
 
-  [[noreturn]] void refuse(const std::string& found) const {
-    throw Error(ErrorKind::Limit,
-                {.place = "", .key = "mesh.size",
-                 .expected = "expected bounds of triangles that " + std::to_string(options_.most_vertices) + " vertices reach",
-                 .found = found, .hint = "ask for a larger size or distance, or a smaller angle"});
-  }
-
   const PatchSurface& surface_;
   const DelaunayOptions& options_;
+  const DelaunayEstimate& estimate_;
   PatchComplex& complex_;
   std::vector<PatchEdge> encroached_;
   std::priority_queue<BadTriangle> bad_;
@@ -289,8 +281,9 @@ class Refiner {
 
 }  // namespace
 
-bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, PatchComplex& complex, DelaunayReport& report) {
-  return Refiner(surface, options, complex).run(report);
+bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex,
+                    DelaunayReport& report) {
+  return Refiner(surface, options, estimate, complex).run(report);
 }
 
 }  // namespace supple::implicit

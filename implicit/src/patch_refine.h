@@ -11,7 +11,9 @@ namespace supple::implicit {
 
 /// Adds vertices until angle, size and distance hold, but for the angle where rims meet at a sharper one.
 /// @return false where edges become ever shorter
+/// @param estimate  for the words of a refusal
 /// @throws Error{Limit} when most_vertices do not reach the bounds
-[[nodiscard]] bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, PatchComplex& complex, DelaunayReport& report);
+[[nodiscard]] bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate,
+                                  PatchComplex& complex, DelaunayReport& report);
 
 }  // namespace supple::implicit

@@ -119,7 +119,7 @@ void DrawingCrew::fail(int frame) {
 void DrawingCrew::begin(Member& member) {
   try {
     std::unique_lock lock(opening_);
-    Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay});
+    Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt});
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);
     lock.unlock();
     work(simulation, writer);

@@ -99,6 +99,7 @@ struct StageContext {
   bool skip = true;
   bool every_call = false;
   const implicit::DelaunayMesher* delaunay = nullptr;
+  const std::atomic<int>* interrupt = nullptr;        ///< see SimulationOptions::interrupt
   double time = 0.0;                                  ///< that obstacles are led by [s]
   double step = 0.0;                                  ///< for which loads are held [s]; 0: they are not
   const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all

@@ -63,15 +63,20 @@ std::vector<DivisionGroup> groups_of(const Model& model, const std::vector<Body>
   return groups;
 }
 
+implicit::DelaunayOptions delaunay_options(const StageContext& context, const implicit::Lattice& lattice) {
+  const MeshingDesc& d = context.model.meshing;
+  const double size = d.size.value_or(2.0 * lattice.cell);
+  return {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell, .interrupt = context.interrupt};
+}
+
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
-std::vector<Mesh> divide(const MeshingDesc& d, std::optional<double> error, std::span<const implicit::FieldView> views,
-                         const implicit::Lattice& lattice, const Executor& executor, implicit::PolygoniseCounts& counts) {
+std::vector<Mesh> divide(const StageContext& context, std::optional<double> error, std::span<const implicit::FieldView> views,
+                         const implicit::Lattice& lattice, implicit::PolygoniseCounts& counts) {
+  const Executor& executor = context.executor;
   implicit::Lattice coarsest = lattice;
-  if (d.method == MeshingName::Delaunay) {
-    const double size = d.size.value_or(2.0 * lattice.cell);
+  if (context.model.meshing.method == MeshingName::Delaunay) {
     implicit::DelaunayReport report;
-    std::vector<Mesh> meshes = implicit::delaunay_partition(
-        views, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell}, executor, &report);
+    std::vector<Mesh> meshes = implicit::delaunay_partition(views, delaunay_options(context, lattice), executor, &report);
     counts.blocks_visited = counts.blocks_present = report.seeds + report.inserted;
     return meshes;
   }
@@ -163,7 +168,7 @@ std::vector<Mesh> divide_some(const StageContext& context, const Division& divis
   for (const std::size_t k : members) views.emplace_back(division.claim[k]);
   implicit::PolygoniseCounts counts;
   const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
-  std::vector<Mesh> parts = divide(context.model.meshing, error, views, lattice, context.executor, counts);
+  std::vector<Mesh> parts = divide(context, error, views, lattice, counts);
   lattice.cell = counts.cell;
   profile.visited += counts.blocks_visited;
   profile.present += counts.blocks_present;
@@ -218,10 +223,8 @@ Mesh mesh_otherwise(const StageContext& context, std::size_t i, const implicit::
     return mesh;
   }
   if (d.method == MeshingName::Delaunay) {
-    const double size = d.size.value_or(2.0 * lattice.cell);
     implicit::DelaunayReport report;
-    Mesh mesh = (*context.delaunay)(
-        field, {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell}, &report);
+    Mesh mesh = (*context.delaunay)(field, delaunay_options(context, lattice), &report);
     profile.visited += report.seeds + report.inserted;
     profile.present += report.seeds + report.inserted;
     return mesh;
@@ -380,6 +383,7 @@ Error with_scene_keys(const Error& error) {
     if (fault.key == "mesh.error") fault.key = "output.meshing.error";
     if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
+    if (fault.key == "mesh.angle") fault.key = "output.meshing.angle_deg";
   }
   return {error.kind(), std::move(faults)};
 }

@@ -26,6 +26,7 @@
 #include "search_files.h"
 #include "warnings.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
@@ -150,6 +151,9 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   try {
     body(result);
     result.outcome = result.exit_code == 0 ? "done" : "interrupted";
+  } catch (const Interrupted&) {
+    (void)was_interrupted(options, result);
+    result.outcome = "interrupted";
   } catch (const Error& error) {
     result.outcome = outcome_of(error.kind());
     result.reason = error.what();
@@ -234,7 +238,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
                                        .hint = "run the scene first: supple run SCENE --out FOLDER"});
     }
     const double before = resident_bytes();
-    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
+    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt});
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, *last);
     std::vector<int> frames;
@@ -355,7 +359,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     }
     if (!options.resume) remove_outputs(options.folder, name);
     const double before = resident_bytes();
-    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay});
+    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt});
     const int frame_count = scene.frame_count();
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, frame_count);

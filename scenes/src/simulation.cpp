@@ -150,6 +150,7 @@ struct Simulation::Impl {
             .skip = options.skip,
             .every_call = options.profile,
             .delaunay = &options.delaunay,
+            .interrupt = options.interrupt,
             .time = time(),
             .step = held_step(),
             .awake = awake.size() < bodies.size() ? &awake : nullptr,

@@ -1,12 +1,16 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "supple/cgal/surface_meshes.h"
+#include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/polygonise.h"
 
@@ -87,21 +91,106 @@ TEST(DelaunayMesh, OfNoSurfaceIsEmpty) {
   EXPECT_EQ(report.seeds, 0u);
 }
 
-TEST(DelaunayMesh, RefusesBoundsThatTakeTooManyVertices) {
-  const Body body = random_blobs();
+Mesh coarse(const FieldView& field) { return march_cubes(field, {.lattice = {.cell = 0.05}}, Executor(1)); }
+
+TEST(DelaunayMesh, TakesMoreVerticesThanTheEstimateAndNotMuchMore) {
+  Primitive segment = wyvill_point(0.8);
+  segment.shape = ShapeKind::Segment;
+  segment.size.x() = 2.0;
+  const Body body = random_blobs(), capsule = body_of({{segment, Vec3::Zero()}});
+  const FunctionField ball = sphere({0.01, 0.02, 0.03}, 0.5), ring = torus(0.4, 0.15);
+  for (const FieldView& field : {FieldView(ball), FieldView(ring), FieldView(body.field), FieldView(capsule.field)}) {
+    for (const auto& [size, distance] : {std::pair{0.3, 0.01}, std::pair{0.3, 3e-3}, std::pair{0.1, 0.1}, std::pair{0.1, 2e-3}}) {
+      const DelaunayOptions options{.size = size, .distance = distance, .cell = 0.05};
+      const Mesh seen = coarse(field);
+      const double estimate = estimate_delaunay({&seen, 1}, options).vertices;
+      const auto found = static_cast<double>(delaunay_mesh(field, options).vertex_count());
+      EXPECT_GE(found, estimate) << size << ' ' << distance;
+      EXPECT_LE(found, 3.0 * estimate) << size << ' ' << distance;
+    }
+  }
+}
+
+Fault fault_of(const FieldView& field, const DelaunayOptions& options) {
   try {
-    (void)delaunay_mesh(body.field, {.size = 1.0, .distance = 1e-5, .cell = 0.05, .most_vertices = 1000});
-    FAIL() << "no error";
+    (void)delaunay_mesh(field, options);
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::Limit);
-    EXPECT_EQ(error.faults().front().found, "more");
+    return error.faults().front();
   }
-  try {  // a trillion: refused before they are made
-    (void)delaunay_mesh(body.field, {.size = 1e-6, .distance = 1.0, .cell = 0.05});
-    FAIL() << "no error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.faults().front().key, "mesh.size");
-    EXPECT_NE(error.faults().front().found.find("by the area"), std::string::npos);
+  ADD_FAILURE() << "no error";
+  return {};
+}
+
+// A billion and more: refused before they are made, and with the values that the hint names there is a mesh.
+TEST(DelaunayMesh, RefusesBoundsThatTakeTooManyVerticesBeforeItBegins) {
+  const Body body = random_blobs();
+  for (const std::string key : {"size", "distance"}) {
+    DelaunayOptions options{.size = 1.0, .distance = 0.1, .cell = 0.05, .most_vertices = 2000};
+    double& bound = key == "size" ? options.size : options.distance;
+    bound = key == "size" ? 1e-6 : 1e-9;
+    const Fault fault = fault_of(body.field, options);
+    EXPECT_EQ(fault.key, "mesh." + key);
+    EXPECT_EQ(fault.expected, "expected bounds of triangles that 2000 vertices reach");
+    EXPECT_TRUE(fault.found.starts_with("at least ")) << fault.found;
+    EXPECT_TRUE(fault.found.ends_with(" by the area and curvature of the surface")) << fault.found;
+    EXPECT_GT(std::stod(fault.found.substr(9)), 1e9);
+    const std::string lead = "ask for a " + key + " of at least ";
+    ASSERT_TRUE(fault.hint.starts_with(lead) && fault.hint.ends_with(" m")) << fault.hint;
+    bound = std::stod(fault.hint.substr(lead.size()));
+    const std::size_t found = delaunay_mesh(body.field, options).vertex_count();
+    EXPECT_LE(found, 2000u);
+    EXPECT_GE(found, 450u);  // 2000 over four, with 5 % more of the bound, by the estimate
+  }
+  const Fault both = fault_of(body.field, {.size = 1e-6, .distance = 1e-9, .cell = 0.05, .most_vertices = 2000});
+  EXPECT_NE(both.hint.find("a size of at least "), std::string::npos) << both.hint;
+  EXPECT_NE(both.hint.find(" m and a distance of at least "), std::string::npos) << both.hint;
+}
+
+TEST(DelaunayMesh, NamesWhatTookTooManyVerticesWhereItStops) {
+  const Body body = random_blobs();
+  DelaunayOptions options{.size = 1.0, .distance = 1e-3, .cell = 0.05};
+  const Mesh seen = coarse(body.field);
+  options.most_vertices = static_cast<std::uint64_t>(1.2 * estimate_delaunay({&seen, 1}, options).vertices);
+  const Fault fault = fault_of(body.field, options);
+  EXPECT_EQ(fault.key, "mesh.distance");
+  EXPECT_EQ(fault.found, "more");
+  EXPECT_TRUE(fault.hint.starts_with("ask for a distance of at least 0.00")) << fault.hint;
+  // What two balls share has an edge, where triangles become small.
+  const FunctionField a = sphere({-0.4, 0.01, 0.02}, 0.5), b = sphere({0.4, 0.01, 0.02}, 0.5);
+  const FunctionField lens{.function =
+                               [=](const Vec3& p, Vec3& gradient) {
+                                 Vec3 other;
+                                 const double f = a.function(p, gradient), g = b.function(p, other);
+                                 if (g < f) gradient = other;
+                                 return std::min(f, g);
+                               },
+                           .lipschitz = 1.0,
+                           .box = {Vec3(-0.11, -0.31, -0.3), Vec3(0.11, 0.33, 0.34)}};
+  const Fault edge = fault_of(lens, {.size = 0.3, .distance = 0.01, .cell = 0.02, .most_vertices = 180});
+  EXPECT_EQ(edge.key, "mesh.angle");
+  EXPECT_TRUE(edge.found.starts_with("more, where size and distance alone ask for less than ")) << edge.found;
+}
+
+// By evaluations of the field, not by a clock.
+TEST(DelaunayMesh, EndsSoonAfterAnInterrupt) {
+  const FunctionField ball = sphere({0.01, 0.02, 0.03}, 0.5);
+  std::atomic<int> interrupt{0};
+  std::uint64_t calls = 0, at = 0;
+  FunctionField counted = ball;
+  counted.function = [&](const Vec3& p, Vec3& gradient) {
+    if (++calls == at) interrupt = 15;
+    return ball.function(p, gradient);
+  };
+  const DelaunayOptions options{.size = 0.3, .distance = 1e-3, .cell = 0.1, .interrupt = &interrupt};
+  (void)delaunay_mesh(counted, options);
+  const std::uint64_t all = calls;
+  for (const double share : {0.2, 0.5, 0.99}) {
+    interrupt = 0;
+    calls = 0;
+    at = static_cast<std::uint64_t>(share * static_cast<double>(all));
+    EXPECT_THROW((void)delaunay_mesh(counted, options), Interrupted) << share;
+    EXPECT_LT(calls - at, 2000u) << share;  // a vertex makes some dozens of triangles, a root takes some dozens of evaluations
   }
 }
 

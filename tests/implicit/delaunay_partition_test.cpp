@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -9,7 +10,9 @@
 #include "implicit/analytic_fields.h"
 #include "implicit/mesh_checks.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/implicit/delaunay.h"
+#include "supple/implicit/polygonise.h"
 
 namespace supple::implicit {
 namespace {
@@ -217,16 +220,103 @@ TEST(DelaunayPartition, RepeatsBitByBitOnAnyNumberOfThreads) {
   EXPECT_EQ(hash_of(delaunay_partition(views_of(balls), options_of(0.1, 0.01), Executor(2))), once);
 }
 
+// Of a ball: area over the largest triangle in a circle of radius min(size, sqrt(2 r distance)), and half as many vertices.
+TEST(DelaunayEstimate, OfABallIsThatOfTheSphere) {
+  constexpr double kRadius = 0.5, kDistance = 1e-4, kSize = 0.02, kCell = 0.05;
+  const FunctionField ball = sphere({0.01, 0.02, 0.03}, kRadius);
+  const Mesh mesh = polygonise(ball, {.cell = kCell}, Executor(1));
+  const double area = 4.0 * std::numbers::pi * kRadius * kRadius, largest = 0.75 * std::numbers::sqrt3;
+  const double by_distance = 0.5 * area / (largest * 2.0 * kRadius * kDistance), by_size = 0.5 * area / (largest * kSize * kSize);
+  const DelaunayEstimate estimate = estimate_delaunay({&mesh, 1}, options_of(kSize, kDistance));
+  const double sagitta = 3.0 * kCell * kCell / (8.0 * kRadius);  // chords are diagonals of cells at most
+  const double least = std::pow(1.0 - sagitta / kRadius, 2);
+  EXPECT_LE(estimate.by_distance, by_distance);
+  EXPECT_GE(estimate.by_distance, least * by_distance);
+  EXPECT_LE(estimate.by_size, by_size);
+  EXPECT_GE(estimate.by_size, least * by_size);
+  EXPECT_GE(estimate.vertices, std::max(estimate.by_size, estimate.by_distance));
+  EXPECT_LE(estimate.vertices, estimate.by_size + estimate.by_distance);
+}
+
+// Planes need no vertices for the distance, and what two bodies share counts once.
+TEST(DelaunayEstimate, CountsContactsOnceAndByAreaAlone) {
+  Mesh mesh;
+  mesh.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normal.assign(3, Vec3::UnitZ());
+  mesh.triangle = {{0, 1, 2}};
+  const auto estimate_of = [&] { return estimate_delaunay({&mesh, 1}, options_of(0.1, 1e-9)); };
+  const double plane = estimate_of().vertices;
+  EXPECT_NEAR(plane, 0.5 * 0.5 / (0.75 * std::numbers::sqrt3 * 0.01), 1e-12 * plane);
+  mesh.normal[1] = Vec3(1, 0, 1).normalized();
+  EXPECT_GT(estimate_of().vertices, 1e6);
+  mesh.columns = {{.name = "contact", .values = {0.0, 0.0, 2.0}}};
+  EXPECT_NEAR(estimate_of().vertices, 0.5 * plane, 1e-12 * plane);
+}
+
+TEST(DelaunayPartition, TakesMoreVerticesThanTheEstimateAndNotMuchMore) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  const std::vector<Mesh> seen = polygonise_partition(views_of(balls), {.origin = Vec3(0.01, 0.02, 0.03), .cell = 0.05}, Executor(1));
+  for (const auto& [size, distance] : {std::pair{0.1, 0.01}, std::pair{0.1, 1e-3}, std::pair{0.2, 1e-3}}) {
+    DelaunayReport report;
+    const double estimate = estimate_delaunay(seen, options_of(size, distance)).vertices;
+    (void)delaunay_partition(views_of(balls), options_of(size, distance), Executor(1), &report);
+    EXPECT_GE(static_cast<double>(report.seeds + report.inserted), estimate) << size << ' ' << distance;
+    EXPECT_LE(static_cast<double>(report.seeds + report.inserted), 4.0 * estimate) << size << ' ' << distance;
+  }
+}
+
 TEST(DelaunayPartition, RefusesBoundsThatTakeTooManyVertices) {
   const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
-  DelaunayOptions options = options_of(0.2, 1e-5);
-  options.most_vertices = 1000;
-  try {
-    (void)delaunay_partition(views_of(balls), options, Executor(1));
-    FAIL() << "no error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::Limit);
-    EXPECT_EQ(error.faults().front().key, "mesh.size");
+  const auto fault_of = [&](DelaunayOptions options, std::uint64_t most) {
+    options.most_vertices = most;
+    try {
+      (void)delaunay_partition(views_of(balls), options, Executor(1));
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::Limit);
+      return error.faults().front();
+    }
+    ADD_FAILURE() << "no error";
+    return Fault{};
+  };
+  const Fault tiny = fault_of(options_of(0.2, 1e-9), 2'000'000);
+  EXPECT_EQ(tiny.key, "mesh.distance");
+  EXPECT_TRUE(tiny.found.starts_with("at least ") && tiny.found.ends_with(" by the area and curvature of the surface")) << tiny.found;
+  DelaunayOptions small = options_of(1e-6, 0.1);
+  small.cell = 0.1;
+  EXPECT_EQ(fault_of(small, 2'000'000).key, "mesh.size");
+  // More than the estimate, fewer than it takes.
+  const Fault more = fault_of(options_of(0.2, 1e-3), 2200);
+  EXPECT_EQ(more.key, "mesh.distance");
+  EXPECT_EQ(more.found, "more");
+  EXPECT_TRUE(more.hint.starts_with("ask for a distance of at least 0.00")) << more.hint;
+}
+
+// By evaluations of the fields, not by a clock: of a batch none comes after the first that is refused.
+TEST(DelaunayPartition, EndsSoonAfterAnInterrupt) {
+  const std::vector<FunctionField> balls{sphere({-0.3, 0.02, 0}, 0.5), sphere({0.25, -0.05, 0.1}, 0.4)};
+  std::atomic<int> interrupt{0};
+  std::uint64_t calls = 0, at = 0;
+  std::vector<FunctionField> counted = balls;
+  for (std::size_t m = 0; m < balls.size(); ++m) {
+    counted[m].function = [&, m](const Vec3& p, Vec3& gradient) {
+      if (++calls == at) interrupt = 15;
+      return balls[m].function(p, gradient);
+    };
+  }
+  for (const double distance : {0.003, 1e-4}) {  // by Delaunay's criterion, and where edges become too short for it
+    DelaunayOptions options = options_of(0.2, distance);
+    options.interrupt = &interrupt;
+    calls = at = 0;
+    interrupt = 0;
+    (void)delaunay_partition(views_of(counted), options, Executor(1));
+    const std::uint64_t all = calls;
+    for (const double share : {0.01, 0.1, 0.5, 0.99}) {
+      interrupt = 0;
+      calls = 0;
+      at = static_cast<std::uint64_t>(share * static_cast<double>(all));
+      EXPECT_THROW((void)delaunay_partition(views_of(counted), options, Executor(1)), Interrupted) << share;
+      EXPECT_LT(calls - at, 1000u) << share;
+    }
   }
 }
 

@@ -2,13 +2,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 
 #include "supple/cgal/surface_meshes.h"
 #include "supple/core/error.h"
 #include "supple/scenes/plan.h"
 #include "supple/scenes/read_scene.h"
+#include "supple/scenes/run.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
@@ -71,12 +76,10 @@ TEST(DelaunayScene, NamesTheKeyWhenTheBoundsTakeTooMuch) {
   }
 }
 
-// Objects that touch share their contact bit for bit, within the angle, the size and the distance asked for.
-TEST(DelaunayScene, DividesObjectsThatTouchWithinAngleSizeAndDistance) {
-  const auto meshes_of = [](const std::string& meshing) {
-    const std::string text = R"(
+constexpr const char* kTwoBalls = R"(
 schema: 1
-duration: 1 s
+duration: 0.2 s
+frame_rate: 25
 objects:
   - name: left
     particles: {arrange: single, at: [0, 0, 0], mass: 1}
@@ -86,7 +89,68 @@ objects:
     particles: {arrange: single, at: [0.6, 0.03, 0.02], mass: 1}
     skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
     contact: {modulus: 6 kPa}
-output: {mesh: ply, cell: 0.1, meshing: )" + meshing + "}\n";
+)";
+
+TEST(DelaunayScene, RefusesATinyDistanceAloneAndInContact) {
+  const std::string lone = "schema: 1\nduration: 1 s\nobjects:\n  - name: a\n    particles: {arrange: single, mass: 1}\n"
+                           "    skeleton: [{shape: point, kernel: {radius: 1}}]\n";
+  for (const std::string& bodies : {lone, std::string(kTwoBalls)}) {
+    Simulation simulation(parse_scene(bodies + "output: {mesh: ply, meshing: {method: delaunay, distance: 1e-9}}\n", "test.yaml", "."),
+                          {.delaunay = cgal::delaunay_mesh});
+    try {
+      (void)simulation.meshes();
+      FAIL() << "no error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::Limit);
+      const Fault& fault = error.faults().front();
+      EXPECT_EQ(fault.key, "output.meshing.distance");
+      EXPECT_EQ(fault.expected, "expected bounds of triangles that 2000000 vertices reach");
+      EXPECT_TRUE(fault.found.starts_with("at least ")) << fault.found;
+      EXPECT_TRUE(fault.hint.starts_with("ask for a distance of at least ")) << fault.hint;
+    }
+  }
+}
+
+// A signal does not wait for a mesh; what was saved is continued to the same files.
+TEST(DelaunayScene, ASignalEndsAMesh) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(testing::TempDir()) / "delaunay_signal";
+  fs::remove_all(folder);
+  const Scene scene = parse_scene(std::string(kTwoBalls) + "output: {mesh: ply, cell: 0.1, meshing: {method: delaunay}}\n", "balls.yaml", ".");
+  RunOptions options{.folder = folder / "whole", .threads = 1, .delaunay = cgal::delaunay_mesh};
+  ASSERT_EQ(run_scene(scene, options).outcome, "done");
+  std::atomic<int> signal{0};
+  options.folder = folder / "stopped";
+  options.interrupt = &signal;
+  options.progress = [&](const Progress& p) {
+    if (p.stage == "surface" && p.frame == 3) signal = 15;
+  };
+  const RunResult stopped = run_scene(scene, options);
+  EXPECT_EQ(stopped.outcome, "interrupted");
+  EXPECT_EQ(stopped.reason, "interrupted by signal 15");
+  EXPECT_EQ(stopped.exit_code, 143);
+  EXPECT_EQ(stopped.frames, 2);
+  options.interrupt = nullptr;
+  options.progress = nullptr;
+  options.resume = true;
+  ASSERT_EQ(run_scene(scene, options).outcome, "done");
+  const auto text = [](const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  int files = 0;
+  for (const auto& entry : fs::directory_iterator(folder / "whole/meshes")) {
+    EXPECT_EQ(text(entry.path()), text(folder / "stopped/meshes" / entry.path().filename())) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, scene.frame_count());
+  fs::remove_all(folder);
+}
+
+// Objects that touch share their contact bit for bit, within the angle, the size and the distance asked for.
+TEST(DelaunayScene, DividesObjectsThatTouchWithinAngleSizeAndDistance) {
+  const auto meshes_of = [](const std::string& meshing) {
+    const std::string text = std::string(kTwoBalls) + "output: {mesh: ply, cell: 0.1, meshing: " + meshing + "}\n";
     Simulation simulation(parse_scene(text, "test.yaml", "."), {.delaunay = cgal::delaunay_mesh});
     return simulation.meshes();
   };

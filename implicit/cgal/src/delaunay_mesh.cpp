@@ -11,16 +11,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
-#include <string>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
 
 #include "supple/cgal/surface_meshes.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/project.h"
 
@@ -114,29 +113,24 @@ class Oracle {
   [[nodiscard]] Construct_initial_points construct_initial_points_object() const { return {}; }
 };
 
-[[noreturn]] void refuse(std::uint64_t most, const std::string& found) {
-  throw Error(ErrorKind::Limit,
-              {.place = "", .key = "mesh.size",
-               .expected = "expected bounds of triangles that " + std::to_string(most) + " vertices reach",
-               .found = found,
-               .hint = "ask for a larger size or distance, or a smaller angle: edges of the surface hold no angle"});
-}
-
-/// The bounds, and a limit: the mesher looks at every new triangle here.
+/// The bounds, a limit, and a way out: the mesher looks at every new triangle here.
 class Criteria : public CGAL::Surface_mesh_default_criteria_3<Triangulation> {
  public:
-  Criteria(const implicit::DelaunayOptions& options, const Triangulation& triangulation)
+  Criteria(const implicit::DelaunayOptions& options, const implicit::DelaunayEstimate& estimate, const Triangulation& triangulation)
       : Surface_mesh_default_criteria_3(options.angle * 180.0 / std::numbers::pi, options.size, options.distance),
-        triangulation_(triangulation),
-        most_(options.most_vertices) {}
+        options_(options),
+        estimate_(estimate),
+        triangulation_(triangulation) {}
   bool is_bad(const Facet& facet, Quality& quality) const {
-    if (triangulation_.number_of_vertices() > most_) refuse(most_, "more");
+    heed(options_.interrupt);
+    if (triangulation_.number_of_vertices() > options_.most_vertices) implicit::refuse_more_vertices(estimate_, options_);
     return Surface_mesh_default_criteria_3::is_bad(facet, quality);
   }
 
  private:
+  const implicit::DelaunayOptions& options_;
+  const implicit::DelaunayEstimate& estimate_;
   const Triangulation& triangulation_;
-  std::uint64_t most_;
 };
 
 /// Connected part of each vertex, numbered by its first vertex.
@@ -206,7 +200,8 @@ void measure(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& surface_ce
 }
 
 /// Triangles of the complex, counter-clockwise from outside: the cell whose circumcentre lies inside is behind each.
-Mesh extract(const implicit::FieldView& field, Complex& complex, implicit::DelaunayReport& report) {
+Mesh extract(const implicit::FieldView& field, const implicit::DelaunayOptions& options, Complex& complex,
+             implicit::DelaunayReport& report) {
   const Triangulation& triangulation = complex.triangulation();
   Mesh mesh;
   std::unordered_map<Triangulation::Vertex_handle, std::uint32_t> number;
@@ -222,6 +217,7 @@ Mesh extract(const implicit::FieldView& field, Complex& complex, implicit::Delau
 
   report.least_angle = std::numbers::pi;
   for (auto facet = complex.facets_begin(); facet != complex.facets_end(); ++facet) {
+    heed(options.interrupt);
     auto [cell, side] = *facet;
     const Vec3 centre = vec(cell->get_facet_surface_center(side));
     if (!triangulation.is_infinite(cell) && (field.value(vec(triangulation.dual(cell))) > 0.0)) {
@@ -250,13 +246,9 @@ Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOpt
   implicit::MarchOptions march;
   march.lattice.cell = options.cell;
   const Mesh coarse = implicit::march_cubes(field, march, Executor(1));
-  // Surface balls cover the surface, and there are two triangles to a vertex.
-  const double least = inspect(coarse).area / (2.0 * std::numbers::pi * options.size * options.size);
-  if (least > static_cast<double>(options.most_vertices)) {
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), "at least %.3g by the area of the surface", least);
-    refuse(options.most_vertices, text.data());
-  }
+  heed(options.interrupt);
+  const implicit::DelaunayEstimate estimate = estimate_delaunay({&coarse, 1}, options);
+  check_estimate(estimate, options);
   const Box box = field.surface_box();
   const Surface surface{field, box.centre(), 0.5 * box.extent().norm(),
                         spread(field, coarse, options.size)};
@@ -265,9 +257,9 @@ Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOpt
   if (!surface.seeds.empty()) {
     Triangulation triangulation;
     Complex complex(triangulation);
-    CGAL::make_surface_mesh(complex, surface, Oracle(), Criteria(options, triangulation), CGAL::Manifold_tag());
+    CGAL::make_surface_mesh(complex, surface, Oracle(), Criteria(options, estimate, triangulation), CGAL::Manifold_tag());
     found.inserted = triangulation.number_of_vertices() - found.seeds;
-    mesh = extract(field, complex, found);
+    mesh = extract(field, options, complex, found);
   }
   if (report != nullptr) *report = found;
   return mesh;

@@ -3,6 +3,7 @@
 /// (`supple::cgal`); code that may do without it takes a `DelaunayMesher`, which is empty where the component is not there.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -23,6 +24,7 @@ struct DelaunayOptions {
   /// Cell of the lattice on which the parts of the surface are looked for [m], > 0.
   double cell = 0.0;
   std::uint64_t most_vertices = 2'000'000;
+  const std::atomic<int>* interrupt = nullptr;  ///< not 0: the mesher throws Interrupted soon (core/interrupt.h)
 };
 
 struct DelaunayReport {
@@ -34,9 +36,30 @@ struct DelaunayReport {
   double largest_distance = 0.0; ///< from a triangle's circumcentre to the surface along its dual edge [m]
 };
 
+/// Vertices that a surface takes at the least. No triangle is larger than the equilateral one in its circumcircle; the radius of that is
+/// the size at most and, where H is the mean curvature, about sqrt(2 distance / |H|): exactly on balls, on average of all directions
+/// elsewhere.
+struct DelaunayEstimate {
+  double by_size = 0.0;      ///< for the size alone
+  double by_distance = 0.0;  ///< for the distance alone
+  double vertices = 0.0;     ///< for whichever is stricter, place by place
+};
+
+/// @param coarse  meshes with normals of all bodies; where "contact" is a column, contacts and their rims count by area and for half, as
+///                two bodies share them
+[[nodiscard]] DelaunayEstimate estimate_delaunay(std::span<const Mesh> coarse, const DelaunayOptions& options);
+
+/// @throws Error{Limit} naming size or distance, and values that will do, where most_vertices are less than the estimate
+void check_estimate(const DelaunayEstimate& estimate, const DelaunayOptions& options);
+
+/// Of a mesher that has most_vertices and has not reached the bounds.
+/// @throws Error{Limit} naming size, distance or, where these ask for much less, the angle
+[[noreturn]] void refuse_more_vertices(const DelaunayEstimate& estimate, const DelaunayOptions& options);
+
 /// The closed surface F = 0 within these bounds, outward oriented, vertices on the surface to rounding, with the field's
 /// normals. Free of self-intersection: its triangles are faces of one Delaunay triangulation.
-/// @throws Error{Limit} when most_vertices do not reach the bounds: an angle cannot be held where the surface has an edge.
+/// @throws Error{Limit} when most_vertices do not reach the bounds, before any is made where an estimate says so; an angle cannot be held
+/// where the surface has an edge. Interrupted.
 using DelaunayMesher =
     std::function<Mesh(const FieldView& field, const DelaunayOptions& options, DelaunayReport* report)>;
 
@@ -48,7 +71,7 @@ using DelaunayMesher =
 /// and largest_distance are not measured. Either shows as `sharp` > 0 and in `least_angle`. Normals and the column "contact" are those of
 /// polygonise_partition; an unbounded body gets an empty mesh. Contacts narrower than the cell, or half the size where that is less, may be
 /// missed, and sheets nearer to each other than the distance may cross.
-/// @throws Error{Limit} when most_vertices do not reach the bounds.
+/// @throws Error{Limit} when most_vertices do not reach the bounds, before any is made where an estimate says so. Interrupted.
 [[nodiscard]] std::vector<Mesh> delaunay_partition(std::span<const FieldView> fields, const DelaunayOptions& options,
                                                    const Executor& executor, DelaunayReport* report = nullptr);
 

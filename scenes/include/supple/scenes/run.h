@@ -42,7 +42,7 @@ struct RunOptions {
   int frames_at_once = 0;                       ///< in work at the same time where pictures are drawn, the one that is simulated too; 0: one a thread, as memory allows
   double memory = 0.0;                          ///< for that, beyond the first one [byte]; 0: half of what the machine has free
   std::function<void(const Progress&)> progress{}; ///< never twice at the same time, but from several threads; may be empty
-  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step (the signal's number)
+  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step, or in a Delaunay mesh (the signal's number)
 };
 
 inline constexpr const char* kOutOfMemory =

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <cstdint>
 #include <memory>
@@ -31,6 +32,7 @@ struct SimulationOptions {
   bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
   bool profile = false;        ///< time every step, not every 64th
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
+  const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps go on
 };
 
 /// Work of one stage so far.

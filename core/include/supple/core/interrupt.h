@@ -1,0 +1,21 @@
+/// @file supple/core/interrupt.h
+/// Long calls that end when somebody else says so.
+#pragma once
+
+#include <atomic>
+#include <exception>
+
+namespace supple {
+
+/// Thrown out of a call that was told to end: what it was making is lost, and nothing else.
+class Interrupted : public std::exception {
+ public:
+  [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
+};
+
+/// @param interrupt  set by another thread or a signal; null: never @throws Interrupted where it is not 0
+inline void heed(const std::atomic<int>* interrupt) {
+  if (interrupt != nullptr && interrupt->load(std::memory_order_relaxed) != 0) throw Interrupted();
+}
+
+}  // namespace supple
