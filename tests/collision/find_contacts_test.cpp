@@ -135,8 +135,10 @@ TEST(FindContacts, LeavesOutPairsWhoseSamplesAreFarFromTheOtherSurface) {
 }
 
 TEST(FindContacts, GivesTheSameForceForAnyNumberOfSamples) {
-  // The ascent ends within 1e-6 of the patch of its peak, and the quadrature does not feel its pole's place.
+  // The ascent ends within 1e-6 of the patch of its peak, where the pressure is less by 1e-12 of itself, and the quadrature
+  // does not feel its pole's place.
   const LinearSphere left{Vec3::Zero(), Linear{1.0, 1.0}}, right{Vec3(1.0, 0.9, 0.8), Linear{0.7, 3.0}};
+  const double peak = (1.7 - right.centre.norm()) / (1.0 + 1.0 / 3.0);  // springs in series on the axis
   double force = 0.0;
   for (const int count : {60, 200, 1000}) {
     const auto left_samples = sphere_samples(left.centre, 1.0, count), right_samples = sphere_samples(right.centre, 0.7, count);
@@ -145,6 +147,8 @@ TEST(FindContacts, GivesTheSameForceForAnyNumberOfSamples) {
     stage.add(right).samples = &right_samples;
     const ContactSurface& s = stage.solve({.error = 1e-4});
     ASSERT_EQ(s.summary.size(), 1u);
+    EXPECT_EQ(s.summary[0].rule, ContactRule::Polar);
+    EXPECT_NEAR(s.summary[0].largest_pressure, peak, 1e-11 * peak);
     if (force > 0.0) {
       EXPECT_NEAR(s.summary[0].force.norm(), force, 1e-9 * force);
     }
