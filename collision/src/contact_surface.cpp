@@ -66,6 +66,12 @@ std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, co
   return CommonAxis{on_a->point, along / length};
 }
 
+/// Whether a bound is as good as asked, or as round-off lets it be.
+bool meets(const ContactSurface::Summary& summary, double error) {
+  constexpr double kRound = 1e-7, kSlack = 1.01;
+  return summary.error_estimate <= std::max(kSlack * error, kRound);
+}
+
 /// The solver of one thread; its buffers are reused.
 class PairSolver {
  public:
@@ -92,8 +98,10 @@ class PairSolver {
   bool thirds_press(PairPressure& pressure, std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
   bool samples(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
                const ContactSettings& settings, PairResult& out);
-  void march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
+  bool march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
              const ContactSettings& settings, PairResult& out);
+  bool stand_in(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
+                const ContactSettings& settings, bool have, PairResult& out);
   bool polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, const Box* faces, PairResult& out);
   void clear(PairResult& out);
   void begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out);
@@ -117,6 +125,12 @@ class PairSolver {
   Regions regions_{};
   Vec3 first_ = Vec3::Zero();  // integral of x p dA
   double load_ = 0.0;
+  /// What another rule has left.
+  struct Kept {
+    PairResult result;
+    Vec3 first = Vec3::Zero();
+    double load = 0.0;
+  } kept_;
 };
 
 void PairSolver::add_sums(const PatchSums& sums, const Vec3& reference, ContactSurface::Summary& summary) {
@@ -342,15 +356,38 @@ bool PairSolver::samples(PairPressure& pressure, std::span<const ContactBody> bo
   return true;
 }
 
-void PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
+bool PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap,
                        const ContactSettings& settings, PairResult& out) {
   begin_anew(bodies, overlap, out);
   const Vec3 reference = overlap.centre();
-  if (!march_.solve(pressure, third_bodies_, overlap, settings.error, settings.max_refinement, reference,
-                    out.points)) {
-    return;
-  }
+  if (!march_.solve(pressure, third_bodies_, overlap, {settings.error, settings.max_refinement}, regions_, reference, out.points)) return false;
   keep(march_, ContactRule::March, reference, out);
+  return true;
+}
+
+/// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.
+/// @param have  `out` holds a result already   @return whether it holds one
+bool PairSolver::stand_in(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
+                          const ContactSettings& settings, bool have, PairResult& out) {
+  // Few samples meet a coarse error with fewer points than marching begins with; finer ones they meet late or never.
+  constexpr double kCoarse = 1e-2, kFinestSampled = 1e-3;
+  const auto set_aside = [&] {
+    std::swap(kept_.result, out);
+    std::swap(kept_.first, first_);
+    std::swap(kept_.load, load_);
+    out.summary.bodies = kept_.result.summary.bodies;
+  };
+  const std::array<ContactRule, 2> marched_first{ContactRule::March, ContactRule::Samples}, sampled_first{ContactRule::Samples, ContactRule::March};
+  for (const ContactRule rule : settings.error >= kCoarse ? sampled_first : marched_first) {
+    if (settings.only != ContactRule::None && settings.only != rule) continue;
+    if (have && (meets(out.summary, settings.error) || (rule == ContactRule::Samples && out.summary.error_estimate <= kFinestSampled))) continue;
+    if (have) set_aside();
+    const bool fits = rule == ContactRule::March ? march(pressure, bodies, overlap, settings, out)
+                                                 : samples(pressure, bodies, overlap, spacing, settings, out);
+    if (have && (!fits || kept_.result.summary.error_estimate <= out.summary.error_estimate)) set_aside();
+    have = have || fits;
+  }
+  return have;
 }
 
 void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
@@ -414,16 +451,15 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (!fits && settings.only == ContactRule::Polar) {
     begin_anew(bodies, overlap, out);
     out.summary.error_estimate = 1.0;
-  } else if (!fits) {
-    // Samples meet a plane sheet of points where marching fills the box with cells: cheaper at every error.
-    fits = settings.only != ContactRule::March && samples(pressure, bodies, overlap, spacing, settings, out);
-    if (!fits && settings.only != ContactRule::Samples) {
-      if (any && a.skeleton == nullptr && b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
-      march(pressure, bodies, overlap, settings, out);
-    } else if (!fits) {
+  } else if (!fits || (any && cover_count_ > 0 && !meets(out.summary, settings.error))) {
+    const bool polar = fits;
+    fits = stand_in(pressure, bodies, overlap, spacing, settings, polar, out);
+    if (polar && out.summary.rule != ContactRule::Polar) reason = RuleReason::Unmet;
+    if (any && !polar && out.summary.rule == ContactRule::March && a.skeleton == nullptr && b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
+    if (!fits) {
       begin_anew(bodies, overlap, out);
       const auto touches = [&](const Vec3& hill) { return finder_.climb(pressure, hill, extent, convex, false).has_value(); };
-      if (std::any_of(starts_.hill.begin(), starts_.hill.end(), touches)) out.summary.error_estimate = 1.0;
+      if (settings.only == ContactRule::Samples && std::any_of(starts_.hill.begin(), starts_.hill.end(), touches)) out.summary.error_estimate = 1.0;
     }
   }
   out.summary.reason = reason;

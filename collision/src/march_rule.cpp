@@ -3,291 +3,603 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include "quadrature.h"
 
 namespace supple::collision {
 namespace {
 
-MarchVertex between(const MarchVertex& p, const MarchVertex& q, double fp, double fq) {
-  const double t = fp / (fp - fq);
-  return {p.x + t * (q.x - p.x), p.a + t * (q.a - p.a), p.b + t * (q.b - p.b), p.third + t * (q.third - p.third)};
-}
+constexpr int kSteps = 30;
+constexpr double kOnSigma = 1e-9;      // of a cell: a last step as long as this leaves its square, and normals as good as it
+constexpr double kLeastCosine = 0.2;   // between the interpolated normal and that of Sigma
+constexpr double kFlat = 0.2;          // in cells: highest middle of an edge of a mesh that is fine enough
+constexpr double kLeastTurn = 0.5;     // cosine between normals of such a mesh's triangle
+constexpr double kMostCells = 1024.0;  // along the longest side of the overlap's box, before cells are halved
+constexpr int kMostHalvings = 4;       // of the cells of a mesh
+constexpr double kSafety = 2.0;        // of the difference between two rules
+constexpr double kMargin = 2.0;        // of a cubic polynomial, in what it misses at the middles of edges
+constexpr double kDoubt = 1.0 / 64.0;  // share of the error asked for that a single doubtful piece may be
+constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
+constexpr int kFewNodes = 3;           // through a squeezed region
+constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
+constexpr int kMostLevels = 24;        // of splitting doubtful pieces at once
 
-/// Keeps the part of a convex polygon where f >= 0 (Sutherland & Hodgman). @return vertices left
-template <class Polygon, class F>
-int clip_polygon(Polygon& polygon, int count, const F& f) {
-  Polygon out;
-  int kept = 0;
-  for (int i = 0; i < count; ++i) {
-    const MarchVertex& p = polygon[static_cast<std::size_t>(i)];
-    const MarchVertex& q = polygon[static_cast<std::size_t>((i + 1) % count)];
-    const double fp = f(p), fq = f(q);
-    if (fp >= 0.0) out[static_cast<std::size_t>(kept++)] = p;
-    if ((fp >= 0.0) != (fq >= 0.0)) out[static_cast<std::size_t>(kept++)] = between(p, q, fp, fq);
-  }
-  polygon = out;
-  return kept;
-}
+using Vec2 = Eigen::Vector2d;
 
-/// Appends the part of a tetrahedron where f >= 0 to `out`, as at most three tetrahedra.
-template <class Tetrahedron, class F>
-void clip_tetrahedron(const Tetrahedron& tetrahedron, const F& f, std::vector<Tetrahedron>& out) {
-  std::array<MarchVertex, 4> in, gone;
-  std::size_t kept = 0, lost = 0;
-  for (const MarchVertex& v : tetrahedron) {
-    if (f(v) >= 0.0) {
-      in[kept++] = v;
-    } else {
-      gone[lost++] = v;
-    }
-  }
-  const auto cut = [&](const MarchVertex& p, const MarchVertex& q) { return between(p, q, f(p), f(q)); };
-  // A prism with triangles (p0, p1, p2) and (q0, q1, q2), edges p_i q_i.
-  const auto prism = [&](const MarchVertex& p0, const MarchVertex& p1, const MarchVertex& p2, const MarchVertex& q0,
-                         const MarchVertex& q1, const MarchVertex& q2) {
-    out.push_back({p0, p1, p2, q0});
-    out.push_back({p1, p2, q0, q1});
-    out.push_back({p2, q0, q1, q2});
-  };
-  switch (kept) {
-    case 4:
-      out.push_back(tetrahedron);
-      break;
-    case 3:
-      prism(in[0], in[1], in[2], cut(in[0], gone[0]), cut(in[1], gone[0]), cut(in[2], gone[0]));
-      break;
-    case 2:
-      prism(in[0], cut(in[0], gone[0]), cut(in[0], gone[1]), in[1], cut(in[1], gone[0]), cut(in[1], gone[1]));
-      break;
-    case 1:
-      out.push_back({in[0], cut(in[0], gone[0]), cut(in[0], gone[1]), cut(in[0], gone[2])});
-      break;
-    default:
-      break;
-  }
-}
+double cross(const Vec2& p, const Vec2& q) { return p.x() * q.y() - p.y() * q.x(); }
 
-/// Corners at which A presses at least as hard as B.
-int count_above(const std::array<MarchVertex, 4>& corner) {
-  return static_cast<int>(std::count_if(corner.begin(), corner.end(), [](const MarchVertex& v) { return v.a - v.b >= 0.0; }));
-}
+int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
 
 }  // namespace
 
-void MarchRuleSolver::add_facet(Polygon& polygon, int count) {
-  count = clip_polygon(polygon, count, [](const MarchVertex& v) { return 0.5 * (v.a + v.b); });
-  if (count < 3) return;
-  count = clip_polygon(polygon, count, [](const MarchVertex& v) { return 0.5 * (v.a + v.b) - v.third; });
-  if (count < 3) return;
-  Vec3 doubled = Vec3::Zero(), first = Vec3::Zero();
-  double total = 0.0;
-  for (int i = 1; i + 1 < count; ++i) {
-    const Vec3 &p = polygon[0].x, &q = polygon[static_cast<std::size_t>(i)].x;
-    const Vec3& r = polygon[static_cast<std::size_t>(i + 1)].x;
-    const Vec3 n = (q - p).cross(r - p);
-    const double twice = n.norm();
-    doubled += n;
-    total += twice;
-    first += twice / 3.0 * (p + q + r);
-  }
-  const double norm = doubled.norm();
-  if (!(norm > 0.0) || !(total > 0.0)) return;
-  facet_.point.push_back(first / total);
-  facet_normal_.push_back(doubled / norm);
-  facet_area_.push_back(0.5 * norm);
+void MarchRuleSolver::Feet::clear() {
+  triangle.clear();
+  at.clear();
+  height.clear();
 }
 
-void MarchRuleSolver::add_squeezed(const Tetrahedron& corner, int side) {
-  const auto own = [side](const MarchVertex& v) { return side == 0 ? v.a : v.b; };
-  const auto other = [side](const MarchVertex& v) { return side == 0 ? v.b : v.a; };
-  const auto run = [&](const auto& f) {
-    kept_.clear();
-    for (const Tetrahedron& piece : pieces_) clip_tetrahedron(piece, f, kept_);
-    pieces_.swap(kept_);
-  };
-  pieces_.assign(1, corner);
-  run(own);
-  run([&](const MarchVertex& v) { return other(v) - own(v); });
-  run([&](const MarchVertex& v) { return own(v) - v.third; });
-  double volume = 0.0;
-  Vec3 first = Vec3::Zero();
-  for (const Tetrahedron& t : pieces_) {
-    const double v = std::abs((t[1].x - t[0].x).cross(t[2].x - t[0].x).dot(t[3].x - t[0].x)) / 6.0;
-    volume += v;
-    first += 0.25 * v * (t[0].x + t[1].x + t[2].x + t[3].x);
-  }
-  if (!(volume > 0.0)) return;
-  volume_point_.push_back(first / volume);
-  volume_weight_.push_back(volume);
-  volume_side_.push_back(static_cast<std::uint8_t>(side));
+void MarchRuleSolver::Feet::add(std::uint32_t in, const Vec2& where, double guess) {
+  triangle.push_back(in);
+  at.push_back(where);
+  height.push_back(guess);
 }
 
-void MarchRuleSolver::cut_tetrahedron(const Tetrahedron& corner) {
-  const int above = count_above(corner);
-  if (above > 0 && above < 4) {
-    std::array<const MarchVertex*, 4> up{}, down{};
-    std::size_t ups = 0, downs = 0;
-    for (const MarchVertex& v : corner) {
-      if (v.a - v.b >= 0.0) {
-        up[ups++] = &v;
-      } else {
-        down[downs++] = &v;
-      }
-    }
-    const auto cut = [](const MarchVertex& p, const MarchVertex& q) { return between(p, q, p.a - p.b, q.a - q.b); };
-    Polygon polygon;
-    int count = 3;
-    if (ups == 2) {
-      polygon[0] = cut(*up[0], *down[0]);
-      polygon[1] = cut(*up[0], *down[1]);
-      polygon[2] = cut(*up[1], *down[1]);
-      polygon[3] = cut(*up[1], *down[0]);
-      count = 4;
-    } else {
-      const MarchVertex& lone = ups == 1 ? *up[0] : *down[0];
-      const auto& others = ups == 1 ? down : up;
-      for (std::size_t i = 0; i < 3; ++i) polygon[i] = cut(lone, *others[i]);
-    }
-    add_facet(polygon, count);
-  }
+Vec3 MarchRuleSolver::plane(std::uint32_t triangle, const Vec2& at) const {
+  const auto& c = mesh_.triangle[triangle].corner;
+  return (1.0 - at.x() - at.y()) * mesh_.vertex[c[0]] + at.x() * mesh_.vertex[c[1]] + at.y() * mesh_.vertex[c[2]];
 }
 
-template <class Visit>
-Box MarchRuleSolver::for_tetrahedra(const Visit& visit) {
-  const auto& n = cells_;
-  const auto index = [&](std::size_t i, std::size_t j, std::size_t k) { return (k * (n[1] + 1) + j) * (n[0] + 1) + i; };
-  Box held;
-  // Six tetrahedra around the main diagonal of a cell: one for each order of the axes.
-  constexpr std::array<std::array<std::size_t, 2>, 6> kPaths{{{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
-  for (std::size_t k = 0; k < n[2]; ++k) {
-    for (std::size_t j = 0; j < n[1]; ++j) {
-      for (std::size_t i = 0; i < n[0]; ++i) {
-        std::array<std::size_t, 8> at;
-        bool a_somewhere = false, b_somewhere = false;
-        for (std::size_t c = 0; c < 8; ++c) {
-          at[c] = index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-          a_somewhere = a_somewhere || node_.a[at[c]] > 0.0;
-          b_somewhere = b_somewhere || node_.b[at[c]] > 0.0;
-        }
-        if (!a_somewhere || !b_somewhere) continue;
-        held.include(node_.point[at[0]]);
-        held.include(node_.point[at[7]]);
-        const auto vertex = [&](std::size_t c) { return MarchVertex{node_.point[at[c]], node_.a[at[c]], node_.b[at[c]], third_[at[c]]}; };
-        for (const auto& path : kPaths) {
-          const Tetrahedron corner{vertex(0), vertex(path[0]), vertex(path[1]), vertex(7)};
-          const bool a = std::any_of(corner.begin(), corner.end(), [](const MarchVertex& v) { return v.a > 0.0; });
-          const bool b = std::any_of(corner.begin(), corner.end(), [](const MarchVertex& v) { return v.b > 0.0; });
-          if (a && b) visit(corner);
-        }
-      }
-    }
-  }
-  return held;
+/// The interpolated normal, which is no unit vector.
+Vec3 MarchRuleSolver::along(std::uint32_t triangle, const Vec2& at) const {
+  const auto& c = mesh_.triangle[triangle].corner;
+  return (1.0 - at.x() - at.y()) * mesh_.normal[c[0]] + at.x() * mesh_.normal[c[1]] + at.y() * mesh_.normal[c[2]];
 }
 
-void MarchRuleSolver::squeeze() {
-  volume_point_.clear();
-  volume_weight_.clear();
-  volume_side_.clear();
-  (void)for_tetrahedra([this](const Tetrahedron& corner) {
-    const int above = count_above(corner);
-    if (above < 4) add_squeezed(corner, 0);
-    if (above > 0) add_squeezed(corner, 1);
-  });
+double MarchRuleSolver::area_of(const Piece& piece) const {
+  const Vec3 p = plane(piece.triangle, piece.corner[0].at), q = plane(piece.triangle, piece.corner[1].at);
+  return 0.5 * (q - p).cross(plane(piece.triangle, piece.corner[2].at) - p).norm();
 }
 
-Box MarchRuleSolver::march(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& box,
-                           int cells) {
-  const Vec3 extent = box.extent();
-  const double cell = extent.maxCoeff() / cells;
-  auto& n = cells_;
-  for (std::size_t k = 0; k < 3; ++k) {
-    n[k] = static_cast<std::size_t>(std::max(2.0, std::ceil(extent[static_cast<Eigen::Index>(k)] / cell - 1e-9)));
+/// Pressures at some feet, at their heights so far, and the tangents of the image as if they were on Sigma.
+void MarchRuleSolver::measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet,
+                              std::span<const std::size_t> which) {
+  for (const std::size_t i : which) feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * along(feet.triangle[i], feet.at[i]);
+  pressure.evaluate(feet.batch, which, some_);
+  for (const std::size_t i : which) {
+    const auto& c = mesh_.triangle[feet.triangle[i]].corner;
+    const Vec3 n = along(feet.triangle[i], feet.at[i]), slope = feet.batch.slope_a[i] - feet.batch.slope_b[i];
+    const double rate = slope.dot(n);
+    const auto flat = [&](std::uint32_t to) {
+      return Vec3(mesh_.vertex[to] - mesh_.vertex[c[0]] + feet.height[i] * (mesh_.normal[to] - mesh_.normal[c[0]]));
+    };
+    const Vec3 s = flat(c[1]), t = flat(c[2]);
+    feet.climb[i] = Vec2(-slope.dot(s), -slope.dot(t)) / rate;
+    feet.along_s[i] = s + feet.climb[i].x() * n;
+    feet.along_t[i] = t + feet.climb[i].y() * n;
   }
-  const Vec3 step(extent[0] / static_cast<double>(n[0]), extent[1] / static_cast<double>(n[1]),
-                  extent[2] / static_cast<double>(n[2]));
-  const auto index = [&](std::size_t i, std::size_t j, std::size_t k) {
-    return (k * (n[1] + 1) + j) * (n[0] + 1) + i;
-  };
-  node_.resize((n[0] + 1) * (n[1] + 1) * (n[2] + 1));
-  for (std::size_t k = 0; k <= n[2]; ++k) {
-    for (std::size_t j = 0; j <= n[1]; ++j) {
-      for (std::size_t i = 0; i <= n[0]; ++i) {
-        node_.point[index(i, j, k)] =
-            box.lower + Vec3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)).cwiseProduct(step);
-      }
-    }
+  if (third.empty()) return;
+  place_.resize(which.size());
+  value_.resize(which.size());
+  slope_.resize(which.size());
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    place_[k] = feet.batch.point[which[k]];
+    feet.third[which[k]] = -std::numeric_limits<double>::max();
   }
-  pressure.evaluate_values(node_);
-  third_.assign(node_.size(), third.empty() ? -std::numeric_limits<double>::max() : -std::numeric_limits<double>::infinity());
-  value_.resize(node_.size());
   for (const ContactBody* body : third) {
-    body->field.evaluate(node_.point, value_);
-    for (std::size_t i = 0; i < node_.size(); ++i) {
-      third_[i] = std::max(third_[i], body->material.modulus * value_[i]);
+    body->field.evaluate(place_, value_, slope_);
+    for (std::size_t k = 0; k < which.size(); ++k) {
+      const double p = body->material.modulus * value_[k];
+      if (p <= feet.third[which[k]]) continue;
+      feet.third[which[k]] = p;
+      feet.third_slope[which[k]] = body->material.modulus * slope_[k];
     }
   }
-
-  facet_.point.clear();
-  facet_normal_.clear();
-  facet_area_.clear();
-  return for_tetrahedra([this](const Tetrahedron& corner) { cut_tetrahedron(corner); });
 }
 
-/// Moves the centroids of the facets onto Sigma along the facets' normals and sums up.
-void MarchRuleSolver::place_on_sigma(PairPressure& pressure, double cell, const Vec3& reference,
-                                     PatchPoints& points) {
-  points.clear();
-  sums_ = {};
-  thickness_ = 0.0;
-  const std::size_t n = facet_.point.size();
-  facet_.resize(n);
-  const double enough = 1e-12 * pressure.largest_modulus();
-  constexpr int kSteps = 8;
-  for (int iteration = 0; iteration < kSteps; ++iteration) {
-    pressure.evaluate(facet_);
-    bool moved = false;
-    for (std::size_t i = 0; i < n && iteration + 1 < kSteps; ++i) {
-      const double gap = facet_.a[i] - facet_.b[i];
-      if (std::abs(gap) <= enough) continue;
-      const double rate = (facet_.slope_b[i] - facet_.slope_a[i]).dot(facet_normal_[i]);
-      if (rate == 0.0) continue;
-      facet_.point[i] += std::clamp(gap / rate, -cell, cell) * facet_normal_[i];
-      moved = true;
+void MarchRuleSolver::Feet::make_room() {
+  const std::size_t n = size();
+  batch.resize(n);
+  along_s.resize(n);
+  along_t.resize(n);
+  climb.resize(n);
+  third.assign(n, 0.0);
+  third_slope.assign(n, Vec3::Zero());
+  good.assign(n, 0);
+}
+
+/// How far a foot is from Sigma along the interpolated normal, to first order.
+double MarchRuleSolver::to_sigma(const Feet& feet, std::size_t i) const {
+  return (feet.batch.b[i] - feet.batch.a[i]) / (feet.batch.slope_a[i] - feet.batch.slope_b[i]).dot(along(feet.triangle[i], feet.at[i]));
+}
+
+/// The pressures after such a move, to first order.
+void MarchRuleSolver::lift(Feet& feet, std::size_t i, double move) const {
+  const Vec3 way = move * along(feet.triangle[i], feet.at[i]);
+  feet.batch.point[i] += way;
+  feet.batch.a[i] += feet.batch.slope_a[i].dot(way);
+  feet.batch.b[i] += feet.batch.slope_b[i].dot(way);
+  feet.third[i] += feet.third_slope[i].dot(way);
+}
+
+/// Feet on Sigma by Newton's method in their heights.
+void MarchRuleSolver::place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet) {
+  feet.make_room();
+  open_.resize(feet.size());
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
+  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+    measure(pressure, third, feet, open_);
+    std::size_t left = 0;
+    for (const std::size_t i : open_) {
+      const double move = to_sigma(feet, i);
+      if (!std::isfinite(move)) continue;
+      feet.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
+      if (std::abs(feet.height[i]) > cell_) continue;
+      if (std::abs(move) > kOnSigma * cell_) {
+        open_[left++] = i;
+        continue;
+      }
+      lift(feet, i, move);
+      const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], way = along(feet.triangle[i], feet.at[i]);
+      const bool upright = normal.dot(way) > kLeastCosine * normal.norm() * way.norm();
+      feet.good[i] = upright && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0 ? 1 : 0;
     }
-    if (!moved) break;
+    open_.resize(left);
   }
-  double largest = 0.0;
-  PeakLine peak;
+}
+
+MarchRuleSolver::Foot MarchRuleSolver::foot(const Feet& feet, std::size_t i) const {
+  Foot out;
+  out.at = feet.at[i];
+  out.height = feet.height[i];
+  out.climb = feet.climb[i];
+  out.good = feet.good[i] != 0;
+  // The softer body says its pressure best, as it changes least off Sigma.
+  const Vec3 &ga = feet.batch.slope_a[i], &gb = feet.batch.slope_b[i];
+  const double sa = ga.norm(), sb = gb.norm(), share = sa + sb > 0.0 ? sb / (sa + sb) : 0.5;
+  out.pressure = share * feet.batch.a[i] + (1.0 - share) * feet.batch.b[i];
+  Vec3 slope = share * ga + (1.0 - share) * gb;
+  if (feet.third[i] > 0.0) {
+    out.pressure -= feet.third[i];
+    slope -= feet.third_slope[i];
+  }
+  out.slope = Vec2(slope.dot(feet.along_s[i]), slope.dot(feet.along_t[i]));
+  if (!out.slope.allFinite()) out.good = false;
+  return out;
+}
+
+/// What a quadratic polynomial through the corners and middles says of them.
+template <class Of>
+double MarchRuleSolver::quadratic(const Piece& piece, const Vec2& at, const Of& of) {
+  const auto& c = piece.corner;
+  const Vec2 u = c[1].at - c[0].at, v = c[2].at - c[0].at, w = at - c[0].at;
+  const double whole = cross(u, v), q = cross(w, v) / whole, r = cross(u, w) / whole, p = 1.0 - q - r;
+  return p * (2.0 * p - 1.0) * of(c[0]) + q * (2.0 * q - 1.0) * of(c[1]) + r * (2.0 * r - 1.0) * of(c[2]) +
+         4.0 * (q * r * of(piece.middle[0]) + r * p * of(piece.middle[1]) + p * q * of(piece.middle[2]));
+}
+
+/// By the Bezier controls of the cubic polynomial with the values and slopes at the corners.
+MarchRuleSolver::Shape MarchRuleSolver::shape_of(const Piece& piece) const {
+  const auto& c = piece.corner;
+  bool good = true;
+  std::size_t positive = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    good = good && c[i].good && piece.middle[i].good;
+    positive += c[i].pressure > 0.0 ? 1 : 0;
+  }
+  std::array<std::array<double, 3>, 3> edge{};  // [i][j]: next to corner i on the way to j
+  double margin = 0.0, lowest = std::numeric_limits<double>::infinity(), highest = -lowest, sum = 0.0;
+  const auto see = [&](double control) {
+    lowest = std::min(lowest, control);
+    highest = std::max(highest, control);
+  };
+  for (std::size_t i = 0; i < 3; ++i) {
+    see(c[i].pressure);
+    for (std::size_t j = 0; j < 3; ++j) {
+      if (i == j) continue;
+      edge[i][j] = c[i].pressure + c[i].slope.dot(c[j].at - c[i].at) / 3.0;
+      see(edge[i][j]);
+      sum += edge[i][j] / 4.0 - c[i].pressure / 12.0;
+    }
+  }
+  see(sum);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    const double middle = (c[j].pressure + 3.0 * (edge[j][k] + edge[k][j]) + c[k].pressure) / 8.0;
+    margin = std::max(margin, kMargin * std::abs(piece.middle[i].pressure - middle));
+  }
+  Shape shape;
+  shape.most = std::max(highest + margin, 0.0);
+  if (positive == 0) {
+    shape.certain = good && highest < -margin;
+    return shape;
+  }
+  if (positive == 3) {
+    shape.part = Part::All;
+    shape.certain = good && lowest > margin;
+    return shape;
+  }
+  shape.part = positive == 1 ? Part::Corner : Part::AllButCorner;
+  const double sign = positive == 1 ? 1.0 : -1.0;  // of the lone corner
+  std::size_t lone = 0;
+  while ((c[lone].pressure > 0.0) != (positive == 1)) ++lone;
+  const std::size_t i = lone;
+  std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+  // Rays run along the edge that crosses the rim more steeply.
+  const Vec3 x = plane(piece.triangle, c[i].at);
+  const auto fall = [&](std::size_t to) { return std::abs(c[i].pressure - c[to].pressure) / (plane(piece.triangle, c[to].at) - x).norm(); };
+  if (fall(k) > fall(j)) std::swap(j, k);
+  const double inner = sum;
+  // Along the rays the pressure only goes away from that of the lone corner: differences of controls are those of its rate.
+  const auto steady = [&](std::size_t to, std::size_t other) {
+    const std::array<double, 6> steps{edge[i][to] - c[i].pressure, edge[to][i] - edge[i][to],     c[to].pressure - edge[to][i],
+                                      inner - edge[i][other],      edge[to][other] - inner, edge[other][to] - edge[other][i]};
+    return std::all_of(steps.begin(), steps.end(), [&](double step) { return sign * step < -margin; });
+  };
+  if (!steady(j, k)) std::swap(j, k);
+  shape.order = {i, j, k};
+  // Controls along the edge across, from the lone corner: once they have changed sign, they stay so.
+  const bool once = !(sign * edge[i][k] < 0.0 && sign * edge[k][i] > 0.0);
+  shape.certain = good && once && steady(j, k) && sign * edge[j][k] < -margin && sign * edge[k][j] < -margin;
+  return shape;
+}
+
+/// The triangles of the mesh as pieces.
+void MarchRuleSolver::begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces) {
+  const std::array<Vec2, 6> at{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1), Vec2(0.5, 0.5), Vec2(0, 0.5), Vec2(0.5, 0)};
+  pieces.clear();
+  feet_.clear();
+  for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
+    Piece piece;
+    piece.triangle = t;
+    pieces.push_back(piece);
+    for (const Vec2& x : at) feet_.add(t, x, 0.0);
+  }
+  place(pressure, third, feet_);
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      pieces[p].corner[k] = foot(feet_, 6 * p + k);
+      pieces[p].middle[k] = foot(feet_, 6 * p + 3 + k);
+    }
+  }
+}
+
+/// Four pieces of each.
+void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from,
+                            std::vector<Piece>& to) {
+  feet_.clear();
+  const std::size_t first = to.size();
+  for (const Piece& p : from) {
+    const auto add = [&](const Foot& a, const Foot& b, const Foot& c) {
+      Piece piece;
+      piece.triangle = p.triangle;
+      piece.corner = {a, b, c};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec2 at = 0.5 * (piece.corner[(k + 1) % 3].at + piece.corner[(k + 2) % 3].at);
+        feet_.add(p.triangle, at, quadratic(p, at, [](const Foot& f) { return f.height; }));
+      }
+      to.push_back(piece);
+    };
+    for (std::size_t k = 0; k < 3; ++k) add(p.corner[k], p.middle[(k + 2) % 3], p.middle[(k + 1) % 3]);
+    add(p.middle[0], p.middle[1], p.middle[2]);
+  }
+  place(pressure, third, feet_);
+  for (std::size_t i = first; i < to.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) to[i].middle[k] = foot(feet_, 3 * (i - first) + k);
+  }
+}
+
+/// Whether a piece with places that were not found may matter at all, by the bounds of the fields.
+bool MarchRuleSolver::may_press(const PairPressure& pressure, const Piece& piece) const {
+  Box box;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec2& at = piece.corner[k].at;
+    box.include(plane(piece.triangle, at));
+    if (std::abs(piece.corner[k].height) <= cell_) box.include(plane(piece.triangle, at) + piece.corner[k].height * along(piece.triangle, at));
+  }
+  return pressure.may_meet(box.inflated(0.5 * box.extent().norm()));
+}
+
+/// Whether the image of a triangle of the mesh bends so little that Newton's method finds all of it.
+bool MarchRuleSolver::smooth(const Piece& piece) const {
+  const auto& c = mesh_.triangle[piece.triangle].corner;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!piece.corner[k].good || !piece.middle[k].good || std::abs(piece.middle[k].height) > kFlat * cell_) return false;
+    if (mesh_.normal[c[k]].dot(mesh_.normal[c[(k + 1) % 3]]) < kLeastTurn) return false;
+  }
+  return true;
+}
+
+/// Takes out pieces that certainly do not press, and splits those whose rim is in doubt until they are small; appends leaves.
+void MarchRuleSolver::settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces) {
+  double held = 0.0;  // area that presses, about
+  for (const Leaf& leaf : leaves_) held += leaf.sums.area;
+  const auto add = [&](const Piece& piece, const Shape& shape, double area) {
+    Leaf leaf;
+    leaf.piece = piece;
+    leaf.shape = shape;
+    if (!shape.certain) {
+      leaf.doubt = area;
+      leaf.doubt_load = area * shape.most;
+    }
+    leaves_.push_back(leaf);
+  };
+  for (int level = 0; !pieces.empty(); ++level) {
+    doubtful_.clear();
+    for (const Piece& piece : pieces) {
+      const Shape shape = shape_of(piece);
+      if (shape.part == Part::None && shape.certain) continue;
+      const double area = area_of(piece);
+      if (shape.certain) {
+        add(piece, shape, area);
+        int positive = 0;
+        for (std::size_t k = 0; k < 3; ++k) positive += (piece.corner[k].pressure > 0.0 ? 1 : 0) + (piece.middle[k].pressure > 0.0 ? 1 : 0);
+        held += area * positive / 6.0;
+        continue;
+      }
+      const bool good = std::all_of(piece.corner.begin(), piece.corner.end(), [](const Foot& f) { return f.good; }) &&
+                        std::all_of(piece.middle.begin(), piece.middle.end(), [](const Foot& f) { return f.good; });
+      if (good || may_press(pressure, piece)) doubtful_.push_back(piece);
+    }
+    const bool last = level == kMostLevels || leaves_.size() + 4 * doubtful_.size() > kMostPieces;
+    std::size_t left = 0;
+    for (const Piece& piece : doubtful_) {
+      const double area = area_of(piece);
+      if (last || area < kDoubt * error * held) {
+        add(piece, shape_of(piece), area);
+      } else {
+        doubtful_[left++] = piece;
+      }
+    }
+    doubtful_.resize(left);
+    pieces.clear();
+    split(pressure, third, doubtful_, pieces);
+  }
+}
+
+/// Where on the rays the rim lies: Newton's method on Sigma, held between places on both sides of it.
+void MarchRuleSolver::find_rims(PairPressure& pressure, std::span<const ContactBody* const> third) {
+  constexpr double kFar = 0.02;  // off Sigma, in cells: too far to move along it
+  constexpr double kMet = 1e-11;
+  const std::size_t n = rays_.size();
+  feet_.clear();
+  for (const Ray& ray : rays_) feet_.add(leaves_[ray.leaf].piece.triangle, ray.from + ray.at * ray.way, ray.height);
+  feet_.make_room();
+  open_.clear();
   for (std::size_t i = 0; i < n; ++i) {
-    const double p = 0.5 * (facet_.a[i] + facet_.b[i]);
-    const Vec3 across = facet_.slope_b[i] - facet_.slope_a[i];
-    const double steepness = across.norm();
-    const double gap = std::abs(facet_.a[i] - facet_.b[i]);
-    if (!(p > 0.0) || !(steepness > 0.0) || gap > 1e-10 * pressure.largest_modulus()) continue;
-    const Vec3 normal = across / steepness;
-    // A facet that is seen at a slant stands for more of Sigma; a crumpled one keeps its own area.
-    const double cosine = std::abs(normal.dot(facet_normal_[i]));
-    const double weight = facet_area_[i] / (cosine > 0.5 ? cosine : 1.0);
-    sums_.add(facet_.point[i] - reference, normal, weight, p);
-    points.point.push_back(facet_.point[i]);
-    points.normal.push_back(normal);
-    points.area.push_back(weight);
-    points.pressure.push_back(p);
-    points.residual = std::max(points.residual, gap);
-    if (p > largest) {
-      largest = p;
-      peak = {facet_.point[i], normal};
+    if (rays_[i].rim != Rim::None) open_.push_back(i);
+  }
+  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+    measure(pressure, third, feet_, open_);
+    std::size_t left = 0;
+    for (const std::size_t i : open_) {
+      Ray& ray = rays_[i];
+      const double move = to_sigma(feet_, i);
+      if (!std::isfinite(move)) continue;
+      feet_.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
+      if (std::abs(feet_.height[i]) > cell_) continue;
+      open_[left++] = i;
+      if (std::abs(move) > kFar * cell_) continue;
+      lift(feet_, i, move);
+      const Foot here = foot(feet_, i);
+      ((here.pressure > 0.0) == (ray.rim == Rim::Rises) ? ray.high : ray.low) = ray.at;
+      double next = ray.at - here.pressure / here.slope.dot(ray.way);
+      if (!(next >= ray.low && next <= ray.high)) next = 0.5 * (ray.low + ray.high);
+      const double step_along = next - ray.at;
+      ray.at = next;
+      if (std::abs(step_along) < kMet && std::abs(move) < kOnSigma * cell_) {
+        ray.found = true;
+        --left;
+        continue;
+      }
+      feet_.at[i] += step_along * ray.way;
+      feet_.height[i] += step_along * here.climb.dot(ray.way);
+    }
+    open_.resize(left);
+  }
+}
+
+/// Where the rim crosses the first edge of each leaf, from the lone corner to the next but one.
+void MarchRuleSolver::find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+  rays_.clear();
+  for (std::size_t l = first; l < end; ++l) {
+    Leaf& leaf = leaves_[l];
+    leaf.ends = 1.0;
+    if (leaf.shape.part != Part::Corner && leaf.shape.part != Part::AllButCorner) continue;
+    const auto& c = leaf.piece.corner;
+    const auto [i, j, k] = leaf.shape.order;
+    Ray ray;
+    ray.leaf = l;
+    ray.from = c[i].at;
+    ray.way = c[k].at - c[i].at;
+    ray.rim = leaf.shape.part == Part::Corner ? Rim::Falls : Rim::Rises;
+    guess(ray);
+    rays_.push_back(ray);
+  }
+  find_rims(pressure, third);
+  for (const Ray& ray : rays_) {
+    leaves_[ray.leaf].ends = ray.at;
+    if (!ray.found) leaves_[ray.leaf].add_doubt(area_of(leaves_[ray.leaf].piece));
+  }
+}
+
+/// By the straight line between the pressures at the ends of a ray.
+void MarchRuleSolver::guess(Ray& ray) const {
+  const Piece& piece = leaves_[ray.leaf].piece;
+  const auto pressure = [](const Foot& f) { return f.pressure; };
+  const double p = quadratic(piece, ray.from, pressure), q = quadratic(piece, ray.from + ray.high * ray.way, pressure), share = p / (p - q);
+  ray.at = ray.high * (share > 0.0 && share < 1.0 ? share : 0.5);
+  ray.height = quadratic(piece, ray.from + ray.at * ray.way, [](const Foot& f) { return f.height; });
+}
+
+/// Rays through the leaves [first, end), all parallel to one edge of their leaf: by Gauss's rule of this order, then of one less,
+/// on each side of where the rim meets the other edge.
+void MarchRuleSolver::send_rays(std::size_t first, std::size_t end, int order) {
+  rays_.clear();
+  for (std::size_t l = first; l < end; ++l) {
+    const Leaf& leaf = leaves_[l];
+    if (leaf.shape.part == Part::None) continue;
+    const auto& c = leaf.piece.corner;
+    const auto [i, j, k] = leaf.shape.order;
+    const auto send = [&](int nodes, double begin, double stop, Rim rim) {
+      const GaussRule& gauss = gauss_rule(nodes);
+      for (std::size_t n = 0; n < gauss.node.size(); ++n) {
+        const double across = begin + (stop - begin) * gauss.node[n];
+        Ray ray;
+        ray.leaf = l;
+        ray.nodes = nodes;
+        ray.fine = nodes == order;
+        ray.from = c[i].at + across * (c[k].at - c[i].at);
+        ray.way = c[j].at - c[i].at;
+        ray.high = ray.exit = 1.0 - across;
+        ray.rim = rim;
+        ray.weight = (stop - begin) * gauss.weight[n] * twice_parameters(leaf.piece);
+        guess(ray);
+        rays_.push_back(ray);
+      }
+    };
+    for (const int nodes : {order, order - 1}) {
+      if (leaf.shape.part != Part::AllButCorner) send(nodes, 0.0, leaf.ends, leaf.shape.part == Part::All ? Rim::None : Rim::Falls);
+      if (leaf.shape.part == Part::AllButCorner) {
+        send(nodes, 0.0, leaf.ends, Rim::Rises);
+        send(nodes, leaf.ends, 1.0, Rim::None);
+      }
     }
   }
-  if (largest > 0.0) thickness_ = depth(pressure, 0, peak, cell) + depth(pressure, 1, peak, cell);
+}
+
+/// Gauss points on the parts of the rays that press, with their shares of the triangles' parameters.
+void MarchRuleSolver::lay_points() {
+  feet_.clear();
+  share_.clear();
+  for (const Ray& ray : rays_) {
+    Leaf& leaf = leaves_[ray.leaf];
+    const double low = ray.rim == Rim::Rises ? ray.at : 0.0, high = ray.rim == Rim::Falls ? ray.at : ray.exit;
+    if (ray.rim != Rim::None && !ray.found) leaf.add_doubt(ray.weight * area_of(leaf.piece) / twice_parameters(leaf.piece));
+    const GaussRule& gauss = gauss_rule(ray.nodes);
+    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+      const Vec2 at = ray.from + (low + (high - low) * gauss.node[j]) * ray.way;
+      feet_.add(leaf.piece.triangle, at, quadratic(leaf.piece, at, [](const Foot& f) { return f.height; }));
+      share_.push_back(ray.weight * gauss.weight[j] * (high - low));
+    }
+  }
+}
+
+double MarchRuleSolver::twice_parameters(const Piece& piece) {
+  return std::abs(cross(piece.corner[1].at - piece.corner[0].at, piece.corner[2].at - piece.corner[0].at));
+}
+
+MarchRuleSolver::Node MarchRuleSolver::node_at(std::size_t i) const {
+  const auto& c = mesh_.triangle[feet_.triangle[i]].corner;
+  const Vec3 across = feet_.batch.slope_b[i] - feet_.batch.slope_a[i], turn_s = mesh_.normal[c[1]] - mesh_.normal[c[0]],
+             turn_t = mesh_.normal[c[2]] - mesh_.normal[c[0]];
+  const Vec3 &s = feet_.along_s[i], &t = feet_.along_t[i];
+  Node node;
+  node.point = feet_.batch.point[i];
+  node.normal = across.normalized();
+  node.along = along(feet_.triangle[i], feet_.at[i]);
+  node.weight = share_[i] * s.cross(t).dot(node.normal);
+  node.residual = std::abs(feet_.batch.a[i] - feet_.batch.b[i]);
+  node.swept = {share_[i] * s.cross(t).dot(node.along), share_[i] * (s.cross(turn_t) + turn_s.cross(t)).dot(node.along),
+                share_[i] * turn_s.cross(turn_t).dot(node.along)};
+  return node;
+}
+
+/// Sums of the leaves from `first` on by rules of this order and of one less.
+void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, int order,
+                                std::size_t first) {
+  for (; first < leaves_.size(); first += kBatch) {
+    const std::size_t end = std::min(leaves_.size(), first + kBatch);
+    find_ends(pressure, third, first, end);
+    send_rays(first, end, order);
+    find_rims(pressure, third);
+    lay_points();
+    place(pressure, third, feet_);
+    std::size_t foot_index = 0, ray = 0;
+    for (std::size_t l = first; l < end; ++l) {
+      Leaf& leaf = leaves_[l];
+      leaf.begin = nodes_.size();
+      PatchSums coarse;
+      for (; ray < rays_.size() && rays_[ray].leaf == l; ++ray) {
+        for (int n = 0; n < rays_[ray].nodes; ++n, ++foot_index) {
+          const Foot here = foot(feet_, foot_index);
+          if (!here.good || !(here.pressure > 0.0)) {
+            leaf.add_doubt(2.0 * share_[foot_index] * area_of(leaf.piece) / twice_parameters(leaf.piece));
+            continue;
+          }
+          Node node = node_at(foot_index);
+          // Where third bodies press, the pressure of the pair is more than what is left of it.
+          node.pressure = here.pressure + std::max(feet_.third[foot_index], 0.0);
+          (rays_[ray].fine ? leaf.sums : coarse).add(node.point - reference, node.normal, node.weight, node.pressure);
+          if (rays_[ray].fine) nodes_.push_back(node);
+        }
+      }
+      leaf.off = leaf.sums;
+      leaf.off.add(coarse, -1.0);
+      leaf.end = nodes_.size();
+    }
+  }
+}
+
+/// The sums over all leaves, and what each may be off by, relative to them.
+void MarchRuleSolver::weigh() {
+  sums_ = {};
+  for (const Leaf& leaf : leaves_) sums_.add(leaf.sums);
+  estimate_ = 1.0;
+  if (!(sums_.load > 0.0)) return;
+  const double across = std::sqrt(sums_.area), force = std::max(sums_.force.norm(), 1e-3 * sums_.load);
+  const Vec3 centre = sums_.centre();
+  std::array<double, 3> sum{};
+  for (Leaf& leaf : leaves_) {
+    const double lever = leaf.sums.load > 0.0 ? (leaf.sums.centre() - centre).norm() : across;
+    const std::array<double, 3> off{(kSafety * std::abs(leaf.off.area) + leaf.doubt) / sums_.area, (kSafety * leaf.off.force.norm() + leaf.doubt_load) / force,
+                                    (kSafety * (leaf.off.first - leaf.off.load * centre).norm() + leaf.doubt_load * lever) / (sums_.load * across)};
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += off[k];
+    leaf.error = *std::max_element(off.begin(), off.end());
+  }
+  estimate_ = std::min(1.0, *std::max_element(sum.begin(), sum.end()));
+}
+
+/// Splits the leaves that err most until the rest is as good as asked. @return whether Sigma was met
+bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference) {
+  const int order = order_for(limits.error);
+  leaves_.clear();
+  nodes_.clear();
+  settle(pressure, third, limits.error, pieces_);
+  integrate(pressure, third, reference, order, 0);
+  weigh();
+  for (int round = 0; round < limits.refinements && estimate_ > limits.error && !leaves_.empty(); ++round) {
+    order_.resize(leaves_.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+    std::sort(order_.begin(), order_.end(), [this](std::uint32_t i, std::uint32_t j) {
+      return leaves_[i].error < leaves_[j].error || (leaves_[i].error == leaves_[j].error && i < j);
+    });
+    double kept = 0.0;
+    std::size_t keeps = 0;
+    while (keeps < order_.size() && kept + leaves_[order_[keeps]].error <= kKept * limits.error) kept += leaves_[order_[keeps++]].error;
+    const std::size_t splits = order_.size() - keeps;
+    if (keeps + 4 * splits > kMostPieces) break;
+    std::sort(order_.begin() + static_cast<std::ptrdiff_t>(keeps), order_.end());
+    halves_.clear();
+    for (std::size_t k = keeps; k < order_.size(); ++k) halves_.push_back(leaves_[order_[k]].piece);
+    for (std::size_t k = keeps; k < order_.size(); ++k) leaves_[order_[k]].error = -1.0;
+    std::erase_if(leaves_, [](const Leaf& leaf) { return leaf.error < 0.0; });
+    pieces_.clear();
+    split(pressure, third, halves_, pieces_);
+    const std::size_t first = leaves_.size();
+    settle(pressure, third, limits.error, pieces_);
+    integrate(pressure, third, reference, order, first);
+    weigh();
+  }
+  return sums_.load > 0.0;
 }
 
 /// Distance along the normal from the peak to where the pressure of one body vanishes; steps are at most a cell.
-double MarchRuleSolver::depth(PairPressure& pressure, int side, const PeakLine& peak, double cell) {
+double MarchRuleSolver::depth(PairPressure& pressure, int side, const Node& peak, double cell) {
   const double sign = side == 0 ? 1.0 : -1.0;
   double t = 0.0;
-  constexpr int kSteps = 200;
-  for (int i = 0; i < kSteps; ++i) {
+  constexpr int kMostSteps = 200;
+  for (int i = 0; i < kMostSteps; ++i) {
     const Vec3 x = peak.point + (sign * t) * peak.normal;
     double p;
     Vec3 slope;
@@ -300,47 +612,106 @@ double MarchRuleSolver::depth(PairPressure& pressure, int side, const PeakLine& 
   return t;
 }
 
-bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
-                            double error, int refinements, const Vec3& reference, PatchPoints& points) {
-  estimate_ = 1.0;
-  points.clear();
-  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return false;
-  Box box = overlap.inflated(1e-6 * overlap.extent().maxCoeff());
-  // The first grid only finds the box of the overlap.
-  const Box held = march(pressure, third, box, kFirstCells);
-  if (held.empty()) return false;
-  box = held.intersection(box);
-  PatchSums coarse;
-  bool known = false;
-  for (int level = 0, cells = kFirstCells; level <= refinements && cells <= kFinestCells; ++level, cells *= 2) {
-    march(pressure, third, box, cells);
-    place_on_sigma(pressure, box.extent().maxCoeff() / cells, reference, points);
-    if (!(sums_.load > 0.0)) continue;
-    if (known) {
-      estimate_ = relative_difference(sums_, coarse);
-      if (estimate_ <= error) break;
+/// Gauss points in the squeezed region of one body, along the interpolated normals: they fill the space beside Sigma without gaps.
+void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, int nodes,
+                                  PatchPoints& points) {
+  const double sign = side == 0 ? 1.0 : -1.0;
+  const std::size_t n = nodes_.size();
+  columns_.assign(n, {});
+  open_.resize(n);
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
+  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+    place_.clear();
+    for (const std::size_t i : open_) place_.push_back(nodes_[i].point + (sign * columns_[i].at) * nodes_[i].along);
+    value_.resize(open_.size());
+    slope_.resize(open_.size());
+    pressure.evaluate(side, place_, value_, slope_);
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < value_.size(); ++k) {
+      const std::size_t i = open_[k];
+      Column& c = columns_[i];
+      (value_[k] > 0.0 ? c.low : c.high) = c.at;
+      const double fall = -sign * slope_[k].dot(nodes_[i].along);
+      double next = fall > 0.0 ? c.at + std::clamp(value_[k] / fall, -cell_, cell_) : c.at + cell_;
+      if (!(next >= c.low && next <= c.high)) next = std::isfinite(c.high) ? 0.5 * (c.low + c.high) : c.low + cell_;
+      const bool moves = std::abs(next - c.at) > 1e-9 * cell_;
+      c.at = next;
+      if (moves) open_[left++] = i;
     }
-    coarse = sums_;
-    known = true;
+    open_.resize(left);
   }
-  if (!known) return false;
-
-  squeeze();
-  for (const int side : {0, 1}) {
-    facet_.point.clear();
-    const std::size_t begin = points.volume_point.size();
-    for (std::size_t i = 0; i < volume_point_.size(); ++i) {
-      if (volume_side_[i] != side) continue;
-      points.volume_point.push_back(volume_point_[i]);
-      points.volume_weight.push_back(volume_weight_[i]);
+  const GaussRule& gauss = gauss_rule(nodes);
+  const std::size_t begin = points.volume_point.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto& [v0, v1, v2] = nodes_[i].swept;
+    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+      const double y = sign * columns_[i].at * gauss.node[j];
+      points.volume_point.push_back(nodes_[i].point + y * nodes_[i].along);
+      points.volume_weight.push_back(std::max(v0 + y * (v1 + y * v2), 0.0) * columns_[i].at * gauss.weight[j]);
       points.volume_side.push_back(static_cast<std::uint8_t>(side));
-      points.displaced[side] += volume_weight_[i];
     }
-    value_.resize(points.volume_point.size() - begin);
-    pressure.evaluate(side, std::span(points.volume_point).subspan(begin), value_);
-    for (std::size_t i = 0; i < value_.size(); ++i) {
-      points.energy += points.volume_weight[begin + i] * std::max(value_[i], 0.0);
+  }
+  const auto added = std::span(points.volume_point).subspan(begin);
+  value_.resize(added.size());
+  pressure.evaluate(side, added, value_);
+  third_.resize(added.size());
+  for (const ContactBody* body : third) {
+    body->field.evaluate(added, third_);
+    for (std::size_t i = 0; i < added.size(); ++i) {
+      if (body->material.modulus * third_[i] > value_[i]) points.volume_weight[begin + i] = 0.0;
     }
+  }
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    points.displaced[side] += points.volume_weight[begin + i];
+    points.energy += points.volume_weight[begin + i] * std::max(value_[i], 0.0);
+  }
+}
+
+/// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press.
+void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap) {
+  const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
+  const double longest = overlap.extent().maxCoeff();
+  cell_ = std::max(std::min(pressure.feature_size(), longest / kFewCells), longest / kMostCells);
+  bool coarse = false;
+  for (; !mesh(); cell_ *= 2.0) coarse = true;
+  begin(pressure, third, pieces_);
+  for (int halvings = 0; halvings < kMostHalvings && !coarse; ++halvings) {
+    if (std::all_of(pieces_.begin(), pieces_.end(), [&](const Piece& p) { return smooth(p) || !may_press(pressure, p); })) return;
+    cell_ *= 0.5;
+    if (!mesh()) {
+      cell_ *= 2.0;
+      mesh();
+      coarse = true;
+    }
+    begin(pressure, third, pieces_);
+  }
+}
+
+bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
+                            const Limits& limits, const Regions& regions, const Vec3& reference, PatchPoints& points) {
+  estimate_ = 1.0;
+  thickness_ = 0.0;
+  points.clear();
+  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite() || !(overlap.extent().maxCoeff() > 0.0)) return false;
+  make_mesh(pressure, third, overlap);
+  if (!refine(pressure, third, limits, reference)) return false;
+
+  std::size_t peak = 0;
+  kept_.clear();
+  for (const Leaf& leaf : leaves_) kept_.insert(kept_.end(), nodes_.begin() + static_cast<std::ptrdiff_t>(leaf.begin), nodes_.begin() + static_cast<std::ptrdiff_t>(leaf.end));
+  nodes_.swap(kept_);
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    const Node& node = nodes_[i];
+    points.point.push_back(node.point);
+    points.normal.push_back(node.normal);
+    points.area.push_back(node.weight);
+    points.pressure.push_back(node.pressure);
+    points.residual = std::max(points.residual, node.residual);
+    if (node.pressure > nodes_[peak].pressure) peak = i;
+  }
+  for (const int side : {0, 1}) {
+    if (regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, std::max(order_for(limits.error) - 1, kFewNodes), points);
+    thickness_ += depth(pressure, side, nodes_[peak], cell_);
   }
   return true;
 }

@@ -1,71 +1,164 @@
 /// @file march_rule.h
-/// Quadrature on any Sigma, of order 2: tetrahedra over the overlap box, linear pieces of {p_A = p_B} clipped by p >= 0
-/// and by third bodies, their centroids moved onto Sigma; likewise linear pieces of the squeezed regions.
+/// Quadrature on any Sigma: tetrahedra over the overlap give plane triangles, each of which is mapped onto Sigma; Gauss points lie in
+/// the part of the image where the pressure is positive, between rims that are found along rays from a corner. Images are split
+/// where the sums of two rules differ most.
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "pair_pressure.h"
 #include "patch_points.h"
+#include "sigma_mesh.h"
 
 namespace supple::collision {
 
-/// Pressures at a vertex: of A, of B, and the largest of all third bodies.
-struct MarchVertex {
-  Vec3 x;
-  double a, b, third;
-};
-
 class MarchRuleSolver {
  public:
-  /// Doubles the cells until two consecutive grids agree to `error`, at most `refinements` times (never beyond
-  /// kFinestCells along the longest side).
+  struct Limits {
+    double error;     ///< relative, asked for
+    int refinements;  ///< times that pieces of images are split, at most
+  };
   /// @param third  bodies whose larger pressure takes space away from the pair
+  /// @param regions  what is wanted of the squeezed regions
   /// @param reference  origin of the moments in `sums`
   /// @return whether Sigma was met
-  bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double error,
-             int refinements, const Vec3& reference, PatchPoints& points);
+  bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const Limits& limits,
+             const Regions& regions, const Vec3& reference, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< about the point of largest pressure [m]
 
-  static constexpr int kFirstCells = 16;
-  static constexpr int kFinestCells = 64;
+  static constexpr double kFewCells = 4.0;  ///< along the longest side of the overlap's box, at least
+  /// Of images, all levels together: no more are split then.
+  static constexpr std::size_t kMostPieces = 1u << 15;
 
  private:
-  using Polygon = std::array<MarchVertex, 10>;
-  using Tetrahedron = std::array<MarchVertex, 4>;
-
-  /// The facets of one grid. @return the box of the cells that hold anything
-  Box march(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& box, int cells);
-  /// The space that the bodies take from each other, of the last grid. Apart from the facets, because only the grid that is
-  /// kept needs it.
-  void squeeze();
-  /// Calls visit(tetrahedron) wherever both bodies may be. @return the box of these cells
-  template <class Visit>
-  Box for_tetrahedra(const Visit& visit);
-  void cut_tetrahedron(const Tetrahedron& corner);
-  void add_facet(Polygon& polygon, int count);
-  void add_squeezed(const Tetrahedron& corner, int side);
-  /// The line through the point of largest pressure along Sigma's normal there.
-  struct PeakLine {
-    Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
+  using Vec2 = Eigen::Vector2d;
+  /// A place of a triangle's image.
+  struct Foot {
+    Vec2 at = Vec2::Zero();     // (s, t): corners of the triangle are (0, 0), (1, 0), (0, 1)
+    double height = 0.0;        // along the interpolated normal [m]
+    double pressure = 0.0;      // of the pair, less that of third bodies where they press [Pa]
+    Vec2 slope = Vec2::Zero();  // of this over s and t
+    Vec2 climb = Vec2::Zero();  // of the height
+    bool good = false;          // it was found, and the image is smooth there
   };
-  static double depth(PairPressure& pressure, int side, const PeakLine& peak, double cell);
-  void place_on_sigma(PairPressure& pressure, double cell, const Vec3& reference, PatchPoints& points);
+  /// A triangle within the parameters of a triangle of the mesh.
+  struct Piece {
+    std::uint32_t triangle = 0;
+    std::array<Foot, 3> corner;
+    std::array<Foot, 3> middle;  // of the edges, across from the corners
+  };
+  /// How the part that presses lies in a piece.
+  enum class Part : std::uint8_t { None, All, Corner, AllButCorner };
+  struct Shape {
+    Part part = Part::None;
+    std::array<std::size_t, 3> order{0, 1, 2};  // corners: the lone one, that at the end of its edge along which rays run, the last
+    bool certain = true;
+    double most = 0.0;     // the pressure is hardly more [Pa]
+  };
+  /// A piece with its sums.
+  struct Leaf {
+    Piece piece;
+    Shape shape;
+    PatchSums sums, off;       // by the finer rule, and what it differs from the coarser one by
+    double doubt = 0.0;        // area that may be wrongly held or left out [m^2]
+    double doubt_load = 0.0;   // [N]
+    std::size_t begin = 0, end = 0;  // of its points
+    double ends = 1.0;  // where the rim crosses the edge across the rays, of it
+    double error = 0.0;
+    void add_doubt(double area) {
+      doubt += area;
+      doubt_load += area * shape.most;
+    }
+  };
+  /// Places to be found: height, and everything after it, is out.
+  struct Feet {
+    std::vector<std::uint32_t> triangle;
+    std::vector<Vec2> at;
+    std::vector<double> height;
+    PressureBatch batch;
+    std::vector<double> third;
+    std::vector<Vec3> third_slope;
+    std::vector<Vec3> along_s, along_t;  // of the image [m]
+    std::vector<Vec2> climb;
+    std::vector<std::uint8_t> good;
+    void clear();
+    void make_room();
+    void add(std::uint32_t in, const Vec2& where, double guess);
+    [[nodiscard]] std::size_t size() const noexcept { return at.size(); }
+  };
+  /// A point of the finer rule, with what columns through it need.
+  struct Node {
+    Vec3 point, normal, along;
+    double weight, pressure, residual;
+    std::array<double, 3> swept;  // area across `along` over the distance along it, as a polynomial
+  };
+  /// How far a squeezed region reaches along a node's way, between places on both sides of its end.
+  struct Column {
+    double at = 0.0, low = 0.0, high = std::numeric_limits<double>::infinity();
+  };
+  enum class Rim : std::uint8_t { None, Falls, Rises };  // how the pressure goes where a ray crosses it
+  /// A ray through a piece, and where on it the rim lies.
+  struct Ray {
+    std::size_t leaf = 0;
+    int nodes = 0;
+    bool fine = false;
+    Vec2 from = Vec2::Zero(), way = Vec2::Zero();
+    double exit = 1.0, weight = 0.0;
+    Rim rim = Rim::None;
+    double low = 0.0, high = 1.0, at = 0.0, height = 0.0;
+    bool found = false;
+  };
 
-  PressureBatch node_, facet_;
-  std::array<std::size_t, 3> cells_{};  ///< of `node_` along x, y, z
-  std::vector<double> third_, value_;
-  std::vector<Vec3> facet_normal_;
-  std::vector<double> facet_area_;
-  std::vector<Vec3> volume_point_;
-  std::vector<double> volume_weight_;
-  std::vector<std::uint8_t> volume_side_;
-  std::vector<Tetrahedron> pieces_, kept_;
+  void measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet, std::span<const std::size_t> which);
+  void place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet);
+  [[nodiscard]] double to_sigma(const Feet& feet, std::size_t i) const;
+  void lift(Feet& feet, std::size_t i, double move) const;
+  [[nodiscard]] Vec3 plane(std::uint32_t triangle, const Vec2& at) const;
+  [[nodiscard]] Vec3 along(std::uint32_t triangle, const Vec2& at) const;
+  [[nodiscard]] double area_of(const Piece& piece) const;
+  [[nodiscard]] Foot foot(const Feet& feet, std::size_t i) const;
+  static double twice_parameters(const Piece& piece);
+  template <class Of>
+  static double quadratic(const Piece& piece, const Vec2& at, const Of& of);
+  [[nodiscard]] Shape shape_of(const Piece& piece) const;
+  [[nodiscard]] bool smooth(const Piece& piece) const;
+  [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
+  void make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap);
+  void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
+  void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, std::vector<Piece>& to);
+  void settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces);
+  void guess(Ray& ray) const;
+  void find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
+  void send_rays(std::size_t first, std::size_t end, int order);
+  void find_rims(PairPressure& pressure, std::span<const ContactBody* const> third);
+  void lay_points();
+  [[nodiscard]] Node node_at(std::size_t i) const;
+  void integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, int order, std::size_t first);
+  void weigh();
+  bool refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference);
+  void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, int nodes, PatchPoints& points);
+  static double depth(PairPressure& pressure, int side, const Node& peak, double cell);
+
+  SigmaMesher mesher_;
+  SigmaMesh mesh_;
+  double cell_ = 0.0;
+  Feet feet_;
+  PressureBatch some_;
+  std::vector<double> value_, third_, share_;
+  std::vector<Vec3> slope_, place_;
+  std::vector<std::size_t> open_;
+  std::vector<Piece> pieces_, halves_, doubtful_;
+  std::vector<Leaf> leaves_;
+  std::vector<Ray> rays_;
+  std::vector<Node> nodes_, kept_;
+  std::vector<Column> columns_;
+  std::vector<std::uint32_t> order_;
   PatchSums sums_;
   double estimate_ = 1.0;
   double thickness_ = 0.0;

@@ -72,6 +72,12 @@ class PairPressure {
     evaluations_ += points.size();
   }
 
+  /// Whether the box may hold a place where both bodies press, and equally hard, by their bounds.
+  [[nodiscard]] bool may_meet(const Box& box) const {
+    const Interval a = field_[0].bound(box), b = field_[1].bound(box);
+    return a.upper > 0.0 && b.upper > 0.0 && modulus_[0] * a.lower <= modulus_[1] * b.upper && modulus_[1] * b.lower <= modulus_[0] * a.upper;
+  }
+
   /// Appends where derivatives of either pressure jump, as far as the fields tell. @return whether these are all
   bool kinks(const Box& box, std::vector<implicit::Kink>& out) const {
     bool all = true;

@@ -38,6 +38,7 @@ std::string reason_text(collision::RuleReason reason) {
     case collision::RuleReason::Fits: return "smooth patches, each seen whole from its peak";
     case collision::RuleReason::NoGraph: return "a patch that is no graph over a disc";
     case collision::RuleReason::ThirdBody: return "a third body presses on the patch";
+    case collision::RuleReason::Unmet: return "its bound is smaller than that of polar rings, which is larger than asked";
     case collision::RuleReason::NoSkeleton: return "no polar patch, and no skeleton to send rays from";
   }
   return "";

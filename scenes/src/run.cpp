@@ -173,7 +173,8 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   }
   if (simulation) {
     result.state_hash = simulation->state_hash();
-    result.warnings.insert(result.warnings.begin(), simulation->warnings().begin(), simulation->warnings().end());
+    const std::vector<std::string> warnings = simulation->warnings();
+    result.warnings.insert(result.warnings.begin(), warnings.begin(), warnings.end());
     result.searches = read_searches(options.folder, scene_name(scene), options.frames, result.frames);
     set_missed(scene.output.meshing, result.searches, result.warnings);
     const auto& overloads = simulation->state().record.overloads;

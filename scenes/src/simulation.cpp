@@ -98,6 +98,7 @@ struct Simulation::Impl {
   bool pulled_meshes = false;
   std::function<bool(const Box&)> shown;
   std::vector<std::string> warnings;
+  UnmetContacts unmet;
   SearchCounts searches;      ///< of the meshes of this state,
   SearchCounts all_searches;  ///< and of all so far
   bool coarse_noted = false;  ///< in the warnings
@@ -580,6 +581,7 @@ struct Simulation::Impl {
   void watch_pressing() {
     if (!contact_on()) return;
     add_unresolved(context(), scene.contact.rule, frame.surface, warnings);
+    unmet.look(context(), frame.surface, time());
     const bool barrier = scene.contact.core == CoreName::Barrier;
     if (barrier && integrator.settings.method != core::Integrator::Symplectic) {
       // The last trial of other methods need not be the state they end with.
@@ -826,7 +828,11 @@ void Simulation::set_shown(std::function<bool(const Box&)> shown) {
 
 Energies Simulation::energies() { return impl_->energies(); }
 
-const std::vector<std::string>& Simulation::warnings() const { return impl_->warnings; }
+std::vector<std::string> Simulation::warnings() const {
+  std::vector<std::string> warnings = impl_->warnings;
+  impl_->unmet.add_to(impl_->model.contact.error, warnings);
+  return warnings;
+}
 
 const SearchCounts& Simulation::searches() const { return impl_->searches; }
 

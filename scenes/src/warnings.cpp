@@ -1,6 +1,8 @@
 #include "warnings.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <utility>
 
 #include "fields_rules.h"
@@ -126,6 +128,28 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
     const std::string text = "contact.rule: " + std::string(name_of(only)) + " does not fit the contact of " + names_of(context, s.bodies) +
                              ", which has no force where this is so; 'auto' fits all";
     if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
+  }
+}
+
+void UnmetContacts::look(const StageContext& context, const collision::ContactSurface& surface, double time) {
+  const double asked = context.model.contact.error;
+  const auto kind = [&](std::uint32_t body) -> const std::string& {
+    return body < context.bodies.size() ? context.model.objects[context.bodies[body].object].name : body_name(context.model, context.bodies, body);
+  };
+  for (const auto& s : surface.summary) {
+    if (s.error_estimate <= kSlack * asked || s.force.norm() == 0.0) continue;  // without force: the rule asked for does not fit
+    Worst& worst = worst_[{kind(s.bodies.a), kind(s.bodies.b)}];
+    if (worst.times++ == 0) worst.first = time;
+    if (s.error_estimate > worst.bound) worst = {s.error_estimate, time, worst.first, worst.times};
+  }
+}
+
+void UnmetContacts::add_to(double asked, std::vector<std::string>& warnings) const {
+  for (const auto& [pair, worst] : worst_) {
+    std::array<char, 160> numbers{};
+    std::snprintf(numbers.data(), numbers.size(), " is not solved to the %.2g asked for: its bound is %.2g at t = %.6g s, and %llu times too large from t = %.6g s on",
+                  asked, worst.bound, worst.time, static_cast<unsigned long long>(worst.times), worst.first);
+    warnings.push_back("contact.error: contact of '" + pair.first + "' and '" + pair.second + '\'' + numbers.data());
   }
 }
 

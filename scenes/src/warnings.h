@@ -1,7 +1,9 @@
 /// What a user may want to know of a scene that runs all the same, as sentences.
 #pragma once
 
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "frame.h"
@@ -23,6 +25,23 @@ namespace supple::scenes {
 /// Adds, once each, contacts that the only rule allowed does not fit: they push nobody.
 void add_unresolved(const StageContext& context, RuleName only, const collision::ContactSurface& surface,
                     std::vector<std::string>& warnings);
+
+/// Contacts whose bound of the error is larger than asked, by the objects that touch. Starts anew after a restart.
+class UnmetContacts {
+ public:
+  /// At the end of a step. @param time  [s]
+  void look(const StageContext& context, const collision::ContactSurface& surface, double time);
+  /// One sentence for each two objects.
+  void add_to(double asked, std::vector<std::string>& warnings) const;
+
+ private:
+  static constexpr double kSlack = 1.01;  // rules end a little above what they were asked for
+  struct Worst {
+    double bound = 0.0, time = 0.0, first = 0.0;
+    std::uint64_t times = 0;
+  };
+  std::map<std::pair<std::string, std::string>, Worst> worst_;
+};
 
 /// What searches for missed pieces of meshes found in all frames, in one sentence that takes the place of the last; none for none.
 /// Other meshers than those that are searched are left to the report: the scene asks for them.

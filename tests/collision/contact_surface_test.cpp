@@ -240,13 +240,13 @@ TEST(ContactSurface, AgreesBetweenItsTwoRules) {
   const ContactSurface::Summary march =
       bodies.stage.solve({.error = 1e-6, .only = ContactRule::March}).summary.front();
   const double bound = march.error_estimate;
-  EXPECT_LT(bound, 5e-3);
+  EXPECT_LE(bound, 1e-6);
   EXPECT_LT((polar.force - march.force).norm(), bound * polar.force.norm());
   EXPECT_NEAR(polar.area, march.area, bound * polar.area);
-  // The volumes are of order 2 in the same cells.
-  EXPECT_NEAR(polar.energy, march.energy, 4.0 * bound * polar.energy);
-  EXPECT_NEAR(polar.displaced_a, march.displaced_a, 4.0 * bound * polar.displaced_a);
-  EXPECT_NEAR(polar.displaced_b, march.displaced_b, 4.0 * bound * polar.displaced_b);
+  // Volumes are no part of the bound, but as good as was asked.
+  EXPECT_NEAR(polar.energy, march.energy, 1e-6 * polar.energy);
+  EXPECT_NEAR(polar.displaced_a, march.displaced_a, 1e-6 * polar.displaced_a);
+  EXPECT_NEAR(polar.displaced_b, march.displaced_b, 1e-6 * polar.displaced_b);
   EXPECT_NEAR(polar.largest_overlap, march.largest_overlap, 0.05 * polar.largest_overlap);
 }
 
@@ -336,7 +336,8 @@ TEST(ContactSurface, IntegratesARingShapedPatch) {
   ASSERT_EQ(s.summary.size(), 1u);
   EXPECT_EQ(s.summary[0].rule, ContactRule::March);
   const double force = plane_integral(torus.field, 2.0);
-  EXPECT_NEAR(s.summary[0].force.z(), force, std::max(1e-3, s.summary[0].error_estimate) * force);
+  EXPECT_LE(s.summary[0].error_estimate, 1e-3);
+  EXPECT_NEAR(s.summary[0].force.z(), force, s.summary[0].error_estimate * force + 1e-5 * force);  // of the midpoint rule
   EXPECT_LT(s.summary[0].centre_of_pressure.norm(), 1e-3);
 }
 

@@ -192,6 +192,21 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   EXPECT_NE(thin[0].find("'a' may have no surface"), std::string::npos) << thin[0];
 }
 
+TEST(Warnings, TellOfContactsThatAreNotSolvedAsWellAsAsked) {
+  // The patch of a ring on the ground: samples end at a bound of 8e-2, marching goes as far as is asked.
+  const auto warnings_of = [](const std::string& rule) {
+    Simulation simulation(parse_scene("schema: 1\nduration: 0.02 s\nframe_rate: 100\nground: {modulus: 1e6}\ncontact: {error: 1e-3, rule: " + rule + "}\nobjects:\n"
+                                      "  - {name: hoop, particles: {at: [0, 0, 0.085]}, skeleton: [{shape: ring, radius: 0.3, kernel: {type: wyvill, radius: 0.2}}], "
+                                      "contact: {modulus: 1e4}}\n", "test.yaml", "."));
+    while (simulation.frame() < simulation.frame_count()) simulation.step_frame();
+    return simulation.warnings();
+  };
+  EXPECT_TRUE(warnings_of("auto").empty());
+  const auto sampled = warnings_of("samples");
+  ASSERT_EQ(sampled.size(), 1u);  // once, for all steps
+  EXPECT_NE(sampled[0].find("contact.error: contact of 'hoop' and 'ground' is not solved to the 0.001 asked for: its bound is 0."), std::string::npos) << sampled[0];
+}
+
 TEST(Warnings, LookForRingsArcsAndCurvesWhereTheyAre) {
   const auto warnings_of = [](const std::string& objects) {
     return Simulation(parse_scene("schema: 1\nduration: 1 s\nobjects:\n" + objects, "test.yaml", ".")).warnings();

@@ -17,7 +17,7 @@ enum class ContactRule : std::uint8_t {
   None,   ///< no overlap was found
   Polar,  ///< Gauss-Legendre in radius times trapezoid in angle about the point of largest pressure
   Samples,  ///< where the seed rays of both bodies cross Sigma (Gascuel 1993), refined by denser seeds
-  March,  ///< tetrahedra over the overlap box, points projected onto Sigma
+  March,  ///< tetrahedra over the overlap box, Gauss points on curved triangles of Sigma, refined where they err most
 };
 
 /// Why a pair got its rule.
@@ -27,13 +27,15 @@ enum class RuleReason : std::uint8_t {
   NoGraph,     ///< not polar: a patch is no graph over a disc, or has no peak
   ThirdBody,   ///< not polar: a third body presses on a patch of bodies with several parts, or cuts it badly
   NoSkeleton,  ///< neither polar nor samples: neither body has a skeleton
+  Unmet,       ///< not polar: it fits, but another rule has the smaller bound
 };
 
 struct ContactSettings {
   double error = 1e-4;   ///< relative error of force, area and centre of pressure asked for, in [1e-10, 0.1]
   bool energy = true;    ///< false: energy, displaced volumes and squeezed regions only where the parts of a body need them
   int max_refinement = 6;  ///< refinements before the estimate is accepted as it is
-  /// None: the cheapest rule that fits, polar before samples before marching; otherwise this rule alone. A pair that it does
+  /// None: polar where it fits; else samples for coarse errors, marching for finer ones; and where a bound is not as good as asked, of
+  /// all the rules that fit the one with the smallest. Otherwise this rule alone. A pair that it does
   /// not fit (no smooth patch; two bodies without skeletons) then has no force, and an error estimate of 1.
   ContactRule only = ContactRule::None;
   /// Two balls, or a ball and a half-space, are the same all around one line: the polar rule then follows a single ray and

@@ -1,0 +1,54 @@
+/// @file sigma_mesh.h
+/// Triangles with corners on Sigma = {p_A = p_B}, by tetrahedra in the cells of a lattice where both bodies may press.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "pair_pressure.h"
+
+namespace supple::collision {
+
+/// Between the plane triangles and Sigma there is a map without gaps: from the triangle along the normals of its corners,
+/// interpolated linearly. Two triangles at one edge share its image, so their images tile Sigma.
+struct SigmaMesh {
+  std::vector<Vec3> vertex;               ///< on Sigma [m]
+  std::vector<Vec3> normal;               ///< unit, out of A and into B
+  std::vector<std::uint8_t> valid;        ///< 0: no place on Sigma was found, or no normal
+  struct Triangle {
+    std::array<std::uint32_t, 3> corner;  ///< seen from B's side counterclockwise
+  };
+  std::vector<Triangle> triangle;
+};
+
+class SigmaMesher {
+ public:
+  /// @param overlap  finite; holds all of Sigma where p > 0   @param cell  side of the lattice's cells [m]
+  /// @return false where there would be more cells than kMostCells
+  bool mesh(PairPressure& pressure, const Box& overlap, double cell, SigmaMesh& out);
+
+  static constexpr std::size_t kMostCells = 1u << 16;
+
+ private:
+  using Key = std::uint64_t;
+  bool find_cells(const PairPressure& pressure, const Box& overlap);
+  void find_nodes(PairPressure& pressure);
+  void cut_cells(SigmaMesh& out);
+  void place_vertices(PairPressure& pressure, SigmaMesh& out);
+  [[nodiscard]] Vec3 place(Key key) const;
+  [[nodiscard]] std::uint32_t node_of(Key key) const;
+
+  struct Cut {
+    std::uint32_t above, below;  // nodes: p_A >= p_B, p_A < p_B
+    friend auto operator<=>(const Cut&, const Cut&) = default;
+  };
+  Vec3 origin_ = Vec3::Zero();
+  double cell_ = 0.0;
+  std::vector<Key> cells_, near_, nodes_;
+  PressureBatch node_, vertex_, some_;
+  std::vector<Cut> cuts_, unique_;
+  std::vector<std::size_t> open_;
+};
+
+}  // namespace supple::collision
