@@ -198,7 +198,7 @@ TEST(Warnings, TellOfContactsThatAreNotSolvedAsWellAsAsked) {
     Simulation simulation(parse_scene("schema: 1\nduration: 0.02 s\nframe_rate: 100\nground: {modulus: 1e6}\ncontact: {error: 1e-3, rule: " + rule + "}\nobjects:\n"
                                       "  - {name: hoop, particles: {at: [0, 0, 0.085]}, skeleton: [{shape: ring, radius: 0.3, kernel: {type: wyvill, radius: 0.2}}], "
                                       "contact: {modulus: 1e4}}\n", "test.yaml", "."));
-    while (simulation.frame() < simulation.frame_count()) simulation.step_frame();
+    while (simulation.frame() < simulation.scene().frame_count()) simulation.step_frame();
     return simulation.warnings();
   };
   EXPECT_TRUE(warnings_of("auto").empty());
