@@ -145,8 +145,8 @@ void ReadArchive::read(const Node& node, const std::string& path, std::string& v
 }
 
 void ReadArchive::read(const Node& node, const std::string& path, Vec3& value, const Rule& rule) {
-  const std::size_t least = rule.least_items == 0 ? 3 : rule.least_items;
-  if (node.kind != Node::Kind::List || node.items.size() < least || node.items.size() > 3) {
+  const std::size_t least = rule.least_items == 0 ? 3 : rule.least_items, most = std::min<std::size_t>(rule.most_items, 3);
+  if (node.kind != Node::Kind::List || node.items.size() < least || node.items.size() > most) {
     fault(node, path, expected_text(FieldType::Vector, rule), node.kind == Node::Kind::Scalar ? automatic_hint(node.text, rule) : "");
     return;
   }
