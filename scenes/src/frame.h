@@ -157,7 +157,8 @@ struct Division {
 [[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
                                                    const core::Interactions& laws, Frame& frame);
 
-/// The names of meshers' and grids' arguments become those of the scene's keys.
-[[nodiscard]] Error with_scene_keys(const Error& error);
+/// The names of meshers' and grids' arguments become those of the scene's keys, or of what these follow from.
+/// @param cell, error  objects that may ask for these themselves; null: the scene does
+[[nodiscard]] Error with_keys_of(const Model& model, const Error& failure, const ObjectModel* cell, const ObjectModel* error);
 
 }  // namespace supple::scenes

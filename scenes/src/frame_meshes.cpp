@@ -6,6 +6,7 @@
 
 #include "frame.h"
 #include "look_columns.h"
+#include "read_scene_faults.h"
 #include "search_choice.h"
 #include "supple/collision/deformed_field.h"
 #include "supple/core/error.h"
@@ -87,15 +88,12 @@ std::vector<Mesh> divide(const StageContext& context, std::optional<double> erro
   return implicit::polygonise_partition_within(views, coarsest, {*error}, executor, &counts);
 }
 
-/// The names of meshers' and grids' arguments become those of the scene's keys.
-/// @param cell, error  objects that ask for these themselves; null: the scene does
-Error with_keys_of(const Error& failure, const ObjectModel* cell, const ObjectModel* error) {
-  std::vector<Fault> faults = failure.faults();
-  for (Fault& fault : faults) {
-    if (fault.key == "lattice.cell" && cell != nullptr && cell->own_cell) fault.key = "objects." + cell->name + ".meshing.cell";
-    if (fault.key == "mesh.error" && error != nullptr && error->own_error) fault.key = "objects." + error->name + ".meshing.error";
-  }
-  return with_scene_keys({failure.kind(), std::move(faults)});
+/// The cell fits a thin surface, for which the scene asks by its iso value or its skeleton.
+void name_thin_surface(const Model& model, Fault& fault) {
+  const ObjectModel& thin = model.objects[*model.thinnest];
+  fault.key = "objects." + thin.name + (thin.skeleton.iso > ObjectDesc{}.iso ? ".iso" : ".skeleton");
+  fault.found += ", " + short_text(kCellsAcross) + " across a surface " + short_text(kCellsAcross * model.cell) + " m thick";
+  fault.hint += " in output.cell, or make the surface thicker";
 }
 
 /// Bodies in mirror image of each other meet in planes of a lattice about the origin, where triangles have no area. [cells]
@@ -204,7 +202,7 @@ void mesh_divided(const StageContext& context, const Division& division, StagePr
     try {
       mesh_group(context, division, group, profile, frame, surfaces);
     } catch (const Error& failure) {
-      throw with_keys_of(failure, group.finest, group.strictest);
+      throw with_keys_of(context.model, failure, group.finest, group.strictest);
     }
   }
 }
@@ -247,8 +245,9 @@ void search_alone(const StageContext& context, std::size_t i, double cell, std::
 
 /// The surface of a body that touches no other. @param bodies  that its object has
 Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, StageProfile& profile, Frame& frame) {
-  const MeshingDesc& d = context.model.meshing;
-  const ObjectModel& object = context.model.objects[context.bodies[i].object];
+  const Model& model = context.model;
+  const MeshingDesc& d = model.meshing;
+  const ObjectModel& object = model.objects[context.bodies[i].object];
   const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = object.cell};
   const implicit::Field& field = frame.field[i];
   try {
@@ -267,7 +266,7 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
     profile.present += 64 * marched.blocks;
     return mesh;
   } catch (const Error& failure) {
-    throw with_keys_of(failure, &object, &object);
+    throw with_keys_of(model, failure, &object, &object);
   }
 }
 
@@ -376,16 +375,27 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   return meshes;
 }
 
-Error with_scene_keys(const Error& error) {
-  std::vector<Fault> faults = error.faults();
+Error with_keys_of(const Model& model, const Error& failure, const ObjectModel* cell, const ObjectModel* error) {
+  std::vector<Fault> faults = failure.faults();
   for (Fault& fault : faults) {
-    if (fault.key == "lattice.cell") fault.key = "output.cell";
-    if (fault.key == "mesh.error") fault.key = "output.meshing.error";
+    if (fault.key == "lattice.cell") {
+      if (cell != nullptr && cell->own_cell) {
+        fault.key = "objects." + cell->name + ".meshing.cell";
+      } else if (model.thinnest) {
+        name_thin_surface(model, fault);
+      } else {
+        fault.key = "output.cell";
+      }
+    }
+    if (fault.key == "mesh.error") {
+      const bool own = error != nullptr && error->own_error;
+      fault.key = own ? "objects." + error->name + ".meshing.error" : "output.meshing.error";
+    }
     if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
     if (fault.key == "mesh.angle") fault.key = "output.meshing.angle_deg";
   }
-  return {error.kind(), std::move(faults)};
+  return {failure.kind(), std::move(faults)};
 }
 
 }  // namespace supple::scenes

@@ -15,8 +15,6 @@
 namespace supple::scenes {
 namespace {
 
-/// Cells across the thinnest surface: a plate then has about a hundred triangles across its rounded rim.
-constexpr double kCellsAcross = 8.0;   // lattice cells across the smallest surface thickness
 constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
 
 constexpr double kBelievable = 1e4;     // ways of a particle over the size of everything, and over that in a frame
@@ -428,8 +426,13 @@ Model build_model(const Scene& scene) {
     for (std::uint32_t p = object.first; p < object.last; ++p) {
       own = own.united(Box{model.rest.position[p], model.rest.position[p]}.inflated(reach));
     }
-    if (!object.skeleton.primitive.empty()) fitting = std::min(fitting, own.extent().maxCoeff() / kCellsAlong);
-    if (!object.own_cell) cell = std::min(cell, fitting);
+    const bool thin = !object.skeleton.primitive.empty() && fitting < own.extent().maxCoeff() / kCellsAlong;
+    if (!object.skeleton.primitive.empty() && !thin) fitting = own.extent().maxCoeff() / kCellsAlong;
+    if (!object.own_cell && fitting < cell) {
+      cell = fitting;
+      model.thinnest.reset();
+      if (thin && !scene.output.cell) model.thinnest = static_cast<std::uint32_t>(i);
+    }
     everything = everything.united(own);
   }
   model.meshing = scene.output.meshing;

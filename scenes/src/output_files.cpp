@@ -148,7 +148,8 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     options.name = bodies[i].name;
-    options.lattice.cell = simulation.model().objects[bodies[i].object].cell;
+    const ObjectModel& object = simulation.model().objects[bodies[i].object];
+    options.lattice.cell = object.cell;
     const bool apart = !std::binary_search(division.body.begin(), division.body.end(), i);
     const double modulus = division.placed[i].material.modulus;
     std::optional<Claims> claims;
@@ -159,14 +160,18 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
       united.push_back(distance ? implicit::FieldView(depth.emplace_back(whole)) : whole);
     }
     if (gridding.of == GriddedName::Scene) continue;
-    if (apart) {
-      grids.push_back(&updaters[i].make(fields[i], options, executor));
-    } else if (distance) {
-      const collision::DeformedDepth deep(std::move(claims->own), std::move(claims->others));
-      grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(deep, options, executor)));
-    } else {
-      const collision::DeformedField field(std::move(claims->own), std::move(claims->others), modulus);
-      grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(field, options, executor)));
+    try {
+      if (apart) {
+        grids.push_back(&updaters[i].make(fields[i], options, executor));
+      } else if (distance) {
+        const collision::DeformedDepth deep(std::move(claims->own), std::move(claims->others));
+        grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(deep, options, executor)));
+      } else {
+        const collision::DeformedField field(std::move(claims->own), std::move(claims->others), modulus);
+        grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(field, options, executor)));
+      }
+    } catch (const Error& error) {
+      throw with_keys_of(simulation.model(), error, &object, nullptr);
     }
   }
   implicit::SurfaceGrid whole;
@@ -178,7 +183,7 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   }
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);
 } catch (const Error& error) {
-  rethrow_with_places(simulation.scene(), with_scene_keys(error));
+  rethrow_with_places(simulation.scene(), with_keys_of(simulation.model(), error, nullptr, nullptr));
 }
 
 PictureSize picture_size(const fs::path& path) {

@@ -1,8 +1,10 @@
 #include "scene_samples.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
+#include "read_scene_faults.h"
 #include "scene_places.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
@@ -41,8 +43,12 @@ void SceneSamples::follow(Simulation& simulation, const Executor& executor) try 
   std::vector<Fault> faults = error.faults();
   for (Fault& fault : faults) {
     if (fault.key != "lattice.cell") continue;
-    fault.key = "output.sampling.spacing";
     fault.hint += ", which are a sixth of the spacing";
+    const std::optional<double> density = simulation.scene().output.sampling.density;
+    fault.key = density ? "output.sampling.density" : "output.sampling.spacing";
+    if (!density) continue;
+    fault.found += " for a density of " + short_text(*density) + " [1/m^2]";
+    fault.hint += ", " + short_text(implicit::even_spacing(1.0)) + " / sqrt(density)";
   }
   rethrow_with_places(simulation.scene(), {error.kind(), std::move(faults)});
 }

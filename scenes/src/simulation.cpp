@@ -806,6 +806,7 @@ void Simulation::set_cells(int cells) {
   }
   if (!all.empty()) {
     impl_->model.cell = all.extent().maxCoeff() / cells;
+    impl_->model.thinnest.reset();
     for (ObjectModel& object : impl_->model.objects) object.cell = impl_->model.cell;
   }
   impl_->pulled_meshes = false;
@@ -815,6 +816,7 @@ void Simulation::set_cell(double cell) {
   SUPPLE_EXPECTS(cell > 0.0);
   if (cell == impl_->model.cell) return;
   impl_->model.cell = cell;
+  impl_->model.thinnest.reset();
   for (ObjectModel& object : impl_->model.objects) {
     if (!object.own_cell) object.cell = cell;
   }

@@ -605,6 +605,9 @@ output: )";
       {"{samples: csv, sampling: {spacing: 10 mm}}",
        "ball.yaml:9:44: output.sampling.spacing: expected at most 1000000000 lattice nodes around the body, found about 1.74e+09 with cells of "
        "0.00167 m; use cells of at least 0.00211 m, which are a sixth of the spacing"},
+      {"{samples: csv, sampling: {density: 1e12}}",
+       "ball.yaml:9:44: output.sampling.density: expected at most 1000000000 lattice nodes around the body, found about 8.24e+20 with cells of "
+       "2.13e-07 m for a density of 1e+12 [1/m^2]; use cells of at least 0.0021 m, which are a sixth of the spacing, 1.28 / sqrt(density)"},
       {"{mesh: ply, meshing: {error: 1e-12}}",
        "ball.yaml:9:38: output.meshing.error: expected an error of at most 1e-12 m, found 0.000175 m with cells of 0.0156 m; allow at least "
        "0.000184 m"}};
@@ -615,6 +618,31 @@ output: )";
     EXPECT_EQ(refused.outcome, "limit");
     EXPECT_EQ(refused.reason, message);
   }
+}
+
+TEST_F(Run, RefusesThinSurfacesAndOwnCellsByTheirKeys) {
+  const auto reason_of = [&](const std::string& object, const std::string& output) {
+    RunOptions o = options();
+    o.overwrite = true;
+    const RunResult refused = run_scene(parse_scene("schema: 1\nduration: 0.1 s\nframe_rate: 10\nobjects:\n  - name: ball\n    particles: "
+                                                    "{mass: 1}\n" + object + "output: " + output + '\n', "ball.yaml", "."), o);
+    EXPECT_EQ(refused.outcome, "limit");
+    return refused.reason;
+  };
+  const std::string point = "    skeleton: [{shape: point, kernel: {radius: 1}}]\n";
+  const std::string disc = "    skeleton: [{shape: disc, radius: 100, kernel: {radius: 1 mm}}]\n";
+  EXPECT_EQ(reason_of(point + "    iso: 0.9999999\n", "{mesh: ply}"),
+            "ball.yaml:8:10: objects.ball.iso: expected at most 1000000000 lattice nodes around the body, found about 8.41e+13 with cells of "
+            "4.56e-05 m, 8 across a surface 0.000365148 m thick; use cells of at least 0.0021 m in output.cell, or make the surface thicker");
+  EXPECT_EQ(reason_of(disc, "{grid: vdb}"),
+            "ball.yaml:7:15: objects.ball.skeleton: expected a surface in at most 200000000 voxels, found about 3.91e+13 with cells of "
+            "0.000114 m, 8 across a surface 0.000908404 m thick; use cells of at least 0.0527 m in output.cell, or make the surface thicker");
+  EXPECT_EQ(reason_of(disc, "{grid: vdb, cell: 0.1 mm}"),
+            "ball.yaml:8:27: output.cell: expected a surface in at most 200000000 voxels, found about 5.04e+13 with cells of 0.0001 m; use "
+            "cells of at least 0.0527 m");
+  EXPECT_EQ(reason_of(point + "    meshing: {cell: 1e-5}\n", "{grid: vdb}"),
+            "ball.yaml:8:21: objects.ball.meshing.cell: expected a surface in at most 200000000 voxels, found about 6.29e+11 with cells of "
+            "1e-05 m; use cells of at least 0.000589 m");
 }
 
 TEST_F(Run, SaysWhenAFolderCannotBeMade) {

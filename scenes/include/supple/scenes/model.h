@@ -25,6 +25,9 @@
 
 namespace supple::scenes {
 
+/// Lattice cells across the thinnest surface where the scene gives none: a plate then has about a hundred triangles across its rounded rim.
+inline constexpr double kCellsAcross = 8.0;
+
 /// One object: a range of particles and the surface they carry.
 struct ObjectModel {
   std::string name;
@@ -107,6 +110,7 @@ struct Model {
   std::vector<CameraDesc> cameras;        ///< of the scene, with their places; empty until a Simulation has them
   MeshingDesc meshing;                    ///< how surfaces become meshes
   double cell = 0.0;                      ///< that of objects that ask for none of their own [m]; 0 when nothing has a surface
+  std::optional<std::uint32_t> thinnest;  ///< the object for whose thin surface `cell` was chosen; none: it was given, or fits an extent
   double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
   double largest_dissipation = 0.0;       ///< d of all pairs that touch [s/m]
   double smallest_length = 0.0;           ///< what a step must resolve: nearest rest distance or iso radius [m]
