@@ -406,6 +406,18 @@ ConvolutionLimits convolution_limits(const ShapeView& shape, const Kernel& kerne
   return {shape.gain * measure, shape.gain * measure * lipschitz(kernel)};
 }
 
+double peak(const Primitive& primitive) noexcept {
+  if (!primitive.convolved) return peak(primitive.kernel);
+  const ShapeView shape = view_of(primitive);
+  const double limit = convolution_limits(shape, primitive.kernel).peak;
+  if (shape.control.empty()) return limit;
+  Vec3 area = Vec3::Zero();
+  for (std::size_t i = 1; i + 1 < shape.control.size(); ++i) {
+    area += 0.5 * (shape.control[i] - shape.control[0]).cross(shape.control[i + 1] - shape.control[0]);
+  }
+  return std::min(limit, shape.gain * area.norm());
+}
+
 FootSample foot(const ShapeView& shape, const Vec3& y, Mat3* second) noexcept {
   if (second != nullptr) *second = 2.0 * Mat3::Identity();
   const Vec3& size = shape.size;

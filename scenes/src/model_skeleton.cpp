@@ -11,6 +11,7 @@
 #include "model_contact.h"
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
+#include "supple/implicit/convolution.h"
 
 namespace supple::scenes {
 namespace {
@@ -154,6 +155,17 @@ Quat principal_axes(Mat3 moments) {
   return Quat(axes).normalized();
 }
 
+/// Convolved primitives may reach less than their kernels do, even together.
+void check_reach(const ObjectDesc& d, const std::string& object, const implicit::Skeleton& skeleton, ModelFaults& faults) {
+  if (skeleton.primitive.empty() || d.volume) return;  // which scales the kernels
+  std::vector<double> sum(skeleton.part_count, 0.0);
+  for (const implicit::Primitive& primitive : skeleton.primitive) sum[d.separate ? primitive.part : 0] += implicit::peak(primitive);
+  const double most = *std::max_element(sum.begin(), sum.end());
+  if (d.iso < most) return;
+  faults.add(object + ".iso", "expected an iso value in (0, " + short_text(most) + "), which the skeleton may reach", number_text(d.iso),
+             "convolved primitives reach more where they are longer or wider against kernel.radius");
+}
+
 }  // namespace
 
 std::optional<std::uint32_t> particle_index(int given, std::uint32_t n, const std::string& key, ModelFaults& faults) {
@@ -191,12 +203,6 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
       faults.add(key + '.' + fault.key, fault.expected, fault.found, fault.hint);
       continue;
     }
-    if (!(d.iso > 0.0 && d.iso < implicit::peak(primitive.kernel))) {
-      faults.add(object + ".iso",
-                 "expected an iso value in (0, " + number_text(implicit::peak(primitive.kernel)) + "), which a kernel reaches",
-                 number_text(d.iso), "");
-      continue;
-    }
     std::vector<std::uint32_t> carriers;
     for (std::size_t j = 0; j < s.particles.size(); ++j) {
       const std::string place = key + ".particles[" + std::to_string(j) + ']';
@@ -222,6 +228,7 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
     skeleton.primitive.push_back(primitive);
     volume.push_back(held);
   }
+  check_reach(d, object, skeleton, faults);
   return skeleton;
 }
 

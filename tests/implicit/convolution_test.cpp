@@ -224,5 +224,34 @@ TEST(ConvolvedPrimitives, TrueRangeLiesInsideTheInterval) {
   EXPECT_GT(decided, 800);
 }
 
+// Small against the support, all of a shape counts fully: f is its measure times the gain, in its middle.
+TEST(Convolution, PeakBoundsThePotentialClosely) {
+  Random random(11);
+  Primitive segment, triangle;
+  segment.shape = ShapeKind::Segment;
+  segment.size = {0.01, 0.0, 0.0};
+  segment.kernel = Kernel::wyvill(1.0);
+  triangle.shape = ShapeKind::Triangle;
+  triangle.kernel = Kernel::murakami(1.0);
+  triangle.control = {Vec3(0.01, 0, 0), Vec3(-0.01, 0.01, 0), Vec3(-0.01, -0.01, 0)};
+  segment.convolved = triangle.convolved = true;
+  for (const Primitive& small : {segment, triangle}) {
+    const double middle = potential(small, Vec3::Zero()).value;
+    EXPECT_LE(middle, peak(small));
+    EXPECT_GT(middle, 0.999 * peak(small));  // f falls by at most 3 q / R^2 = 6e-4 over the shape
+  }
+  Primitive wide_segment = segment, wide_triangle = triangle, plain = segment;
+  wide_segment.size.x() = 3.0;
+  for (Vec3& corner : wide_triangle.control) corner *= 300.0;
+  plain.convolved = false;
+  EXPECT_EQ(peak(plain), 1.0);
+  for (const Primitive& primitive : {segment, triangle, wide_segment, wide_triangle}) {
+    for (int k = 0; k < 200; ++k) {
+      const Vec3 y = random.in_box(0.5);
+      EXPECT_LE(potential(primitive, y).value, peak(primitive));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace supple::implicit

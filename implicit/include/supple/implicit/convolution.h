@@ -7,7 +7,7 @@
 #include <span>
 
 #include "supple/core/types.h"
-#include "supple/implicit/kernel.h"
+#include "supple/implicit/skeleton.h"
 
 namespace supple::implicit {
 
@@ -30,5 +30,8 @@ struct Convolution {
 /// Over a whole line or plane at a distance [m, m^2].
 [[nodiscard]] double convolve_line(const Kernel& kernel, double distance) noexcept;
 [[nodiscard]] double convolve_plane(const Kernel& kernel, double distance) noexcept;
+
+/// What f of a primitive alone does not exceed, and reaches unless the primitive is convolved.
+[[nodiscard]] double peak(const Primitive& primitive) noexcept;
 
 }  // namespace supple::implicit
