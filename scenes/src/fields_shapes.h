@@ -47,15 +47,17 @@ void check_points(Archive& archive, const SkeletonDesc& d) {
   if (d.shape == Curve && n >= 2) {
     double length = 0.0;
     for (std::size_t i = 1; i < n; ++i) length += (p[i] - p[i - 1]).norm();
-    archive.check(length > 0.0, "points", "expected a curve of some length", "all points at one place", "");
+    archive.check(length > 0.0, "points", "expected a curve of length > 0 [m]", number_text(length), "");
   }
   if ((d.shape != Triangle && d.shape != Polygon) || n < 3) return;
   Vec3 area = Vec3::Zero();
   double largest = 0.0;
   for (std::size_t i = 1; i + 1 < n; ++i) area += 0.5 * (p[i] - p[0]).cross(p[i + 1] - p[0]);
   for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, (p[i] - p[0]).norm());
-  const bool spans = area.norm() > 1e-9 * largest * largest;
-  archive.check(spans, "points", "expected corners that span an area", number_text(area.norm()) + " m^2", "");
+  const double least = 1e-9 * largest * largest;
+  const bool spans = area.norm() > least;
+  archive.check(spans, "points", "expected corners that span an area > " + short_text(least) + " m^2, 1e-9 of their largest distance squared",
+                number_text(area.norm()) + " m^2", "");
   if (!spans || d.shape == Triangle) return;
   const Vec3 normal = area.normalized();
   double turned = 0.0;
@@ -65,9 +67,12 @@ void check_points(Archive& archive, const SkeletonDesc& d) {
     const double off = std::abs(normal.dot(here - p[0]));
     const std::string key = "points[" + std::to_string(i) + ']';
     archive.check(off <= 1e-9 * largest, key, "expected a corner in the plane of the others", short_text(off) + " m off it", "");
-    archive.check(normal.dot(ahead.cross(next)) >= -1e-12 * largest * largest && ahead.norm() > 0.0, key,
-                  "expected corners of a convex polygon, in order", "a turn to the other side", "");
-    turned += math::atan2(normal.dot(ahead.cross(next)), ahead.dot(next));
+    archive.check(ahead.norm() > 0.0, key, "expected a distance > 0 [m] to the next corner", number_text(ahead.norm()), "");
+    const double turn = math::atan2(normal.dot(ahead.cross(next)), ahead.dot(next));
+    archive.check(normal.dot(ahead.cross(next)) >= -1e-12 * largest * largest, key,
+                  "expected corners of a convex polygon, in order, with a turn >= 0 [deg] after this edge",
+                  short_text(turn * 180.0 / std::numbers::pi), "");
+    turned += turn;
   }
   archive.check(turned < 3.0 * std::numbers::pi, "points", "expected corners of a convex polygon, in order", "edges that cross", "");
 }
