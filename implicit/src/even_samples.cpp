@@ -7,6 +7,7 @@
 
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/implicit/mesh_limits.h"
 #include "supple/implicit/project.h"
 
 namespace supple::implicit {
@@ -96,6 +97,10 @@ EvenSampler::EvenSampler(double spacing) : spacing_(spacing) { SUPPLE_EXPECTS(sp
 double even_spacing(double density) {
   SUPPLE_EXPECTS(density > 0.0);
   return kSpacingByDensity / std::sqrt(density);
+}
+
+void EvenSampler::expect_size(const Field& field, const Executor& executor) const {
+  expect_marchable(field, {.cell = kCell * spacing_}, executor);
 }
 
 EvenSampleCounts EvenSampler::update(const Field& field, std::span<const Pose> parts, const Executor& executor,

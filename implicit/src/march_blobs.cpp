@@ -71,6 +71,11 @@ class BlobSampler final : public Sampler {
     lay_out(table, grid_.support().lower, grid_.support().upper, lattice_);
   }
 
+  void expect_size(const Executor&) override {
+    grid_.build(index_.primitive, lattice_);
+    if (!grid_.support().empty() && index_.iso > 0.0) expect_nodes(grid_.support().lower, grid_.support().upper, lattice_);
+  }
+
   void sample(const Executor& executor, BlockTable& table) override {
     const bool all = grid_.change().all;
     const std::vector<std::uint32_t> blocks = all ? all_blocks(table) : changed_blocks(table);

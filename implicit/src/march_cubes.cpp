@@ -11,6 +11,7 @@
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
 #include "supple/implicit/field.h"
+#include "supple/implicit/mesh_limits.h"
 
 namespace supple::implicit {
 namespace march {
@@ -223,6 +224,11 @@ void CubeMesher::forget() { impl_->kept = false; }
 Mesh march_cubes(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   CubeMesher mesher;
   return mesher.make(field, options, executor, counts);
+}
+
+void expect_marchable(const FieldView& field, const Lattice& lattice, const Executor& executor) {
+  blobs::BlobGrid grid;
+  march::make_sampler(field, lattice, true, grid)->expect_size(executor);
 }
 
 }  // namespace supple::implicit

@@ -24,6 +24,8 @@ class Sampler {
   virtual ~Sampler() = default;
   /// Lays out the table: every block that the surface may enter. @throws Error{Limit} before taking memory
   virtual void prepare(const Executor& executor, BlockTable& table) = 0;
+  /// @throws as prepare(), which it leaves to be called
+  virtual void expect_size(const Executor& executor) = 0;
   /// Fills tiles with signs and values, those that are not as in the last call, and marks them as changed.
   virtual void sample(const Executor& executor, BlockTable& table) = 0;
   /// Vertices of the tiles marked `solve` at their place in the mesh: positions, normals, and, among the points of their block, both

@@ -32,22 +32,19 @@ class ViewSampler final : public Sampler {
   ViewSampler(const FieldView& field, const Lattice& lattice) : field_(field), lattice_(lattice) {}
 
   void prepare(const Executor& executor, BlockTable& table) override {
-    PolygoniseCounts counts;
-    leaves_ = lattice::surface_blocks(field_, lattice_, executor, kMostLeaves, counts);
-    if (leaves_.block.empty()) {
-      table = {};
-      return;
-    }
     Cells lower, upper;
-    lower.fill(std::numeric_limits<std::int64_t>::max());
-    upper.fill(std::numeric_limits<std::int64_t>::min());
-    for (const auto& leaf : leaves_.block) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        lower[k] = std::min<std::int64_t>(lower[k], std::int64_t{kLeafNodes} * leaf[k]);
-        upper[k] = std::max<std::int64_t>(upper[k], std::int64_t{kLeafNodes} * (leaf[k] + 1));
-      }
+    if (find_leaves(executor, lower, upper)) {
+      lay_out(table, lower, upper, lattice_);
+    } else {
+      table = {};
     }
-    lay_out(table, lower, upper, lattice_);
+  }
+
+  void expect_size(const Executor& executor) override {
+    // As many leaves in any order have fewer nodes than fit.
+    if (lattice::block_range(field_.surface_box(), lattice_, 1).count() <= kMostLeaves) return;
+    Cells lower, upper;
+    if (find_leaves(executor, lower, upper)) expect_nodes(lower, upper, lattice_);
   }
 
   void sample(const Executor& executor, BlockTable& table) override {
@@ -98,6 +95,21 @@ class ViewSampler final : public Sampler {
 
  private:
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+  /// Fills `leaves_`. @return whether there are any, then with the nodes [lower, upper] that they hold
+  bool find_leaves(const Executor& executor, Cells& lower, Cells& upper) {
+    PolygoniseCounts counts;
+    leaves_ = lattice::surface_blocks(field_, lattice_, executor, kMostLeaves, counts);
+    lower.fill(std::numeric_limits<std::int64_t>::max());
+    upper.fill(std::numeric_limits<std::int64_t>::min());
+    for (const auto& leaf : leaves_.block) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        lower[k] = std::min<std::int64_t>(lower[k], std::int64_t{kLeafNodes} * leaf[k]);
+        upper[k] = std::max<std::int64_t>(upper[k], std::int64_t{kLeafNodes} * (leaf[k] + 1));
+      }
+    }
+    return !leaves_.block.empty();
+  }
 
   void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const {
     thread_local lattice::EdgeRoots roots;

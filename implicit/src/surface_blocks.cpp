@@ -5,6 +5,7 @@
 
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
+#include "supple/implicit/mesh_limits.h"
 
 namespace supple::implicit {
 namespace lattice {
@@ -246,6 +247,18 @@ BlockList surface_blocks(const FieldView& field, const Lattice& lattice, const E
 }
 
 }  // namespace lattice
+
+void expect_divisible(std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor) {
+  std::vector<Box> surface;
+  Box all;
+  for (const FieldView& field : fields) {
+    surface.push_back(field.surface_box());
+    if (lattice::is_bounded(surface.back()) && !surface.back().empty()) all = all.united(surface.back());
+  }
+  if (lattice::block_range(all, lattice, 1).count() <= kMostBlocks) return;
+  PolygoniseCounts counts;
+  (void)lattice::find_label_blocks(fields, surface, lattice, executor, kMostBlocks, counts);
+}
 
 std::vector<std::array<std::int32_t, 3>> find_surface_blocks(const FieldView& field, const Lattice& lattice,
                                                              const Executor& executor, std::uint64_t limit,

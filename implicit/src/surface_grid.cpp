@@ -15,6 +15,7 @@
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/implicit/mesh_limits.h"
 
 namespace supple::implicit {
 namespace {
@@ -216,22 +217,28 @@ struct MadeGrid {
   std::uint64_t looked_at = 0;
 };
 
-MadeGrid make_whole(const FieldView& field, const GridOptions& options, const Executor& executor) {
-  SUPPLE_EXPECTS(options.half_width >= 1.0 && std::isfinite(options.half_width));
-  openvdb::initialize();
-  const Lattice& lattice = options.lattice;
+std::uint64_t most_leaves(const GridOptions& options) { return std::max<std::uint64_t>(1, options.max_voxels / kLeafVoxels); }
+
+/// The leaves that may hold some of the band. @throws Error{Limit}
+BlockList band_leaves(const FieldView& field, const GridOptions& options, const Executor& executor) {
   const double width = band_of(options);
-  const RefineOptions refine{.limit = std::max<std::uint64_t>(1, options.max_voxels / kLeafVoxels),
+  const RefineOptions refine{.limit = most_leaves(options),
                              .look_factor = 8,  // up to eight for each that is kept
                              .last_node = kCells - 1,
                              .keep_inside = true,
                              .counted = "voxels",
                              .per_block = kLeafVoxels};
-  const BlockList list =
-      refine_blocks(range_of(field, options), lattice, 0, executor, refine,
-                    [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) {
-                      return look(field, width, box);
-                    });
+  return refine_blocks(range_of(field, options), options.lattice, 0, executor, refine,
+                       [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) {
+                         return look(field, width, box);
+                       });
+}
+
+MadeGrid make_whole(const FieldView& field, const GridOptions& options, const Executor& executor) {
+  SUPPLE_EXPECTS(options.half_width >= 1.0 && std::isfinite(options.half_width));
+  openvdb::initialize();
+  const Lattice& lattice = options.lattice;
+  const BlockList list = band_leaves(field, options, executor);
   std::vector<SampledLeaf> leaves(list.block.size());
   executor.for_blocks(leaves.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) leaves[i] = sample_leaf(field, options, list.block[i]);
@@ -310,6 +317,10 @@ bool same(const GridOptions& a, const GridOptions& b) {
 bool same(const BlockRange& a, const BlockRange& b) { return a.lower == b.lower && a.upper == b.upper; }
 
 }  // namespace
+
+void expect_griddable(const FieldView& field, const GridOptions& options, const Executor& executor) {
+  if (range_of(field, options).count() > most_leaves(options)) (void)band_leaves(field, options, executor);
+}
 
 SurfaceGrid make_surface_grid(const FieldView& field, const GridOptions& options, const Executor& executor) {
   SurfaceGrid result;

@@ -20,6 +20,7 @@
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/scenes/inspect.h"
+#include "supple/scenes/output_limits.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
@@ -209,7 +210,12 @@ int compare(const Arguments& arguments) {
 int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   scenes::check_pictures(scene);
-  const scenes::Simulation simulation(scene, simulation_options(1));
+  scenes::Simulation simulation(scene, simulation_options(1));
+  try {
+    scenes::expect_output_sizes(simulation, scenes::requested_outputs(scene));
+  } catch (const Error& error) {
+    throw Error(ErrorKind::Scene, error.faults());
+  }
   for (const std::string& warning : simulation.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
     const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };

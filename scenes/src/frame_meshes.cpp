@@ -6,12 +6,15 @@
 
 #include "frame.h"
 #include "look_columns.h"
+#include "mesh_sizes.h"
 #include "read_scene_faults.h"
+#include "scene_places.h"
 #include "search_choice.h"
 #include "supple/collision/deformed_field.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 #include "supple/implicit/creases.h"
+#include "supple/implicit/mesh_limits.h"
 #include "supple/implicit/mesh_motion.h"
 #include "supple/implicit/mesh_routes.h"
 #include "supple/implicit/missed_pieces.h"
@@ -243,6 +246,12 @@ void search_alone(const StageContext& context, std::size_t i, double cell, std::
   }
 }
 
+/// Whether a body that touches no other is meshed by marching cubes.
+bool takes_cubes(const MeshingDesc& d, const ObjectModel& object, const implicit::Skeleton& skeleton, std::span<const Box> supports) {
+  if (d.method != MeshingName::Auto || object.mesh_error) return d.method == MeshingName::Auto || d.method == MeshingName::Cubes;
+  return d.search.value_or(false) || implicit::estimate_routes(skeleton, supports, object.cell).prefers_cubes();
+}
+
 /// The surface of a body that touches no other. @param bodies  that its object has
 Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, StageProfile& profile, Frame& frame) {
   const Model& model = context.model;
@@ -252,10 +261,7 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
   const implicit::Field& field = frame.field[i];
   try {
     const bool automatic = d.method == MeshingName::Auto && !object.mesh_error;
-    const bool cubes = automatic ? d.search.value_or(false) ||
-                                       implicit::estimate_routes(context.bodies[i].skeleton, frame.placed[i].support, object.cell).prefers_cubes()
-                                 : d.method == MeshingName::Auto || d.method == MeshingName::Cubes;
-    if (!cubes) return mesh_otherwise(context, i, lattice, profile, frame);
+    if (!takes_cubes(d, object, context.bodies[i].skeleton, frame.placed[i].support)) return mesh_otherwise(context, i, lattice, profile, frame);
     implicit::MarchCounts marched;
     Mesh mesh = automatic && implicit::has_creases(field)
                     ? implicit::march_creases(field, lattice, context.executor, &marched)
@@ -267,6 +273,19 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
     return mesh;
   } catch (const Error& failure) {
     throw with_keys_of(model, failure, &object, &object);
+  }
+}
+
+/// @throws Error{Limit} as mesh_alone would for the size of the body
+void expect_size_alone(const MeshingDesc& d, const ObjectModel& object, const implicit::Skeleton& skeleton, std::span<const Box> supports,
+                       const implicit::FieldView& field, const Executor& executor) {
+  const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = object.cell};
+  if (takes_cubes(d, object, skeleton, supports)) {
+    implicit::expect_marchable(field, lattice, executor);
+  } else if (d.method == MeshingName::Tetrahedra) {
+    implicit::expect_divisible({&field, 1}, lattice, executor);
+  } else {
+    implicit::expect_griddable(field, {.lattice = lattice}, executor);
   }
 }
 
@@ -373,6 +392,42 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
     }
   }
   return meshes;
+}
+
+void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Box&)>& shown, const Executor& executor) try {
+  const Model& model = simulation.model();
+  const MeshingDesc& d = model.meshing;
+  if (d.method == MeshingName::Delaunay) return;
+  const std::vector<Body>& bodies = simulation.bodies();
+  const std::vector<implicit::Field>& fields = simulation.fields();
+  const Division division = division_of(model, bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  for (const DivisionGroup& group : groups_of(model, bodies, division)) {
+    if (group.strictest != nullptr) continue;
+    std::vector<implicit::FieldView> views;
+    for (const std::size_t k : group.member) views.emplace_back(division.claim[k]);
+    const double cell = group.finest->cell;
+    try {
+      implicit::expect_divisible(views, {.origin = cell * kOffPlanes, .cell = cell}, executor);
+    } catch (const Error& failure) {
+      throw with_keys_of(model, failure, group.finest, nullptr);
+    }
+  }
+  std::vector<Pose> pose;
+  implicit::PlacedSkeleton placed;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    const ObjectModel& object = model.objects[bodies[i].object];
+    if (bodies[i].skeleton.primitive.empty() || object.mesh_error) continue;
+    if (std::binary_search(division.body.begin(), division.body.end(), i) || (shown && !shown(fields[i].surface_box()))) continue;
+    core::gather_poses(simulation.state().particles, bodies[i].particle, pose);
+    implicit::place_skeleton(bodies[i].skeleton, pose, placed);
+    try {
+      expect_size_alone(d, object, bodies[i].skeleton, placed.support, fields[i], executor);
+    } catch (const Error& failure) {
+      throw with_keys_of(model, failure, &object, nullptr);
+    }
+  }
+} catch (const Error& failure) {
+  rethrow_with_places(simulation.scene(), failure);
 }
 
 Error with_keys_of(const Model& model, const Error& failure, const ObjectModel* cell, const ObjectModel* error) {

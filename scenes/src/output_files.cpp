@@ -15,6 +15,7 @@
 #include "supple/collision/deformed_field.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
+#include "supple/implicit/mesh_limits.h"
 
 namespace supple::scenes {
 namespace {
@@ -184,6 +185,25 @@ void write_grid_file(const fs::path& folder, const std::string& name, int frame,
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);
 } catch (const Error& error) {
   rethrow_with_places(simulation.scene(), with_keys_of(simulation.model(), error, nullptr, nullptr));
+}
+
+void expect_grid_sizes(Simulation& simulation, const Executor& executor) try {
+  const std::vector<Body>& bodies = simulation.bodies();
+  const GriddingDesc& gridding = simulation.scene().output.gridding;
+  if (gridding.of == GriddedName::Scene) return;
+  const std::vector<implicit::Field>& fields = simulation.fields();
+  const Division division = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
+    const ObjectModel& object = simulation.model().objects[bodies[i].object];
+    try {
+      implicit::expect_griddable(fields[i], {.lattice = {.cell = object.cell}, .half_width = gridding.half_width}, executor);
+    } catch (const Error& error) {
+      throw with_keys_of(simulation.model(), error, &object, nullptr);
+    }
+  }
+} catch (const Error& error) {
+  rethrow_with_places(simulation.scene(), error);
 }
 
 PictureSize picture_size(const fs::path& path) {

@@ -31,6 +31,8 @@ void remove_temporaries(const std::filesystem::path& folder, const std::string& 
 /// @param updaters  by body, kept from frame to frame: only what moved is made anew
 void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation,
                      std::vector<implicit::GridUpdater>& updaters);
+/// Of bodies that touch no other. @throws Error{Limit} as write_grid_file
+void expect_grid_sizes(Simulation& simulation, const Executor& executor);
 /// Width and height of a PNG, by its head; zeros of what is none.
 using PictureSize = std::pair<int, int>;
 [[nodiscard]] PictureSize picture_size(const std::filesystem::path& path);

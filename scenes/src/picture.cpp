@@ -147,6 +147,15 @@ std::vector<render::ScaleBar> bars_of(const Scene& scene) {
   return bars;
 }
 
+std::vector<render::Camera> cameras_at(const Scene& scene, const Model& model, double time) {
+  std::vector<render::Camera> cameras;
+  for (const CameraDesc& desc : model.cameras) cameras.push_back(camera_at(desc, time, scene.duration));
+  return cameras;
+}
+
+/// Width and height [pixel].
+std::vector<int> picture_size_of(const Scene& scene) { return scene.output.images ? scene.output.images->size : ImagesDesc{}.size; }
+
 }  // namespace
 
 void check_pictures(const Scene& scene) {
@@ -192,18 +201,21 @@ void ScenePictures::add(render::Item item, std::string name) {
   item_names_.push_back(std::move(name));
 }
 
-void ScenePictures::limit_meshes(Simulation& simulation) const {
-  std::vector<render::Camera> cameras;
-  for (const CameraDesc& desc : simulation.model().cameras) cameras.push_back(camera_at(desc, simulation.time(), scene_.duration));
-  const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
+std::function<bool(const Box&)> shown_by_cameras(const Scene& scene, const Model& model, double time) {
+  if (scene.render.renderer != RendererName::Gl) return {};
+  const std::vector<int> size = picture_size_of(scene);
   const double aspect = static_cast<double>(size.at(0)) / size.at(1);
-  if (scene_.render.renderer == RendererName::Gl) {
-    simulation.set_shown([cameras, aspect, light = scene_.light](const Box& box) {
-      return std::any_of(cameras.begin(), cameras.end(), [&](const render::Camera& camera) {
-        return may_show(camera, aspect, light.direction, light.softness, box);
-      });
+  return [cameras = cameras_at(scene, model, time), aspect, light = scene.light](const Box& box) {
+    return std::any_of(cameras.begin(), cameras.end(), [&](const render::Camera& camera) {
+      return may_show(camera, aspect, light.direction, light.softness, box);
     });
-  }
+  };
+}
+
+void ScenePictures::limit_meshes(Simulation& simulation) const {
+  if (auto shown = shown_by_cameras(scene_, simulation.model(), simulation.time())) simulation.set_shown(std::move(shown));
+  const std::vector<render::Camera> cameras = cameras_at(scene_, simulation.model(), simulation.time());
+  const std::vector<int> size = picture_size_of(scene_);
   if (!scene_.render.pixel_error || scene_.output.cell) return;
   constexpr double kFiner = 8.0, kCoarser = 4.0;
   double cell = kCoarser * cell_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +18,9 @@ namespace supple::scenes {
 
 /// What is drawn of each obstacle at a time, with its velocity where it is led along; empty where it is not visible.
 [[nodiscard]] std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double time);
+
+/// Whether a surface in a box may show in a picture of that time; empty where all may (light between surfaces needs everything).
+[[nodiscard]] std::function<bool(const Box&)> shown_by_cameras(const Scene& scene, const Model& model, double time);
 
 class ScenePictures {
  public:

@@ -28,6 +28,7 @@
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/scenes/output_limits.h"
 
 namespace supple::scenes {
 namespace {
@@ -382,6 +383,8 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
       result.frames = simulation->frame();
     };
     if (result.frames == 0) {
+      // Frames that are asked for may lie far behind.
+      if (!options.frames.empty() && !options.frames.contains(1)) expect_output_sizes(*simulation, outputs);
       writer.write(*simulation, report, 1.0 / frame_count);
       save();
     }

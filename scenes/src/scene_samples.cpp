@@ -20,6 +20,21 @@ double spacing_of(const SamplingDesc& sampling, double cell) {
   return cell > 0.0 ? kCellsApart * cell : 1.0;  // without a surface there is no cell, and nothing to sample
 }
 
+/// Cells become what the scene says of samples.
+[[noreturn]] void refuse(const Scene& scene, const Error& error) {
+  std::vector<Fault> faults = error.faults();
+  for (Fault& fault : faults) {
+    if (fault.key != "lattice.cell") continue;
+    fault.hint += ", which are a sixth of the spacing";
+    const std::optional<double> density = scene.output.sampling.density;
+    fault.key = density ? "output.sampling.density" : "output.sampling.spacing";
+    if (!density) continue;
+    fault.found += " for a density of " + short_text(*density) + " [1/m^2]";
+    fault.hint += ", " + short_text(implicit::even_spacing(1.0)) + " / sqrt(density)";
+  }
+  rethrow_with_places(scene, {error.kind(), std::move(faults)});
+}
+
 }  // namespace
 
 SceneSamples::SceneSamples(const SamplingDesc& sampling, double cell) : sampler_(spacing_of(sampling, cell)) {}
@@ -40,17 +55,15 @@ void SceneSamples::follow(Simulation& simulation, const Executor& executor) try 
     (void)sampler_.update(simulation.fields()[i], pose, executor, samples.set);
   }
 } catch (const Error& error) {
-  std::vector<Fault> faults = error.faults();
-  for (Fault& fault : faults) {
-    if (fault.key != "lattice.cell") continue;
-    fault.hint += ", which are a sixth of the spacing";
-    const std::optional<double> density = simulation.scene().output.sampling.density;
-    fault.key = density ? "output.sampling.density" : "output.sampling.spacing";
-    if (!density) continue;
-    fault.found += " for a density of " + short_text(*density) + " [1/m^2]";
-    fault.hint += ", " + short_text(implicit::even_spacing(1.0)) + " / sqrt(density)";
+  refuse(simulation.scene(), error);
+}
+
+void SceneSamples::expect_sizes(Simulation& simulation, const Executor& executor) const try {
+  for (std::size_t i = 0; i < simulation.bodies().size(); ++i) {
+    if (!simulation.bodies()[i].skeleton.primitive.empty()) sampler_.expect_size(simulation.fields()[i], executor);
   }
-  rethrow_with_places(simulation.scene(), {error.kind(), std::move(faults)});
+} catch (const Error& error) {
+  refuse(simulation.scene(), error);
 }
 
 io::PointSet SceneSamples::points() const {

@@ -20,6 +20,9 @@ class SceneSamples {
   /// Samples of the present frame. A body that broke since the last frame begins anew in its pieces.
   void follow(Simulation& simulation, const Executor& executor);
 
+  /// @throws Error{Limit} as follow() would for the size of a body
+  void expect_sizes(Simulation& simulation, const Executor& executor) const;
+
   /// The samples of the last frame followed, with id, object, owner (number of the particle), normal and area.
   [[nodiscard]] io::PointSet points() const;
 

@@ -20,6 +20,7 @@
 #include "supple/render/image.h"
 #include "supple/render/layers.h"
 #include "supple/scenes/inspect.h"
+#include "supple/scenes/output_limits.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 
@@ -643,6 +644,53 @@ TEST_F(Run, RefusesThinSurfacesAndOwnCellsByTheirKeys) {
   EXPECT_EQ(reason_of(point + "    meshing: {cell: 1e-5}\n", "{grid: vdb}"),
             "ball.yaml:8:21: objects.ball.meshing.cell: expected a surface in at most 200000000 voxels, found about 6.29e+11 with cells of "
             "1e-05 m; use cells of at least 0.000589 m");
+}
+
+/// What is told of the outputs of a scene at its start; empty: nothing.
+std::string told_at_the_start(const Scene& scene) {
+  Simulation simulation(scene);
+  try {
+    expect_output_sizes(simulation, requested_outputs(scene));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(Run, TellsTooFineCellsBeforeAStepAsItRefusesThem) {
+  const auto scene_of = [](const std::string& output, bool touching) {
+    const bool whole = output.starts_with("{images") || output.starts_with("{samples");
+    const std::string shape = whole ? "shape: point" : "shape: segment, half_length: 0.3";  // all nodes are counted, or those of the surface
+    std::string objects;
+    for (const double x : {0.0, touching ? 0.8 : 3.0}) {
+      objects += "  - {name: rod" + std::to_string(static_cast<int>(10.0 * x)) + ", particles: {at: [" + std::to_string(x) +
+                 ", 0, 0], mass: 1}, skeleton: [{" + shape + ", kernel: {radius: 1}}], contact: {modulus: 1e3}}\n";
+    }
+    return parse_scene("schema: 1\nduration: 0.3 s\nframe_rate: 10\nobjects:\n" + objects + "output: " + output + '\n', "rods.yaml", ".");
+  };
+  for (const bool touching : {false, true}) {
+    for (const std::string output : {"{mesh: ply, cell: 1e-10, meshing: {method: cubes}}", "{mesh: ply, cell: 1e-5, meshing: {method: tetrahedra}}",
+                                     "{mesh: ply, cell: 1e-5, meshing: {method: openvdb}}", "{mesh: ply, cell: 1e-10}",
+                                     "{images: {size: [64, 64]}, cell: 1e-5}", "{samples: csv, sampling: {density: 1e12}}",
+                                     "{grid: vdb, cell: 1e-5}"}) {
+      if (touching && output != "{mesh: ply, cell: 1e-10}") continue;  // methods divide alike, bulges in grids are looked at when they are made
+      const Scene scene = scene_of(output, touching);
+      RunOptions o = options();
+      o.overwrite = true;
+      const std::string refused = run_scene(scene, o).reason;
+      EXPECT_NE(refused.find("use cells of at least"), std::string::npos) << output << refused;
+      EXPECT_EQ(told_at_the_start(scene), refused) << output << touching;
+    }
+    for (const std::string output : {"{mesh: ply, cell: 0.05}", "{grid: vdb, cell: 0.05}", "{samples: csv}"}) {
+      EXPECT_EQ(told_at_the_start(scene_of(output, touching)), "") << output << touching;
+    }
+  }
+  RunOptions last = options();
+  last.overwrite = true;
+  last.frames = {3};
+  const RunResult refused = run_scene(scene_of("{mesh: ply, cell: 1e-10}", false), last);
+  EXPECT_EQ(refused.outcome, "limit");
+  EXPECT_EQ(refused.frames, 0);
 }
 
 TEST_F(Run, SaysWhenAFolderCannotBeMade) {

@@ -46,6 +46,8 @@ class EvenSampler {
   /// sampler has given to no other. Areas add up to that of the lattice's mesh.
   /// @param parts  world poses, shape [part_count]
   EvenSampleCounts update(const Field& field, std::span<const Pose> parts, const Executor& executor, EvenSampleSet& set);
+  /// @throws Error{Limit} as update() would of this field
+  void expect_size(const Field& field, const Executor& executor) const;
 
  private:
   double spacing_;

@@ -1,0 +1,22 @@
+/// @file supple/implicit/mesh_limits.h
+/// Whether meshes and grids would be refused for their size, by what refuses them, before anything is sampled. Where the box of a surface
+/// holds few enough blocks nothing else is looked at.
+#pragma once
+
+#include <span>
+
+#include "supple/core/executor.h"
+#include "supple/implicit/field_view.h"
+#include "supple/implicit/polygonise.h"
+#include "supple/implicit/surface_grid.h"
+
+namespace supple::implicit {
+
+/// @throws Error{Limit} as CubeMesher::make without options.error, and march_creases
+void expect_marchable(const FieldView& field, const Lattice& lattice, const Executor& executor);
+/// @throws Error{Limit} as polygonise_partition and, for one field, polygonise
+void expect_divisible(std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor);
+/// @throws Error{Limit} as make_surface_grid
+void expect_griddable(const FieldView& field, const GridOptions& options, const Executor& executor);
+
+}  // namespace supple::implicit
