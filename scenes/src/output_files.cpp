@@ -48,8 +48,8 @@ std::string stem_of_frame(const Part& part, const fs::path& file) {
 
 template <class Use>
 void for_each_file(const fs::path& folder, const Use& use) {
-  std::error_code absent;
-  for (const auto& entry : fs::directory_iterator(folder, absent)) use(entry.path());
+  if (!fs::is_directory(folder)) return;  // throws where that cannot be told
+  for (const auto& entry : fs::directory_iterator(folder)) use(entry.path());
 }
 
 /// The claim of a body that others divide, and those that may take of it.

@@ -278,7 +278,7 @@ void add_surfaces(std::vector<Option>& all) {
                           {.particles = "arrange: line, count: 2, spacing: 0.5", .skeleton = "{" + skeleton + "}"}, one, other));
   };
   const std::map<std::string, std::string> shapes = {
-      {"segment", "half_length: 0.1"}, {"square", "half_size: 0.1"}, {"rectangle", "half_sizes: [0.1, 0.2, 0.1]"}, {"disc", "radius: 0.1"},
+      {"segment", "half_length: 0.1"}, {"square", "half_size: 0.1"}, {"rectangle", "half_sizes: [0.1, 0.2]"}, {"disc", "radius: 0.1"},
       {"box", "half_sizes: [0.1, 0.1, 0.1]"}, {"triangle", "points: [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0]]"},
       {"polygon", "points: [[0, 0, 0], [0.2, 0, 0], [0.2, 0.2, 0], [0, 0.2, 0]]"}, {"ring", "radius: 0.15"},
       {"arc", "radius: 0.15, half_angle_deg: 40"}, {"curve", "points: [[0, 0, 0], [0.1, 0.1, 0], [0.2, 0, 0]]"}};
@@ -411,6 +411,11 @@ void add_contact(std::vector<Option>& all) {
   obstacle("file", "shape: heights, at: [0, 0, -0.12], file: $", "heights.csv", "more_heights.csv");
   obstacle("shape=mesh", "at: [0, 0, -0.2], $", "shape: box, half_sizes: [0.5, 0.5, 0.1]", "shape: mesh, file: block.obj");
   obstacle("voxel", "at: [0, 0, -0.2], shape: mesh, file: block.obj, voxel: $", "0.05", "0.04");
+  obstacle("shape=implicit", "at: [0, 0, -0.2], $", "shape: box, half_sizes: [0.5, 0.5, 0.1]",
+           "shape: implicit, skeleton: [{shape: rectangle, half_sizes: [0.5, 0.5], kernel: {radius: 0.2}}]");
+  const std::string plate = "at: [0, 0, -0.2], shape: implicit, skeleton: [{shape: rectangle, half_sizes: [0.5, 0.5], kernel: ";
+  obstacle("skeleton", plate + "{radius: $}}]", "0.2", "0.21");
+  obstacle("iso", plate + "{radius: 0.2}}], iso: $", "0.5", "0.45");
   obstacle("slope", "shape: plane, at: [0, 0, -0.12], slope: $", "1", "2");
   obstacle("friction", "shape: plane, at: [0, 0, -0.12], friction: $", "0.5", "0.1");
   all.push_back(differs("obstacles.modulus", In::State,
@@ -726,7 +731,9 @@ TEST_F(Options, AreAllTried) {
   }
   std::map<std::string, std::set<std::string>> untried;
   std::set<std::string> holders;
-  walk(nlohmann::json::parse(scene_json_schema()), "", [&](const std::string& path, const std::vector<std::string>& choices) {
+  walk(nlohmann::json::parse(scene_json_schema()), "", [&](const std::string& read, const std::vector<std::string>& choices) {
+    // Skeletons of obstacles are read as those of objects are.
+    const std::string path = read.starts_with("obstacles.skeleton.") ? "objects" + read.substr(read.find('.')) : read;
     if (path.empty() || exempt.contains(path)) return;
     for (const char* key : {"render.", "aperture", "focus"}) {
       if (!render::has_path_tracer() && path.find(key) != std::string::npos) return;
