@@ -310,8 +310,9 @@ TEST(Cradle, PassesTheSpeedOfTheFirstBallToTheLast) {
   EXPECT_LT(simulation.audits().energy_error, 1e-3);
 }
 
-TEST(Ring, HoldsABallThatIsTooLargeForIt) {
-  Simulation simulation = library("contacts/ball_in_ring", {"contact.error=0.1", "objects.ball.particles.at=[0, 0, 0.11]",
+/// A ball that has come to rest in the ring, by one rule.
+void expect_held(const char* rule, double sideways) {
+  Simulation simulation = library("contacts/ball_in_ring", {"contact.error=0.1", std::string("contact.rule=") + rule, "objects.ball.particles.at=[0, 0, 0.11]",
                                                             "objects.ball.medium.linear=60", "objects.ball.contact.friction=0"});
   // Where the ball first touches the ring: surfaces lie at sqrt(1 - 2^(-1/3)) of the supports.
   const double reach = std::sqrt(1.0 - std::cbrt(0.5)) * (0.4 + 0.1);
@@ -321,11 +322,16 @@ TEST(Ring, HoldsABallThatIsTooLargeForIt) {
   const Vec3 at = simulation.state().particles.position[0];
   EXPECT_LT(at.z(), first_touch);
   EXPECT_GT(at.z(), first_touch - 0.03);
-  // The lattice of the marching rule has not the symmetry of the ring, which is kept as far as its errors fall below what is asked.
-  EXPECT_LT(std::hypot(at.x(), at.y()), 1e-7);
+  EXPECT_LT(std::hypot(at.x(), at.y()), sideways);
   const Vec3 force = simulation.contact_loads().force[0];
   EXPECT_NEAR(force.z(), 9.81, 1e-5 * 9.81);
-  EXPECT_LT(std::hypot(force.x(), force.y()), 1e-7 * force.z());
+  EXPECT_LT(std::hypot(force.x(), force.y()), sideways * force.z());
+}
+
+TEST(Ring, HoldsABallThatIsTooLargeForIt) {
+  expect_held("samples", 1e-12);
+  // The lattice of the marching rule has not the symmetry of the ring, which is kept as far as its errors fall below what is asked.
+  expect_held("march", 1e-7);
 }
 
 TEST(SpiralHitByThreeBalls, KeepsItsMomentaAndTurnsThemBack) {
