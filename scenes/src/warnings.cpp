@@ -163,7 +163,7 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
   const std::uint64_t bulges = all.not_searched(Unsearched::Bulges);
   const bool asked = meshing.search.value_or(false) && all.pieces + all.undecided + bulges > 0;
   add(asked || all.pieces > 0, "pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames", all.pieces);
-  add(asked || all.undecided > 0, "cells where one may be missed", all.undecided);
+  add(asked || all.undecided > 0, "cells where a piece may be missed", all.undecided);
   add(asked || bulges > 0, "meshes of bodies that bulge, which are not searched", bulges);
   for (const auto& [why, what] : {std::pair{Unsearched::Undecided, "meshes that auto does not search, as cells along blends by gradients or tight bends would stay undecided"},
                                   std::pair{Unsearched::Cost, "meshes that auto does not search, as that would take far longer than to make them"}}) {

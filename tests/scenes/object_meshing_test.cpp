@@ -69,7 +69,7 @@ TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodesUnlessItIsOff) {
   EXPECT_NE(plain.warnings()[0].find("cells of 0.9 m may miss 'coin'"), std::string::npos) << plain.warnings()[0];
   ASSERT_EQ(searched.warnings().size(), 1u);
   EXPECT_EQ(searched.warnings()[0],
-            std::string(kFoundOne) + "; cells where one may be missed: 0; meshes of bodies that bulge, which are not searched: 0");
+            std::string(kFoundOne) + "; cells where a piece may be missed: 0; meshes of bodies that bulge, which are not searched: 0");
   ASSERT_EQ(automatic.warnings().size(), 1u);
   EXPECT_EQ(automatic.warnings()[0], kFoundOne);
   EXPECT_EQ(automatic.searches().pieces, 1u);
@@ -93,7 +93,7 @@ TEST(ObjectMeshing, SearchFindsACoinInAHouseUnlessItIsOff) {
   EXPECT_EQ(with[1].triangle_count(), without[1].triangle_count() + with[0].triangle_count());
   EXPECT_TRUE(same(with[2], without[2]));
   ASSERT_FALSE(searched.warnings().empty());
-  EXPECT_NE(searched.warnings().back().find("all frames: 1; cells where one may be missed: 0;"), std::string::npos) << searched.warnings().back();
+  EXPECT_NE(searched.warnings().back().find("all frames: 1; cells where a piece may be missed: 0;"), std::string::npos) << searched.warnings().back();
   (void)bulging.meshes();
   EXPECT_NE(bulging.warnings().back().find("are not searched: 2"), std::string::npos) << bulging.warnings().back();
   Simulation automatic = make("");
