@@ -87,29 +87,36 @@ double PolarRuleSolver::rim_moved() const {
   return moved;
 }
 
-bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error) {
+/// @param again  evaluate all rays until the last has ended: bounds on smooth patches take what is left of the way from the pressure at its end
+bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error, bool again) {
   const std::size_t n = rays.size();
   rim_batch_.resize(n);
   rays.outward.resize(n);
   low_.assign(n, 0.0);
   high_.assign(n, std::numeric_limits<double>::infinity());
-  done_.assign(n, 0);
+  open_.resize(n);
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
-  std::size_t open = n;
   rim_error_ = 0.0;
   rim_left_.assign(n, 0.0);
   moved_.assign(n, 0.0);
-  for (int iteration = 0; iteration < kRimSteps && open > 0; ++iteration) {
-    for (std::size_t k = 0; k < n; ++k) {
-      const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
-      rim_batch_.point[k] = origin + rays.radius[k] * e + rays.height[k] * axis;
+  const auto place = [&](std::size_t k) {
+    const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
+    rim_batch_.point[k] = origin + rays.radius[k] * e + rays.height[k] * axis;
+  };
+  for (int iteration = 0; iteration < kRimSteps && !open_.empty(); ++iteration) {
+    if (again) {
+      for (std::size_t k = 0; k < n; ++k) place(k);
+      pressure.evaluate(rim_batch_);
+    } else {
+      for (const std::size_t k : open_) place(k);
+      pressure.evaluate(rim_batch_, open_, some_);
     }
-    pressure.evaluate(rim_batch_);
-    for (std::size_t k = 0; k < n; ++k) {
-      if (done_[k] != 0) continue;
+    std::size_t left = 0;
+    for (const std::size_t k : open_) {
       const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
       const Vec3 &ga = rim_batch_.slope_a[k], &gb = rim_batch_.slope_b[k];
       const double a = rim_batch_.a[k], b = rim_batch_.b[k];
@@ -139,19 +146,20 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         const double norm_a = ga.norm(), norm_b = gb.norm();
         if (!(-at > kUpright * norm_a) && !widen_columns(0, ga / -norm_a, radius * e)) return false;
         if (!(bt > kUpright * norm_b) && !widen_columns(1, gb / -norm_b, radius * e)) return false;
-        done_[k] = 1;
-        --open;
         rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
         // Newton's method leaves about half the square of its last step, which the area feels twice.
         rim_error_ = std::max(rim_error_, step * step / (falls * radius));
         if (last_move > 0.0) rim_left_[k] = std::abs(step) / radius * moved_[k] / last_move;
+      } else {
+        open_[left++] = k;
       }
       radius = next;
       rays.height[k] += lift;
       if (radius * e.norm() > extent_ || !std::isfinite(radius + rays.height[k])) return false;
     }
+    open_.resize(left);
   }
-  return open == 0;
+  return open_.empty();
 }
 
 /// Columns that hold the squeezed region of a body so deep that it is wider beyond Sigma spread so far that it falls away from them at the rim.
@@ -319,23 +327,41 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
     end[i] = fall * frame_.depth[side] > 0.5 * pressure_[i] ? pressure_[i] / fall : 2.0 * frame_.depth[side];
   }
   end[n - 1] = frame_.depth[side];
+  reached_.resize(n);
+  open_.resize(n);
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
   for (int iteration = 0; iteration < kEndSteps; ++iteration) {
-    reached_ = end;
-    for (std::size_t i = 0; i < n; ++i) line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
-    pressure.evaluate(side, line_point_, line_value_, line_slope_);
-    bool moved = false;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (const std::size_t i : open_) {
+      reached_[i] = end[i];
+      line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
+    }
+    evaluate_on_lines(pressure, side);
+    std::erase_if(open_, [&](std::size_t i) {
       const double fall = -line_slope_[i].dot(column(i).way), newton = end[i] + line_value_[i] / fall;
       (line_value_[i] > 0.0 ? low_[i] : high_[i]) = end[i];
       // Where a body is deep its pressure rises first; far beyond its surface the support may have ended.
       const double next = fall > 0.0 && newton >= low_[i] && newton <= high_[i] ? newton : 0.5 * (low_[i] + high_[i]);
       const double enough = line_value_[i] >= 0.0 ? inside : tolerance;
-      if (std::abs(next - end[i]) > enough * frame_.thickness && std::abs(line_value_[i]) > floor) moved = true;
+      const bool near = std::abs(next - end[i]) <= enough * frame_.thickness || std::abs(line_value_[i]) <= floor;
       end[i] = next;
-    }
-    if (!moved) return true;
+      return near;
+    });
+    if (open_.empty()) return true;
   }
   return false;
+}
+
+/// Values and slopes of one body at the open points of lines.
+void PolarRuleSolver::evaluate_on_lines(PairPressure& pressure, int side) {
+  const std::size_t n = open_.size();
+  if (n == line_point_.size()) return pressure.evaluate(side, line_point_, line_value_, line_slope_);
+  some_.resize(n);
+  for (std::size_t k = 0; k < n; ++k) some_.point[k] = line_point_[open_[k]];
+  pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
+  for (std::size_t k = 0; k < n; ++k) {
+    line_value_[open_[k]] = some_.a[k];
+    line_slope_[open_[k]] = some_.slope_a[k];
+  }
 }
 
 /// Ways of the columns of a side, and how what they enclose widens; the last one is that through the peak. @return false where two of them meet
@@ -486,7 +512,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   for (std::size_t r = first; r <= last; ++r) {
     const PolarRule& rule = round ? polar_rays()[r] : rules[r];
     start_rim(rule, r == first);
-    if (!solve_rim(pressure, rim_, error)) return false;
+    if (!solve_rim(pressure, rim_, error, true)) return false;
     if (smooth && std::any_of(rim_batch_.point.begin(), rim_batch_.point.end(), [this](const Vec3& x) { return !smooth_.contains(x); })) {
       smooth = false;
       first = first_of(false);

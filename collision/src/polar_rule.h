@@ -79,7 +79,7 @@ class PolarRuleSolver {
   };
   bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                         const Regions& regions, bool round, bool any, bool star, PatchPoints& points);
-  bool solve_rim(PairPressure& pressure, Rays& rays, double error);
+  bool solve_rim(PairPressure& pressure, Rays& rays, double error, bool again);
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
   void start_outline(const PolarRule& rule);
@@ -92,6 +92,7 @@ class PolarRuleSolver {
   bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
   bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
+  void evaluate_on_lines(PairPressure& pressure, int side);
   bool start_columns(int side);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
@@ -123,6 +124,8 @@ class PolarRuleSolver {
     int nodes = 0;                    // on a ray that no kink crosses
     std::size_t rays = 0;             // of `fine`
     std::size_t change = 0, change_end = 0;  // of `changes_`
+    std::size_t along = 0;            // its first ray of `along_`, where kinks are mild
+    bool extend = false;              // rays between its own are due
     bool halved = false;              // or a part of one
     bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
     bool lost = false;                // a crossing that seemed to be there was not found
@@ -150,6 +153,11 @@ class PolarRuleSolver {
   struct Change {
     double place = 0.0;
     std::optional<Touch> touch;    // a kink that rays meet twice before it, or after it, and then not at all
+  };
+  /// What one ray adds to the sums of its panel, and its nodes.
+  struct RaySums {
+    PatchSums sums;
+    std::size_t first = 0, last = 0;  // of `kept_`
   };
   struct Corner {
     Vec3 at;                       // on the rim
@@ -186,6 +194,8 @@ class PolarRuleSolver {
   bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
+  bool extend_panels(PairPressure& pressure, double error);
+  void merge(Panel& panel, const Panel& added);
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
   static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all) const;
@@ -278,7 +288,6 @@ class PolarRuleSolver {
   Rays rim_;
   std::vector<double> coarse_radius_, coarse_height_, start_radius_;
   std::vector<double> low_, high_;
-  std::vector<std::uint8_t> done_;
   PressureBatch rim_batch_, crossing_batch_, node_;
   PressureBatch some_;              // points of one of these at which Newton's method has not ended
   std::vector<std::size_t> open_;   // which they are
@@ -310,6 +319,7 @@ class PolarRuleSolver {
   std::vector<implicit::Kink> near_kinks_;
   std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
+  std::vector<RaySums> along_;
   std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
   std::vector<Vec3> fine_rim_;
   Rays rays_;

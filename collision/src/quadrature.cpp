@@ -60,6 +60,20 @@ void add_highest(KronrodRule& rule) {
   for (std::size_t d = 0; d < rule.highest.size(); ++d) rule.highest[d] = d < n ? all[n - 1 - d] : std::vector<double>(n, 0.0);
 }
 
+/// @param node  the positive ones from the outside, the middle one last   @param smaller  weights of every second one
+KronrodRule make_nested(std::span<const double> node, std::span<const double> weight, std::span<const double> smaller) {
+  KronrodRule rule;
+  const std::size_t half = node.size() - 1;
+  for (std::size_t k = 0; k <= 2 * half; ++k) {
+    const std::size_t i = k <= half ? k : 2 * half - k;
+    rule.node.push_back(k <= half ? -node[i] : node[i]);
+    rule.weight.push_back(weight[i]);
+    rule.gauss_weight.push_back(i % 2 == 1 ? smaller[i / 2] : 0.0);
+  }
+  add_highest(rule);
+  return rule;
+}
+
 /// Weight of an even number n of equally spaced angles in the trigonometric interpolant, at distance x from an angle:
 /// sin(n x / 2) cot(x / 2) / n.
 double cardinal(int n, double x) {
@@ -139,27 +153,14 @@ const TwoEndRule& two_end_rule(int n) {
 }
 
 const KronrodRule& kronrod_rule(int gauss) {
-  // The positive nodes from the outside, the middle one last.
-  const auto make = [](std::span<const double> node, std::span<const double> weight, std::span<const double> smaller) {
-    KronrodRule rule;
-    const std::size_t half = node.size() - 1;
-    for (std::size_t k = 0; k <= 2 * half; ++k) {
-      const std::size_t i = k <= half ? k : 2 * half - k;
-      rule.node.push_back(k <= half ? -node[i] : node[i]);
-      rule.weight.push_back(weight[i]);
-      rule.gauss_weight.push_back(i % 2 == 1 ? smaller[i / 2] : 0.0);
-    }
-    add_highest(rule);
-    return rule;
-  };
-  static const KronrodRule coarsest = make(std::array{std::sqrt(6.0 / 7.0), std::sqrt(1.0 / 3.0), 0.0},
+  static const KronrodRule coarsest = make_nested(std::array{std::sqrt(6.0 / 7.0), std::sqrt(1.0 / 3.0), 0.0},
                                            std::array{98.0 / 495.0, 27.0 / 55.0, 28.0 / 45.0}, std::array{1.0});
-  static const KronrodRule coarse = make(std::array{0.960491268708020283423507092629080, 0.774596669241483377035853079956480,
+  static const KronrodRule coarse = make_nested(std::array{0.960491268708020283423507092629080, 0.774596669241483377035853079956480,
                                                     0.434243749346802558002071502844628, 0.0},
                                          std::array{0.104656226026467265193823857192073, 0.268488089868333440728569280666710,
                                                     0.401397414775962222905051818618432, 0.450916538658474142345110087045571},
                                          std::array{5.0 / 9.0, 8.0 / 9.0});
-  static const KronrodRule fine = make(
+  static const KronrodRule fine = make_nested(
       std::array{0.991455371120812639206854697526329, 0.949107912342758524526189684047851, 0.864864423359769072789712788640926,
                  0.741531185599394439863864773280788, 0.586087235467691130294144691258258, 0.405845151377397166906606412076961,
                  0.207784955007898467600689403773245, 0.0},
@@ -170,6 +171,33 @@ const KronrodRule& kronrod_rule(int gauss) {
                  0.417959183673469387755102040816327});
   SUPPLE_EXPECTS(gauss == 2 || gauss == 3 || gauss == 7);
   return gauss == 2 ? coarsest : gauss == 3 ? coarse : fine;
+}
+
+const KronrodRule& patterson_rule() {
+  static const KronrodRule rule = make_nested(
+      std::array{0.993831963212755022208512841307951, 0.960491268708020283423507092629080, 0.888459232872256998890420167258503,
+                 0.774596669241483377035853079956480, 0.621102946737226402940687443816595, 0.434243749346802558002071502844628,
+                 0.223386686428966881628203986843998, 0.0},
+      std::array{0.017001719629940260339027417402654, 0.051603282997079739696920120567861, 0.092927195315124537685894222654169,
+                 0.134415255243784220359968764802492, 0.171511909136391380787353165019717, 0.200628529376989021033931873331359,
+                 0.219156858401587496403693161643774, 0.225510499798206687386422549155950},
+      std::span(kronrod_rule(3).weight).first(4));
+  return rule;
+}
+
+const KronrodRule& patterson_additions() {
+  static const KronrodRule rule = [] {
+    const KronrodRule& whole = patterson_rule();
+    KronrodRule added;
+    for (std::size_t k = 0; k < whole.node.size(); k += 2) {
+      added.node.push_back(whole.node[k]);
+      added.weight.push_back(whole.weight[k]);
+    }
+    added.gauss_weight.resize(added.node.size());
+    added.highest.fill(added.gauss_weight);
+    return added;
+  }();
+  return rule;
 }
 
 std::span<const PolarRule> polar_rules() {

@@ -74,6 +74,7 @@ constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2;
 constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 /// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
 constexpr double kMildAngle = 0.15, kMildRadius = 2.0;
+constexpr double kExtended = 100.0;  // over what it may be: a panel's doubt that twice as many rays are worth their while for; beyond it is halved
 constexpr std::size_t kFine = 15;  // rays
 
 }  // namespace
@@ -103,7 +104,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
     }
   }
   const double rim_error = rim_error_;
-  if (!solve_rim(pressure, rays_, error)) return false;
+  if (!solve_rim(pressure, rays_, error, false)) return false;
   rim_error_ = std::max(rim_error_, rim_error);
   for (std::size_t p = first; p < panels_.size(); ++p) {
     Panel& panel = panels_[p];
@@ -221,6 +222,7 @@ double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
 void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
   panel.fine = panel.angular = panel.radial = {};
   panel.highest = {};
+  panel.along = along_.size();
   const std::size_t highest = rule.node.size() >= kFine ? panel.highest.size() : panel.highest.size() - 2;
   panel.first = kept_.point.size();
   double rim = 0.0, whole = 0.0, rate = 0.0;
@@ -235,6 +237,7 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       weigh(along, x, normal_[i], area_[i], pressure_[i]);
     }
     panel.angular.add(along, rule.gauss_weight[k] / rule.weight[k]);
+    if (mild_) along_.push_back({along, kept_.point.size(), kept_.point.size() + ray_check_[ray + k] - ray_nodes_[ray + k]});
     for (std::size_t d = 0; d < highest; ++d) panel.highest[d].add(along, rule.highest[d][k]);
     const double area = rule.weight[k] * turn_[ray + k] * rays_.radius[ray + k] * rays_.radius[ray + k];
     rim += area * rim_error(ray + k, rate);
@@ -250,6 +253,69 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
   panel.by_rim = rim / whole;
   panel.rays = rule.node.size();
   panel.last = kept_.point.size();
+}
+
+/// Gives the panels that are due the rays of Patterson's rule between those of Kronrod's, which they keep.
+bool PolarRuleSolver::extend_panels(PairPressure& pressure, double error) {
+  const std::size_t count = panels_.size();
+  std::vector<std::size_t> due;
+  for (std::size_t p = 0; p < count; ++p) {
+    if (!panels_[p].extend) continue;
+    due.push_back(p);
+    Panel added;
+    added.begin = panels_[p].begin;
+    added.end = panels_[p].end;
+    added.nodes = panels_[p].nodes;
+    panels_.push_back(added);
+  }
+  if (due.empty()) return true;
+  const KronrodRule& rule = patterson_additions();
+  if (!find_rays(pressure, rule, error, count) || !solve_panels(pressure, rule, error, count)) return false;
+  for (std::size_t k = 0; k < due.size(); ++k) merge(panels_[due[k]], panels_[count + k]);
+  panels_.resize(count);
+  return true;
+}
+
+/// A panel of 7 rays and the 8 between them become one of 15; what radii are off by has been told by the former.
+void PolarRuleSolver::merge(Panel& panel, const Panel& added) {
+  const KronrodRule &old = kronrod_rule(3), &rule = patterson_rule();
+  Panel merged = panel;
+  merged.angular = panel.fine;
+  merged.radial.add(panel.angular, -1.0);
+  merged.radial.add(panel.fine);
+  merged.fine = {};
+  merged.highest = {};
+  merged.first = kept_.point.size();
+  merged.rim = kept_rim_.size();
+  merged.along = along_.size();
+  for (std::size_t k = 0; k < rule.node.size(); ++k) {
+    const bool kept = k % 2 == 1;
+    const Panel& from = kept ? panel : added;
+    const RaySums ray = along_[from.along + k / 2];
+    const double share = kept ? rule.weight[k] / old.weight[k / 2] : 1.0;
+    PatchSums along;
+    along.add(ray.sums, share);
+    merged.fine.add(along);
+    for (std::size_t d = 0; d < merged.highest.size(); ++d) merged.highest[d].add(along, rule.highest[d][k]);
+    const std::size_t begin = kept_.point.size();
+    for_columns([&](auto& all, const auto&) {
+      all.resize(begin + ray.last - ray.first);
+      std::copy(all.begin() + static_cast<std::ptrdiff_t>(ray.first), all.begin() + static_cast<std::ptrdiff_t>(ray.last),
+                all.begin() + static_cast<std::ptrdiff_t>(begin));
+    });
+    for (std::size_t i = begin; i < kept_.point.size(); ++i) {
+      kept_weight_[i] *= share;
+      kept_area_[i] *= share;
+    }
+    along_.push_back({along, begin, kept_.point.size()});
+    kept_rim_.push_back(RimPoint(kept_rim_[from.rim + k / 2]));
+  }
+  merged.by_rim = std::max(panel.by_rim, added.by_rim);
+  merged.rays = rule.node.size();
+  merged.last = kept_.point.size();
+  merged.rim_end = kept_rim_.size();
+  merged.extend = false;
+  panel = merged;
 }
 
 /// What the coefficients of the highest degrees say that a panel's sums are off by, over those of `all`: nothing to speak of where they fall
@@ -409,6 +475,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   kept_pressure_.clear();
   kept_normal_.clear();
   kept_rim_.clear();
+  along_.clear();
   changes_.clear();
   residual_ = lift_ = rim_error_ = 0.0;
   spread_ = {};
@@ -417,9 +484,12 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   const bool beside = about_middle_ && cut_;
   const std::size_t most = beside ? kMostBesideThirds : mild_ ? kMostMild : kMostPanels;
   for (;;) {
-    if (!find_rays(pressure, *rule, error, begin)) return false;
-    if (begin == 0 && look && add_missed_kinks()) return true;
-    if (!solve_panels(pressure, *rule, error, begin)) return false;
+    if (begin < panels_.size()) {
+      if (!find_rays(pressure, *rule, error, begin)) return false;
+      if (begin == 0 && look && add_missed_kinks()) return true;
+      if (!solve_panels(pressure, *rule, error, begin)) return false;
+    }
+    if (!extend_panels(pressure, error)) return false;
     all = {};
     for (const Panel& panel : panels_) all.add(panel.fine);
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
@@ -438,10 +508,16 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     const double share = mild_ ? largest_to_leave(0.75 * error) : 0.5 * error / count;
     std::vector<Panel> finer;
     bool by_angle = false;
-    std::erase_if(panels_, [&](const Panel& panel) {
+    std::size_t extended = 0;
+    std::erase_if(panels_, [&](Panel& panel) {
       const bool more = !enough && panel.by_radius > share && panel.nodes < kMostRadial;
       const bool part = (!enough && panel.by_angle > share) || unseen(panel);
       if (!more && !part) return false;
+      if (mild_ && !more && panel.rays < kFine && panel.by_angle <= kExtended * share) {
+        panel.extend = true;
+        ++extended;
+        return false;
+      }
       Panel next;
       next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
       next.begin = panel.begin;
@@ -470,10 +546,10 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       finer.push_back(next);
       return true;
     });
-    if (finer.empty()) break;
+    if (finer.empty() && extended == 0) break;
     if (larger != nullptr && by_angle) rule = std::exchange(larger, nullptr);
     begin = panels_.size();
-    solved += finer.size();
+    solved += finer.size() + extended;
     panels_.insert(panels_.end(), finer.begin(), finer.end());
   }
   std::sort(panels_.begin(), panels_.end(), [](const Panel& a, const Panel& b) { return a.begin < b.begin; });

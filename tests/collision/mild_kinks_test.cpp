@@ -144,6 +144,8 @@ TEST(MildKinks, AreCrossedByFewRaysWhereOutlinesAreUneven) {
         const ContactSurface::Summary s = blobs.solve(asked);
         EXPECT_EQ(s.kinks, 0u) << c.seed << ' ' << pose;
         EXPECT_LE(s.points, asked > 1e-4 ? 700u : 6000u) << c.seed << ' ' << pose;
+        // Panels that are not exact enough keep their rays; halved, they took up to 14,100 and 117,000.
+        EXPECT_LE(s.evaluations, asked > 1e-4 ? 13000u : 95000u) << c.seed << ' ' << pose;
         EXPECT_LE(s.error_estimate, asked) << c.seed << ' ' << pose;
         EXPECT_LE(off_by(s, exact), s.error_estimate + exact.error_estimate) << c.seed << ' ' << pose << ' ' << asked;
       }
