@@ -379,7 +379,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   cut_ = !crossing_.empty() && crossing_.back() >= kinks_.size();
   const bool fine = error < 1e-4;
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
-  const int radial = !fine ? 4 : error >= 1e-6 ? 6 : error >= 1e-8 ? 8 : 10;
+  const int radial = error >= 1e-3 ? 3 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
   const double widest = fine ? kWidest : kWidestCoarse;
   about_middle_ = by_sectors_ = mild_ = false;
   for (;;) {
