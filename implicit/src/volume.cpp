@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "supple/core/error.h"
 
@@ -12,13 +14,128 @@ namespace {
 
 constexpr int kEdge = 4;  // cells along a block
 constexpr std::size_t kCells = kEdge * kEdge * kEdge;
+constexpr double kShift = 0.5;                        // of the surface, to either side [cells]
+constexpr double kHalfDiagonal = 0.8660254037844387;  // [cells]
+constexpr double kReach = kHalfDiagonal + kShift;     // a cell farther from the surface lies on one side of all three [cells]
+
+/// A level set near a point by its tangent plane: the signed distance, positive inside, and |direction| along the axes of the
+/// unit normal. Lengths in cells.
+struct NearPlane {
+  double distance = 0.0;
+  Vec3 slant = Vec3::UnitX();
+};
+
+/// Part of a unit cube on the inner side of a plane at a distance from its middle: over all cubes of a lattice these add up
+/// exactly to what lies between planes.
+double cube_share(const NearPlane& plane, double shift) {
+  constexpr double kLeast = 1e-4;  // of a slant, for which round-off stays below 1e-8
+  Vec3 n = plane.slant.cwiseMax(kLeast);
+  const double whole = n.sum();
+  const double up_to = 0.5 * whole + plane.distance + shift;  // from the corner that lies deepest
+  if (up_to <= 0.0) return 0.0;
+  if (up_to >= whole) return 1.0;
+  // The smaller of the two parts, by inclusion and exclusion of the corners that stick out.
+  const double a = std::min(up_to, whole - up_to);
+  const auto cube = [](double x) { return x > 0.0 ? x * x * x : 0.0; };
+  const double part = (cube(a) - cube(a - n.x()) - cube(a - n.y()) - cube(a - n.z()) + cube(a - n.x() - n.y()) + cube(a - n.y() - n.z()) +
+                       cube(a - n.z() - n.x())) / (6.0 * n.prod());
+  return up_to <= whole - up_to ? part : 1.0 - part;
+}
+
+/// The share of a cell. Smeared by cubes, whose second moment is 1/12 in all directions, volumes V(s) of the bodies between the
+/// surface and its parallel at s are too large by V''/24, whose difference over -1/2, 0, 1/2 is taken off: what is left is exact
+/// for planes and, as V is cubic (Steiner), of fourth order for smooth surfaces.
+double share_of(const NearPlane& plane) {
+  return (4.0 * cube_share(plane, 0.0) - 0.5 * (cube_share(plane, kShift) + cube_share(plane, -kShift))) / 3.0;
+}
 
 /// Middles of a block's cells, and how much of each lies inside [cells].
 struct Block {
   std::array<Vec3, kCells> points;
-  std::array<double, kCells> values;
-  std::array<Vec3, kCells> gradients;
   std::array<double, kCells> share;
+};
+
+/// Shares of the cells of a block that the surface may cut: from each middle Newton's steps to the foot on the surface, and the
+/// distance from the tangent plane there.
+class CutBlock {
+ public:
+  /// @param steepest  bound of |grad F| wherever the steps may lead [1/m]
+  void measure(const FieldView& field, double cell, double steepest, Block& block) {
+    std::array<double, kCells> values;
+    std::array<Vec3, kCells> gradients;
+    field.evaluate(block.points, values, gradients);
+    open_.clear();
+    for (std::size_t i = 0; i < kCells; ++i) {
+      block.share[i] = values[i] > 0.0 ? 1.0 : 0.0;
+      if (std::abs(values[i]) > steepest * kReach * cell || gradients[i].isZero()) continue;
+      searches_[open_.size()] = {.cell = i, .middle = block.points[i], .inside = values[i] > 0.0};
+      open_.push_back(open_.size());
+      searches_[open_.back()].look(block.points[i], values[i], gradients[i], cell);
+    }
+    const std::size_t count = open_.size();
+    for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+      std::array<Vec3, kCells> feet;
+      const std::size_t n = open_.size();
+      for (std::size_t k = 0; k < n; ++k) feet[k] = searches_[open_[k]].foot;
+      field.evaluate({feet.data(), n}, {values.data(), n}, {gradients.data(), n});
+      std::size_t left = 0;
+      for (std::size_t k = 0; k < n; ++k) {
+        if (searches_[open_[k]].look(feet[k], values[k], gradients[k], cell)) open_[left++] = open_[k];
+      }
+      open_.resize(left);
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      Search& search = searches_[k];
+      double& distance = search.plane.distance;
+      distance = search.inside ? std::max(distance, 0.0) : std::min(distance, 0.0);
+      block.share[search.cell] = share_of(search.plane);
+    }
+  }
+
+ private:
+  static constexpr int kSteps = 12;
+  static constexpr double kSettled = 1e-3;           // of a cell; the next step would change its square
+  static constexpr double kFarthest = kReach + 0.5;  // where a foot is looked for [cells]
+
+  /// For the foot of one middle.
+  struct Search {
+    std::size_t cell = 0;
+    Vec3 middle = Vec3::Zero();
+    bool inside = false;
+    Vec3 foot = Vec3::Zero();  ///< to look at next
+    NearPlane plane{};
+    double least = std::numeric_limits<double>::infinity();  ///< of |F| so far
+    Vec3 before = Vec3::Zero(), beyond = Vec3::Zero();  ///< the last feet on the middle's side of the surface and on the other one
+    bool crossed = false;
+
+    /// Takes the field at a point. @return whether there is more to look at
+    bool look(const Vec3& point, double value, const Vec3& gradient, double size) {
+      const bool first = std::isinf(least);
+      const bool halved = std::abs(value) <= 0.5 * least;
+      least = std::min(least, std::abs(value));
+      if ((value > 0.0) == inside) {
+        before = point;
+      } else {
+        beyond = point;
+        crossed = true;
+      }
+      if (!halved && crossed) {  // steep between flat sides, where Newton's steps would go to and fro
+        foot = 0.5 * (before + beyond);
+        return true;
+      }
+      const double steepness = gradient.norm();
+      if (!(steepness > 0.0)) return false;
+      const Vec3 inward = gradient / steepness;
+      const double distance = (value / steepness + inward.dot(middle - point)) / size, change = distance - plane.distance;
+      plane = {distance, inward.cwiseAbs()};
+      foot = middle - std::clamp(distance, -kFarthest, kFarthest) * size * inward;
+      if (first) return true;
+      return std::abs(change) > kSettled && (crossed || std::abs(distance) < kFarthest);
+    }
+  };
+
+  std::array<Search, kCells> searches_;
+  std::vector<std::size_t> open_;
 };
 
 /// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may hold some of the body;
@@ -26,18 +143,22 @@ struct Block {
 template <class Whole, class Cut>
 void for_blocks_of(const FieldView& field, double cell, const Whole& whole, const Cut& cut) {
   SUPPLE_EXPECTS(cell > 0.0);
-  const Box box = field.surface_box();
+  Box box = field.surface_box();
   if (box.empty()) return;
   SUPPLE_EXPECTS(box.lower.allFinite() && box.upper.allFinite());
+  const Vec3 around = Vec3::Constant(kShift * cell);
+  box = {box.lower - around, box.upper + around};
   const double edge = kEdge * cell;
   Block block;
+  CutBlock near_surface;
   using Place = Eigen::Matrix<std::int64_t, 3, 1>;
   const Place first = (box.lower / edge).array().floor().cast<std::int64_t>(), last = (box.upper / edge).array().floor().cast<std::int64_t>();
   for (std::int64_t z = first.z(); z <= last.z(); ++z) {
     for (std::int64_t y = first.y(); y <= last.y(); ++y) {
       for (std::int64_t x = first.x(); x <= last.x(); ++x) {
         const Vec3 corner = edge * Place(x, y, z).cast<double>();
-        const Interval bound = field.bound({corner, corner + Vec3::Constant(edge)});
+        const Box reach{corner - around, corner + Vec3::Constant(edge) + around};
+        const Interval bound = field.bound(reach);
         if (bound.upper < 0.0) continue;
         for (std::size_t i = 0; i < kCells; ++i) {
           const auto k = static_cast<int>(i);
@@ -47,17 +168,48 @@ void for_blocks_of(const FieldView& field, double cell, const Whole& whole, cons
           whole(block);
           continue;
         }
-        field.evaluate(block.points, block.values, block.gradients);
-        for (std::size_t i = 0; i < kCells; ++i) {
-          // Distance from the tangent plane over the width of the cell along its normal.
-          const double width = cell * block.gradients[i].cwiseAbs().sum();
-          const double f = block.values[i];
-          block.share[i] = width > 0.0 ? std::clamp(0.5 + f / width, 0.0, 1.0) : (f > 0.0 ? 1.0 : 0.0);
-        }
+        const Vec3 steps = Vec3::Constant(kReach * cell);
+        near_surface.measure(field, cell, field.gradient_bound({corner - steps, corner + Vec3::Constant(edge) + steps}), block);
         cut(block);
       }
     }
   }
+}
+
+/// How the parts of a row share a cell: each has what lies on its side of the planes where it is as strong as the strongest other
+/// one. The shares add up to 1.
+void share_among(const FieldParts& parts, std::size_t row, double cell, std::vector<double>& shares) {
+  const std::uint32_t begin = parts.offset[row], end = parts.offset[row + 1];
+  shares.assign(end - begin, 0.0);
+  std::uint32_t best = begin, second = end;
+  for (std::uint32_t r = begin + 1; r < end; ++r) {
+    if (parts.value[r] > parts.value[best]) {
+      second = best;
+      best = r;
+    } else if (second == end || parts.value[r] > parts.value[second]) {
+      second = r;
+    }
+  }
+  if (second == end) {
+    shares[0] = 1.0;
+    return;
+  }
+  double sum = 0.0;
+  for (std::uint32_t r = begin; r < end; ++r) {
+    const std::uint32_t other = r == best ? second : best;
+    const double ahead = parts.value[r] - parts.value[other];
+    const Vec3 gradient = parts.gradient[r] - parts.gradient[other];
+    const double steepness = gradient.norm() * cell;
+    double& share = shares[r - begin];
+    if (std::abs(ahead) >= kReach * steepness) {
+      share = r == best && ahead > 0.0 ? 1.0 : 0.0;
+    } else {
+      share = share_of({ahead / steepness, gradient.cwiseAbs() * (cell / steepness)});
+    }
+    sum += share;
+  }
+  if (!(sum > 0.0)) shares[best - begin] = sum = 1.0;
+  for (double& share : shares) share /= sum;
 }
 
 }  // namespace
@@ -77,16 +229,14 @@ double enclosed_volume(const FieldView& field, double cell) {
 std::vector<double> part_volumes(const FieldView& field, double cell, std::size_t part_count) {
   std::vector<double> volume(part_count, 0.0);
   FieldParts parts;
+  std::vector<double> shares;
   const auto give = [&](const Block& block, bool whole) {
     field.evaluate_parts(block.points, parts);
     for (std::size_t i = 0; i < kCells; ++i) {
       const double share = whole ? 1.0 : block.share[i];
       if (share == 0.0 || parts.offset[i] == parts.offset[i + 1]) continue;
-      std::uint32_t best = parts.offset[i];
-      for (std::uint32_t r = best + 1; r < parts.offset[i + 1]; ++r) {
-        if (parts.value[r] > parts.value[best]) best = r;
-      }
-      volume[parts.part[best]] += share * cell * cell * cell;
+      share_among(parts, i, cell, shares);
+      for (std::size_t k = 0; k < shares.size(); ++k) volume[parts.part[parts.offset[i] + k]] += share * shares[k] * cell * cell * cell;
     }
   };
   for_blocks_of(
@@ -138,10 +288,10 @@ void VolumeState::hash(Hasher& hasher) const {
 }
 
 void control_volume(const VolumeControl& control, double volume, double dt, VolumeState& state) noexcept {
-  constexpr double kLargestChange = 0.02;
+  constexpr double kLargestChange = 0.02, kLargestGain = 1.0 / 3.0;
   const double change = state.volume > 0.0 ? volume - state.volume : 0.0;
-  const double growth = (control.rate * (control.target - volume) * dt - control.damping * change) / control.target;
-  state.scale = std::clamp(state.scale * (1.0 + std::clamp(growth, -kLargestChange, kLargestChange)), 0.25, 4.0);
+  const double growth = (std::min(control.rate * dt, kLargestGain) * (control.target - volume) - control.damping * change) / control.target;
+  state.scale = std::clamp(state.scale * (1.0 + std::clamp(growth, -kLargestChange, kLargestChange)), kLeastScale, kLargestScale);
   state.volume = volume;
 }
 

@@ -161,7 +161,7 @@ void fields(Archive& archive, BlendDesc& d) {
 template <class Archive>
 void fields(Archive& archive, VolumeDesc& d) {
   archive("of", d.of, {}, "object: one scale for all its kernels; particle: the part of the body in which the particle's share of the field is the largest, a scale for its own kernels; primitive: the same for every primitive");
-  archive("target", d.target, above(0.0, kVolume).or_auto(), "V0; auto: the volume at the start");
+  archive("target", d.target, above(0.0, kVolume).or_auto(), "V0, for kernels of 1/4 to 4 times their size; a run says where it is not reached; auto: the volume at the start");
   archive("rate", d.rate, up_to(1000.0, kRate), "alpha: kernels grow by alpha (V0 - V) / V0");
   archive("damping", d.damping, between(0.0, 0.15, kNumber), "beta: against change of the volume");
 }

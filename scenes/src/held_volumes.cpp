@@ -19,15 +19,18 @@ std::vector<double> primitive_volumes(const Body& body, const core::ParticleStat
   return implicit::part_volumes(field, cell, poses.size());
 }
 
-/// Volumes of a body that its object holds [m^3]: its own, or those of its particles or primitives.
-std::vector<double> volumes_of(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame) {
+/// Volumes of a body that its object holds [m^3]: its own, or those of its particles or primitives. Cells are as fine as the smallest
+/// kernels ask for.
+std::vector<double> volumes_of(const StageContext& context, const core::ParticleState& particles, std::size_t body,
+                               const std::vector<implicit::VolumeState>& volumes, Frame& frame) {
   const ObjectModel& object = context.model.objects[context.bodies[body].object];
-  if (object.volume_of == VolumeOfName::Primitive) return primitive_volumes(context.bodies[body], particles, object.volume_cell);
+  double scale = implicit::kLargestScale;
+  for (std::size_t k = 0; k < object.target.size(); ++k) scale = std::min(scale, volumes[object.first_volume + k].scale);
+  const double cell = scale * object.volume_cell;
+  if (object.volume_of == VolumeOfName::Primitive) return primitive_volumes(context.bodies[body], particles, cell);
   place_and_index(context, particles, body, frame);
-  if (object.volume_of == VolumeOfName::Particle) {
-    return implicit::part_volumes(frame.field[body], object.volume_cell, object.target.size());
-  }
-  return {implicit::enclosed_volume(frame.field[body], object.volume_cell)};
+  if (object.volume_of == VolumeOfName::Particle) return implicit::part_volumes(frame.field[body], cell, object.target.size());
+  return {implicit::enclosed_volume(frame.field[body], cell)};
 }
 
 }  // namespace
@@ -53,12 +56,13 @@ void scale_kernels(const Model& model, const std::vector<implicit::VolumeState>&
   }
 }
 
-void measure_targets(const StageContext& context, const core::ParticleState& particles, Frame& frame, Model& model) {
+void measure_targets(const StageContext& context, const core::ParticleState& particles, const std::vector<implicit::VolumeState>& state, Frame& frame,
+                     Model& model) {
   for (std::size_t i = 0; i < context.bodies.size(); ++i) {
     ObjectModel& object = model.objects[context.bodies[i].object];
     if (!object.holds_volume) continue;
     if (std::all_of(object.target.begin(), object.target.end(), [](double v) { return v > 0.0; })) continue;
-    const std::vector<double> volumes = volumes_of(context, particles, i, frame);
+    const std::vector<double> volumes = volumes_of(context, particles, i, state, frame);
     for (std::size_t k = 0; k < volumes.size(); ++k) {
       if (!(object.target[k] > 0.0)) object.target[k] = volumes[k];
     }
@@ -71,7 +75,7 @@ bool control_volumes(const StageContext& context, const core::ParticleState& par
   for (std::size_t i = 0; i < context.bodies.size(); ++i) {
     const ObjectModel& object = context.model.objects[context.bodies[i].object];
     if (!object.holds_volume || rests(context, i)) continue;
-    const std::vector<double> found = volumes_of(context, particles, i, frame);
+    const std::vector<double> found = volumes_of(context, particles, i, volumes, frame);
     for (std::size_t k = 0; k < found.size(); ++k) {
       implicit::VolumeControl control = object.volume;
       control.target = object.target[k];

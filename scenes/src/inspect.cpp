@@ -78,6 +78,29 @@ std::string files_text(const fs::path& folder) {
   return text;
 }
 
+/// Of one object; empty where it holds none.
+std::string volumes_text(const ordered_json& object) {
+  if (!object.contains("volume")) return {};
+  const ordered_json& held = object["volume"];
+  if (!(held.contains("target_m3") && held.contains("volume_m3") && held.contains("scale"))) return {};
+  const ordered_json &targets = held["target_m3"], &volumes = held["volume_m3"], &scales = held["scale"];
+  std::string text;
+  constexpr std::size_t kMost = 8;
+  const std::size_t n = std::min({targets.size(), volumes.size(), scales.size()});
+  for (std::size_t k = 0; k < std::min(n, kMost); ++k) {
+    const std::string what = n == 1 ? "holds" : text_at(held, "of") + ' ' + std::to_string(k) + " holds";
+    if (!targets[k].is_number() || !scales[k].is_number()) continue;
+    if (volumes[k].is_number()) {
+      text += line("    %s %.4g of %.4g m^3, kernels of %.3g times their size", what.c_str(), volumes[k].get<double>(), targets[k].get<double>(),
+                   scales[k].get<double>());
+    } else {
+      text += line("    %s %.4g m^3 from the first step on", what.c_str(), targets[k].get<double>());
+    }
+  }
+  if (n > kMost) text += line("    %zu more volumes are held", n - kMost);
+  return text;
+}
+
 /// Empty where there is nothing to tell.
 std::string searches_text(const ordered_json& searches) {
   std::string text;
@@ -157,6 +180,7 @@ std::string describe_run(const fs::path& folder) {
       text += line("  %-20s %6.0f particle%s in %.0f piece%s, largest deformation %.3g, in the end %.3g", name.c_str(), particles,
                    particles == 1.0 ? "" : "s", pieces, pieces == 1.0 ? "" : "s", number_at(object, "largest_deformation"),
                    number_at(object, "final_shape_error"));
+      text += volumes_text(object);
     }
   }
   if (report.contains("searches")) text += searches_text(report["searches"]);

@@ -8,6 +8,7 @@
 #include "model_faults.h"
 #include "model_laws.h"
 #include "model_skeleton.h"
+#include "model_volume.h"
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
@@ -18,7 +19,6 @@ namespace {
 constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
 
 constexpr double kBelievable = 1e4;     // ways of a particle over the size of everything, and over that in a frame
-constexpr double kVolumeCell = 0.125;   // of the iso radius: cells that measure a held volume
 
 core::NormalDirection direction_of(NormalKind normal) {
   return normal == NormalKind::Radial ? core::NormalDirection::Radial : core::NormalDirection::Axis;
@@ -190,15 +190,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     object.iso_radius = object.iso_radius == 0.0 ? iso : std::min(object.iso_radius, iso);
   }
 
-  if (d.volume && !object.skeleton.primitive.empty()) {
-    object.holds_volume = true;
-    object.volume = {.rate = d.volume->rate, .damping = d.volume->damping};
-    object.volume_cell = kVolumeCell * object.iso_radius;
-    object.volume_of = d.volume->of;
-    if (object.volume_of != VolumeOfName::Primitive) volume.assign(object.volume_of == VolumeOfName::Particle ? n : 1, 0.0);
-    for (double& target : volume) target = target > 0.0 ? target : d.volume->target.value_or(0.0);
-    object.target = std::move(volume);
-  }
+  if (d.volume && !object.skeleton.primitive.empty()) hold_volume(d, key, n, std::move(volume), object, faults);
 
   const std::vector<double> nearest = NearestNeighbours(arrangement.position).distances();
   Vec3 centre = Vec3::Zero();

@@ -9,6 +9,7 @@
 #include <Eigen/Jacobi>
 
 #include "model_contact.h"
+#include "model_volume.h"
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
 #include "supple/implicit/convolution.h"
@@ -203,6 +204,7 @@ implicit::Skeleton build_skeleton(const ObjectDesc& d, const std::string& object
       faults.add(key + '.' + fault.key, fault.expected, fault.found, fault.hint);
       continue;
     }
+    if (s.volume) check_volume(primitive, *s.volume, key + ".volume", faults);
     std::vector<std::uint32_t> carriers;
     for (std::size_t j = 0; j < s.particles.size(); ++j) {
       const std::string place = key + ".particles[" + std::to_string(j) + ']';

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "fields_rules.h"
 #include "search_files.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -18,6 +19,20 @@ double peak_memory_mb() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+/// Null where no step has measured it.
+ordered_json json_of(const ObjectModel& object, const std::vector<implicit::VolumeState>& volumes) {
+  ordered_json held = {{"of", name_of(object.volume_of)},
+                       {"target_m3", object.target},
+                       {"volume_m3", ordered_json::array()},
+                       {"scale", ordered_json::array()}};
+  for (std::size_t k = 0; k < object.target.size(); ++k) {
+    const implicit::VolumeState& v = volumes[object.first_volume + k];
+    held["volume_m3"].push_back(v.volume > 0.0 ? ordered_json(v.volume) : ordered_json(nullptr));
+    held["scale"].push_back(v.scale);
+  }
+  return held;
 }
 
 ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
@@ -84,6 +99,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
                          {"diameter", o.rest_diameter},
                          {"largest_deformation", record.largest_deformation},
                          {"final_shape_error", record.final_shape_error}};
+      if (o.holds_volume) objects[o.name]["volume"] = json_of(o, state.volumes);
     }
     json["objects"] = objects;
     json["searches"] = json_of(result.searches);

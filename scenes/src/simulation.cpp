@@ -131,7 +131,7 @@ struct Simulation::Impl {
     }
     state.volumes.resize(volumes);
     form_bodies();
-    measure_targets(context(), state.particles, pulled, model);
+    measure_targets(context(), state.particles, state.volumes, pulled, model);
     for (const Body& body : bodies) state.samples.push_back(fresh_samples(body));
     if (scene.sleep) state.sleep.reset(bodies.size());
     form_awake();
@@ -833,6 +833,7 @@ Energies Simulation::energies() { return impl_->energies(); }
 std::vector<std::string> Simulation::warnings() const {
   std::vector<std::string> warnings = impl_->warnings;
   impl_->unmet.add_to(impl_->model.contact.error, warnings);
+  add_missed_volumes(impl_->model, impl_->state.volumes, warnings);
   return warnings;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -150,6 +151,42 @@ void UnmetContacts::add_to(double asked, std::vector<std::string>& warnings) con
     std::snprintf(numbers.data(), numbers.size(), " is not solved to the %.2g asked for: its bound is %.2g at t = %.6g s, and %llu times too large from t = %.6g s on",
                   asked, worst.bound, worst.time, static_cast<unsigned long long>(worst.times), worst.first);
     warnings.push_back("contact.error: contact of '" + pair.first + "' and '" + pair.second + '\'' + numbers.data());
+  }
+}
+
+void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeState>& volumes, std::vector<std::string>& warnings) {
+  constexpr double kNear = 0.005;  // measures err by a tenth of that
+  for (const ObjectModel& object : model.objects) {
+    if (!object.holds_volume) continue;
+    std::size_t missed = 0, worst = 0;
+    double most = 0.0;
+    for (std::size_t k = 0; k < object.target.size(); ++k) {
+      const implicit::VolumeState& held = volumes[object.first_volume + k];
+      if (!(object.target[k] > 0.0 && held.volume > 0.0)) continue;  // it holds none, or no step was taken
+      const double off = std::abs(held.volume / object.target[k] - 1.0);
+      if (off <= kNear) continue;
+      ++missed;
+      if (off > most) {
+        most = off;
+        worst = k;
+      }
+    }
+    if (missed == 0) continue;
+    const implicit::VolumeState& held = volumes[object.first_volume + worst];
+    std::string text = "objects." + object.name + ".volume: ";
+    if (object.volume_of == VolumeOfName::Object) {
+      text += '\'' + object.name + '\'';
+    } else {
+      const std::string what(name_of(object.volume_of));
+      text += std::to_string(missed) + " of " + std::to_string(object.target.size()) + " volumes by " + what +
+              (missed == 1 ? " is" : " are") + " off, most that of " + what + ' ' + std::to_string(worst) + ", which";
+    }
+    text += " has " + short_text(held.volume) + " m^3 in place of the " + short_text(object.target[worst]) + " m^3 to hold; its kernels ";
+    const bool grows = held.volume < object.target[worst];
+    if (grows && held.scale >= implicit::kLargestScale) text += "have 4 times their size, the most they may";
+    else if (!grows && held.scale <= implicit::kLeastScale) text += "have 1/4 of their size, the least they may";
+    else text += std::string("still ") + (grows ? "grow" : "shrink") + ", at " + short_text(held.scale) + " times their size ('rate' lets them be faster)";
+    warnings.push_back(std::move(text));
   }
 }
 

@@ -43,6 +43,10 @@ class UnmetContacts {
   std::map<std::pair<std::string, std::string>, Worst> worst_;
 };
 
+/// Held volumes that the last step did not find within 0.5 % of their targets, one sentence an object: the one that is off most, and whether its kernels
+/// may change no further or still do. @param volumes  State::volumes
+void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeState>& volumes, std::vector<std::string>& warnings);
+
 /// What searches for missed pieces of meshes found in all frames, in one sentence that takes the place of the last; none for none.
 /// Other meshers than those that are searched are left to the report: the scene asks for them.
 void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings);

@@ -54,7 +54,7 @@ struct ObjectModel {
   implicit::VolumeControl volume;         ///< but for the target
   std::vector<double> target{};           ///< of the object, or by particle or primitive [m^3]; 0: that of the start
   std::uint32_t first_volume = 0;         ///< of `target` in State::volumes
-  double volume_cell = 0.0;               ///< of the cells that measure it [m]
+  double volume_cell = 0.0;               ///< of the cells that measure it while no kernel is scaled [m]
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single [m]
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
   LookDesc look;                          ///< decides which columns its meshes carry

@@ -151,8 +151,8 @@ class Simulation {
 
   [[nodiscard]] Energies energies();
   [[nodiscard]] Audits audits() const;
-  /// What is odd about the start of the scene, contacts that were not solved as well as asked so far, and what searches of all meshes so far tell, as
-  /// sentences.
+  /// What is odd about the start of the scene, contacts that were not solved as well as asked so far, held volumes that are off at the present state, and
+  /// what searches of all meshes so far tell, as sentences.
   [[nodiscard]] std::vector<std::string> warnings() const;
   /// What searches found for all meshes made of the present state, and which were not searched.
   [[nodiscard]] const SearchCounts& searches() const;
