@@ -447,6 +447,7 @@ Error with_keys_of(const Model& model, const Error& failure, const ObjectModel* 
       fault.key = own ? "objects." + error->name + ".meshing.error" : "output.meshing.error";
     }
     if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
+    if (fault.key == "mesh.cell") fault.key = cell != nullptr && cell->own_cell ? "objects." + cell->name + ".meshing.cell" : "output.cell";
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
     if (fault.key == "mesh.angle") fault.key = "output.meshing.angle_deg";
   }

@@ -82,6 +82,49 @@ TEST(DelaunayMesh, FindsEveryPartHoweverSmall) {
   EXPECT_EQ(report.euler_characteristic, 6);
 }
 
+Mesh coarse(const FieldView& field) { return march_cubes(field, {.lattice = {.cell = 0.05}}, Executor(1)); }
+
+Primitive segment(double half_length, double radius) {
+  Primitive primitive = wyvill_point(radius);
+  primitive.shape = ShapeKind::Segment;
+  primitive.size.x() = half_length;
+  return primitive;
+}
+
+/// Closed, with the parts of marching cubes, and all of them: within the distance asked for, twice for the cubes' own.
+void expect_whole(const Body& body, const DelaunayOptions& options, const std::string& what) {
+  DelaunayReport report;
+  const Mesh mesh = delaunay_mesh(body.field, options, &report);
+  const MeshReport found = inspect(mesh), cubes = inspect(coarse(body.field));
+  ASSERT_GT(cubes.components, 0u) << what;
+  EXPECT_TRUE(found.closed && found.oriented) << what;
+  EXPECT_EQ(found.components, cubes.components) << what;
+  EXPECT_EQ(found.euler_characteristic, cubes.euler_characteristic) << what;
+  EXPECT_LE(report.largest_distance, options.distance) << what;
+  EXPECT_NEAR(found.volume, cubes.volume, 2.0 * options.distance * cubes.area) << what;
+}
+
+TEST(DelaunayMesh, OfASegmentThinnerThanTheSizeIsWhole) {
+  expect_whole(body_of({{segment(1.0, 0.8), Vec3::Zero()}}), {.size = 1.0, .distance = 0.01, .cell = 0.05}, "short");
+  expect_whole(body_of({{segment(2.0, 0.8), Vec3::Zero()}}), {.size = 1.0, .distance = 0.01, .cell = 0.05}, "long");
+}
+
+TEST(DelaunayMesh, OfRandomThinBodiesAndPartsHasThePartsOfCubes) {
+  Random random(21);
+  for (int i = 0; i < 12; ++i) {
+    // A segment of a radius from three cells on, up to thirty times as long, or a ring, turned at random; a small ball and a large one apart from it.
+    const double radius = random.uniform(0.33, 0.9);
+    Body body = body_of({{segment(random.uniform(0.5, 2.5), radius), random.in_box(0.2)},
+                         {wyvill_point(random.uniform(0.35, 0.6)), Vec3(0, 0, 4.3)},
+                         {wyvill_point(random.uniform(1.0, 2.0)), Vec3(0, 0, -6.0)}});
+    body.parts[0].orientation = random.rotation();
+    if (i % 3 == 0) body.skeleton.primitive[0].shape = ShapeKind::Ring;
+    body.place();
+    const double size = random.uniform(0.4, 2.0);
+    expect_whole(body, {.size = size, .distance = random.uniform(0.01, 0.05), .cell = 0.05}, std::to_string(i));
+  }
+}
+
 TEST(DelaunayMesh, OfNoSurfaceIsEmpty) {
   Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});
   body.skeleton.iso = 1.5;
@@ -91,13 +134,8 @@ TEST(DelaunayMesh, OfNoSurfaceIsEmpty) {
   EXPECT_EQ(report.seeds, 0u);
 }
 
-Mesh coarse(const FieldView& field) { return march_cubes(field, {.lattice = {.cell = 0.05}}, Executor(1)); }
-
 TEST(DelaunayMesh, TakesMoreVerticesThanTheEstimateAndNotMuchMore) {
-  Primitive segment = wyvill_point(0.8);
-  segment.shape = ShapeKind::Segment;
-  segment.size.x() = 2.0;
-  const Body body = random_blobs(), capsule = body_of({{segment, Vec3::Zero()}});
+  const Body body = random_blobs(), capsule = body_of({{segment(2.0, 0.8), Vec3::Zero()}});
   const FunctionField ball = sphere({0.01, 0.02, 0.03}, 0.5), ring = torus(0.4, 0.15);
   for (const FieldView& field : {FieldView(ball), FieldView(ring), FieldView(body.field), FieldView(capsule.field)}) {
     for (const auto& [size, distance] : {std::pair{0.3, 0.01}, std::pair{0.3, 3e-3}, std::pair{0.1, 0.1}, std::pair{0.1, 2e-3}}) {

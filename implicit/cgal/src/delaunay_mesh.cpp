@@ -11,8 +11,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <numbers>
+#include <set>
+#include <span>
+#include <string>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
@@ -151,12 +155,13 @@ std::vector<std::uint32_t> parts_of(const Mesh& mesh) {
   return parent;
 }
 
-/// Vertices of the mesh, in their order, that keep a distance from those taken before: `spacing`, and a sixth of the extent of
-/// their own part where that is less.
-std::vector<Point> spread(const implicit::FieldView& field, const Mesh& mesh, double spacing) {
-  const std::vector<std::uint32_t> part = parts_of(mesh);
-  std::vector<Box> extent(mesh.vertex_count());
-  for (std::size_t v = 0; v < part.size(); ++v) extent[part[v]].include(mesh.position[v]);
+struct Seed {
+  Vec3 place;
+  std::uint32_t part;
+};
+
+/// Vertices of the mesh, in their order, that keep the spacing of their part from those taken before.
+std::vector<Seed> spread(const implicit::FieldView& field, const Mesh& mesh, std::span<const std::uint32_t> part, std::span<const double> spacing) {
   struct Place {
     std::int64_t x, y, z;
     std::uint32_t part;
@@ -167,9 +172,9 @@ std::vector<Point> spread(const implicit::FieldView& field, const Mesh& mesh, do
                                     (static_cast<std::uint64_t>(p.z) * 83492791u) ^ (std::uint64_t{p.part} * 2654435761u));
   };
   std::unordered_map<Place, std::vector<std::uint32_t>, decltype(hash)> taken(64, hash);
-  std::vector<Point> seeds;
+  std::vector<Seed> seeds;
   for (std::uint32_t v = 0; v < part.size(); ++v) {
-    const double apart = std::min(spacing, extent[part[v]].extent().norm() / 6.0);
+    const double apart = spacing[part[v]];
     const Vec3& p = mesh.position[v];
     const Eigen::Matrix<std::int64_t, 3, 1> at = (p / apart).array().floor().cast<std::int64_t>();
     bool free = true;
@@ -181,9 +186,18 @@ std::vector<Point> spread(const implicit::FieldView& field, const Mesh& mesh, do
     }
     if (!free) continue;
     taken[{at.x(), at.y(), at.z(), part[v]}].push_back(v);
-    seeds.push_back(point(implicit::project_to_surface(field, p).point));
+    seeds.push_back({implicit::project_to_surface(field, p).point, part[v]});
   }
   return seeds;
+}
+
+/// Of seeds, by part: a size, and a sixth of the part's extent where that is less.
+std::vector<double> first_spacing(const Mesh& mesh, std::span<const std::uint32_t> part, double size) {
+  std::vector<Box> extent(mesh.vertex_count());
+  for (std::size_t v = 0; v < part.size(); ++v) extent[part[v]].include(mesh.position[v]);
+  std::vector<double> spacing(mesh.vertex_count());
+  for (std::size_t v = 0; v < spacing.size(); ++v) spacing[v] = std::min(size, extent[v].extent().norm() / 6.0);
+  return spacing;
 }
 
 void measure(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& surface_centre, implicit::DelaunayReport& report) {
@@ -236,6 +250,63 @@ Mesh extract(const implicit::FieldView& field, const implicit::DelaunayOptions& 
   return mesh;
 }
 
+/// Parts of the surface with a seed that no triangle reached.
+struct Missing {
+  std::set<std::uint32_t> part;
+};
+
+/// Seeds farther apart than the body is thick may leave some of it without triangles: dual edges that cross it twice count as none.
+Mesh refine(const implicit::FieldView& field, const implicit::DelaunayOptions& options, const implicit::DelaunayEstimate& estimate,
+            std::span<const Seed> seeds, implicit::DelaunayReport& report, Missing& missing) {
+  const Box box = field.surface_box();
+  Surface surface{field, box.centre(), 0.5 * box.extent().norm(), {}};
+  for (const Seed& seed : seeds) surface.seeds.push_back(point(seed.place));
+  Triangulation triangulation;
+  Complex complex(triangulation);
+  CGAL::make_surface_mesh(complex, surface, Oracle(), Criteria(options, estimate, triangulation), CGAL::Manifold_tag());
+  report.seeds = seeds.size();
+  report.inserted = triangulation.number_of_vertices() - seeds.size();
+  const auto key = [](const Vec3& p) { return std::tuple(p.x(), p.y(), p.z()); };
+  std::set<std::tuple<double, double, double>> bare;
+  for (auto v = triangulation.finite_vertices_begin(); v != triangulation.finite_vertices_end(); ++v) {
+    if (!complex.is_in_complex(v)) bare.insert(key(vec(v->point())));
+  }
+  for (const Seed& seed : seeds) {
+    if (bare.contains(key(seed.place))) missing.part.insert(seed.part);
+  }
+  return extract(field, options, complex, report);
+}
+
+bool alike(const MeshReport& a, const MeshReport& b) {
+  return a.components == b.components && a.euler_characteristic == b.euler_characteristic;
+}
+
+/// Halves the spacing of seeds in the parts concerned, in all where none is: then parts are broken or joined. @return false where seeds
+/// lie as densely as the lattice has vertices
+bool seed_denser(const Missing& missing, std::span<const std::uint32_t> part, double cell, std::span<double> spacing) {
+  constexpr double kDensest = 0.25;
+  bool any = false;
+  for (std::uint32_t v = 0; v < part.size(); ++v) {
+    if (part[v] != v || !(missing.part.empty() || missing.part.contains(v))) continue;
+    if (spacing[v] < kDensest * cell) continue;
+    spacing[v] *= 0.5;
+    any = true;
+  }
+  return any;
+}
+
+/// @throws Error{Limit}
+[[noreturn]] void refuse_missing(const implicit::DelaunayOptions& options) {
+  std::array<char, 32> cell{};
+  std::snprintf(cell.data(), cell.size(), "%.3g", options.cell);
+  throw Error(ErrorKind::Limit,
+              Fault{.place = "",
+                    .key = "mesh.cell",
+                    .expected = "expected cells that resolve the surface, from whose vertices its triangles grow",
+                    .found = std::string("a part that no triangles reach from the vertices of cells of ") + cell.data() + " m",
+                    .hint = "ask for smaller cells"});
+}
+
 }  // namespace
 
 Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOptions& options,
@@ -249,17 +320,24 @@ Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOpt
   heed(options.interrupt);
   const implicit::DelaunayEstimate estimate = estimate_delaunay({&coarse, 1}, options);
   check_estimate(estimate, options);
-  const Box box = field.surface_box();
-  const Surface surface{field, box.centre(), 0.5 * box.extent().norm(),
-                        spread(field, coarse, options.size)};
-  found.seeds = surface.seeds.size();
   Mesh mesh;
-  if (!surface.seeds.empty()) {
-    Triangulation triangulation;
-    Complex complex(triangulation);
-    CGAL::make_surface_mesh(complex, surface, Oracle(), Criteria(options, estimate, triangulation), CGAL::Manifold_tag());
-    found.inserted = triangulation.number_of_vertices() - found.seeds;
-    mesh = extract(field, options, complex, found);
+  if (coarse.triangle.empty()) {
+    if (report != nullptr) *report = found;
+    return mesh;
+  }
+  const std::vector<std::uint32_t> part = parts_of(coarse);
+  const MeshReport seen = inspect(coarse);
+  std::vector<double> spacing = first_spacing(coarse, part, options.size);
+  for (;;) {
+    const std::vector<Seed> seeds = spread(field, coarse, part, spacing);
+    Missing missing;
+    found = {};
+    mesh = refine(field, options, estimate, seeds, found, missing);
+    if (missing.part.empty() && alike(inspect(mesh), seen)) break;
+    if (!seed_denser(missing, part, options.cell, spacing)) {
+      if (!missing.part.empty()) refuse_missing(options);
+      break;  // whole, though of another topology than the lattice saw
+    }
   }
   if (report != nullptr) *report = found;
   return mesh;

@@ -58,8 +58,9 @@ void check_estimate(const DelaunayEstimate& estimate, const DelaunayOptions& opt
 
 /// The closed surface F = 0 within these bounds, outward oriented, vertices on the surface to rounding, with the field's
 /// normals. Free of self-intersection: its triangles are faces of one Delaunay triangulation.
+/// Every part that marching cubes of the cell find has triangles.
 /// @throws Error{Limit} when most_vertices do not reach the bounds, before any is made where an estimate says so; an angle cannot be held
-/// where the surface has an edge. Interrupted.
+/// where the surface has an edge; or where cells do not resolve a part. Interrupted.
 using DelaunayMesher =
     std::function<Mesh(const FieldView& field, const DelaunayOptions& options, DelaunayReport* report)>;
 

@@ -9,7 +9,8 @@
 namespace supple::cgal {
 
 /// A DelaunayMesher: Delaunay refinement (Boissonnat & Oudot 2005) by CGAL's surface mesher from points of marching cubes,
-/// at least `size` apart or a sixth of a small part's extent, so that every part that the lattice sees is meshed.
+/// `size` apart or a sixth of a small part's extent. Where triangles reach not all of them, or the topology is not that of marching cubes, as with
+/// a body thinner than `size`, it begins anew from twice as many of the part, down to a quarter of the cell.
 [[nodiscard]] Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOptions& options,
                                  implicit::DelaunayReport* report = nullptr);
 
