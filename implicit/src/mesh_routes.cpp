@@ -19,6 +19,8 @@ constexpr double kSingleValue = 0.1, kValue = 0.7, kGradient = 1.1;
 constexpr double kCubesLeaf = 3500.0, kGridLeaf = 10000.0;
 /// Of a primitive, to find it near a leaf [ns].
 constexpr double kPrimitive = 200.0;
+/// Vertices of a leaf by way of a grid, and how often each is evaluated: twice and a half on their way onto the surface, once for normals.
+constexpr double kGridVertices = 45.0, kLooksAtVertex = 3.5;
 /// Leaves of the band, three cells wide on each side, for one that holds surface.
 constexpr double kBandLeaves = 1.8;
 
@@ -143,7 +145,8 @@ RouteEstimate estimate_routes(const Skeleton& skeleton, std::span<const Box> sup
   const double find = kPrimitive * static_cast<double>(supports.size());
   const double value = is_blobs(skeleton) ? kSingleValue : kValue;
   estimate.cubes_ms = 1e-6 * (find + estimate.leaves * (at_nodes * value + kCubesLeaf));
-  estimate.openvdb_ms = 1e-6 * (find + kBandLeaves * estimate.leaves * (at_nodes * kGradient + kGridLeaf));
+  const double at_vertices = kLooksAtVertex * kGridVertices * estimate.overlap * kGradient;
+  estimate.openvdb_ms = 1e-6 * (find + estimate.leaves * (kBandLeaves * (at_nodes * kGradient + kGridLeaf) + at_vertices));
   return estimate;
 }
 

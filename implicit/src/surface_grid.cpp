@@ -525,6 +525,63 @@ double UnitedField::feature_size() const {
   return least;
 }
 
+namespace {
+
+constexpr std::size_t kPointsPerTask = 512;
+
+/// Newton's steps along the gradient onto the surface; a point that they do not bring there within half a cell stays.
+/// @pre no more than kPointsPerTask points
+void project(const FieldView& field, double cell, std::span<const Vec3> from, std::span<Vec3> onto) {
+  constexpr int kSteps = 6;
+  constexpr double kNear = 1e-5, kFarthest = 0.5;  // of a cell; the step from so near goes to the square of it
+  std::array<double, kPointsPerTask> values;
+  std::array<Vec3, kPointsPerTask> at, gradients;
+  std::array<std::size_t, kPointsPerTask> open;
+  std::size_t count = from.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    open[k] = k;
+    at[k] = onto[k] = from[k];
+  }
+  for (int step = 0; step < kSteps && count > 0; ++step) {
+    field.evaluate(std::span(at).first(count), std::span(values).first(count), std::span(gradients).first(count));
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double square = gradients[k].squaredNorm();
+      if (!(square > 0.0)) continue;
+      const Vec3 way = -values[k] / square * gradients[k];
+      const Vec3 next = at[k] + way;
+      if (!((next - from[open[k]]).norm() <= kFarthest * cell)) continue;
+      if (way.norm() <= kNear * cell) {
+        onto[open[k]] = next;
+        continue;
+      }
+      open[left] = open[k];
+      at[left++] = next;
+    }
+    count = left;
+  }
+}
+
+/// Takes back what turns triangles over, until none is.
+void keep_sides(const Mesh& mesh, std::vector<Vec3>& onto) {
+  const auto normal_of = [&](const std::vector<Vec3>& p, const std::array<std::uint32_t, 3>& t) {
+    return Vec3((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]));
+  };
+  for (bool turned = true; turned;) {
+    turned = false;
+    for (const auto& t : mesh.triangle) {
+      const Vec3 before = normal_of(mesh.position, t);
+      if (before.dot(normal_of(onto, t)) > 0.0 || before.isZero()) continue;
+      for (const std::uint32_t v : t) {
+        turned = turned || onto[v] != mesh.position[v];
+        onto[v] = mesh.position[v];
+      }
+    }
+  }
+}
+
+}  // namespace
+
 Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor) {
   SUPPLE_EXPECTS(grid.impl_ != nullptr);
   std::vector<openvdb::Vec3s> points;
@@ -540,8 +597,14 @@ Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& ex
     add(q[0], q[1], q[2]);
     add(q[0], q[2], q[3]);
   }
+  const double cell = grid.impl_->grid->voxelSize().x();
+  std::vector<Vec3> onto(points.size());
+  executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {
+    project(field, cell, std::span(mesh.position).subspan(begin, end - begin), std::span(onto).subspan(begin, end - begin));
+  });
+  keep_sides(mesh, onto);
+  mesh.position = std::move(onto);
   mesh.normal.resize(points.size());
-  constexpr std::size_t kPointsPerTask = 512;
   executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {
     std::array<double, kPointsPerTask> values;
     const auto normals = std::span(mesh.normal).subspan(begin, end - begin);

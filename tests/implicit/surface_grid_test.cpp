@@ -12,6 +12,7 @@
 
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
+#include "implicit/mesh_checks.h"
 #include "supple/core/hash.h"
 #include "supple/core/mesh.h"
 #include "supple/implicit/march_cubes.h"
@@ -304,21 +305,54 @@ TEST(SurfaceGrid, OfUnitedDepthsHasTheDistanceToTheNearestWhateverTheKernels) {
   EXPECT_GT(nearer_to_small, 20);
 }
 
-TEST(SurfaceGrid, BecomesAMeshNearTheSurfaceByOpenVdb) {
-  const Body body = body_of({{wyvill_point(1.0), kOrigin}, {wyvill_point(0.8), kOrigin + Vec3(0.5, 0, 0)}});
-  const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(1));
-  const Mesh mesh = mesh_of(grid, body.field, Executor(2));
-  const MeshReport report = inspect(mesh);
-  const MeshReport exact = inspect(march_cubes(body.field, {.lattice = {.cell = 0.01}}, Executor(1)));
-  EXPECT_TRUE(report.closed && report.oriented);
-  EXPECT_EQ(report.components, exact.components);
-  EXPECT_NEAR(report.volume, exact.volume, 0.1 * kCell * exact.area);
+/// Of the vertices' distances from the surface to first order [m].
+double rms_distance(const Mesh& mesh, const FieldView& field) {
   std::vector<double> values(mesh.vertex_count());
   std::vector<Vec3> gradients(mesh.vertex_count());
-  body.field.evaluate(mesh.position, values, gradients);
-  for (std::size_t v = 0; v < values.size(); ++v) {
-    ASSERT_LT(std::abs(values[v]), 0.2 * kCell * gradients[v].norm());
-    ASSERT_NEAR(mesh.normal[v].dot(gradients[v].normalized()), -1.0, 1e-12);
+  field.evaluate(mesh.position, values, gradients);
+  double sum = 0.0;
+  for (std::size_t v = 0; v < values.size(); ++v) sum += values[v] * values[v] / gradients[v].squaredNorm();
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+TEST(SurfaceGrid, BecomesAMeshOnTheSurfaceByOpenVdb) {
+  Primitive plate = wyvill_point(0.5);
+  plate.shape = ShapeKind::Box;
+  plate.size = {0.4, 0.3, 0.1};
+  Primitive ring = wyvill_point(0.4);
+  ring.shape = ShapeKind::Ring;
+  ring.size.x() = 0.6;
+  const std::array bodies{body_of({{wyvill_point(1.0), kOrigin}, {wyvill_point(0.8), kOrigin + Vec3(0.5, 0, 0)}}), body_of({{plate, kOrigin}}),
+                          body_of({{ring, kOrigin}}), random_body({.seed = 5, .parts = 12, .half_width = 0.5, .only_points = true})};
+  for (const Body& body : bodies) {
+    const SurfaceGrid grid = make_surface_grid(body.field, options_of(GridContent::SignedDistance), Executor(1));
+    const Mesh mesh = mesh_of(grid, body.field, Executor(2));
+    const MeshReport report = inspect(mesh);
+    const MeshReport exact = inspect(march_cubes(body.field, {.lattice = {.cell = 0.01}}, Executor(1)));
+    EXPECT_TRUE(report.closed && report.oriented);
+    EXPECT_EQ(report.components, exact.components);
+    EXPECT_NEAR(report.volume, exact.volume, 0.1 * kCell * exact.area);
+    EXPECT_LE(rms_distance(mesh, body.field), 1e-4 * kCell);
+    std::vector<double> values(mesh.vertex_count());
+    std::vector<Vec3> gradients(mesh.vertex_count());
+    body.field.evaluate(mesh.position, values, gradients);
+    for (std::size_t v = 0; v < values.size(); ++v) ASSERT_NEAR(mesh.normal[v].dot(gradients[v].normalized()), -1.0, 1e-12);
+    EXPECT_EQ(hash_of(mesh_of(grid, body.field, Executor(1))), hash_of(mesh));
+  }
+}
+
+// A grid of a ball half a cell smaller than the field's: there the way is short; of one two cells smaller it is too long, and all stay.
+TEST(SurfaceGrid, GivesVerticesThatStayWhereTheSurfaceIsTooFar) {
+  const Body body = body_of({{wyvill_point(1.0), kOrigin}});
+  const double radius = iso_distance(Kernel::wyvill(1.0), 0.5);
+  for (const double off : {0.4, 2.0}) {
+    const Body smaller = body_of({{wyvill_point((radius - off * kCell) / radius), kOrigin}});
+    const SurfaceGrid grid = make_surface_grid(smaller.field, options_of(GridContent::SignedDistance), Executor(1));
+    const Mesh mesh = mesh_of(grid, body.field, Executor(1));
+    EXPECT_TRUE(inspect(mesh).closed && inspect(mesh).oriented);
+    const double rms = rms_distance(mesh, off < 1.0 ? body.field : smaller.field);
+    EXPECT_LE(rms, off < 1.0 ? 1e-4 * kCell : 0.1 * kCell);
+    for (const Vec3& p : mesh.position) EXPECT_LT(std::abs((p - kOrigin).norm() - radius) / kCell, off < 1.0 ? 1e-4 : 2.1);
   }
 }
 

@@ -16,7 +16,7 @@ struct RouteEstimate {
   double leaves = 0.0;     ///< of 8^3 nodes that hold surface: what the faces of the supports' box would take
   double overlap = 0.0;    ///< primitives whose supports hold a node, on average
   double cubes_ms = 0.0;   ///< CPU time of marching cubes
-  double openvdb_ms = 0.0; ///< of a grid and OpenVDB's volumeToMesh
+  double openvdb_ms = 0.0; ///< of a grid, OpenVDB's volumeToMesh, and vertices projected onto the surface
   [[nodiscard]] bool prefers_cubes() const noexcept { return cubes_ms <= openvdb_ms; }
 };
 

@@ -124,8 +124,10 @@ class UnitedField {
   std::vector<FieldView> fields_;
 };
 
-/// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles cut in two; normals are
-/// those of the field. Vertices lie near the surface, not on it.
+/// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles cut in two, its vertices projected
+/// onto the surface of the field along its gradients, with its normals. Vertices stay that Newton's steps do not bring there within half a
+/// cell, or whose triangles would turn over.
+/// @param field  that the grid was made from
 [[nodiscard]] Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor);
 
 /// Writes one .vdb with all grids, by temporary file and rename. @throws Error{Io}
