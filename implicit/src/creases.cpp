@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "error_search.h"
 #include "field_index.h"
 #include "supple/core/error.h"
 
@@ -213,7 +214,8 @@ std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
   return loop.size() == open.size() ? loop : std::vector<std::uint32_t>{};
 }
 
-/// Puts a vertex onto the crease in every cell whose vertices belong to several nodes, and turns edges that cross the crease
+/// Puts a vertex onto the crease in every cell whose vertices belong to several nodes, turns edges that cross the crease, and cuts those
+/// that still do
 /// (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here).
 class Sharpener {
  public:
@@ -247,9 +249,20 @@ class Sharpener {
     turn_edges();
     mesh_.triangle = std::move(kept);
     mesh_.triangle.insert(mesh_.triangle.end(), star_.begin(), star_.end());
+    cut_edges();
   }
 
  private:
+  /// An edge of a triangle.
+  struct Side {
+    std::uint32_t low, high, triangle;
+    auto operator<=>(const Side&) const = default;
+  };
+  /// An edge with a vertex on the crease.
+  struct Cut {
+    std::uint32_t low, high, vertex;
+  };
+
   /// Replaces the triangles of a cell by those around a point of the crease. @return whether that was done
   bool star(std::span<const Triangle> triangles, const std::array<std::int64_t, 3>& cell) {
     std::vector<std::uint32_t> nodes;
@@ -263,8 +276,8 @@ class Sharpener {
     if (loop.empty()) return false;
     Vec3 middle = Vec3::Zero();
     for (const std::uint32_t v : loop) middle += mesh_.position[v] / static_cast<double>(loop.size());
-    const std::optional<Vec3> point = meeting_point(fields_, nodes, middle, 2.0 * lattice_.cell);
-    if (!point || !(whole_.value(*point) <= 1e-12)) return false;  // a third node covers it
+    const std::optional<Vec3> point = crease_point(nodes, middle);
+    if (!point) return false;
     // In its own cell a cone over the loop crosses nothing; a little beyond, its triangles must face outward.
     const Vec3 at = (*point - lattice_.origin) / lattice_.cell;
     for (int k = 0; k < 3; ++k) {
@@ -274,17 +287,28 @@ class Sharpener {
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (!faces_out(loop[k], loop[(k + 1) % loop.size()], *point)) return false;
     }
-    const auto fresh = static_cast<std::uint32_t>(mesh_.position.size());
-    mesh_.position.push_back(*point);
+    const std::uint32_t fresh = add_vertex(nodes, *point);
+    for (std::size_t k = 0; k < loop.size(); ++k) star_.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
+    return true;
+  }
+
+  /// Where the nodes meet on the surface near a point.
+  [[nodiscard]] std::optional<Vec3> crease_point(std::span<const std::uint32_t> nodes, const Vec3& near) const {
+    const std::optional<Vec3> point = meeting_point(fields_, nodes, near, 2.0 * lattice_.cell);
+    return point && whole_.value(*point) <= 1e-12 ? point : std::nullopt;  // else another node covers it
+  }
+
+  /// @return the number of a new vertex on the crease of some nodes
+  std::uint32_t add_vertex(std::span<const std::uint32_t> nodes, const Vec3& point) {
+    mesh_.position.push_back(point);
     Vec3 normal = Vec3::Zero();
     for (const std::uint32_t node : nodes) {
       Vec3 gradient;
-      (void)fields_[node].value(*point, gradient);
+      (void)fields_[node].value(point, gradient);
       if (gradient.squaredNorm() > 0.0) normal -= gradient.normalized();
     }
     mesh_.normal.push_back(normal.squaredNorm() > 0.0 ? Vec3(normal.normalized()) : Vec3::UnitZ());
-    for (std::size_t k = 0; k < loop.size(); ++k) star_.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
-    return true;
+    return static_cast<std::uint32_t>(mesh_.position.size() - 1);
   }
 
   [[nodiscard]] bool faces_out(std::uint32_t a, std::uint32_t b, const Vec3& c) const {
@@ -294,17 +318,12 @@ class Sharpener {
 
   /// An edge between two nodes' vertices and two points of the crease becomes the edge between the points.
   void turn_edges() {
-    struct Side {
-      std::uint32_t low, high, triangle;
-    };
     std::vector<Side> sides;
     for (std::uint32_t i = 0; i < star_.size(); ++i) {
       const auto [a, b, top] = star_[i];
       if (owner_[a] != owner_[b]) sides.push_back({std::min(a, b), std::max(a, b), i});
     }
-    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-      return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-    });
+    std::sort(sides.begin(), sides.end());
     for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
       if (sides[i].low != sides[i + 1].low || sides[i].high != sides[i + 1].high) continue;
       Triangle &s = star_[sides[i].triangle], &t = star_[sides[i + 1].triangle];
@@ -320,6 +339,98 @@ class Sharpener {
       }
       ++i;
     }
+  }
+
+  [[nodiscard]] bool on_crease(std::uint32_t v) const { return v >= owner_.size(); }
+  /// Whether the edge crosses a crease where it has no vertex.
+  [[nodiscard]] bool crosses(std::uint32_t a, std::uint32_t b) const {
+    return !on_crease(a) && !on_crease(b) && owner_[a] != owner_[b];
+  }
+
+  /// Whether a triangle's part at its corner a faces outward when its edge from a to b is cut at x.
+  [[nodiscard]] bool part_faces_out(std::uint32_t a, const Vec3& x, std::uint32_t c, double turn) const {
+    const Vec3& p = mesh_.position[a];
+    const Vec3 normal = crosses(a, c) ? Vec3(mesh_.normal[a] + mesh_.normal[c]) : mesh_.normal[a];
+    return turn * (x - p).cross(mesh_.position[c] - p).dot(normal) > 0.0;
+  }
+
+  /// An edge that crosses a crease still is cut at a point of it, unless a triangle would turn over.
+  void cut_edges() {
+    std::vector<Side> sides;
+    for (std::uint32_t i = 0; i < mesh_.triangle.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = mesh_.triangle[i][k], b = mesh_.triangle[i][(k + 1) % 3];
+        if (crosses(a, b)) sides.push_back({std::min(a, b), std::max(a, b), i});
+      }
+    }
+    std::sort(sides.begin(), sides.end());
+    std::vector<Cut> cuts;
+    for (std::size_t i = 0; i + 1 < sides.size(); i += 2) {
+      const auto [low, high, left] = sides[i];
+      const std::array nodes{std::min(owner_[low], owner_[high]), std::max(owner_[low], owner_[high])};
+      const std::optional<Vec3> x = crease_point(nodes, between(low, high));
+      if (x && can_cut(mesh_.triangle[left], low, high, *x) && can_cut(mesh_.triangle[sides[i + 1].triangle], low, high, *x)) {
+        cuts.push_back({low, high, add_vertex(nodes, *x)});
+      }
+    }
+    std::vector<Triangle> pieces;
+    for (const Triangle& t : mesh_.triangle) cut(t, cuts, pieces);
+    mesh_.triangle = std::move(pieces);
+  }
+
+  /// Where the fields of the nodes of two vertices, taken to be linear, are equal on the edge between them.
+  [[nodiscard]] Vec3 between(std::uint32_t a, std::uint32_t b) const {
+    const Vec3 &p = mesh_.position[a], &q = mesh_.position[b];
+    const FieldView &f = fields_[owner_[a]], &g = fields_[owner_[b]];
+    const double at_p = std::max(f.value(p) - g.value(p), 0.0), at_q = std::max(g.value(q) - f.value(q), 0.0);
+    return at_p + at_q > 0.0 ? Vec3(p + at_p / (at_p + at_q) * (q - p)) : Vec3(0.5 * (p + q));
+  }
+
+  [[nodiscard]] bool can_cut(const Triangle& t, std::uint32_t low, std::uint32_t high, const Vec3& x) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+      if (std::min(a, b) == low && std::max(a, b) == high) return part_faces_out(a, x, c, 1.0) && part_faces_out(b, x, c, -1.0);
+    }
+    return false;
+  }
+
+  /// The parts of a triangle whose edges are cut. The part between two cuts and an edge is halved along its shorter diagonal.
+  void cut(const Triangle& t, std::span<const Cut> cuts, std::vector<Triangle>& out) const {
+    std::array<std::optional<std::uint32_t>, 3> middle;  // of the edges from corner k on
+    for (std::size_t k = 0; k < 3; ++k) middle[k] = middle_of(t[k], t[(k + 1) % 3], cuts);
+    const auto count = std::count_if(middle.begin(), middle.end(), [](const auto& m) { return m.has_value(); });
+    if (count == 0) {
+      out.push_back(t);
+      return;
+    }
+    // Turned so that the only cut edge comes first, or the only whole one last.
+    std::size_t k = 0;
+    while (count == 1 ? !middle[k] : count == 2 && middle[(k + 2) % 3]) ++k;
+    const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3], x = *middle[k];
+    if (count == 1) {
+      out.insert(out.end(), {Triangle{a, x, c}, Triangle{x, b, c}});
+      return;
+    }
+    const std::uint32_t y = *middle[(k + 1) % 3];
+    out.push_back({x, b, y});
+    if (count == 3) {
+      const std::uint32_t z = *middle[(k + 2) % 3];
+      out.insert(out.end(), {Triangle{y, c, z}, Triangle{z, a, x}, Triangle{x, y, z}});
+    } else if ((mesh_.position[a] - mesh_.position[y]).squaredNorm() < (mesh_.position[x] - mesh_.position[c]).squaredNorm()) {
+      out.insert(out.end(), {Triangle{a, x, y}, Triangle{a, y, c}});
+    } else {
+      out.insert(out.end(), {Triangle{x, y, c}, Triangle{a, x, c}});
+    }
+  }
+
+  [[nodiscard]] std::optional<std::uint32_t> middle_of(std::uint32_t a, std::uint32_t b, std::span<const Cut> cuts) const {
+    if (!crosses(a, b)) return std::nullopt;
+    const std::pair edge = std::minmax(a, b);
+    const auto at = std::lower_bound(cuts.begin(), cuts.end(), edge, [](const Cut& c, const auto& e) {
+      return std::tie(c.low, c.high) < std::tie(e.first, e.second);
+    });
+    if (at == cuts.end() || at->low != edge.first || at->high != edge.second) return std::nullopt;
+    return at->vertex;
   }
 
   static constexpr double kBeyond = 1.0;  // [cells]
@@ -352,9 +463,9 @@ bool has_creases(const Field& field) {
   return false;
 }
 
-Mesh march_creases(const Field& field, const Lattice& lattice, const Executor& executor, MarchCounts* counts) {
+Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   const Field::Index& index = field.index();
-  SUPPLE_EXPECTS(index.blend.rule() == BlendRule::Graph);
+  SUPPLE_EXPECTS(index.blend.rule() == BlendRule::Graph && options.refinements == 0 && options.error >= 0.0);
   const Box all = field.surface_box();
   const std::vector<Box> box = node_supports(index);
   std::vector<NodeField> nodes;
@@ -362,8 +473,23 @@ Mesh march_creases(const Field& field, const Lattice& lattice, const Executor& e
     if (!box[k].empty()) nodes.emplace_back(field, k, box[k], all);
   }
   const std::vector<FieldView> views(nodes.begin(), nodes.end());
-  Mesh mesh = march_cubes(field, {.lattice = lattice}, executor, counts);
-  Sharpener(field, views, lattice, executor, mesh).run();
+  MarchCounts local;
+  MarchCounts& count = counts != nullptr ? *counts : local;
+  Mesh mesh;
+  const auto make = [&](const Lattice& lattice) {
+    mesh = march_cubes(field, {.lattice = lattice, .skip = options.skip}, executor, &count);
+    Sharpener(field, views, lattice, executor, mesh).run();
+  };
+  if (options.error == 0.0) {
+    make(options.lattice);
+    return mesh;
+  }
+  const double first = first_cell(field, options.lattice.cell);
+  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+    make({.origin = options.lattice.origin, .cell = spacing_at(first, level)});
+    count.error = centroid_error(field, mesh, executor);
+    return tried(count.error, mesh, count);
+  });
   return mesh;
 }
 

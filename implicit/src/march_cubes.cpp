@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "error_search.h"
 #include "field_index.h"
 #include "march_sampling.h"
 #include "polygonise_block_edges.h"
@@ -124,25 +125,15 @@ CubeMesher& CubeMesher::operator=(CubeMesher&&) noexcept = default;
 
 namespace {
 
-/// Largest distance of the centroids to the surface.
-double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& executor) {
-  constexpr std::size_t kBatch = 512;
-  std::vector<double> largest((mesh.triangle_count() + kBatch - 1) / kBatch, 0.0);
-  executor.for_blocks(mesh.triangle_count(), kBatch, [&](std::size_t begin, std::size_t end) {
-    std::array<Vec3, kBatch> points, gradients;
-    std::array<double, kBatch> values;
-    const std::size_t n = end - begin;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto& t = mesh.triangle[begin + i];
-      points[i] = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
-    }
-    field.evaluate(std::span(points).first(n), std::span(values).first(n), std::span(gradients).first(n));
-    for (std::size_t i = 0; i < n; ++i) {
-      const double slope = gradients[i].norm();
-      if (slope > 0.0) largest[begin / kBatch] = std::max(largest[begin / kBatch], std::abs(values[i]) / slope);
-    }
-  });
-  return largest.empty() ? 0.0 : *std::max_element(largest.begin(), largest.end());
+/// How a mesh of a level is made: triangles are cut, up to twice, before cells get smaller.
+struct LevelPlan {
+  double cell = 0.0;  ///< [m]
+  int refinements = 0;
+};
+LevelPlan plan_of(double first_cell, int level) {
+  constexpr int kRefinements = 2;
+  const int refinements = std::min(level / 2, kRefinements);
+  return {spacing_at(first_cell, level - 2 * refinements), refinements};
 }
 
 }  // namespace
@@ -156,27 +147,17 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
     const Mesh& mesh = impl_->march(field, options.lattice, options.skip, executor, count);
     return options.refinements == 0 ? mesh : impl_->refine(options.refinements, executor, count);
   }
-  constexpr int kRefinements = 2, kHalvings = 6;  // cells of 1/2 to 1/64 of the feature size
-  Lattice lattice = options.lattice;
-  lattice.cell = 0.5 * field.feature_size();
-  double found = 0.0;
-  for (int halving = 0; halving < kHalvings; ++halving, lattice.cell *= 0.5) {
-    const Mesh& mesh = impl_->march(field, lattice, options.skip, executor, count);
-    count.error = found = centroid_error(field, mesh, executor);
-    if (found <= options.error) return mesh;
-    if (found > std::pow(4.0, kRefinements) * options.error) continue;  // a refinement divides errors by four
-    for (int level = 1; level <= kRefinements; ++level) {
-      const Mesh& refined = impl_->refine(level, executor, count);
-      count.error = found = centroid_error(field, refined, executor);
-      if (found <= options.error) return refined;
-    }
-  }
-  throw Error(ErrorKind::Limit, {.place = "",
-                                 .key = "mesh.error",
-                                 .expected = "expected an error of at most " + lattice::three_digits(options.error) + " m",
-                                 .found = lattice::three_digits(found) + " m with cells of " +
-                                          lattice::three_digits(2.0 * lattice.cell) + " m",
-                                 .hint = "allow at least " + lattice::three_digits(1.05 * found) + " m"});
+  const double first = first_cell(field, options.lattice.cell);
+  const Mesh* mesh = nullptr;
+  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+    const LevelPlan plan = plan_of(first, level);
+    const bool same_cells = mesh != nullptr && plan.cell == impl_->cell_lattice.cell;
+    if (!same_cells) mesh = &impl_->march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor, count);
+    if (plan.refinements > 0) mesh = &impl_->refine(plan.refinements, executor, count);
+    count.error = centroid_error(field, *mesh, executor);
+    return tried(count.error, *mesh, count);
+  });
+  return *mesh;
 }
 
 const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor,

@@ -29,8 +29,8 @@ template <class Archive>
 void fields(Archive& archive, MeshingDesc& d) {
   using enum MeshingName;
   const auto only = [&d](const Rule& rule) { return rule.only("method", d.method, {Delaunay}); };
-  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra, to the same error; delaunay refines what bounds them, too); auto: cubes or openvdb, whichever costs less by counts, and vertices on the creases of blending graphs; openvdb: through a grid; delaunay: triangles of guaranteed quality, needs the component supple_cgal");
-  archive("error", d.error, above(0.0, kLength).or_auto(), "largest distance of a triangle's centroid to the surface, for cubes and where objects touch; auto: by the cell");
+  archive("method", d.method, {}, "of objects that touch no other (those that do are divided by tetrahedra, to the same error; delaunay refines what bounds them, too); auto: cubes or openvdb, whichever costs less by counts (cubes with an error), and vertices on the creases of blending graphs, which all other methods cut off within a cell; openvdb: through a grid; delaunay: triangles of guaranteed quality, needs the component supple_cgal");
+  archive("error", d.error, above(0.0, kLength).or_auto(), "largest distance of a triangle's centroid to the surface, for auto, cubes and where objects touch; chooses the cells, none above a stated 'cell', and is refused where what meets it does not fit (8 GB, 1e9 nodes around a body); auto: by the cell");
   archive("angle_deg", d.angle, only(degrees(1.0, 30.0)), "least angle of a triangle");
   archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
   archive("distance", d.distance, only(above(0.0, kLength).or_auto()), "from a triangle's circumcentre to that point; auto: a tenth of the size");

@@ -1,6 +1,7 @@
 // Stage 9: from fields and the contact surface to meshes.
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -74,21 +75,22 @@ implicit::DelaunayOptions delaunay_options(const StageContext& context, const im
 }
 
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
-std::vector<Mesh> divide(const StageContext& context, std::optional<double> error, std::span<const implicit::FieldView> views,
+std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, std::span<const implicit::FieldView> views,
                          const implicit::Lattice& lattice, implicit::PolygoniseCounts& counts) {
   const Executor& executor = context.executor;
-  implicit::Lattice coarsest = lattice;
   if (context.model.meshing.method == MeshingName::Delaunay) {
     implicit::DelaunayReport report;
     std::vector<Mesh> meshes = implicit::delaunay_partition(views, delaunay_options(context, lattice), executor, &report);
     counts.blocks_visited = counts.blocks_present = report.seeds + report.inserted;
     return meshes;
   }
-  if (!error) return implicit::polygonise_partition(views, lattice, executor, &counts);
-  coarsest.cell = views.front().feature_size();
-  for (const implicit::FieldView& view : views) coarsest.cell = std::min(coarsest.cell, view.feature_size());
-  coarsest.cell *= 0.5;
-  return implicit::polygonise_partition_within(views, coarsest, {*error}, executor, &counts);
+  if (group.strictest == nullptr) return implicit::polygonise_partition(views, lattice, executor, &counts);
+  double feature = std::numeric_limits<double>::infinity();
+  for (const implicit::FieldView& view : views) feature = std::min(feature, view.feature_size());
+  const bool stated = group.finest->cell_is_stated && lattice.cell <= 0.5 * feature;
+  const implicit::PartitionError error{.largest = *group.strictest->mesh_error, .cell_is_stated = stated};
+  return implicit::polygonise_partition_within(views, {.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature}, error, executor,
+                                               &counts);
 }
 
 /// The cell fits a thin surface, for which the scene asks by its iso value or its skeleton.
@@ -168,8 +170,7 @@ std::vector<Mesh> divide_some(const StageContext& context, const Division& divis
   std::vector<implicit::FieldView> views;
   for (const std::size_t k : members) views.emplace_back(division.claim[k]);
   implicit::PolygoniseCounts counts;
-  const std::optional<double> error = group.strictest != nullptr ? group.strictest->mesh_error : std::nullopt;
-  std::vector<Mesh> parts = divide(context, error, views, lattice, counts);
+  std::vector<Mesh> parts = divide(context, group, views, lattice, counts);
   lattice.cell = counts.cell;
   profile.visited += counts.blocks_visited;
   profile.present += counts.blocks_present;
@@ -260,13 +261,13 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
   const implicit::Lattice lattice{.origin = Vec3::Zero(), .cell = object.cell};
   const implicit::Field& field = frame.field[i];
   try {
-    const bool automatic = d.method == MeshingName::Auto && !object.mesh_error;
     if (!takes_cubes(d, object, context.bodies[i].skeleton, frame.placed[i].support)) return mesh_otherwise(context, i, lattice, profile, frame);
     implicit::MarchCounts marched;
-    Mesh mesh = automatic && implicit::has_creases(field)
-                    ? implicit::march_creases(field, lattice, context.executor, &marched)
-                    : frame.mesher[i].make(field, {.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip},
-                                           context.executor, &marched);
+    implicit::MarchOptions options{.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip};
+    if (object.mesh_error && !object.cell_is_stated) options.lattice.cell = 0.0;
+    Mesh mesh = d.method == MeshingName::Auto && implicit::has_creases(field)
+                    ? implicit::march_creases(field, options, context.executor, &marched)
+                    : frame.mesher[i].make(field, options, context.executor, &marched);
     search_alone(context, i, marched.cell, bodies, frame, mesh);
     profile.visited += marched.tiles;
     profile.present += 64 * marched.blocks;

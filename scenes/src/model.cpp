@@ -404,6 +404,7 @@ Model build_model(const Scene& scene) {
     ObjectModel& object = model.objects[i];
     const ObjectMeshingDesc& meshing = scene.objects[i].meshing;
     object.own_cell = meshing.cell.has_value();
+    object.cell_is_stated = object.own_cell || scene.output.cell;
     object.own_error = meshing.error.has_value();
     object.mesh_error = meshing.error ? meshing.error : scene.output.meshing.error;
     if (meshing.cell) least_own = std::min(least_own, *meshing.cell);

@@ -21,8 +21,8 @@ constexpr double kApart = 0.3;           // of each of two centres from their mi
 
 /// Two balls along a tilted axis.
 const Vec3 kAxis = Vec3(0.8, 0.36, 0.48);
-Body two_balls(double weight) {
-  Body body = body_of({{wyvill_point(1.0), kApart * kAxis}, {wyvill_point(1.0), -kApart * kAxis}});
+Body two_balls(double weight, double apart = kApart) {
+  Body body = body_of({{wyvill_point(1.0), apart * kAxis}, {wyvill_point(1.0), -apart * kAxis}});
   body.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, weight}}};
   body.place();
   return body;
@@ -52,7 +52,7 @@ CreaseError crease_error(const Mesh& mesh, double cell) {
 TEST(Creases, LieOnTheCircleWhereTwoBallsMeet) {
   const Body body = two_balls(0.0);
   for (const double cell : {0.08, 0.04}) {
-    const Mesh mesh = march_creases(body.field, lattice_of(cell), Executor(2));
+    const Mesh mesh = march_creases(body.field, {.lattice = lattice_of(cell)}, Executor(2));
     const MeshReport report = inspect(mesh);
     EXPECT_TRUE(report.closed && report.oriented);
     EXPECT_EQ(report.components, 1u);
@@ -74,6 +74,71 @@ TEST(Creases, LieOnTheCircleWhereTwoBallsMeet) {
   }
 }
 
+/// Distance to the surface of two balls of kRadius, `apart` from their middle along kAxis, united.
+double distance_to_two_balls(const Vec3& p, double apart) {
+  const double along = p.dot(kAxis), rim = std::sqrt(kRadius * kRadius - apart * apart);
+  const double to_rim = std::hypot(along, (p - along * kAxis).norm() - rim);
+  const Vec3 from = p - std::copysign(apart, along) * kAxis;
+  // The foot on the ball of this side is on the surface where it stays on this side of the middle plane.
+  const double foot = std::copysign(apart, along) + kRadius * from.dot(kAxis) / from.norm();
+  return (foot > 0.0) == (along > 0.0) ? std::min(to_rim, std::abs(from.norm() - kRadius)) : to_rim;
+}
+
+// Beside the crease as elsewhere, the error falls with the square of the cell: no edge crosses the crease without a vertex there.
+TEST(Creases, AreMetToSecondOrder) {
+  for (const double apart : {0.1, 0.3}) {
+    const Body body = two_balls(0.0, apart);
+    for (const double cell : {0.04, 0.02, 0.01}) {
+      const Mesh mesh = march_creases(body.field, {.lattice = lattice_of(cell)}, Executor(2));
+      const MeshReport report = inspect(mesh);
+      EXPECT_TRUE(report.closed && report.oriented);
+      EXPECT_EQ(report.euler_characteristic, 2);
+      EXPECT_EQ(self_intersections(mesh, cell), 0u) << cell;
+      double largest = 0.0;
+      for (const auto& t : mesh.triangle) {
+        largest = std::max(largest, distance_to_two_balls((mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0, apart));
+      }
+      // A triangle with corners on a ball lies within r^2 / (2 R) of it, r its circumradius: below sqrt(3) / 2 cells in a cell.
+      EXPECT_LT(largest, 0.75 * cell * cell / (2.0 * kRadius)) << apart << ' ' << cell;
+    }
+  }
+}
+
+// Both ways, though only the centroids are promised: a chord's middle lies 9/8 times as far as its triangle's centroid, and at the crease the
+// circle bends by kRadius / rim times as much as the balls.
+TEST(Creases, ReachTheErrorThatIsAskedFor) {
+  const Body body = two_balls(0.0);
+  const Vec3 u = kAxis.unitOrthogonal(), v = kAxis.cross(u);
+  const double rim = std::sqrt(kRadius * kRadius - kApart * kApart);
+  std::size_t last = 0;
+  for (const double error : {1e-2, 1e-3, 1e-4}) {
+    MarchCounts counts;
+    const Mesh mesh = march_creases(body.field, {.lattice = lattice_of(0.0), .error = error}, Executor(2), &counts);
+    const MeshReport report = inspect(mesh);
+    EXPECT_TRUE(report.closed && report.oriented);
+    double there = 0.0, back = 0.0;
+    for (const auto& t : mesh.triangle) {
+      there = std::max(there, distance_to_two_balls((mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0, kApart));
+    }
+    EXPECT_LE(there, error);
+    EXPECT_NEAR(there, counts.error, 0.1 * there);
+    EXPECT_GT(there, 0.25 * error);
+    const supple::testing::MeshDistance distance(mesh, counts.cell);
+    for (int i = 0; i < 4000; ++i) {
+      const double angle = 2.399963 * i, z = (kApart + kRadius) * (2.0 * (i + 0.5) / 4000.0 - 1.0);
+      const double across = std::sqrt(std::max(kRadius * kRadius - std::pow(std::abs(z) - kApart, 2), 0.0));
+      const Vec3 turn = std::cos(angle) * u + std::sin(angle) * v;
+      back = std::max({back, distance(z * kAxis + across * turn), distance(rim * turn)});
+    }
+    EXPECT_LE(back, 2.0 * kRadius / rim * error) << error;
+    EXPECT_GT(mesh.triangle_count(), 2 * last);
+    last = mesh.triangle_count();
+  }
+  // A stated cell is the coarsest.
+  const Mesh stated = march_creases(body.field, {.lattice = lattice_of(0.03), .error = 0.1}, Executor(1));
+  EXPECT_EQ(hash_of(stated), hash_of(march_creases(body.field, {.lattice = lattice_of(0.03)}, Executor(1))));
+}
+
 TEST(Creases, AreTheSurfaceOfOtherMeshersForAnyGraph) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     Body body = random_body({.seed = seed, .parts = 8, .half_width = 0.5, .only_points = true});
@@ -86,7 +151,7 @@ TEST(Creases, AreTheSurfaceOfOtherMeshersForAnyGraph) {
     }
     body.place();
     const double cell = 0.03;
-    const Mesh mesh = march_creases(body.field, lattice_of(cell), Executor(1));
+    const Mesh mesh = march_creases(body.field, {.lattice = lattice_of(cell)}, Executor(1));
     const MeshReport report = inspect(mesh);
     EXPECT_TRUE(report.closed && report.oriented) << seed;
     const Mesh plain = polygonise(body.field, lattice_of(cell), Executor(1));
@@ -106,9 +171,9 @@ TEST(Creases, AreTheSurfaceOfOtherMeshersForAnyGraph) {
 
 TEST(Creases, DoNotDependOnThreads) {
   const Body body = two_balls(0.5);
-  const std::uint64_t expected = hash_of(march_creases(body.field, lattice_of(0.05), Executor(1)));
+  const std::uint64_t expected = hash_of(march_creases(body.field, {.lattice = lattice_of(0.05)}, Executor(1)));
   for (const int threads : {2, 8}) {
-    EXPECT_EQ(hash_of(march_creases(body.field, lattice_of(0.05), Executor(threads))), expected);
+    EXPECT_EQ(hash_of(march_creases(body.field, {.lattice = lattice_of(0.05)}, Executor(threads))), expected);
   }
 }
 
@@ -125,7 +190,7 @@ TEST(Creases, AreWhereNodesMeetWithoutBlending) {
   body.skeleton.blend = {};
   body.place();
   EXPECT_FALSE(has_creases(body.field));  // a sum
-  EXPECT_THROW((void)march_creases(body.field, lattice_of(0.1), Executor(1)), ContractViolation);
+  EXPECT_THROW((void)march_creases(body.field, {.lattice = lattice_of(0.1)}, Executor(1)), ContractViolation);
   const Body apart = [] {
     Body far = body_of({{wyvill_point(1.0), Vec3::Zero()}, {wyvill_point(1.0), Vec3(2.5, 0, 0)}});
     far.skeleton.blend = {.rule = BlendRule::Graph};

@@ -1,6 +1,8 @@
 /// `objects[].meshing`: cells and errors of their own, alone and where objects touch.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "supple/core/error.h"
@@ -177,6 +179,45 @@ TEST(ObjectMeshing, ErrorIsOfTheObjectOrOfAllThatTouchIt) {
   const std::vector<Mesh> two = meshes_of(scene_of("error: 2 mm", cubes + ", error: 20 mm}", kTouching));
   const std::vector<Mesh> all = meshes_of(scene_of("", cubes + ", error: 2 mm}", kTouching));
   EXPECT_TRUE(same(two[0], all[0]) && same(two[1], all[1]));
+}
+
+/// Two balls that unite without blending, askew; their surfaces meet on a circle.
+std::string creased(const std::string& meshing) {
+  return "schema: 1\nduration: 1\nobjects:\n  - name: a\n    particles: {arrange: line, count: 2, spacing: 0.6, inertia_radius: .1, axis: [1, .3, .2], "
+         "angle_deg: 17}\n    blend: {rule: graph}\n    skeleton: [{shape: point, kernel: {radius: 1}}]\noutput: {mesh: ply, meshing: {" + meshing + "}}\n";
+}
+
+TEST(ObjectMeshing, ErrorKeepsCreasesUnlessTheyAreNotAskedFor) {
+  Simulation simulation(parse_scene(creased("error: 1 mm"), "test.yaml", "."));
+  const Mesh mesh = simulation.meshes().front();
+  const Vec3 a = simulation.state().particles.position[0], b = simulation.state().particles.position[1];
+  const double radius = 0.454202019, apart = 0.5 * (b - a).norm(), rim = std::sqrt(radius * radius - apart * apart);
+  const auto on_circle = [&](const Mesh& m) {
+    return std::count_if(m.position.begin(), m.position.end(), [&](const Vec3& p) {
+      const double along = (p - 0.5 * (a + b)).dot(b - a) / (2.0 * apart);
+      return std::abs(along) < 1e-8 && std::abs((p - 0.5 * (a + b)).norm() - rim) < 1e-8;
+    });
+  };
+  EXPECT_GT(on_circle(mesh), 20);
+  double largest = 0.0;  // from the ball of the side where a centroid lies, as their surface does but next to the circle
+  for (const auto& t : mesh.triangle) {
+    const Vec3 c = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
+    largest = std::max(largest, std::min(std::abs((c - a).norm() - radius), std::abs((c - b).norm() - radius)));
+  }
+  EXPECT_LE(largest, 1e-3);
+  EXPECT_EQ(on_circle(meshes_of(creased("method: cubes, error: 5 mm")).front()), 0);
+}
+
+TEST(ObjectMeshing, StatedCellIsTheCoarsestThatAnErrorMayTake) {
+  for (const std::string at : {"[3, 0, 0]", kTouching}) {
+    const std::string cell = ", cell: 0.03, meshing: {method: cubes";
+    const std::vector<Mesh> by_cell = meshes_of(scene_of("", cell + "}", at)), both = meshes_of(scene_of("", cell + ", error: 0.1}", at));
+    const std::vector<Mesh> by_error = meshes_of(scene_of("", ", meshing: {method: cubes, error: 0.1}", at));
+    for (const std::size_t k : {0u, 1u}) {
+      EXPECT_TRUE(same(both[k], by_cell[k])) << at << k;
+      EXPECT_LT(by_error[k].triangle_count(), by_cell[k].triangle_count()) << at << k;
+    }
+  }
 }
 
 TEST(ObjectMeshing, AutomaticCellIsByTheObjectsWithoutOne) {

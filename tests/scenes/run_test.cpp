@@ -646,8 +646,11 @@ output: )";
        "ball.yaml:9:44: output.sampling.density: expected at most 1000000000 lattice nodes around the body, found about 8.24e+20 with cells of "
        "2.13e-07 m for a density of 1e+12 [1/m^2]; use cells of at least 0.0021 m, which are a sixth of the spacing, 1.28 / sqrt(density)"},
       {"{mesh: ply, meshing: {error: 1e-12}}",
-       "ball.yaml:9:38: output.meshing.error: expected an error of at most 1e-12 m, found 0.000175 m with cells of 0.0156 m; allow at least "
-       "0.000184 m"}};
+       "ball.yaml:9:38: output.meshing.error: expected an error of at most 1e-12 m, found 0.000155 m with triangles of 0.0156 m, and so many "
+       "that reach it do not fit; allow at least 1.27e-06 m"},
+      {"{mesh: ply, cell: 1 mm, meshing: {error: 1 mm}}",
+       "ball.yaml:9:27: output.cell: expected at most 1000000000 lattice nodes around the body, found about 8.04e+09 with cells of 0.001 m; "
+       "use cells of at least 0.0021 m"}};
   for (const auto& [output, message] : cases) {
     RunOptions o = options();
     o.overwrite = true;

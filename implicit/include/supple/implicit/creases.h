@@ -18,8 +18,9 @@ namespace supple::implicit {
 /// vertex where their fields vanish together, and edges that cross the crease are turned onto it (Kobbelt et al. 2001).
 /// Where that point lies more than half a cell beyond its cell, or a triangle would turn over, the cell stays as it was:
 /// there the crease is cut off as by march_cubes. Closed and oriented. A vertex on a crease has the mean of the normals of
-/// its sides. @pre the rule of the field's blend is Graph
-[[nodiscard]] Mesh march_creases(const Field& field, const Lattice& lattice, const Executor& executor,
+/// its sides. With options.error, cells get smaller by sqrt(2) until it is met, from those on that march_cubes would begin with.
+/// @pre the rule of the field's blend is Graph, options.refinements is 0   @throws Error{Limit} as CubeMesher::make
+[[nodiscard]] Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor,
                                  MarchCounts* counts = nullptr);
 
 }  // namespace supple::implicit

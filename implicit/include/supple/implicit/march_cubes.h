@@ -37,7 +37,7 @@ struct MarchOptions {
   Lattice lattice;
   int refinements = 0;  ///< times that every triangle is cut into four, new vertices moved to the surface; 0..4
   /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
-  /// chosen: cells of half the field's feature size, halved until at most two refinements do, see `make`.
+  /// chosen, with cells of at most half the field's feature size and, if that is stated, lattice.cell; see `make`.
   double error = 0.0;
   /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them. Changes no bit.
   bool skip = true;
@@ -55,10 +55,11 @@ class CubeMesher {
   /// The closed surface F = 0, outward oriented, with the normals of the field; valid until the next call.
   /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges: where
   /// the surface turns by more than a right angle within a cell, as at a neck about to close, refined triangles can fold.
-  /// With options.error, distances are |F| / |grad F|, and a body of separate balls is found whole: half a support is a
-  /// cell that no ball of its surface passes through.
-  /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes, or when cells of
-  /// a 64th of the feature size do not reach options.error.
+  /// With options.error, a body of separate balls is found whole: half a support is a cell that no ball of its surface passes
+  /// through. Triangles get shorter by sqrt(2) until the error is met, first by refinements, twice at most, then by smaller cells.
+  /// Distances are |F| / |grad F|, or by Newton's method where the surface turns within a triangle.
+  /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes; with options.error,
+  /// as soon as no mesh within kMarchNodes nodes and 8 GB is to be expected to reach it.
   const Mesh& make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                    MarchCounts* counts = nullptr);
   /// The next call keeps nothing but memory.

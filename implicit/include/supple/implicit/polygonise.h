@@ -70,11 +70,12 @@ inline constexpr std::uint64_t kMostBlocks = 250'000;
 struct PartitionError {
   double largest = 0.0;             ///< of the centroids of all triangles [m], > 0
   std::string key = "mesh.error";   ///< named when it cannot be reached
+  bool cell_is_stated = false;      ///< the coarsest cell is a wish, and refused as such where it is too small
 };
 
-/// polygonise_partition on the coarsest of the lattices with cells of coarsest.cell, half of that, ... where every centroid lies
-/// within the error of its body's surface, to first order: |D| / |grad D| with D = F_m - max(0, F_j). Bodies still share
-/// their contact bit for bit. @throws Error{Limit} when cells of a 32nd of coarsest.cell do not reach it.
+/// polygonise_partition with cells of coarsest.cell, or smaller by powers of sqrt(2), so that every centroid lies within the error of its
+/// body's surface: |D| / |grad D| with D = F_m - max(0, F_j) where that is smooth, along Newton's steps elsewhere. Bodies still share
+/// their contact bit for bit. @throws Error{Limit} as soon as no mesh within kMostBlocks is to be expected to reach it.
 [[nodiscard]] std::vector<Mesh> polygonise_partition_within(std::span<const FieldView> fields, const Lattice& coarsest,
                                                             const PartitionError& error, const Executor& executor,
                                                             PolygoniseCounts* counts = nullptr);

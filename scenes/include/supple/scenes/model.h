@@ -60,6 +60,7 @@ struct ObjectModel {
   LookDesc look;                          ///< decides which columns its meshes carry
   double cell = 0.0;                      ///< lattice cell of its meshes and grids [m]; 0 without surface
   bool own_cell = false;                  ///< `cell` is asked for by the object itself
+  bool cell_is_stated = false;            ///< by it or by output.cell
   std::optional<double> mesh_error;       ///< that its meshes are made to [m]
   bool own_error = false;                 ///< likewise
 };
