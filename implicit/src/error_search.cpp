@@ -130,9 +130,11 @@ int levels_left(double now, double most, double growth) {
 LevelTry tried(double error, const Mesh& mesh, const MarchCounts& counts) {
   constexpr double kTelling = 10'000.0;  // triangles
   constexpr double kMostBytes = 8e9;
+  // By counts: memory that a mesher keeps from earlier meshes must not decide.
   constexpr double kBytesATriangle = 72.0;  // with its half of a vertex, and what cutting triangles takes
+  constexpr double kBytesATile = 400.0;     // of 4^3 nodes
   const auto triangles = static_cast<double>(mesh.triangle_count());
-  const double bytes = static_cast<double>(counts.bytes) + kBytesATriangle * triangles;
+  const double bytes = kBytesATile * static_cast<double>(counts.tiles) + kBytesATriangle * triangles;
   // Blocks reach half their length beyond the nodes, on average.
   const double along = march::kBlockNodes * (std::cbrt(static_cast<double>(counts.blocks)) - 0.5), nodes = along * along * along;
   return {.error = error,

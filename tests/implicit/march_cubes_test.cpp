@@ -404,6 +404,18 @@ TEST(MarchCubes, ReachesFineErrorsAndHeedsAStatedCell) {
   EXPECT_GT(largest, 2.5e-6);
   const Mesh stated = march_cubes(ball.field, {.lattice = lattice_of(0.05), .error = 0.1}, Executor(2), &counts);
   EXPECT_EQ(hash_of(stated), hash_of(march_cubes(ball.field, {.lattice = lattice_of(0.05)}, Executor(1))));
+  // What it can reach does not depend on what was meshed before.
+  const auto refused = [&](CubeMesher& mesher) -> std::string {
+    try {
+      (void)mesher.make(ball.field, {.lattice = lattice_of(0.0), .error = 1e-12}, Executor(1));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "reached";
+  };
+  CubeMesher fresh, used;
+  (void)used.make(ball.field, {.lattice = lattice_of(0.02), .refinements = 4}, Executor(2));
+  EXPECT_EQ(refused(used), refused(fresh));
   const MarchOptions same{.lattice = lattice_of(0.0), .error = 1e-3};
   EXPECT_EQ(hash_of(march_cubes(ball.field, same, Executor(1))), hash_of(march_cubes(ball.field, same, Executor(3))));
 }
