@@ -6,12 +6,13 @@
 #include "polygonise_partition.h"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
+#include "partition_keep.h"
 #include "polygonise_block_edges.h"
-#include "polygonise_blocks.h"
-#include "polygonise_rims.h"
 #include "supple/core/error.h"
-#include "supple/implicit/polygonise.h"
+#include "supple/implicit/partition_mesher.h"
 
 namespace supple::implicit {
 namespace {
@@ -40,14 +41,14 @@ BodyCount& count_of(std::vector<BodyCount>& counts, std::uint32_t body) {
   return counts.emplace_back(BodyCount{.body = body});
 }
 
-const BlockCoord& coord_of(const LabelledBlock& block) { return block.coord; }
+const BlockCoord& coord_of(const LabelledBlock* block) { return block->coord; }
 
 /// Writes the facets of one block.
 class FacetMaker {
  public:
-  FacetMaker(std::span<const LabelledBlock> blocks, std::size_t self, std::span<const std::uint8_t> has_mesh,
+  FacetMaker(std::span<const LabelledBlock* const> blocks, std::size_t self, std::span<const std::uint8_t> has_mesh,
              std::vector<Facet>& out)
-      : blocks_(blocks), block_(blocks[self]), has_mesh_(has_mesh),
+      : blocks_(blocks), block_(*blocks[self]), has_mesh_(has_mesh),
         neighbour_(upper_neighbours(blocks, self, coord_of)), out_(out),
         next_interior_(block_.first_vertex + block_.edge_count + static_cast<std::uint32_t>(block_.face_key.size())) {}
 
@@ -140,7 +141,7 @@ class FacetMaker {
   [[nodiscard]] const LabelledBlock& owner(const OwnedNode& node) const {
     const std::int64_t at = neighbour_[node.neighbour];
     if (at < 0) missing(node);
-    return blocks_[static_cast<std::size_t>(at)];
+    return *blocks_[static_cast<std::size_t>(at)];
   }
   [[noreturn]] void missing(const OwnedNode& node) const {
     BlockCoord coord = block_.coord;
@@ -185,7 +186,7 @@ class FacetMaker {
                     .faces = static_cast<std::uint16_t>(face[0] | face[1] << 3 | face[2] << 6)});
   }
 
-  std::span<const LabelledBlock> blocks_;
+  std::span<const LabelledBlock* const> blocks_;
   const LabelledBlock& block_;
   std::span<const std::uint8_t> has_mesh_;
   std::array<std::int64_t, 8> neighbour_;
@@ -201,91 +202,117 @@ void for_sides(const Facet& facet, std::span<const std::uint8_t> has_mesh, const
   if (facet.outer != 0 && has_mesh[facet.outer - 1] != 0) use(facet.outer - 1, facet.inner, std::array{v[0], v[2], v[1]});
 }
 
-AllVertices join(std::vector<PartitionVertices>& parts, const Lattice& lattice, PolygoniseCounts& counts) {
-  AllVertices all;
-  std::uint64_t vertices = 0, uses = 0;
-  for (PartitionVertices& part : parts) {
-    for (LabelledBlock& block : part.block) {
-      block.first_vertex += static_cast<std::uint32_t>(vertices);
-      all.block.push_back(std::move(block));
-    }
-    vertices += part.use_end.size();
-    expect_indexable(vertices + uses + part.use.size(), lattice);
-    for (const std::uint32_t end : part.use_end) all.use_end.push_back(end + static_cast<std::uint32_t>(uses));
-    uses += part.use.size();
-    all.use.insert(all.use.end(), part.use.begin(), part.use.end());
-    all.kind.insert(all.kind.end(), part.kind.begin(), part.kind.end());
-    for (Cover cover : part.cover) {
-      cover.vertex += static_cast<std::uint32_t>(vertices - part.use_end.size());
-      all.cover.push_back(cover);
-    }
-    for (Meeting meeting : part.meeting) {
-      meeting.vertex += static_cast<std::uint32_t>(vertices - part.use_end.size());
-      all.meeting.push_back(meeting);
-    }
+/// Numbers the vertices of all blocks and lists them. @param carried  gets the numbers of those that are kept, and which are new
+/// @param keeps  whether the partition is needed after this call
+AllVertices& join(KeptPartition& partition, bool keeps, Carried& carried, const Lattice& lattice, PolygoniseCounts& counts) {
+  AllVertices& all = partition.all;
+  all.clear();
+  std::uint64_t vertices = 0, uses = 0, covers = 0;
+  for (const KeptBlock& block : partition.block) {
+    vertices += block.vertices.use_end.size();
+    uses += block.vertices.use.size();
+    covers += block.vertices.cover.size();
+  }
+  expect_indexable(vertices + uses, lattice);
+  all.use_end.reserve(vertices + covers);  // those on rims follow
+  all.kind.reserve(vertices + covers);
+  all.use.reserve(uses + 3 * covers);
+  carried.number.assign(partition.vertices, kGone);
+  carried.disturbed.assign(vertices, kNew);
+  for (KeptBlock& kept : partition.block) {
+    PartitionVertices& part = kept.vertices;
     counts.nodes += part.counts.nodes;
     counts.residual = std::max(counts.residual, part.counts.residual);
     counts.junctions += part.counts.junctions;
     counts.junctions_moved += part.counts.junctions_moved;
     counts.gaps += part.counts.gaps;
-    part = {};
+    part.counts.nodes = 0;
+    if (part.block.empty()) continue;
+    LabelledBlock& block = part.block.front();
+    const auto first = static_cast<std::uint32_t>(all.use_end.size()), first_use = static_cast<std::uint32_t>(all.use.size());
+    for (std::uint32_t v = 0; !kept.made && v < part.use_end.size(); ++v) {
+      carried.number[block.first_vertex + v] = first + v;
+      carried.disturbed[first + v] = 0;
+    }
+    block.first_vertex = first;
+    all.block.push_back(&block);
+    for (const std::uint32_t end : part.use_end) all.use_end.push_back(end + first_use);
+    all.use.insert(all.use.end(), part.use.begin(), part.use.end());
+    all.kind.insert(all.kind.end(), part.kind.begin(), part.kind.end());
+    for (Cover cover : part.cover) {
+      cover.vertex += first;
+      all.cover.push_back(cover);
+    }
+    for (Meeting meeting : part.meeting) {
+      meeting.vertex += first;
+      all.meeting.push_back(meeting);
+    }
+    if (!keeps) part.use = {};
   }
   return all;
 }
 
-}  // namespace
-
-std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice,
-                                       const Executor& executor, PolygoniseCounts* counts) {
-  PolygoniseCounts local;
-  PolygoniseCounts& count = counts != nullptr ? *counts : local;
-  count = {};
-  std::vector<Box> surface;
-  std::vector<std::uint8_t> has_mesh;
-  for (const FieldView& field : fields) {
-    surface.push_back(field.surface_box());
-    has_mesh.push_back(surface.back().empty() || is_bounded(surface.back()) ? 1 : 0);
+/// Makes the facets of all blocks, or takes those of the last call, and finds vertices at which they differ.
+std::vector<FacetPart> join_facets(KeptPartition& partition, std::span<const ChangedBlock> changed, const AllVertices& all,
+                                   std::span<const std::uint8_t> has_mesh, const Executor& executor, Carried& carried) {
+  std::vector<FacetPart> parts;
+  std::vector<std::uint8_t> made;
+  parts.reserve(all.block.size());
+  for (KeptBlock& block : partition.block) {
+    if (block.vertices.block.empty()) continue;
+    parts.push_back(std::move(block.facets));
+    made.push_back(block.made ? 1 : 0);
   }
-  if (!fields.empty() && std::count(has_mesh.begin(), has_mesh.end(), 1) == 0) {
-    (void)block_range(surface.front(), lattice, 1);  // refuses it
+  carried.same = find_same_parts(changed, all.block);
+  for (const ChangedBlock& block : changed) mark_last(block.facet, true, carried);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (carried.same[i] == 0) mark_last(parts[i].facet, false, carried);
   }
-  const BlockList list = find_label_blocks(fields, surface, lattice, executor, kMostBlocks, count);
-  count.blocks_visited = list.block.size();
-  count.cell = lattice.cell;
-
-  std::vector<PartitionVertices> parts((list.block.size() + kBlocksPerTask - 1) / kBlocksPerTask);
-  executor.for_blocks(list.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
-    Labeller labeller(fields, has_mesh, lattice);
+  executor.for_blocks(parts.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const std::span candidates(list.candidate.data() + list.offset[i], list.offset[i + 1] - list.offset[i]);
-      labeller.take_block(list.block[i], candidates, parts[begin / kBlocksPerTask]);
+      if (carried.same[i] != 0) {
+        renumber(carried.number, parts[i].facet);
+        continue;
+      }
+      parts[i] = {};
+      FacetMaker(all.block, i, has_mesh, parts[i].facet).run();
+      parts[i].facet.shrink_to_fit();
     }
   });
-  AllVertices all = join(parts, lattice, count);
-
-  std::vector<FacetPart> facets((all.block.size() + kBlocksPerTask - 1) / kBlocksPerTask);
-  executor.for_blocks(all.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
-    FacetPart& part = facets[begin / kBlocksPerTask];
-    part.first_block = static_cast<std::uint32_t>(begin);
-    for (std::size_t i = begin; i < end; ++i) {
-      FacetMaker(all.block, i, has_mesh, part.facet).run();
-      part.end.push_back(part.facet.size());
-    }
-  });
-  cut_at_rims(fields, has_mesh, lattice, executor, all, facets, count);
-  std::vector<std::uint32_t> vertex_count(fields.size());
-  for (VertexUse& use : all.use) {
-    if (use.body != kNoBody) use.local = vertex_count[use.body]++;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (carried.same[i] == 0) mark_now(parts[i].facet, made[i] != 0, carried);
   }
-  executor.for_blocks(facets.size(), 1, [&](std::size_t p, std::size_t) {
-    for (const Facet& facet : facets[p].facet) {
-      for_sides(facet, has_mesh, [&](std::uint32_t body, Label, const auto&) { ++count_of(facets[p].body, body).count; });
+  return parts;
+}
+
+/// The number that a use of a vertex has in its body's mesh, with what finds it.
+struct UseNumber {
+  std::uint32_t body;
+  Label other;
+  std::uint32_t local;
+  [[nodiscard]] bool is_for(std::uint32_t of, Label beyond) const { return body == of && (other == kAnyLabel || other == beyond); }
+};
+
+std::vector<Mesh> write_meshes(std::size_t bodies, const AllVertices& all, std::span<FacetPart> parts, std::span<const std::uint8_t> has_mesh,
+                               const Executor& executor) {
+  std::vector<std::uint32_t> vertex_count(bodies);
+  std::vector<UseNumber> number(all.use.size());
+  for (std::size_t u = 0; u < number.size(); ++u) {
+    const VertexUse& use = all.use[u];
+    number[u] = {use.body, use.other, use.body != kNoBody ? vertex_count[use.body]++ : 0};
+  }
+  executor.for_blocks(parts.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      if (!parts[p].body.empty()) continue;  // counted in the last call
+      for (const Facet& facet : parts[p].whole()) {
+        for_sides(facet, has_mesh, [&](std::uint32_t body, Label, const auto&) { ++count_of(parts[p].body, body).count; });
+      }
     }
   });
 
-  std::vector<Mesh> meshes(fields.size());
-  std::vector<std::uint64_t> triangle_count(fields.size());
-  for (FacetPart& part : facets) {
+  std::vector<Mesh> meshes(bodies);
+  std::vector<std::uint64_t> triangle_count(bodies);
+  for (FacetPart& part : parts) {
     for (BodyCount& body : part.body) {
       body.first = triangle_count[body.body];
       triangle_count[body.body] += body.count;
@@ -303,23 +330,110 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
       for (; u < all.use_end[i]; ++u) {
         const VertexUse& use = all.use[u];
         if (use.body == kNoBody) continue;
-        meshes[use.body].position[use.local] = use.position;
-        meshes[use.body].normal[use.local] = use.normal;
-        meshes[use.body].columns[0].values[use.local] = use.contact;
+        const std::uint32_t local = number[u].local;
+        meshes[use.body].position[local] = use.position;
+        meshes[use.body].normal[local] = use.normal;
+        meshes[use.body].columns[0].values[local] = use.contact;
       }
     }
   });
-  executor.for_blocks(facets.size(), 1, [&](std::size_t p, std::size_t) {
-    FacetPart& part = facets[p];
-    for (const Facet& facet : part.facet) {
-      for_sides(facet, has_mesh, [&](std::uint32_t body, Label other, const std::array<std::uint32_t, 3>& v) {
-        std::uint64_t& next = count_of(part.body, body).first;
-        const auto number = [&](std::uint32_t vertex) { return all.use_of(vertex, body, other).local; };
-        meshes[body].triangle[next++] = {number(v[0]), number(v[1]), number(v[2])};
-      });
+  executor.for_blocks(parts.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      for (const Facet& facet : parts[p].whole()) {
+        for_sides(facet, has_mesh, [&](std::uint32_t body, Label other, const std::array<std::uint32_t, 3>& v) {
+          std::uint64_t& next = count_of(parts[p].body, body).first;
+          const auto local = [&](std::uint32_t vertex) {
+            std::uint32_t u = all.first_use(vertex);
+            while (!number[u].is_for(body, other)) ++u;
+            return number[u].local;
+          };
+          meshes[body].triangle[next++] = {local(v[0]), local(v[1]), local(v[2])};
+        });
+      }
     }
   });
   return meshes;
+}
+
+/// Divides space anew where `partition`, of the last call, does not hold; it becomes that of this one, if anything is to be kept.
+std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std::uint64_t> version, const Lattice& lattice,
+                         const Executor& executor, bool keeps, KeptPartition& partition, PolygoniseCounts& count) {
+  count = {};
+  std::vector<Box> surface;
+  std::vector<std::uint8_t> has_mesh;
+  for (const FieldView& field : fields) {
+    surface.push_back(field.surface_box());
+    has_mesh.push_back(surface.back().empty() || is_bounded(surface.back()) ? 1 : 0);
+  }
+  if (!fields.empty() && std::count(has_mesh.begin(), has_mesh.end(), 1) == 0) {
+    (void)block_range(surface.front(), lattice, 1);  // refuses it
+  }
+  const BlockList list = find_label_blocks(fields, surface, lattice, executor, kMostBlocks, count);
+  count.cell = lattice.cell;
+
+  const std::vector<ChangedBlock> changed = take_blocks(partition, list, lattice, version);
+  std::vector<std::uint32_t> to_make;
+  for (std::uint32_t i = 0; i < partition.block.size(); ++i) {
+    if (partition.block[i].made) to_make.push_back(i);
+  }
+  count.blocks_visited = to_make.size();
+  executor.for_blocks(to_make.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+    Labeller labeller(fields, has_mesh, lattice);
+    for (std::size_t i = begin; i < end; ++i) {
+      KeptBlock& block = partition.block[to_make[i]];
+      labeller.take_block(block.coord, block.candidate, block.vertices);
+      block.vertices.use.shrink_to_fit();  // most of what is kept, with facets
+    }
+  });
+  Carried carried;
+  AllVertices& all = join(partition, keeps, carried, lattice, count);
+  std::vector<FacetPart> parts = join_facets(partition, changed, all, has_mesh, executor, carried);
+  cut_at_rims(fields, has_mesh, lattice, executor, all, parts, carried, partition.rims, count);
+  partition.vertices = static_cast<std::uint32_t>(all.use_end.size());
+  std::vector<Mesh> meshes = write_meshes(fields.size(), all, parts, has_mesh, executor);
+  auto part = parts.begin();
+  for (KeptBlock& block : partition.block) {
+    if (!block.vertices.block.empty()) block.facets = std::move(*part++);
+  }
+  return meshes;
+}
+
+}  // namespace
+
+struct PartitionMesher::Impl {
+  KeptPartition kept;
+};
+
+PartitionMesher::PartitionMesher() : impl_(std::make_unique<Impl>()) {}
+PartitionMesher::~PartitionMesher() = default;
+PartitionMesher::PartitionMesher(PartitionMesher&&) noexcept = default;
+PartitionMesher& PartitionMesher::operator=(PartitionMesher&&) noexcept = default;
+
+std::vector<Mesh> PartitionMesher::make(std::span<const FieldView> fields, std::span<const std::uint64_t> version, const Lattice& lattice,
+                                        const Executor& executor, PolygoniseCounts* counts) {
+  SUPPLE_EXPECTS(version.size() == fields.size());
+  PolygoniseCounts local;
+  PolygoniseCounts& count = counts != nullptr ? *counts : local;
+  KeptPartition partition = std::exchange(impl_->kept, {});  // nothing is kept of a call that throws
+  std::vector<Mesh> meshes = divide(fields, version, lattice, executor, true, partition, count);
+  count.bytes = partition.bytes();
+  if (count.bytes <= kMostKeptBytes) {
+    impl_->kept = std::move(partition);
+  } else {
+    count.bytes = 0;
+  }
+  return meshes;
+}
+
+void PartitionMesher::forget() { impl_->kept = {}; }
+
+std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor,
+                                       PolygoniseCounts* counts) {
+  PolygoniseCounts local;
+  std::vector<std::uint64_t> version(fields.size());
+  std::iota(version.begin(), version.end(), std::uint64_t{0});
+  KeptPartition none;
+  return divide(fields, version, lattice, executor, false, none, counts != nullptr ? *counts : local);
 }
 
 }  // namespace supple::implicit

@@ -56,7 +56,6 @@ struct VertexUse {
   std::uint32_t body = 0;
   Label other = kAnyLabel;    ///< beyond the triangles that it is meant for
   std::uint32_t contact = 0;  ///< other body + 1, or 0
-  std::uint32_t local = 0;    ///< index in the body's mesh
   Vec3 normal = Vec3::Zero();
   Vec3 position = Vec3::Zero();  ///< bit-equal for all bodies of a contact; each body's own across a gap
 };
@@ -90,10 +89,10 @@ struct LabelledBlock {
   std::vector<std::uint16_t> lone_key;   ///< of tetrahedra with nodes of two labels and an interior point, ascending
   std::vector<Label> label;              ///< of its nodes, shape [kBlockNodes]
   bool has_junctions = false;            ///< three or more labels in the block
-  std::uint32_t first_vertex = 0;        ///< within its task, then over all blocks
+  std::uint32_t first_vertex = 0;        ///< over all blocks
 };
 
-/// Vertices of the blocks of one task; those of a block follow each other.
+/// Vertices of some blocks; those of a block follow each other.
 struct PartitionVertices {
   std::vector<LabelledBlock> block;
   std::vector<std::uint32_t> use_end;  ///< uses of vertex i end here and begin where those of i - 1 end

@@ -7,6 +7,7 @@
 #include "polygonise_block_edges.h"
 #include "rim_crossings.h"
 #include "rim_facets.h"
+#include "rim_islands.h"
 #include "rim_pieces.h"
 
 namespace supple::implicit::lattice {
@@ -27,12 +28,12 @@ class RimCutter {
         if (is_mixed(facet)) mixed.insert(mixed.end(), facet.vertex.begin(), facet.vertex.end());
       }
       find_loose(mixed);
-      for (const std::uint32_t v : mixed) uncover(v);
+      uncover(mixed);
     } while (!mixed.empty());
   }
 
   /// The same where points on the edges of a facet do not tell how it is cut, where sheets on either side of a third label would cross
-  /// within a tetrahedron, and where more than two of a body would meet in an edge. @return whether there were any
+  /// within a tetrahedron, and, when there are none, where more than two of a body would meet in an edge. @return whether there were any
   bool uncover_tangles() {
     std::vector<std::uint32_t> tangled;
     std::vector<Facet> pieces;
@@ -50,24 +51,32 @@ class RimCutter {
       if (clear && !pieces_.cross(pieces)) continue;
       for (std::size_t f = begin; f < end; ++f) tangled.insert(tangled.end(), facets[f].vertex.begin(), facets[f].vertex.end());
     }
-    if (tangled.empty()) find_crowded(tangled);
+    if (uncover(tangled)) return true;
+    tangled.clear();
+    find_crowded(tangled);
+    return uncover(tangled);
+  }
+
+  /// @return whether any was covered
+  bool uncover(std::span<const std::uint32_t> vertices) {
     bool any = false;
-    for (const std::uint32_t v : tangled) any = uncover(v) || any;
+    for (const std::uint32_t v : vertices) any = uncover(v) || any;
     return any;
   }
 
   void cut(FacetPart& part) const {
-    if (std::none_of(part.facet.begin(), part.facet.end(), [&](const Facet& facet) { return facets_.is_covered(facet); })) return;
-    std::vector<Facet> out;
-    out.reserve(part.facet.size());
+    part.body.clear();
+    part.cut.clear();
+    part.is_cut = std::any_of(part.facet.begin(), part.facet.end(), [&](const Facet& facet) { return facets_.is_covered(facet); });
+    if (!part.is_cut) return;
+    part.cut.reserve(part.facet.size());
     for (const Facet& facet : part.facet) {
       if (facets_.is_covered(facet)) {
-        (void)pieces_.cut(facet, out);
+        (void)pieces_.cut(facet, part.cut);
       } else {
-        out.push_back(facet);
+        part.cut.push_back(facet);
       }
     }
-    part.facet = std::move(out);
   }
 
  private:
@@ -199,7 +208,7 @@ void drop_unused(AllVertices& all, std::span<const FacetPart> parts) {
   std::sort(doubtful.begin(), doubtful.end());
   std::vector<std::uint8_t> used(all.use.size());
   for (const FacetPart& part : parts) {
-    for (const Facet& facet : part.facet) {
+    for (const Facet& facet : part.whole()) {
       for (const std::uint32_t v : facet.vertex) {
         if (all.kind[v] == VertexKind::Edge || !std::binary_search(doubtful.begin(), doubtful.end(), v)) continue;
         for (const VertexUse& use : all.uses_of(v)) {
@@ -215,25 +224,98 @@ void drop_unused(AllVertices& all, std::span<const FacetPart> parts) {
   }
 }
 
+/// Takes what was found at rims to the numbers of this call, without what is gone.
+void renumber(std::span<const std::uint32_t> number, KeptRims& kept) {
+  const auto first = static_cast<std::uint32_t>(number.size() - kept.crossing.size());
+  for (std::uint32_t i = 0; i < kept.crossing.size(); ++i) kept.crossing[i].before = first + i;
+  const auto move = [&](auto& edge) {
+    edge.a = number[edge.a];
+    edge.b = number[edge.b];
+    return edge.a == kGone || edge.b == kGone;
+  };
+  std::erase_if(kept.crossing, move);
+  std::erase_if(kept.twice, move);
+  for (std::uint32_t& v : kept.uncovered) v = number[v];
+  std::erase(kept.uncovered, kGone);
+}
+
+/// Leaves in `kept` what holds in this call.
+void leave_kept(const AllVertices& all, const Carried& carried, const RimIslands& islands, KeptRims& kept) {
+  renumber(carried.number, kept);
+  const auto changed = [&](const auto& edge) { return islands.changed(all.kind[edge.a] == VertexKind::Covered ? edge.a : edge.b); };
+  std::erase_if(kept.crossing, changed);
+  std::erase_if(kept.twice, changed);
+  std::erase_if(kept.uncovered, [&](std::uint32_t v) { return islands.changed(v); });
+}
+
+/// By part: 1 where facets are to be cut, 0 where they are those of the last call and so are their cuts.
+std::vector<std::uint8_t> find_recut(const RimFacets& facets, const Carried& carried) {
+  std::vector<std::uint8_t> recut(facets.parts().size());
+  for (std::size_t p = 0; p < recut.size(); ++p) recut[p] = carried.same[p] == 0 ? 1 : 0;
+  for (const FacetPlace& place : facets.near()) recut[place.part] = 1;
+  return recut;
+}
+
+/// What this call found at rims.
+void keep(const AllVertices& all, const RimCrossings& crossings, std::vector<std::uint32_t> island, KeptRims& kept) {
+  kept = {.crossing = crossings.crossings(), .twice = crossings.twice(), .uncovered = {}, .island = std::move(island)};
+  for (const Cover& cover : all.cover) {
+    if (all.kind[cover.vertex] == VertexKind::Uncovered) kept.uncovered.push_back(cover.vertex);
+  }
+}
+
 }  // namespace
 
 void cut_at_rims(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, const Lattice& lattice,
-                 const Executor& executor, AllVertices& all, std::span<FacetPart> parts, PolygoniseCounts& counts) {
-  if (all.cover.empty()) return;
-  const RimFacets facets(fields, has_mesh, all, parts);
+                 const Executor& executor, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
+                 PolygoniseCounts& counts) {
+  if (all.cover.empty()) {
+    kept = {};
+    for (FacetPart& part : parts) {
+      part.cut.clear();
+      part.is_cut = false;
+    }
+    return;
+  }
+  const RimIslands islands(all, carried, kept.island);
+  const RimFacets facets(fields, has_mesh, all, parts, islands);
+  leave_kept(all, carried, islands, kept);
+  const std::vector<std::uint8_t> recut = find_recut(facets, carried);
+  std::vector<std::uint32_t> island = islands.now(facets);
   RimCrossings crossings(facets, lattice);
   RimCutter cutter(facets, crossings);
   expect_indexable(all.use.size() + 8 * all.cover.size(), lattice);
+  cutter.uncover(kept.uncovered);
   cutter.uncover_mixed();
   for (;;) {  // ends when nothing is covered at the latest
     crossings.find(executor);
-    crossings.add_vertices(counts);
+    crossings.add_vertices();
     if (!cutter.uncover_tangles()) break;
     crossings.remove_vertices();
     cutter.uncover_mixed();
   }
-  executor.for_blocks(parts.size(), 1, [&](std::size_t p, std::size_t) { cutter.cut(parts[p]); });
+  if (!kept.crossing.empty() || !kept.twice.empty()) {
+    crossings.remove_vertices();
+    crossings.add_kept(kept);
+    crossings.add_vertices();
+  }
+  crossings.count(counts);
+  for (std::uint32_t i = 0; i < crossings.crossings().size(); ++i) {
+    const std::uint32_t before = crossings.crossings()[i].before;
+    if (before != kGone) carried.number[before] = crossings.first_vertex() + i;
+  }
+  constexpr std::size_t kPartsPerTask = 16;
+  executor.for_blocks(parts.size(), kPartsPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      if (recut[p] != 0) {
+        cutter.cut(parts[p]);
+        continue;
+      }
+      renumber(carried.number, parts[p].cut);
+    }
+  });
   drop_unused(all, parts);
+  keep(all, crossings, std::move(island), kept);
 }
 
 }  // namespace supple::implicit::lattice

@@ -24,9 +24,8 @@ void RimCrossings::find(const Executor& executor) {
   crossing_.clear();
   twice_.clear();
   for (const FacetPlace& at : facets_.near()) {
-    const FacetPart& part = facets_.parts()[at.part];
-    const Facet& facet = part.facet[at.facet];
-    const auto block = part.first_block + static_cast<std::uint32_t>(std::upper_bound(part.end.begin(), part.end.end(), at.facet) - part.end.begin());
+    const Facet& facet = facets_.facet_at(at);
+    const std::uint32_t block = at.part;
     const auto [low, high] = std::minmax(facet.inner, facet.outer);
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [a, b] = std::minmax(facet.vertex[k], facet.vertex[(k + 1) % 3]);
@@ -63,13 +62,9 @@ void RimCrossings::find(const Executor& executor) {
   sort_crossings();
 }
 
-void RimCrossings::add_vertices(PolygoniseCounts& counts) {
+void RimCrossings::add_vertices() {
   first_ = static_cast<std::uint32_t>(facets_.all().use_end.size());
-  counts.rim_points = counts.rim_points_moved = 0;
   for (const Crossing& c : crossing_) {
-    ++counts.rim_points;
-    if (!c.found.exact) ++counts.rim_points_moved;
-    counts.residual = std::max(counts.residual, c.found.residual);
     add_uses(c.labels, c.found.point);
     facets_.all().use_end.push_back(static_cast<std::uint32_t>(facets_.all().use.size()));
     facets_.all().kind.push_back(VertexKind::Junction);
@@ -80,6 +75,24 @@ void RimCrossings::remove_vertices() {
   facets_.all().use_end.resize(first_);
   facets_.all().kind.resize(first_);
   facets_.all().use.resize(first_ == 0 ? 0 : facets_.all().use_end.back());
+}
+
+void RimCrossings::add_kept(const KeptRims& kept) {
+  const auto merge = [](auto& into, const auto& more) {
+    const auto middle = static_cast<std::ptrdiff_t>(into.size());
+    into.insert(into.end(), more.begin(), more.end());
+    std::inplace_merge(into.begin(), into.begin() + middle, into.end(), [](const auto& x, const auto& y) { return x.key() < y.key(); });
+  };
+  merge(crossing_, kept.crossing);
+  merge(twice_, kept.twice);
+}
+
+void RimCrossings::count(PolygoniseCounts& counts) const {
+  for (const Crossing& c : crossing_) {
+    ++counts.rim_points;
+    if (!c.found.exact) ++counts.rim_points_moved;
+    counts.residual = std::max(counts.residual, c.found.residual);
+  }
 }
 
 std::uint32_t RimCrossings::crossing_of(std::uint32_t v, std::uint32_t w, const std::array<Label, 3>& labels) const {
@@ -158,7 +171,7 @@ void RimCrossings::sort_crossings() {
 }
 
 Simplex RimCrossings::simplex_of(const Crossing& c) const {
-  const BlockCoord& block = facets_.all().block[c.block].coord;
+  const BlockCoord& block = facets_.all().block[c.block]->coord;
   const int cell = c.tetrahedron / 6;
   const std::int64_t x = std::int64_t{kCells} * block[0] + cell % kCells, y = std::int64_t{kCells} * block[1] + cell / kCells % kCells,
                      z = std::int64_t{kCells} * block[2] + cell / (kCells * kCells);

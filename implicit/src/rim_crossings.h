@@ -23,6 +23,7 @@ struct Crossing {
   Label minus = 0, plus = 0;                       ///< F_plus - F_minus changes its sign
   Vec3 here = Vec3::Zero(), there = Vec3::Zero();  ///< from where it is negative, on the interface of the two other labels, or of each
   Junction found{};
+  std::uint32_t before = kGone;  ///< number of its vertex in the last call
 
   [[nodiscard]] auto key() const { return std::tuple(a, b, labels.label); }
 };
@@ -40,6 +41,14 @@ struct TwiceCovered {
   [[nodiscard]] auto key() const { return std::tuple(a, b, low, high); }
 };
 
+/// What one call leaves to the next, in the numbers of its vertices: points on rims, and covered vertices that got one place.
+struct KeptRims {
+  std::vector<Crossing> crossing;     ///< with the places and labels from which they were found left as they were
+  std::vector<TwiceCovered> twice;
+  std::vector<std::uint32_t> uncovered;
+  std::vector<std::uint32_t> island;  ///< by vertex, see rim_islands.h
+};
+
 class RimCrossings {
  public:
   RimCrossings(const RimFacets& facets, const Lattice& lattice) : facets_(facets), lattice_(lattice) {}
@@ -47,8 +56,13 @@ class RimCrossings {
   /// All, anew.
   void find(const Executor& executor);
   /// Vertices at them behind all others, and takes these away.
-  void add_vertices(PolygoniseCounts& counts);
+  void add_vertices();
   void remove_vertices();
+  /// Adds what the last call found, in the numbers of this one. @pre no vertices are added
+  void add_kept(const KeptRims& kept);
+  void count(PolygoniseCounts& counts) const;
+  [[nodiscard]] const std::vector<Crossing>& crossings() const { return crossing_; }
+  [[nodiscard]] const std::vector<TwiceCovered>& twice() const { return twice_; }
   /// The vertex on the edge between two others where three labels meet. @pre there is one
   [[nodiscard]] std::uint32_t crossing_of(std::uint32_t v, std::uint32_t w, const std::array<Label, 3>& labels) const;
   /// The vertex on an edge where a third label meets two for which the edge has no end that is covered, if there is one.

@@ -14,13 +14,15 @@ bool has_edge_of_rims(const AllVertices& all, const Facet& facet) {
 }  // namespace
 
 RimFacets::RimFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all,
-                     std::span<const FacetPart> parts)
+                     std::span<const FacetPart> parts, const RimIslands& islands)
     : fields_(fields), has_mesh_(has_mesh), all_(all), parts_(parts), place_(all.kind.size()) {
   for (std::uint32_t c = 0; c < all.cover.size(); ++c) place_[all.cover[c].vertex] = c;
   for (std::uint32_t m = 0; m < all.meeting.size(); ++m) place_[all.meeting[m].vertex] = m;
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    if (!islands.any_changed(p)) continue;
     for (std::size_t f = 0; f < parts[p].facet.size(); ++f) {
       const FacetPlace at{p, static_cast<std::uint32_t>(f)};
+      if (!islands.changed(parts[p].facet[f])) continue;
       const bool near = is_covered(parts[p].facet[f]);
       if (near) near_.push_back(at);
       if (near || has_edge_of_rims(all, parts[p].facet[f])) beside_.push_back(at);

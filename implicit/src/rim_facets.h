@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "polygonise_rims.h"
+#include "rim_islands.h"
 
 namespace supple::implicit::lattice {
 
@@ -21,7 +22,9 @@ struct FacetPlace {
 
 class RimFacets {
  public:
-  RimFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all, std::span<const FacetPart> parts);
+  /// @param islands  facets of those that are kept are neither near nor beside any
+  RimFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all, std::span<const FacetPart> parts,
+            const RimIslands& islands);
 
   [[nodiscard]] std::span<const FieldView> fields() const { return fields_; }
   [[nodiscard]] AllVertices& all() const { return all_; }

@@ -289,6 +289,52 @@ void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, Place
   }
 }
 
+void add_content(const Skeleton& skeleton, const PlacedSkeleton& placed, ContentWords& words) {
+  // By parts, so that a member that is added cannot be left out.
+  const auto add_kernel = [&](const Kernel& kernel) {
+    const auto& [kind, radius, thickness, slope, iso, shape, floor, tilt, gain, steepest] = kernel;
+    words.add(kind);
+    for (const double x : {radius, thickness, slope, iso, shape, floor, tilt, gain, steepest}) words.add(x);
+  };
+  const auto& [primitives, part_count, iso, blend] = skeleton;
+  words.add(primitives.size());
+  for (const Primitive& primitive : primitives) {
+    const auto& [part, shape, size, offset, kernel, control, taper, exponent, stretch, convolved] = primitive;
+    words.add(part);
+    words.add(shape);
+    words.add(size);
+    words.add(offset);
+    add_kernel(kernel);
+    words.add(control);
+    for (const double x : {taper, exponent[0], exponent[1]}) words.add(x);
+    words.add(stretch);
+    words.add(convolved);
+  }
+  words.add(part_count);
+  words.add(iso);
+  const auto& [rule, node, edges, sharpness, opening] = blend;
+  words.add(rule);
+  words.add(node);
+  words.add(edges.size());
+  for (const auto& [a, b, weight] : edges) {
+    words.add(a);
+    words.add(b);
+    words.add(weight);
+  }
+  words.add(sharpness);
+  words.add(opening);
+  const auto& [position, rotation, support, radius, part] = placed;
+  words.add(position);
+  words.add(rotation);
+  words.add(support.size());
+  for (const auto& [lower, upper] : support) {
+    words.add(lower);
+    words.add(upper);
+  }
+  words.add(radius);
+  words.add(part);
+}
+
 bool well_formed(const Primitive& p) noexcept {
   const auto positive = [](const Vec3& v) { return (v.array() > 0.0).all() && v.allFinite(); };
   if (!(p.kernel.radius > 0.0) || !positive(p.stretch) || !(p.taper > 0.0)) return false;

@@ -389,5 +389,52 @@ TEST(PlaceSkeleton, RefusesPosesThatDoNotFitTheParts) {
   EXPECT_THROW(place_skeleton(skeleton, parts, placed), ContractViolation);
 }
 
+TEST(SkeletonContent, HasEveryMember) {
+  testing::Body body = testing::random_body({.seed = 4, .parts = 2, .every_shape = true});
+  body.skeleton.primitive[0].control = {Vec3(0.1, 0.2, 0.3)};
+  body.skeleton.blend.node = {0, 1};
+  body.skeleton.blend.edge = {{0, 1, 0.5}};
+  body.placed.radius = {0.5};
+  body.placed.part = {1};
+  const auto content = [&] {
+    ContentWords words;
+    add_content(body.skeleton, body.placed, words);
+    return std::vector<std::uint64_t>(words.view().begin(), words.view().end());
+  };
+  std::vector<std::uint64_t> last = content();
+  EXPECT_EQ(content(), last);
+  int changes = 0;
+  const auto changed = [&] {
+    const std::vector<std::uint64_t> now = content();
+    EXPECT_NE(now, last) << "change " << changes;
+    ++changes;
+    last = now;
+  };
+  const auto change = [&](auto& member) {
+    member = static_cast<std::remove_reference_t<decltype(member)>>(static_cast<int>(member) + 1);
+    changed();
+  };
+  Primitive& p = body.skeleton.primitive[0];
+  change(p.part);
+  change(p.shape);
+  change(p.kernel.kind);
+  for (double* x : {&p.size[2], &p.offset.position[1], &p.offset.orientation.z(), &p.control[0][2], &p.taper, &p.exponent[0], &p.exponent[1],
+                    &p.stretch[0], &p.kernel.radius, &p.kernel.thickness, &p.kernel.slope, &p.kernel.iso, &p.kernel.shape, &p.kernel.floor,
+                    &p.kernel.tilt, &p.kernel.gain, &p.kernel.steepest, &body.skeleton.iso, &body.skeleton.blend.edge[0].weight,
+                    &body.skeleton.blend.exponent, &body.skeleton.blend.opening, &body.placed.position[1][0], &body.placed.rotation[1](2, 2),
+                    &body.placed.support[1].lower[0], &body.placed.support[1].upper[2], &body.placed.radius[0]}) {
+    *x = std::nextafter(*x, 10.0);
+    changed();
+  }
+  p.convolved = !p.convolved;
+  changed();
+  change(body.skeleton.part_count);
+  change(body.skeleton.blend.rule);
+  change(body.skeleton.blend.node[1]);
+  change(body.skeleton.blend.edge[0].a);
+  change(body.skeleton.blend.edge[0].b);
+  change(body.placed.part[0]);
+}
+
 }  // namespace
 }  // namespace supple::implicit

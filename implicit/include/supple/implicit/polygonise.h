@@ -33,6 +33,7 @@ struct PolygoniseCounts {
   std::uint64_t rim_points = 0;       ///< vertices where a rim leaves the faces between three different nodes
   std::uint64_t rim_points_moved = 0; ///< of these, not exact: near the rim
   std::uint64_t gaps = 0;             ///< edges across a gap between two bodies that is thinner than a cell
+  std::uint64_t bytes = 0;            ///< that a PartitionMesher keeps
 };
 
 /// Blocks of a mesh: a block takes 25 kB while one is made, 50 kB where bodies touch, 12 GB in all.

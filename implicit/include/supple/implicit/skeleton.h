@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "supple/core/content_versions.h"
 #include "supple/core/types.h"
 #include "supple/implicit/blend.h"
 #include "supple/implicit/kernel.h"
@@ -107,5 +108,8 @@ struct PlacedSkeleton {
 
 /// Stage 2. @param parts  world poses of the body's parts, shape [part_count]
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out);
+
+/// All that a field of them depends on, bit by bit.
+void add_content(const Skeleton& skeleton, const PlacedSkeleton& placed, ContentWords& words);
 
 }  // namespace supple::implicit
