@@ -356,6 +356,26 @@ double ClaimField::gradient_bound(const Box& box) const {
   return steepness(bodies_[body_]) + bulge;
 }
 
+void ClaimField::add_content(const std::function<std::uint64_t(std::uint32_t)>& field, ContentWords& words) const {
+  const auto add_body = [&](std::uint32_t body) {
+    words.add(field(body));
+    words.add(bodies_[body].material.modulus);
+  };
+  add_body(body_);
+  words.add(neighbours_.size());
+  for (const auto& [body, profile] : neighbours_) {
+    add_body(body);
+    for (const double x : {profile.stiffness, profile.height, profile.width}) words.add(x);
+  }
+  words.add(limiting_.size());
+  for (const std::uint32_t body : limiting_) add_body(body);
+  words.add(literal_);
+  words.add(highest_);
+  words.add(rise_);
+  words.add(box_.lower);
+  words.add(box_.upper);
+}
+
 Box ClaimField::surface_box() const { return box_; }
 double ClaimField::feature_size() const { return bodies_[body_].field.feature_size(); }
 

@@ -354,6 +354,36 @@ TEST(LiteralBulge, MayClaimAPointForTwoBodies) {
   EXPECT_LE(both({.attenuation = 0.8, .width = 0.1}), 1e-12);
 }
 
+// A claim is the same as long as its body, the bodies that it bulges around or gives way to, and the bulges are.
+TEST(ClaimField, HasTheContentOfAllThatItDependsOn) {
+  Touching t;
+  Blobs far{{Vec3(9, 0, 0)}, 1.0};
+  t.stage.add(far.field, far.centre, 1e4);
+  std::vector<std::uint64_t> field{10, 11, 12};
+  const auto content = [&](double attenuation) {
+    ContentWords words;
+    ClaimField(t.stage.bodies(), 0, t.stage.surface, {.attenuation = attenuation}).add_content([&](std::uint32_t body) { return field[body]; }, words);
+    return std::vector<std::uint64_t>(words.view().begin(), words.view().end());
+  };
+  const std::vector<std::uint64_t> bulging = content(0.01), plain = content(0.0);
+  EXPECT_EQ(content(0.01), bulging);
+  EXPECT_NE(content(0.02), bulging);
+  field[2] = 13;
+  EXPECT_EQ(content(0.01), bulging);
+  field[1] = 14;
+  EXPECT_NE(content(0.01), bulging);
+  EXPECT_EQ(content(0.0), plain);
+  field[0] = 15;
+  EXPECT_NE(content(0.0), plain);
+  field = {10, 11, 12};
+  t.stage.bodies()[0].material.modulus *= 2.0;
+  EXPECT_NE(content(0.0), plain);
+  t.stage.bodies()[0].material.modulus *= 0.5;
+  t.stage.surface.summary[0].largest_pressure *= 0.5;
+  EXPECT_NE(content(0.01), bulging);
+  EXPECT_EQ(content(0.0), plain);
+}
+
 TEST(ClaimField, IsContinuousWhereBulgesOfSeveralBodiesMeet) {
   // Steps of 1e-5 change a claim by at most its slope times the step: no jump at any surface.
   const Blobs centre({Vec3::Zero()}, 1.0), right({Vec3(0.8, 0, 0)}, 1.0), top({Vec3(0.35, 0.78, 0)}, 1.0);

@@ -3,11 +3,14 @@
 /// meshed and drawn.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "supple/collision/bodies.h"
 #include "supple/collision/contact_surface.h"
+#include "supple/core/content_versions.h"
 
 namespace supple::collision {
 
@@ -60,6 +63,9 @@ class ClaimField {
   [[nodiscard]] double gradient_bound(const Box& box) const;
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
+  /// All that the claim depends on, bit by bit. @param field  a number for the field of a body, by index in `bodies`: equal ones mean
+  /// equal fields
+  void add_content(const std::function<std::uint64_t(std::uint32_t)>& field, ContentWords& words) const;
 
  private:
   struct Neighbour {
