@@ -11,10 +11,12 @@
 #include "supple/collision/find_contacts.h"
 #include "supple/collision/react.h"
 #include "supple/collision/sleep.h"
+#include "supple/core/content_versions.h"
 #include "supple/core/executor.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/march_cubes.h"
+#include "supple/implicit/partition_mesher.h"
 #include "supple/implicit/solids.h"
 #include "supple/scenes/mesh_search.h"
 #include "supple/scenes/model.h"
@@ -28,6 +30,17 @@ struct LedSolid {
   Pose pose;
   Vec3 velocity = Vec3::Zero();
   Vec3 spin = Vec3::Zero();
+};
+
+/// Meshers of bodies that touch, one for each lattice. What they keep holds for any state.
+struct DivisionMeshers {
+  struct OnLattice {
+    double cell = 0.0;
+    bool used = true;  ///< in this frame
+    implicit::PartitionMesher mesher;
+  };
+  std::vector<OnLattice> mesher;
+  ContentVersions fields, claims;
 };
 
 struct Frame {
@@ -44,6 +57,7 @@ struct Frame {
   std::uint64_t bodies_present = 0;           ///< that collide
   std::uint64_t samples_present = 0;          ///< of these
   std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
+  DivisionMeshers dividing;                   ///< keep what does not move of bodies that touch
   SearchCounts missed;                        ///< by the last meshes
   std::vector<std::uint8_t> convex;           ///< 1: a contact body that is convex; shape [bodies + fixed ones]
   std::vector<std::uint8_t> near;             ///< 1: its supports reach another body

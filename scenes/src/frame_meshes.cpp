@@ -74,9 +74,57 @@ implicit::DelaunayOptions delaunay_options(const StageContext& context, const im
   return {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell, .interrupt = context.interrupt};
 }
 
+/// Numbers of the claims of a division, by what they depend on. Meshers of lattices that the last frame did not use are left out.
+std::vector<std::uint64_t> versions_of(const StageContext& context, const Division& division, Frame& frame) {
+  DivisionMeshers& dividing = frame.dividing;
+  std::erase_if(dividing.mesher, [](const auto& on) { return !on.used; });
+  for (auto& on : dividing.mesher) on.used = false;
+  dividing.fields.begin_frame();
+  dividing.claims.begin_frame();
+  std::vector<std::optional<std::uint64_t>> field(division.placed.size());
+  const auto field_of = [&](std::uint32_t body) {
+    if (field[body]) return *field[body];
+    ContentWords words;
+    const std::size_t moving = context.bodies.size();
+    words.add(body < moving);
+    if (body < moving) {
+      implicit::add_content(context.bodies[body].skeleton, frame.placed[body], words);
+    } else {  // what is fixed is the same but for its place
+      words.add(body - moving);
+      words.add(frame.led[body - moving].pose);
+    }
+    return *(field[body] = dividing.fields.of(words.view()));
+  };
+  std::vector<std::uint64_t> version;
+  ContentWords words;
+  for (const collision::ClaimField& claim : division.claim) {
+    words.clear();
+    claim.add_content(field_of, words);
+    version.push_back(dividing.claims.of(words.view()));
+  }
+  return version;
+}
+
+implicit::PartitionMesher& mesher_on(double cell, DivisionMeshers& dividing) {
+  auto on = std::find_if(dividing.mesher.begin(), dividing.mesher.end(), [&](const auto& m) { return m.cell == cell; });
+  if (on == dividing.mesher.end()) on = dividing.mesher.insert(on, {.cell = cell, .used = true, .mesher = {}});
+  on->used = true;
+  return on->mesher;
+}
+
+/// The claims of some bodies, and what may keep their meshes: those of all that share a lattice.
+struct Claims {
+  std::vector<implicit::FieldView> view;
+  std::vector<std::uint64_t> version;
+  implicit::PartitionMesher* mesher = nullptr;  ///< null: nothing is kept
+};
+
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
 std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, std::span<const implicit::FieldView> views,
                          const implicit::Lattice& lattice, implicit::PolygoniseCounts& counts) {
+std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Claims& claims, const implicit::Lattice& lattice,
+                         implicit::PolygoniseCounts& counts) {
+  const std::vector<implicit::FieldView>& views = claims.view;
   const Executor& executor = context.executor;
   if (context.model.meshing.method == MeshingName::Delaunay) {
     implicit::DelaunayReport report;
@@ -91,6 +139,12 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
   const implicit::PartitionError error{.largest = *group.strictest->mesh_error, .cell_is_stated = stated};
   return implicit::polygonise_partition_within(views, {.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature}, error, executor,
                                                &counts);
+  if (claims.mesher != nullptr) return claims.mesher->make(views, claims.version, lattice, executor, &counts);
+  if (group.strictest == nullptr) return implicit::polygonise_partition(views, lattice, executor, &counts);
+  coarsest.cell = views.front().feature_size();
+  for (const implicit::FieldView& view : views) coarsest.cell = std::min(coarsest.cell, view.feature_size());
+  coarsest.cell *= 0.5;
+  return implicit::polygonise_partition_within(views, coarsest, {*group.strictest->mesh_error}, executor, &counts);
 }
 
 /// The cell fits a thin surface, for which the scene asks by its iso value or its skeleton.
@@ -165,12 +219,11 @@ void search_between(const StageContext& context, const Division& division, const
 }
 
 /// The surfaces of some bodies of a group, in their order. @param lattice  whose cell becomes the one that was used
-std::vector<Mesh> divide_some(const StageContext& context, const Division& division, const DivisionGroup& group,
-                              std::span<const std::size_t> members, implicit::Lattice& lattice, StageProfile& profile) {
-  std::vector<implicit::FieldView> views;
-  for (const std::size_t k : members) views.emplace_back(division.claim[k]);
+std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& group, const Claims& claims, implicit::Lattice& lattice,
+                              StageProfile& profile) {
   implicit::PolygoniseCounts counts;
   std::vector<Mesh> parts = divide(context, group, views, lattice, counts);
+  std::vector<Mesh> parts = divide(context, group, claims, lattice, counts);
   lattice.cell = counts.cell;
   profile.visited += counts.blocks_visited;
   profile.present += counts.blocks_present;
@@ -178,22 +231,30 @@ std::vector<Mesh> divide_some(const StageContext& context, const Division& divis
 }
 
 /// The surfaces of the bodies of a group: all at once, but for those that pass through another one.
-void mesh_group(const StageContext& context, const Division& division, const DivisionGroup& group, StageProfile& profile, Frame& frame,
-                std::vector<Mesh>& surfaces) {
+void mesh_group(const StageContext& context, const Division& division, std::span<const std::uint64_t> version, const DivisionGroup& group,
+                StageProfile& profile, Frame& frame, std::vector<Mesh>& surfaces) {
   const double cell = group.finest->cell;
   const implicit::Lattice lattice{.origin = cell * kOffPlanes, .cell = cell};
   implicit::Lattice used = lattice;
-  std::vector<Mesh> parts = divide_some(context, division, group, group.member, used, profile);
+  Claims claims;
+  for (const std::size_t k : group.member) {
+    claims.view.emplace_back(division.claim[k]);
+    claims.version.push_back(version[k]);
+  }
+  const bool keeps = group.strictest == nullptr && context.model.meshing.method != MeshingName::Delaunay;
+  if (keeps) claims.mesher = &mesher_on(cell, frame.dividing);
+  std::vector<Mesh> parts = divide_some(context, group, claims, used, profile);
   search_between(context, division, group, used, frame, parts);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     const std::size_t k = group.member[n];
     if (division.passes(k)) {
-      std::vector<std::size_t> members{k};
+      Claims some;
+      some.view.emplace_back(division.claim[k]);
       for (const std::size_t j : division.others_of(k)) {
-        if (std::binary_search(group.member.begin(), group.member.end(), j)) members.push_back(j);
+        if (std::binary_search(group.member.begin(), group.member.end(), j)) some.view.emplace_back(division.claim[j]);
       }
       implicit::Lattice own = lattice;
-      parts[n] = std::move(divide_some(context, division, group, members, own, profile).front());
+      parts[n] = std::move(divide_some(context, group, some, own, profile).front());
     }
     surfaces[division.body[k]] = std::move(parts[n]);
   }
@@ -202,9 +263,10 @@ void mesh_group(const StageContext& context, const Division& division, const Div
 /// The surfaces of bodies that touch, by body. They are divided together, those that share a lattice; the ground divides
 /// nothing, it is flat and opaque. Pieces of one object are divided where they still overlap.
 void mesh_divided(const StageContext& context, const Division& division, StageProfile& profile, Frame& frame, std::vector<Mesh>& surfaces) {
+  const std::vector<std::uint64_t> version = versions_of(context, division, frame);
   for (const DivisionGroup& group : groups_of(context.model, context.bodies, division)) {
     try {
-      mesh_group(context, division, group, profile, frame, surfaces);
+      mesh_group(context, division, version, group, profile, frame, surfaces);
     } catch (const Error& failure) {
       throw with_keys_of(context.model, failure, group.finest, group.strictest);
     }

@@ -178,6 +178,13 @@ struct Simulation::Impl {
     model.cameras = placed_cameras(scene, seen);
   }
 
+  /// Nothing is pulled; meshers keep what they know, which holds for any state.
+  void renew_pulled() {
+    DivisionMeshers dividing = std::move(pulled.dividing);
+    pulled = Frame(model, bodies);
+    pulled.dividing = std::move(dividing);
+  }
+
   /// Bodies, rules and frames for the present pieces.
   void form_bodies() {
     bodies = make_bodies(model, parted_links(model, state.links, state.broken_for));
@@ -186,7 +193,7 @@ struct Simulation::Impl {
     watch.forget();
     rules = make_body_rules(model, bodies, state.apart);
     frame = Frame(model, bodies);
-    pulled = Frame(model, bodies);
+    renew_pulled();
   }
 
   /// Components of one object that overlap at the start would be driven apart: they meet once they have been apart.
@@ -195,7 +202,7 @@ struct Simulation::Impl {
     pull_contacts();
     if (!note_overlapping(bodies, pulled, model)) return;
     divide_anew();
-    pulled = Frame(model, bodies);
+    renew_pulled();
     drop_results();
   }
 

@@ -1,0 +1,96 @@
+// Meshes of bodies that touch keep from frame to frame what does not move, and no bit tells.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "run_scenes.h"
+
+namespace supple::scenes {
+namespace {
+
+template <class T>
+bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+void expect_same(const std::vector<Mesh>& kept, const std::vector<Mesh>& alone) {
+  ASSERT_EQ(kept.size(), alone.size());
+  for (std::size_t m = 0; m < kept.size(); ++m) {
+    EXPECT_GT(kept[m].triangle_count(), 0u);
+    ASSERT_TRUE(same_bits(kept[m].position, alone[m].position)) << m;
+    ASSERT_TRUE(same_bits(kept[m].normal, alone[m].normal)) << m;
+    ASSERT_TRUE(same_bits(kept[m].triangle, alone[m].triangle)) << m;
+    ASSERT_EQ(kept[m].columns.size(), alone[m].columns.size());
+    for (std::size_t c = 0; c < kept[m].columns.size(); ++c) {
+      ASSERT_TRUE(same_bits(kept[m].columns[c].values, alone[m].columns[c].values)) << m << " " << kept[m].columns[c].name;
+    }
+  }
+}
+
+/// By a simulation that has made no mesh before.
+std::vector<Mesh> meshes_alone(const Scene& scene, const State& state) {
+  Simulation alone(scene, {});
+  alone.restore(State(state));
+  return alone.meshes();
+}
+
+TEST(KeptMeshes, OfAPileAreThoseOfEachFrameMeshedAlone) {
+  const std::vector<std::string> small{"objects.balls.particles.columns=3", "objects.balls.particles.rows=3", "objects.balls.particles.layers=2",
+                                       "objects.balls.particles.at=[0, 0, 0.11]", "output.cell=0.012"};
+  for (const std::vector<std::string>& bulge :
+       {std::vector<std::string>{}, {"contact.bulge=0.4"}, {"contact.bulge=0.4", "contact.bulge_literal=true"}}) {
+    std::vector<std::string> keys = small;
+    keys.insert(keys.end(), bulge.begin(), bulge.end());
+    const Scene scene = library_scene("contacts/pile_rests", keys);
+    Simulation simulation(scene, {.threads = 2});
+    for (const int frame : {3, 4, 5, 6, 8, 30, 31}) {
+      run(simulation, frame);
+      ASSERT_NO_FATAL_FAILURE(expect_same(simulation.meshes(), meshes_alone(scene, simulation.state()))) << frame << " " << bulge.size();
+    }
+  }
+}
+
+// Bulges beside obstacles that are led along depend on where these are.
+TEST(KeptMeshes, OfABeltAndAPressAreThoseOfEachFrameMeshedAlone) {
+  const Scene scene = library_scene("contacts/press_and_belt");
+  Simulation simulation(scene, {.threads = 2});
+  for (const int frame : {2, 3, 20, 21}) {
+    run(simulation, frame);
+    ASSERT_NO_FATAL_FAILURE(expect_same(simulation.meshes(), meshes_alone(scene, simulation.state()))) << frame;
+  }
+}
+
+TEST(KeptMeshes, VisitOnlyWhatMovedAlsoAfterAStateIsRestored) {
+  const std::string text = R"(
+schema: 1
+duration: 1 s
+frame_rate: 10
+objects:
+  - name: balls
+    particles: {arrange: line, count: 12, spacing: 0.19, mass: 0.1}
+    separate: true
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 2e4}
+output: {cell: 0.01}
+)";
+  Simulation simulation = make(text);
+  const auto visited = [&] {
+    const std::uint64_t before = simulation.profile(Stage::Polygonise).visited;
+    (void)simulation.meshes();
+    return simulation.profile(Stage::Polygonise).visited - before;
+  };
+  const std::uint64_t all = visited();
+  EXPECT_GT(all, 100u);
+  State state = simulation.state();
+  simulation.restore(State(state));
+  EXPECT_EQ(visited(), 0u);
+  state.particles.position[6].y() += 0.003;
+  simulation.restore(State(state));
+  const std::uint64_t moved = visited();
+  EXPECT_GT(moved, 0u);
+  EXPECT_LT(moved, all / 3);  // it has a twelfth, and its neighbours reach some of the blocks beside
+  expect_same(simulation.meshes(), meshes_alone(parse_scene(text, "test.yaml", "."), state));
+}
+
+}  // namespace
+}  // namespace supple::scenes
