@@ -4,6 +4,8 @@
 /// outside, and the places nearest to a vertex that Newton's method finds elsewhere.
 ///   partition_bench rims [SETS] [CELL]       vertices of rims and corners beside the exact ones, lengths over the cell
 ///   partition_bench delaunay [SETS] [SIZE]   how many sets hold the angle
+///   partition_bench moved [BALLS] [CELL]     a pile in which some balls move: PartitionMesher beside polygonise_partition, one thread;
+///                                            share is that of the time, blocks_share that of the blocks visited
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -16,8 +18,10 @@
 
 #include "implicit/analytic_fields.h"
 #include "patch_complex.h"
+#include "supple/core/content_versions.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/delaunay.h"
+#include "supple/implicit/partition_mesher.h"
 #include "supple/implicit/polygonise.h"
 
 namespace {
@@ -217,6 +221,72 @@ void delaunay(int sets, double size) {
   }
 }
 
+/// Balls of radius 0.05 that press on their neighbours, a place each in layers of five by five.
+std::vector<testing::Body> pile_of(int count) {
+  testing::Random random(1);
+  std::vector<testing::Body> balls;
+  for (int i = 0; i < count; ++i) {
+    Primitive point;
+    point.kernel = Kernel::gascuel(0.05, 0.075, 10.0);
+    const Vec3 place(i % 5, i / 5 % 5, i / 25);
+    balls.push_back(testing::body_of({{point, 0.097 * place + random.in_box(0.002)}}));
+  }
+  return balls;
+}
+
+void moved(int count, double cell) {
+  constexpr int kFrames = 8;
+  const Lattice lattice{.origin = cell * Vec3(0.382, 0.236, 0.447), .cell = cell};
+  for (const double part : {0.0, 0.01, 0.1, 1.0}) {
+    const int moving = part > 0.0 ? std::max(1, static_cast<int>(std::lround(part * count))) : 0;
+    testing::Random random(2);
+    std::vector<testing::Body> balls = pile_of(count);
+    PartitionMesher mesher;
+    ContentVersions versions;
+    double whole = 0.0, kept = 0.0;
+    std::uint64_t blocks = 0, visited = 0, bytes = 0;
+    bool same = true;
+    for (int frame = 0; frame <= kFrames; ++frame) {
+      std::vector<FieldView> views;
+      std::vector<std::uint64_t> version;
+      versions.begin_frame();
+      for (const testing::Body& ball : balls) {
+        ContentWords words;
+        add_content(ball.skeleton, ball.placed, words);
+        version.push_back(versions.of(words.view()));
+        views.emplace_back(ball.field);
+      }
+      PolygoniseCounts all, counts;
+      const double start = cpu_seconds();
+      const std::vector<Mesh> fresh = polygonise_partition(views, lattice, Executor(1), &all);
+      const double between = cpu_seconds();
+      const std::vector<Mesh> meshes = mesher.make(views, version, lattice, Executor(1), &counts);
+      const double end = cpu_seconds();
+      Hasher hash, fresh_hash;
+      add(meshes, hash);
+      add(fresh, fresh_hash);
+      same = same && hash.value() == fresh_hash.value();
+      if (frame > 0) {  // nothing is kept before it
+        whole += between - start;
+        kept += end - between;
+        blocks += all.blocks_visited;
+        visited += counts.blocks_visited;
+        bytes = counts.bytes;
+      }
+      for (int n = 0; n < moving; ++n) {
+        testing::Body& ball = balls[moving == count ? static_cast<std::size_t>(n) : random.below(static_cast<std::uint32_t>(count))];
+        ball.parts[0].position += random.in_box(0.001);
+        ball.place();
+      }
+    }
+    std::printf("{\"balls\":%d,\"moved\":%d,\"cell\":%g,\"whole_ms\":%.2f,\"moved_ms\":%.2f,\"share\":%.4f,\"blocks\":%.0f,\"blocks_share\":%.4f,"
+                "\"kept_mb\":%.1f,\"same\":%s}\n",
+                count, moving, cell, 1e3 * whole / kFrames, 1e3 * kept / kFrames, kept / whole, static_cast<double>(blocks) / kFrames,
+                static_cast<double>(visited) / static_cast<double>(blocks), 1e-6 * static_cast<double>(bytes), same ? "true" : "false");
+    std::fflush(stdout);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -224,6 +294,8 @@ int main(int argc, char** argv) {
   const int sets = argc > 2 ? std::atoi(argv[2]) : 50;
   if (what == "delaunay") {
     delaunay(sets, argc > 3 ? std::atof(argv[3]) : 0.1);
+  } else if (what == "moved") {
+    moved(argc > 2 ? sets : 100, argc > 3 ? std::atof(argv[3]) : 0.005);
   } else {
     rims(sets, argc > 3 ? std::atof(argv[3]) : 0.05);
   }
