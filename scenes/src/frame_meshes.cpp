@@ -120,8 +120,6 @@ struct Claims {
 };
 
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
-std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, std::span<const implicit::FieldView> views,
-                         const implicit::Lattice& lattice, implicit::PolygoniseCounts& counts) {
 std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Claims& claims, const implicit::Lattice& lattice,
                          implicit::PolygoniseCounts& counts) {
   const std::vector<implicit::FieldView>& views = claims.view;
@@ -132,6 +130,7 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
     counts.blocks_visited = counts.blocks_present = report.seeds + report.inserted;
     return meshes;
   }
+  if (claims.mesher != nullptr) return claims.mesher->make(views, claims.version, lattice, executor, &counts);
   if (group.strictest == nullptr) return implicit::polygonise_partition(views, lattice, executor, &counts);
   double feature = std::numeric_limits<double>::infinity();
   for (const implicit::FieldView& view : views) feature = std::min(feature, view.feature_size());
@@ -139,12 +138,6 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
   const implicit::PartitionError error{.largest = *group.strictest->mesh_error, .cell_is_stated = stated};
   return implicit::polygonise_partition_within(views, {.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature}, error, executor,
                                                &counts);
-  if (claims.mesher != nullptr) return claims.mesher->make(views, claims.version, lattice, executor, &counts);
-  if (group.strictest == nullptr) return implicit::polygonise_partition(views, lattice, executor, &counts);
-  coarsest.cell = views.front().feature_size();
-  for (const implicit::FieldView& view : views) coarsest.cell = std::min(coarsest.cell, view.feature_size());
-  coarsest.cell *= 0.5;
-  return implicit::polygonise_partition_within(views, coarsest, {*group.strictest->mesh_error}, executor, &counts);
 }
 
 /// The cell fits a thin surface, for which the scene asks by its iso value or its skeleton.
@@ -222,7 +215,6 @@ void search_between(const StageContext& context, const Division& division, const
 std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& group, const Claims& claims, implicit::Lattice& lattice,
                               StageProfile& profile) {
   implicit::PolygoniseCounts counts;
-  std::vector<Mesh> parts = divide(context, group, views, lattice, counts);
   std::vector<Mesh> parts = divide(context, group, claims, lattice, counts);
   lattice.cell = counts.cell;
   profile.visited += counts.blocks_visited;
