@@ -86,18 +86,20 @@ bool is_sampled(const ContactBody& body) {
 /// Mean distance of the samples of a body [m]; 0 without samples.
 double sample_spacing(const ContactBody& body) {
   if (body.samples == nullptr) return 0.0;
-  double area = 0.0;
+  // Invalid ones have no area. Four sums, as each waits for its last.
+  const implicit::SurfaceSamples& samples = *body.samples;
+  std::array<double, 4> area{};
   std::size_t count = 0;
-  for (std::size_t s = 0; s < body.samples->point.size(); ++s) {
-    if (body.samples->valid[s] == 0) continue;
-    area += body.samples->area[s];
-    ++count;
+  for (std::size_t s = 0; s < samples.area.size(); ++s) {
+    area[s % 4] += samples.area[s];
+    count += samples.valid[s];
   }
-  return count == 0 ? 0.0 : std::sqrt(area / static_cast<double>(count));
+  return count == 0 ? 0.0 : std::sqrt((area[0] + area[1] + area[2] + area[3]) / static_cast<double>(count));
 }
 
 /// Buffers of one thread.
 struct Scratch {
+  std::vector<std::uint32_t> inside;
   std::vector<Vec3> point;
   std::vector<double> reach;  // how far this sample looks [m]
   std::vector<double> value;
@@ -109,10 +111,20 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
              std::vector<Vec3>& seeds) {
   if (from.samples == nullptr) return;
   const implicit::SurfaceSamples& samples = *from.samples;
+  // Without a branch: which samples lie inside cannot be foreseen.
+  scratch.inside.resize(samples.point.size());
+  const Vec3 lower = box.lower, upper = box.upper;
+  std::size_t count = 0;
+  for (std::uint32_t s = 0; s < samples.point.size(); ++s) {
+    const Vec3& x = samples.point[s];
+    scratch.inside[count] = s;
+    const double beyond_x = std::max(lower[0] - x[0], x[0] - upper[0]), beyond_y = std::max(lower[1] - x[1], x[1] - upper[1]),
+                 beyond_z = std::max(lower[2] - x[2], x[2] - upper[2]);
+    count += static_cast<std::size_t>(std::max(std::max(beyond_x, beyond_y), beyond_z) <= 0.0) & samples.valid[s];
+  }
   scratch.point.clear();
   scratch.reach.clear();
-  for (std::size_t s = 0; s < samples.point.size(); ++s) {
-    if (samples.valid[s] == 0 || !box.contains(samples.point[s])) continue;
+  for (const std::uint32_t s : std::span(scratch.inside).first(count)) {
     scratch.point.push_back(samples.point[s]);
     scratch.reach.push_back(std::max(spacing, std::sqrt(samples.area[s])));
   }

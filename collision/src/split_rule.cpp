@@ -14,7 +14,7 @@ namespace supple::collision {
 namespace {
 
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
-constexpr double kWidestCoarse = 3.3;
+constexpr double kWidestCoarse = 2.4;
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
