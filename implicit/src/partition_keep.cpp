@@ -98,7 +98,7 @@ bool has_vertex(std::span<const Facet> facets, const Is& is) {
 
 template <class T>
 std::uint64_t bytes_of(const std::vector<T>& items) {
-  return items.capacity() * sizeof(T);
+  return items.capacity() * sizeof(T);  // NOLINT: items may be pointers
 }
 
 }  // namespace

@@ -110,7 +110,10 @@ std::string searches_text(const ordered_json& searches) {
   if (searches.contains("unsearched")) {
     for (const auto& [object, meshes] : searches["unsearched"].items()) {
       for (const auto& [why, count] : meshes.items()) {
-        if (count.is_number()) text += line("  %-34s %8.0f", ("meshes of " + object + " not searched, " + why).c_str(), count.get<double>());
+        if (!count.is_number()) continue;
+        std::string what = "meshes of " + object;
+        what += " not searched, " + why;
+        text += line("  %-34s %8.0f", what.c_str(), count.get<double>());
       }
     }
   }

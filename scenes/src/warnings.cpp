@@ -178,8 +178,9 @@ void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeSt
       text += '\'' + object.name + '\'';
     } else {
       const std::string what(name_of(object.volume_of));
-      text += std::to_string(missed) + " of " + std::to_string(object.target.size()) + " volumes by " + what +
-              (missed == 1 ? " is" : " are") + " off, most that of " + what + ' ' + std::to_string(worst) + ", which";
+      text += std::to_string(missed) + " of " + std::to_string(object.target.size()) + " volumes by " + what;
+      text += (missed == 1 ? " is off, most that of " : " are off, most that of ") + what;
+      text += ' ' + std::to_string(worst) + ", which";
     }
     text += " has " + short_text(held.volume) + " m^3 in place of the " + short_text(object.target[worst]) + " m^3 to hold; its kernels ";
     const bool grows = held.volume < object.target[worst];
