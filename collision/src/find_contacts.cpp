@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -101,42 +102,56 @@ double sample_spacing(const ContactBody& body) {
 struct Scratch {
   std::vector<std::uint32_t> inside;
   std::vector<Vec3> point;
-  std::vector<double> reach;  // how far this sample looks [m]
   std::vector<double> value;
   std::vector<Vec3> slope;
 };
+
+/// Samples that are looked at together: one bit of a word each.
+constexpr std::size_t kTogether = 64;
+
+/// Appends the numbers of those of the first kTogether points that are valid and lie in a box.
+void add_inside(std::span<const Vec3> points, const std::uint8_t* valid, const Box& box, std::uint32_t first, std::vector<std::uint32_t>& inside) {
+  const std::size_t count = std::min(points.size(), kTogether);
+  const Vec3 lower = box.lower, upper = box.upper;
+  // Which lie inside cannot be foreseen: no branch until it is known whether there are any.
+  std::array<std::int64_t, kTogether> in;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3& x = points[i];
+    in[i] = (x[0] >= lower[0]) & (x[1] >= lower[1]) & (x[2] >= lower[2]) & (x[0] <= upper[0]) & (x[1] <= upper[1]) & (x[2] <= upper[2]);
+  }
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < count; ++i) bits |= static_cast<std::uint64_t>(in[i] & valid[i]) << i;
+  for (; bits != 0; bits &= bits - 1) inside.push_back(first + static_cast<std::uint32_t>(std::countr_zero(bits)));
+}
 
 /// Appends the samples of `from` in `box` from which the surface of `to` is at most one spacing away.
 void collect(const ContactBody& from, const ContactBody& to, const Box& box, double spacing, Scratch& scratch,
              std::vector<Vec3>& seeds) {
   if (from.samples == nullptr) return;
   const implicit::SurfaceSamples& samples = *from.samples;
-  // Without a branch: which samples lie inside cannot be foreseen.
-  scratch.inside.resize(samples.point.size());
-  const Vec3 lower = box.lower, upper = box.upper;
-  std::size_t count = 0;
-  for (std::uint32_t s = 0; s < samples.point.size(); ++s) {
-    const Vec3& x = samples.point[s];
-    scratch.inside[count] = s;
-    const double beyond_x = std::max(lower[0] - x[0], x[0] - upper[0]), beyond_y = std::max(lower[1] - x[1], x[1] - upper[1]),
-                 beyond_z = std::max(lower[2] - x[2], x[2] - upper[2]);
-    count += static_cast<std::size_t>(std::max(std::max(beyond_x, beyond_y), beyond_z) <= 0.0) & samples.valid[s];
+  scratch.inside.clear();
+  for (std::size_t first = 0; first < samples.point.size(); first += kTogether) {
+    add_inside(std::span(samples.point).subspan(first), samples.valid.data() + first, box, static_cast<std::uint32_t>(first), scratch.inside);
   }
-  scratch.point.clear();
-  scratch.reach.clear();
-  for (const std::uint32_t s : std::span(scratch.inside).first(count)) {
-    scratch.point.push_back(samples.point[s]);
-    scratch.reach.push_back(std::max(spacing, std::sqrt(samples.area[s])));
+  const std::size_t count = scratch.inside.size();
+  scratch.point.resize(count);
+  scratch.value.resize(count);
+  scratch.slope.resize(count);
+  const std::span<const std::uint32_t> inside(scratch.inside);
+  const std::span<Vec3> point(scratch.point), slope(scratch.slope);
+  const std::span<double> value(scratch.value);
+  for (std::size_t i = 0; i < count; ++i) point[i] = samples.point[inside[i]];
+  to.field.evaluate(point, value, slope);
+  // Which are near cannot be foreseen either. Distances by their squares: f > - reach |grad f|.
+  std::size_t kept = seeds.size();
+  seeds.resize(kept + count);
+  const std::span<Vec3> seed(seeds);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double reach2 = std::max(spacing * spacing, samples.area[inside[i]]);
+    seed[kept] = point[i];
+    kept += static_cast<std::size_t>((value[i] > 0.0) | (value[i] * value[i] < reach2 * slope[i].squaredNorm()));
   }
-  scratch.value.resize(scratch.point.size());
-  scratch.slope.resize(scratch.point.size());
-  to.field.evaluate(scratch.point, scratch.value, scratch.slope);
-  for (std::size_t s = 0; s < scratch.point.size(); ++s) {
-    const double slope = scratch.slope[s].norm();
-    if (scratch.value[s] > 0.0 || (slope > 0.0 && scratch.value[s] > -scratch.reach[s] * slope)) {
-      seeds.push_back(scratch.point[s]);
-    }
-  }
+  seeds.resize(kept);
 }
 
 /// Between two convex bodies.
