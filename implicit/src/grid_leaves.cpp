@@ -1,0 +1,160 @@
+#include "grid_leaves.h"
+
+#include "supple/core/error.h"
+
+namespace supple::implicit::gridding {
+
+using namespace lattice;
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+
+namespace {
+
+Coord first_voxel(const BlockCoord& block) { return {kCells * block[0], kCells * block[1], kCells * block[2]}; }
+
+}  // namespace
+
+SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, const BlockCoord& block) {
+  std::array<Vec3, kLeafVoxels> points;
+  std::array<double, kLeafVoxels> values{};
+  std::array<Vec3, kLeafVoxels> gradients;
+  const Coord origin = first_voxel(block);
+  for (openvdb::Index n = 0; n < kLeafVoxels; ++n) {
+    const Coord at = origin + Leaf::offsetToLocalCoord(n);
+    points[n] = node_position(options.lattice, at.x(), at.y(), at.z());
+  }
+  field.evaluate(points, values, gradients);
+  SampledLeaf result;
+  result.leaf = std::make_unique<Leaf>(origin);
+  const double width = options.half_width * options.lattice.cell;
+  for (openvdb::Index n = 0; n < kLeafVoxels; ++n) {
+    const double f = values[n], slope = gradients[n].norm();
+    if (!(std::abs(f) <= width * slope)) {
+      result.leaf->setValueOff(n, f > 0.0 ? 1.0F : -1.0F);  // its side, until the background is known
+      continue;
+    }
+    const double distance = slope > 0.0 ? -f / slope : 0.0;
+    const auto value = static_cast<float>(options.content == GridContent::Field ? f : distance);
+    result.leaf->setValueOn(n, value);
+    result.largest = std::max(result.largest, std::abs(value));
+  }
+  if (result.leaf->onVoxelCount() == 0) {
+    result.inside = values[0] > 0.0;
+    const bool uniform =
+        std::all_of(values.begin(), values.end(), [&](double f) { return (f > 0.0) == result.inside; });
+    if (uniform) result.leaf.reset();
+  }
+  return result;
+}
+
+Verdict look(const FieldView& field, double width, const Box& box) {
+  const Interval value = field.bound(box);
+  const double band = width * field.gradient_bound(box);
+  if (value.lower > band) return Verdict::Inside;
+  if (value.upper < -band) return Verdict::Outside;
+  return Verdict::Keep;
+}
+
+BlockRange range_of(const FieldView& field, const GridOptions& options) {
+  return block_range(field.surface_box(), options.lattice,
+                     static_cast<int>(std::min(std::ceil(options.half_width), 1e6)));
+}
+
+Box box_of(const BlockCoord& block, const Lattice& lattice) {
+  return {node_position(lattice, kCells * block[0], kCells * block[1], kCells * block[2]),
+          node_position(lattice, kCells * block[0] + kCells - 1, kCells * block[1] + kCells - 1, kCells * block[2] + kCells - 1)};
+}
+
+float inside_value(const GridOptions& options, float largest) {
+  const auto width = static_cast<float>(band_of(options));
+  if (options.content == GridContent::SignedDistance) return -width;
+  return largest > 0.0F ? largest : width;
+}
+
+void set_beyond(Leaf& leaf, float inside) {
+  for (auto voxel = leaf.beginValueOff(); voxel; ++voxel) voxel.setValue(*voxel > 0.0F ? inside : -inside);
+}
+
+void fill(FloatTree& tree, const BlockBox& box, float value) {
+  tree.fill({first_voxel(box.lower), first_voxel(box.upper).offsetBy(kCells - 1)}, value, false);
+}
+
+void place(FloatTree& tree, const BlockCoord& block, SampledLeaf& sampled, float inside) {
+  if (sampled.leaf) {
+    tree.addLeaf(sampled.leaf.release());
+  } else {
+    fill(tree, {block, block}, sampled.inside ? inside : -inside);
+  }
+}
+
+std::uint64_t most_leaves(const GridOptions& options) { return std::max<std::uint64_t>(1, options.max_voxels / kLeafVoxels); }
+
+BlockList band_leaves(const BlockRange& range, const GridOptions& options, std::uint32_t bodies, const Executor& executor,
+                      const Decide& decide) {
+  const RefineOptions refine{.limit = most_leaves(options),
+                             .look_factor = 8,  // up to eight for each that is kept
+                             .last_node = kCells - 1,
+                             .keep_inside = true,
+                             .counted = "voxels",
+                             .per_block = kLeafVoxels};
+  return refine_blocks(range, options.lattice, bodies, executor, refine, decide);
+}
+
+BlockList band_leaves(const FieldView& field, const GridOptions& options, const Executor& executor) {
+  const double width = band_of(options);
+  return band_leaves(range_of(field, options), options, 0, executor,
+                     [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) { return look(field, width, box); });
+}
+
+MadeGrid make_whole(const BlockList& list, const GridOptions& options, const Executor& executor,
+                    const std::function<SampledLeaf(std::size_t)>& sample) {
+  openvdb::initialize();
+  const Lattice& lattice = options.lattice;
+  std::vector<SampledLeaf> leaves(list.block.size());
+  executor.for_blocks(leaves.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) leaves[i] = sample(i);
+  });
+  MadeGrid made;
+  made.looked_at = leaves.size();
+  float largest = 0.0F;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    largest = std::max(largest, leaves[i].largest);
+    if (leaves[i].leaf) made.largest.emplace_back(list.block[i], leaves[i].largest);
+  }
+  made.inside = inside_value(options, largest);
+  executor.for_blocks(leaves.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (leaves[i].leaf) set_beyond(*leaves[i].leaf, made.inside);
+    }
+  });
+  executor.run([&] {
+    made.grid = FloatGrid::create(-made.inside);
+    for (const BlockBox& box : list.inside) fill(made.grid->tree(), box, made.inside);
+    for (std::size_t i = 0; i < leaves.size(); ++i) place(made.grid->tree(), list.block[i], leaves[i], made.inside);
+    // One tree for one content: boxes are tiles as large as they can be, whatever the order in which they came.
+    made.grid->tree().prune();
+    made.grid->setName(options.name);
+    made.grid->setGridClass(options.content == GridContent::SignedDistance ? openvdb::GRID_LEVEL_SET
+                                                                           : openvdb::GRID_UNKNOWN);
+    openvdb::math::Transform::Ptr transform = openvdb::math::Transform::createLinearTransform(lattice.cell);
+    transform->postTranslate({lattice.origin.x(), lattice.origin.y(), lattice.origin.z()});
+    made.grid->setTransform(transform);
+    made.grid->insertMeta("units", openvdb::StringMetadata("m"));
+    made.grid->insertMeta("up_axis", openvdb::StringMetadata("z"));
+  });
+  return made;
+}
+
+MadeGrid make_whole(const FieldView& field, const GridOptions& options, const Executor& executor) {
+  SUPPLE_EXPECTS(options.half_width >= 1.0 && std::isfinite(options.half_width));
+  const BlockList list = band_leaves(field, options, executor);
+  return make_whole(list, options, executor, [&](std::size_t i) { return sample_leaf(field, options, list.block[i]); });
+}
+
+bool same(const GridOptions& a, const GridOptions& b) {
+  return a.lattice.origin == b.lattice.origin && a.lattice.cell == b.lattice.cell && a.content == b.content &&
+         a.half_width == b.half_width && a.max_voxels == b.max_voxels && a.name == b.name;
+}
+
+}  // namespace supple::implicit::gridding
