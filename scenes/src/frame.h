@@ -166,6 +166,9 @@ struct Division {
 [[nodiscard]] Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
                               std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface);
 
+/// All that the field of a body depends on, bit by bit; fixed ones follow those that move.
+void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words);
+
 /// Stage 9 on the deformed fields, one mesh an object, with the columns its look needs; of several pieces the meshes lie
 /// side by side in it. @param laws  those that nothing has broken
 [[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,

@@ -85,14 +85,7 @@ std::vector<std::uint64_t> versions_of(const StageContext& context, const Divisi
   const auto field_of = [&](std::uint32_t body) {
     if (field[body]) return *field[body];
     ContentWords words;
-    const std::size_t moving = context.bodies.size();
-    words.add(body < moving);
-    if (body < moving) {
-      implicit::add_content(context.bodies[body].skeleton, frame.placed[body], words);
-    } else {  // what is fixed is the same but for its place
-      words.add(body - moving);
-      words.add(frame.led[body - moving].pose);
-    }
+    add_field_content(context.bodies, frame, body, words);
     return *(field[body] = dividing.fields.of(words.view()));
   };
   std::vector<std::uint64_t> version;
@@ -362,6 +355,17 @@ void find_strangers(const Model& model, const std::vector<Body>& bodies, Divisio
 }
 
 }  // namespace
+
+void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words) {
+  const std::size_t moving = bodies.size();
+  words.add(body < moving);
+  if (body < moving) {
+    implicit::add_content(bodies[body].skeleton, frame.placed[body], words);
+  } else {  // what is fixed is the same but for its place
+    words.add(body - moving);
+    words.add(frame.led[body - moving].pose);
+  }
+}
 
 Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
                      std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface) {

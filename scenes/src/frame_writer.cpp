@@ -118,7 +118,7 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
   if (animation_) add_to_animation(simulation, *meshes);
   if (!files) return;
   if (outputs_.meshes) write_meshes(simulation, *meshes);
-  if (outputs_.grids) write_grid_file(options_.folder, name_, frame, simulation, grids_);
+  if (outputs_.grids) grids_.write(options_.folder, name_, frame, simulation);
   write_tables(simulation);
 }
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "picture.h"
+#include "scene_grids.h"
 #include "scene_samples.h"
 #include "supple/core/io/usd_file.h"
-#include "supple/implicit/surface_grid.h"
 #include "supple/scenes/run.h"
 
 namespace supple::scenes {
@@ -81,7 +81,7 @@ class FrameWriter {
   std::unique_ptr<ScenePictures> pictures_;
   std::unique_ptr<io::UsdAnimation> animation_;
   std::unique_ptr<SceneSamples> samples_;
-  std::vector<implicit::GridUpdater> grids_;  // by body
+  SceneGrids grids_;
   int pictures_drawn_ = 0;
   int images_ = 0;
   double encode_s_ = 0.0;

@@ -2,20 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <deque>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "frame.h"
-#include "scene_places.h"
-#include "supple/collision/deformed_field.h"
 #include "supple/core/cpu_time.h"
-#include "supple/core/error.h"
-#include "supple/implicit/mesh_limits.h"
 
 namespace supple::scenes {
 namespace {
@@ -50,19 +43,6 @@ template <class Use>
 void for_each_file(const fs::path& folder, const Use& use) {
   if (!fs::is_directory(folder)) return;  // throws where that cannot be told
   for (const auto& entry : fs::directory_iterator(folder)) use(entry.path());
-}
-
-/// The claim of a body that others divide, and those that may take of it.
-struct Claims {
-  collision::ClaimField own;
-  std::vector<collision::ClaimField> others;
-};
-
-Claims claims_of(const Division& division, std::uint32_t body) {
-  const auto at = static_cast<std::size_t>(std::lower_bound(division.body.begin(), division.body.end(), body) - division.body.begin());
-  Claims claims{division.claim[at], {}};
-  for (const std::size_t k : division.others_of(at)) claims.others.push_back(division.claim[k]);
-  return claims;
 }
 
 }  // namespace
@@ -126,84 +106,6 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
   for (const char* report : {"result.json", "render.json", "export.json"}) old.push_back(folder / report);
   std::error_code ignored;
   for (const fs::path& path : old) fs::remove(path, ignored);
-}
-
-void write_grid_file(const fs::path& folder, const std::string& name, int frame, Simulation& simulation,
-                     std::vector<implicit::GridUpdater>& updaters) try {
-  const std::vector<Body>& bodies = simulation.bodies();
-  const GriddingDesc& gridding = simulation.scene().output.gridding;
-  const Executor executor(1);
-  implicit::GridOptions options;
-  options.half_width = gridding.half_width;
-  options.content = gridding.content == GridContentName::Field ? implicit::GridContent::Field
-                                                               : implicit::GridContent::SignedDistance;
-  const std::vector<implicit::Field>& fields = simulation.fields();
-  const Division division = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
-  std::vector<const implicit::SurfaceGrid*> grids;
-  std::deque<implicit::SurfaceGrid> deformed;  // of bodies that touch, which no updater knows
-  std::deque<collision::DeformedField> bulging;
-  std::deque<implicit::DepthField> depth;
-  std::vector<implicit::FieldView> united;
-  const bool distance = options.content == implicit::GridContent::SignedDistance;
-  updaters.resize(bodies.size());
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (bodies[i].skeleton.primitive.empty()) continue;
-    options.name = bodies[i].name;
-    const ObjectModel& object = simulation.model().objects[bodies[i].object];
-    options.lattice.cell = object.cell;
-    const bool apart = !std::binary_search(division.body.begin(), division.body.end(), i);
-    const double modulus = division.placed[i].material.modulus;
-    std::optional<Claims> claims;
-    if (!apart) claims = claims_of(division, i);
-    if (gridding.of != GriddedName::Objects) {
-      // With its bulges, but without what others take: that is in the union.
-      const implicit::FieldView whole = apart ? implicit::FieldView(fields[i]) : bulging.emplace_back(claims->own, std::vector<collision::ClaimField>{}, modulus);
-      united.push_back(distance ? implicit::FieldView(depth.emplace_back(whole)) : whole);
-    }
-    if (gridding.of == GriddedName::Scene) continue;
-    try {
-      if (apart) {
-        grids.push_back(&updaters[i].make(fields[i], options, executor));
-      } else if (distance) {
-        const collision::DeformedDepth deep(std::move(claims->own), std::move(claims->others));
-        grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(deep, options, executor)));
-      } else {
-        const collision::DeformedField field(std::move(claims->own), std::move(claims->others), modulus);
-        grids.push_back(&deformed.emplace_back(implicit::make_surface_grid(field, options, executor)));
-      }
-    } catch (const Error& error) {
-      throw with_keys_of(simulation.model(), error, &object, nullptr);
-    }
-  }
-  implicit::SurfaceGrid whole;
-  if (!united.empty()) {
-    options.name = "scene";
-    options.lattice.cell = simulation.cell();
-    whole = implicit::make_surface_grid(implicit::UnitedField(united), options, executor);
-    grids.push_back(&whole);
-  }
-  implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);
-} catch (const Error& error) {
-  rethrow_with_places(simulation.scene(), with_keys_of(simulation.model(), error, nullptr, nullptr));
-}
-
-void expect_grid_sizes(Simulation& simulation, const Executor& executor) try {
-  const std::vector<Body>& bodies = simulation.bodies();
-  const GriddingDesc& gridding = simulation.scene().output.gridding;
-  if (gridding.of == GriddedName::Scene) return;
-  const std::vector<implicit::Field>& fields = simulation.fields();
-  const Division division = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
-    const ObjectModel& object = simulation.model().objects[bodies[i].object];
-    try {
-      implicit::expect_griddable(fields[i], {.lattice = {.cell = object.cell}, .half_width = gridding.half_width}, executor);
-    } catch (const Error& error) {
-      throw with_keys_of(simulation.model(), error, &object, nullptr);
-    }
-  }
-} catch (const Error& error) {
-  rethrow_with_places(simulation.scene(), error);
 }
 
 PictureSize picture_size(const fs::path& path) {

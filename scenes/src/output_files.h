@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "supple/implicit/surface_grid.h"
 #include "supple/render/image.h"
 #include "supple/scenes/simulation.h"
 
@@ -28,11 +27,6 @@ void remove_outputs(const std::filesystem::path& folder, const std::string& name
 /// Removes files of an interrupted run of this scene that never got their names.
 void remove_temporaries(const std::filesystem::path& folder, const std::string& name);
 
-/// @param updaters  by body, kept from frame to frame: only what moved is made anew
-void write_grid_file(const std::filesystem::path& folder, const std::string& name, int frame, Simulation& simulation,
-                     std::vector<implicit::GridUpdater>& updaters);
-/// Of bodies that touch no other. @throws Error{Limit} as write_grid_file
-void expect_grid_sizes(Simulation& simulation, const Executor& executor);
 /// Width and height of a PNG, by its head; zeros of what is none.
 using PictureSize = std::pair<int, int>;
 [[nodiscard]] PictureSize picture_size(const std::filesystem::path& path);

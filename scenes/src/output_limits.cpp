@@ -3,8 +3,8 @@
 #include <functional>
 
 #include "mesh_sizes.h"
-#include "output_files.h"
 #include "picture.h"
+#include "scene_grids.h"
 #include "scene_samples.h"
 
 namespace supple::scenes {

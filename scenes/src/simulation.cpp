@@ -792,6 +792,13 @@ const std::vector<implicit::Field>& Simulation::fields() {
   return impl_->pulled.field;
 }
 
+void Simulation::add_field_content(std::uint32_t body, ContentWords& words) {
+  impl_->pull_fields();
+  impl_->pull_contacts();
+  SUPPLE_EXPECTS(body < impl_->pulled.bodies.size());
+  scenes::add_field_content(impl_->bodies, impl_->pulled, body, words);
+}
+
 const core::Loads& Simulation::contact_loads() {
   impl_->pull_contacts();
   impl_->pulled_sample.internal.force.resize(impl_->model.particles.size(), Vec3::Zero());

@@ -270,6 +270,91 @@ TEST(GridUpdater, MakesEverythingAnewForOtherOptionsIsoOrPrimitives) {
   EXPECT_FALSE(whole());
 }
 
+/// Bodies that come, move and go, each with a number for what it is.
+struct Crowd {
+  struct Member {
+    Body body;
+    std::uint64_t version;
+  };
+  std::vector<Member> member;
+  std::uint64_t next = 0;
+
+  void add(std::uint64_t seed, const Vec3& at) {
+    Body body = random_body({.seed = seed, .parts = 3, .half_width = 0.3, .only_points = seed % 2 == 0});
+    for (Pose& part : body.parts) part.position += at;
+    body.place();
+    member.push_back({std::move(body), next++});
+  }
+  void move(std::size_t i, const Vec3& by) {
+    for (Pose& part : member[i].body.parts) part.position += by;
+    member[i].body.place();
+    member[i].version = next++;
+  }
+  [[nodiscard]] std::vector<DepthField> depths() const {
+    std::vector<DepthField> out;
+    for (const Member& m : member) out.emplace_back(m.body.field);
+    return out;
+  }
+  [[nodiscard]] std::vector<UnitedBody> united(const std::vector<DepthField>& depths) const {
+    std::vector<UnitedBody> out;
+    for (std::size_t i = 0; i < member.size(); ++i) out.push_back({depths[i], member[i].version});
+    return out;
+  }
+};
+
+TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
+  const Folder folder;
+  const GridOptions options = options_of(GridContent::SignedDistance);
+  Crowd crowd;
+  Random random(31);
+  for (std::uint64_t seed = 0; seed < 9; ++seed) crowd.add(seed, random.in_box(1.5));
+  UnionUpdater updater;
+  int kept = 0;
+  for (int step = 0; step < 12; ++step) {
+    if (step % 3 == 0) crowd.move(random.below(static_cast<std::uint32_t>(crowd.member.size())), random.in_box(0.2));
+    if (step == 4) crowd.move(2, Vec3(2.0, 0, 0));  // the box of all gets another one
+    if (step == 5) crowd.member.erase(crowd.member.begin() + 1);
+    if (step == 7) crowd.add(40, random.in_box(1.0));
+    if (step == 8) std::swap(crowd.member[0], crowd.member[3]);
+    if (step == 10) crowd.move(0, crowd.member[4].body.parts[0].position - crowd.member[0].body.parts[0].position);  // into another one
+    const std::vector<DepthField> depths = crowd.depths();
+    GridCounts counts;
+    const SurfaceGrid& grid = updater.make(crowd.united(depths), options, Executor(2), &counts);
+    const SurfaceGrid whole = make_surface_grid(UnitedField({depths.begin(), depths.end()}), options, Executor(1));
+    ASSERT_EQ(grid.hash(), whole.hash()) << step;
+    ASSERT_EQ(content_of(bytes_of(folder, grid)), content_of(bytes_of(folder, whole))) << step;
+    kept += counts.whole ? 0 : 1;
+  }
+  EXPECT_GE(kept, 9);
+}
+
+TEST(UnionUpdater, TouchesOnlyLeavesNearBodiesThatChanged) {
+  GridOptions options = options_of(GridContent::SignedDistance);
+  Crowd crowd;
+  for (std::uint64_t i = 0; i < 20; ++i) crowd.add(2 * i, Vec3(1.5 * static_cast<double>(i), 0, 0));
+  UnionUpdater updater;
+  GridCounts counts;
+  const auto make = [&] {
+    const std::vector<DepthField> depths = crowd.depths();
+    const std::uint64_t hash = updater.make(crowd.united(depths), options, Executor(1), &counts).hash();
+    EXPECT_EQ(hash, make_surface_grid(UnitedField({depths.begin(), depths.end()}), options, Executor(1)).hash());
+  };
+  make();
+  EXPECT_TRUE(counts.whole);
+  const std::uint64_t all = counts.leaves_sampled;
+  make();
+  EXPECT_FALSE(counts.whole);
+  EXPECT_EQ(counts.leaves_sampled, 0u);
+  crowd.move(7, Vec3(0.01, 0, 0));
+  make();
+  EXPECT_FALSE(counts.whole);
+  EXPECT_GT(counts.leaves_sampled, 0u);
+  EXPECT_LT(counts.leaves_sampled, all / 10);
+  options.half_width = 2.0;
+  make();
+  EXPECT_TRUE(counts.whole);
+}
+
 TEST(SurfaceGrid, OfUnitedBodiesHasTheDistanceToTheNearest) {
   const FunctionField left = sphere(kOrigin, 0.4), right = sphere(kOrigin + Vec3(1.5, 0, 0), 0.3);
   const UnitedField both({left, right});

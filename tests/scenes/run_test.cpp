@@ -611,6 +611,37 @@ TEST_F(Run, GridsOfBodiesThatTouchEndWhereTheyDo) {
   }
 }
 
+TEST_F(Run, KeepsOfGridsOnlyWhatIsThatOfAFrameAlone) {
+  scene_.output.images.reset();
+  scene_.output.film.reset();
+  scene_.output.mesh.clear();
+  scene_.output.gridding.of = GriddedName::Both;
+  scene_.output.cell = 0.02;
+  for (ObjectDesc& object : scene_.objects) object.particles.at.x() = object.name == "left" ? -0.25 : 0.25;
+  ObjectDesc far = scene_.objects.front();  // stands still beside them
+  far.name = "far";
+  far.particles.at = Vec3(0.0, 2.0, 0.0);
+  far.particles.velocity = Vec3::Zero();
+  scene_.objects.push_back(far);
+  RunOptions all = options();
+  EXPECT_EQ(run_scene(scene_, all).outcome, "done");
+  int touching = 0;
+  for (int frame = 1; frame <= 5; ++frame) {
+    RunOptions alone = options();
+    alone.folder = folder_ / "alone";
+    alone.overwrite = true;
+    alone.frames = {frame};
+    EXPECT_EQ(run_scene(scene_, alone).outcome, "done");
+    const fs::path name = "grids/drops.000" + std::to_string(frame) + ".vdb";
+    for (const char* grid : {"left", "right", "far", "scene"}) {
+      EXPECT_EQ(implicit::read_grid(folder_ / name, grid).hash(), implicit::read_grid(alone.folder / name, grid).hash()) << grid << ' ' << frame;
+    }
+    touching += implicit::read_grid(folder_ / name, "left").interpolate(Vec3(0.0, 0.0, 0.0)) < 1e-3 ? 1 : 0;
+  }
+  EXPECT_GE(touching, 1);
+  EXPECT_LE(touching, 4);
+}
+
 TEST_F(Run, RefusesGridsOfTooManyVoxelsByTheKeyOfTheScene) {
   scene_.output.images.reset();
   scene_.output.film.reset();

@@ -46,6 +46,7 @@ class SurfaceGrid {
 
  private:
   friend class GridUpdater;
+  friend class UnionUpdater;
   friend SurfaceGrid make_surface_grid(const FieldView&, const GridOptions&, const Executor&);
   friend void write_grids(const std::filesystem::path&, std::span<const SurfaceGrid* const>);
   friend Mesh mesh_of(const SurfaceGrid&, const FieldView&, const Executor&);
@@ -122,6 +123,32 @@ class UnitedField {
 
  private:
   std::vector<FieldView> fields_;
+};
+
+/// A body of a union.
+struct UnitedBody {
+  FieldView depth;            ///< of slope 1, as a DepthField; must outlive the call
+  std::uint64_t version = 0;  ///< no two the same: equal ones, of any calls, mean that the depth is the same bit for bit (core/content_versions.h)
+};
+
+/// Makes the signed distances of several bodies again and again: only leaves are touched that a body may reach which is no longer, or was
+/// not, what it is. The grid is that of `make_surface_grid` of a UnitedField of the depths, in values, in its tree and so in its file.
+class UnionUpdater {
+ public:
+  UnionUpdater();
+  ~UnionUpdater();
+  UnionUpdater(UnionUpdater&&) noexcept;
+  UnionUpdater& operator=(UnionUpdater&&) noexcept;
+
+  /// Valid until the next call. Everything is made anew where options are not those of the last call and where more than half of the
+  /// leaves would change. @pre options.content is SignedDistance
+  /// @throws as make_surface_grid; the next call then makes everything anew
+  const SurfaceGrid& make(std::span<const UnitedBody> bodies, const GridOptions& options, const Executor& executor,
+                          GridCounts* counts = nullptr);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 /// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles cut in two, its vertices projected

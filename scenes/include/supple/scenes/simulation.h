@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "supple/core/content_versions.h"
 #include "supple/core/mesh.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/scenes/mesh_search.h"
@@ -138,6 +139,8 @@ class Simulation {
   [[nodiscard]] const core::Loads& contact_loads();
   /// Fields of the bodies at the current state; valid until the next step.
   [[nodiscard]] const std::vector<implicit::Field>& fields();
+  /// All that the field of one of `contact_bodies` depends on at the current state, bit by bit.
+  void add_field_content(std::uint32_t body, ContentWords& words);
 
   /// Edge of a lattice cell of `meshes` [m], of objects that ask for none of their own.
   [[nodiscard]] double cell() const;
