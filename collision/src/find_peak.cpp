@@ -9,7 +9,6 @@ namespace {
 
 constexpr std::size_t kMostHills = 16;
 constexpr int kMostSteps = 40;
-constexpr double kNearSigma = 0.1;  // gap over the level, where the level is believed
 
 /// What slopes along the axis say. A body so deep in the other that its pressure hardly falls, or rises, from Sigma on has the extent.
 void set_depths(PeakFrame& frame, double fall, double rise, double extent) {
@@ -137,7 +136,7 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
   PeakFrame frame;
   Vec3 x = start;
   double before = -std::numeric_limits<double>::infinity();  // min(p_A, p_B) and |p_A - p_B| at the last point kept
-  double gap_before = 0.0, level_before = 0.0;
+  double gap_before = 0.0;
   Vec3 kept = start, step = Vec3::Zero();
   bool lifted = false;
   batch_.resize(5);
@@ -170,9 +169,8 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     const double fall = -batch_.slope_a[0].dot(axis), rise = batch_.slope_b[0].dot(axis);
     const double w = std::clamp(fall / (fall + rise), 0.0, 1.0);
     const double level = (1.0 - w) * a + w * b;  // p at the foot on Sigma, to first order
-    // Neither up nor nearer to Sigma; along a bent Sigma every good step leaves it a little, but its foot is higher.
-    const bool higher = lower >= before || (level > level_before && gap <= kNearSigma * level);
-    if (!higher && gap > 0.5 * gap_before && step.norm() > 1e-12 * reach) {
+    // Neither up nor nearer to Sigma.
+    if (lower < before && gap > 0.5 * gap_before && step.norm() > 1e-12 * reach) {
       // A long step along a bent Sigma is a good one from where its end has a foot.
       if (!lifted && !convex) {
         x = foot_on_sigma(pressure, x, reach);
@@ -187,7 +185,6 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     kept = x;
     before = lower;
     gap_before = gap;
-    level_before = level;
 
     // Round-off of the pressures, which that of the coordinates adds to.
     const double noise = 16.0 * std::numeric_limits<double>::epsilon() *

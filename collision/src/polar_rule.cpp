@@ -131,9 +131,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       if (iteration >= kFreeRimSteps) (on_sigma > 0.0 ? low_[k] : high_[k]) = radius;
       double next = along < 0.0 ? radius - on_sigma / along : 2.0 * radius;
       next = std::clamp(next, 0.4 * radius, 2.0 * radius);
-      // On faces the pressure falls over the last part of the way alone, and Newton's method errs by the square over that.
-      const double falls = about_middle_ ? std::min(radius, 2.0 * frame_.peak / std::abs(along)) : radius;
-      const bool near = (next - radius) * (next - radius) <= enough * enough * falls * radius;
+      const bool near = (next - radius) * (next - radius) <= enough * enough * radius * radius;
       if (!near && (!(next > low_[k]) || !(next < high_[k]))) {
         next = std::isfinite(high_[k]) ? 0.5 * (low_[k] + high_[k]) : 1.5 * radius;
       }
@@ -148,7 +146,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         if (!(bt > kUpright * norm_b) && !widen_columns(1, gb / -norm_b, radius * e)) return false;
         rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
         // Newton's method leaves about half the square of its last step, which the area feels twice.
-        rim_error_ = std::max(rim_error_, step * step / (falls * radius));
+        rim_error_ = std::max(rim_error_, step * step / (radius * radius));
         if (last_move > 0.0) rim_left_[k] = std::abs(step) / radius * moved_[k] / last_move;
       } else {
         open_[left++] = k;

@@ -514,9 +514,9 @@ TEST(SplitRule, HasBoundsNearItsErrors) {
     EXPECT_LT(ratio[ratio.size() / 2], most);
   };
   const auto of_plate = bounds_over_errors(ball, plate, 0.07, 150, true), of_blobs = bounds_over_errors(a, b, 0.05, 100, true);
-  expect_near(of_plate[0], 90.0);
-  expect_near(of_plate[1], 25.0);
-  expect_near(of_blobs[0], 60.0);
+  expect_near(of_plate[0], 30.0);
+  expect_near(of_plate[1], 20.0);
+  expect_near(of_blobs[0], 30.0);
   expect_near(of_blobs[1], 20.0);
 }
 

@@ -55,14 +55,18 @@ TEST(Islands, DoNotRestWhileTheyGiveWayToTheirLoad) {
 }
 
 TEST(Islands, FallForAWholeStepAtLeastBeforeTheyAreTakenToRest) {
-  // Steps longer than the rule's time: the body falls slowly, and is never held.
-  SleepState state = awake(1);
+  // Steps longer than the rule's time: the first body falls slowly and is never held, the second is carried.
+  SleepState state = awake(2);
   const double dt = 1.0, weight = 0.01;
+  const Vec3 load(0, 0, -weight);
+  Bodies slept;
   for (int step = 1; step <= 8; ++step) {
     const double v = weight * dt * step;
-    EXPECT_TRUE(fall_asleep(kRule, dt, std::vector<BodyMotion>{{.energy = 0.5 * v * v, .velocity = Vec3(0, 0, -v), .load = Vec3(0, 0, -weight)}}, {}, state)
-                    .empty());
+    const std::vector<BodyMotion> motion{{.energy = 0.5 * v * v, .velocity = Vec3(0, 0, -v), .load = load}, {.load = load}};
+    for (const std::uint32_t i : fall_asleep(kRule, dt, motion, {}, state)) slept.push_back(i);
+    EXPECT_EQ(slept.size(), step < 2 ? 0u : 1u) << step;
   }
+  EXPECT_EQ(slept, (Bodies{1}));
 }
 
 TEST(Islands, AreNotJoinedByWhatIsFixed) {
