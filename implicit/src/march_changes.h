@@ -99,6 +99,6 @@ inline void set_sign(Block& block, Bits tiles, bool inside) {
 
 /// The samplers of bodies of Wyvill points, in single precision, and of any field, through its view in double precision.
 [[nodiscard]] std::unique_ptr<Sampler> make_blob_sampler(const Field& field, const Lattice& lattice, bool skip, blobs::BlobGrid& grid);
-[[nodiscard]] std::unique_ptr<Sampler> make_view_sampler(const FieldView& field, const Lattice& lattice);
+[[nodiscard]] std::unique_ptr<Sampler> make_view_sampler(const FieldView& field, const Lattice& lattice, ViewMemory& memory);
 
 }  // namespace supple::implicit::march

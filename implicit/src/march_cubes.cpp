@@ -104,14 +104,14 @@ void refine(const Sampler& sampler, const Lattice& lattice, const Executor& exec
 }  // namespace march
 
 struct CubeMesher::Impl {
-  blobs::BlobGrid grid;
+  march::SamplerMemory memory;
   march::BlockTable table;
   march::MeshScratch scratch;
   Mesh mesh, refined;
   std::unique_ptr<march::Sampler> sampler;  ///< of the last mesh
   Lattice cell_lattice;
   double iso = 0.0;
-  bool kept = false;  ///< table and mesh are those of the grid's last build
+  bool kept = false;  ///< table and mesh are those of the memory
 
   const Mesh& march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
   /// The last mesh, refined.
@@ -152,7 +152,11 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
     const LevelPlan plan = plan_of(first, level);
     const bool same_cells = mesh != nullptr && plan.cell == impl_->cell_lattice.cell;
-    if (!same_cells) mesh = &impl_->march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor, count);
+    if (!same_cells) {
+      // What still fits is told by counts, and those of a mesh that was kept may be others than of a fresh one.
+      impl_->memory.view.forget();
+      mesh = &impl_->march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor, count);
+    }
     if (plan.refinements > 0) mesh = &impl_->refine(plan.refinements, executor, count);
     count.error = centroid_error(field, *mesh, executor);
     return tried(count.error, *mesh, count);
@@ -164,15 +168,16 @@ const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& latti
                                     MarchCounts& counts) {
   const Field* points = field.as_field();
   const double level = points != nullptr ? points->packed().iso : 0.0;
-  if (!kept || level != iso) grid.forget();
+  const bool single = sampler != nullptr && sampler->single_precision();
+  sampler = march::make_sampler(field, lattice, skip, memory);
+  if (!kept || level != iso || sampler->single_precision() != single) memory.forget();
   kept = false;
   iso = level;
-  sampler = march::make_sampler(field, lattice, skip, grid);
   sampler->prepare(executor, table);
   table.begin_call();
   sampler->sample(executor, table);
   march::assemble(table, *sampler, lattice, executor, scratch, mesh);
-  kept = sampler->single_precision();
+  kept = true;
   cell_lattice = lattice;
   counts = {};
   counts.blocks = table.block.size();
@@ -186,7 +191,7 @@ const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& latti
   counts.tiles = table.held.tiles;
   counts.nodes = blobs::kTileNodes * counts.tiles;
   counts.bytes = table.held.bytes;
-  counts.bytes += scratch.bytes() + grid.bytes();
+  counts.bytes += scratch.bytes() + memory.bytes();
   return mesh;
 }
 
@@ -208,8 +213,8 @@ Mesh march_cubes(const FieldView& field, const MarchOptions& options, const Exec
 }
 
 void expect_marchable(const FieldView& field, const Lattice& lattice, const Executor& executor) {
-  blobs::BlobGrid grid;
-  march::make_sampler(field, lattice, true, grid)->expect_size(executor);
+  march::SamplerMemory memory;
+  march::make_sampler(field, lattice, true, memory)->expect_size(executor);
 }
 
 }  // namespace supple::implicit

@@ -15,15 +15,15 @@ namespace supple::implicit::march {
 using blobs::Cells;
 using blobs::kTileNodes;
 
-std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip, blobs::BlobGrid& grid) {
+std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip, SamplerMemory& memory) {
   SUPPLE_EXPECTS(std::isfinite(lattice.cell) && lattice.cell > 0.0 && lattice.origin.allFinite());
   if (const Field* points = field.as_field()) {
     const Field::Index& index = points->packed();
     if (index.size() > 0 && index.uniform && index.primitive[0].kind == PackedKind::PointWyvill && !index.blend.active()) {
-      return make_blob_sampler(*points, lattice, skip, grid);
+      return make_blob_sampler(*points, lattice, skip, memory.grid);
     }
   }
-  return make_view_sampler(field, lattice);
+  return make_view_sampler(field, lattice, memory.view);
 }
 
 float value_at(const BlockTable& table, const Block& block, int x, int y, int z) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "march_leaves.h"
 #include "march_tiles.h"
 #include "supple/core/executor.h"
 #include "supple/implicit/field_view.h"
@@ -39,11 +40,21 @@ class Sampler {
   [[nodiscard]] virtual bool single_precision() const = 0;
 };
 
+/// What samplers keep from call to call.
+struct SamplerMemory {
+  blobs::BlobGrid grid;  ///< of a body of Wyvill points
+  ViewMemory view;       ///< of any other
+  void forget() {
+    grid.forget();
+    view.forget();
+  }
+  [[nodiscard]] std::size_t bytes() const { return grid.bytes() + view.bytes(); }
+};
+
 /// In single precision for a body of Wyvill points, through the view for any other.
-/// @param grid  kept by the caller, for its memory
-/// @param skip  whether sums may end early where they are sure to be inside
-[[nodiscard]] std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip,
-                                                    blobs::BlobGrid& grid);
+/// @param memory  kept by the caller
+/// @param skip    whether sums may end early where they are sure to be inside
+[[nodiscard]] std::unique_ptr<Sampler> make_sampler(const FieldView& field, const Lattice& lattice, bool skip, SamplerMemory& memory);
 
 /// F at a node of the block or of one beyond its upper faces, 0 where only the sign is known. @pre 0 <= x, y, z <= 16
 [[nodiscard]] float value_at(const BlockTable& table, const Block& block, int x, int y, int z);

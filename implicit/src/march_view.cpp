@@ -1,6 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <immintrin.h>
 #include <limits>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "march_changes.h"
 #include "polygonise_block_edges.h"
@@ -29,45 +33,53 @@ Vec3 position_of(const Lattice& lattice, const Block& block, int x, int y, int z
 /// Any field, through its view in double precision.
 class ViewSampler final : public Sampler {
  public:
-  ViewSampler(const FieldView& field, const Lattice& lattice) : field_(field), lattice_(lattice) {}
+  ViewSampler(const FieldView& field, const Lattice& lattice, ViewMemory& memory) : field_(field), lattice_(lattice), memory_(memory) {}
 
   void prepare(const Executor& executor, BlockTable& table) override {
-    Cells lower, upper;
-    if (find_leaves(executor, lower, upper)) {
-      lay_out(table, lower, upper, lattice_);
-    } else {
-      table = {};
+    memory_.compare(field_, lattice_);
+    if (!memory_.all) look_again(executor);
+    if (memory_.all) {
+      leaves_ = find_leaves(executor);
+      memory_.leaf = leaves_.block;
     }
+    if (memory_.leaf.empty()) {
+      table = {};
+      return;
+    }
+    const auto [lower, upper] = nodes_of(memory_.leaf);
+    lay_out(table, lower, upper, lattice_);
   }
 
   void expect_size(const Executor& executor) override {
     // As many leaves in any order have fewer nodes than fit.
     if (lattice::block_range(field_.surface_box(), lattice_, 1).count() <= kMostLeaves) return;
-    Cells lower, upper;
-    if (find_leaves(executor, lower, upper)) expect_nodes(lower, upper, lattice_);
+    const std::vector<BlockCoord> leaves = find_leaves(executor).block;
+    if (leaves.empty()) return;
+    const auto [lower, upper] = nodes_of(leaves);
+    expect_nodes(lower, upper, lattice_);
   }
 
   void sample(const Executor& executor, BlockTable& table) override {
-    for (Block& block : table.block) {
-      block.clear();
-      block.changed = kAll;
+    if (memory_.all) {
+      for (Block& block : table.block) {
+        block.clear();
+        block.changed = kAll;
+      }
+      table.all = true;
+      table.touched.assign(table.block.size(), 1);
+      table.blank.assign(table.block.size(), 0);
+      sign_inside(table);
+    } else {
+      mark_changed(table);
     }
-    table.all = true;
-    table.touched.assign(table.block.size(), 1);
-    table.blank.assign(table.block.size(), 0);
     // By block, so that a block is written by one task.
     std::vector<std::uint8_t> leaves(table.block.size());
-    for (const auto& leaf : leaves_.block) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
+    for (const auto& leaf : memory_.leaf) leaves[table.index(block_of(leaf))] |= static_cast<std::uint8_t>(1u << slot_of(leaf));
     executor.for_blocks(table.block.size(), kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
-      thread_local TileChanges changes;
       for (std::size_t b = begin; b < end; ++b) {
-        if (leaves[b] == 0) continue;
-        changes.begin(table.block[b]);
-        for_bits(leaves[b], [&](unsigned leaf) { sample_leaf(table.block[b], leaf, changes); });
-        changes.apply(table.block[b]);
+        if (table.block[b].changed != 0) sample_block(table.block[b], leaves[b]);
       }
     });
-    sign_inside(table);
   }
 
   void solve(const Executor& executor, const BlockTable& table, std::span<const std::uint32_t> blocks, Mesh& mesh,
@@ -96,25 +108,64 @@ class ViewSampler final : public Sampler {
  private:
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-  /// Fills `leaves_`. @return whether there are any, then with the nodes [lower, upper] that they hold
-  bool find_leaves(const Executor& executor, Cells& lower, Cells& upper) {
+  [[nodiscard]] lattice::BlockList find_leaves(const Executor& executor) const {
     PolygoniseCounts counts;
-    leaves_ = lattice::surface_blocks(field_, lattice_, executor, kMostLeaves, counts);
+    return lattice::surface_blocks(field_, lattice_, executor, kMostLeaves, counts);
+  }
+
+  /// The nodes [lower, upper] that leaves hold.
+  static std::pair<Cells, Cells> nodes_of(std::span<const BlockCoord> leaves) {
+    Cells lower, upper;
     lower.fill(std::numeric_limits<std::int64_t>::max());
     upper.fill(std::numeric_limits<std::int64_t>::min());
-    for (const auto& leaf : leaves_.block) {
+    for (const BlockCoord& leaf : leaves) {
       for (std::size_t k = 0; k < 3; ++k) {
         lower[k] = std::min<std::int64_t>(lower[k], std::int64_t{kLeafNodes} * leaf[k]);
         upper[k] = std::max<std::int64_t>(upper[k], std::int64_t{kLeafNodes} * (leaf[k] + 1));
       }
     }
-    return !leaves_.block.empty();
+    return {lower, upper};
+  }
+
+  [[nodiscard]] lattice::Verdict verdict(const Box& box, const Box& surface) const {
+    if (!surface.overlaps(box)) return lattice::Verdict::Outside;
+    const Interval value = field_.bound(box);
+    if (!(value.upper > 0.0)) return lattice::Verdict::Outside;
+    return value.lower > 0.0 ? lattice::Verdict::Inside : lattice::Verdict::Keep;
+  }
+
+  /// What bounds tell of leaves that something different reaches, block by block. What they told of the others still holds. That they may
+  /// tell more or less of a leaf than in a search from above does not show in the mesh: see `upper_value`.
+  void look_again(const Executor& executor) {
+    looked_ = memory_.changed.leaves();
+    std::stable_sort(looked_.begin(), looked_.end(), [](const BlockCoord& a, const BlockCoord& b) { return lattice::before(block_of(a), block_of(b)); });
+    std::vector<std::size_t> start;
+    for (std::size_t i = 0; i < looked_.size(); ++i) {
+      if (i == 0 || block_of(looked_[i]) != block_of(looked_[i - 1])) start.push_back(i);
+    }
+    start.push_back(looked_.size());
+    verdict_.resize(looked_.size());
+    const Box surface = field_.surface_box();
+    executor.for_blocks(start.size() - 1, kBlocksPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = begin; b < end; ++b) {
+        Box whole;
+        for (std::size_t i = start[b]; i < start[b + 1]; ++i) whole = whole.united(leaf_box(looked_[i], lattice_));
+        const lattice::Verdict all = verdict(whole, surface);
+        for (std::size_t i = start[b]; i < start[b + 1]; ++i) {
+          verdict_[i] = all == lattice::Verdict::Keep ? verdict(leaf_box(looked_[i], lattice_), surface) : all;
+        }
+      }
+    });
+    std::erase_if(memory_.leaf, [&](const BlockCoord& leaf) { return memory_.changed[leaf] != 0; });
+    for (std::size_t i = 0; i < looked_.size(); ++i) {
+      if (verdict_[i] == lattice::Verdict::Keep) memory_.leaf.push_back(looked_[i]);
+    }
   }
 
   void solve(const BlockTable& table, const Block& block, Mesh& mesh, std::vector<EdgePoint>& points) const {
     thread_local lattice::EdgeRoots roots;
     for (const Tile& tile : block.tile) {
-      if (tile.vertices == 0) continue;
+      if (tile.vertices == 0 || (block.solve >> tile.place & 1u) == 0) continue;
       roots.clear();
       double scale = 0.0;
       const auto corner = corner_of(tile.place);
@@ -129,8 +180,7 @@ class ViewSampler final : public Sampler {
         const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);
         const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
         const double f0 = static_cast<double>(value_at(table, block, x, y, z));
-        double f1 = static_cast<double>(value_at(table, block, x + dx, y + dy, z + dz));
-        if (f1 == 0.0) f1 = f0 > 0.0 ? std::min(field_.value(end), 0.0) : field_.value(end);
+        const double f1 = upper_value(static_cast<double>(value_at(table, block, x + dx, y + dy, z + dz)), f0, end);
         scale = std::max({scale, std::abs(f0), std::abs(f1)});
         roots.add(start, end, f0, f1, lattice::guess_root(kMissing, f0, f1, kMissing));
       });
@@ -157,26 +207,65 @@ class ViewSampler final : public Sampler {
     }
   }
 
+  /// F at the upper end of an edge that the surface crosses: as a tile holds it or, if none does, would hold it, so that it does not matter
+  /// to a root which tiles bounds left. @param held  0 if none does or the value is no other  @param lower  F at the lower end
+  [[nodiscard]] double upper_value(double held, double lower, const Vec3& end) const {
+    if (held != 0.0) return held;
+    const double exact = field_.value(end), rounded = static_cast<double>(static_cast<float>(exact));
+    if (rounded != 0.0) return rounded;
+    return lower > 0.0 ? std::min(exact, 0.0) : exact;
+  }
+
   static BlockCoord block_of(const BlockCoord& leaf) { return {leaf[0] >> 1, leaf[1] >> 1, leaf[2] >> 1}; }
   static unsigned slot_of(const BlockCoord& leaf) {
     return static_cast<unsigned>((leaf[0] & 1) | (leaf[1] & 1) << 1 | (leaf[2] & 1) << 2);
   }
 
-  void sample_leaf(Block& block, unsigned leaf, TileChanges& changes) const {
+  /// Marks the tiles whose values may be different, and gives a sign to the leaves that hold none.
+  void mark_changed(BlockTable& table) const {
+    for (std::size_t i = 0; i < looked_.size(); ++i) {
+      if (table.find(block_of(looked_[i])) == nullptr) continue;  // beyond all that hold values: outside
+      const std::size_t b = table.index(block_of(looked_[i]));
+      const Bits own = tiles_of(slot_of(looked_[i]));
+      table.block[b].changed |= _pdep_u64(memory_.changed[looked_[i]], own);
+      table.touched[b] = 1;
+      table.blank[b] = 0;
+      if (verdict_[i] != lattice::Verdict::Keep) set_sign(table.block[b], own, verdict_[i] == lattice::Verdict::Inside);
+    }
+  }
+
+  /// @param leaves  that are to hold values
+  void sample_block(Block& block, std::uint8_t leaves) const {
+    thread_local TileChanges changes;
+    changes.begin(block);
+    for (unsigned leaf = 0; leaf < kLeaves; ++leaf) {
+      const Bits own = tiles_of(leaf);
+      if ((leaves >> leaf & 1u) == 0) {
+        changes.drop(own);
+        continue;
+      }
+      const Bits tiles = (block.held & own) != 0 ? own & block.changed : own;
+      block.changed |= tiles;
+      if (tiles != 0) sample_tiles(block, tiles, changes);
+    }
+    changes.apply(block);
+  }
+
+  void sample_tiles(Block& block, Bits tiles, TileChanges& changes) const {
     const Cells base = block.base();
     std::array<Vec3, 8 * kTileNodes> nodes;
     std::array<double, 8 * kTileNodes> values;
     std::size_t n = 0;
-    for_bits(tiles_of(leaf), [&](unsigned tile) {
+    for_bits(tiles, [&](unsigned tile) {
       const auto corner = corner_of(tile);
       for (unsigned node = 0; node < kTileNodes; ++node) {
         const auto [x, y, z] = coordinates(node);
         nodes[n++] = lattice::node_position(lattice_, base[0] + corner[0] + x, base[1] + corner[1] + y, base[2] + corner[2] + z);
       }
     });
-    field_.evaluate(nodes, values);
+    field_.evaluate(std::span(nodes).first(n), std::span(values).first(n));
     const double* value = values.data();
-    for_bits(tiles_of(leaf), [&](unsigned tile) {
+    for_bits(tiles, [&](unsigned tile) {
       Bits inside = 0;
       float* out = changes.room(tile);
       for (std::size_t i = 0; i < kTileNodes; ++i) {
@@ -205,13 +294,16 @@ class ViewSampler final : public Sampler {
 
   FieldView field_;
   Lattice lattice_;
-  lattice::BlockList leaves_;
+  ViewMemory& memory_;
+  lattice::BlockList leaves_;               ///< where everything is different
+  std::vector<BlockCoord> looked_;          ///< elsewhere: leaves that bounds were asked for
+  std::vector<lattice::Verdict> verdict_;   ///< on them
 };
 
 }  // namespace
 
-std::unique_ptr<Sampler> make_view_sampler(const FieldView& field, const Lattice& lattice) {
-  return std::make_unique<ViewSampler>(field, lattice);
+std::unique_ptr<Sampler> make_view_sampler(const FieldView& field, const Lattice& lattice, ViewMemory& memory) {
+  return std::make_unique<ViewSampler>(field, lattice, memory);
 }
 
 }  // namespace supple::implicit::march

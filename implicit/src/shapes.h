@@ -10,6 +10,9 @@
 
 namespace supple::implicit {
 
+/// All that a kernel depends on, bit by bit.
+void add_content(const Kernel& kernel, ContentWords& words);
+
 /// A shape without its place; `y` below is in its frame, unstretched.
 struct ShapeView {
   ShapeKind kind = ShapeKind::Point;

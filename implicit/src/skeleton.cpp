@@ -289,13 +289,15 @@ void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, Place
   }
 }
 
+// By parts, so that a member that is added cannot be left out.
+
+void add_content(const Kernel& kernel, ContentWords& words) {
+  const auto& [kind, radius, thickness, slope, iso, shape, floor, tilt, gain, steepest] = kernel;
+  words.add(kind);
+  for (const double x : {radius, thickness, slope, iso, shape, floor, tilt, gain, steepest}) words.add(x);
+}
+
 void add_content(const Skeleton& skeleton, const PlacedSkeleton& placed, ContentWords& words) {
-  // By parts, so that a member that is added cannot be left out.
-  const auto add_kernel = [&](const Kernel& kernel) {
-    const auto& [kind, radius, thickness, slope, iso, shape, floor, tilt, gain, steepest] = kernel;
-    words.add(kind);
-    for (const double x : {radius, thickness, slope, iso, shape, floor, tilt, gain, steepest}) words.add(x);
-  };
   const auto& [primitives, part_count, iso, blend] = skeleton;
   words.add(primitives.size());
   for (const Primitive& primitive : primitives) {
@@ -304,7 +306,7 @@ void add_content(const Skeleton& skeleton, const PlacedSkeleton& placed, Content
     words.add(shape);
     words.add(size);
     words.add(offset);
-    add_kernel(kernel);
+    add_content(kernel, words);
     words.add(control);
     for (const double x : {taper, exponent[0], exponent[1]}) words.add(x);
     words.add(stretch);

@@ -43,8 +43,9 @@ inline Body plate_spiral() {
   return body;
 }
 
-/// Wyvill blobs in a deformed ball such that 30 supports overlap inside.
-inline Body blobs(std::uint32_t count) {
+/// Parts at random in a deformed ball, one primitive each. @param primitive  called for the kernel radius by which `overlap` balls overlap inside
+template <class Make>
+Body filled_ball(std::uint32_t count, double overlap, const Make& primitive) {
   std::mt19937_64 engine(7);
   const auto uniform = [&] { return 2.0 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1.0; };
   const auto surface = [](const Vec3& u) {
@@ -54,15 +55,58 @@ inline Body blobs(std::uint32_t count) {
   Body body;
   body.skeleton.part_count = count;
   const double volume = 4.3;  // of the deformed ball, nearly
-  const double R = std::cbrt(30.0 * volume / (count * 4.0 / 3.0 * 3.141592653589793));
+  const double R = std::cbrt(overlap * volume / (count * 4.0 / 3.0 * 3.141592653589793));
   while (body.parts.size() < count) {
     const Vec3 x = 1.4 * Vec3(uniform(), uniform(), uniform());
     if (x.norm() > surface(x.normalized())) continue;
-    Primitive p;
+    Primitive p = primitive(R);
     p.part = static_cast<std::uint32_t>(body.parts.size());
-    p.kernel = Kernel::wyvill(R);
     body.skeleton.primitive.push_back(p);
     body.parts.push_back(Pose{x, Quat::Identity()});
+  }
+  return body;
+}
+
+/// Wyvill blobs such that 30 supports overlap inside.
+inline Body blobs(std::uint32_t count) {
+  Body body = filled_ball(count, 30.0, [](double R) {
+    Primitive p;
+    p.kernel = Kernel::wyvill(R);
+    return p;
+  });
+  body.place();
+  return body;
+}
+
+/// Capsules with Gascuel's kernel, turned every way, such that 30 supports overlap inside, nearly.
+inline Body capsules(std::uint32_t count) {
+  Body body = filled_ball(count, 20.0, [](double R) {
+    Primitive p;
+    p.shape = ShapeKind::Segment;
+    p.size.x() = 0.4 * R;
+    p.kernel = Kernel::gascuel(0.5 * R, R, 1.0 / R);
+    return p;
+  });
+  implicit::testing::Random random(11);
+  for (Pose& part : body.parts) part.orientation = random.rotation();
+  body.place();
+  return body;
+}
+
+/// Wyvill blobs of which near ones unite, some with a blend and some at an angle.
+inline Body united_blobs(std::uint32_t count) {
+  Body body = filled_ball(count, 8.0, [](double R) {
+    Primitive p;
+    p.kernel = Kernel::wyvill(R);
+    return p;
+  });
+  Blend& blend = body.skeleton.blend;
+  blend.rule = BlendRule::Graph;
+  for (std::uint32_t a = 0; a < count; ++a) {
+    for (std::uint32_t b = a + 1; b < count; ++b) {
+      const double apart = (body.parts[a].position - body.parts[b].position).norm();
+      if ((a + b) % 3 == 0 && apart < body.skeleton.primitive[a].kernel.radius) blend.edge.push_back({a, b, 1.0});
+    }
   }
   body.place();
   return body;

@@ -57,6 +57,7 @@ Frame frame_of(const Body& body) {
 
 Body make_body(std::string_view name) {
   if (name == "w1") return benchmarks::plate_spiral();
+  if (name == "capsules") return benchmarks::capsules(1000);
   return benchmarks::blobs(name == "w2" ? 1000u : name == "w3" ? 10000u : 100000u);
 }
 
@@ -356,7 +357,7 @@ void evaluate_touched(const Field& field, const Lattice& lattice, std::int64_t n
 }
 
 /// Values where bounds admit a surface, candidate search included.
-double sample_seconds(const Field& field, const Lattice& lattice, blobs::BlobGrid& kept, march::BlockTable& table) {
+double sample_seconds(const Field& field, const Lattice& lattice, march::SamplerMemory& kept, march::BlockTable& table) {
   const Executor executor(1);
   const double begin = cpu_seconds();
   const auto sampler = march::make_sampler(field, lattice, true, kept);
@@ -392,7 +393,7 @@ double kernel_rate() {
 /// evaluating every tile that a support reaches.
 void measure_field(const std::string& name, const Body& body, const Lattice& lattice, int cells) {
   double stage = 1e300, touched = 1e300, sum = 0.0, values = 0.0, rate = 0.0;
-  blobs::BlobGrid kept;
+  march::SamplerMemory kept;
   march::BlockTable table;
   for (int repeat = 0; repeat < 10; ++repeat) {
     kept.forget();  // memory stays at hand, as in an animation where all moves
@@ -406,7 +407,7 @@ void measure_field(const std::string& name, const Body& body, const Lattice& lat
     blobs::BlobList near, leaf_list;
     for (const march::Block& block : table.block) {
       if (block.uniform()) continue;
-      kept.gather(block.base(), march::kBlockNodes, 0, near);
+      kept.grid.gather(block.base(), march::kBlockNodes, 0, near);
       for (unsigned leaf = 0; leaf < march::kLeaves; ++leaf) {
         if ((block.held & march::tiles_of(leaf)) == 0) continue;
         const std::array centre{8.0F * static_cast<float>(leaf & 1u) + 4.0F, 8.0F * static_cast<float>(leaf >> 1 & 1u) + 4.0F,
@@ -478,7 +479,7 @@ int write_grid(Body& body, const Lattice& lattice, int cells, const char* path) 
     });
     touched = std::min(touched, cpu_seconds() - begin);
     for (std::size_t i = 0; i < values.size(); ++i) apart = std::max(apart, std::abs(values[i] - other[i]));
-    blobs::BlobGrid kept;
+    march::SamplerMemory kept;
     march::BlockTable table;
     surface = std::min(surface, sample_seconds(body.field, lattice, kept, table));
   }
@@ -542,7 +543,7 @@ int main(int argc, char** argv) {
   }
   const std::string_view filter = argc > 1 ? argv[1] : "";
   const bool two_sided = argc > 2 && std::string_view(argv[2]) == "--both";
-  for (const std::string body_name : {"w1", "w2", "w3", "w4"}) {
+  for (const std::string body_name : {"w1", "w2", "w3", "w4", "capsules"}) {
     if (!starts_alike(filter, body_name)) continue;
     Body body = make_body(body_name);
     const Frame frame = frame_of(body);

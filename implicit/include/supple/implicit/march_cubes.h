@@ -43,8 +43,10 @@ struct MarchOptions {
   bool skip = true;
 };
 
-/// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh of Wyvill points
-/// that no moved primitive reaches; the result is what a fresh mesher gives, bit by bit.
+/// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh that no moved
+/// primitive reaches; the result is what a fresh mesher gives, bit by bit. Primitives are compared by their numbers with those
+/// of the last call. All is made anew when half of them moved or another lattice, iso value or blend is given, and,
+/// but for Wyvill points, with options.error. Fields that are no Field are sampled anew in each call.
 class CubeMesher {
  public:
   CubeMesher();

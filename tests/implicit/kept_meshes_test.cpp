@@ -1,0 +1,176 @@
+// What moved primitives do not reach is kept from mesh to mesh, whatever the field: the mesh is that of a fresh mesher, bit by bit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <tuple>
+
+#include "implicit/bodies.h"
+#include "implicit/mesh_checks.h"
+#include "supple/implicit/convolution.h"
+#include "supple/implicit/march_cubes.h"
+#include "supple/implicit/volume.h"
+
+namespace supple::implicit {
+namespace {
+
+using namespace testing;
+
+Lattice lattice_of(double cell) { return {.origin = Vec3(0.013, -0.007, 0.004), .cell = cell}; }
+
+/// Edges between some of the nodes, with weights of 0, 1 and between.
+void link(Body& body, Random& random) {
+  Blend& blend = body.skeleton.blend;
+  blend.edge.clear();
+  std::uint32_t nodes = body.skeleton.part_count;
+  if (!blend.node.empty()) nodes = *std::max_element(blend.node.begin(), blend.node.end()) + 1;
+  for (std::uint32_t a = 0; a < nodes; ++a) {
+    for (std::uint32_t b = a + 1; b < nodes; ++b) {
+      if (random.below(3) == 0) blend.edge.push_back({a, b, random.below(2) == 0 ? 1.0 : random.uniform(0.0, 1.0)});
+    }
+  }
+}
+
+/// Of all shapes and kernels, some of them convolved.
+Body mixed_body(std::uint64_t seed, BlendRule rule, std::uint32_t parts) {
+  Random random(300 + seed);
+  const double radius = parts > 64 ? 0.22 : 0.4;
+  Body body = random_body({.seed = seed, .parts = parts, .half_width = 0.8, .least_radius = 0.7 * radius, .largest_radius = radius, .every_shape = true});
+  for (Primitive& p : body.skeleton.primitive) {
+    const bool can = p.shape == ShapeKind::Segment || p.shape == ShapeKind::Triangle || p.shape == ShapeKind::Arc;
+    if (can && convolves(p.kernel.kind) && random.below(2) == 0) {
+      p.taper = 1.0;
+      p.convolved = true;
+    }
+  }
+  Blend& blend = body.skeleton.blend;
+  blend.rule = rule;
+  if (random.below(2) == 0) {  // groups
+    for (std::uint32_t k = 0; k < parts; ++k) blend.node.push_back(k % (1 + parts / 3));
+  }
+  if (rule == BlendRule::Graph) link(body, random);
+  body.place();
+  return body;
+}
+
+/// Changes a body in a way of its own for each round, and says how.
+std::string change(Body& body, std::uint32_t round, Random& random) {
+  Skeleton& skeleton = body.skeleton;
+  const auto any = [&] { return random.below(static_cast<std::uint32_t>(body.parts.size())); };
+  const std::uint32_t some = any();
+  switch (round) {
+    case 0: return "nothing";
+    case 1: body.parts[some].position += random.in_box(0.01); return "one moved a little";
+    case 2: body.parts[some].orientation = random.rotation(); return "one turned";
+    case 3: body.parts[some].position = Vec3(2.1, 0.3, -0.2); return "one left the others";
+    case 4: body.parts[some].position = random.in_box(0.6); return "one moved far";
+    case 5: skeleton.primitive[some] = scaled(skeleton.primitive[some], 0.8); return "one shrank";
+    case 6: {
+      skeleton.primitive.push_back(skeleton.primitive[some]);
+      skeleton.primitive.back().part = skeleton.part_count++;
+      body.parts.push_back({random.in_box(0.7), random.rotation()});
+      if (!skeleton.blend.node.empty()) skeleton.blend.node.push_back(skeleton.blend.node[some]);
+      return "one more";
+    }
+    case 7:
+      for (int k = 0; k < 3; ++k) body.parts[any()].position += random.in_box(0.1);
+      return "some moved";
+    case 8: skeleton.iso = 0.44; return "another iso value";
+    case 9: {
+      body.parts.pop_back();
+      skeleton.primitive.pop_back();
+      --skeleton.part_count;
+      if (!skeleton.blend.node.empty()) skeleton.blend.node.pop_back();
+      return "one fewer";
+    }
+    case 10: body.parts[some].position += random.in_box(0.05); return "one moved";
+    case 11:
+      if (skeleton.blend.rule == BlendRule::Graph) link(body, random);
+      skeleton.blend.exponent = 3.0;
+      skeleton.blend.opening = 0.4;
+      return "another blend";
+    case 12: skeleton.primitive[some].kernel = Kernel::murakami(0.35); return "another kernel";
+    case 13:
+      for (Pose& part : body.parts) part.position += random.in_box(0.01);
+      return "all moved";
+    default: body.parts[some].position += random.in_box(0.3); return "one moved";
+  }
+}
+constexpr std::uint32_t kRounds = 15;
+
+class KeptMesh : public ::testing::TestWithParam<std::tuple<BlendRule, int, std::uint32_t>> {};
+
+TEST_P(KeptMesh, IsThatOfAFreshMesherWhateverMoves) {
+  const auto [rule, threads, parts] = GetParam();
+  for (std::uint64_t seed = 0; seed < (parts > 64 ? 1 : 2); ++seed) {
+    Random random(40 + seed);
+    Body body = mixed_body(seed, rule, parts);
+    const MarchOptions options{.lattice = lattice_of(parts > 64 ? 0.07 : 0.08)};
+    CubeMesher mesher;
+    const Executor executor(threads);
+    for (std::uint32_t round = 0; round < kRounds; ++round) {
+      const std::string what = change(body, round, random);
+      body.place();
+      const Mesh& kept = mesher.make(body.field, options, executor);
+      body.field.set_culling(round % 2 == 0);
+      EXPECT_EQ(hash_of(kept), hash_of(march_cubes(body.field, options, Executor(1)))) << seed << ": " << what;
+      body.field.set_culling(true);
+      EXPECT_GT(kept.triangle_count(), 300u);
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Rules, KeptMesh,
+                         ::testing::Combine(::testing::Values(BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient),
+                                            ::testing::Values(1, 2), ::testing::Values(12u, 70u)));
+
+// Values are sums of few primitives: those of other places, signs and roots are kept.
+TEST(KeptMeshes, SampleOnlyWhatMovedPrimitivesReach) {
+  for (const BlendRule rule : {BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient}) {
+    Body body = random_body({.seed = 3, .parts = 300, .half_width = 1.5, .least_radius = 0.2, .largest_radius = 0.3});
+    body.skeleton.blend.rule = rule;
+    body.place();
+    const MarchOptions options{.lattice = lattice_of(0.06)};
+    CubeMesher mesher;
+    MarchCounts all, counts;
+    (void)mesher.make(body.field, options, Executor(1), &all);
+    EXPECT_FALSE(all.single_precision);
+    EXPECT_GT(all.bytes, 0u);
+    (void)mesher.make(body.field, options, Executor(1), &counts);
+    EXPECT_EQ(counts.tiles_sampled, 0u);
+    EXPECT_EQ(counts.tiles, all.tiles);
+    Random random(9);
+    for (int round = 0; round < 4; ++round) {
+      body.parts[random.below(300)].position += random.in_box(0.03);
+      body.place();
+      const Mesh& kept = mesher.make(body.field, options, Executor(1), &counts);
+      EXPECT_GT(counts.tiles_sampled, 0u);
+      EXPECT_LT(counts.tiles_sampled, all.tiles_sampled / 20);
+      EXPECT_EQ(hash_of(kept), hash_of(march_cubes(body.field, options, Executor(1))));
+    }
+    mesher.forget();
+    (void)mesher.make(body.field, options, Executor(1), &counts);
+    EXPECT_EQ(counts.tiles_sampled, all.tiles_sampled);
+  }
+}
+
+// One mesher for a body of Wyvill points and another of capsules in turn, and on other lattices.
+TEST(KeptMeshes, ForgetWhatIsOfAnotherBodyOrLattice) {
+  const Body points = random_body({.seed = 1, .parts = 40, .only_points = true}), shapes = random_body({.seed = 2, .parts = 40});
+  CubeMesher mesher;
+  const auto expect_fresh = [&](const Body& body, double cell) {
+    const MarchOptions options{.lattice = lattice_of(cell)};
+    EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(1))), hash_of(march_cubes(body.field, options, Executor(1))));
+  };
+  for (int round = 0; round < 2; ++round) {
+    expect_fresh(points, 0.08);
+    expect_fresh(shapes, 0.08);
+    expect_fresh(shapes, 0.1);
+    expect_fresh(shapes, 0.08);
+  }
+  const Body none;
+  expect_fresh(none, 0.08);
+  expect_fresh(shapes, 0.08);
+}
+
+}  // namespace
+}  // namespace supple::implicit
