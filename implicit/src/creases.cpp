@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include "error_search.h"
 #include "field_index.h"
+#include "march_mesher.h"
 #include "supple/core/error.h"
+#include "supple/core/hash.h"
 
 namespace supple::implicit {
 namespace {
@@ -31,14 +35,7 @@ std::vector<Box> node_supports(const Field::Index& index) {
 /// F_k of one node.
 class NodeField {
  public:
-  NodeField(const Field& field, std::uint32_t node, const Box& support, const Box& surface)
-      : field_(&field), node_(node) {
-    for (int k = 0; k < 3; ++k) {
-      box_.lower[k] = std::max(support.lower[k], surface.lower[k]);
-      box_.upper[k] = std::min(support.upper[k], surface.upper[k]);
-    }
-    if ((box_.upper.array() < box_.lower.array()).any()) box_ = {};
-  }
+  NodeField(const Field& field, std::uint32_t node, const Box& support) : field_(&field), node_(node), box_(support) {}
 
   void evaluate(std::span<const Vec3> points, std::span<double> values) const { evaluate(points, values, {}); }
   void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
@@ -167,7 +164,64 @@ std::optional<Vec3> meeting_point(std::span<const FieldView> fields, std::span<c
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// The node whose field is the largest at each point.
+/// Where nodes meet on the surface, sought from a point between two vertices or in the middle of a cell, where both ends are one.
+struct CreaseSearch {
+  Vec3 from, to;
+  std::array<std::uint32_t, 3> node{kNone, kNone, kNone};  ///< two or three of the fields; that of `from` first
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
+  CreaseSearch(const Vec3& a, const Vec3& b, std::span<const std::uint32_t> nodes) : from(a), to(b) {
+    std::copy(nodes.begin(), nodes.end(), node.begin());
+  }
+  [[nodiscard]] std::span<const std::uint32_t> nodes() const { return std::span(node).first(node[2] == kNone ? 2 : 3); }
+  [[nodiscard]] std::array<std::uint64_t, 8> words() const {
+    std::array<std::uint64_t, 8> words{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      words[k] = std::bit_cast<std::uint64_t>(from[static_cast<Eigen::Index>(k)]);
+      words[3 + k] = std::bit_cast<std::uint64_t>(to[static_cast<Eigen::Index>(k)]);
+    }
+    words[6] = std::uint64_t{node[0]} << 32 | node[1];
+    words[7] = node[2];
+    return words;
+  }
+};
+
+struct CreasePoint {
+  Vec3 position, normal;
+};
+
+/// What searches for points of creases found, from call to call.
+class CreaseMemory {
+ public:
+  /// @param nothing  of the last call holds
+  void begin_call(bool nothing) {
+    last_.clear();
+    if (!nothing) last_.swap(now_);
+    now_.clear();
+  }
+  /// What this search found in the last call if that still holds by `holds(search)`, else search_anew(search).
+  template <class Holds, class Search>
+  const std::optional<CreasePoint>& find(const CreaseSearch& search, const Holds& holds, const Search& search_anew) {
+    const auto words = search.words();
+    if (auto known = last_.extract(words); known && holds(search)) return now_.insert(std::move(known)).position->second;
+    return now_.insert_or_assign(words, search_anew(search)).first->second;
+  }
+  void end_call() { last_.clear(); }
+  [[nodiscard]] std::size_t bytes() const {
+    constexpr std::size_t kNode = sizeof(Points::value_type) + 2 * sizeof(void*);
+    return now_.size() * kNode + (now_.bucket_count() + last_.bucket_count()) * sizeof(void*);
+  }
+
+ private:
+  using Words = std::array<std::uint64_t, 8>;
+  struct WordsHash {
+    std::size_t operator()(const Words& words) const { return hash_bytes(std::as_bytes(std::span(words))); }
+  };
+  using Points = std::unordered_map<Words, std::optional<CreasePoint>, WordsHash>;
+  Points last_, now_;
+};
+
+/// The node whose field is the largest at each point: at least one is positive or zero on the surface, and none is beyond its support.
 std::vector<std::uint32_t> owners(std::span<const FieldView> fields, std::span<const Vec3> points, const Executor& executor) {
   constexpr std::size_t kPointsPerTask = 512;
   std::vector<std::uint32_t> owner(points.size(), 0);
@@ -219,8 +273,10 @@ std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
 /// (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here).
 class Sharpener {
  public:
-  Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor, Mesh& mesh)
-      : whole_(whole), fields_(fields), lattice_(lattice), mesh_(mesh), owner_(owners(fields, mesh.position, executor)) {}
+  /// @param owner    of the vertices   @param changes  since the memory was last used
+  Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
+            const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh)
+      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), changes_(changes), memory_(memory), mesh_(mesh) {}
 
   void run() {
     struct Piece {
@@ -276,38 +332,48 @@ class Sharpener {
     if (loop.empty()) return false;
     Vec3 middle = Vec3::Zero();
     for (const std::uint32_t v : loop) middle += mesh_.position[v] / static_cast<double>(loop.size());
-    const std::optional<Vec3> point = crease_point(nodes, middle);
+    const std::optional<CreasePoint>& point = crease_point({middle, middle, nodes});
     if (!point) return false;
     // In its own cell a cone over the loop crosses nothing; a little beyond, its triangles must face outward.
-    const Vec3 at = (*point - lattice_.origin) / lattice_.cell;
+    const Vec3 at = (point->position - lattice_.origin) / lattice_.cell;
     for (int k = 0; k < 3; ++k) {
       const double offset = at[k] - static_cast<double>(cell[static_cast<std::size_t>(k)]);
       if (offset < -kBeyond || offset > 1.0 + kBeyond) return false;
     }
     for (std::size_t k = 0; k < loop.size(); ++k) {
-      if (!faces_out(loop[k], loop[(k + 1) % loop.size()], *point)) return false;
+      if (!faces_out(loop[k], loop[(k + 1) % loop.size()], point->position)) return false;
     }
-    const std::uint32_t fresh = add_vertex(nodes, *point);
+    const std::uint32_t fresh = add_vertex(*point);
     for (std::size_t k = 0; k < loop.size(); ++k) star_.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
     return true;
   }
 
-  /// Where the nodes meet on the surface near a point.
-  [[nodiscard]] std::optional<Vec3> crease_point(std::span<const std::uint32_t> nodes, const Vec3& near) const {
-    const std::optional<Vec3> point = meeting_point(fields_, nodes, near, 2.0 * lattice_.cell);
-    return point && whole_.value(*point) <= 1e-12 ? point : std::nullopt;  // else another node covers it
+  /// As the last call found it, where that cannot be different: all that a search looks at lies this near.
+  [[nodiscard]] const std::optional<CreasePoint>& crease_point(const CreaseSearch& search) {
+    const auto holds = [&](const CreaseSearch& s) {
+      return !changes_.differs(Box{s.from.cwiseMin(s.to), s.from.cwiseMax(s.to)}.inflated(1.01 * kFarthest * lattice_.cell));
+    };
+    return memory_.find(search, holds, [&](const CreaseSearch& s) { return seek(s); });
   }
 
-  /// @return the number of a new vertex on the crease of some nodes
-  std::uint32_t add_vertex(std::span<const std::uint32_t> nodes, const Vec3& point) {
-    mesh_.position.push_back(point);
+  [[nodiscard]] std::optional<CreasePoint> seek(const CreaseSearch& search) const {
+    const std::span<const std::uint32_t> nodes = search.nodes();
+    const Vec3 start = search.from == search.to ? search.from : between(search);
+    const std::optional<Vec3> point = meeting_point(fields_, nodes, start, kFarthest * lattice_.cell);
+    if (!point || !(whole_.value(*point) <= 1e-12)) return std::nullopt;  // else another node covers it
     Vec3 normal = Vec3::Zero();
     for (const std::uint32_t node : nodes) {
       Vec3 gradient;
-      (void)fields_[node].value(point, gradient);
+      (void)fields_[node].value(*point, gradient);
       if (gradient.squaredNorm() > 0.0) normal -= gradient.normalized();
     }
-    mesh_.normal.push_back(normal.squaredNorm() > 0.0 ? Vec3(normal.normalized()) : Vec3::UnitZ());
+    return CreasePoint{*point, normal.squaredNorm() > 0.0 ? Vec3(normal.normalized()) : Vec3::UnitZ()};
+  }
+
+  /// @return its number
+  std::uint32_t add_vertex(const CreasePoint& point) {
+    mesh_.position.push_back(point.position);
+    mesh_.normal.push_back(point.normal);
     return static_cast<std::uint32_t>(mesh_.position.size() - 1);
   }
 
@@ -367,10 +433,11 @@ class Sharpener {
     std::vector<Cut> cuts;
     for (std::size_t i = 0; i + 1 < sides.size(); i += 2) {
       const auto [low, high, left] = sides[i];
-      const std::array nodes{std::min(owner_[low], owner_[high]), std::max(owner_[low], owner_[high])};
-      const std::optional<Vec3> x = crease_point(nodes, between(low, high));
-      if (x && can_cut(mesh_.triangle[left], low, high, *x) && can_cut(mesh_.triangle[sides[i + 1].triangle], low, high, *x)) {
-        cuts.push_back({low, high, add_vertex(nodes, *x)});
+      const std::array nodes{owner_[low], owner_[high]};
+      const std::optional<CreasePoint>& x = crease_point({mesh_.position[low], mesh_.position[high], nodes});
+      if (x && can_cut(mesh_.triangle[left], low, high, x->position) &&
+          can_cut(mesh_.triangle[sides[i + 1].triangle], low, high, x->position)) {
+        cuts.push_back({low, high, add_vertex(*x)});
       }
     }
     std::vector<Triangle> pieces;
@@ -379,9 +446,9 @@ class Sharpener {
   }
 
   /// Where the fields of the nodes of two vertices, taken to be linear, are equal on the edge between them.
-  [[nodiscard]] Vec3 between(std::uint32_t a, std::uint32_t b) const {
-    const Vec3 &p = mesh_.position[a], &q = mesh_.position[b];
-    const FieldView &f = fields_[owner_[a]], &g = fields_[owner_[b]];
+  [[nodiscard]] Vec3 between(const CreaseSearch& search) const {
+    const Vec3 &p = search.from, &q = search.to;
+    const FieldView &f = fields_[search.node[0]], &g = fields_[search.node[1]];
     const double at_p = std::max(f.value(p) - g.value(p), 0.0), at_q = std::max(g.value(q) - f.value(q), 0.0);
     return at_p + at_q > 0.0 ? Vec3(p + at_p / (at_p + at_q) * (q - p)) : Vec3(0.5 * (p + q));
   }
@@ -433,12 +500,14 @@ class Sharpener {
     return at->vertex;
   }
 
-  static constexpr double kBeyond = 1.0;  // [cells]
+  static constexpr double kBeyond = 1.0, kFarthest = 2.0;  // [cells]
   FieldView whole_;
   std::span<const FieldView> fields_;  ///< of the nodes
   const Lattice& lattice_;
+  std::span<const std::uint32_t> owner_;
+  const march::ViewMemory& changes_;
+  CreaseMemory& memory_;
   Mesh& mesh_;
-  std::vector<std::uint32_t> owner_;
   std::vector<Triangle> star_;
 };
 
@@ -463,34 +532,93 @@ bool has_creases(const Field& field) {
   return false;
 }
 
-Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
+struct CreaseMesher::Impl {
+  march::Marcher marcher;
+  std::vector<std::uint32_t> node;   ///< that the fields of the last mesh are of
+  std::vector<std::uint32_t> owner;  ///< of the vertices of the marched mesh, by place in `node`
+  CreaseMemory memory;
+  Mesh mesh;
+
+  void make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
+  /// Of the vertices that did not stay where they were and as they were.
+  void find_owners(std::span<const FieldView> fields, bool all, const Executor& executor);
+};
+
+void CreaseMesher::Impl::make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts) {
   const Field::Index& index = field.index();
-  SUPPLE_EXPECTS(index.blend.rule() == BlendRule::Graph && options.refinements == 0 && options.error >= 0.0);
-  const Box all = field.surface_box();
   const std::vector<Box> box = node_supports(index);
   std::vector<NodeField> nodes;
+  std::vector<std::uint32_t> present;
   for (std::uint32_t k = 0; k < box.size(); ++k) {
-    if (!box[k].empty()) nodes.emplace_back(field, k, box[k], all);
+    if (box[k].empty()) continue;
+    nodes.emplace_back(field, k, box[k]);
+    present.push_back(k);
   }
   const std::vector<FieldView> views(nodes.begin(), nodes.end());
+  const bool others = present != node;
+  node.clear();  // should the next lines throw
+  marcher.march(field, lattice, skip, executor, counts);
+  const march::ViewMemory& changes = marcher.memory.view;
+  find_owners(views, others || changes.all, executor);
+  memory.begin_call(others || changes.all);
+  mesh = marcher.mesh;
+  Sharpener(field, views, lattice, owner, changes, memory, mesh).run();
+  memory.end_call();
+  node = std::move(present);
+  counts.bytes += memory.bytes() + owner.capacity() * sizeof(owner[0]) + marcher.mesh.position.capacity() * 2 * sizeof(Vec3) +
+                  marcher.mesh.triangle.capacity() * sizeof(Triangle);
+}
+
+void CreaseMesher::Impl::find_owners(std::span<const FieldView> fields, bool all, const Executor& executor) {
+  const std::vector<Vec3>& position = marcher.mesh.position;
+  std::vector<std::uint32_t> found(position.size()), fresh;
+  std::size_t known = 0;  // vertices so far
+  const auto add_fresh = [&](std::size_t end) {
+    for (; known < end; ++known) fresh.push_back(static_cast<std::uint32_t>(known));
+  };
+  if (!all) {
+    for (const march::Run& run : marcher.scratch.stayed) {
+      add_fresh(run.to);
+      std::copy_n(owner.begin() + static_cast<std::ptrdiff_t>(run.from), run.count, found.begin() + static_cast<std::ptrdiff_t>(run.to));
+      known = run.to + run.count;
+    }
+  }
+  add_fresh(position.size());
+  std::vector<Vec3> points;
+  for (const std::uint32_t v : fresh) points.push_back(position[v]);
+  const std::vector<std::uint32_t> of_points = owners(fields, points, executor);
+  for (std::size_t i = 0; i < fresh.size(); ++i) found[fresh[i]] = of_points[i];
+  owner = std::move(found);
+}
+
+CreaseMesher::CreaseMesher() = default;
+CreaseMesher::~CreaseMesher() = default;
+CreaseMesher::CreaseMesher(CreaseMesher&&) noexcept = default;
+CreaseMesher& CreaseMesher::operator=(CreaseMesher&&) noexcept = default;
+
+const Mesh& CreaseMesher::make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
+  SUPPLE_EXPECTS(field.packed().blend.rule() == BlendRule::Graph && options.refinements == 0 && options.error >= 0.0);
+  if (impl_ == nullptr) impl_ = std::make_unique<Impl>();
+  Impl& self = *impl_;
   MarchCounts local;
   MarchCounts& count = counts != nullptr ? *counts : local;
-  Mesh mesh;
-  const auto make = [&](const Lattice& lattice) {
-    mesh = march_cubes(field, {.lattice = lattice, .skip = options.skip}, executor, &count);
-    Sharpener(field, views, lattice, executor, mesh).run();
-  };
   if (options.error == 0.0) {
-    make(options.lattice);
-    return mesh;
+    self.make(field, options.lattice, options.skip, executor, count);
+    return self.mesh;
   }
   const double first = first_cell(field, options.lattice.cell);
   make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
-    make({.origin = options.lattice.origin, .cell = spacing_at(first, level)});
-    count.error = centroid_error(field, mesh, executor);
-    return tried(count.error, mesh, count);
+    self.marcher.memory.view.forget();  // as CubeMesher does
+    self.make(field, {.origin = options.lattice.origin, .cell = spacing_at(first, level)}, options.skip, executor, count);
+    count.error = centroid_error(field, self.mesh, executor);
+    return tried(count.error, self.mesh, count);
   });
-  return mesh;
+  return self.mesh;
+}
+
+Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
+  CreaseMesher mesher;
+  return mesher.make(field, options, executor, counts);
 }
 
 }  // namespace supple::implicit

@@ -173,18 +173,19 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
     if (table.holds[b] != 0) blocks.push_back(static_cast<std::uint32_t>(b));
   }
   std::size_t vertices = 0, triangles = 0;
-  std::vector<Run> same_vertices, same_triangles;
+  std::vector<Run> same_triangles;
+  scratch.stayed.clear();
   BlockShifts shifts(table);
   for (const std::uint32_t b : blocks) {
     Block& block = table.block[b];
     block.old_vertex = std::exchange(block.first_vertex, static_cast<std::uint32_t>(vertices));
     block.old_triangle = std::exchange(block.first_triangle, static_cast<std::uint32_t>(triangles));
     if (block.solve == 0) {
-      add_run(same_vertices, {block.old_vertex, vertices, block.vertices});
+      add_run(scratch.stayed, {block.old_vertex, vertices, block.vertices});
     } else {
       for_bits(block.held & ~block.solve, [&](unsigned place) {
         const Tile& tile = block.tile[block.rank(place)];
-        add_run(same_vertices, {std::size_t{block.old_vertex} + tile.old_vertex, vertices + tile.first_vertex, tile.vertices});
+        add_run(scratch.stayed, {std::size_t{block.old_vertex} + tile.old_vertex, vertices + tile.first_vertex, tile.vertices});
       });
     }
     shifts.set(b, block);
@@ -207,9 +208,9 @@ void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice,
   }
   lattice::expect_indexable(std::max(vertices, triangles), lattice);
   mesh.columns.clear();
-  move_runs(same_vertices, vertices, mesh.position);
-  move_runs(same_vertices, vertices, mesh.normal);
-  place_points(table, blocks, counted, vertices, same_vertices.empty(), scratch.point);
+  move_runs(scratch.stayed, vertices, mesh.position);
+  move_runs(scratch.stayed, vertices, mesh.normal);
+  place_points(table, blocks, counted, vertices, scratch.stayed.empty(), scratch.point);
   move_triangles(table, same_triangles, triangles, mesh);
   sampler.solve(executor, table, counted, mesh, scratch.point);
   for_each(emitting, [&](const Block& block) { emit_triangles(table, block, scratch.point.data(), mesh); });

@@ -11,13 +11,6 @@
 
 namespace supple::implicit::march {
 
-/// A run of numbers that moves as a whole.
-struct Run {
-  std::size_t from, to, count;
-  const Block* block = nullptr;  ///< of triangles whose vertices move by different shifts
-  std::uint32_t more = 0;        ///< of all others
-};
-
 /// Behind the last run, or as its continuation.
 void add_run(std::vector<Run>& runs, const Run& run);
 /// Moves items in place and makes room for `count`. @param runs  in rising order, before and after

@@ -7,7 +7,7 @@
 
 #include "error_search.h"
 #include "field_index.h"
-#include "march_sampling.h"
+#include "march_mesher.h"
 #include "polygonise_block_edges.h"
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
@@ -101,19 +101,40 @@ void refine(const Sampler& sampler, const Lattice& lattice, const Executor& exec
   }
 }
 
+void Marcher::march(const FieldView& field, const Lattice& on, bool skip, const Executor& executor, MarchCounts& counts) {
+  const Field* points = field.as_field();
+  const double level = points != nullptr ? points->packed().iso : 0.0;
+  const bool single = sampler != nullptr && sampler->single_precision();
+  sampler = make_sampler(field, on, skip, memory);
+  if (!kept || level != iso || sampler->single_precision() != single) memory.forget();
+  kept = false;
+  iso = level;
+  sampler->prepare(executor, table);
+  table.begin_call();
+  sampler->sample(executor, table);
+  assemble(table, *sampler, on, executor, scratch, mesh);
+  kept = true;
+  lattice = on;
+  counts = {};
+  counts.blocks = table.block.size();
+  counts.single_precision = sampler->single_precision();
+  counts.cell = on.cell;
+  for (std::size_t b = 0; b < table.block.size(); ++b) {
+    if (table.touched[b] == 0) continue;
+    counts.tiles_sampled += static_cast<std::uint64_t>(std::popcount(table.block[b].changed));
+    counts.kernel_values += table.block[b].kernel_values;
+  }
+  counts.tiles = table.held.tiles;
+  counts.nodes = blobs::kTileNodes * counts.tiles;
+  counts.bytes = table.held.bytes + scratch.bytes() + memory.bytes();
+}
+
 }  // namespace march
 
 struct CubeMesher::Impl {
-  march::SamplerMemory memory;
-  march::BlockTable table;
-  march::MeshScratch scratch;
-  Mesh mesh, refined;
-  std::unique_ptr<march::Sampler> sampler;  ///< of the last mesh
-  Lattice cell_lattice;
-  double iso = 0.0;
-  bool kept = false;  ///< table and mesh are those of the memory
+  march::Marcher marcher;
+  Mesh refined;
 
-  const Mesh& march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
   /// The last mesh, refined.
   const Mesh& refine(int refinements, const Executor& executor, MarchCounts& counts);
 };
@@ -143,19 +164,20 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   SUPPLE_EXPECTS(options.refinements >= 0 && options.refinements <= kMostRefinements && options.error >= 0.0);
   MarchCounts local;
   MarchCounts& count = counts != nullptr ? *counts : local;
+  march::Marcher& marcher = impl_->marcher;
   if (options.error == 0.0) {
-    const Mesh& mesh = impl_->march(field, options.lattice, options.skip, executor, count);
-    return options.refinements == 0 ? mesh : impl_->refine(options.refinements, executor, count);
+    marcher.march(field, options.lattice, options.skip, executor, count);
+    return options.refinements == 0 ? marcher.mesh : impl_->refine(options.refinements, executor, count);
   }
   const double first = first_cell(field, options.lattice.cell);
   const Mesh* mesh = nullptr;
   make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
     const LevelPlan plan = plan_of(first, level);
-    const bool same_cells = mesh != nullptr && plan.cell == impl_->cell_lattice.cell;
-    if (!same_cells) {
+    if (mesh == nullptr || plan.cell != marcher.lattice.cell) {
       // What still fits is told by counts, and those of a mesh that was kept may be others than of a fresh one.
-      impl_->memory.view.forget();
-      mesh = &impl_->march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor, count);
+      marcher.memory.view.forget();
+      marcher.march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor, count);
+      mesh = &marcher.mesh;
     }
     if (plan.refinements > 0) mesh = &impl_->refine(plan.refinements, executor, count);
     count.error = centroid_error(field, *mesh, executor);
@@ -164,48 +186,17 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   return *mesh;
 }
 
-const Mesh& CubeMesher::Impl::march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor,
-                                    MarchCounts& counts) {
-  const Field* points = field.as_field();
-  const double level = points != nullptr ? points->packed().iso : 0.0;
-  const bool single = sampler != nullptr && sampler->single_precision();
-  sampler = march::make_sampler(field, lattice, skip, memory);
-  if (!kept || level != iso || sampler->single_precision() != single) memory.forget();
-  kept = false;
-  iso = level;
-  sampler->prepare(executor, table);
-  table.begin_call();
-  sampler->sample(executor, table);
-  march::assemble(table, *sampler, lattice, executor, scratch, mesh);
-  kept = true;
-  cell_lattice = lattice;
-  counts = {};
-  counts.blocks = table.block.size();
-  counts.single_precision = sampler->single_precision();
-  counts.cell = lattice.cell;
-  for (std::size_t b = 0; b < table.block.size(); ++b) {
-    if (table.touched[b] == 0) continue;
-    counts.tiles_sampled += static_cast<std::uint64_t>(std::popcount(table.block[b].changed));
-    counts.kernel_values += table.block[b].kernel_values;
-  }
-  counts.tiles = table.held.tiles;
-  counts.nodes = blobs::kTileNodes * counts.tiles;
-  counts.bytes = table.held.bytes;
-  counts.bytes += scratch.bytes() + memory.bytes();
-  return mesh;
-}
-
 const Mesh& CubeMesher::Impl::refine(int refinements, const Executor& executor, MarchCounts& counts) {
-  refined = mesh;
-  march::list_tiles(table, scratch.tiles);
+  refined = marcher.mesh;
+  march::list_tiles(marcher.table, marcher.scratch.tiles);
   for (int level = 0; level < refinements; ++level) {
-    march::refine(*sampler, cell_lattice, executor, scratch, refined);
+    march::refine(*marcher.sampler, marcher.lattice, executor, marcher.scratch, refined);
   }
   counts.refinements = refinements;
   return refined;
 }
 
-void CubeMesher::forget() { impl_->kept = false; }
+void CubeMesher::forget() { impl_->marcher.kept = false; }
 
 Mesh march_cubes(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   CubeMesher mesher;

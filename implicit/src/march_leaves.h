@@ -49,6 +49,8 @@ struct ViewMemory {
   bool all = true;               ///< everywhere
 
   void forget() { changes.forget(); }
+  /// Whether values next to the surface, as far as a leaf, may be different in a box.
+  [[nodiscard]] bool differs(const Box& box) const { return all || changed.meets(box, lattice); }
   /// Sees what is different in a field that is to be sampled, and `leaf` as it was.
   void compare(const FieldView& field, const Lattice& now);
   [[nodiscard]] std::size_t bytes() const { return changes.bytes() + leaf.capacity() * sizeof(leaf[0]) + changed.bytes(); }

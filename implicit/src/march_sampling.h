@@ -72,14 +72,22 @@ struct TileTriangles {
   std::size_t first, count;
 };
 
+/// A run of numbers that moves as a whole.
+struct Run {
+  std::size_t from, to, count;
+  const Block* block = nullptr;  ///< of triangles whose vertices move by different shifts
+  std::uint32_t more = 0;        ///< of all others
+};
+
 /// What building a mesh needs besides the mesh; kept for its memory.
 struct MeshScratch {
   std::vector<EdgePoint> point;      ///< of the vertices, block by block from Block::first_point on
+  std::vector<Run> stayed;           ///< vertices that are those of the last mesh, in rising order
   std::vector<TileTriangles> tiles;
   std::vector<std::array<std::uint32_t, 3>> triangle, middle;
   std::vector<std::uint32_t> start, target, edge;
   [[nodiscard]] std::size_t bytes() const {
-    return point.capacity() * sizeof(EdgePoint) + tiles.capacity() * sizeof(TileTriangles) +
+    return point.capacity() * sizeof(EdgePoint) + stayed.capacity() * sizeof(Run) + tiles.capacity() * sizeof(TileTriangles) +
            (triangle.capacity() + middle.capacity()) * sizeof(triangle[0]) +
            (start.capacity() + target.capacity() + edge.capacity()) * sizeof(std::uint32_t);
   }

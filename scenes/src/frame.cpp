@@ -285,6 +285,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
       field(all.size()),
       indexed(all.size(), 0),
       mesher(all.size()),
+      creases(all.size()),
       convex(reach.size(), 0),
       near(all.size(), 0),
       active(all.size()),

@@ -13,6 +13,7 @@
 #include "supple/collision/sleep.h"
 #include "supple/core/content_versions.h"
 #include "supple/core/executor.h"
+#include "supple/implicit/creases.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/march_cubes.h"
@@ -57,6 +58,7 @@ struct Frame {
   std::uint64_t bodies_present = 0;           ///< that collide
   std::uint64_t samples_present = 0;          ///< of these
   std::vector<implicit::CubeMesher> mesher;   ///< by body; keeps what does not move
+  std::vector<implicit::CreaseMesher> creases;  ///< the same for those whose blend leaves creases
   DivisionMeshers dividing;                   ///< keep what does not move of bodies that touch
   SearchCounts missed;                        ///< by the last meshes
   std::vector<std::uint8_t> convex;           ///< 1: a contact body that is convex; shape [bodies + fixed ones]

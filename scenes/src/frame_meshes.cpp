@@ -313,7 +313,7 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
     implicit::MarchOptions options{.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip};
     if (object.mesh_error && !object.cell_is_stated) options.lattice.cell = 0.0;
     Mesh mesh = d.method == MeshingName::Auto && implicit::has_creases(field)
-                    ? implicit::march_creases(field, options, context.executor, &marched)
+                    ? frame.creases[i].make(field, options, context.executor, &marched)
                     : frame.mesher[i].make(field, options, context.executor, &marched);
     search_alone(context, i, marched.cell, bodies, frame, mesh);
     profile.visited += marched.tiles;

@@ -27,6 +27,7 @@
 #include "march_sampling.h"
 #include "support/mesh_distance.h"
 #include "supple/core/hash.h"
+#include "supple/implicit/creases.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/polygonise.h"
@@ -58,6 +59,7 @@ Frame frame_of(const Body& body) {
 Body make_body(std::string_view name) {
   if (name == "w1") return benchmarks::plate_spiral();
   if (name == "capsules") return benchmarks::capsules(1000);
+  if (name == "united") return benchmarks::united_blobs(2000);
   return benchmarks::blobs(name == "w2" ? 1000u : name == "w3" ? 10000u : 100000u);
 }
 
@@ -200,21 +202,35 @@ void measure_grid(const std::string& name, Body& body, const Lattice& lattice) {
   std::fflush(stdout);
 }
 
+/// @tparam Mesher  CubeMesher or CreaseMesher
+template <class Mesher>
 void measure_moved(const std::string& name, Body& body, const Lattice& lattice) {
   const Executor executor(1);
-  CubeMesher mesher, fresh;
+  Mesher mesher, fresh;
   MarchCounts counts;
   const std::vector<std::uint32_t> some = blobs_at_the_side(body);
+  // Memory stays at hand where it can, as in an animation where all moves.
+  const auto start_afresh = [&] {
+    if constexpr (requires { fresh.forget(); }) {
+      fresh.forget();
+    } else {
+      fresh = Mesher();
+    }
+  };
+  const auto move_some = [&](int repeat) {
+    move(body, some, repeat);
+    if (body.field.packed().primitive[0].kind != PackedKind::PointWyvill) (void)body.field.index();
+  };
   double whole = 1e300, moved = 1e300, total = 0.0;
   Mesh mesh;
   for (int repeat = 0; repeat < 100 && (repeat < 4 || total < 1.5); ++repeat) {
-    move(body, some, repeat);
+    move_some(repeat);
     double begin = cpu_seconds();
     const Mesh& kept = mesher.make(body.field, {.lattice = lattice}, executor, &counts);
     const double once = cpu_seconds() - begin;
     if (repeat > 0) moved = std::min(moved, once);
     mesh = kept;
-    fresh.forget();
+    start_afresh();
     begin = cpu_seconds();
     const Mesh& made = fresh.make(body.field, {.lattice = lattice}, executor);
     const double all = cpu_seconds() - begin;
@@ -228,8 +244,8 @@ void measure_moved(const std::string& name, Body& body, const Lattice& lattice) 
     double& best = keeps ? next : next_whole;
     total = 0.0;
     for (int repeat = 0; repeat < 100 && (repeat < 4 || total < 0.5); ++repeat) {
-      move(body, some, repeat);
-      if (!keeps) fresh.forget();
+      move_some(repeat);
+      if (!keeps) start_afresh();
       const double begin = cpu_seconds();
       (void)(keeps ? mesher : fresh).make(body.field, {.lattice = lattice}, executor);
       const double once = cpu_seconds() - begin;
@@ -543,7 +559,7 @@ int main(int argc, char** argv) {
   }
   const std::string_view filter = argc > 1 ? argv[1] : "";
   const bool two_sided = argc > 2 && std::string_view(argv[2]) == "--both";
-  for (const std::string body_name : {"w1", "w2", "w3", "w4", "capsules"}) {
+  for (const std::string body_name : {"w1", "w2", "w3", "w4", "capsules", "united"}) {
     if (!starts_alike(filter, body_name)) continue;
     Body body = make_body(body_name);
     const Frame frame = frame_of(body);
@@ -555,7 +571,11 @@ int main(int argc, char** argv) {
       }
       const std::string name = body_name + '/' + std::to_string(cells) + "/moved";
       if (body_name != "w1" && name.compare(0, filter.size(), filter) == 0) {
-        measure_moved(name, body, frame.lattice(cells));
+        if (body.skeleton.blend.rule == BlendRule::Graph) {
+          measure_moved<CreaseMesher>(name, body, frame.lattice(cells));
+        } else {
+          measure_moved<CubeMesher>(name, body, frame.lattice(cells));
+        }
       }
       const std::string field = body_name + '/' + std::to_string(cells) + "/field";
       if (body_name != "w1" && field.compare(0, filter.size(), filter) == 0) {

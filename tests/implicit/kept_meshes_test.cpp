@@ -8,6 +8,7 @@
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "supple/implicit/convolution.h"
+#include "supple/implicit/creases.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/volume.h"
 
@@ -123,6 +124,24 @@ INSTANTIATE_TEST_SUITE_P(Rules, KeptMesh,
                          ::testing::Combine(::testing::Values(BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient),
                                             ::testing::Values(1, 2), ::testing::Values(12u, 70u)));
 
+// And where the blend leaves creases, the vertices on them.
+TEST_P(KeptMesh, WithCreasesIsThatOfAFreshMesherWhateverMoves) {
+  const auto [rule, threads, parts] = GetParam();
+  if (rule != BlendRule::Graph) GTEST_SKIP() << "only graphs leave creases";
+  Random random(70);
+  Body body = mixed_body(3, rule, parts);
+  const MarchOptions options{.lattice = lattice_of(0.09)};
+  CreaseMesher mesher;
+  const Executor executor(threads);
+  for (std::uint32_t round = 0; round < kRounds; ++round) {
+    const std::string what = change(body, round, random);
+    body.place();
+    const Mesh& kept = mesher.make(body.field, options, executor);
+    EXPECT_EQ(hash_of(kept), hash_of(march_creases(body.field, options, Executor(1)))) << what;
+    EXPECT_GT(kept.vertex_count(), march_cubes(body.field, options, Executor(1)).vertex_count());
+  }
+}
+
 // Values are sums of few primitives: those of other places, signs and roots are kept.
 TEST(KeptMeshes, SampleOnlyWhatMovedPrimitivesReach) {
   for (const BlendRule rule : {BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient}) {
@@ -151,6 +170,43 @@ TEST(KeptMeshes, SampleOnlyWhatMovedPrimitivesReach) {
     (void)mesher.make(body.field, options, Executor(1), &counts);
     EXPECT_EQ(counts.tiles_sampled, all.tiles_sampled);
   }
+}
+
+/// Rows of balls that unite where they touch.
+Body rows_of_balls() {
+  std::vector<std::pair<Primitive, Vec3>> balls;
+  for (int i = 0; i < 12; ++i) {
+    for (int j = 0; j < 3; ++j) balls.emplace_back(wyvill_point(0.5), Vec3(0.35 * i, 0.35 * j, 0.03 * ((i + j) % 3)));
+  }
+  Body body = body_of(balls);
+  body.skeleton.blend.rule = BlendRule::Graph;
+  body.place();
+  return body;
+}
+
+// Points of creases are kept beside one ball after the other that moves, to the last bit: also those that only a step of their search
+// brings near it.
+TEST(KeptMeshes, WithCreasesFollowOneBallAfterTheOther) {
+  Body body = rows_of_balls();
+  const MarchOptions options{.lattice = lattice_of(0.03)};
+  CreaseMesher mesher;
+  MarchCounts all, counts;
+  (void)mesher.make(body.field, options, Executor(2), &all);
+  (void)mesher.make(body.field, options, Executor(2), &counts);
+  EXPECT_EQ(counts.tiles_sampled, 0u);
+  EXPECT_GT(all.bytes, 0u);
+  Random random(4);
+  for (std::size_t i = 0; i < body.parts.size(); i += 3) {
+    body.parts[i].position += random.in_box(i % 2 == 0 ? 0.005 : 0.06);
+    body.place();
+    const Mesh& kept = mesher.make(body.field, options, Executor(2), &counts);
+    EXPECT_LT(counts.tiles_sampled, all.tiles_sampled / 4);
+    EXPECT_EQ(hash_of(kept), hash_of(march_creases(body.field, options, Executor(1)))) << i;
+  }
+  // To an error nothing is kept, and from there on as before.
+  const MarchOptions within{.lattice = {.origin = options.lattice.origin, .cell = 0.0}, .error = 0.02};
+  EXPECT_EQ(hash_of(mesher.make(body.field, within, Executor(2))), hash_of(march_creases(body.field, within, Executor(1))));
+  EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(2))), hash_of(march_creases(body.field, options, Executor(1))));
 }
 
 // One mesher for a body of Wyvill points and another of capsules in turn, and on other lattices.

@@ -3,6 +3,8 @@
 /// meet at an angle along a curve. Other meshers cut it off within a cell.
 #pragma once
 
+#include <memory>
+
 #include "supple/core/executor.h"
 #include "supple/core/mesh.h"
 #include "supple/implicit/field.h"
@@ -22,5 +24,22 @@ namespace supple::implicit {
 /// @pre the rule of the field's blend is Graph, options.refinements is 0   @throws Error{Limit} as CubeMesher::make
 [[nodiscard]] Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor,
                                  MarchCounts* counts = nullptr);
+
+/// Meshes one body with creases again and again: what moved primitives do not reach is kept as by CubeMesher, and so are the nodes that
+/// its vertices belong to and the points of its creases. The result is that of march_creases, bit by bit.
+class CreaseMesher {
+ public:
+  CreaseMesher();
+  ~CreaseMesher();
+  CreaseMesher(CreaseMesher&&) noexcept;
+  CreaseMesher& operator=(CreaseMesher&&) noexcept;
+
+  /// @return as march_creases, valid until the next call   @pre, @throws as march_creases
+  const Mesh& make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts = nullptr);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;  ///< made with the first mesh
+};
 
 }  // namespace supple::implicit

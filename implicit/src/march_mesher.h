@@ -1,0 +1,26 @@
+/// @file march_mesher.h
+/// A mesh of marching cubes and what is kept of it from call to call.
+#pragma once
+
+#include <memory>
+
+#include "march_sampling.h"
+#include "supple/implicit/march_cubes.h"
+
+namespace supple::implicit::march {
+
+struct Marcher {
+  SamplerMemory memory;
+  BlockTable table;
+  MeshScratch scratch;
+  Mesh mesh;
+  std::unique_ptr<Sampler> sampler;  ///< of the last mesh
+  Lattice lattice;                   ///< of the last mesh
+  double iso = 0.0;
+  bool kept = false;  ///< table and mesh are those of the memory
+
+  /// Makes `mesh`, unrefined.
+  void march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
+};
+
+}  // namespace supple::implicit::march
