@@ -6,7 +6,7 @@
 ///   mesh_bench --bounded BODY CELLS            Hausdorff distances of cubes and tetrahedra to a mesh of a quarter of the cell
 ///                                              and back, with a bounded error (needs the component supple_cgal)
 ///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
-///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the blobs moved;
+///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the primitives moved;
 ///                                              /field: the field stage against its floors; /searched, only by its whole name:
 ///                                              cubes and the pieces that they miss
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers

@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
@@ -90,7 +92,7 @@ std::string change(Body& body, std::uint32_t round, Random& random) {
       skeleton.blend.exponent = 3.0;
       skeleton.blend.opening = 0.4;
       return "another blend";
-    case 12: skeleton.primitive[some].kernel = Kernel::murakami(0.35); return "another kernel";
+    case 12: skeleton.primitive[some].kernel = Kernel::murakami(skeleton.primitive[some].kernel.radius); return "another kernel of that radius";
     case 13:
       for (Pose& part : body.parts) part.position += random.in_box(0.01);
       return "all moved";
@@ -120,35 +122,35 @@ TEST_P(KeptMesh, IsThatOfAFreshMesherWhateverMoves) {
     }
   }
 }
-INSTANTIATE_TEST_SUITE_P(Rules, KeptMesh,
-                         ::testing::Combine(::testing::Values(BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient),
-                                            ::testing::Values(1, 2), ::testing::Values(12u, 70u)));
+constexpr std::array kRules{BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient};
+// Up to 64 primitives are scanned, more are sought in a hierarchy.
+INSTANTIATE_TEST_SUITE_P(Few, KeptMesh, ::testing::Combine(::testing::ValuesIn(kRules), ::testing::Values(1, 2), ::testing::Values(12u)));
+INSTANTIATE_TEST_SUITE_P(Many, KeptMesh, ::testing::Combine(::testing::ValuesIn(kRules), ::testing::Values(2), ::testing::Values(70u)));
 
-// And where the blend leaves creases, the vertices on them.
-TEST_P(KeptMesh, WithCreasesIsThatOfAFreshMesherWhateverMoves) {
-  const auto [rule, threads, parts] = GetParam();
-  if (rule != BlendRule::Graph) GTEST_SKIP() << "only graphs leave creases";
-  Random random(70);
-  Body body = mixed_body(3, rule, parts);
-  const MarchOptions options{.lattice = lattice_of(0.09)};
-  CreaseMesher mesher;
-  const Executor executor(threads);
-  for (std::uint32_t round = 0; round < kRounds; ++round) {
-    const std::string what = change(body, round, random);
-    body.place();
-    const Mesh& kept = mesher.make(body.field, options, executor);
-    EXPECT_EQ(hash_of(kept), hash_of(march_creases(body.field, options, Executor(1)))) << what;
-    EXPECT_GT(kept.vertex_count(), march_cubes(body.field, options, Executor(1)).vertex_count());
+TEST(KeptMeshes, WithCreasesAreThoseOfAFreshMesherWhateverMoves) {
+  for (const auto& [threads, parts] : {std::pair{1, 12u}, std::pair{2, 70u}}) {
+    Random random(70);
+    Body body = mixed_body(3, BlendRule::Graph, parts);
+    const MarchOptions options{.lattice = lattice_of(0.09)};
+    CreaseMesher mesher;
+    const Executor executor(threads);
+    for (std::uint32_t round = 0; round < kRounds; ++round) {
+      const std::string what = change(body, round, random);
+      body.place();
+      const Mesh& kept = mesher.make(body.field, options, executor);
+      EXPECT_EQ(hash_of(kept), hash_of(march_creases(body.field, options, Executor(1)))) << parts << ": " << what;
+      EXPECT_GT(kept.vertex_count(), march_cubes(body.field, options, Executor(1)).vertex_count());
+    }
   }
 }
 
 // Values are sums of few primitives: those of other places, signs and roots are kept.
 TEST(KeptMeshes, SampleOnlyWhatMovedPrimitivesReach) {
-  for (const BlendRule rule : {BlendRule::Sum, BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient}) {
+  for (const BlendRule rule : kRules) {
     Body body = random_body({.seed = 3, .parts = 300, .half_width = 1.5, .least_radius = 0.2, .largest_radius = 0.3});
     body.skeleton.blend.rule = rule;
     body.place();
-    const MarchOptions options{.lattice = lattice_of(0.06)};
+    const MarchOptions options{.lattice = lattice_of(0.08)};
     CubeMesher mesher;
     MarchCounts all, counts;
     (void)mesher.make(body.field, options, Executor(1), &all);
@@ -169,6 +171,22 @@ TEST(KeptMeshes, SampleOnlyWhatMovedPrimitivesReach) {
     mesher.forget();
     (void)mesher.make(body.field, options, Executor(1), &counts);
     EXPECT_EQ(counts.tiles_sampled, all.tiles_sampled);
+  }
+}
+
+// Leaves within a ball hold no values: their signs must follow it, from inside to outside and back at once.
+TEST(KeptMeshes, FollowABallThatJumps) {
+  std::vector<std::pair<Primitive, Vec3>> balls;
+  for (int i = 0; i < 3; ++i) balls.emplace_back(wyvill_point(0.8), Vec3(1.2 * i, 0, 0));
+  for (auto& [ball, place] : balls) ball.kernel = Kernel::soft_object(0.8);
+  Body body = body_of(balls);
+  const MarchOptions options{.lattice = lattice_of(0.02)};
+  CubeMesher mesher;
+  (void)mesher.make(body.field, options, Executor(1));
+  for (const Vec3& place : {Vec3(0.3, 1.5, 0.2), Vec3(0.4, 0.1, 0.0), Vec3(-2.0, -1.0, 0.6), Vec3(0.0, 0.0, 0.0)}) {
+    body.parts[0].position = place;
+    body.place();
+    EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(1))), hash_of(march_cubes(body.field, options, Executor(1))));
   }
 }
 

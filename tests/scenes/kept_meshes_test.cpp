@@ -1,4 +1,4 @@
-// Meshes of bodies that touch keep from frame to frame what does not move, and no bit tells.
+// Meshes keep from frame to frame what does not move, and no bit tells.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -90,6 +90,35 @@ output: {cell: 0.01}
   EXPECT_GT(moved, 0u);
   EXPECT_LT(moved, all / 3);  // it has a twelfth, and its neighbours reach some of the blocks beside
   expect_same(simulation.meshes(), meshes_alone(parse_scene(text, "test.yaml", "."), state));
+}
+
+// Bodies that touch no other: marched, with creases where nodes unite, with kernels that grow and shrink.
+TEST(KeptMeshes, OfBodiesApartAreThoseOfEachFrameMeshedAlone) {
+  for (const char* blend : {"", "blend: {rule: graph, groups: [{particles: [0, 1]}, {particles: [4, 5, 6]}]}", "blend: {rule: ricci}", "blend: {rule: gradient}"}) {
+    const std::string text = std::string(R"(
+schema: 1
+duration: 1 s
+frame_rate: 10
+objects:
+  - name: row
+    particles: {arrange: line, count: 14, spacing: 0.19, mass: 0.1}
+    skeleton: [{shape: segment, length: 0.1, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    )") + blend + "\noutput: {cell: 0.02, meshing: {search: false}}\n";
+    const Scene scene = parse_scene(text, "test.yaml", ".");
+    Simulation simulation = make(text);
+    State state = simulation.state();
+    for (std::size_t moving : {3u, 3u, 9u, 13u}) {
+      ASSERT_NO_FATAL_FAILURE(expect_same(simulation.meshes(), meshes_alone(scene, state))) << blend << ' ' << moving;
+      state.particles.position[moving] += Vec3(0.01, -0.004, 0.007);
+      simulation.restore(State(state));
+    }
+  }
+  const Scene scene = library_scene("objects/blob_keeps_its_volume");
+  Simulation simulation(scene, {.threads = 2});
+  for (const int frame : {2, 3}) {
+    run(simulation, frame);
+    ASSERT_NO_FATAL_FAILURE(expect_same(simulation.meshes(), meshes_alone(scene, simulation.state()))) << frame;
+  }
 }
 
 }  // namespace
