@@ -102,7 +102,7 @@ frame_rate: 10
 objects:
   - name: row
     particles: {arrange: line, count: 14, spacing: 0.19, mass: 0.1}
-    skeleton: [{shape: segment, length: 0.1, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    skeleton: [{shape: segment, half_length: 0.05, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
     )") + blend + "\noutput: {cell: 0.02, meshing: {search: false}}\n";
     const Scene scene = parse_scene(text, "test.yaml", ".");
     Simulation simulation = make(text);
