@@ -2,6 +2,7 @@
 /// Where a field may have other values than in the last call.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>

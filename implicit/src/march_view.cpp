@@ -1,6 +1,7 @@
+#include <immintrin.h>
+
 #include <algorithm>
 #include <cmath>
-#include <immintrin.h>
 #include <limits>
 #include <span>
 #include <utility>
