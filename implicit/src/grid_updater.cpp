@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <unordered_map>
+#include <utility>
 
-#include "field_index.h"
+#include "field_changes.h"
 #include "grid_leaves.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -15,34 +16,8 @@ using openvdb::FloatTree;
 
 namespace {
 
-/// All that the values near a primitive depend on, by a hash for what is more than a point.
-struct PrimitiveKey {
-  std::array<double, 3> position{};
-  double inverse_r2 = 0.0;
-  std::uint64_t rest = 0;
-  bool operator==(const PrimitiveKey&) const = default;
-};
-
-PrimitiveKey key_of(const Field::Index& index, std::size_t id) {
-  const PackedPrimitive& p = index.primitive[id];
-  PrimitiveKey key{p.position, p.inverse_r2, p.part};
-  if (p.kind == PackedKind::PointWyvill) return key;
-  const PackedShape& shape = index.shape[id];
-  Hasher hasher;
-  hasher.add(std::uint64_t{p.part});
-  hasher.add(std::span<const double>(shape.to_local));
-  hasher.add(std::span<const double>(shape.half));
-  const Kernel& k = shape.kernel;
-  hasher.add(static_cast<std::uint64_t>(k.kind));
-  for (const double x : {k.radius, k.thickness, k.slope, k.iso, k.shape}) hasher.add(x);
-  const ShapeView& v = shape.view;
-  hasher.add(static_cast<std::uint64_t>(v.kind));
-  hasher.add(std::span<const Vec3>(&v.size, 1));
-  for (const double x : {v.radius, v.taper, v.pair[0], v.pair[1], v.gain}) hasher.add(x);
-  hasher.add(v.control);
-  key.rest = hasher.value();
-  return key;
-}
+/// Ranges of more are made anew: their differences would be too many blocks to look at.
+constexpr std::uint64_t kMostBlocksKept = 100'000'000;
 
 struct BlockHash {
   std::size_t operator()(const BlockCoord& b) const {
@@ -50,7 +25,12 @@ struct BlockHash {
   }
 };
 
-bool same(const BlockRange& a, const BlockRange& b) { return a.lower == b.lower && a.upper == b.upper; }
+bool holds(const BlockRange& range, const BlockCoord& block) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (block[k] < range.lower[k] || block[k] > range.upper[k]) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -59,39 +39,55 @@ struct GridUpdater::Impl {
   bool usable = false;
   GridOptions options;
   BlockRange range;
-  double iso = 0.0;
-  BlendIndex blend;
-  std::vector<PrimitiveKey> key, next_key;
-  std::vector<Box> support;
+  FieldChanges changes;
   float inside = 0.0F;
   std::unordered_map<BlockCoord, float, BlockHash> largest;  ///< |value| by leaf, for GridContent::Field
   std::vector<BlockCoord> touched;
   std::vector<SampledLeaf> sampled;
 
-  /// Blocks of the range that a box reaches.
-  void touch(const Box& box) {
-    const BlockRange reached = block_range(box, options.lattice, 1);
-    for (std::int32_t z = std::max(reached.lower[2], range.lower[2]); z <= std::min(reached.upper[2], range.upper[2]); ++z) {
-      for (std::int32_t y = std::max(reached.lower[1], range.lower[1]); y <= std::min(reached.upper[1], range.upper[1]); ++y) {
-        for (std::int32_t x = std::max(reached.lower[0], range.lower[0]); x <= std::min(reached.upper[0], range.upper[0]); ++x) {
-          touched.push_back({x, y, z});
-        }
+  void touch(const BlockRange& blocks) {
+    for (std::int32_t z = blocks.lower[2]; z <= blocks.upper[2]; ++z) {
+      for (std::int32_t y = blocks.lower[1]; y <= blocks.upper[1]; ++y) {
+        for (std::int32_t x = blocks.lower[0]; x <= blocks.upper[0]; ++x) touched.push_back({x, y, z});
       }
     }
   }
+  /// Blocks of the range that a box reaches.
+  void touch(const Box& box) {
+    BlockRange reached = block_range(box, options.lattice, 1);
+    for (std::size_t k = 0; k < 3; ++k) {
+      reached.lower[k] = std::max(reached.lower[k], range.lower[k]);
+      reached.upper[k] = std::min(reached.upper[k], range.upper[k]);
+    }
+    touch(reached);
+  }
+  /// Blocks of a that b has not, side by side.
+  void touch_others(BlockRange a, const BlockRange& b) {
+    if (b.empty()) return touch(a);
+    for (std::size_t k = 0; k < 3 && !a.empty(); ++k) {
+      BlockRange below = a, above = a;
+      below.upper[k] = std::min(a.upper[k], b.lower[k] - 1);
+      above.lower[k] = std::max(a.lower[k], b.upper[k] + 1);
+      if (!below.empty()) touch(below);
+      if (!above.empty() && above.lower[k] > below.upper[k]) touch(above);
+      a.lower[k] = std::max(a.lower[k], b.lower[k]);
+      a.upper[k] = std::min(a.upper[k], b.upper[k]);
+    }
+  }
 
-  /// Lists the blocks that may be different. @return false where everything may be
-  bool list_touched(const Field::Index& index, const std::vector<Box>& boxes) {
+  /// Lists the blocks that may be different. @param last  the range of the last call   @return false where too many are
+  bool list_touched(const BlockRange& last) {
+    const std::size_t most = std::max<std::size_t>(result.impl_->grid->tree().leafCount(), 64) / 2;
     touched.clear();
-    if (key.size() != next_key.size()) return false;
-    for (std::size_t i = 0; i < key.size(); ++i) {
-      if (key[i] == next_key[i]) continue;
-      touch(support[i]);
-      touch(boxes[i]);
-      if (touched.size() > 64 * (index.size() + 4096)) drop_repeats();
+    if (changes.all() || last.count() + range.count() > kMostBlocksKept) return false;
+    touch_others(last, range);
+    touch_others(range, last);
+    for (const Reach& reach : changes.reaches()) {
+      touch(reach.whole);
+      if (touched.size() > 64 * (most + 4096)) drop_repeats();
     }
     drop_repeats();
-    return 2 * touched.size() < std::max<std::size_t>(result.impl_->grid->tree().leafCount(), 64);
+    return touched.size() < most;
   }
   void drop_repeats() {
     std::sort(touched.begin(), touched.end(), before);
@@ -107,7 +103,7 @@ struct GridUpdater::Impl {
     executor.for_blocks(touched.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const BlockCoord& b = touched[i];
-        verdict[i] = look(field, width, box_of(b, options.lattice));
+        verdict[i] = holds(range, b) ? look(field, width, box_of(b, options.lattice)) : Verdict::Outside;
         if (verdict[i] == Verdict::Keep) {
           sampled[i] = sample_leaf(field, options, b);
         } else {
@@ -147,16 +143,12 @@ GridUpdater& GridUpdater::operator=(GridUpdater&&) noexcept = default;
 const SurfaceGrid& GridUpdater::make(const Field& field, const GridOptions& options, const Executor& executor,
                                      GridCounts* counts) {
   Impl& self = *impl_;
-  const Field::Index& index = field.index();
   GridCounts count;
-  self.next_key.resize(index.size());
-  for (std::size_t i = 0; i < index.size(); ++i) self.next_key[i] = key_of(index, i);
-  const BlockRange range = range_of(field, options);
-  const bool comparable = self.usable && same(options, self.options) && index.iso == self.iso &&
-                          index.blend == self.blend && same(range, self.range);
-  self.usable = false;
+  const bool comparable = std::exchange(self.usable, false) && same(options, self.options);
+  self.changes.update(field.index());
+  const BlockRange last = std::exchange(self.range, range_of(field, options));
   bool done = false;
-  if (comparable && self.list_touched(index, index.support)) {
+  if (comparable && self.list_touched(last)) {
     executor.run([&] { done = self.update(field, executor, count); });
   }
   if (!done) {
@@ -167,12 +159,7 @@ const SurfaceGrid& GridUpdater::make(const Field& field, const GridOptions& opti
     self.largest.clear();
     if (options.content == GridContent::Field) self.largest.insert(made.largest.begin(), made.largest.end());
     self.options = options;
-    self.range = range;
-    self.iso = index.iso;
-    self.blend = index.blend;
   }
-  self.key.swap(self.next_key);
-  self.support = index.support;
   self.usable = true;
   if (counts != nullptr) *counts = count;
   return self.result;

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
+#include "field_changes.h"
 #include "grid_leaves.h"
 #include "supple/core/error.h"
 
@@ -31,6 +33,7 @@ struct UnionUpdater::Impl {
   GridOptions options;
   BlockList list;                      ///< of the last call; candidates are places among its bodies
   std::vector<std::uint64_t> version;  ///< of these
+  std::vector<FieldChanges> changes;   ///< by place
 
   [[nodiscard]] float inside() const { return inside_value(options, 0.0F); }
 
@@ -59,13 +62,34 @@ struct UnionUpdater::Impl {
     return sample_leaf(UnitedField(std::move(near)), options, list.block[i]);
   }
 
+  /// Sees what moved within bodies that are not what they were. @param known  the last call is there to compare with
+  void find_changes(std::span<const UnitedBody> bodies, bool known) {
+    if (!known) changes.clear();
+    changes.resize(bodies.size());
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      if (bodies[b].field == nullptr) {
+        changes[b].forget();
+      } else if (!known || b >= version.size() || bodies[b].version != version[b]) {
+        changes[b].update(bodies[b].field->index());
+      }
+    }
+  }
+  /// Whether the depth of a body is in a leaf what that of a body of the last call was, by their places.
+  [[nodiscard]] bool stays(std::span<const UnitedBody> bodies, std::uint32_t now, std::uint32_t last, const Box& leaf) const {
+    if (bodies[now].version == version[last]) return true;
+    if (now != last || bodies[now].field == nullptr || changes[now].all()) return false;
+    const auto& reaches = changes[now].reaches();
+    return std::none_of(reaches.begin(), reaches.end(), [&](const Reach& reach) { return reach.whole.overlaps(leaf) && reach.meets(leaf); });
+  }
+
   /// Leaves of `next` that are not as they were, and leaves of the last list that `next` has not.
   void compare(std::span<const UnitedBody> bodies, const BlockList& next, std::vector<std::size_t>& changed, std::vector<BlockCoord>& gone) const {
     const auto unchanged = [&](std::size_t i, std::size_t old) {
       const std::size_t count = next.offset[i + 1] - next.offset[i];
       if (count != list.offset[old + 1] - list.offset[old]) return false;
+      const Box leaf = box_of(next.block[i], options.lattice);
       for (std::size_t k = 0; k < count; ++k) {
-        if (bodies[next.candidate[next.offset[i] + k]].version != version[list.candidate[list.offset[old] + k]]) return false;
+        if (!stays(bodies, next.candidate[next.offset[i] + k], list.candidate[list.offset[old] + k], leaf)) return false;
       }
       return true;
     };
@@ -110,8 +134,8 @@ const SurfaceGrid& UnionUpdater::make(std::span<const UnitedBody> bodies, const 
   Impl& self = *impl_;
   std::vector<FieldView> depths;
   for (const UnitedBody& body : bodies) depths.push_back(body.depth);
-  const bool comparable = self.usable && same(options, self.options);
-  self.usable = false;
+  const bool comparable = std::exchange(self.usable, false) && same(options, self.options);
+  self.find_changes(bodies, comparable);
   BlockList next = Impl::look_at(bodies, range_of(UnitedField(std::move(depths)), options), options, executor);
   GridCounts count{.leaves_looked_at = next.block.size(), .leaves_sampled = next.block.size(), .whole = true};
   std::vector<std::size_t> changed;

@@ -113,7 +113,8 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
       // With its bulges, but without what others take: that is in the union.
       const implicit::FieldView whole =
           apart ? implicit::FieldView(fields[i]) : bulging.emplace_back(division.claim[at], std::vector<collision::ClaimField>{}, modulus);
-      united.push_back({distance ? implicit::FieldView(depth.emplace_back(whole)) : whole, apart ? versions.field(i) : versions.claim(at)});
+      united.push_back({distance ? implicit::FieldView(depth.emplace_back(whole)) : whole, apart ? versions.field(i) : versions.claim(at),
+                        apart ? &fields[i] : nullptr});
     }
     if (gridding.of == GriddedName::Scene) continue;
     try {

@@ -246,7 +246,7 @@ TEST(GridUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
   EXPECT_LT(10 * counts.leaves_sampled, all);
 }
 
-TEST(GridUpdater, MakesEverythingAnewForOtherOptionsIsoOrPrimitives) {
+TEST(GridUpdater, MakesEverythingAnewForAnotherIsoBlendOrOptions) {
   Body body = random_body({.seed = 8, .parts = 60, .half_width = 2.0, .only_points = true});
   GridUpdater updater;
   GridOptions options = options_of(GridContent::SignedDistance);
@@ -266,7 +266,6 @@ TEST(GridUpdater, MakesEverythingAnewForOtherOptionsIsoOrPrimitives) {
   body.skeleton.blend.rule = BlendRule::Ricci;
   EXPECT_TRUE(whole());
   body.skeleton.primitive.pop_back();
-  EXPECT_TRUE(whole());
   EXPECT_FALSE(whole());
 }
 
@@ -285,6 +284,11 @@ struct Crowd {
     body.place();
     member.push_back({std::move(body), next++});
   }
+  void move_a_part(std::size_t i, const Vec3& by) {
+    member[i].body.parts[1].position += by;
+    member[i].body.place();
+    member[i].version = next++;
+  }
   void move(std::size_t i, const Vec3& by) {
     for (Pose& part : member[i].body.parts) part.position += by;
     member[i].body.place();
@@ -297,7 +301,7 @@ struct Crowd {
   }
   [[nodiscard]] std::vector<UnitedBody> united(const std::vector<DepthField>& depths) const {
     std::vector<UnitedBody> out;
-    for (std::size_t i = 0; i < member.size(); ++i) out.push_back({depths[i], member[i].version});
+    for (std::size_t i = 0; i < member.size(); ++i) out.push_back({depths[i], member[i].version, i % 2 == 0 ? &member[i].body.field : nullptr});
     return out;
   }
 };
@@ -310,7 +314,8 @@ TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
   for (std::uint64_t seed = 0; seed < 9; ++seed) crowd.add(seed, random.in_box(1.5));
   UnionUpdater updater;
   int kept = 0;
-  for (int step = 0; step < 12; ++step) {
+  for (int step = 0; step < 14; ++step) {
+    if (step % 2 == 1) crowd.move_a_part(random.below(static_cast<std::uint32_t>(crowd.member.size())), random.in_box(0.1));
     if (step % 3 == 0) crowd.move(random.below(static_cast<std::uint32_t>(crowd.member.size())), random.in_box(0.2));
     if (step == 4) crowd.move(2, Vec3(2.0, 0, 0));  // the box of all gets another one
     if (step == 5) crowd.member.erase(crowd.member.begin() + 1);
@@ -353,6 +358,24 @@ TEST(UnionUpdater, TouchesOnlyLeavesNearBodiesThatChanged) {
   options.half_width = 2.0;
   make();
   EXPECT_TRUE(counts.whole);
+}
+
+TEST(UnionUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
+  Crowd crowd;
+  crowd.member.push_back({random_body({.seed = 8, .parts = 200, .half_width = 3.0, .only_points = true}), crowd.next++});
+  crowd.add(2, Vec3(6.0, 0, 0));
+  UnionUpdater updater;
+  GridCounts counts;
+  const auto make = [&] {
+    const std::vector<DepthField> depths = crowd.depths();
+    (void)updater.make(crowd.united(depths), options_of(GridContent::SignedDistance), Executor(1), &counts);
+    return counts.leaves_sampled;
+  };
+  const std::uint64_t all = make();
+  crowd.move_a_part(0, Vec3(0.01, 0, 0));
+  const std::uint64_t moved = make();
+  EXPECT_GT(moved, 0u);
+  EXPECT_LT(10 * moved, all);
 }
 
 TEST(SurfaceGrid, OfUnitedBodiesHasTheDistanceToTheNearest) {

@@ -75,8 +75,8 @@ class GridUpdater {
   GridUpdater(GridUpdater&&) noexcept;
   GridUpdater& operator=(GridUpdater&&) noexcept;
 
-  /// Valid until the next call. Everything is made anew where options, iso value, blend or the number of primitives are not
-  /// those of the last call, where more than half of the leaves would change, and with GridContent::Field where the largest
+  /// Valid until the next call. Everything is made anew where options, iso value or blend are not those of the last call, where half of
+  /// the primitives moved, where more than half of the leaves would change, and with GridContent::Field where the largest
   /// value does: it stands for all beyond the band.
   /// @throws as make_surface_grid; the next call then makes everything anew
   const SurfaceGrid& make(const Field& field, const GridOptions& options, const Executor& executor,
@@ -129,6 +129,7 @@ class UnitedField {
 struct UnitedBody {
   FieldView depth;            ///< of slope 1, as a DepthField; must outlive the call
   std::uint64_t version = 0;  ///< no two the same: equal ones, of any calls, mean that the depth is the same bit for bit (core/content_versions.h)
+  const Field* field = nullptr;  ///< whose depth it is, if that of one: then leaves stay that none of its moved primitives reaches
 };
 
 /// Makes the signed distances of several bodies again and again: only leaves are touched that a body may reach which is no longer, or was
