@@ -226,6 +226,21 @@ TEST(GridUpdater, HasTheTreeOfAWholeGridWhateverMoved) {
   }
 }
 
+TEST(GridUpdater, FollowsASurfaceThatGrowsAndShrinks) {
+  const Folder folder;
+  const GridOptions options = options_of(GridContent::SignedDistance);
+  Body body = random_body({.seed = 8, .parts = 200, .half_width = 3.0, .only_points = true});
+  GridUpdater updater;
+  for (const double x : {3.2, 3.5, 3.9, 3.3, 3.0}) {
+    body.parts[7].position = Vec3(x, 0.3, -0.2);
+    body.place();
+    GridCounts counts;
+    const SurfaceGrid& grid = updater.make(body.field, options, Executor(1), &counts);
+    EXPECT_EQ(counts.whole, x == 3.2) << x;
+    EXPECT_EQ(content_of(bytes_of(folder, grid)), content_of(bytes_of(folder, make_surface_grid(body.field, options, Executor(1))))) << x;
+  }
+}
+
 TEST(GridUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
   Body body = random_body({.seed = 8, .parts = 200, .half_width = 3.0, .only_points = true});
   GridUpdater updater;
@@ -284,6 +299,11 @@ struct Crowd {
     body.place();
     member.push_back({std::move(body), next++});
   }
+  void set_iso(std::size_t i, double iso) {
+    member[i].body.skeleton.iso = iso;
+    member[i].body.place();
+    member[i].version = next++;
+  }
   void move_a_part(std::size_t i, const Vec3& by) {
     member[i].body.parts[1].position += by;
     member[i].body.place();
@@ -312,16 +332,22 @@ TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
   Crowd crowd;
   Random random(31);
   for (std::uint64_t seed = 0; seed < 9; ++seed) crowd.add(seed, random.in_box(1.5));
+  for (const double x : {4.0, 8.0, -4.0, -8.0}) crowd.member.push_back({body_of({{wyvill_point(2.6), Vec3(x, 0, 0)}}), crowd.next++});  // whole leaves of it lie inside
   UnionUpdater updater;
   int kept = 0;
-  for (int step = 0; step < 14; ++step) {
-    if (step % 2 == 1) crowd.move_a_part(random.below(static_cast<std::uint32_t>(crowd.member.size())), random.in_box(0.1));
-    if (step % 3 == 0) crowd.move(random.below(static_cast<std::uint32_t>(crowd.member.size())), random.in_box(0.2));
-    if (step == 4) crowd.move(2, Vec3(2.0, 0, 0));  // the box of all gets another one
+  for (int step = 0; step < 16; ++step) {
+    if (step % 2 == 1) crowd.move_a_part(random.below(9), random.in_box(0.1));
+    if (step % 3 == 0) crowd.move(random.below(9), random.in_box(0.2));
+    if (step == 4) crowd.move(2, Vec3(2.0, 0, 0));
     if (step == 5) crowd.member.erase(crowd.member.begin() + 1);
     if (step == 7) crowd.add(40, random.in_box(1.0));
     if (step == 8) std::swap(crowd.member[0], crowd.member[3]);
     if (step == 10) crowd.move(0, crowd.member[4].body.parts[0].position - crowd.member[0].body.parts[0].position);  // into another one
+    if (step == 11) crowd.move(0, Vec3(0.05, 0.05, 0.0));
+    if (step == 12) crowd.move(9, Vec3(0.6, 0.0, 0.2));  // a large one, which whole leaves stay inside of
+    if (step == 13) crowd.move(10, Vec3(3.0, 0.0, 0.0));  // and one that leaves the box of all
+    if (step == 14) crowd.set_iso(0, 0.3);
+    if (step == 15) crowd.member.pop_back();
     const std::vector<DepthField> depths = crowd.depths();
     GridCounts counts;
     const SurfaceGrid& grid = updater.make(crowd.united(depths), options, Executor(2), &counts);
@@ -330,7 +356,7 @@ TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
     ASSERT_EQ(content_of(bytes_of(folder, grid)), content_of(bytes_of(folder, whole))) << step;
     kept += counts.whole ? 0 : 1;
   }
-  EXPECT_GE(kept, 9);
+  EXPECT_GE(kept, 11);
 }
 
 TEST(UnionUpdater, TouchesOnlyLeavesNearBodiesThatChanged) {
