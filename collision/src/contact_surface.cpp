@@ -11,6 +11,7 @@
 #include "march_rule.h"
 #include "polar_rule.h"
 #include "sample_rule.h"
+#include "symmetry.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
@@ -360,7 +361,9 @@ bool PairSolver::march(PairPressure& pressure, std::span<const ContactBody> bodi
                        const ContactSettings& settings, PairResult& out) {
   begin_anew(bodies, overlap, out);
   const Vec3 reference = overlap.centre();
-  if (!march_.solve(pressure, third_bodies_, overlap, {settings.error, settings.max_refinement}, regions_, reference, out.points)) return false;
+  const bool alone = settings.symmetry && third_bodies_.empty();
+  const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(bodies[out.summary.bodies.a], bodies[out.summary.bodies.b], overlap) : std::nullopt;
+  if (!march_.solve(pressure, third_bodies_, overlap, {settings.error, settings.max_refinement}, regions_, axis, reference, out.points)) return false;
   keep(march_, ContactRule::March, reference, out);
   return true;
 }

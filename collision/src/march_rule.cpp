@@ -11,7 +11,9 @@ namespace supple::collision {
 namespace {
 
 constexpr int kSteps = 30;
-constexpr double kOnSigma = 1e-9;      // of a cell: a last step as long as this leaves its square, and normals as good as it
+/// Of a cell: a last step as long as this leaves its square, and normals as good as it.
+constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kLeastCosine = 0.2;   // between the interpolated normal and that of Sigma
 constexpr double kFlat = 0.2;          // in cells: highest middle of an edge of a mesh that is fine enough
 constexpr double kLeastTurn = 0.5;     // cosine between normals of such a mesh's triangle
@@ -21,6 +23,7 @@ constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kMargin = 2.0;        // of a cubic polynomial, in what it misses at the middles of edges
 constexpr double kDoubt = 1.0 / 64.0;  // share of the error asked for that a single doubtful piece may be
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
+constexpr double kShortest = 1e-9;     // piece of a ray
 constexpr int kFewNodes = 3;           // through a squeezed region
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
 constexpr int kMostLevels = 24;        // of splitting doubtful pieces at once
@@ -135,7 +138,7 @@ void MarchRuleSolver::place(PairPressure& pressure, std::span<const ContactBody*
       if (!std::isfinite(move)) continue;
       feet.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
       if (std::abs(feet.height[i]) > cell_) continue;
-      if (std::abs(move) > kOnSigma * cell_) {
+      if (std::abs(move) > on_sigma_ * cell_) {
         open_[left++] = i;
         continue;
       }
@@ -168,14 +171,8 @@ MarchRuleSolver::Foot MarchRuleSolver::foot(const Feet& feet, std::size_t i) con
   return out;
 }
 
-/// What a quadratic polynomial through the corners and middles says of them.
-template <class Of>
-double MarchRuleSolver::quadratic(const Piece& piece, const Vec2& at, const Of& of) {
-  const auto& c = piece.corner;
-  const Vec2 u = c[1].at - c[0].at, v = c[2].at - c[0].at, w = at - c[0].at;
-  const double whole = cross(u, v), q = cross(w, v) / whole, r = cross(u, w) / whole, p = 1.0 - q - r;
-  return p * (2.0 * p - 1.0) * of(c[0]) + q * (2.0 * q - 1.0) * of(c[1]) + r * (2.0 * r - 1.0) * of(c[2]) +
-         4.0 * (q * r * of(piece.middle[0]) + r * p * of(piece.middle[1]) + p * q * of(piece.middle[2]));
+double MarchRuleSolver::height_at(const Piece& piece, const Vec2& at) {
+  return quadratic(piece, at, [](const Foot& f) { return f.height; });
 }
 
 /// By the Bezier controls of the cubic polynomial with the values and slopes at the corners.
@@ -276,7 +273,7 @@ void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody*
       piece.corner = {a, b, c};
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec2 at = 0.5 * (piece.corner[(k + 1) % 3].at + piece.corner[(k + 2) % 3].at);
-        feet_.add(p.triangle, at, quadratic(p, at, [](const Foot& f) { return f.height; }));
+        feet_.add(p.triangle, at, height_at(p, at));
       }
       to.push_back(piece);
     };
@@ -357,23 +354,26 @@ void MarchRuleSolver::settle(PairPressure& pressure, std::span<const ContactBody
   }
 }
 
-/// Where on the rays the rim lies: Newton's method on Sigma, held between places on both sides of it.
-void MarchRuleSolver::find_rims(PairPressure& pressure, std::span<const ContactBody* const> third) {
+/// Where on the rays the rim lies, or a kink: Newton's method on Sigma, held between places on both sides of it.
+void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays) {
   constexpr double kFar = 0.02;  // off Sigma, in cells: too far to move along it
-  constexpr double kMet = 1e-11;
-  const std::size_t n = rays_.size();
+  constexpr double kNear = 1e-5;  // near enough to tell on which side of the rim
+  constexpr double kMet = 1e-11, kAtZero = 1e-7;
+  // The square of this is left of the way to a kink, and sums miss a higher power of it.
+  constexpr double kMetKink = 1e-4;
+  const std::size_t n = rays.size();
   feet_.clear();
-  for (const Ray& ray : rays_) feet_.add(leaves_[ray.leaf].piece.triangle, ray.from + ray.at * ray.way, ray.height);
+  for (const Ray& ray : rays) feet_.add(leaves_[ray.leaf].piece.triangle, ray.from + ray.at * ray.way, ray.height);
   feet_.make_room();
   open_.clear();
   for (std::size_t i = 0; i < n; ++i) {
-    if (rays_[i].rim != Rim::None) open_.push_back(i);
+    if (rays[i].rim != Rim::None) open_.push_back(i);
   }
   for (int step = 0; step < kSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet_, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {
-      Ray& ray = rays_[i];
+      Ray& ray = rays[i];
       const double move = to_sigma(feet_, i);
       if (!std::isfinite(move)) continue;
       feet_.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
@@ -382,13 +382,21 @@ void MarchRuleSolver::find_rims(PairPressure& pressure, std::span<const ContactB
       if (std::abs(move) > kFar * cell_) continue;
       lift(feet_, i, move);
       const Foot here = foot(feet_, i);
-      ((here.pressure > 0.0) == (ray.rim == Rim::Rises) ? ray.high : ray.low) = ray.at;
-      double next = ray.at - here.pressure / here.slope.dot(ray.way);
+      const bool rim = ray.kink == kPressure;
+      double value = here.pressure, rate = here.slope.dot(ray.way);
+      if (!rim) {
+        Vec3 slope;
+        value = kinks_[ray.kink].value(feet_.batch.point[i], slope);
+        rate = slope.dot(ray.way.x() * feet_.along_s[i] + ray.way.y() * feet_.along_t[i]);
+      }
+      if (std::abs(move) < kNear * cell_) ((value > 0.0) == (ray.rim == Rim::Rises) ? ray.high : ray.low) = ray.at;
+      const double newton = -value / rate;
+      double next = ray.at + newton;
       if (!(next >= ray.low && next <= ray.high)) next = 0.5 * (ray.low + ray.high);
       const double step_along = next - ray.at;
       ray.at = next;
-      if (std::abs(step_along) < kMet && std::abs(move) < kOnSigma * cell_) {
-        ray.found = true;
+      if (std::abs(step_along) < (rim ? kMet : kMetKink) && std::abs(move) < (rim ? on_sigma_ : kMetKink) * cell_) {
+        ray.found = !rim || std::abs(newton) < kAtZero;
         --left;
         continue;
       }
@@ -416,7 +424,7 @@ void MarchRuleSolver::find_ends(PairPressure& pressure, std::span<const ContactB
     guess(ray);
     rays_.push_back(ray);
   }
-  find_rims(pressure, third);
+  find_zeros(pressure, third, rays_);
   for (const Ray& ray : rays_) {
     leaves_[ray.leaf].ends = ray.at;
     if (!ray.found) leaves_[ray.leaf].add_doubt(area_of(leaves_[ray.leaf].piece));
@@ -429,11 +437,11 @@ void MarchRuleSolver::guess(Ray& ray) const {
   const auto pressure = [](const Foot& f) { return f.pressure; };
   const double p = quadratic(piece, ray.from, pressure), q = quadratic(piece, ray.from + ray.high * ray.way, pressure), share = p / (p - q);
   ray.at = ray.high * (share > 0.0 && share < 1.0 ? share : 0.5);
-  ray.height = quadratic(piece, ray.from + ray.at * ray.way, [](const Foot& f) { return f.height; });
+  ray.height = height_at(piece, ray.from + ray.at * ray.way);
 }
 
 /// Rays through the leaves [first, end), all parallel to one edge of their leaf: by Gauss's rule of this order, then of one less,
-/// on each side of where the rim meets the other edge.
+/// between two breaks each.
 void MarchRuleSolver::send_rays(std::size_t first, std::size_t end, int order) {
   rays_.clear();
   for (std::size_t l = first; l < end; ++l) {
@@ -441,28 +449,33 @@ void MarchRuleSolver::send_rays(std::size_t first, std::size_t end, int order) {
     if (leaf.shape.part == Part::None) continue;
     const auto& c = leaf.piece.corner;
     const auto [i, j, k] = leaf.shape.order;
-    const auto send = [&](int nodes, double begin, double stop, Rim rim) {
-      const GaussRule& gauss = gauss_rule(nodes);
-      for (std::size_t n = 0; n < gauss.node.size(); ++n) {
-        const double across = begin + (stop - begin) * gauss.node[n];
-        Ray ray;
-        ray.leaf = l;
-        ray.nodes = nodes;
-        ray.fine = nodes == order;
-        ray.from = c[i].at + across * (c[k].at - c[i].at);
-        ray.way = c[j].at - c[i].at;
-        ray.high = ray.exit = 1.0 - across;
-        ray.rim = rim;
-        ray.weight = (stop - begin) * gauss.weight[n] * twice_parameters(leaf.piece);
-        guess(ray);
-        rays_.push_back(ray);
-      }
+    const auto send = [&](int nodes, std::size_t part, Rim rim, double across, double weight) {
+      Ray ray;
+      ray.leaf = l;
+      ray.nodes = nodes;
+      ray.fine = nodes == order && weight > 0.0;
+      ray.part = part;
+      ray.from = c[i].at + across * (c[k].at - c[i].at);
+      ray.way = c[j].at - c[i].at;
+      ray.high = ray.exit = 1.0 - across;
+      ray.rim = rim;
+      ray.weight = weight;
+      guess(ray);
+      rays_.push_back(ray);
     };
     for (const int nodes : {order, order - 1}) {
-      if (leaf.shape.part != Part::AllButCorner) send(nodes, 0.0, leaf.ends, leaf.shape.part == Part::All ? Rim::None : Rim::Falls);
-      if (leaf.shape.part == Part::AllButCorner) {
-        send(nodes, 0.0, leaf.ends, Rim::Rises);
-        send(nodes, leaf.ends, 1.0, Rim::None);
+      for (std::size_t part = 0; part + 1 < leaf.breaks; ++part) {
+        const bool beyond = breaks_[leaf.first_break + part] >= leaf.ends;
+        if (beyond && leaf.shape.part == Part::Corner) break;
+        const bool rim = leaf.shape.part != Part::All && !beyond;
+        const Rim goes = !rim ? Rim::None : leaf.shape.part == Part::Corner ? Rim::Falls : Rim::Rises;
+        const double begin = breaks_[leaf.first_break + part], width = breaks_[leaf.first_break + part + 1] - begin;
+        const GaussRule& gauss = gauss_rule(nodes);
+        // The edge shows kinks that leave before the first ray.
+        if (leaf.crossings > 0 && part == 0 && nodes == order) send(nodes, part, goes, 0.0, 0.0);
+        for (std::size_t n = 0; n < gauss.node.size(); ++n) {
+          send(nodes, part, goes, begin + width * gauss.node[n], width * gauss.weight[n] * twice_parameters(leaf.piece));
+        }
       }
     }
   }
@@ -472,16 +485,23 @@ void MarchRuleSolver::send_rays(std::size_t first, std::size_t end, int order) {
 void MarchRuleSolver::lay_points() {
   feet_.clear();
   share_.clear();
-  for (const Ray& ray : rays_) {
+  for (Ray& ray : rays_) {
     Leaf& leaf = leaves_[ray.leaf];
-    const double low = ray.rim == Rim::Rises ? ray.at : 0.0, high = ray.rim == Rim::Falls ? ray.at : ray.exit;
     if (ray.rim != Rim::None && !ray.found) leaf.add_doubt(ray.weight * area_of(leaf.piece) / twice_parameters(leaf.piece));
     const GaussRule& gauss = gauss_rule(ray.nodes);
-    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
-      const Vec2 at = ray.from + (low + (high - low) * gauss.node[j]) * ray.way;
-      feet_.add(leaf.piece.triangle, at, quadratic(leaf.piece, at, [](const Foot& f) { return f.height; }));
-      share_.push_back(ray.weight * gauss.weight[j] * (high - low));
+    const std::size_t first = feet_.size();
+    double low = ray.begins();
+    for (std::size_t k = 0; k <= ray.cuts; ++k) {
+      const double high = k < ray.cuts ? cuts_[ray.first_cut + k].at : ray.ends();
+      if (k < ray.cuts && high - low < kShortest) continue;
+      for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+        const Vec2 at = ray.from + (low + (high - low) * gauss.node[j]) * ray.way;
+        feet_.add(leaf.piece.triangle, at, height_at(leaf.piece, at));
+        share_.push_back(ray.weight * gauss.weight[j] * (high - low));
+      }
+      low = high;
     }
+    ray.feet = feet_.size() - first;
   }
 }
 
@@ -506,13 +526,16 @@ MarchRuleSolver::Node MarchRuleSolver::node_at(std::size_t i) const {
 }
 
 /// Sums of the leaves from `first` on by rules of this order and of one less.
-void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, int order,
+void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, double error,
                                 std::size_t first) {
+  const int order = order_for(error);
   for (; first < leaves_.size(); first += kBatch) {
     const std::size_t end = std::min(leaves_.size(), first + kBatch);
-    find_ends(pressure, third, first, end);
+    find_crossings(first, end, error);
+    find_breaks(pressure, third, first, end);
     send_rays(first, end, order);
-    find_rims(pressure, third);
+    find_zeros(pressure, third, rays_);
+    find_cuts(pressure, third);
     lay_points();
     place(pressure, third, feet_);
     std::size_t foot_index = 0, ray = 0;
@@ -520,8 +543,9 @@ void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactB
       Leaf& leaf = leaves_[l];
       leaf.begin = nodes_.size();
       PatchSums coarse;
+      const std::size_t first_ray = ray, first_foot = foot_index;
       for (; ray < rays_.size() && rays_[ray].leaf == l; ++ray) {
-        for (int n = 0; n < rays_[ray].nodes; ++n, ++foot_index) {
+        for (std::size_t n = 0; n < rays_[ray].feet; ++n, ++foot_index) {
           const Foot here = foot(feet_, foot_index);
           if (!here.good || !(here.pressure > 0.0)) {
             leaf.add_doubt(2.0 * share_[foot_index] * area_of(leaf.piece) / twice_parameters(leaf.piece));
@@ -534,6 +558,7 @@ void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactB
           if (rays_[ray].fine) nodes_.push_back(node);
         }
       }
+      if (leaf.crossings > 0 && !sides_agree(leaf, first_ray, ray, first_foot)) leaf.trust = Trust::Lost;
       leaf.off = leaf.sums;
       leaf.off.add(coarse, -1.0);
       leaf.end = nodes_.size();
@@ -541,8 +566,22 @@ void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactB
   }
 }
 
+/// What the finer rule of a leaf may be off by, of what it differs from the coarser one by. Where sums converge like a power of the order,
+/// as Gauss's do on smooth pieces, that falls with the difference.
+double MarchRuleSolver::share_of(const Leaf& leaf, int order) {
+  constexpr double kFall = 30.0, kLost = 10.0;
+  if (leaf.trust == Trust::Lost) return kLost;
+  if (leaf.trust == Trust::Kinked || !leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kSafety;
+  const double off = std::max(leaf.off.force.norm() / leaf.sums.load, std::abs(leaf.off.area) / leaf.sums.area);
+  double root = std::sqrt(off);  // of degree order - 1 at least
+  for (int degree = 2; degree < order - 1; degree *= 2) root = std::sqrt(root);
+  return std::min(kSafety, kFall * root);
+}
+
 /// The sums over all leaves, and what each may be off by, relative to them.
-void MarchRuleSolver::weigh() {
+void MarchRuleSolver::weigh(int order) {
+  // Of a leaf as large as a triangle of the mesh: what two rules may both miss of a kink.
+  constexpr double kUnseen = 1e-4;
   sums_ = {};
   for (const Leaf& leaf : leaves_) sums_.add(leaf.sums);
   estimate_ = 1.0;
@@ -551,9 +590,12 @@ void MarchRuleSolver::weigh() {
   const Vec3 centre = sums_.centre();
   std::array<double, 3> sum{};
   for (Leaf& leaf : leaves_) {
-    const double lever = leaf.sums.load > 0.0 ? (leaf.sums.centre() - centre).norm() : across;
-    const std::array<double, 3> off{(kSafety * std::abs(leaf.off.area) + leaf.doubt) / sums_.area, (kSafety * leaf.off.force.norm() + leaf.doubt_load) / force,
-                                    (kSafety * (leaf.off.first - leaf.off.load * centre).norm() + leaf.doubt_load * lever) / (sums_.load * across)};
+    const double lever = leaf.sums.load > 0.0 ? (leaf.sums.centre() - centre).norm() : across, share = share_of(leaf, order);
+    const double square = twice_parameters(leaf.piece), size = leaf.mild ? square : std::sqrt(square);
+    const double unseen = leaf.trust == Trust::Lost ? kUnseen * size : 0.0;
+    const double doubt = leaf.doubt + unseen * leaf.sums.area, doubt_load = leaf.doubt_load + unseen * leaf.sums.load;
+    const std::array<double, 3> off{(share * std::abs(leaf.off.area) + doubt) / sums_.area, (share * leaf.off.force.norm() + doubt_load) / force,
+                                    (share * (leaf.off.first - leaf.off.load * centre).norm() + doubt_load * lever) / (sums_.load * across)};
     for (std::size_t k = 0; k < 3; ++k) sum[k] += off[k];
     leaf.error = *std::max_element(off.begin(), off.end());
   }
@@ -566,8 +608,8 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
   leaves_.clear();
   nodes_.clear();
   settle(pressure, third, limits.error, pieces_);
-  integrate(pressure, third, reference, order, 0);
-  weigh();
+  integrate(pressure, third, reference, limits.error, 0);
+  weigh(order);
   for (int round = 0; round < limits.refinements && estimate_ > limits.error && !leaves_.empty(); ++round) {
     order_.resize(leaves_.size());
     std::iota(order_.begin(), order_.end(), 0u);
@@ -577,6 +619,9 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
     double kept = 0.0;
     std::size_t keeps = 0;
     while (keeps < order_.size() && kept + leaves_[order_[keeps]].error <= kKept * limits.error) kept += leaves_[order_[keeps++]].error;
+    // All pieces that mirror one another, whose errors differ by round-off, are split, or none.
+    constexpr double kAlike = 1.0 - 1e-6;
+    while (keeps > 0 && keeps < order_.size() && leaves_[order_[keeps - 1]].error >= kAlike * leaves_[order_[keeps]].error) --keeps;
     const std::size_t splits = order_.size() - keeps;
     if (keeps + 4 * splits > kMostPieces) break;
     std::sort(order_.begin() + static_cast<std::ptrdiff_t>(keeps), order_.end());
@@ -588,8 +633,8 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
     split(pressure, third, halves_, pieces_);
     const std::size_t first = leaves_.size();
     settle(pressure, third, limits.error, pieces_);
-    integrate(pressure, third, reference, order, first);
-    weigh();
+    integrate(pressure, third, reference, limits.error, first);
+    weigh(order);
   }
   return sums_.load > 0.0;
 }
@@ -668,8 +713,9 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
 }
 
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press.
-void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap) {
-  const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
+void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
+                                const std::optional<CommonAxis>& axis) {
+  const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, axis, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
   const double longest = overlap.extent().maxCoeff();
   cell_ = std::max(std::min(pressure.feature_size(), longest / kFewCells), longest / kMostCells);
   bool coarse = false;
@@ -688,12 +734,18 @@ void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactB
 }
 
 bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
-                            const Limits& limits, const Regions& regions, const Vec3& reference, PatchPoints& points) {
+                            const Limits& limits, const Regions& regions, const std::optional<CommonAxis>& axis, const Vec3& reference,
+                            PatchPoints& points) {
   estimate_ = 1.0;
   thickness_ = 0.0;
   points.clear();
   if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite() || !(overlap.extent().maxCoeff() > 0.0)) return false;
-  make_mesh(pressure, third, overlap);
+  const double coordinates = std::max(overlap.lower.cwiseAbs().maxCoeff(), overlap.upper.cwiseAbs().maxCoeff());
+  on_sigma_ = kOnSigma;
+  make_mesh(pressure, third, overlap, axis);
+  on_sigma_ = std::max(std::clamp(1e-2 * limits.error, kOnSigmaAtBest, kOnSigma), 64.0 * kEpsilon * coordinates / cell_);
+  kinks_.clear();
+  all_kinks_ = pressure.kinks(overlap, kinks_);
   if (!refine(pressure, third, limits, reference)) return false;
 
   std::size_t peak = 0;
@@ -713,6 +765,8 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
     if (regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, std::max(order_for(limits.error) - 1, kFewNodes), points);
     thickness_ += depth(pressure, side, nodes_[peak], cell_);
   }
+  // What rounding of the coordinates does to so thin an overlap.
+  if (thickness_ > 0.0) estimate_ = std::min(1.0, estimate_ + 32.0 * kEpsilon * (1.0 + coordinates / thickness_));
   return true;
 }
 

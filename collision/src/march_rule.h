@@ -1,7 +1,7 @@
 /// @file march_rule.h
 /// Quadrature on any Sigma: tetrahedra over the overlap give plane triangles, each of which is mapped onto Sigma; Gauss points lie in
-/// the part of the image where the pressure is positive, between rims that are found along rays from a corner. Images are split
-/// where the sums of two rules differ most.
+/// the part of the image where the pressure is positive, between rims that are found along parallel rays, and on both sides of the kinks
+/// of the fields that cross it. Images are split where the sums of two rules differ most.
 #pragma once
 
 #include <array>
@@ -23,10 +23,11 @@ class MarchRuleSolver {
   };
   /// @param third  bodies whose larger pressure takes space away from the pair
   /// @param regions  what is wanted of the squeezed regions
+  /// @param axis  all around which both bodies, and no third, are the same: what is sideways to it cancels but for round-off
   /// @param reference  origin of the moments in `sums`
   /// @return whether Sigma was met
   bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const Limits& limits,
-             const Regions& regions, const Vec3& reference, PatchPoints& points);
+             const Regions& regions, const std::optional<CommonAxis>& axis, const Vec3& reference, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
@@ -61,6 +62,8 @@ class MarchRuleSolver {
     bool certain = true;
     double most = 0.0;     // the pressure is hardly more [Pa]
   };
+  /// How far two rules of a leaf tell what they miss.
+  enum class Trust : std::uint8_t { Smooth, Kinked, Lost };  // a kink is left uncut, or was not cut alike on all rays
   /// A piece with its sums.
   struct Leaf {
     Piece piece;
@@ -70,6 +73,10 @@ class MarchRuleSolver {
     double doubt_load = 0.0;   // [N]
     std::size_t begin = 0, end = 0;  // of its points
     double ends = 1.0;  // where the rim crosses the edge across the rays, of it
+    std::size_t first_crossing = 0, crossings = 0;
+    std::size_t first_break = 0, breaks = 0;
+    Trust trust = Trust::Smooth;
+    bool mild = true;  // second derivatives do not jump
     double error = 0.0;
     void add_doubt(double area) {
       doubt += area;
@@ -102,10 +109,22 @@ class MarchRuleSolver {
   struct Column {
     double at = 0.0, low = 0.0, high = std::numeric_limits<double>::infinity();
   };
-  enum class Rim : std::uint8_t { None, Falls, Rises };  // how the pressure goes where a ray crosses it
-  /// A ray through a piece, and where on it the rim lies.
+  /// A kink that may cross a leaf, by its s at the corners and at the middles of the edges.
+  struct Crossing {
+    std::size_t kink = 0;
+    std::array<double, 6> side{};
+  };
+  /// Where a kink meets the rim of a leaf.
+  struct Corner {
+    std::size_t leaf, kink;
+    bool found;
+  };
+  enum class Rim : std::uint8_t { None, Falls, Rises };  // how the pressure, or s of a kink, goes where a ray crosses its zero
+  static constexpr std::size_t kPressure = std::numeric_limits<std::size_t>::max();
+  /// A ray through a piece, and where on it the rim lies, or a kink.
   struct Ray {
     std::size_t leaf = 0;
+    std::size_t kink = kPressure;  // that is sought
     int nodes = 0;
     bool fine = false;
     Vec2 from = Vec2::Zero(), way = Vec2::Zero();
@@ -113,6 +132,11 @@ class MarchRuleSolver {
     Rim rim = Rim::None;
     double low = 0.0, high = 1.0, at = 0.0, height = 0.0;
     bool found = false;
+    std::size_t first_cut = 0, cuts = 0;
+    std::size_t part = 0;  // of its leaf, between breaks
+    std::size_t feet = 0;
+    [[nodiscard]] double begins() const noexcept { return rim == Rim::Rises ? at : 0.0; }
+    [[nodiscard]] double ends() const noexcept { return rim == Rim::Falls ? at : exit; }
   };
 
   void measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet, std::span<const std::size_t> which);
@@ -124,23 +148,39 @@ class MarchRuleSolver {
   [[nodiscard]] double area_of(const Piece& piece) const;
   [[nodiscard]] Foot foot(const Feet& feet, std::size_t i) const;
   static double twice_parameters(const Piece& piece);
+  /// What a quadratic polynomial through the corners and middles says of them.
   template <class Of>
-  static double quadratic(const Piece& piece, const Vec2& at, const Of& of);
+  static double quadratic(const Piece& piece, const Vec2& at, const Of& of) {
+    const std::array<double, 6> weight = weights(piece, at);
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) sum += weight[k] * of(piece.corner[k]) + weight[3 + k] * of(piece.middle[k]);
+    return sum;
+  }
   [[nodiscard]] Shape shape_of(const Piece& piece) const;
   [[nodiscard]] bool smooth(const Piece& piece) const;
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
-  void make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap);
+  void make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis);
   void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
   void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, std::vector<Piece>& to);
   void settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces);
   void guess(Ray& ray) const;
+  static double height_at(const Piece& piece, const Vec2& at);
+  static std::array<double, 6> weights(const Piece& piece, const Vec2& at);
+  void cross_kinks(Leaf& leaf) const;
+  void find_crossings(std::size_t first, std::size_t end, double error);
+  void add_cuts(const Ray& along, double low, double high, std::vector<Ray>& cuts) const;
+  void find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
+  void find_breaks(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
+  void find_cuts(PairPressure& pressure, std::span<const ContactBody* const> third);
+  bool sides_agree(const Leaf& leaf, std::size_t first_ray, std::size_t end_ray, std::size_t foot);
   void find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
   void send_rays(std::size_t first, std::size_t end, int order);
-  void find_rims(PairPressure& pressure, std::span<const ContactBody* const> third);
+  void find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays);
   void lay_points();
   [[nodiscard]] Node node_at(std::size_t i) const;
-  void integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, int order, std::size_t first);
-  void weigh();
+  void integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, double error, std::size_t first);
+  static double share_of(const Leaf& leaf, int order);
+  void weigh(int order);
   bool refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference);
   void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, int nodes, PatchPoints& points);
   static double depth(PairPressure& pressure, int side, const Node& peak, double cell);
@@ -148,6 +188,7 @@ class MarchRuleSolver {
   SigmaMesher mesher_;
   SigmaMesh mesh_;
   double cell_ = 0.0;
+  double on_sigma_ = 0.0;  // in cells: a last step that may be left
   Feet feet_;
   PressureBatch some_;
   std::vector<double> value_, third_, share_;
@@ -155,7 +196,14 @@ class MarchRuleSolver {
   std::vector<std::size_t> open_;
   std::vector<Piece> pieces_, halves_, doubtful_;
   std::vector<Leaf> leaves_;
-  std::vector<Ray> rays_;
+  std::vector<implicit::Kink> kinks_;
+  bool all_kinks_ = true;
+  std::vector<Crossing> crossings_;
+  std::vector<Corner> corners_;
+  std::vector<double> breaks_;
+  std::vector<std::uint8_t> sides_;
+  std::vector<std::vector<std::uint8_t>> part_sides_;
+  std::vector<Ray> rays_, cuts_;
   std::vector<Node> nodes_, kept_;
   std::vector<Column> columns_;
   std::vector<std::uint32_t> order_;

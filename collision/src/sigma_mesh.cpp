@@ -47,7 +47,7 @@ int turn(std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
 
 Vec3 SigmaMesher::place(Key key) const {
   const Place at = place_of(key);
-  return origin_ + cell_ * Vec3(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]));
+  return origin_ + axes_ * (cell_ * Vec3(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])));
 }
 
 std::uint32_t SigmaMesher::node_of(Key key) const {
@@ -58,7 +58,8 @@ std::uint32_t SigmaMesher::node_of(Key key) const {
 /// the border leave out then lies where nobody presses.
 bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
   unsigned level = 0;
-  while (std::ldexp(cell_, static_cast<int>(level)) < overlap.extent().maxCoeff()) {
+  const double reach = mirrored_ ? (overlap.centre() - origin_).norm() + 0.5 * overlap.extent().norm() : overlap.extent().maxCoeff();
+  while (std::ldexp(cell_, static_cast<int>(level)) < reach) {
     if (++level + 2 >= kBits) return false;
   }
   cells_.clear();
@@ -71,8 +72,10 @@ bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
     std::erase_if(cells_, [&](Key key) {
       const Place at = place_of(key);
       Box box;
-      box.lower = origin_ + side * Vec3(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]));
-      box.upper = box.lower + Vec3::Constant(side);
+      const Vec3 low(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]));
+      const Vec3 centre = origin_ + axes_ * (side * (low + Vec3::Constant(0.5))), half = axes_.cwiseAbs() * Vec3::Constant(0.5 * side);
+      box.lower = centre - half;
+      box.upper = centre + half;
       return !box.overlaps(overlap) || !pressure.may_meet(box);
     });
     if (level == 0) break;
@@ -121,18 +124,23 @@ void SigmaMesher::cut_cells(SigmaMesh& out) {
     std::array<std::uint32_t, 8> node;
     std::array<bool, 8> above;
     for (std::size_t c = 0; c < 8; ++c) {
-      const auto k = corner(c);
+      auto k = corner(c);
+      for (std::size_t i = 0; i < 2; ++i) {
+        if (mirrored_ && at[i] < 0) k[i] = 1 - k[i];
+      }
       node[c] = node_of(key_of({at[0] + k[0], at[1] + k[1], at[2] + k[2]}));
       above[c] = node_.a[node[c]] >= node_.b[node[c]];
     }
     if (std::equal(above.begin() + 1, above.end(), above.begin())) continue;
+    const bool reversed = mirrored_ && (at[0] < 0) != (at[1] < 0);
     for (const auto& path : kPaths) {
       std::array<std::size_t, 4> up, down;
       std::size_t ups = 0, downs = 0;
       for (const std::size_t c : {std::size_t{0}, path[0], path[1], std::size_t{7}}) (above[c] ? up[ups++] : down[downs++]) = c;
       if (ups == 0 || downs == 0) continue;
       const auto cut = [&](std::size_t u, std::size_t d) { return Cut{node[u], node[d]}; };
-      const auto add = [&](const Cut& p, const Cut& q, const Cut& r, bool keep) {
+      const auto add = [&](const Cut& p, const Cut& q, const Cut& r, bool upright) {
+        const bool keep = upright != reversed;
         cuts_.push_back(p);
         cuts_.push_back(keep ? q : r);
         cuts_.push_back(keep ? r : q);
@@ -160,33 +168,37 @@ void SigmaMesher::cut_cells(SigmaMesh& out) {
   for (std::size_t i = 0; i < cuts_.size(); i += 3) out.triangle.push_back({{index(cuts_[i]), index(cuts_[i + 1]), index(cuts_[i + 2])}});
 }
 
-/// Newton's method along the slope of p_A - p_B from the linear cuts.
+/// Newton's method on the edges of the lattice, held between places on both sides of Sigma: triangles do not turn over, as they may where
+/// vertices leave their edges.
 void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   const std::size_t n = unique_.size();
   vertex_.resize(n);
+  edge_.resize(n);
   out.valid.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
     const auto [u, d] = unique_[i];
     const double above = node_.a[u] - node_.b[u], below = node_.a[d] - node_.b[d];
-    vertex_.point[i] = node_.point[u] + above / (above - below) * (node_.point[d] - node_.point[u]);
+    edge_[i] = {.at = above / (above - below)};
+    vertex_.point[i] = node_.point[u] + edge_[i].at * (node_.point[d] - node_.point[u]);
   }
-  out.vertex = vertex_.point;
   open_.resize(n);
   for (std::size_t i = 0; i < n; ++i) open_[i] = i;
-  constexpr int kSteps = 12;
+  constexpr int kSteps = 30;
   for (int step = 0; step < kSteps && !open_.empty(); ++step) {
     pressure.evaluate(vertex_, open_, some_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {
-      const Vec3 slope = vertex_.slope_a[i] - vertex_.slope_b[i];
-      const double square = slope.squaredNorm();
-      if (!(square > 0.0)) continue;
-      Vec3 move = ((vertex_.b[i] - vertex_.a[i]) / square) * slope;
-      const double length = move.norm();
-      if (length > 0.5 * cell_) move *= 0.5 * cell_ / length;
-      vertex_.point[i] += move;
-      if (length < 1e-7 * cell_) {
-        out.valid[i] = (vertex_.point[i] - out.vertex[i]).norm() < cell_ ? 1 : 0;
+      Edge& edge = edge_[i];
+      const Vec3 &from = node_.point[unique_[i].above], way = node_.point[unique_[i].below] - from;
+      const double value = vertex_.a[i] - vertex_.b[i];
+      (value >= 0.0 ? edge.low : edge.high) = edge.at;
+      double next = edge.at - value / (vertex_.slope_a[i] - vertex_.slope_b[i]).dot(way);
+      if (!(next >= edge.low && next <= edge.high)) next = 0.5 * (edge.low + edge.high);
+      const double move = next - edge.at;
+      edge.at = next;
+      vertex_.point[i] = from + next * way;
+      if (std::abs(move) < 1e-7) {
+        out.valid[i] = 1;
       } else {
         open_[left++] = i;
       }
@@ -200,10 +212,19 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   }
 }
 
-bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, SigmaMesh& out) {
-  cell_ = cell;
-  // No planes of symmetry of bodies go through nodes.
-  origin_ = overlap.centre() + cell * Vec3(0.2763932, 0.3819660, 0.4142136);
+bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, SigmaMesh& out) {
+  mirrored_ = axis.has_value();
+  // Sigma goes through no node but by chance: no planes of symmetry of bodies do, and no cylinders of round radii.
+  if (mirrored_) {
+    cell_ = 0.9472136 * cell;
+    const Vec3 &z = axis->direction, x = z.unitOrthogonal();
+    axes_ << x, z.cross(x), z;
+    origin_ = axis->point + ((overlap.centre() - axis->point).dot(z) + 0.4142136 * cell) * z;
+  } else {
+    cell_ = cell;
+    axes_.setIdentity();
+    origin_ = overlap.centre() + cell * Vec3(0.2763932, 0.3819660, 0.4142136);
+  }
   if (!find_cells(pressure, overlap)) return false;
   find_nodes(pressure);
   cut_cells(out);

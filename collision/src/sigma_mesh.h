@@ -4,8 +4,10 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "find_peak.h"
 #include "pair_pressure.h"
 
 namespace supple::collision {
@@ -24,9 +26,10 @@ struct SigmaMesh {
 
 class SigmaMesher {
  public:
-  /// @param overlap  finite; holds all of Sigma where p > 0   @param cell  side of the lattice's cells [m]
+  /// @param overlap  finite; holds all of Sigma where p > 0   @param cell  side of the lattice's cells [m], about
+  /// @param axis  of symmetry, if there is one: two planes through it, at right angles, mirror the triangles
   /// @return false where there would be more cells than kMostCells
-  bool mesh(PairPressure& pressure, const Box& overlap, double cell, SigmaMesh& out);
+  bool mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, SigmaMesh& out);
 
   static constexpr std::size_t kMostCells = 1u << 16;
 
@@ -43,11 +46,18 @@ class SigmaMesher {
     std::uint32_t above, below;  // nodes: p_A >= p_B, p_A < p_B
     friend auto operator<=>(const Cut&, const Cut&) = default;
   };
+  /// Where Sigma cuts the way from `above` to `below`, between places on both sides of it.
+  struct Edge {
+    double at = 0.0, low = 0.0, high = 1.0;
+  };
   Vec3 origin_ = Vec3::Zero();
+  Mat3 axes_ = Mat3::Identity();  // of the lattice, columns
+  bool mirrored_ = false;
   double cell_ = 0.0;
   std::vector<Key> cells_, near_, nodes_;
   PressureBatch node_, vertex_, some_;
   std::vector<Cut> cuts_, unique_;
+  std::vector<Edge> edge_;
   std::vector<std::size_t> open_;
 };
 

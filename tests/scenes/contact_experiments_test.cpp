@@ -330,8 +330,7 @@ void expect_held(const char* rule, double sideways) {
 
 TEST(Ring, HoldsABallThatIsTooLargeForIt) {
   expect_held("samples", 1e-12);
-  // The lattice of the marching rule has not the symmetry of the ring, which is kept as far as its errors fall below what is asked.
-  expect_held("march", 1e-7);
+  expect_held("march", 1e-12);
 }
 
 TEST(SpiralHitByThreeBalls, KeepsItsMomentaAndTurnsThemBack) {
