@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "crease_mending.h"
 #include "error_search.h"
 #include "field_index.h"
 #include "march_mesher.h"
@@ -306,6 +307,10 @@ class Sharpener {
     mesh_.triangle = std::move(kept);
     mesh_.triangle.insert(mesh_.triangle.end(), star_.begin(), star_.end());
     cut_edges();
+    mend_creases(mesh_, owner_, lattice_.cell, [this](const std::array<std::uint32_t, 2>& nodes, const Vec3& near) {
+      const std::optional<CreasePoint>& point = crease_point({near, near, nodes});
+      return point ? std::optional(add_vertex(*point)) : std::nullopt;
+    });
   }
 
  private:

@@ -104,6 +104,68 @@ TEST(Creases, AreMetToSecondOrder) {
   }
 }
 
+/// Edges between vertices on either side of a plane through the origin.
+std::size_t edges_across(const Mesh& mesh, const Vec3& normal, double on_plane) {
+  std::size_t count = 0;
+  for (const auto& t : mesh.triangle) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      count += mesh.position[t[k]].dot(normal) > on_plane && mesh.position[t[(k + 1) % 3]].dot(normal) < -on_plane ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+// Two balls that meet at the bottom of a valley with walls that lean this little from the vertical: cells bridge it a cell and more above.
+TEST(Creases, AreMetInSteepValleys) {
+  constexpr double kRim = 1.0, kCell = 0.125;
+  Random random(5);
+  for (const double degrees : {26.0, 22.0, 18.0, 26.0, 22.0, 18.0, 22.0, 18.0}) {
+    const double lean = degrees * std::numbers::pi / 180.0, ball = kRim / std::sin(lean), apart = kRim / std::tan(lean);
+    const Vec3 axis = random.direction(), u = axis.unitOrthogonal(), v = axis.cross(u);
+    Body body = body_of({{wyvill_point(ball / kRadius), apart * axis}, {wyvill_point(ball / kRadius), -apart * axis}});
+    body.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, 0.0}}};
+    body.place();
+    const Mesh mesh = march_creases(body.field, {.lattice = {.origin = random.in_box(kCell), .cell = kCell}}, Executor(2));
+    const MeshReport report = inspect(mesh);
+    EXPECT_TRUE(report.closed && report.oriented);
+    EXPECT_EQ(report.euler_characteristic, 2);
+    EXPECT_EQ(self_intersections(mesh, kCell), 0u) << degrees;
+    EXPECT_EQ(edges_across(mesh, axis, 1e-6 * kCell), 0u) << degrees;
+    EXPECT_EQ(2 * mesh.vertex_count(), mesh.triangle_count() + 4);  // none is left over
+    const supple::testing::MeshDistance distance(mesh, kCell);
+    double largest = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / 1000.0;
+      largest = std::max(largest, distance(kRim * (std::cos(angle) * u + std::sin(angle) * v)));
+    }
+    EXPECT_LT(largest, 9.0 * kCell * kCell / (8.0 * kRim)) << degrees;  // the sagitta of a chord of three cells
+  }
+}
+
+// Two capsules that cross, one a little above the other, so that their creases do not: the valley is steep at the sharp angle.
+TEST(Creases, AreMetWhereCapsulesCross) {
+  constexpr double kCell = 0.04;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Random random(seed);
+    const double angle = 0.15 + 0.02 * static_cast<double>(seed);
+    const Quat turn = random.rotation();
+    Primitive one = wyvill_point(0.8);
+    one.shape = ShapeKind::Segment;
+    one.size = Vec3(1.5, 0.0, 0.0);
+    Primitive other = one;
+    one.offset.orientation = turn * Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
+    other.offset.orientation = turn * Quat(Eigen::AngleAxisd(-angle, Vec3::UnitZ()));
+    Body body = body_of({{one, Vec3::Zero()}, {other, turn * Vec3(0.0, 0.0, 0.1)}});
+    body.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, 0.0}}};
+    body.place();
+    const Mesh mesh = march_creases(body.field, {.lattice = {.origin = random.in_box(kCell), .cell = kCell}}, Executor(2));
+    const MeshReport report = inspect(mesh);
+    EXPECT_TRUE(report.closed && report.oriented);
+    EXPECT_EQ(report.euler_characteristic, 2);
+    EXPECT_EQ(self_intersections(mesh, kCell), 0u) << seed;
+  }
+}
+
 // Both ways, though only the centroids are promised: a chord's middle lies 9/8 times as far as its triangle's centroid, and at the crease the
 // circle bends by kRadius / rim times as much as the balls.
 TEST(Creases, ReachTheErrorThatIsAskedFor) {
