@@ -5,13 +5,16 @@
 // the angle.
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <numbers>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "patch_coarsen.h"
 #include "patch_complex.h"
+#include "patch_crossings.h"
 #include "patch_refine.h"
 #include "patch_surface.h"
 #include "polygonise_blocks.h"
@@ -66,6 +69,30 @@ class HeedingField {
   const std::atomic<int>* interrupt_;
 };
 
+/// Refines where triangles cross, nearer and nearer to the surface. @return false as refine_patches
+/// @throws Error{Limit} when most_vertices do not reach the bounds without a thought of crossings
+bool refine_apart(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex,
+                  DelaunayReport& report) {
+  constexpr int kTries = 4;
+  constexpr double kNearer = 0.25;  // edges of half the length
+  std::vector<NearerPlace> nearer;
+  double distance = options.distance;
+  for (int i = 0;; ++i) {
+    if (!refine_patches(surface, options, estimate, nearer, complex, report)) return false;
+    const std::vector<std::array<std::uint32_t, 2>> crossings = find_crossings(complex);
+    report.crossings = crossings.size();
+    if (crossings.empty() || i == kTries) return true;
+    distance *= kNearer;
+    for (const auto& pair : crossings) {
+      Box box;
+      for (const std::uint32_t t : pair) {
+        for (const Vec3& p : complex.corners(t)) box.include(p);
+      }
+      nearer.push_back({.box = box, .distance = distance});
+    }
+  }
+}
+
 /// @return false where the bodies are divided in a way that it does not untangle; their meshes are then of no use
 bool make_delaunay(std::span<const FieldView> fields, const DelaunayOptions& options, const DelaunayEstimate& estimate,
                    PatchComplex& complex, DelaunayReport& report) {
@@ -73,7 +100,7 @@ bool make_delaunay(std::span<const FieldView> fields, const DelaunayOptions& opt
   coarsen_patches(surface, options, complex);
   if (surface.is_folded(complex, 0.0)) return false;
   for (Vertex v = 0; v < complex.vertex_count(); ++v) report.seeds += complex.star(v).empty() ? 0 : 1;
-  if (!refine_patches(surface, options, estimate, complex, report) || surface.is_folded(complex, 0.2)) return false;
+  if (!refine_apart(surface, options, estimate, complex, report) || surface.is_folded(complex, 0.2)) return false;
   measure(surface, options, complex, report);
   return report.largest_radius <= options.size && report.largest_distance <= options.distance;
 }
@@ -146,22 +173,23 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, const DelaunayOption
   const DelaunayEstimate estimate = estimate_delaunay(polygonise_partition(fields, lattice_of(options.cell), executor), options);
   check_estimate(estimate, options);
   const double coarsest = std::min(options.cell, 0.5 * options.size);
+  const auto better = [](const DelaunayReport& a, const DelaunayReport& b) { return std::tie(a.crossings, a.sharp) < std::tie(b.crossings, b.sharp); };
   std::optional<std::vector<Mesh>> best;
   for (const double share : {1.0, 0.75, 0.5}) {
     std::vector<Mesh> meshes = polygonise_partition(fields, lattice_of(share * coarsest), executor);
     PatchComplex complex(fields, meshes);
     DelaunayReport found{.least_angle = std::numbers::pi};
-    if (!make_delaunay(fields, options, estimate, complex, found) || (best && found.sharp >= report.sharp)) continue;
+    if (!make_delaunay(fields, options, estimate, complex, found) || (best && !better(found, report))) continue;
     for (std::size_t m = 0; m < meshes.size(); ++m) {
       if (!meshes[m].triangle.empty()) meshes[m] = extract(fields, complex, static_cast<std::uint32_t>(m));
     }
     report = found;
     best = std::move(meshes);
-    if (found.sharp == 0) break;
+    if (found.sharp == 0 && found.crossings == 0) break;
   }
   if (best) return std::move(*best);
-  // Size and distance without the angle: the longest edge of a tetrahedron is no longer than the size.
-  const Lattice lattice{.origin = Vec3::Zero(), .cell = options.size / std::sqrt(3.0)};
+  // Size and distance without the angle: the longest edge of a tetrahedron is no longer than the size. Nor are parts missed that the cell sees.
+  const Lattice lattice{.origin = Vec3::Zero(), .cell = std::min(options.cell, options.size / std::sqrt(3.0))};
   std::vector<Mesh> meshes = polygonise_partition_within(fields, lattice, {options.distance, "mesh.distance"}, executor);
   report.least_angle = std::numbers::pi;
   for (const Mesh& mesh : meshes) {
@@ -200,6 +228,7 @@ std::vector<Mesh> delaunay_partition(std::span<const FieldView> fields, const De
     all.seeds += found.seeds;
     all.inserted += found.inserted;
     all.sharp += found.sharp;
+    all.crossings += found.crossings;
     all.least_angle = std::min(all.least_angle, found.least_angle);
     all.largest_radius = std::max(all.largest_radius, found.largest_radius);
     all.largest_distance = std::max(all.largest_distance, found.largest_distance);

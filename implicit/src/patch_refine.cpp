@@ -25,8 +25,9 @@ bool encroaches(const Vec3& p, const Vec3& a, const Vec3& b) { return (a - p).do
 
 class Refiner {
  public:
-  Refiner(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex)
-      : surface_(surface), options_(options), estimate_(estimate), complex_(complex) {}
+  Refiner(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate,
+          std::span<const NearerPlace> nearer, PatchComplex& complex)
+      : surface_(surface), options_(options), estimate_(estimate), nearer_(nearer), complex_(complex) {}
 
   [[nodiscard]] bool run(DelaunayReport& report) {
     for (std::uint32_t t = 0; t < complex_.triangles().size(); ++t) {
@@ -51,7 +52,7 @@ class Refiner {
       if (!triangle.alive || triangle.version != next.version) continue;
       improve(next);
     }
-    report.inserted = complex_.vertex_count() - before;
+    report.inserted += complex_.vertex_count() - before;
     return true;
   }
 
@@ -87,7 +88,17 @@ class Refiner {
     const Vec3 normal = normal_of(corner).normalized();
     const double away = surface_.distance_along(triangle, shape.centre, normal, 2.0 * options_.size);
     const double ball = std::hypot(away, shape.radius);
-    return away > options_.distance || ball > options_.size ? 2.0 + ball / options_.size : 0.0;
+    return away > distance_at(corner) || ball > options_.size ? 2.0 + ball / options_.size : 0.0;
+  }
+
+  [[nodiscard]] double distance_at(const Corners& corner) const {
+    double least = options_.distance;
+    Box box;
+    for (const Vec3& p : corner) box.include(p);
+    for (const NearerPlace& place : nearer_) {
+      if (place.distance < least && place.box.overlaps(box)) least = place.distance;
+    }
+    return least;
   }
 
   void look_at(std::uint32_t t) {
@@ -272,6 +283,7 @@ class Refiner {
   const PatchSurface& surface_;
   const DelaunayOptions& options_;
   const DelaunayEstimate& estimate_;
+  std::span<const NearerPlace> nearer_;
   PatchComplex& complex_;
   std::vector<PatchEdge> encroached_;
   std::priority_queue<BadTriangle> bad_;
@@ -281,9 +293,9 @@ class Refiner {
 
 }  // namespace
 
-bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex,
-                    DelaunayReport& report) {
-  return Refiner(surface, options, estimate, complex).run(report);
+bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate,
+                    std::span<const NearerPlace> nearer, PatchComplex& complex, DelaunayReport& report) {
+  return Refiner(surface, options, estimate, nearer, complex).run(report);
 }
 
 }  // namespace supple::implicit

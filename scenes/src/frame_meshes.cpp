@@ -114,13 +114,14 @@ struct Claims {
 
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
 std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Claims& claims, const implicit::Lattice& lattice,
-                         implicit::PolygoniseCounts& counts) {
+                         implicit::PolygoniseCounts& counts, SearchCounts& missed) {
   const std::vector<implicit::FieldView>& views = claims.view;
   const Executor& executor = context.executor;
   if (context.model.meshing.method == MeshingName::Delaunay) {
     implicit::DelaunayReport report;
     std::vector<Mesh> meshes = implicit::delaunay_partition(views, delaunay_options(context, lattice), executor, &report);
     counts.blocks_visited = counts.blocks_present = report.seeds + report.inserted;
+    missed.crossings += report.crossings;
     return meshes;
   }
   if (claims.mesher != nullptr) return claims.mesher->make(views, claims.version, lattice, executor, &counts);
@@ -206,9 +207,9 @@ void search_between(const StageContext& context, const Division& division, const
 
 /// The surfaces of some bodies of a group, in their order. @param lattice  whose cell becomes the one that was used
 std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& group, const Claims& claims, implicit::Lattice& lattice,
-                              StageProfile& profile) {
+                              StageProfile& profile, SearchCounts& missed) {
   implicit::PolygoniseCounts counts;
-  std::vector<Mesh> parts = divide(context, group, claims, lattice, counts);
+  std::vector<Mesh> parts = divide(context, group, claims, lattice, counts, missed);
   lattice.cell = counts.cell;
   profile.visited += counts.blocks_visited;
   profile.present += counts.blocks_present;
@@ -228,7 +229,7 @@ void mesh_group(const StageContext& context, const Division& division, std::span
   }
   const bool keeps = group.strictest == nullptr && context.model.meshing.method != MeshingName::Delaunay;
   if (keeps) claims.mesher = &mesher_on(cell, frame.dividing);
-  std::vector<Mesh> parts = divide_some(context, group, claims, used, profile);
+  std::vector<Mesh> parts = divide_some(context, group, claims, used, profile, frame.missed);
   search_between(context, division, group, used, frame, parts);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     const std::size_t k = group.member[n];
@@ -239,7 +240,7 @@ void mesh_group(const StageContext& context, const Division& division, std::span
         if (std::binary_search(group.member.begin(), group.member.end(), j)) some.view.emplace_back(division.claim[j]);
       }
       implicit::Lattice own = lattice;
-      parts[n] = std::move(divide_some(context, group, some, own, profile).front());
+      parts[n] = std::move(divide_some(context, group, some, own, profile, frame.missed).front());
     }
     surfaces[division.body[k]] = std::move(parts[n]);
   }

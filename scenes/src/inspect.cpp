@@ -104,7 +104,7 @@ std::string volumes_text(const ordered_json& object) {
 /// Empty where there is nothing to tell.
 std::string searches_text(const ordered_json& searches) {
   std::string text;
-  for (const auto& [key, what] : {std::pair{"pieces", "added to meshes"}, {"undecided", "cells where a piece may be missed"}}) {
+  for (const auto& [key, what] : {std::pair{"pieces", "added to meshes"}, {"undecided", "cells where a piece may be missed"}, {"crossings", "pairs of triangles that cross"}}) {
     if (number_at(searches, key) > 0.0) text += line("  %-34s %8.0f", what, number_at(searches, key));
   }
   if (searches.contains("unsearched")) {

@@ -192,8 +192,8 @@ void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeSt
 }
 
 void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings) {
-  const std::string key = "output.meshing.search: ";
-  std::erase_if(warnings, [&](const std::string& warning) { return warning.starts_with(key); });
+  const std::string key = "output.meshing.search: ", crossing = "output.meshing.distance: ";
+  std::erase_if(warnings, [&](const std::string& warning) { return warning.starts_with(key) || warning.starts_with(crossing); });
   std::string text;
   const auto add = [&](bool told, const char* what, std::uint64_t count) {
     if (told) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
@@ -208,6 +208,10 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
     add(all.not_searched(why) > 0, what, all.not_searched(why));
   }
   if (!text.empty()) warnings.push_back(std::move(text));
+  if (all.crossings > 0) {
+    warnings.push_back(crossing + "pairs of triangles that pass through each other where bodies touch: " + std::to_string(all.crossings) +
+                       "; a smaller distance may part them");
+  }
 }
 
 }  // namespace supple::scenes

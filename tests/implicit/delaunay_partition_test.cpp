@@ -170,6 +170,48 @@ TEST(DelaunayPartition, HoldsTheAngleWhereThreeAndFourBodiesMeet) {
   }
 }
 
+/// A hollow ball with a thin wall.
+FunctionField hollow_ball(double radius, double wall) {
+  return {.function =
+              [=](const Vec3& p, Vec3& gradient) {
+                const double r = p.norm(), off = r - radius;
+                gradient = r > 0.0 ? Vec3(std::copysign(1.0, -off) * p / r) : Vec3::Zero();
+                return 0.5 * wall - std::abs(off);
+              },
+          .lipschitz = 1.0,
+          .box = Box{Vec3::Constant(-radius), Vec3::Constant(radius)}.inflated(0.51 * wall)};
+}
+
+// A ball in a hollow one, with a gap that is a tenth of the distance: triangles of the one would reach through those of the other.
+TEST(DelaunayPartition, KeepsSheetsApartThatAreNearerThanTheDistance) {
+  for (const double gap : {0.01, 0.003}) {
+    const std::vector<FunctionField> bodies{hollow_ball(0.1, 0.04), sphere(Vec3::Zero(), 0.08 - gap)};
+    const DelaunayOptions options{.angle = 30.0 * kDegree, .size = 0.12, .distance = 0.03, .cell = 0.012};
+    DelaunayReport report;
+    const std::vector<Mesh> mesh = delaunay_partition(views_of(bodies), options, Executor(1), &report);
+    EXPECT_EQ(report.crossings, 0u);
+    EXPECT_EQ(report.sharp, 0u);
+    Mesh both = mesh[0];
+    append(both, mesh[1]);
+    EXPECT_EQ(expect_closed(both).components, 3u);  // outside, inside and the ball
+    EXPECT_EQ(self_intersections(both, 0.02), 0u) << gap;
+    EXPECT_LE(report.largest_radius, options.size);
+    EXPECT_LE(report.largest_distance, options.distance);
+  }
+}
+
+// What it divides without the angle keeps the parts that cells of the lattice see.
+TEST(DelaunayPartition, KeepsThinWallsWhereItDoesNotHoldTheAngle) {
+  const std::vector<FunctionField> bodies{hollow_ball(0.1, 0.014), sphere({0.0, 0.005, 0.14}, 0.035)};
+  const DelaunayOptions options{.angle = 30.0 * kDegree, .size = 0.09, .distance = 0.03, .cell = 0.0056};
+  DelaunayReport report;
+  const std::vector<Mesh> mesh = delaunay_partition(views_of(bodies), options, Executor(1), &report);
+  EXPECT_GT(report.sharp, 0u);
+  const MeshReport wall = expect_closed(mesh[0]);
+  EXPECT_EQ(wall.components, 2u);
+  EXPECT_EQ(wall.euler_characteristic, 4);
+}
+
 // Whatever lies how: meshes are closed, and what is not held is said. Of pairs, nearly all hold the angle.
 TEST(DelaunayPartition, SaysWhereItDoesNotHoldTheAngle) {
   int held = 0;

@@ -9,12 +9,14 @@
 #include <iterator>
 #include <numbers>
 
+#include "search_files.h"
 #include "supple/cgal/surface_meshes.h"
 #include "supple/core/error.h"
 #include "supple/scenes/plan.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
 #include "supple/scenes/simulation.h"
+#include "warnings.h"
 
 namespace supple::scenes {
 namespace {
@@ -145,6 +147,23 @@ TEST(DelaunayScene, ASignalEndsAMesh) {
   }
   EXPECT_GE(files, scene.frame_count());
   fs::remove_all(folder);
+}
+
+TEST(DelaunayScene, TellsOfTrianglesThatCrossInAllFrames) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "delaunay_crossings";
+  for (const int frame : {1, 2}) {
+    SearchCounts counts;
+    counts.crossings = static_cast<std::uint64_t>(frame);
+    write_searches(folder, "balls", frame, counts);
+  }
+  const SearchCounts all = read_searches(folder, "balls", {}, 2);
+  EXPECT_EQ(all.crossings, 3u);
+  std::vector<std::string> warnings;
+  for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "output.meshing.distance: pairs of triangles that pass through each other where bodies touch: 3; a smaller distance may part them");
+  set_missed(MeshingDesc{}, {}, warnings);
+  EXPECT_TRUE(warnings.empty());
 }
 
 // Objects that touch share their contact bit for bit, within the angle, the size and the distance asked for.

@@ -1,5 +1,6 @@
 /// @file supple/scenes/mesh_search.h
-/// What searches for the pieces that meshes miss (implicit/missed_pieces.h) found, and which meshes were not searched.
+/// What is not as it should be in meshes: pieces that they miss (implicit/missed_pieces.h), by what searches found, which were not searched,
+/// and triangles that cross.
 #pragma once
 
 #include <array>
@@ -25,9 +26,10 @@ struct SearchCounts {
   using Meshes = std::array<std::uint64_t, kUnsearchedNames.size()>;  ///< by reason
   std::uint64_t pieces = 0;     ///< found and added
   std::uint64_t undecided = 0;  ///< cells where one may be missed
+  std::uint64_t crossings = 0;  ///< pairs of triangles of method delaunay that pass through each other
   std::map<std::string, Meshes> unsearched;  ///< by object, where there are any
 
-  [[nodiscard]] bool empty() const { return pieces == 0 && undecided == 0 && unsearched.empty(); }
+  [[nodiscard]] bool empty() const { return pieces == 0 && undecided == 0 && crossings == 0 && unsearched.empty(); }
   [[nodiscard]] std::uint64_t not_searched(Unsearched why) const {
     std::uint64_t sum = 0;
     for (const auto& [object, meshes] : unsearched) sum += meshes[static_cast<std::size_t>(why)];
@@ -36,6 +38,7 @@ struct SearchCounts {
   void add(const SearchCounts& other) {
     pieces += other.pieces;
     undecided += other.undecided;
+    crossings += other.crossings;
     for (const auto& [object, meshes] : other.unsearched) {
       for (std::size_t k = 0; k < meshes.size(); ++k) unsearched[object][k] += meshes[k];
     }
