@@ -34,6 +34,35 @@ constexpr std::array kUnits{
     Unit{"mJ", 1e-3, kTorque.dimension},     Unit{"kJ", 1e3, kTorque.dimension},     Unit{"%", 1e-2, kNoDimension},
 };
 
+/// Units that scenes do not know, and what to write for one of them.
+struct OtherUnit {
+  std::string_view name, instead;
+};
+constexpr std::array kOtherUnits{
+    OtherUnit{"nm", "1e-9 m"},      OtherUnit{"pm", "1e-12 m"},       OtherUnit{"Mm", "1e6 m"},        OtherUnit{"in", "0.0254 m"},
+    OtherUnit{"inch", "0.0254 m"},  OtherUnit{"ft", "0.3048 m"},      OtherUnit{"yd", "0.9144 m"},     OtherUnit{"mi", "1609.344 m"},
+    OtherUnit{"ns", "1e-9 s"},      OtherUnit{"ps", "1e-12 s"},       OtherUnit{"h", "3600 s"},        OtherUnit{"hr", "3600 s"},
+    OtherUnit{"d", "86400 s"},      OtherUnit{"day", "86400 s"},      OtherUnit{"ug", "1e-9 kg"},      OtherUnit{"ng", "1e-12 kg"},
+    OtherUnit{"lb", "0.45359237 kg"}, OtherUnit{"oz", "0.028349523125 kg"}, OtherUnit{"mrad", "1e-3 rad"}, OtherUnit{"gon", "0.9 deg"},
+    OtherUnit{"rev", "360 deg"},    OtherUnit{"turn", "360 deg"},     OtherUnit{"arcmin", "1/60 deg"}, OtherUnit{"arcsec", "1/3600 deg"},
+    OtherUnit{"MHz", "1e6 Hz"},     OtherUnit{"GHz", "1e9 Hz"},       OtherUnit{"uN", "1e-6 N"},       OtherUnit{"nN", "1e-9 N"},
+    OtherUnit{"lbf", "4.4482216152605 N"}, OtherUnit{"hPa", "100 Pa"}, OtherUnit{"bar", "1e5 Pa"},     OtherUnit{"atm", "101325 Pa"},
+    OtherUnit{"psi", "6894.757 Pa"}, OtherUnit{"MJ", "1e6 J"},
+};
+
+/// Other words for units that scenes know.
+struct UnitWord {
+  std::string_view word, unit;
+};
+constexpr std::array kUnitWords{
+    UnitWord{"meter", "m"},     UnitWord{"meters", "m"},      UnitWord{"metre", "m"},    UnitWord{"metres", "m"},    UnitWord{"micron", "um"},
+    UnitWord{"microns", "um"},  UnitWord{"\u00b5m", "um"},    UnitWord{"\u03bcm", "um"}, UnitWord{"gram", "g"},      UnitWord{"grams", "g"},
+    UnitWord{"Kg", "kg"},     UnitWord{"KG", "kg"},       UnitWord{"tonne", "t"},     UnitWord{"tonnes", "t"},      UnitWord{"ton", "t"},      UnitWord{"sec", "s"},       UnitWord{"secs", "s"},
+    UnitWord{"second", "s"},    UnitWord{"seconds", "s"},     UnitWord{"msec", "ms"},    UnitWord{"\u00b5s", "us"},  UnitWord{"\u03bcs", "us"},
+    UnitWord{"mins", "min"},    UnitWord{"minute", "min"},    UnitWord{"minutes", "min"}, UnitWord{"degree", "deg"}, UnitWord{"degrees", "deg"},
+    UnitWord{"\u00b0", "deg"},  UnitWord{"radian", "rad"},    UnitWord{"radians", "rad"}, UnitWord{"percent", "%"},
+};
+
 /// Of numbers that are not zero: products of six of them are still finite, and so are their inverses.
 constexpr double kSmallest = 1e-50, kLargest = 1e50;
 constexpr const char* kRangeHint = "numbers are 0 or between 1e-50 and 1e50 in size";
@@ -93,13 +122,31 @@ std::string plain_decimal(std::string_view text) {
 }
 
 /// "m/s^2", "N s/m", "1/m^2": factors joined by blanks, '*' or '/', the latter for the next factor alone.
+/// @param wanted  whose units are suggested; null: all
+std::string unknown_unit_hint(std::string_view name, const Dimension* wanted) {
+  const std::string unknown = "unknown unit '" + shown(name) + '\'';
+  const auto* const word = std::find_if(kUnitWords.begin(), kUnitWords.end(), [&](const UnitWord& w) { return w.word == name; });
+  if (word != kUnitWords.end()) return unknown + "; did you mean '" + std::string(word->unit) + "'?";
+  const auto* const other = std::find_if(kOtherUnits.begin(), kOtherUnits.end(), [&](const OtherUnit& u) { return u.name == name; });
+  if (other != kOtherUnits.end()) return unknown + "; 1 " + std::string(name) + " is " + std::string(other->instead);
+  std::vector<std::string_view> names;
+  for (const Unit& u : kUnits) {
+    if (wanted == nullptr || u.dimension == *wanted) names.push_back(u.name);
+  }
+  // Of several that are as near, the first in the order is named: one that is so in either order is the only one.
+  const std::string near = nearest_word(name, names);
+  const std::vector<std::string_view> backwards(names.rbegin(), names.rend());
+  const bool only = !near.empty() && nearest_word(name, backwards) == near;
+  return unknown + (only ? "; did you mean '" + near + "'?" : "; known: " + joined(names));
+}
+
 struct UnitText {
   bool ok = false;
   double factor = 1.0;
   Dimension dimension;
   std::string hint;
 };
-UnitText read_unit(std::string_view text) {
+UnitText read_unit(std::string_view text, const Dimension& wanted) {
   UnitText out;
   int sign = 1;
   for (std::size_t i = 0; i < text.size();) {
@@ -129,11 +176,8 @@ UnitText read_unit(std::string_view text) {
     if (name == "1" && sign == 1) continue;
     const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.name == name; });
     if (unit == kUnits.end()) {
-      std::vector<std::string_view> names;
-      for (const Unit& u : kUnits) names.push_back(u.name);
-      const std::string near = nearest_word(name, names);
-      out.hint = "unknown unit '" + shown(name) + '\'' +
-                 (near.empty() ? "; known: " + joined(names) : "; did you mean '" + near + "'?");
+      const bool alone = name.size() == text.size() && std::any_of(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.dimension == wanted; });
+      out.hint = unknown_unit_hint(name, alone ? &wanted : nullptr);
       return out;
     }
     for (int k = 0; k < power; ++k) {
@@ -211,7 +255,7 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
     out.hint = "write a plain decimal number";
     return out;
   }
-  const UnitText unit = read_unit(rest);
+  const UnitText unit = read_unit(rest, quantity.dimension);
   if (!unit.ok) {
     out.hint = unit.hint;
     return out;

@@ -120,6 +120,35 @@ TEST(SceneReader, ConvertsUnits) {
   EXPECT_EQ(parse("schema: 1\nduration: 2 min\nframe_rate: 12 Hz\nobjects: [{name: a, particles: {}}]").duration, 120.0);
 }
 
+TEST(SceneReader, TellsWhatToWriteForUnitsItDoesNotKnow) {
+  const auto hint = [](const std::string& key, const std::string& unit) {
+    const std::vector<Fault> faults = faults_of(object_with(key + ": 5 " + unit));
+    return faults.size() == 1 ? faults[0].hint : std::to_string(faults.size()) + " faults";
+  };
+  struct Case {
+    std::string key, unit, text;
+  };
+  const std::string kSpacing = "arrange: line, count: 2, spacing";
+  for (const Case& c : std::vector<Case>{{kSpacing, "nm", "1 nm is 1e-9 m"},
+                                         {kSpacing, "inch", "1 inch is 0.0254 m"},
+                                         {kSpacing, "meters", "did you mean 'm'?"},
+                                         {kSpacing, "\u00b5m", "did you mean 'um'?"},
+                                         {kSpacing, "kkm", "did you mean 'km'?"},
+                                         {kSpacing, "xm", "known: m, km, dm, cm, mm, um"},
+                                         {kSpacing, "furlong", "known: m, km, dm, cm, mm, um"},
+                                         {"mass", "kgs", "did you mean 'kg'?"},
+                                         {"mass", "Kg", "did you mean 'kg'?"},
+                                         {"mass", "lb", "1 lb is 0.45359237 kg"},
+                                         {"angle_deg", "degrees", "did you mean 'deg'?"},
+                                         {"angle_deg", "rev", "1 rev is 360 deg"}}) {
+    const std::string found = hint(c.key, c.unit);
+    EXPECT_TRUE(found.ends_with(c.text)) << c.unit << ": " << found;
+  }
+  const auto duration = faults_of("schema: 1\nduration: 3 ns\nobjects: [{name: a, particles: {}}]");
+  EXPECT_EQ(duration.at(0).hint, "unknown unit 'ns'; 1 ns is 1e-9 s");
+  EXPECT_EQ(faults_of(object_with("velocity: [5 km/h, 0, 0]")).at(0).hint, "unknown unit 'h'; 1 h is 3600 s");
+}
+
 TEST(SceneReader, TakesFalseAsAbsentAndTrueAsTheDefaults) {
   const std::string skeleton = "    skeleton: [{shape: point, kernel: {radius: 1}}]\n";
   EXPECT_FALSE(parse(object_with("", skeleton + "    contact: false\n")).objects[0].contact);
