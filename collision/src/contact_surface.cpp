@@ -23,6 +23,9 @@ struct PairResult {
   PatchPoints points;
 };
 
+/// A patch reaches so much farther than its rim, over its radius, where places are told from those of others.
+constexpr double kBesideRim = 0.05;
+
 /// Bodies by pair, to find third ones: the partners of body i are partner[offset[i] .. offset[i + 1]), rising.
 struct Partners {
   std::vector<std::uint32_t> offset, partner;
@@ -80,12 +83,12 @@ class PairSolver {
              std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out);
 
  private:
-  bool polar(PairPressure& pressure, const ContactSettings& settings, double extent,
+  bool polar(PairPressure& pressure, const ContactSettings& settings, double extent, double spacing,
              std::span<const ContactBody* const> third, const Box* faces, PairResult& out);
   struct PatchJob {
     PairPressure& pressure;
     const ContactSettings& settings;
-    double extent;
+    double extent, spacing;
     std::span<const ContactBody* const> third;
     const Box* faces;
   };
@@ -95,6 +98,8 @@ class PairSolver {
   Patch add_patch(const PatchJob& job, const Vec3& hill, bool follow, PairResult& out);
   [[nodiscard]] bool patches_overlap() const;
   std::optional<Vec3> outside_patches(PairPressure& pressure, double extent);
+  void find_crossings(PairPressure& pressure, double spacing);
+  [[nodiscard]] bool covered(const Vec3& x, double slack) const;
   void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(PairPressure& pressure, std::span<const ContactBody> bodies, std::span<const Box> boxes, const PairResult& out);
   bool samples(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
@@ -103,7 +108,7 @@ class PairSolver {
              const ContactSettings& settings, PairResult& out);
   bool stand_in(PairPressure& pressure, std::span<const ContactBody> bodies, const Box& overlap, double spacing,
                 const ContactSettings& settings, bool have, PairResult& out);
-  bool polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, const Box* faces, PairResult& out);
+  bool polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, double spacing, const Box* faces, PairResult& out);
   void clear(PairResult& out);
   void begin_anew(std::span<const ContactBody> bodies, const Box& overlap, PairResult& out);
   template <class Rule>
@@ -116,6 +121,7 @@ class PairSolver {
   SampleRuleSolver samples_;
   MarchRuleSolver march_;
   StartPoints starts_;
+  std::vector<Vec3> crossing_, from_, point_, before_;
   std::vector<PolarCover> covers_;
   std::size_t cover_count_ = 0;
   std::vector<std::uint32_t> third_;
@@ -144,9 +150,9 @@ void PairSolver::add_sums(const PatchSums& sums, const Vec3& reference, ContactS
 
 /// One polar patch for each hill. @param third  that patches are cut at   @param faces  of convex bodies: a box of their overlap
 /// @return false where the rule does not fit
-bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent,
+bool PairSolver::polar(PairPressure& pressure, const ContactSettings& settings, double extent, double spacing,
                        std::span<const ContactBody* const> third, const Box* faces, PairResult& out) {
-  const PatchJob job{pressure, settings, extent, third, faces};
+  const PatchJob job{pressure, settings, extent, spacing, third, faces};
   bool unseen = false;
   if (polar(job, false, unseen, out)) return true;
   if (!unseen) return false;
@@ -167,28 +173,34 @@ bool PairSolver::polar(const PatchJob& job, bool follow, bool& unseen, PairResul
     unseen = found == Patch::Known && cover_count_ > 0;
     if (found != Patch::Added) return false;
   }
+  crossing_.clear();
+  if (!job.pressure.convex()) find_crossings(job.pressure, job.spacing);
+  for (const Vec3& x : crossing_) {
+    if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
+  }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
   return !patches_overlap();
 }
 
+bool PairSolver::covered(const Vec3& x, double slack) const {
+  return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
+                     [&](const PolarCover& cover) { return cover.contains(x, slack); });
+}
+
 PairSolver::Patch PairSolver::add_patch(const PatchJob& job, const Vec3& hill, bool follow, PairResult& out) {
-  const auto covered = [this](const Vec3& x) {
-    return std::any_of(covers_.begin(), covers_.begin() + static_cast<std::ptrdiff_t>(cover_count_),
-                       [&](const PolarCover& cover) { return cover.contains(x, 0.0); });
-  };
-  if (covered(hill)) return Patch::Known;
+  if (covered(hill, 0.0)) return Patch::Known;
   std::optional<PeakFrame> frame;
   if (axis_ && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *axis_, hill, job.extent);
   const bool on_axis = frame.has_value();
   if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, job.faces != nullptr);
-  if (!frame || covered(frame->origin)) return Patch::Known;
+  if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
   const auto solve = [&] {
     return polar_.solve(job.pressure, *frame, job.settings, regions_, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };
   if (!solve()) {
     if (!frame->flat) return Patch::Unfit;
     frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, false);
-    if (!frame || covered(frame->origin)) return Patch::Known;
+    if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
     if (!solve()) return Patch::Unfit;
   }
   add_sums(polar_.sums(), polar_.origin(), out.summary);
@@ -217,12 +229,9 @@ bool PairSolver::patches_overlap() const {
 
 /// A place of Sigma where both bodies press that belongs to no patch, from the points inside both.
 std::optional<Vec3> PairSolver::outside_patches(PairPressure& pressure, double extent) {
-  constexpr double kSlack = 0.05;
   batch_.point.clear();
   for (const Vec3& x : starts_.inside) {
-    bool inside = false;
-    for (std::size_t i = 0; i < cover_count_ && !inside; ++i) inside = covers_[i].contains(x, kSlack);
-    if (!inside) batch_.point.push_back(x);
+    if (!covered(x, kBesideRim)) batch_.point.push_back(x);
   }
   if (batch_.point.empty()) return std::nullopt;
   // The rest may only seem to lie outside, by a slanted axis: what counts is their foot on Sigma.
@@ -246,11 +255,50 @@ std::optional<Vec3> PairSolver::outside_patches(PairPressure& pressure, double e
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     if (std::min(batch_.a[i], batch_.b[i]) <= 1e-3 * peak) continue;
     if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
-    bool inside = false;
-    for (std::size_t c = 0; c < cover_count_ && !inside; ++c) inside = covers_[c].contains(batch_.point[i], kSlack);
-    if (!inside) return batch_.point[i];
+    if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
   }
   return std::nullopt;
+}
+
+/// Fills `crossing_`: places near seeds where the surfaces cross, or all but touch, and that belong to no patch. A patch may lie between samples, and
+/// beside a larger one, whose hill then is the only one.
+void PairSolver::find_crossings(PairPressure& pressure, double spacing) {
+  constexpr int kSteps = 6;
+  constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05;  // of the spacing
+  crossing_.clear();
+  batch_.point.clear();
+  from_.clear();
+  const auto keep = [&](const Vec3& x, const Vec3& from) {
+    if (covered(x, kBesideRim)) return;
+    batch_.point.push_back(x);
+    from_.push_back(from);
+  };
+  for (const Vec3& x : starts_.beside) keep(x, x);
+  for (int step = 0; step < kSteps && !batch_.point.empty(); ++step) {
+    batch_.resize(batch_.point.size());
+    pressure.evaluate(batch_);
+    point_.swap(batch_.point);
+    before_.swap(from_);
+    batch_.point.clear();
+    from_.clear();
+    for (std::size_t i = 0; i < point_.size(); ++i) {
+      const double steep_a = batch_.slope_a[i].norm(), steep_b = batch_.slope_b[i].norm();
+      if (!(steep_a > 0.0) || !(steep_b > 0.0)) continue;
+      // Newton's method to p_A = p_B = 0, the shortest step: normals and distances of both surfaces, to first order.
+      const Vec3 normal_a = batch_.slope_a[i] / steep_a, normal_b = batch_.slope_b[i] / steep_b;
+      const double off_a = batch_.a[i] / steep_a, off_b = batch_.b[i] / steep_b, c = normal_a.dot(normal_b), square = 1.0 - c * c;
+      if (step + 1 == kSteps) {
+        if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back(point_[i]);
+        continue;
+      }
+      if (!(square > 0.0)) continue;
+      Vec3 move = ((c * off_b - off_a) / square) * normal_a + ((c * off_a - off_b) / square) * normal_b;
+      const double length = move.norm(), longest = kLongest * spacing;
+      if (length > longest) move *= longest / length;
+      const Vec3 next = point_[i] + move;
+      if ((next - before_[i]).norm() <= kFarthest * spacing) keep(next, before_[i]);
+    }
+  }
 }
 
 /// Partners of either body whose surfaces may reach the overlap.
@@ -320,10 +368,10 @@ void PairSolver::begin_anew(std::span<const ContactBody> bodies, const Box& over
 }
 
 /// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit
-bool PairSolver::polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, const Box* faces,
+bool PairSolver::polar_cut(PairPressure& pressure, const ContactSettings& settings, double extent, double spacing, const Box* faces,
                            PairResult& out) {
   clear(out);
-  if (!polar(pressure, settings, extent, third_bodies_, faces, out)) return false;
+  if (!polar(pressure, settings, extent, spacing, third_bodies_, faces, out)) return false;
   if (out.points.point.empty()) return true;  // all of it lies in a third body
   out.summary.rule = ContactRule::Polar;
   out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
@@ -423,6 +471,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (convex) {
     starts_.hill.assign(seeds.begin(), seeds.end());
     starts_.inside.clear();
+    starts_.beside.clear();
     batch_.resize(1);
     batch_.point[0] = seeds.front();
     pressure.evaluate_values(batch_);
@@ -435,11 +484,11 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   const bool any = settings.only == ContactRule::None;
   const Box* faces = convex && !axis_ && overlap.lower.allFinite() && overlap.upper.allFinite() ? &overlap : nullptr;
   const bool polar_first = any || settings.only == ContactRule::Polar;
-  bool fits = polar_first && polar(pressure, settings, extent, {}, faces, out);
+  bool fits = polar_first && polar(pressure, settings, extent, spacing, {}, faces, out);
   if (convex && polar_first && fits && cover_count_ == 0) {
     // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
     finder_.start_from_scan(pressure, overlap, starts_);
-    fits = polar(pressure, settings, extent, {}, faces, out);
+    fits = polar(pressure, settings, extent, spacing, {}, faces, out);
   }
   RuleReason reason = any ? RuleReason::Fits : RuleReason::Asked;
   if (any && !fits) reason = RuleReason::NoGraph;
@@ -447,7 +496,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
     out.summary.rule = ContactRule::Polar;
     if (any && !third_.empty() && thirds_press(pressure, bodies, boxes, out)) {
       // The squeezed regions of bodies with several parts are not cut that exactly.
-      fits = a.pose.size() == 1 && b.pose.size() == 1 && polar_cut(pressure, settings, extent, faces, out);
+      fits = a.pose.size() == 1 && b.pose.size() == 1 && polar_cut(pressure, settings, extent, spacing, faces, out);
       if (!fits) reason = RuleReason::ThirdBody;
     }
   }

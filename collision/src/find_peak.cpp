@@ -42,6 +42,7 @@ void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> 
                                   StartPoints& out) {
   out.hill.clear();
   out.inside.clear();
+  out.beside.clear();
   batch_.resize(seeds.size());
   std::copy(seeds.begin(), seeds.end(), batch_.point.begin());
   pressure.evaluate_values(batch_);
@@ -51,7 +52,7 @@ void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> 
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
     score_[i] = a + b;
-    if (std::min(a, b) > -1e-9 && score_[i] > 0.0) out.inside.push_back(seeds[i]);
+    (std::min(a, b) > -1e-9 && score_[i] > 0.0 ? out.inside : out.beside).push_back(seeds[i]);
   }
   order_.resize(seeds.size());
   std::iota(order_.begin(), order_.end(), 0u);
@@ -70,6 +71,7 @@ void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> 
 void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, StartPoints& out) {
   out.hill.clear();
   out.inside.clear();
+  out.beside.clear();
   if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return;
   constexpr int kNodes = 11;
   constexpr double kStep = 1.0 / (kNodes - 1);

@@ -43,6 +43,7 @@ struct CommonAxis {
 struct StartPoints {
   std::vector<Vec3> hill;    ///< one for each hill of the seeds, most promising first
   std::vector<Vec3> inside;  ///< points of {p_A >= 0, p_B >= 0}: every component should hold one
+  std::vector<Vec3> beside;  ///< seeds that lie outside one body, near its surface: components between samples lie near one
 };
 
 class PeakFinder {

@@ -54,6 +54,9 @@ class PairPressure {
       batch.slope_b[i] = some.slope_b[k];
     }
   }
+  /// Whether both bodies are known to be convex, whatever the pressure from which they are seen.
+  [[nodiscard]] bool convex() const { return field_[0].convex() && field_[1].convex(); }
+
   /// Values of both bodies.
   void evaluate_values(PressureBatch& batch) {
     evaluate(0, batch.point, batch.a);

@@ -282,6 +282,8 @@ FieldCounts Field::count(std::span<const Vec3> points) const {
           .primitives_present = points.size() * index_->size()};
 }
 
+bool Field::convex() const noexcept { return index_->convex; }
+
 std::optional<CorePoint> Field::core_point(const Vec3& place) const {
   if (!index_->core_radius) return std::nullopt;
   const PackedPrimitive& p = index_->primitive.front();

@@ -242,6 +242,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   index.feature_size = kInfinity;
   index.uniform = true;
   index.convolved = false;
+  index.convex = has_convex_levels(skeleton);
   index.surface_box.reset();
   index.core_radius.reset();
   index.control.clear();

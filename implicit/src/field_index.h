@@ -85,6 +85,7 @@ struct Field::Index {
   bool cull = true;
   bool uniform = true;          ///< all primitives are of one kind
   bool convolved = false;       ///< some primitive is a convolution
+  bool convex = false;          ///< all level sets are
   /// Of many Wyvill points only their places are packed at once; shapes, rounded boxes and supports follow with the hierarchy.
   std::vector<double> ball_radius;
   BlendIndex blend;

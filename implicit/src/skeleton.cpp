@@ -197,9 +197,15 @@ Support support_of(const Primitive& p, const Mat3& rotation) noexcept {
 }
 
 bool has_convex_core(const Skeleton& skeleton) noexcept {
+  if (!has_convex_levels(skeleton)) return false;
+  const Primitive& p = skeleton.primitive.front();
+  return p.shape != ShapeKind::Ellipsoid && p.stretch == Vec3::Ones();
+}
+
+bool has_convex_levels(const Skeleton& skeleton) noexcept {
   if (skeleton.primitive.size() != 1) return false;
   const Primitive& p = skeleton.primitive.front();
-  if (p.taper != 1.0 || p.convolved || p.stretch != Vec3::Ones()) return false;
+  if (p.taper != 1.0 || p.convolved) return false;
   switch (p.shape) {
     case ShapeKind::Point:
     case ShapeKind::Segment:
@@ -208,8 +214,8 @@ bool has_convex_core(const Skeleton& skeleton) noexcept {
     case ShapeKind::Box:
     case ShapeKind::Triangle:
     case ShapeKind::Polygon:
-      return true;
     case ShapeKind::Ellipsoid:
+      return true;
     case ShapeKind::Ring:
     case ShapeKind::Arc:
     case ShapeKind::Curve:

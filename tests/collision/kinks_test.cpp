@@ -504,6 +504,60 @@ std::array<std::vector<double>, 2> bounds_over_errors(benchmarks::Rigid& a, benc
   return ratio;
 }
 
+/// Summary of two bodies at an error, by the search for candidates and the surface.
+ContactSurface::Summary contact_of(const std::array<ContactBody, 2>& bodies, double error, ContactRule only = ContactRule::None) {
+  const Executor executor(1);
+  ContactCandidates candidates;
+  find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
+  ContactSurface surface;
+  solve_contact_surface(bodies, candidates, {.error = error, .only = only}, executor, surface);
+  return surface.summary.empty() ? ContactSurface::Summary{} : surface.summary.front();
+}
+
+TEST(PatchesBetweenSamples, AreFoundBesideLargerOnes) {
+  // Two balls of one body on a plane, the second hardly: samples are two radii apart, so mostly none lies in its patch.
+  constexpr double kRadius = 0.014, kApart = 0.045, kSpacing = 0.03, kE = 1e6;
+  implicit::Skeleton two = benchmarks::linear_sphere(kRadius);
+  two.primitive.push_back(two.primitive.front());
+  two.primitive[0].offset.position.x() = -0.5 * kApart;
+  two.primitive[1].offset.position.x() = 0.5 * kApart;
+  benchmarks::Rigid both(two, kE, kSpacing), one(benchmarks::linear_sphere(kRadius), kE, kSpacing);
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0 / kRadius};
+  const Pose origin;
+  const ContactBody ground = benchmarks::single_part(plane, kE, origin);
+  benchmarks::Draw draw(3);
+  for (int i = 0; i < 60; ++i) {
+    const double deep = draw.logarithmic(1e-3, 0.1) * kRadius, shallow = draw.logarithmic(1e-3, 0.5) * deep;
+    const Quat tilt(Eigen::AngleAxisd(std::asin((deep - shallow) / kApart), -Vec3::UnitY())), roll(Eigen::AngleAxisd(draw.uniform(0.0, 6.28), Vec3::UnitX()));
+    both.put({Vec3(0, 0, kRadius - 0.5 * (deep + shallow)), Quat(tilt * roll)});
+    const ContactSurface::Summary s = contact_of({both.body(), ground}, 1e-3);
+    double force = 0.0, area = 0.0;
+    for (const double depth : {deep, shallow}) {
+      one.put({Vec3(0, 0, kRadius - depth), Quat::Identity()});
+      const ContactSurface::Summary alone = contact_of({one.body(), ground}, 1e-8);
+      force += alone.force.norm();
+      area += alone.area;
+    }
+    EXPECT_EQ(s.patches, 2u) << i << " depths " << deep << ' ' << shallow;
+    EXPECT_NEAR(s.force.norm(), force, 1e-3 * force) << i;
+    EXPECT_NEAR(s.area, area, 1e-3 * area) << i;
+  }
+}
+
+TEST(PatchesBetweenSamples, OfBlobsAreThoseOfMarching) {
+  // Poses in which the second patch has a sixth of the area, and no sample.
+  benchmarks::Rigid a(benchmarks::ten_blobs(1), 1e6, 0.03), b(benchmarks::ten_blobs(2), 2e6, 0.03);
+  for (const auto& [seed, pose] : {std::pair(9201, 263), std::pair(9701, 90)}) {
+    benchmarks::Draw draw(static_cast<std::uint64_t>(seed));
+    for (int i = 0; i <= pose; ++i) benchmarks::press(a, b, draw.logarithmic(0.01, 0.3) * 0.05, draw);
+    const ContactSurface::Summary polar = contact_of({a.body(), b.body()}, 1e-3), march = contact_of({a.body(), b.body()}, 1e-3, ContactRule::March);
+    EXPECT_EQ(polar.rule, ContactRule::Polar);
+    EXPECT_EQ(polar.patches, 2u);
+    EXPECT_NEAR(polar.area, march.area, 2e-3 * march.area);
+    EXPECT_NEAR(polar.force.norm(), march.force.norm(), 2e-3 * march.force.norm());
+  }
+}
+
 TEST(SplitRule, HasBoundsNearItsErrors) {
   // 230 and 90 for a plate, 180 and 100 for blobs by what coarser rules differ by from the radii and angles that count.
   benchmarks::Rigid ball(benchmarks::wyvill_shape(ShapeKind::Point, Vec3::Zero(), 0.22), 1e6, 0.03);

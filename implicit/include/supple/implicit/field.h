@@ -36,6 +36,8 @@ class Field {
   [[nodiscard]] double feature_size() const;
   /// For bodies with `has_convex_core`.
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
+  /// Whether it is known that all {F >= c} are convex: `has_convex_levels`.
+  [[nodiscard]] bool convex() const noexcept;
 
   /// Bounds of F on a box, never wider than `bound` and on small boxes with overlapping primitives far narrower: value and
   /// gradient at the centre and bounds of the second derivatives leave an error of second order in the box. Costs about

@@ -38,6 +38,12 @@ concept HasCore = requires(const T& field, const Vec3& place) {
   { field.core_point(place) } -> std::same_as<std::optional<CorePoint>>;
 };
 
+/// A field may say whether it is known that all {F >= c} are convex; those with a core are.
+template <class T>
+concept SaysWhetherConvex = requires(const T& field) {
+  { field.convex() } -> std::same_as<bool>;
+};
+
 /// What a type must offer to be seen through a FieldView.
 template <class T>
 concept ScalarField = requires(const T& field, std::span<const Vec3> points, std::span<double> values,
@@ -81,6 +87,9 @@ class FieldView {
   /// The nearest point of the core of a convex body; none where the field does not know its body to be convex.
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const { return table_->core_point(self_, place); }
 
+  /// Whether it is known that all {F >= c} are convex.
+  [[nodiscard]] bool convex() const { return table_->convex(self_); }
+
   [[nodiscard]] double value(const Vec3& p) const {
     double v;
     evaluate({&p, 1}, {&v, 1});
@@ -105,6 +114,7 @@ class FieldView {
     Box (*surface_box)(const void*);
     double (*feature_size)(const void*);
     std::optional<CorePoint> (*core_point)(const void*, const Vec3&);
+    bool (*convex)(const void*);
     const Field* (*as_field)(const void*);
   };
   template <class T>
@@ -123,6 +133,15 @@ class FieldView {
           return static_cast<const T*>(f)->core_point(place);
         } else {
           return std::nullopt;
+        }
+      },
+      []([[maybe_unused]] const void* f) {
+        if constexpr (SaysWhetherConvex<T>) {
+          return static_cast<const T*>(f)->convex();
+        } else if constexpr (HasCore<T>) {
+          return static_cast<const T*>(f)->core_point(Vec3::Zero()).has_value();
+        } else {
+          return false;
         }
       },
       []([[maybe_unused]] const void* f) -> const Field* {

@@ -92,6 +92,8 @@ struct Skeleton {
 
 /// Whether the body is convex by construction: one primitive, offsets of a convex shape.
 [[nodiscard]] bool has_convex_core(const Skeleton& skeleton) noexcept;
+/// Whether all its level sets are convex by construction: those bodies, stretched ones and ellipsoids, too.
+[[nodiscard]] bool has_convex_levels(const Skeleton& skeleton) noexcept;
 
 /// Primitives in world axes; Frame data.
 struct PlacedSkeleton {
