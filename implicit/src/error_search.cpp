@@ -165,10 +165,11 @@ void make_within(const ErrorGoal& goal, const std::function<LevelTry(int level)>
     }
     if (now.error <= goal.error) return;
     order.add(level, now.error);
-    const bool hopeless = order.known() && now.telling && order.least_levels_to(goal.error) > now.levels_left;
-    if (now.levels_left == 0 || hopeless) refuse(goal, now.error, level, order.most_after(std::max(now.levels_left - 1, 0)));
+    const bool hopeless = now.telling && order.least_levels_to(goal.error) > now.levels_left;
+    if (now.levels_left == 0 || (hopeless && order.known())) refuse(goal, now.error, level, order.most_after(std::max(now.levels_left - 1, 0)));
     last = level;
-    level += std::min({order.levels_to(kPromise * goal.error), order.even() ? kEvenLevels : kLevels, now.levels_left});
+    const int most = hopeless ? 1 : order.even() ? kEvenLevels : kLevels;
+    level += std::min({order.levels_to(kPromise * goal.error), most, now.levels_left});
   }
 }
 

@@ -355,9 +355,10 @@ std::vector<Mesh> write_meshes(std::size_t bodies, const AllVertices& all, std::
   return meshes;
 }
 
-/// Divides space anew where `partition`, of the last call, does not hold; it becomes that of this one, if anything is to be kept.
+/// Divides space anew where `partition`, of the last call, does not hold; it becomes that of this one, or empty where that would take more.
+/// @param most_kept  [byte]
 std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std::uint64_t> version, const Lattice& lattice,
-                         const Executor& executor, bool keeps, KeptPartition& partition, PolygoniseCounts& count) {
+                         const Executor& executor, std::uint64_t most_kept, KeptPartition& partition, PolygoniseCounts& count) {
   count = {};
   std::vector<Box> surface;
   std::vector<std::uint8_t> has_mesh;
@@ -370,6 +371,7 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std:
   }
   const BlockList list = find_label_blocks(fields, surface, lattice, executor, kMostBlocks, count);
   count.cell = lattice.cell;
+  count.blocks = list.block.size();
 
   const std::vector<ChangedBlock> changed = take_blocks(partition, list, lattice, version);
   std::vector<std::uint32_t> to_make;
@@ -385,6 +387,7 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std:
       block.vertices.use.shrink_to_fit();  // most of what is kept, with facets
     }
   });
+  const bool keeps = most_kept > 0 && partition.bytes() <= most_kept;
   Carried carried;
   AllVertices& all = join(partition, keeps, carried, lattice, count);
   std::vector<FacetPart> parts = join_facets(partition, changed, all, has_mesh, executor, carried);
@@ -394,6 +397,11 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std:
   auto part = parts.begin();
   for (KeptBlock& block : partition.block) {
     if (!block.vertices.block.empty()) block.facets = std::move(*part++);
+  }
+  count.bytes = keeps ? partition.bytes() : 0;
+  if (!keeps || count.bytes > most_kept) {
+    partition = {};
+    count.bytes = 0;
   }
   return meshes;
 }
@@ -415,13 +423,8 @@ std::vector<Mesh> PartitionMesher::make(std::span<const FieldView> fields, std::
   PolygoniseCounts local;
   PolygoniseCounts& count = counts != nullptr ? *counts : local;
   KeptPartition partition = std::exchange(impl_->kept, {});  // nothing is kept of a call that throws
-  std::vector<Mesh> meshes = divide(fields, version, lattice, executor, true, partition, count);
-  count.bytes = partition.bytes();
-  if (count.bytes <= kMostKeptBytes) {
-    impl_->kept = std::move(partition);
-  } else {
-    count.bytes = 0;
-  }
+  std::vector<Mesh> meshes = divide(fields, version, lattice, executor, kMostKeptBytes, partition, count);
+  impl_->kept = std::move(partition);
   return meshes;
 }
 
@@ -433,7 +436,7 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
   std::vector<std::uint64_t> version(fields.size());
   std::iota(version.begin(), version.end(), std::uint64_t{0});
   KeptPartition none;
-  return divide(fields, version, lattice, executor, false, none, counts != nullptr ? *counts : local);
+  return divide(fields, version, lattice, executor, 0, none, counts != nullptr ? *counts : local);
 }
 
 }  // namespace supple::implicit

@@ -1,22 +1,34 @@
 #include <algorithm>
+#include <cstring>
 #include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "error_search.h"
 #include "supple/core/error.h"
+#include "supple/implicit/partition_mesher.h"
 #include "supple/implicit/polygonise.h"
 
 namespace supple::implicit {
 namespace {
 
+/// Body m and the others that may take of its surface, ascending.
+std::vector<std::size_t> sharers_of(std::span<const FieldView> fields, std::size_t m) {
+  const Box box = fields[m].surface_box();
+  std::vector<std::size_t> sharers{m};
+  for (std::size_t j = 0; j < fields.size(); ++j) {
+    if (j != m && fields[j].surface_box().overlaps(box)) sharers.push_back(j);
+  }
+  return sharers;
+}
+
 /// D = F_m - max(0, F_j): the surface of body m where bodies divide space is D = 0.
 class Share {
  public:
-  Share(std::span<const FieldView> fields, std::size_t own) : own_(fields[own]) {
-    const Box box = own_.surface_box();
-    for (std::size_t j = 0; j < fields.size(); ++j) {
-      if (j != own && fields[j].surface_box().overlaps(box)) others_.push_back(fields[j]);
-    }
+  Share(std::span<const FieldView> fields, std::span<const std::size_t> sharers) : own_(fields[sharers.front()]) {
+    for (const std::size_t j : sharers.subspan(1)) others_.push_back(fields[j]);
   }
 
   void evaluate(std::span<const Vec3> points, std::span<double> values) const {
@@ -63,24 +75,139 @@ class Share {
   std::vector<FieldView> others_;
 };
 
-}  // namespace
+/// Errors of meshes by bodies whose surfaces are the same.
+class KeptErrors {
+ public:
+  /// centroid_error of the bodies' meshes, the largest.
+  double measure(std::span<const FieldView> fields, std::span<const std::uint64_t> version, std::span<const Mesh> meshes,
+                 const Executor& executor) {
+    std::map<std::uint64_t, Entry> last = std::exchange(entry_, {});
+    double largest = 0.0;
+    for (std::size_t m = 0; m < meshes.size(); ++m) {
+      const std::vector<std::size_t> sharers = sharers_of(fields, m);
+      std::vector<std::uint64_t> versions;
+      for (const std::size_t j : sharers) versions.push_back(version[j]);
+      auto node = last.extract(version[m]);
+      Entry entry = node.empty() ? Entry{} : std::move(node.mapped());
+      if (node.empty() || entry.version != versions || !entry.is_of(meshes[m])) {
+        entry = {.version = std::move(versions), .position = meshes[m].position, .normal = meshes[m].normal, .triangle = meshes[m].triangle};
+        entry.error = centroid_error(Share(fields, sharers), meshes[m], executor);
+      }
+      largest = std::max(largest, entry.error);
+      entry_.emplace(version[m], std::move(entry));
+    }
+    return largest;
+  }
+  [[nodiscard]] std::uint64_t bytes() const {
+    std::uint64_t sum = 0;
+    for (const auto& [own, e] : entry_) sum += sizeof e + bytes_of(e.version) + bytes_of(e.position) + bytes_of(e.normal) + bytes_of(e.triangle);
+    return sum;
+  }
 
-std::vector<Mesh> polygonise_partition_within(std::span<const FieldView> fields, const Lattice& coarsest, const PartitionError& error,
-                                              const Executor& executor, PolygoniseCounts* counts) {
+ private:
+  struct Entry {
+    std::vector<std::uint64_t> version;  ///< of the fields, as the body's sharers
+    std::vector<Vec3> position, normal;
+    std::vector<std::array<std::uint32_t, 3>> triangle;
+    double error = 0.0;  ///< [m]
+
+    [[nodiscard]] bool is_of(const Mesh& mesh) const {
+      return same_bits(position, mesh.position) && same_bits(normal, mesh.normal) && same_bits(triangle, mesh.triangle);
+    }
+  };
+  template <class T>
+  static bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+    return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+  }
+  template <class T>
+  static std::uint64_t bytes_of(const std::vector<T>& items) {
+    return items.capacity() * sizeof(T);
+  }
+
+  std::map<std::uint64_t, Entry> entry_;  ///< by the version of the body's own field
+};
+
+/// @param make  the meshes of a level on its lattice, their error and counts
+template <class Make>
+std::vector<Mesh> within(const Lattice& coarsest, const PartitionError& error, PolygoniseCounts& all, const Make& make) {
   SUPPLE_EXPECTS(error.largest > 0.0 && coarsest.cell > 0.0);
-  constexpr double kTelling = 1000.0;  // blocks
-  PolygoniseCounts local;
-  PolygoniseCounts& count = counts != nullptr ? *counts : local;
+  constexpr double kTelling = 100.0;  // blocks, of some 300 triangles each
   std::vector<Mesh> meshes;
+  all = {};
   const ErrorGoal goal{.error = error.largest, .first = coarsest.cell, .stated = error.cell_is_stated, .key = error.key, .where = " where objects touch"};
   make_within(goal, [&](int level) {
-    meshes = polygonise_partition(fields, {.origin = coarsest.origin, .cell = spacing_at(coarsest.cell, level)}, executor, &count);
-    double found = 0.0;
-    for (std::size_t m = 0; m < meshes.size(); ++m) found = std::max(found, centroid_error(Share(fields, m), meshes[m], executor));
-    const auto blocks = static_cast<double>(count.blocks_visited);
+    PolygoniseCounts count;
+    const double found = make(level, Lattice{.origin = coarsest.origin, .cell = spacing_at(coarsest.cell, level)}, meshes, count);
+    const PolygoniseCounts before = std::exchange(all, count);
+    all.blocks_visited += before.blocks_visited;
+    all.blocks_present += before.blocks_present;
+    all.nodes += before.nodes;
+    const auto blocks = static_cast<double>(count.blocks);
     return LevelTry{.error = found, .telling = blocks >= kTelling, .levels_left = levels_left(blocks, static_cast<double>(kMostBlocks), 2.0)};
   });
   return meshes;
+}
+
+}  // namespace
+
+struct PartitionErrorMesher::Impl {
+  struct OnLevel {
+    PartitionMesher mesher;
+    KeptErrors errors;
+    std::uint64_t bytes = 0;  ///< of both
+    bool used = false;        ///< in this call
+  };
+  std::uint64_t most_kept = 0;
+  std::map<int, OnLevel> level;
+
+  [[nodiscard]] std::uint64_t bytes() const {
+    return std::accumulate(level.begin(), level.end(), std::uint64_t{0}, [](std::uint64_t sum, const auto& on) { return sum + on.second.bytes; });
+  }
+  /// The coarsest ones take the least time to make anew.
+  void leave_out_coarsest() {
+    while (!level.empty() && bytes() > most_kept) level.erase(level.begin());
+  }
+};
+
+PartitionErrorMesher::PartitionErrorMesher(std::uint64_t most_kept) : impl_(std::make_unique<Impl>()) { impl_->most_kept = most_kept; }
+PartitionErrorMesher::~PartitionErrorMesher() = default;
+PartitionErrorMesher::PartitionErrorMesher(PartitionErrorMesher&&) noexcept = default;
+PartitionErrorMesher& PartitionErrorMesher::operator=(PartitionErrorMesher&&) noexcept = default;
+
+std::vector<Mesh> PartitionErrorMesher::make(std::span<const FieldView> fields, std::span<const std::uint64_t> version, const Lattice& coarsest,
+                                             const PartitionError& error, const Executor& executor, PolygoniseCounts* counts) {
+  SUPPLE_EXPECTS(version.size() == fields.size());
+  PolygoniseCounts local;
+  PolygoniseCounts& count = counts != nullptr ? *counts : local;
+  for (auto& [number, on] : impl_->level) on.used = false;
+  std::vector<Mesh> result = within(coarsest, error, count, [&](int number, const Lattice& lattice, std::vector<Mesh>& meshes, PolygoniseCounts& of_level) {
+    Impl::OnLevel& on = impl_->level[number];
+    on.used = true;
+    meshes = on.mesher.make(fields, version, lattice, executor, &of_level);
+    const double found = on.errors.measure(fields, version, meshes, executor);
+    on.bytes = of_level.bytes + on.errors.bytes();
+    impl_->leave_out_coarsest();
+    return found;
+  });
+  std::erase_if(impl_->level, [](const auto& on) { return !on.second.used; });
+  count.bytes = impl_->bytes();
+  return result;
+}
+
+void PartitionErrorMesher::forget() { impl_->level.clear(); }
+
+std::vector<Mesh> polygonise_partition_within(std::span<const FieldView> fields, const Lattice& coarsest, const PartitionError& error,
+                                              const Executor& executor, PolygoniseCounts* counts) {
+  PolygoniseCounts local;
+  return within(coarsest, error, counts != nullptr ? *counts : local,
+                [&](int, const Lattice& lattice, std::vector<Mesh>& meshes, PolygoniseCounts& count) {
+                  meshes = polygonise_partition(fields, lattice, executor, &count);
+                  double found = 0.0;
+                  for (std::size_t m = 0; m < meshes.size(); ++m) {
+                    found = std::max(found, centroid_error(Share(fields, sharers_of(fields, m)), meshes[m], executor));
+                  }
+                  return found;
+                });
 }
 
 }  // namespace supple::implicit

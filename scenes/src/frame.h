@@ -33,12 +33,14 @@ struct LedSolid {
   Vec3 spin = Vec3::Zero();
 };
 
-/// Meshers of bodies that touch, one for each lattice. What they keep holds for any state.
+/// Meshers of bodies that touch, one for each lattice and error. What they keep holds for any state.
 struct DivisionMeshers {
   struct OnLattice {
     double cell = 0.0;
-    bool used = true;  ///< in this frame
-    implicit::PartitionMesher mesher;
+    double error = 0.0;  ///< 0: none is asked for
+    bool used = true;    ///< in this frame
+    implicit::PartitionMesher mesher{};             ///< without an error
+    implicit::PartitionErrorMesher error_mesher{};  ///< with one
   };
   std::vector<OnLattice> mesher;
   ContentVersions fields, claims;

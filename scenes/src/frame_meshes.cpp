@@ -32,6 +32,11 @@ struct DivisionGroup {
   const ObjectModel* strictest = nullptr;  ///< whose error it is; null: none is asked for
 };
 
+/// An error of 0: none is asked for.
+std::pair<double, double> cell_and_error(const DivisionGroup& group) {
+  return {group.finest->cell, group.strictest != nullptr ? *group.strictest->mesh_error : 0.0};
+}
+
 /// Of bodies that touch, directly or by way of others, the smallest cell and error hold for all of them. What has the same
 /// of both is divided in one go, whether it touches or not.
 std::vector<DivisionGroup> groups_of(const Model& model, const std::vector<Body>& bodies, const Division& division) {
@@ -55,13 +60,10 @@ std::vector<DivisionGroup> groups_of(const Model& model, const std::vector<Body>
     const bool strict = object.mesh_error && (part.strictest == nullptr || *object.mesh_error < *part.strictest->mesh_error);
     if (strict) part.strictest = &object;
   }
-  const auto lattice_of = [](const DivisionGroup& group) {
-    return std::pair(group.finest->cell, group.strictest != nullptr ? *group.strictest->mesh_error : 0.0);
-  };
   std::vector<DivisionGroup> groups;
   for (std::size_t k = 0; k < all.size(); ++k) {
     const DivisionGroup& part = parts[root_of(all[k])];
-    auto group = std::find_if(groups.begin(), groups.end(), [&](const DivisionGroup& g) { return lattice_of(g) == lattice_of(part); });
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const DivisionGroup& g) { return cell_and_error(g) == cell_and_error(part); });
     if (group == groups.end()) group = groups.insert(groups.end(), part);
     group->member.push_back(k);
   }
@@ -98,18 +100,19 @@ std::vector<std::uint64_t> versions_of(const StageContext& context, const Divisi
   return version;
 }
 
-implicit::PartitionMesher& mesher_on(double cell, DivisionMeshers& dividing) {
-  auto on = std::find_if(dividing.mesher.begin(), dividing.mesher.end(), [&](const auto& m) { return m.cell == cell; });
-  if (on == dividing.mesher.end()) on = dividing.mesher.insert(on, {.cell = cell, .used = true, .mesher = {}});
+DivisionMeshers::OnLattice& mesher_of(const DivisionGroup& group, DivisionMeshers& dividing) {
+  const auto [cell, error] = cell_and_error(group);
+  auto on = std::find_if(dividing.mesher.begin(), dividing.mesher.end(), [&](const auto& m) { return m.cell == cell && m.error == error; });
+  if (on == dividing.mesher.end()) on = dividing.mesher.insert(on, DivisionMeshers::OnLattice{.cell = cell, .error = error});
   on->used = true;
-  return on->mesher;
+  return *on;
 }
 
 /// The claims of some bodies, and what may keep their meshes: those of all that share a lattice.
 struct Claims {
   std::vector<implicit::FieldView> view;
   std::vector<std::uint64_t> version;
-  implicit::PartitionMesher* mesher = nullptr;  ///< null: nothing is kept
+  DivisionMeshers::OnLattice* mesher = nullptr;  ///< null: nothing is kept
 };
 
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
@@ -124,14 +127,17 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
     missed.crossings += report.crossings;
     return meshes;
   }
-  if (claims.mesher != nullptr) return claims.mesher->make(views, claims.version, lattice, executor, &counts);
-  if (group.strictest == nullptr) return implicit::polygonise_partition(views, lattice, executor, &counts);
+  if (group.strictest == nullptr) {
+    return claims.mesher != nullptr ? claims.mesher->mesher.make(views, claims.version, lattice, executor, &counts)
+                                    : implicit::polygonise_partition(views, lattice, executor, &counts);
+  }
   double feature = std::numeric_limits<double>::infinity();
   for (const implicit::FieldView& view : views) feature = std::min(feature, view.feature_size());
   const bool stated = group.finest->cell_is_stated && lattice.cell <= 0.5 * feature;
   const implicit::PartitionError error{.largest = *group.strictest->mesh_error, .cell_is_stated = stated};
-  return implicit::polygonise_partition_within(views, {.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature}, error, executor,
-                                               &counts);
+  const implicit::Lattice coarsest{.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature};
+  return claims.mesher != nullptr ? claims.mesher->error_mesher.make(views, claims.version, coarsest, error, executor, &counts)
+                                  : implicit::polygonise_partition_within(views, coarsest, error, executor, &counts);
 }
 
 /// The cell fits a thin surface, for which the scene asks by its iso value or its skeleton.
@@ -227,8 +233,7 @@ void mesh_group(const StageContext& context, const Division& division, std::span
     claims.view.emplace_back(division.claim[k]);
     claims.version.push_back(version[k]);
   }
-  const bool keeps = group.strictest == nullptr && context.model.meshing.method != MeshingName::Delaunay;
-  if (keeps) claims.mesher = &mesher_on(cell, frame.dividing);
+  if (context.model.meshing.method != MeshingName::Delaunay) claims.mesher = &mesher_of(group, frame.dividing);
   std::vector<Mesh> parts = divide_some(context, group, claims, used, profile, frame.missed);
   search_between(context, division, group, used, frame, parts);
   for (std::size_t n = 0; n < parts.size(); ++n) {

@@ -4,7 +4,8 @@
 /// outside, and the places nearest to a vertex that Newton's method finds elsewhere.
 ///   partition_bench rims [SETS] [CELL]       vertices of rims and corners beside the exact ones, lengths over the cell
 ///   partition_bench delaunay [SETS] [SIZE]   how many sets hold the angle
-///   partition_bench moved [BALLS] [CELL]     a pile in which some balls move: PartitionMesher beside polygonise_partition, one thread;
+///   partition_bench moved [BALLS] [CELL] [ERROR]  a pile in which some balls move: PartitionMesher beside polygonise_partition, or, to an
+///                                            error [m] from CELL on, PartitionErrorMesher beside polygonise_partition_within, one thread;
 ///                                            share is that of the time, blocks_share that of the blocks visited
 #include <Eigen/Dense>
 #include <algorithm>
@@ -234,7 +235,8 @@ std::vector<testing::Body> pile_of(int count) {
   return balls;
 }
 
-void moved(int count, double cell) {
+/// @param error  0: of the one lattice
+void moved(int count, double cell, double error) {
   constexpr int kFrames = 8;
   const Lattice lattice{.origin = cell * Vec3(0.382, 0.236, 0.447), .cell = cell};
   for (const double part : {0.0, 0.01, 0.1, 1.0}) {
@@ -242,6 +244,7 @@ void moved(int count, double cell) {
     testing::Random random(2);
     std::vector<testing::Body> balls = pile_of(count);
     PartitionMesher mesher;
+    PartitionErrorMesher error_mesher;
     ContentVersions versions;
     double whole = 0.0, kept = 0.0;
     std::uint64_t blocks = 0, visited = 0, bytes = 0;
@@ -258,9 +261,11 @@ void moved(int count, double cell) {
       }
       PolygoniseCounts all, counts;
       const double start = cpu_seconds();
-      const std::vector<Mesh> fresh = polygonise_partition(views, lattice, Executor(1), &all);
+      const std::vector<Mesh> fresh =
+          error > 0.0 ? polygonise_partition_within(views, lattice, {error}, Executor(1), &all) : polygonise_partition(views, lattice, Executor(1), &all);
       const double between = cpu_seconds();
-      const std::vector<Mesh> meshes = mesher.make(views, version, lattice, Executor(1), &counts);
+      const std::vector<Mesh> meshes = error > 0.0 ? error_mesher.make(views, version, lattice, {error}, Executor(1), &counts)
+                                                   : mesher.make(views, version, lattice, Executor(1), &counts);
       const double end = cpu_seconds();
       Hasher hash, fresh_hash;
       add(meshes, hash);
@@ -295,7 +300,7 @@ int main(int argc, char** argv) {
   if (what == "delaunay") {
     delaunay(sets, argc > 3 ? std::atof(argv[3]) : 0.1);
   } else if (what == "moved") {
-    moved(argc > 2 ? sets : 100, argc > 3 ? std::atof(argv[3]) : 0.005);
+    moved(argc > 2 ? sets : 100, argc > 3 ? std::atof(argv[3]) : 0.005, argc > 4 ? std::atof(argv[4]) : 0.0);
   } else {
     rims(sets, argc > 3 ? std::atof(argv[3]) : 0.05);
   }

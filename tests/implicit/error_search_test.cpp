@@ -22,13 +22,13 @@ struct Search {
   double hint = 0.0;
 };
 
-/// Errors that start at 1 and shrink by `factor` from level to level; `levels` fit, errors from level 4 on are telling.
-Search search(double wanted, double factor, int levels) {
+/// Errors that start at 1 and shrink by `factor` from level to level; `levels` fit, errors from level `telling` on are telling.
+Search search(double wanted, double factor, int levels, int telling = 4) {
   Search out;
   try {
     make_within({.error = wanted, .first = 1.0}, [&](int level) {
       out.level.push_back(level);
-      return LevelTry{.error = std::pow(factor, level), .telling = level >= 4, .levels_left = levels - level};
+      return LevelTry{.error = std::pow(factor, level), .telling = level >= telling, .levels_left = levels - level};
     });
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::Limit);
@@ -67,6 +67,18 @@ TEST(ErrorSearch, RefusesEarlyWithAHintThatHolds) {
       EXPECT_TRUE(followed.refused.empty()) << followed.refused;
       EXPECT_LE(followed.level.back(), levels);
     }
+  }
+}
+
+TEST(ErrorSearch, RefusesFromTheThreeCoarsestMeshesWhereTheyAreTelling) {
+  for (const double factor : {kTwo, kOne}) {
+    constexpr int kLevels = 12;
+    const Search refused = search(1e-12, factor, kLevels, 0);
+    EXPECT_EQ(refused.level, (std::vector<int>{0, 1, 2}));
+    EXPECT_GE(refused.hint, std::pow(factor, kLevels));
+    EXPECT_LE(refused.hint, 1.06 * std::pow(factor, kLevels - 1));
+    const Search followed = search(refused.hint, factor, kLevels, 0);
+    EXPECT_TRUE(followed.refused.empty()) << followed.refused;
   }
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string>
+#include <tuple>
 
 #include "implicit/analytic_fields.h"
 #include "supple/core/content_versions.h"
@@ -212,6 +214,157 @@ TEST(PartitionMesher, BeginsAnewOnAnotherLatticeAndAfterAFault) {
   const std::vector<Mesh> fresh = polygonise_partition(in.view, kLattice, Executor(1));
   expect_same(mesher.make(in.view, in.version, kLattice, Executor(1)), fresh);
   EXPECT_TRUE(mesher.make({}, {}, kLattice, Executor(1)).empty());
+}
+
+/// What polygonise_partition_within says; empty where it finds meshes, those of `fresh`.
+std::string refusal_of(const Pieces::Input& in, const PartitionError& error, std::vector<Mesh>& fresh, PolygoniseCounts& counts) {
+  try {
+    fresh = polygonise_partition_within(in.view, {.origin = kLattice.origin, .cell = 0.2}, error, Executor(1), &counts);
+  } catch (const Error& refused) {
+    return refused.what();
+  }
+  return {};
+}
+
+TEST(PartitionErrorMesher, GivesAndRefusesWhatAFreshOneDoesWhateverMovesComesAndGoes) {
+  constexpr int kFrames = 6;
+  std::uint64_t visited = 0, all_visited = 0;
+  int refused = 0;
+  for (std::uint64_t seed = 61; seed <= 65; ++seed) {
+    Random random(seed);
+    Pieces pieces;
+    pieces.piece.push_back({.from = {0, 0, -0.5}});
+    for (std::uint32_t n = 2 + random.below(4); n > 0; --n) pieces.piece.push_back(random_piece(random));
+    PartitionErrorMesher one, two, small(1'000'000);
+    for (int frame = 0; frame < kFrames; ++frame) {
+      const Pieces::Input in = pieces.input();
+      const PartitionError error{.largest = frame == 3 ? 1e-9 : frame == 4 ? 0.02 : 0.008};
+      PolygoniseCounts counts, of_two, of_small, fresh_counts;
+      std::vector<Mesh> fresh;
+      const std::string said = refusal_of(in, error, fresh, fresh_counts);
+      for (const auto& [mesher, threads, count] : {std::tuple{&one, 1, &counts}, std::tuple{&two, 2, &of_two}, std::tuple{&small, 1, &of_small}}) {
+        const auto make = [&, mesher = mesher, threads = threads, count = count] {
+          return mesher->make(in.view, in.version, {.origin = kLattice.origin, .cell = 0.2}, error, Executor(threads), count);
+        };
+        if (said.empty()) {
+          ASSERT_NO_FATAL_FAILURE(expect_same(make(), fresh)) << seed << " " << frame;
+          expect_same(*count, fresh_counts);
+          continue;
+        }
+        try {
+          (void)make();
+          ADD_FAILURE() << "not refused";
+        } catch (const Error& kept) {
+          EXPECT_EQ(kept.what(), said);
+        }
+      }
+      refused += said.empty() ? 0 : 1;
+      EXPECT_EQ(counts.blocks_visited, of_two.blocks_visited);
+      EXPECT_TRUE(!said.empty() || of_small.bytes <= 1'000'000u) << of_small.bytes;
+      EXPECT_GE(of_small.blocks_visited, counts.blocks_visited);
+      if (frame != 3) {
+        visited += counts.blocks_visited;
+        all_visited += fresh_counts.blocks_visited;
+      }
+      next_frame(random, pieces.piece);
+    }
+  }
+  EXPECT_EQ(refused, 5);
+  EXPECT_LT(visited, (4 * all_visited) / 5);  // or nothing was tried
+}
+
+TEST(PartitionErrorMesher, VisitsNoBlockOfAnyLevelWhereNothingMovedAndKeepsAsMuchAsItMay) {
+  Pieces pieces = row_of_balls(8);
+  const auto visited = [&](PartitionErrorMesher& mesher, PolygoniseCounts& counts) {
+    const Pieces::Input in = pieces.input();
+    (void)mesher.make(in.view, in.version, {.origin = kLattice.origin, .cell = 0.2}, {.largest = 0.004}, Executor(1), &counts);
+    return counts.blocks_visited;
+  };
+  PartitionErrorMesher mesher;
+  PolygoniseCounts counts, last;
+  const std::uint64_t all = visited(mesher, counts);
+  EXPECT_GT(all, counts.blocks);  // of more than one level
+  EXPECT_EQ(visited(mesher, counts), 0u);
+  const std::uint64_t bytes = counts.bytes;
+
+  PartitionErrorMesher less(bytes - 1), none(0);  // the coarsest is made anew
+  EXPECT_EQ(visited(less, last), all);
+  const std::uint64_t anew = visited(less, last);
+  EXPECT_GT(anew, 0u);
+  EXPECT_LE(anew, all - counts.blocks);
+  EXPECT_GT(last.bytes, bytes / 2);
+  EXPECT_LT(last.bytes, bytes);
+  (void)visited(none, last);
+  EXPECT_EQ(visited(none, last), all);
+  EXPECT_EQ(last.bytes, 0u);
+
+  pieces.piece[4].from.z() += 0.01;
+  pieces.piece[4].to.z() += 0.01;
+  const std::uint64_t moved = visited(mesher, counts);
+  EXPECT_GT(moved, 0u);
+  EXPECT_LT(moved, all / 2);
+  mesher.forget();
+  EXPECT_EQ(visited(mesher, counts), all);
+}
+
+TEST(PartitionErrorMesher, RefusesAnErrorOutOfReachFromCoarseMeshes) {
+  Pieces pieces = row_of_balls(8);
+  const Pieces::Input in = pieces.input();
+  PolygoniseCounts counts, coarsest;
+  (void)polygonise_partition(in.view, kLattice, Executor(1), &coarsest);
+  ASSERT_GT(coarsest.blocks, 100u);
+  EXPECT_THROW((void)polygonise_partition_within(in.view, kLattice, {.largest = 1e-9}, Executor(1), &counts), Error);
+  // Surfaces take 1, 2 and 4 times the blocks, and those beside them; four levels up they would take 16 times.
+  EXPECT_LT(counts.blocks_visited, 10 * coarsest.blocks);
+  EXPECT_NEAR(counts.cell, 0.5 * kLattice.cell, 1e-15);
+}
+
+TEST(PartitionErrorMesher, BeginsAnewOnAnotherLatticeAndAfterARefusal) {
+  Pieces pieces = row_of_balls(3);
+  const Pieces::Input in = pieces.input();
+  PartitionErrorMesher mesher;
+  for (const double cell : {0.1, 0.2, 0.14, 0.05, 0.1}) {
+    for (const double largest : {0.004, 1e-9, 0.01}) {
+      const Lattice coarsest{.origin = kLattice.origin, .cell = cell};
+      if (largest == 1e-9) {
+        EXPECT_THROW((void)mesher.make(in.view, in.version, coarsest, {.largest = largest}, Executor(1)), Error);
+        continue;
+      }
+      PolygoniseCounts counts, fresh_counts;
+      const std::vector<Mesh> fresh = polygonise_partition_within(in.view, coarsest, {.largest = largest}, Executor(1), &fresh_counts);
+      expect_same(mesher.make(in.view, in.version, coarsest, {.largest = largest}, Executor(1), &counts), fresh);
+      expect_same(counts, fresh_counts);
+    }
+  }
+  EXPECT_TRUE(mesher.make({}, {}, kLattice, {.largest = 0.01}, Executor(1)).empty());
+}
+
+// The mesh of a body is the same, and what the error is measured by is not: a field that is steeper off its surface.
+TEST(PartitionErrorMesher, MeasuresAnewWhereAFieldChangedAndTheMeshDidNot) {
+  const auto ball = [](double bend) {
+    return FunctionField{.function =
+                             [=](const Vec3& p, Vec3& gradient) {
+                               const double n = p.norm(), f = 0.4 - n;
+                               const double slope = 1.0 + (std::abs(f) > 1e-7 ? bend : 0.0);
+                               gradient = n > 0.0 ? Vec3(-slope / n * p) : Vec3::Zero();
+                               return f;
+                             },
+                         .lipschitz = 1.0,
+                         .box = Box{Vec3::Constant(-0.401), Vec3::Constant(0.401)}};
+  };
+  const Lattice coarsest{.origin = kLattice.origin, .cell = 0.1};
+  PartitionErrorMesher mesher;
+  double cell[2] = {};
+  for (const std::size_t k : {0u, 1u}) {
+    const FunctionField field = ball(k == 0 ? 3.0 : 0.0);  // by the first, errors are a quarter
+    const FieldView view(field);
+    const std::uint64_t version = k;
+    PolygoniseCounts counts, fresh;
+    const std::vector<Mesh> expected = polygonise_partition_within({&view, 1}, coarsest, {.largest = 0.001}, Executor(1), &fresh);
+    expect_same(mesher.make({&view, 1}, {&version, 1}, coarsest, {.largest = 0.001}, Executor(1), &counts), expected);
+    cell[k] = counts.cell;
+  }
+  EXPECT_GT(cell[0], cell[1]);
 }
 
 }  // namespace

@@ -50,6 +50,17 @@ TEST(KeptMeshes, OfAPileAreThoseOfEachFrameMeshedAlone) {
   }
 }
 
+TEST(KeptMeshes, OfAPileToAnErrorAreThoseOfEachFrameMeshedAlone) {
+  const Scene scene = library_scene("contacts/pile_rests", {"objects.balls.particles.columns=2", "objects.balls.particles.rows=2",
+                                                            "objects.balls.particles.layers=2", "objects.balls.particles.at=[0, 0, 0.11]",
+                                                            "output.meshing.error=0.001"});
+  Simulation simulation(scene, {.threads = 2});
+  for (const int frame : {3, 4, 8, 30}) {
+    run(simulation, frame);
+    ASSERT_NO_FATAL_FAILURE(expect_same(simulation.meshes(), meshes_alone(scene, simulation.state()))) << frame;
+  }
+}
+
 // Bulges beside obstacles that are led along depend on where these are.
 TEST(KeptMeshes, OfABeltAndAPressAreThoseOfEachFrameMeshedAlone) {
   const Scene scene = library_scene("contacts/press_and_belt");
@@ -61,7 +72,8 @@ TEST(KeptMeshes, OfABeltAndAPressAreThoseOfEachFrameMeshedAlone) {
 }
 
 TEST(KeptMeshes, VisitOnlyWhatMovedAlsoAfterAStateIsRestored) {
-  const std::string text = R"(
+  for (const char* error : {"", ", meshing: {error: 0.001}"}) {
+    const std::string text = std::string(R"(
 schema: 1
 duration: 1 s
 frame_rate: 10
@@ -71,25 +83,25 @@ objects:
     separate: true
     skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
     contact: {modulus: 2e4}
-output: {cell: 0.01}
-)";
-  Simulation simulation = make(text);
-  const auto visited = [&] {
-    const std::uint64_t before = simulation.profile(Stage::Polygonise).visited;
-    (void)simulation.meshes();
-    return simulation.profile(Stage::Polygonise).visited - before;
-  };
-  const std::uint64_t all = visited();
-  EXPECT_GT(all, 100u);
-  State state = simulation.state();
-  simulation.restore(State(state));
-  EXPECT_EQ(visited(), 0u);
-  state.particles.position[6].y() += 0.003;
-  simulation.restore(State(state));
-  const std::uint64_t moved = visited();
-  EXPECT_GT(moved, 0u);
-  EXPECT_LT(moved, all / 3);  // it has a twelfth, and its neighbours reach some of the blocks beside
-  expect_same(simulation.meshes(), meshes_alone(parse_scene(text, "test.yaml", "."), state));
+output: {cell: 0.01)") + error + "}\n";
+    Simulation simulation = make(text);
+    const auto visited = [&] {
+      const std::uint64_t before = simulation.profile(Stage::Polygonise).visited;
+      (void)simulation.meshes();
+      return simulation.profile(Stage::Polygonise).visited - before;
+    };
+    const std::uint64_t all = visited();
+    EXPECT_GT(all, 100u);
+    State state = simulation.state();
+    simulation.restore(State(state));
+    EXPECT_EQ(visited(), 0u);
+    state.particles.position[6].y() += 0.003;
+    simulation.restore(State(state));
+    const std::uint64_t moved = visited();
+    EXPECT_GT(moved, 0u);
+    EXPECT_LT(moved, all / 3);  // it has a twelfth, and its neighbours reach some of the blocks beside
+    expect_same(simulation.meshes(), meshes_alone(parse_scene(text, "test.yaml", "."), state));
+  }
 }
 
 // Bodies that touch no other: marched, with creases where nodes unite, with kernels that grow and shrink.

@@ -25,6 +25,7 @@ struct Lattice {
 struct PolygoniseCounts {
   std::uint64_t blocks_visited = 0;   ///< blocks evaluated
   std::uint64_t blocks_present = 0;   ///< blocks of the lattice inside the surface boxes
+  std::uint64_t blocks = 0;           ///< where the bodies of a division may meet, evaluated or kept
   std::uint64_t nodes = 0;            ///< field values taken
   double cell = 0.0;                  ///< edge of the lattice's cells [m]
   double residual = 0.0;              ///< largest |F| at a vertex, |F_a - F_b| where two bodies touch
@@ -77,6 +78,7 @@ struct PartitionError {
 /// polygonise_partition with cells of coarsest.cell, or smaller by powers of sqrt(2), so that every centroid lies within the error of its
 /// body's surface: |D| / |grad D| with D = F_m - max(0, F_j) where that is smooth, along Newton's steps elsewhere. Bodies still share
 /// their contact bit for bit. @throws Error{Limit} as soon as no mesh within kMostBlocks is to be expected to reach it.
+/// @param counts  blocks and nodes are those of all meshes that were tried, the others those of the last
 [[nodiscard]] std::vector<Mesh> polygonise_partition_within(std::span<const FieldView> fields, const Lattice& coarsest,
                                                             const PartitionError& error, const Executor& executor,
                                                             PolygoniseCounts* counts = nullptr);
