@@ -339,30 +339,30 @@ TEST(PartitionErrorMesher, BeginsAnewOnAnotherLatticeAndAfterARefusal) {
   EXPECT_TRUE(mesher.make({}, {}, kLattice, {.largest = 0.01}, Executor(1)).empty());
 }
 
-// The mesh of a body is the same, and what the error is measured by is not: a field that is steeper off its surface.
-TEST(PartitionErrorMesher, MeasuresAnewWhereAFieldChangedAndTheMeshDidNot) {
-  const auto ball = [](double bend) {
+// A body that wins nowhere changes no mesh, but what the error of the other one is measured by.
+TEST(PartitionErrorMesher, MeasuresAnewWhereANeighbourChangedAndTheMeshDidNot) {
+  const FunctionField ball = sphere(Vec3::Zero(), 0.4);
+  const auto within = [&](double share) {  // a field that takes this share of the ball's own, and its slope not
     return FunctionField{.function =
                              [=](const Vec3& p, Vec3& gradient) {
-                               const double n = p.norm(), f = 0.4 - n;
-                               const double slope = 1.0 + (std::abs(f) > 1e-7 ? bend : 0.0);
-                               gradient = n > 0.0 ? Vec3(-slope / n * p) : Vec3::Zero();
-                               return f;
+                               gradient = Vec3::Zero();
+                               return share * (0.4 - p.norm()) - 1e-6;
                              },
                          .lipschitz = 1.0,
-                         .box = Box{Vec3::Constant(-0.401), Vec3::Constant(0.401)}};
+                         .box = ball.box};
   };
   const Lattice coarsest{.origin = kLattice.origin, .cell = 0.1};
   PartitionErrorMesher mesher;
-  double cell[2] = {};
-  for (const std::size_t k : {0u, 1u}) {
-    const FunctionField field = ball(k == 0 ? 3.0 : 0.0);  // by the first, errors are a quarter
-    const FieldView view(field);
-    const std::uint64_t version = k;
+  std::vector<double> cell;
+  for (const double share : {0.9, 0.0}) {  // by the first, errors are a tenth
+    const FunctionField other = within(share);
+    const std::vector<FieldView> views{ball, other};
+    const std::vector<std::uint64_t> version{0, 1 + cell.size()};
     PolygoniseCounts counts, fresh;
-    const std::vector<Mesh> expected = polygonise_partition_within({&view, 1}, coarsest, {.largest = 0.001}, Executor(1), &fresh);
-    expect_same(mesher.make({&view, 1}, {&version, 1}, coarsest, {.largest = 0.001}, Executor(1), &counts), expected);
-    cell[k] = counts.cell;
+    const std::vector<Mesh> expected = polygonise_partition_within(views, coarsest, {.largest = 0.001}, Executor(1), &fresh);
+    expect_same(mesher.make(views, version, coarsest, {.largest = 0.001}, Executor(1), &counts), expected);
+    EXPECT_EQ(counts.cell, fresh.cell);
+    cell.push_back(fresh.cell);
   }
   EXPECT_GT(cell[0], cell[1]);
 }
