@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "error_search.h"
+#include "polygonise_blocks.h"
 #include "supple/core/error.h"
+#include "supple/implicit/mesh_limits.h"
 #include "supple/implicit/partition_mesher.h"
 #include "supple/implicit/polygonise.h"
 
@@ -75,10 +77,19 @@ class Share {
   std::vector<FieldView> others_;
 };
 
+/// centroid_error of the bodies' meshes, the largest.
+double largest_error(std::span<const FieldView> fields, std::span<const Mesh> meshes, const Executor& executor) {
+  double largest = 0.0;
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    largest = std::max(largest, centroid_error(Share(fields, sharers_of(fields, m)), meshes[m], executor));
+  }
+  return largest;
+}
+
 /// Errors of meshes by bodies whose surfaces are the same.
 class KeptErrors {
  public:
-  /// centroid_error of the bodies' meshes, the largest.
+  /// As largest_error.
   double measure(std::span<const FieldView> fields, std::span<const std::uint64_t> version, std::span<const Mesh> meshes,
                  const Executor& executor) {
     std::map<std::uint64_t, Entry> last = std::exchange(entry_, {});
@@ -202,12 +213,23 @@ std::vector<Mesh> polygonise_partition_within(std::span<const FieldView> fields,
   return within(coarsest, error, counts != nullptr ? *counts : local,
                 [&](int, const Lattice& lattice, std::vector<Mesh>& meshes, PolygoniseCounts& count) {
                   meshes = polygonise_partition(fields, lattice, executor, &count);
-                  double found = 0.0;
-                  for (std::size_t m = 0; m < meshes.size(); ++m) {
-                    found = std::max(found, centroid_error(Share(fields, sharers_of(fields, m)), meshes[m], executor));
-                  }
-                  return found;
+                  return largest_error(fields, meshes, executor);
                 });
+}
+
+void expect_divisible_within(std::span<const FieldView> fields, const Lattice& coarsest, const PartitionError& error, const Executor& executor,
+                             std::uint64_t most_blocks) {
+  constexpr double kReached = 0.0;  // ends the search
+  std::vector<Box> surface;
+  for (const FieldView& field : fields) surface.push_back(field.surface_box());
+  double blocks = 0.0;  // of level 0
+  PolygoniseCounts counts;
+  (void)within(coarsest, error, counts, [&](int level, const Lattice& lattice, std::vector<Mesh>& meshes, PolygoniseCounts& count) {
+    if (level == 0) blocks = static_cast<double>(lattice::find_label_blocks(fields, surface, lattice, executor, kMostBlocks, count).block.size());
+    if (std::ldexp(blocks, level) > static_cast<double>(most_blocks)) return kReached;
+    meshes = polygonise_partition(fields, lattice, executor, &count);
+    return largest_error(fields, meshes, executor);
+  });
 }
 
 }  // namespace supple::implicit

@@ -115,6 +115,16 @@ struct Claims {
   DivisionMeshers::OnLattice* mesher = nullptr;  ///< null: nothing is kept
 };
 
+/// Where the search for a lattice that meets the group's error begins. @pre group.strictest is not null
+std::pair<implicit::Lattice, implicit::PartitionError> to_error(const DivisionGroup& group, std::span<const implicit::FieldView> views,
+                                                                const implicit::Lattice& lattice) {
+  double feature = std::numeric_limits<double>::infinity();
+  for (const implicit::FieldView& view : views) feature = std::min(feature, view.feature_size());
+  const bool stated = group.finest->cell_is_stated && lattice.cell <= 0.5 * feature;
+  return {{.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature},
+          {.largest = *group.strictest->mesh_error, .cell_is_stated = stated}};
+}
+
 /// The meshes of bodies that touch, within the bounds that the scene asks for.
 std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Claims& claims, const implicit::Lattice& lattice,
                          implicit::PolygoniseCounts& counts, SearchCounts& missed) {
@@ -131,11 +141,7 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
     return claims.mesher != nullptr ? claims.mesher->mesher.make(views, claims.version, lattice, executor, &counts)
                                     : implicit::polygonise_partition(views, lattice, executor, &counts);
   }
-  double feature = std::numeric_limits<double>::infinity();
-  for (const implicit::FieldView& view : views) feature = std::min(feature, view.feature_size());
-  const bool stated = group.finest->cell_is_stated && lattice.cell <= 0.5 * feature;
-  const implicit::PartitionError error{.largest = *group.strictest->mesh_error, .cell_is_stated = stated};
-  const implicit::Lattice coarsest{.origin = lattice.origin, .cell = stated ? lattice.cell : 0.5 * feature};
+  const auto [coarsest, error] = to_error(group, views, lattice);
   return claims.mesher != nullptr ? claims.mesher->error_mesher.make(views, claims.version, coarsest, error, executor, &counts)
                                   : implicit::polygonise_partition_within(views, coarsest, error, executor, &counts);
 }
@@ -467,14 +473,19 @@ void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Bo
   const std::vector<implicit::Field>& fields = simulation.fields();
   const Division division = division_of(model, bodies, fields, simulation.contact_bodies(), simulation.contacts());
   for (const DivisionGroup& group : groups_of(model, bodies, division)) {
-    if (group.strictest != nullptr) continue;
+    constexpr std::uint64_t kBlocksASecond = 1000;
     std::vector<implicit::FieldView> views;
     for (const std::size_t k : group.member) views.emplace_back(division.claim[k]);
-    const double cell = group.finest->cell;
+    const implicit::Lattice lattice{.origin = group.finest->cell * kOffPlanes, .cell = group.finest->cell};
     try {
-      implicit::expect_divisible(views, {.origin = cell * kOffPlanes, .cell = cell}, executor);
+      if (group.strictest == nullptr) {
+        implicit::expect_divisible(views, lattice, executor);
+      } else {
+        const auto [coarsest, error] = to_error(group, views, lattice);
+        implicit::expect_divisible_within(views, coarsest, error, executor, kBlocksASecond);
+      }
     } catch (const Error& failure) {
-      throw with_keys_of(model, failure, group.finest, nullptr);
+      throw with_keys_of(model, failure, group.finest, group.strictest);
     }
   }
   std::vector<Pose> pose;

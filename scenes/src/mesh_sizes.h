@@ -8,7 +8,8 @@
 
 namespace supple::scenes {
 
-/// Looks at all but meshes within a given error and Delaunay's, which choose their cells as they go.
+/// Looks at all but Delaunay's meshes and, of bodies that touch no other, those within a given error, which choose their cells as they go.
+/// Of an error where bodies touch as much is told as follows from meshes that take about a second.
 /// @param shown  which surfaces a mesh is wanted of, by their boxes; empty: all
 /// @throws Error{Limit} as Simulation::meshes
 void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Box&)>& shown, const Executor& executor);

@@ -9,6 +9,7 @@
 #include "implicit/analytic_fields.h"
 #include "supple/core/content_versions.h"
 #include "supple/core/error.h"
+#include "supple/implicit/mesh_limits.h"
 #include "supple/implicit/partition_mesher.h"
 
 namespace supple::implicit {
@@ -317,6 +318,26 @@ TEST(PartitionErrorMesher, RefusesAnErrorOutOfReachFromCoarseMeshes) {
   // Surfaces take 1, 2 and 4 times the blocks, and those beside them; four levels up they would take 16 times.
   EXPECT_LT(counts.blocks_visited, 10 * coarsest.blocks);
   EXPECT_NEAR(counts.cell, 0.5 * kLattice.cell, 1e-15);
+}
+
+TEST(MeshLimits, TellOfAnErrorOutOfReachWhatItsMeshWouldWhereThatIsSoon) {
+  Pieces pieces = row_of_balls(8);
+  const Pieces::Input in = pieces.input();
+  const auto refusal = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const Error& refused) {
+      return refused.what();
+    }
+    return {};
+  };
+  for (const double largest : {1e-9, 1e-3}) {
+    const std::string of_meshes =
+        refusal([&] { (void)polygonise_partition_within(in.view, kLattice, {.largest = largest}, Executor(1)); });
+    EXPECT_EQ(of_meshes.empty(), largest > 1e-9);
+    EXPECT_EQ(refusal([&] { expect_divisible_within(in.view, kLattice, {.largest = largest}, Executor(1), 10'000); }), of_meshes);
+    EXPECT_EQ(refusal([&] { expect_divisible_within(in.view, kLattice, {.largest = largest}, Executor(1), 10); }), "");
+  }
 }
 
 TEST(PartitionErrorMesher, BeginsAnewOnAnotherLatticeAndAfterARefusal) {

@@ -1,8 +1,9 @@
 /// @file supple/implicit/mesh_limits.h
-/// Whether meshes and grids would be refused for their size, by what refuses them, before anything is sampled. Where the box of a surface
-/// holds few enough blocks nothing else is looked at.
+/// Whether meshes and grids would be refused for their size, by what refuses them, before anything is sampled but where an error is asked
+/// for. Where the box of a surface holds few enough blocks nothing else is looked at.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "supple/core/executor.h"
@@ -16,6 +17,9 @@ namespace supple::implicit {
 void expect_marchable(const FieldView& field, const Lattice& lattice, const Executor& executor);
 /// @throws Error{Limit} as polygonise_partition and, for one field, polygonise
 void expect_divisible(std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor);
+/// @throws Error{Limit} as polygonise_partition_within, as far as that follows from meshes of about most_blocks at most. These are made.
+void expect_divisible_within(std::span<const FieldView> fields, const Lattice& coarsest, const PartitionError& error, const Executor& executor,
+                             std::uint64_t most_blocks);
 /// @throws Error{Limit} as make_surface_grid
 void expect_griddable(const FieldView& field, const GridOptions& options, const Executor& executor);
 
