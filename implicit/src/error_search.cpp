@@ -165,10 +165,10 @@ void make_within(const ErrorGoal& goal, const std::function<LevelTry(int level)>
     }
     if (now.error <= goal.error) return;
     order.add(level, now.error);
-    const bool hopeless = now.telling && order.least_levels_to(goal.error) > now.levels_left;
+    const bool far = order.least_levels_to(goal.error) > now.levels_left, hopeless = far && now.telling;
     if (now.levels_left == 0 || (hopeless && order.known())) refuse(goal, now.error, level, order.most_after(std::max(now.levels_left - 1, 0)));
     last = level;
-    const int most = hopeless ? 1 : order.even() ? kEvenLevels : kLevels;
+    const int most = hopeless ? 1 : order.even() && !far ? kEvenLevels : kLevels;
     level += std::min({order.levels_to(kPromise * goal.error), most, now.levels_left});
   }
 }

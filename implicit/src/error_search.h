@@ -50,7 +50,8 @@ struct ErrorGoal {
 
 /// Makes meshes of rising level, from 0 on, until one has the error. Errors fall by two a level on a smooth surface, by sqrt(2) where it
 /// has an edge that no vertex meets; which of both is seen from the last meshes. At most four levels are taken at once, two while
-/// the order is in doubt, one where the error looks out of reach. @param make  a level's mesh; what it throws for its size, Error{Limit}, is told in terms of errors
+/// the order is in doubt or the error looks out of reach, and then one from a mesh that tells.
+/// @param make  a level's mesh; what it throws for its size, Error{Limit}, is told in terms of errors
 /// @throws Error{Limit} as soon as no mesh that fits would have the error; the hint keeps a level in hand
 void make_within(const ErrorGoal& goal, const std::function<LevelTry(int level)>& make);
 

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -222,12 +224,14 @@ void expect_divisible_within(std::span<const FieldView> fields, const Lattice& c
   constexpr double kReached = 0.0;  // ends the search
   std::vector<Box> surface;
   for (const FieldView& field : fields) surface.push_back(field.surface_box());
-  double blocks = 0.0;  // of level 0
+  double blocks = 0.0;  // of the last level
+  int last = 0;
   PolygoniseCounts counts;
   (void)within(coarsest, error, counts, [&](int level, const Lattice& lattice, std::vector<Mesh>& meshes, PolygoniseCounts& count) {
     if (level == 0) blocks = static_cast<double>(lattice::find_label_blocks(fields, surface, lattice, executor, kMostBlocks, count).block.size());
-    if (std::ldexp(blocks, level) > static_cast<double>(most_blocks)) return kReached;
+    if (std::ldexp(blocks, level - std::exchange(last, level)) > static_cast<double>(most_blocks)) return kReached;
     meshes = polygonise_partition(fields, lattice, executor, &count);
+    blocks = static_cast<double>(count.blocks);
     return largest_error(fields, meshes, executor);
   });
 }

@@ -82,6 +82,11 @@ TEST(ErrorSearch, RefusesFromTheThreeCoarsestMeshesWhereTheyAreTelling) {
   }
 }
 
+TEST(ErrorSearch, StepsNoFartherThanTwoLevelsTowardsAnErrorOutOfReach) {
+  EXPECT_EQ(search(1e-12, kTwo, 12, 5).level, (std::vector<int>{0, 2, 4, 6}));
+  EXPECT_EQ(search(1e-12, kOne, 12, 5).level, (std::vector<int>{0, 2, 4, 6}));
+}
+
 // Errors that fall fast once and slowly from then on, as where a small edge shows late: what a refusal names is reached.
 TEST(ErrorSearch, NamesAnErrorThatIsReachedWhereErrorsFallMoreSlowlyThanOnce) {
   constexpr int kLevels = 14;
