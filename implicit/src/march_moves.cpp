@@ -127,6 +127,7 @@ void move_runs(const std::vector<Run>& runs, std::size_t count, std::vector<Vec3
 
 void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::size_t count, Mesh& mesh) {
   if (mesh.triangle.size() < count) mesh.triangle.resize(count);
+  if (mesh.triangle.empty()) return;
   std::uint32_t* vertex = mesh.triangle.data()->data();
   std::vector<Shift> shifts;
   const Block* block = nullptr;
