@@ -28,8 +28,7 @@ struct Query {
   collision::ContactSurface surface;
   double cpu_us = 0.0;
 
-  void once(std::span<const collision::ContactBody> bodies, double error, collision::ContactRule rule) {
-    const Executor executor(1);
+  void once(std::span<const collision::ContactBody> bodies, double error, collision::ContactRule rule, const Executor& executor) {
     find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
     solve_contact_surface(bodies, candidates, {.error = error, .only = rule}, executor, surface);
   }
@@ -38,11 +37,12 @@ struct Query {
   const collision::ContactSurface::Summary* ask(std::span<const collision::ContactBody> bodies, double error,
                                                 int repeats, collision::ContactRule rule = collision::ContactRule::None) {
     constexpr double kShort = 200.0;  // [us]
+    const Executor executor(1);
     cpu_us = std::numeric_limits<double>::infinity();
     for (int i = 0; i < repeats; ++i) {
       const int in_a_row = cpu_us < kShort ? 4 : 1;
       const double start = cpu_microseconds();
-      for (int n = 0; n < in_a_row; ++n) once(bodies, error, rule);
+      for (int n = 0; n < in_a_row; ++n) once(bodies, error, rule, executor);
       cpu_us = std::min(cpu_us, (cpu_microseconds() - start) / in_a_row);
     }
     return surface.summary.empty() ? nullptr : &surface.summary.front();
