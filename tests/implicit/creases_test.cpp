@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -63,6 +64,11 @@ TEST(Creases, LieOnTheCircleWhereTwoBallsMeet) {
     EXPECT_LT(4.0 * sharp.rms, cut.rms);
     EXPECT_LT(sharp.rms, 0.06 * cell);
     EXPECT_LT(sharp.largest, 0.3 * cell);  // where the crease only grazes a cell
+    // One vertex in each cell that the circle passes, at most sqrt(3) a cell of its length, where edges are turned onto it; with one more in each
+    // edge where they are cut instead, which few are.
+    const auto on_circle = static_cast<double>(std::count_if(mesh.position.begin(), mesh.position.end(), [](const Vec3& p) { return std::abs(p.dot(kAxis)) < 1e-9; }));
+    const double rim = std::sqrt(kRadius * kRadius - kApart * kApart);
+    EXPECT_LT(on_circle, 1.5 * std::sqrt(3.0) * 2.0 * std::numbers::pi * rim / cell);
     // Two caps of height kRadius + kApart, less at most the sagitta of a cell's diagonal all over.
     const double cap = kRadius + kApart, exact = 2.0 * std::numbers::pi * cap * cap * (3.0 * kRadius - cap) / 3.0;
     EXPECT_LT(report.volume, exact);

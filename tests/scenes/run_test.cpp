@@ -18,7 +18,6 @@
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/read_mesh.h"
-#include "supple/implicit/surface_grid.h"
 #include "supple/render/image.h"
 #include "supple/render/layers.h"
 #include "supple/scenes/inspect.h"
@@ -555,103 +554,6 @@ TEST_F(Run, WritesForEarlierFramesTooWhatARestartAsksForFirst) {
     EXPECT_EQ(run_scene(scene_, o).outcome, "done") << part;
     for (const fs::path& file : lost) EXPECT_TRUE(fs::exists(file)) << file;
   }
-}
-
-TEST_F(Run, WritesGridsOfObjectsOfTheSceneOrBoth) {
-  scene_.output.images.reset();
-  scene_.output.film.reset();
-  const auto grids_of = [&](GriddedName of, GridContentName content) {
-    scene_.output.gridding.of = of;
-    scene_.output.gridding.content = content;
-    RunOptions again = options();
-    again.overwrite = true;
-    EXPECT_EQ(run_scene(scene_, again).outcome, "done");
-    return folder_ / "grids/drops.0001.vdb";
-  };
-  const auto refused = [](const fs::path& file, const std::string& name) {
-    try {
-      (void)implicit::read_grid(file, name);
-      return false;
-    } catch (const Error&) {
-      return true;
-    }
-  };
-  const fs::path objects = grids_of(GriddedName::Objects, GridContentName::Distance);
-  EXPECT_LT(implicit::read_grid(objects, "left").interpolate(Vec3(-0.3, 0, 0)), 0.0);
-  EXPECT_GT(implicit::read_grid(objects, "left").interpolate(Vec3(0.3, 0, 0)), 0.0);
-  EXPECT_TRUE(refused(objects, "scene"));
-  const fs::path scene = grids_of(GriddedName::Scene, GridContentName::Distance);
-  EXPECT_TRUE(refused(scene, "left"));
-  EXPECT_LT(implicit::read_grid(scene, "scene").interpolate(Vec3(-0.3, 0, 0)), 0.0);
-  EXPECT_LT(implicit::read_grid(scene, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
-  const fs::path both = grids_of(GriddedName::Both, GridContentName::Field);
-  EXPECT_GT(implicit::read_grid(both, "right").interpolate(Vec3(0.3, 0, 0)), 0.0);
-  EXPECT_GT(implicit::read_grid(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
-}
-
-TEST_F(Run, GridsOfBodiesThatTouchEndWhereTheyDo) {
-  scene_.output.images.reset();
-  scene_.output.film.reset();
-  scene_.output.gridding.of = GriddedName::Both;
-  scene_.output.cell = 0.02;
-  for (ObjectDesc& object : scene_.objects) object.particles.at.x() = object.name == "left" ? -0.2 : 0.2;
-  RunOptions first = options();
-  first.frames = {1};
-  EXPECT_EQ(run_scene(scene_, first).outcome, "done");
-  const fs::path file = folder_ / "grids/drops.0001.vdb";
-  const implicit::SurfaceGrid left = implicit::read_grid(file, "left"), right = implicit::read_grid(file, "right"),
-                              both = implicit::read_grid(file, "scene");
-  // In the plane between equal drops, whose undeformed surfaces lie 0.027 m beyond it, and to its sides.
-  for (const double y : {-0.04, 0.0, 0.04}) {
-    EXPECT_NEAR(left.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
-    EXPECT_NEAR(right.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
-    EXPECT_NEAR(left.interpolate(Vec3(-0.02, y, 0.0)), -0.02, 1e-3);
-    EXPECT_NEAR(right.interpolate(Vec3(-0.02, y, 0.0)), 0.02, 1e-3);
-    EXPECT_NEAR(left.interpolate(Vec3(-0.04, y, 0.0)), -0.04, 2e-3);  // where the right drop claims nothing
-    EXPECT_LT(both.interpolate(Vec3(0.0, y, 0.0)), -0.01);  // nothing parts their union
-  }
-}
-
-TEST_F(Run, KeepsOfGridsOnlyWhatIsThatOfAFrameAlone) {
-  scene_.output.images.reset();
-  scene_.output.film.reset();
-  scene_.output.mesh.clear();
-  scene_.output.gridding.of = GriddedName::Both;
-  scene_.output.cell = 0.02;
-  for (ObjectDesc& object : scene_.objects) object.particles.at.x() = object.name == "left" ? -0.25 : 0.25;
-  ObjectDesc far = scene_.objects.front();  // stands still beside them
-  far.name = "far";
-  far.particles.at = Vec3(0.0, 2.0, 0.0);
-  far.particles.velocity = Vec3::Zero();
-  scene_.objects.push_back(far);
-  RunOptions all = options();
-  EXPECT_EQ(run_scene(scene_, all).outcome, "done");
-  int touching = 0;
-  for (int frame = 1; frame <= 5; ++frame) {
-    RunOptions alone = options();
-    alone.folder = folder_ / "alone";
-    alone.overwrite = true;
-    alone.frames = {frame};
-    EXPECT_EQ(run_scene(scene_, alone).outcome, "done");
-    const fs::path name = "grids/drops.000" + std::to_string(frame) + ".vdb";
-    for (const char* grid : {"left", "right", "far", "scene"}) {
-      EXPECT_EQ(implicit::read_grid(folder_ / name, grid).hash(), implicit::read_grid(alone.folder / name, grid).hash()) << grid << ' ' << frame;
-    }
-    touching += implicit::read_grid(folder_ / name, "left").interpolate(Vec3(0.0, 0.0, 0.0)) < 1e-3 ? 1 : 0;
-  }
-  EXPECT_GE(touching, 1);
-  EXPECT_LE(touching, 4);
-}
-
-TEST_F(Run, RefusesGridsOfTooManyVoxelsByTheKeyOfTheScene) {
-  scene_.output.images.reset();
-  scene_.output.film.reset();
-  scene_.output.mesh.clear();
-  scene_.output.cell = 1e-5;
-  const RunResult refused = run_scene(scene_, options());
-  EXPECT_EQ(refused.outcome, "limit");
-  EXPECT_NE(refused.reason.find("output.cell: expected a surface in at most"), std::string::npos) << refused.reason;
-  EXPECT_NE(refused.reason.find("use cells of at least"), std::string::npos) << refused.reason;
 }
 
 TEST_F(Run, RefusesTooFineCellsWordForWord) {
