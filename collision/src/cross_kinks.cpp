@@ -176,10 +176,11 @@ void PolarRuleSolver::follow_rim() {
     out.assign(2 * half + 2, 0.0);
     for (std::size_t m = 0; m <= half; ++m) {
       const double scale = (m == 0 || 2 * m == n ? 1.0 : 2.0) / static_cast<double>(n);
-      for (std::size_t k = 0; k < n; ++k) {
-        const std::size_t at = m * k % n;
+      for (std::size_t k = 0, at = 0; k < n; ++k) {
         out[2 * m] += scale * f[k] * rim_.cosine[at];
         out[2 * m + 1] += scale * f[k] * rim_.sine[at];
+        at += m;
+        if (at >= n) at -= n;
       }
     }
   }

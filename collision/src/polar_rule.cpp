@@ -639,11 +639,12 @@ PolarCover::Reach PolarCover::reach(const Vec2& at) const {
     height_there = (1.0 - share) * height[k] + share * height[next];
   } else {
     for (std::size_t k = 0; k < corner.size(); ++k) {
-      const Vec2 &a = corner[k], &b = corner[(k + 1) % corner.size()];
+      const std::size_t next = k + 1 < corner.size() ? k + 1 : 0;
+      const Vec2 &a = corner[k], &b = corner[next];
       const double beyond_a = a.x() * s - a.y() * c, beyond_b = c * b.y() - s * b.x(), whole = beyond_a + beyond_b;
       if (!(beyond_a >= 0.0) || !(beyond_b >= 0.0) || !(whole > 0.0)) continue;
       far = whole / (a.x() * b.y() - a.y() * b.x());
-      height_there = (beyond_b * height[k] + beyond_a * height[(k + 1) % corner.size()]) / whole;
+      height_there = (beyond_b * height[k] + beyond_a * height[next]) / whole;
       break;
     }
   }

@@ -145,10 +145,12 @@ double PolarRuleSolver::unseen_by_angles(std::size_t r) const {
   double most = 0.0;
   for (std::size_t m = 3; 2 * m <= n; ++m) {
     double c = 0.0, s = 0.0;
-    for (std::size_t k = 0; k < n; ++k) {
+    for (std::size_t k = 0, at = 0; k < n; ++k) {
       const double square = rim_.radius[k] * rim_.radius[k];
-      c += square * rim_.cosine[m * k % n];
-      s += square * rim_.sine[m * k % n];
+      c += square * rim_.cosine[at];
+      s += square * rim_.sine[at];
+      at += m;
+      if (at >= n) at -= n;
     }
     const double share = (2 * m == n ? 1.0 : 2.0) * std::sqrt(c * c + s * s) / mean;
     if (share > 0.0) most = std::max(most, math::pow(share, static_cast<double>(n) / static_cast<double>(m)));

@@ -127,11 +127,15 @@ std::optional<Vec2> PolarRuleSolver::point_that_sees(std::span<const Vec2> polyg
   for (std::size_t i = 0; i < n; ++i) {
     const Vec2 &a = polygon[i], edge = polygon[(i + 1) % n] - a;
     kept.clear();
+    const double at_first = cross(edge, kernel.front() - a);
+    double at_p = at_first;
     for (std::size_t k = 0; k < kernel.size(); ++k) {
-      const Vec2 &p = kernel[k], &q = kernel[(k + 1) % kernel.size()];
-      const double at_p = cross(edge, p - a), at_q = cross(edge, q - a);
+      const bool last = k + 1 == kernel.size();
+      const Vec2 &p = kernel[k], &q = last ? kernel.front() : kernel[k + 1];
+      const double at_q = last ? at_first : cross(edge, q - a);
       if (at_p >= 0.0) kept.push_back(p);
       if ((at_p >= 0.0) != (at_q >= 0.0)) kept.push_back(p + at_p / (at_p - at_q) * (q - p));
+      at_p = at_q;
     }
     kernel.swap(kept);
     if (kernel.size() < 3) return std::nullopt;
