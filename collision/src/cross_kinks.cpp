@@ -1,5 +1,6 @@
 /// Where kinks of a field, and the borders of third bodies, cross a patch: on its rim, on rays, and where rays begin to meet others.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -169,43 +170,55 @@ void PolarRuleSolver::find_imprints(PairPressure& pressure) {
 
 /// The rim found so far as a trigonometric sum, and points of it that leave no room for a kink between them.
 void PolarRuleSolver::follow_rim() {
-  const std::size_t n = rim_.size(), half = n / 2;
-  for (const int which : {0, 1}) {
-    const std::vector<double>& f = which == 0 ? rim_.radius : rim_.height;
-    std::vector<double>& out = wave_[which];
-    out.assign(2 * half + 2, 0.0);
-    for (std::size_t m = 0; m <= half; ++m) {
-      const double scale = (m == 0 || 2 * m == n ? 1.0 : 2.0) / static_cast<double>(n);
-      for (std::size_t k = 0, at = 0; k < n; ++k) {
-        out[2 * m] += scale * f[k] * rim_.cosine[at];
-        out[2 * m + 1] += scale * f[k] * rim_.sine[at];
-        at += m;
-        if (at >= n) at -= n;
-      }
+  const auto n = static_cast<Eigen::Index>(rim_.size()), waves = n / 2 + 1;
+  const CurveAngles& angles = curve_angles(rim_.size());
+  for (Wave& wave : wave_) {
+    const std::vector<double>& f = &wave == &wave_[0] ? rim_.radius : rim_.height;
+    wave.cosine.setZero(waves);
+    wave.sine.setZero(waves);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double share = f[static_cast<std::size_t>(k)] * (1.0 / static_cast<double>(n));
+      wave.cosine += share * Eigen::Map<const Eigen::ArrayXd>(angles.wave_cosine.data() + k * waves, waves);
+      wave.sine += share * Eigen::Map<const Eigen::ArrayXd>(angles.wave_sine.data() + k * waves, waves);
     }
+    const Eigen::Index inner = (n - 1) / 2;
+    wave.cosine.segment(1, inner) *= 2.0;
+    wave.sine.segment(1, inner) *= 2.0;
   }
-  fine_rim_.clear();
-  for (std::size_t i = 0; i < n; ++i) {
-    for (const double part : {0.0, 0.25, 0.5, 0.75}) {
-      const auto [s, c] = math::sin_cos(kTurn * (static_cast<double>(i) + part) / static_cast<double>(n));
-      const auto [radius, height] = rim_at(c, s);
-      fine_rim_.push_back(frame_.origin + radius * direction(c, s) + height * frame_.axis);
+  constexpr std::size_t kTogether = 8;
+  using Together = Eigen::Array<double, kTogether, 1>;
+  fine_rim_.resize(4 * rim_.size());
+  for (std::size_t first = 0; first < fine_rim_.size(); first += kTogether) {
+    const std::size_t count = std::min(kTogether, fine_rim_.size() - first);
+    Together cosine = Together::Zero(), sine = Together::Zero();
+    std::copy_n(angles.cosine.data() + first, count, cosine.data());
+    std::copy_n(angles.sine.data() + first, count, sine.data());
+    const std::array<Together, 2> at = sum_waves(cosine, sine);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto j = static_cast<Eigen::Index>(i);
+      fine_rim_[first + i] = frame_.origin + at[0][j] * direction(cosine[j], sine[j]) + at[1][j] * frame_.axis;
     }
   }
 }
 
-std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const {
-  std::array<double, 2> sum{};
-  double c = 1.0, s = 0.0;
-  for (std::size_t m = 0; 2 * m < wave_[0].size(); ++m) {
-    for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
-      sum[which] += wave_[which][2 * m] * c + wave_[which][2 * m + 1] * s;
-    }
-    const double next = c * cosine - s * sine;
+/// Radius and height of the rim in directions, all at once.
+template <class Directions>
+std::array<Directions, 2> PolarRuleSolver::sum_waves(const Directions& cosine, const Directions& sine) const {
+  std::array<Directions, 2> sum{Directions::Zero(), Directions::Zero()};
+  Directions c = Directions::Ones(), s = Directions::Zero();
+  for (Eigen::Index m = 0; m < wave_[0].cosine.size(); ++m) {
+    for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) sum[which] += wave_[which].cosine[m] * c + wave_[which].sine[m] * s;
+    const Directions next = c * cosine - s * sine;
     s = s * cosine + c * sine;
     c = next;
   }
   return sum;
+}
+
+std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const {
+  using One = Eigen::Array<double, 1, 1>;
+  const std::array<One, 2> at = sum_waves(One(cosine), One(sine));
+  return {at[0][0], at[1][0]};
 }
 
 /// Where a function changes its sign around a closed line, from its values at points of it: i + t lies between points i and i + 1.

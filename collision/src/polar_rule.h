@@ -182,6 +182,8 @@ class PolarRuleSolver {
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
+  template <class Directions>
+  std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
   void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
   void find_corners(PairPressure& pressure, std::vector<Corner>& corners);
   [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
@@ -320,7 +322,10 @@ class PolarRuleSolver {
   std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
   std::vector<RaySums> along_;
-  std::vector<double> wave_[2];        // Fourier coefficients of the rim's radius and height
+  struct Wave {
+    Eigen::ArrayXd cosine, sine;
+  };
+  std::array<Wave, 2> wave_;  // Fourier coefficients of the rim's radius and height
   std::vector<Vec3> fine_rim_;
   Rays rays_;
   std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)

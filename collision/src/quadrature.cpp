@@ -1,5 +1,6 @@
 #include "quadrature.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -105,6 +106,23 @@ std::vector<PolarRule> make_polar(bool single_ray) {
   return rules;
 }
 
+CurveAngles make_curve_angles(const PolarRule& rule) {
+  CurveAngles angles;
+  const auto n = static_cast<std::size_t>(rule.angular);
+  for (std::size_t i = 0; i < 4 * n; ++i) {
+    const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * (0.25 * static_cast<double>(i)) / static_cast<double>(n));
+    angles.cosine.push_back(c);
+    angles.sine.push_back(s);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    for (std::size_t m = 0; m <= n / 2; ++m) {
+      angles.wave_cosine.push_back(rule.cosine[m * k % n]);
+      angles.wave_sine.push_back(rule.sine[m * k % n]);
+    }
+  }
+  return angles;
+}
+
 }  // namespace
 
 const GaussRule& gauss_rule(int n) {
@@ -198,6 +216,17 @@ const KronrodRule& patterson_additions() {
     return added;
   }();
   return rule;
+}
+
+const CurveAngles& curve_angles(std::size_t n) {
+  static const std::vector<std::pair<std::size_t, CurveAngles>> all = [] {
+    std::vector<std::pair<std::size_t, CurveAngles>> made{{1, make_curve_angles(polar_rays().front())}};
+    for (const PolarRule& rule : polar_rules()) made.emplace_back(rule.angular, make_curve_angles(rule));
+    return made;
+  }();
+  const auto found = std::find_if(all.begin(), all.end(), [n](const auto& of) { return of.first == n; });
+  SUPPLE_EXPECTS(found != all.end());
+  return found->second;
 }
 
 std::span<const PolarRule> polar_rules() {

@@ -52,4 +52,12 @@ struct PolarRule {
 /// The same with a single ray.
 [[nodiscard]] std::span<const PolarRule> polar_rays();
 
+/// For a closed curve known at the angles 2 pi k / n of a rule.
+struct CurveAngles {
+  std::vector<double> cosine, sine;            ///< of these and of three between each two, 2 pi i / (4 n)
+  std::vector<double> wave_cosine, wave_sine;  ///< row k: of 2 pi m k / n, m from 0 to n / 2
+};
+/// @pre n is the number of angles of a rule
+[[nodiscard]] const CurveAngles& curve_angles(std::size_t n);
+
 }  // namespace supple::collision
