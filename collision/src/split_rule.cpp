@@ -408,11 +408,21 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
     }
     if (turns.empty()) turns.push_back({0.0, false});
     std::sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.angle < b.angle; });
+    // Of those that are the same one stays, so that panels leave nothing out between them.
+    std::size_t last = 0;
+    for (const Turn& turn : turns) {
+      if (turn.angle - turns[last].angle >= kSameTurn) {
+        turns[++last] = turn;
+      } else {
+        turns[last].touch |= turn.touch;
+      }
+    }
+    if (last > 0 && turns.front().angle + kTurn - turns[last].angle < kSameTurn) turns.front().touch |= turns[last--].touch;
+    turns.resize(last + 1);
     turns.push_back({turns.front().angle + kTurn, turns.front().touch});
     panels_.clear();
     for (std::size_t t = 0; t + 1 < turns.size(); ++t) {
       const double width = turns[t + 1].angle - turns[t].angle;
-      if (width < kSameTurn) continue;
       const int parts = static_cast<int>(std::ceil(width / widest));
       for (int i = 0; i < parts; ++i) {
         Panel panel;

@@ -413,6 +413,33 @@ TEST(StarRule, FindsAllOfThePatchesOfTwoLumps) {
   }
 }
 
+TEST(SplitRule, LeavesNothingOutBetweenCornersThatAreNearlyTheSame) {
+  // Two corners of the rim less than 1e-7 apart, which the bodies in the other order have too; marching has no corners.
+  benchmarks::Rigid a(benchmarks::ten_blobs(1), 1e6, 0.03), b(benchmarks::ten_blobs(2), 2e6, 0.03);
+  benchmarks::Draw draw(9501);
+  const Executor executor(1);
+  for (int pose = 0; pose <= 216; ++pose) {
+    benchmarks::press(a, b, draw.logarithmic(0.01, 0.3) * 0.05, draw);
+    if (pose != 15 && pose != 207 && pose != 216) continue;
+    const std::array<ContactBody, 2> bodies{a.body(), b.body()};
+    ContactCandidates candidates;
+    find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
+    const auto solve = [&](double error, ContactRule only) {
+      ContactSurface surface;
+      solve_contact_surface(bodies, candidates, {.error = error, .only = only}, executor, surface);
+      return surface.summary.at(0);
+    };
+    const ContactSurface::Summary marched = solve(1e-10, ContactRule::March);
+    EXPECT_LE(marched.error_estimate, 1e-10) << pose;
+    for (const double asked : {1e-8, 1e-10}) {
+      const ContactSurface::Summary s = solve(asked, ContactRule::Polar);
+      EXPECT_LE(s.error_estimate, asked) << pose;
+      EXPECT_LE(benchmarks::difference(s, {marched.force.norm(), marched.area, marched.centre_of_pressure}), s.error_estimate + marched.error_estimate)
+          << pose << ' ' << asked;
+    }
+  }
+}
+
 TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
   // Poses of `contact_poses 1000 SHAPES auto SEED`, against the bodies in the other order at 1e-10. Of a disc on a box: a ray that meets
   // two kinks in another order than the next one; a kink that lies elsewhere on Sigma than the guess of its heights says; a kink that the
