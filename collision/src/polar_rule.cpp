@@ -22,6 +22,7 @@ constexpr double kEnough = 0.9;          // leaves room for Newton's method
 constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
 constexpr std::size_t kMostCoarse = 3;   // the finest rule for others
 constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
+constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -555,7 +556,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
                           : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
     if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kEnough * error));
     if (difference > kEnough * error && r < last) continue;
-    estimate_ = difference + algebraic_error();
+    estimate_ = (any ? kSafetyAcross : 1.0) * difference + algebraic_error();
     if (estimate_ > error && !any) return false;
     // Which rule is enough is not asked of this bound, as energies converge later; but two rules agree by chance where it is far above what they say.
     if (r <= kFinestJudged && (smooth || (!any && third_.empty() && error < kSplitBelow && clear_of_kinks(pressure)))) {
