@@ -73,7 +73,7 @@ constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 /// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
-constexpr double kMildAngle = 0.15, kMildRadius = 2.0;
+constexpr double kMildAngle = 0.15, kMildByChance = 0.3, kMildRadius = 2.0;
 constexpr double kExtended = 100.0;  // over what it may be: a panel's doubt that twice as many rays are worth their while for; beyond it is halved
 constexpr std::size_t kFine = 15;  // rays
 
@@ -334,12 +334,14 @@ double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
 }
 
 /// What the sums of a panel are off by at most, over those of `all`.
-void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
+void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) const {
   const bool fine = panel.rays >= kFine;
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
   if (mild_) {
-    panel.by_angle = std::max(kMildAngle * panel.by_angle, slow_decay(panel, all));
+    // Rules agree by chance at any size, but it harms only where they differ by about what is asked for.
+    const double share = error < kMildPartedBelow ? std::clamp(kMildByChance * panel.by_angle / error, kMildAngle, 1.0) : kMildAngle;
+    panel.by_angle = std::max(share * panel.by_angle, slow_decay(panel, all));
     panel.by_radius *= kMildRadius;
     return;
   }
@@ -505,7 +507,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
     estimate_ = rim_error_ = 0.0;
     for (Panel& panel : panels_) {
-      doubt(panel, all);
+      doubt(panel, all, error);
       estimate_ += panel.by_angle + panel.by_radius;
       rim_error_ += panel.by_rim * panel.fine.area / all.area;
     }

@@ -449,7 +449,7 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
   // angle at which the rim nearly goes along the ray; many short pieces; the two coarsest rules; short pieces with two points; fine
   // rules that agree by chance at a coarse error; radii that are compared with too few. Of discs: a ray that touches a kink, near a corner of
   // the rim, between two rays that neither sees it, or where it also crosses another. Of blobs: a rim that nearly goes along the ray, whose
-  // last two pairs of coefficients fall by chance; many kinks in one panel; rings of a mild patch that agree by chance.
+  // last two pairs of coefficients fall by chance; many kinks in one panel; rings of a mild patch, and rays of one of its sectors, that agree by chance.
   enum class Shapes : std::uint8_t { DiscOnBox, Capsules, Blobs, Murakami };
   struct Case {
     Shapes shapes;
@@ -475,7 +475,7 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
                         Case{Shapes::Blobs, 1234, 898, 1e-2}, Case{Shapes::Blobs, 831, 178, 1e-4}, Case{Shapes::Blobs, 901, 4, 1e-2},
                         Case{Shapes::Murakami, 1, 451, 1e-6}, Case{Shapes::Murakami, 5, 696, 1e-4}, Case{Shapes::DiscOnBox, 6102, 719, 1e-8},
                         Case{Shapes::DiscOnBox, 6103, 27, 1e-9}, Case{Shapes::DiscOnBox, 6103, 322, 1e-9}, Case{Shapes::Blobs, 1, 397, 1e-8},
-                        Case{Shapes::Murakami, 7, 13, 1e-5}, Case{Shapes::Blobs, 3, 219, 1e-6}}) {
+                        Case{Shapes::Murakami, 7, 13, 1e-5}, Case{Shapes::Blobs, 3, 219, 1e-6}, Case{Shapes::Blobs, 9601, 581, 1e-5}}) {
     const bool disc = c.shapes == Shapes::DiscOnBox, blobs = c.shapes == Shapes::Blobs || c.shapes == Shapes::Murakami;
     const auto ten = [&](std::uint64_t seed) {
       implicit::Skeleton skeleton = benchmarks::ten_blobs(seed);
