@@ -20,6 +20,12 @@ GradientBounds Claim::bound_gradient(const Box& box) const {
   bounds.least_slope *= weight_;
   bounds.curved.curvature = {weight_ * bounds.curved.curvature.lower, weight_ * bounds.curved.curvature.upper};
   bounds.curved.round_off *= weight_;
+  bounds.slack *= weight_;
+  for (GradientBounds::Term& term : bounds.term) {
+    term.factor = scaled(term.factor);
+    term.gradient *= weight_;
+    term.turn *= weight_;
+  }
   for (GradientBounds::Ball& ball : bounds.hull) {
     ball.gradient *= weight_;
     ball.turn *= weight_;
@@ -66,6 +72,7 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
   for (unsigned c = 0; c < 8; ++c) {
     for (std::size_t i = 1; i < entry_.size(); ++i) {
       GradientBounds& bounds = entry_[i].bounds;
+      bounds.term.clear();  // of the whole box
       const auto& [lower, upper] = bounds.curved.curvature;
       const double first = slope_[i][c].cwiseAbs().dot(half) + bounds.curved.round_off, second = 0.5 * reach * reach;
       bounds.value = {value_[i][c] - first + second * lower, value_[i][c] + first + second * upper};
@@ -123,10 +130,14 @@ bool CubeBounds::rises(const Entry& own) {
   }
   const Vec3 along = shortest_in_hull(over_);
   const double length = (1.0 + 1e-12) * along.norm();
-  for (std::size_t k = 0; k < over_.size(); ++k) {
-    if (!(over_[k].dot(along) > turn_[k] * length)) return false;
-  }
-  return true;
+  bool ahead = true;
+  for (std::size_t k = 0; k < over_.size() && ahead; ++k) ahead = over_[k].dot(along) > turn_[k] * length;
+  if (ahead) return true;
+  if (!(length > 0.0)) return false;
+  const Vec3 direction = along / along.norm();
+  const double own_slope = slope_along(own.bounds, direction).lower;
+  return std::all_of(lead_.begin(), lead_.end(),
+      [&](const Lead& l) { return own_slope > slope_along(l.other->bounds, direction).upper; });
 }
 
 }  // namespace supple::implicit

@@ -38,7 +38,37 @@ struct Expansion {
 
 Interval added(const Interval& a, const Interval& b) { return {a.lower + b.lower, a.upper + b.upper}; }
 
-void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansion& sum) {
+/// Bounds of df/dq for q in the range. It is negative and rises with q, but for two kernels: Blanc & Schlick's, which is flat at 0; and
+/// that of Gascuel may be steepest farther out, where df/dd is largest at one end of any range: it is a parabola that opens upwards or rises.
+/// @param curvature  of the kernel there, whose lower end is no more than twice df/dq
+Interval slope_range(const Kernel& kernel, const DistanceRange& range, const KernelSample& near, const KernelSample& far,
+                     const CurvatureRange& curvature) {
+  switch (kernel.kind) {
+    case KernelKind::BlancSchlick: return {0.5 * curvature.lower, 0.0};
+    case KernelKind::Gascuel: {
+      const double near_slope = near.slope * std::sqrt(range.near2 / range.far2);
+      return {0.5 * curvature.lower, std::max(near_slope, far.slope) * (1.0 - 1e-12)};
+    }
+    default: return {near.slope, far.slope};
+  }
+}
+
+/// How fast the vector from the nearest point of a shape may change, over how fast the place does: not at all along it and as fast
+/// across for convex shapes.
+double gap_rate(const ShapeView& shape) {
+  switch (shape.kind) {
+    case ShapeKind::Ring:
+    case ShapeKind::Arc:
+    case ShapeKind::Curve:
+    case ShapeKind::Superquadric:
+    case ShapeKind::Directed: return kInfinity;
+    case ShapeKind::Segment: return shape.taper == 1.0 ? 1.0 : kInfinity;
+    default: return 1.0;
+  }
+}
+
+/// @param terms  null: not wanted
+void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansion& sum, std::vector<GradientBounds::Term>* terms) {
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const PackedPrimitive& p = index.primitive[id];
   const PackedShape& shape = index.shape[id];
@@ -51,6 +81,7 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
   CurvatureRange curvature;
   Potential centre;
   Interval plain;
+  GradientBounds::Term term{.spread = kInfinity, .factor = {-kInfinity, 0.0}};
   if (shape.foot == PackedFoot::Convolved) {
     plain = bound_primitive(index, id, box, false).value;
     // The peak is the measure of the shape times that of the kernel, which is 1.
@@ -61,14 +92,21 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
     sum.scale += 1e4 * shape.peak;  // sums over edges cancel
   } else {
     const DistanceRange range = distance_range(index, id, box);
-    plain = {evaluate(shape.kernel, range.far2).value, evaluate(shape.kernel, range.near2).value};
+    const KernelSample near = evaluate(shape.kernel, range.near2), least = evaluate(shape.kernel, range.far2);
+    plain = {least.value, near.value};
     const bool clipped = !(index.support[id].contains(box.lower) && index.support[id].contains(box.upper));
     const double far = clipped ? shape.kernel.radius : std::min(std::sqrt(range.far2), shape.kernel.radius);
     const ShapeBall ball{.centre = y, .reach = std::sqrt(metric2) * reach, .far = far};
-    curvature = shape_curvature(shape.view, ball, curvature_range(shape.kernel, std::sqrt(range.near2), far));
+    const CurvatureRange of_kernel = curvature_range(shape.kernel, std::sqrt(range.near2), far);
+    curvature = shape_curvature(shape.view, ball, of_kernel);
     const FootSample sample = foot(shape.view, y);
     const KernelSample kernel = supple::implicit::evaluate(shape.kernel, sample.q);
     centre = {kernel.value, 2.0 * kernel.slope * sample.half_gradient};
+    if (terms != nullptr && std::isfinite(of_kernel.lower)) {
+      const Interval slope = slope_range(shape.kernel, range, near, least, of_kernel);
+      term = {.gap = A.transpose() * sample.half_gradient, .spread = gap_rate(shape.view) * metric2 * reach * (1.0 + 1e-12),
+              .factor = {2.0 * slope.lower, 2.0 * slope.upper}};
+    }
   }
   sum.plain = added(sum.plain, plain);
   if (!std::isfinite(curvature.lower) || !std::isfinite(curvature.upper)) {
@@ -77,7 +115,13 @@ void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansi
     return;
   }
   sum.value += centre.value;
-  sum.gradient += A.transpose() * centre.gradient;
+  const Vec3 gradient = A.transpose() * centre.gradient;
+  sum.gradient += gradient;
+  if (terms != nullptr) {
+    term.gradient = gradient;
+    term.turn = metric2 * std::max(-curvature.lower, curvature.upper) * reach;
+    terms->push_back(term);
+  }
   sum.curvature = {sum.curvature.lower + metric2 * curvature.lower, sum.curvature.upper + metric2 * curvature.upper};
 }
 
@@ -91,7 +135,7 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
     const std::uint32_t node = index.blend.node_of(index.primitive[id].part);
     auto place = std::lower_bound(nodes.begin(), nodes.end(), node, [](const Expansion& a, std::uint32_t b) { return a.node < b; });
     if (place == nodes.end() || place->node != node) place = nodes.insert(place, Expansion{.node = node});
-    expand(index, id, box, *place);
+    expand(index, id, box, *place, nullptr);
   }
 }
 
@@ -196,10 +240,11 @@ GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = field.bound(box)}, {}, {}};
   if (index.blend.active()) return blended_box_bounds(index, box, field.bound(box));
   Expansion sum{.value = -index.iso, .scale = index.iso};
+  GradientBounds out{};
   bool round = true;
   for (const std::uint32_t id : candidates_of(index, box)) {
     if (!index.support[id].overlaps(box)) continue;
-    expand(index, id, box, sum);
+    expand(index, id, box, sum, &out.term);
     round = index.shape[id].view.kind == ShapeKind::Point;
   }
   // As Field::bound has them.
@@ -207,14 +252,37 @@ GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
   const Interval plain{std::max(sum.plain.lower - index.iso - round_off, -index.iso), sum.plain.upper - index.iso + round_off};
   if (sum.terms == 0.0) return {{.value = {-index.iso, -index.iso}, .second_order = true}, {}, {GradientBounds::Ball{}}};
   const Vec3 half = 0.5 * box.extent();
-  GradientBounds out{{.value = intersection(plain, sum.range(half)), .second_order = true}, {}, {}};
+  out.value = intersection(plain, sum.range(half));
+  out.second_order = true;
   out.round = round && sum.terms == 1.0;  // a lone ball or ellipsoid
   if (sum.sloped && half.maxCoeff() > 0.0) {
-    out.hull.push_back({sum.gradient, sum.turn(half.norm()) + sum.round_off() / half.maxCoeff()});
+    out.slack = sum.round_off() / half.maxCoeff();
+    out.hull.push_back({sum.gradient, sum.turn(half.norm()) + out.slack});
     out.least_slope = least_of_hull(out.hull);
     out.curved = {true, sum.curvature, sum.round_off()};
   }
   return out;
+}
+
+Interval slope_along(const GradientBounds& bounds, const Vec3& direction) {
+  Interval all{kInfinity, -kInfinity};
+  for (const GradientBounds::Ball& ball : bounds.hull) {
+    const double along = ball.gradient.dot(direction);
+    all = {std::min(all.lower, along - ball.turn), std::max(all.upper, along + ball.turn)};
+  }
+  if (bounds.term.empty()) return all;
+  Interval sum{-bounds.slack, bounds.slack};
+  for (const GradientBounds::Term& term : bounds.term) {
+    const double way = term.gap.dot(direction), along = term.gradient.dot(direction);
+    Interval one{along - term.turn, along + term.turn};
+    if (std::isfinite(term.spread)) {
+      const double least = way - term.spread, most = way + term.spread;
+      one = intersection(one, {(most > 0.0 ? term.factor.lower : term.factor.upper) * most,
+                               (least > 0.0 ? term.factor.upper : term.factor.lower) * least});
+    }
+    sum = added(sum, one);
+  }
+  return intersection(all, sum);
 }
 
 }  // namespace supple::implicit

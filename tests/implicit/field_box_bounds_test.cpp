@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bodies.h"
+#include "field_box_bounds.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/project.h"
 
@@ -70,6 +71,8 @@ double least_in_hull(std::span<const Vec3> vectors) {
   return at.norm();
 }
 
+const Kernel kGascuel = Kernel::gascuel(0.25, 0.5, 3.0);
+
 class BoundsOnBoxes : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BoundsOnBoxes, HoldValuesAndGradientsAndAreOfUse) {
@@ -104,7 +107,50 @@ TEST_P(BoundsOnBoxes, HoldValuesAndGradientsAndAreOfUse) {
   RecordProperty("steep", steep);
 }
 
-const Kernel kGascuel = Kernel::gascuel(0.25, 0.5, 3.0);
+// Along random directions and that of the gradient in the middle, in which the search for missed pieces takes them.
+TEST_P(BoundsOnBoxes, HoldSlopesAlongDirections) {
+  const Body body = body_of_case(GetParam());
+  Random random(6);
+  std::vector<Vec3> points(32), gradients(32);
+  std::vector<double> values(32);
+  int violations = 0, known = 0;
+  for (int trial = 0; trial < 6000; ++trial) {
+    const double size = 0.6 * std::pow(10.0, -2.0 * random.uniform(0, 1));
+    const Vec3 half = 0.5 * size * (Vec3::Ones() + 0.9 * random.in_box(1.0)), centre = random.in_box(1.1);
+    const Box box{centre - half, centre + half};
+    const GradientBounds bounds = bounds_with_gradient(body.field, box);
+    if (bounds.hull.empty()) continue;
+    for (Vec3& x : points) x = centre + half.cwiseProduct(random.in_box(1.0));
+    for (unsigned c = 0; c < 8; ++c) {
+      for (unsigned k = 0; k < 3; ++k) points[c][k] = (c >> k & 1u) != 0 ? box.upper[k] : box.lower[k];
+    }
+    points[8] = centre;
+    body.field.evaluate(points, values, gradients);
+    for (const Vec3& direction : {random.direction(), Vec3(gradients[8].normalized())}) {
+      if (!(direction.norm() > 0.5)) continue;
+      ++known;
+      const Interval slope = slope_along(bounds, direction);
+      for (const Vec3& g : gradients) violations += !slope.contains(g.dot(direction));
+    }
+  }
+  EXPECT_EQ(violations, 0);
+  EXPECT_GT(known, 1000);
+}
+
+// All balls whose supports reach a box lie to one side, beyond its corners: F rises towards them however their supports end in the box.
+TEST(BoxBounds, KnowThatSumsRiseTowardsAllTheirPrimitives) {
+  for (const Kernel& kernel : {Kernel::wyvill(1.0), kGascuel, Kernel::murakami(1.0), Kernel::nishimura(1.0), Kernel::soft_object(1.0)}) {
+    const double R = kernel.radius;
+    Primitive p = testing::wyvill_point(R);
+    p.kernel = kernel;
+    const Body body = testing::body_of({{p, R * Vec3(0.5, 0.3, 0.0)}, {p, R * Vec3(0.6, -0.3, 0.1)}, {p, R * Vec3(0.95, 0.0, -0.2)},
+                                        {p, R * Vec3(0.9, 0.4, 0.5)}});
+    const Vec3 half = Vec3::Constant(0.2 * R);
+    const GradientBounds bounds = bounds_with_gradient(body.field, {-half, half});
+    EXPECT_EQ(bounds.least_slope, 0.0);  // second derivatives alone do not tell
+    EXPECT_GT(slope_along(bounds, Vec3::UnitX()).lower, 0.0);
+  }
+}
 
 INSTANTIATE_TEST_SUITE_P(
     Kinds, BoundsOnBoxes,
