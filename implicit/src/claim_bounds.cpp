@@ -8,74 +8,110 @@
 
 namespace supple::implicit {
 
+namespace {
+
+Interval scaled(const Interval& value, double weight) { return {weight * value.lower, weight * value.upper}; }
+
+}  // namespace
+
 Claim::Claim(const SearchedBody& body, bool alone) : field_(body.field), weight_(body.weight) {
   if (alone) return;
   const double bound = gradient_bound(surface_box());
   if (bound > 0.0 && std::isfinite(bound)) steepness_ = bound;
 }
 
-GradientBounds Claim::bound_gradient(const Box& box) const {
-  GradientBounds bounds = bounds_with_gradient(*field_, box);
-  bounds.value = scaled(bounds.value);
-  bounds.least_slope *= weight_;
-  bounds.curved.curvature = {weight_ * bounds.curved.curvature.lower, weight_ * bounds.curved.curvature.upper};
-  bounds.curved.round_off *= weight_;
-  bounds.slack *= weight_;
-  for (GradientBounds::Term& term : bounds.term) {
-    term.factor = scaled(term.factor);
-    term.gradient *= weight_;
-    term.turn *= weight_;
+void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found) {
+  found.body.assign(bodies.begin(), bodies.end());
+  found.offset.assign(1, 0);
+  found.primitive.clear();
+  for (const std::uint32_t body : bodies) {
+    if (is_sum(claims[body].field())) find_primitives(claims[body].field(), box, found.primitive);
+    found.offset.push_back(static_cast<std::uint32_t>(found.primitive.size()));
   }
-  for (GradientBounds::Ball& ball : bounds.hull) {
-    ball.gradient *= weight_;
-    ball.turn *= weight_;
-  }
-  return bounds;
 }
 
-bool CubeBounds::certain(const Box& box, std::span<const std::uint32_t> candidates) {
-  entry_.assign(1, outside());
-  for (const std::uint32_t body : candidates) entry_.push_back({.label = body + 1,
-      .bounds = {{.value = claims_[body].bound(box)}, {}, {}}});
-  return judge().certain;
+void narrow_candidates(std::span<const Claim> claims, const Box& box, const Candidates& from, Candidates& found) {
+  found.body = from.body;
+  found.offset.assign(1, 0);
+  found.primitive.clear();
+  for (std::size_t k = 0; k < from.body.size(); ++k) {
+    narrow_primitives(claims[from.body[k]].field(), box, from.primitives_of(k), found.primitive);
+    found.offset.push_back(static_cast<std::uint32_t>(found.primitive.size()));
+  }
 }
 
-Verdict CubeBounds::operator()(const Box& box, std::span<const std::uint32_t> candidates) {
-  entry_.assign(1, outside());
-  for (const std::uint32_t body : candidates) {
-    entry_.push_back({.label = body + 1, .steepness = claims_[body].steepness(), .bounds = claims_[body].bound_gradient(box)});
+void CubeBounds::start(const Box& box, const Candidates& candidates) {
+  count_ = 1 + candidates.body.size();
+  if (entry_.size() < count_) entry_.resize(count_);
+  for (std::size_t k = 0; k + 1 < count_; ++k) {
+    const Claim& claim = claims_[candidates.body[k]];
+    Entry& entry = entry_[k + 1];
+    entry.label = candidates.body[k] + 1;
+    entry.steepness = claim.steepness();
+    entry.weight = claim.weight();
+    start_bounds(claim.field(), box, candidates.primitives_of(k), entry.bounds);
+    entry.value = scaled(entry.bounds.value, entry.weight);
   }
+}
+
+void CubeBounds::add(Step step, const Box& box) {
+  for (Entry& entry : entries().subspan(1)) {
+    step(claims_[entry.label - 1].field(), box, entry.bounds);
+    entry.value = scaled(entry.bounds.value, entry.weight);
+  }
+}
+
+Verdict CubeBounds::operator()(const Box& box, const Candidates& candidates, bool flat_anyway) {
+  start(box, candidates);
   Verdict verdict = judge();
+  if (verdict.certain && !flat_anyway) return verdict;
+  add(add_slopes, box);
+  verdict.flat = is_flat();
+  if (verdict.flat) return verdict;
+  add(add_curvature, box);
+  verdict = judge();
   verdict.flat = is_flat();
   return verdict;
 }
 
 bool CubeBounds::is_flat() {
-  return std::all_of(entry_.begin(), entry_.end(),
-      [&](const Entry& e) { return e.bounds.value.upper < most_ || rises(e) || (e.label == 0 && passes_round_bodies()); });
+  return std::all_of(entries().begin(), entries().end(),
+      [&](const Entry& e) { return e.value.upper < most_ || rises(e) || (e.label == 0 && passes_round_bodies()); });
+}
+
+bool CubeBounds::knows_eighths() const {
+  bool all_round = true;
+  for (const Entry& e : entries().subspan(1)) {
+    if (!e.bounds.term.empty() && !e.bounds.curved.known) return false;
+    if (e.bounds.hull.size() != 1) return false;
+    all_round = all_round && (e.bounds.term.empty() || e.bounds.round);
+  }
+  return !all_round;
 }
 
 std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
   std::array<Verdict, 8> verdict;
-  for (const Entry& e : entry_) {
-    if (e.label != 0 && !e.bounds.curved.known) return verdict;
-  }
+  if (!knows_eighths()) return verdict;
   const Vec3 half = 0.25 * box.extent();
   const double reach = half.norm(), largest = half.maxCoeff();
   std::array<Vec3, 8> middle;
   for (unsigned c = 0; c < 8; ++c) {
     for (unsigned k = 0; k < 3; ++k) middle[c][k] = box.lower[k] + ((c >> k & 1u) != 0 ? 3.0 : 1.0) * half[k];
   }
-  value_.resize(entry_.size());
-  slope_.resize(entry_.size());
-  for (std::size_t i = 1; i < entry_.size(); ++i) claims_[entry_[i].label - 1].evaluate(middle, value_[i], slope_[i]);
+  value_.resize(count_);
+  slope_.resize(count_);
+  for (std::size_t i = 1; i < count_; ++i) {
+    if (entry_[i].bounds.curved.known) claims_[entry_[i].label - 1].field().evaluate(middle, value_[i], slope_[i]);
+  }
   for (unsigned c = 0; c < 8; ++c) {
-    for (std::size_t i = 1; i < entry_.size(); ++i) {
+    for (std::size_t i = 1; i < count_; ++i) {
       GradientBounds& bounds = entry_[i].bounds;
+      if (!bounds.curved.known) continue;  // the same everywhere
       bounds.term.clear();  // of the whole box
       const auto& [lower, upper] = bounds.curved.curvature;
       const double first = slope_[i][c].cwiseAbs().dot(half) + bounds.curved.round_off, second = 0.5 * reach * reach;
       bounds.value = {value_[i][c] - first + second * lower, value_[i][c] + first + second * upper};
+      entry_[i].value = scaled(bounds.value, entry_[i].weight);
       bounds.hull[0] = {slope_[i][c], std::max(-lower, upper) * reach + bounds.curved.round_off / largest};
     }
     verdict[c] = judge();
@@ -86,11 +122,11 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
 
 Verdict CubeBounds::judge() {
   most_ = 0.0;
-  for (const Entry& e : entry_) most_ = std::max(most_, e.bounds.value.lower);
+  for (const Entry& e : entries()) most_ = std::max(most_, e.value.lower);
   Verdict verdict;
   int possible = 0;
-  for (const Entry& e : entry_) {
-    if (e.bounds.value.upper < most_ || (e.label != 0 && !(e.bounds.value.upper > 0.0))) continue;
+  for (const Entry& e : entries()) {
+    if (e.value.upper < most_ || (e.label != 0 && !(e.value.upper > 0.0))) continue;
     ++possible;
     verdict.label = e.label;
     verdict.second_order = verdict.second_order && e.bounds.second_order;
@@ -102,17 +138,19 @@ Verdict CubeBounds::judge() {
 bool CubeBounds::passes_round_bodies() const {
   return lead_.size() <= 3 && std::all_of(lead_.begin(), lead_.end(), [](const Lead& l) {
     const GradientBounds& bounds = l.other->bounds;
-    return bounds.round && bounds.hull.size() == 1 && bounds.hull[0].gradient.norm() > (1.0 + 1e-12) * bounds.hull[0].turn;
+    if (!bounds.round || bounds.hull.size() != 1) return false;
+    const double length = bounds.hull[0].gradient.norm();
+    return length > (1.0 + 1e-12) * bounds.hull[0].turn || (length > 0.0 && slope_along(bounds, bounds.hull[0].gradient / length).lower > 0.0);
   });
 }
 
 bool CubeBounds::rises(const Entry& own) {
   lead_.clear();
   double least = std::numeric_limits<double>::infinity();
-  for (const Entry& e : entry_) {
+  for (const Entry& e : entries()) {
     if (e.label == own.label) continue;
     const double scale = 1.0 / (own.steepness + e.steepness);
-    const Interval &a = own.bounds.value, &b = e.bounds.value;
+    const Interval &a = own.value, &b = e.value;
     lead_.push_back({&e, {scale * (a.lower - b.upper), scale * (a.upper - b.lower)}});
     least = std::min(least, lead_.back().value.upper);
   }
@@ -123,8 +161,8 @@ bool CubeBounds::rises(const Entry& own) {
     if (own.bounds.hull.empty() || l.other->bounds.hull.empty()) return false;
     for (const GradientBounds::Ball& a : own.bounds.hull) {
       for (const GradientBounds::Ball& b : l.other->bounds.hull) {
-        over_.push_back(a.gradient - b.gradient);
-        turn_.push_back(a.turn + b.turn);
+        over_.push_back(own.weight * a.gradient - l.other->weight * b.gradient);
+        turn_.push_back(own.weight * a.turn + l.other->weight * b.turn);
       }
     }
   }
@@ -135,9 +173,9 @@ bool CubeBounds::rises(const Entry& own) {
   if (ahead) return true;
   if (!(length > 0.0)) return false;
   const Vec3 direction = along / along.norm();
-  const double own_slope = slope_along(own.bounds, direction).lower;
+  const double own_slope = own.weight * slope_along(own.bounds, direction).lower;
   return std::all_of(lead_.begin(), lead_.end(),
-      [&](const Lead& l) { return own_slope > slope_along(l.other->bounds, direction).upper; });
+      [&](const Lead& l) { return own_slope > l.other->weight * slope_along(l.other->bounds, direction).upper; });
 }
 
 }  // namespace supple::implicit

@@ -35,7 +35,8 @@ class Claim {
   [[nodiscard]] double gradient_bound(const Box& box) const { return weight_ * field_->gradient_bound(box); }
   [[nodiscard]] Box surface_box() const { return field_->surface_box(); }
   [[nodiscard]] double feature_size() const { return field_->feature_size(); }
-  [[nodiscard]] GradientBounds bound_gradient(const Box& box) const;
+  [[nodiscard]] const Field& field() const { return *field_; }
+  [[nodiscard]] double weight() const { return weight_; }
 
  private:
   [[nodiscard]] Interval scaled(const Interval& value) const { return {weight_ * value.lower, weight_ * value.upper}; }
@@ -49,33 +50,58 @@ struct Verdict {
   Label label = 0;
   bool flat = false;     ///< no claim's difference to the next has an extremum there
   bool second_order = true;
+  [[nodiscard]] bool settled() const { return certain || flat; }
 };
+
+/// Bodies that may have a part of a cube, each with those of its primitives that may reach it, where it is a sum.
+struct Candidates {
+  std::vector<std::uint32_t> body;    ///< ascending
+  std::vector<std::uint32_t> offset;  ///< of their primitives, body.size() + 1 of them
+  std::vector<std::uint32_t> primitive;
+
+  [[nodiscard]] std::span<const std::uint32_t> primitives_of(std::size_t k) const {
+    return std::span(primitive).subspan(offset[k], offset[k + 1] - offset[k]);
+  }
+};
+void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found);
+/// The same bodies with less primitives. @pre `from` are the candidates of a box around this one
+void narrow_candidates(std::span<const Claim> claims, const Box& box, const Candidates& from, Candidates& found);
 
 /// Takes the bounds of the claims on cubes; outside claims 0.
 class CubeBounds {
  public:
-  explicit CubeBounds(std::span<const Claim> claims) : claims_(claims) {}
+  explicit CubeBounds(std::span<const Claim> claims) : claims_(claims), entry_(1) {
+    entry_[0].bounds.second_order = true;
+    entry_[0].bounds.hull.assign(1, {});
+  }
 
-  /// By bounds of first order alone.
-  [[nodiscard]] bool certain(const Box& box, std::span<const std::uint32_t> candidates);
-  [[nodiscard]] Verdict operator()(const Box& box, std::span<const std::uint32_t> candidates);
-  /// The same on the eighths of the box that was looked at last, x + 2 y + 4 z: by its bounds of second derivatives and
-  /// by values and gradients at their middles. Undecided where some claim is no sum.
+  /// Step by step, until a cube is settled: by bounds of first order, by directions, by second derivatives.
+  /// @param flat_anyway  whether one that is certain is flat matters, too
+  [[nodiscard]] Verdict operator()(const Box& box, const Candidates& candidates, bool flat_anyway);
+  /// The same on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
+  /// by values and gradients at their middles. Undecided where some claim is no sum, and between lone balls, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:
   struct Entry {
     Label label = 0;
-    double steepness = 0.0;
-    GradientBounds bounds;
+    double steepness = 0.0, weight = 1.0;
+    GradientBounds bounds;              ///< of the field
+    Interval value{};                   ///< of the claim
   };
   /// How far a claim is ahead of another one.
   struct Lead {
     const Entry* other;
     Interval value;  ///< [m], to first order
   };
-  [[nodiscard]] static Entry outside() { return {.bounds = {{.second_order = true}, {}, {GradientBounds::Ball{}}}}; }
+  using Step = void (*)(const Field& field, const Box& box, GradientBounds& bounds);
+  void start(const Box& box, const Candidates& candidates);
+  void add(Step step, const Box& box);
+  [[nodiscard]] std::span<Entry> entries() { return std::span(entry_).first(count_); }
 
+  [[nodiscard]] std::span<const Entry> entries() const { return std::span(entry_).first(count_); }
+
+  [[nodiscard]] bool knows_eighths() const;
   [[nodiscard]] Verdict judge();
   [[nodiscard]] bool is_flat();
   /// Whether there is a direction along which all leads rise that may be the least of a claim. They are divided by how steep their
@@ -86,7 +112,8 @@ class CubeBounds {
   [[nodiscard]] bool passes_round_bodies() const;
 
   std::span<const Claim> claims_;
-  std::vector<Entry> entry_;
+  std::vector<Entry> entry_;  ///< the first is outside; they keep their memory
+  std::size_t count_ = 1;     ///< of those in use
   std::vector<std::array<double, 8>> value_;  ///< by entry, at the middles of eighths,
   std::vector<std::array<Vec3, 8>> slope_;    ///< and gradients
   std::vector<Lead> lead_;

@@ -38,91 +38,120 @@ struct Expansion {
 
 Interval added(const Interval& a, const Interval& b) { return {a.lower + b.lower, a.upper + b.upper}; }
 
-/// Bounds of df/dq for q in the range. It is negative and rises with q, but for two kernels: Blanc & Schlick's, which is flat at 0; and
+using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// In the frame of the shape.
+Vec3 local_middle(const PackedPrimitive& p, const Mat3& to_local, const Box& box) {
+  return to_local * (box.centre() - Vec3(p.position[0], p.position[1], p.position[2]));
+}
+/// |A|^2: its rows are orthogonal.
+double metric2_of(const Mat3& to_local) { return to_local.rowwise().squaredNorm().maxCoeff() * (1.0 + 4.0 * kEps); }
+
+/// Bounds of 2 df/dq for q in [near2, far2]. It is negative and rises with q, but for two kernels: Blanc & Schlick's, which is flat at 0; and
 /// that of Gascuel may be steepest farther out, where df/dd is largest at one end of any range: it is a parabola that opens upwards or rises.
-/// @param curvature  of the kernel there, whose lower end is no more than twice df/dq
-Interval slope_range(const Kernel& kernel, const DistanceRange& range, const KernelSample& near, const KernelSample& far,
-                     const CurvatureRange& curvature) {
-  switch (kernel.kind) {
-    case KernelKind::BlancSchlick: return {0.5 * curvature.lower, 0.0};
-    case KernelKind::Gascuel: {
-      const double near_slope = near.slope * std::sqrt(range.near2 / range.far2);
-      return {0.5 * curvature.lower, std::max(near_slope, far.slope) * (1.0 - 1e-12)};
-    }
-    default: return {near.slope, far.slope};
-  }
+Interval slope_range(const Kernel& kernel, double near2, double far2) {
+  const double near = std::sqrt(near2), far = std::sqrt(far2);
+  const double near_slope = 2.0 * evaluate(kernel, near2).slope, far_slope = 2.0 * evaluate(kernel, far2).slope;
+  if (kernel.kind != KernelKind::BlancSchlick && kernel.kind != KernelKind::Gascuel) return {near_slope, far_slope};
+  const double steepest = near > 0.0 ? -lipschitz(kernel, near, far) / near * (1.0 + 1e-12) : -kInfinity;
+  if (kernel.kind == KernelKind::BlancSchlick) return {steepest, 0.0};
+  return {steepest, std::max(near_slope * near / far, far_slope) * (1.0 - 1e-12)};
 }
 
-/// How fast the vector from the nearest point of a shape may change, over how fast the place does: not at all along it and as fast
-/// across for convex shapes.
-double gap_rate(const ShapeView& shape) {
-  switch (shape.kind) {
-    case ShapeKind::Ring:
-    case ShapeKind::Arc:
-    case ShapeKind::Curve:
-    case ShapeKind::Superquadric:
-    case ShapeKind::Directed: return kInfinity;
-    case ShapeKind::Segment: return shape.taper == 1.0 ? 1.0 : kInfinity;
-    default: return 1.0;
-  }
-}
-
-/// @param terms  null: not wanted
-void expand(const Field::Index& index, std::uint32_t id, const Box& box, Expansion& sum, std::vector<GradientBounds::Term>* terms) {
-  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const PackedPrimitive& p = index.primitive[id];
+/// Values by distances. @return whether the primitive adds anything on the box
+bool start_term(const Field::Index& index, std::uint32_t id, const Box& box, GradientBounds::Term& term) {
   const PackedShape& shape = index.shape[id];
-  const double reach = 0.5 * box.extent().norm();
-  sum.scale += shape.peak + shape.lipschitz * reach;
-  sum.terms += 1.0;
-  const Eigen::Map<const RowMajor> A(shape.to_local.data());
-  const double metric2 = A.rowwise().squaredNorm().maxCoeff() * (1.0 + 4.0 * kEps);  // its rows are orthogonal
-  const Vec3 y = A * (box.centre() - Vec3(p.position[0], p.position[1], p.position[2]));
-  CurvatureRange curvature;
-  Potential centre;
-  Interval plain;
-  GradientBounds::Term term{.spread = kInfinity, .factor = {-kInfinity, 0.0}};
+  term = {.id = id};
   if (shape.foot == PackedFoot::Convolved) {
-    plain = bound_primitive(index, id, box, false).value;
+    term.value = bound_primitive(index, id, box, false).value;
+    return true;
+  }
+  const DistanceRange range = distance_range(index, id, box);
+  if (range.near2 > shape.kernel.radius * shape.kernel.radius * (1.0 + 1e-12)) return false;
+  term.near2 = range.near2;
+  term.far2 = range.far2;
+  term.value = {evaluate(shape.kernel, range.far2).value, evaluate(shape.kernel, range.near2).value};
+  return true;
+}
+
+/// Value and gradient at the middle, and where gradients lie by nearest points: the vectors from them change no faster than the place for convex
+/// shapes, each component of those to boxes depends on its coordinate alone and rises no faster, and so does that across a disc.
+void add_slope(const Field::Index& index, const Box& box, GradientBounds::Term& term) {
+  const PackedShape& shape = index.shape[term.id];
+  term.to_local = Eigen::Map<const RowMajor>(shape.to_local.data());
+  term.turn = kInfinity;
+  term.spread = kInfinity;
+  const Vec3 y = local_middle(index.primitive[term.id], term.to_local, box);
+  if (shape.foot == PackedFoot::Convolved) {
+    const Potential centre = convolve(shape.view, shape.kernel, y);
+    term.at_middle = centre.value;
+    term.gradient = term.to_local.transpose() * centre.gradient;
+    return;
+  }
+  const FootSample sample = foot(shape.view, y);
+  const KernelSample kernel = evaluate(shape.kernel, sample.q);
+  term.at_middle = kernel.value;
+  term.gradient = term.to_local.transpose() * Vec3(2.0 * kernel.slope * sample.half_gradient);
+  const bool scalar = shape.foot == PackedFoot::Scalar;
+  if (scalar && shape.view.kind != ShapeKind::Triangle && shape.view.kind != ShapeKind::Polygon) return;
+  term.factor = slope_range(shape.kernel, term.near2, term.far2);
+  if (!std::isfinite(term.factor.lower)) return;
+  const Vec3 half = 0.5 * box.extent();
+  const Vec3 step = (1.0 + 1e-12) * (term.to_local.cwiseAbs() * half);
+  term.low = term.high = sample.half_gradient;
+  term.spread = std::sqrt(metric2_of(term.to_local)) * half.norm() * (1.0 + 1e-12);
+  if (shape.foot == PackedFoot::Slab) {
+    for (int k = 0; k < 3; ++k) {
+      const double h = shape.half[static_cast<std::size_t>(k)], low = y[k] - step[k], high = y[k] + step[k];
+      term.low[k] = low - std::clamp(low, -h, h);
+      term.high[k] = high - std::clamp(high, -h, h);
+    }
+    term.spread = 0.0;
+  } else if (shape.foot == PackedFoot::Disc) {
+    term.low.z() -= step.z();
+    term.high.z() += step.z();
+    term.across = 0.0;
+  }
+}
+
+/// Of second derivatives on the box.
+CurvatureRange curvature_of(const Field::Index& index, const Box& box, const GradientBounds::Term& term) {
+  const PackedShape& shape = index.shape[term.id];
+  const double reach = 0.5 * box.extent().norm(), metric2 = metric2_of(term.to_local);
+  const Vec3 y = local_middle(index.primitive[term.id], term.to_local, box);
+  CurvatureRange curvature;
+  if (shape.foot == PackedFoot::Convolved) {
     // The peak is the measure of the shape times that of the kernel, which is 1.
     const double near = std::max(std::sqrt(foot(shape.view, y).q) - shape.distance_scale * reach, 0.0);
     curvature = curvature_range(shape.kernel, near, shape.kernel.radius);
     curvature = {shape.peak * curvature.lower, shape.peak * curvature.upper};
-    centre = convolve(shape.view, shape.kernel, y);
-    sum.scale += 1e4 * shape.peak;  // sums over edges cancel
   } else {
-    const DistanceRange range = distance_range(index, id, box);
-    const KernelSample near = evaluate(shape.kernel, range.near2), least = evaluate(shape.kernel, range.far2);
-    plain = {least.value, near.value};
-    const bool clipped = !(index.support[id].contains(box.lower) && index.support[id].contains(box.upper));
-    const double far = clipped ? shape.kernel.radius : std::min(std::sqrt(range.far2), shape.kernel.radius);
+    const bool clipped = !(index.support[term.id].contains(box.lower) && index.support[term.id].contains(box.upper));
+    const double far = clipped ? shape.kernel.radius : std::min(std::sqrt(term.far2), shape.kernel.radius);
     const ShapeBall ball{.centre = y, .reach = std::sqrt(metric2) * reach, .far = far};
-    const CurvatureRange of_kernel = curvature_range(shape.kernel, std::sqrt(range.near2), far);
-    curvature = shape_curvature(shape.view, ball, of_kernel);
-    const FootSample sample = foot(shape.view, y);
-    const KernelSample kernel = supple::implicit::evaluate(shape.kernel, sample.q);
-    centre = {kernel.value, 2.0 * kernel.slope * sample.half_gradient};
-    if (terms != nullptr && std::isfinite(of_kernel.lower)) {
-      const Interval slope = slope_range(shape.kernel, range, near, least, of_kernel);
-      term = {.gap = A.transpose() * sample.half_gradient, .spread = gap_rate(shape.view) * metric2 * reach * (1.0 + 1e-12),
-              .factor = {2.0 * slope.lower, 2.0 * slope.upper}};
-    }
+    curvature = shape_curvature(shape.view, ball, curvature_range(shape.kernel, std::sqrt(term.near2), far));
   }
-  sum.plain = added(sum.plain, plain);
+  return {metric2 * curvature.lower, metric2 * curvature.upper};
+}
+
+/// Of round-off, of a primitive's value on the box.
+double scale_of(const PackedShape& shape, double reach) {
+  return shape.peak + shape.lipschitz * reach + (shape.foot == PackedFoot::Convolved ? 1e4 * shape.peak : 0.0);  // sums over edges cancel
+}
+
+/// With all that is known of a primitive. @return that, less where it cannot be expanded
+void add_expanded(const Field::Index& index, const Box& box, GradientBounds::Term& term, Expansion& sum) {
+  sum.plain = added(sum.plain, term.value);
+  const CurvatureRange curvature = curvature_of(index, box, term);
   if (!std::isfinite(curvature.lower) || !std::isfinite(curvature.upper)) {
-    sum.rest = added(sum.rest, plain);
+    sum.rest = added(sum.rest, term.value);
     sum.sloped = false;
     return;
   }
-  sum.value += centre.value;
-  const Vec3 gradient = A.transpose() * centre.gradient;
-  sum.gradient += gradient;
-  if (terms != nullptr) {
-    term.gradient = gradient;
-    term.turn = metric2 * std::max(-curvature.lower, curvature.upper) * reach;
-    terms->push_back(term);
-  }
-  sum.curvature = {sum.curvature.lower + metric2 * curvature.lower, sum.curvature.upper + metric2 * curvature.upper};
+  sum.value += term.at_middle;
+  sum.gradient += term.gradient;
+  sum.curvature = {sum.curvature.lower + curvature.lower, sum.curvature.upper + curvature.upper};
+  term.turn = std::max(-curvature.lower, curvature.upper) * 0.5 * box.extent().norm();
 }
 
 Interval intersection(const Interval& a, const Interval& b) { return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)}; }
@@ -135,7 +164,12 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
     const std::uint32_t node = index.blend.node_of(index.primitive[id].part);
     auto place = std::lower_bound(nodes.begin(), nodes.end(), node, [](const Expansion& a, std::uint32_t b) { return a.node < b; });
     if (place == nodes.end() || place->node != node) place = nodes.insert(place, Expansion{.node = node});
-    expand(index, id, box, *place, nullptr);
+    GradientBounds::Term term;
+    if (!start_term(index, id, box, term)) continue;
+    add_slope(index, box, term);
+    place->scale += scale_of(index.shape[id], 0.5 * box.extent().norm());
+    place->terms += 1.0;
+    add_expanded(index, box, term, *place);
   }
 }
 
@@ -236,32 +270,93 @@ Field::BoxBounds Field::box_bounds(const Box& box) const {
 }
 
 GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
+  GradientBounds bounds;
+  std::vector<std::uint32_t> ids;
+  if (is_sum(field) && !box.empty() && box.lower.allFinite() && box.upper.allFinite()) find_primitives(field, box, ids);
+  start_bounds(field, box, ids, bounds);
+  add_slopes(field, box, bounds);
+  add_curvature(field, box, bounds);
+  return bounds;
+}
+
+bool is_sum(const Field& field) { return !field.index().blend.active(); }
+
+void find_primitives(const Field& field, const Box& box, std::vector<std::uint32_t>& ids) {
+  narrow_primitives(field, box, candidates_of(field.index(), box), ids);
+}
+
+void narrow_primitives(const Field& field, const Box& box, std::span<const std::uint32_t> from, std::vector<std::uint32_t>& ids) {
+  for (const std::uint32_t id : from) {
+    if (field.index().support[id].overlaps(box)) ids.push_back(id);
+  }
+}
+
+void start_bounds(const Field& field, const Box& box, std::span<const std::uint32_t> ids, GradientBounds& bounds) {
   const Field::Index& index = field.index();
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return {{.value = field.bound(box)}, {}, {}};
-  if (index.blend.active()) return blended_box_bounds(index, box, field.bound(box));
-  Expansion sum{.value = -index.iso, .scale = index.iso};
-  GradientBounds out{};
-  bool round = true;
-  for (const std::uint32_t id : candidates_of(index, box)) {
-    if (!index.support[id].overlaps(box)) continue;
-    expand(index, id, box, sum, &out.term);
-    round = index.shape[id].view.kind == ShapeKind::Point;
+  std::vector<GradientBounds::Term> terms = std::move(bounds.term);
+  std::vector<GradientBounds::Ball> hull = std::move(bounds.hull);
+  terms.clear();
+  hull.clear();
+  bounds = {};
+  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) {
+    bounds.value = field.bound(box);
+    return;
+  }
+  if (index.blend.active()) {
+    bounds = blended_box_bounds(index, box, field.bound(box));
+    return;
+  }
+  const double reach = 0.5 * box.extent().norm();
+  bounds.scale = index.iso;
+  Interval plain{0.0, 0.0};
+  for (const std::uint32_t id : ids) {
+    terms.emplace_back();
+    if (!index.support[id].overlaps(box) || !start_term(index, id, box, terms.back())) {
+      terms.pop_back();
+      continue;
+    }
+    plain = added(plain, terms.back().value);
+    bounds.scale += scale_of(index.shape[id], reach);
+  }
+  bounds.second_order = true;
+  bounds.term = std::move(terms);
+  bounds.hull = std::move(hull);
+  if (bounds.term.empty()) {
+    bounds.value = {-index.iso, -index.iso};
+    bounds.hull.push_back({});
+    return;
   }
   // As Field::bound has them.
-  const double round_off = (16.0 + sum.terms) * kEps * sum.scale;
-  const Interval plain{std::max(sum.plain.lower - index.iso - round_off, -index.iso), sum.plain.upper - index.iso + round_off};
-  if (sum.terms == 0.0) return {{.value = {-index.iso, -index.iso}, .second_order = true}, {}, {GradientBounds::Ball{}}};
-  const Vec3 half = 0.5 * box.extent();
-  out.value = intersection(plain, sum.range(half));
-  out.second_order = true;
-  out.round = round && sum.terms == 1.0;  // a lone ball or ellipsoid
-  if (sum.sloped && half.maxCoeff() > 0.0) {
-    out.slack = sum.round_off() / half.maxCoeff();
-    out.hull.push_back({sum.gradient, sum.turn(half.norm()) + out.slack});
-    out.least_slope = least_of_hull(out.hull);
-    out.curved = {true, sum.curvature, sum.round_off()};
+  const double n = static_cast<double>(bounds.term.size()), round_off = (16.0 + n) * kEps * bounds.scale;
+  bounds.value = {std::max(plain.lower - index.iso - round_off, -index.iso), plain.upper - index.iso + round_off};
+  const double largest = 0.5 * box.extent().maxCoeff();
+  bounds.stepwise = largest > 0.0;
+  bounds.slack = Expansion{.scale = bounds.scale, .terms = n}.round_off() / largest;
+  bounds.round = bounds.term.size() == 1 && index.shape[bounds.term[0].id].view.kind == ShapeKind::Point;  // a lone ball or ellipsoid
+}
+
+void add_slopes(const Field& field, const Box& box, GradientBounds& bounds) {
+  if (!bounds.stepwise) return;
+  Vec3 gradient = Vec3::Zero();
+  for (GradientBounds::Term& term : bounds.term) {
+    add_slope(field.index(), box, term);
+    gradient += term.gradient;
   }
-  return out;
+  bounds.hull.assign(1, {gradient, kInfinity});
+}
+
+void add_curvature(const Field& field, const Box& box, GradientBounds& bounds) {
+  if (!bounds.stepwise) return;
+  const Field::Index& index = field.index();
+  Expansion sum{.value = -index.iso, .scale = bounds.scale, .terms = static_cast<double>(bounds.term.size())};
+  for (GradientBounds::Term& term : bounds.term) add_expanded(index, box, term, sum);
+  const Vec3 half = 0.5 * box.extent();
+  bounds.value = intersection(bounds.value, sum.range(half));
+  bounds.hull.clear();
+  if (!sum.sloped) return;
+  bounds.hull.push_back({sum.gradient, sum.turn(half.norm()) + bounds.slack});
+  bounds.least_slope = least_of_hull(bounds.hull);
+  bounds.curved = {true, sum.curvature, sum.round_off()};
 }
 
 Interval slope_along(const GradientBounds& bounds, const Vec3& direction) {
@@ -273,10 +368,13 @@ Interval slope_along(const GradientBounds& bounds, const Vec3& direction) {
   if (bounds.term.empty()) return all;
   Interval sum{-bounds.slack, bounds.slack};
   for (const GradientBounds::Term& term : bounds.term) {
-    const double way = term.gap.dot(direction), along = term.gradient.dot(direction);
+    const double along = term.gradient.dot(direction);
     Interval one{along - term.turn, along + term.turn};
     if (std::isfinite(term.spread)) {
-      const double least = way - term.spread, most = way + term.spread;
+      const Vec3 local = term.to_local * direction;
+      const Vec3 from = local.cwiseProduct(term.low), to = local.cwiseProduct(term.high);
+      const double spread = term.spread * std::sqrt(local.head<2>().squaredNorm() + term.across * local.z() * local.z());
+      const double least = from.cwiseMin(to).sum() - spread, most = from.cwiseMax(to).sum() + spread;
       one = intersection(one, {(most > 0.0 ? term.factor.lower : term.factor.upper) * most,
                                (least > 0.0 ? term.factor.upper : term.factor.lower) * least});
     }

@@ -1,6 +1,7 @@
 /// @file field_box_bounds.h
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "supple/implicit/field.h"
@@ -22,22 +23,44 @@ struct GradientBounds : Field::BoxBounds {
     double round_off = 0.0;      ///< of values [1]
   };
   Curved curved;
-  /// What is known of the gradient of one term of a sum on the box: it is `factor` times a vector within `spread` of `gap`, and lies
-  /// within `turn` of `gradient`. A support that ends in the box leaves the first of some use.
+  /// One primitive's part of a sum. Its gradient is `factor` times a vector A^T v, v in [low, high] and up to `spread` away, and lies within
+  /// `turn` of `gradient`. A support that ends in the box leaves the first of some use.
   struct Term {
-    Vec3 gap = Vec3::Zero();       ///< from the nearest point of the shape to the middle of the box, in the metric of the shape
-    double spread = 0.0;
-    Interval factor{};             ///< at most 0
-    Vec3 gradient = Vec3::Zero();  ///< [1/m]
-    double turn = 0.0;             ///< [1/m]
+    std::uint32_t id = 0;
+    double near2 = 0.0, far2 = 0.0;  ///< of squared distances
+    Interval value{};
+    Interval factor{};               ///< twice df/dq, at most 0
+    double at_middle = 0.0;          ///< f
+    Vec3 gradient = Vec3::Zero();    ///< at the middle [1/m]
+    Mat3 to_local = Mat3::Zero();    ///< A
+    Vec3 low = Vec3::Zero(), high = Vec3::Zero();
+    double spread = 0.0, turn = 0.0;
+    double across = 1.0;             ///< share of the third axis in the spread: 0 where v is known exactly along it
   };
   std::vector<Ball> hull{};  ///< of these balls holds Clarke's gradients of F on all of the box; several where parts win in turn, empty: not known
   bool round = false;  ///< {F >= F(x)} is strictly convex for each point x of the box where the gradient is not 0
   std::vector<Term> term{};  ///< of a sum; empty: not known, or none
-  double slack = 0.0;        ///< round-off of sums of these [1/m]
+  double scale = 0.0;        ///< of round-off of the sum [1]
+  double slack = 0.0;        ///< and of slopes [1/m]
+  bool stepwise = false;     ///< add_slopes and add_curvature know more
 };
 
 [[nodiscard]] GradientBounds bounds_with_gradient(const Field& field, const Box& box);
+
+/// The same in steps, of which each costs more than the one before. `bounds` keeps its memory.
+/// First by distances alone: the value; of a blend all at once. @param ids  of all primitives whose supports may meet the box, ascending
+void start_bounds(const Field& field, const Box& box, std::span<const std::uint32_t> ids, GradientBounds& bounds);
+/// Then by nearest points: slope_along.
+void add_slopes(const Field& field, const Box& box, GradientBounds& bounds);
+/// And by second derivatives: all that bounds_with_gradient tells.
+void add_curvature(const Field& field, const Box& box, GradientBounds& bounds);
+
+/// Whether fields are sums, whose bounds come in steps.
+[[nodiscard]] bool is_sum(const Field& field);
+/// Ids of the primitives whose supports meet a box, ascending.
+void find_primitives(const Field& field, const Box& box, std::vector<std::uint32_t>& ids);
+/// Those of `from`. @pre they are all that meet a box around this one
+void narrow_primitives(const Field& field, const Box& box, std::span<const std::uint32_t> from, std::vector<std::uint32_t>& ids);
 
 /// Of grad F along a unit vector, on the box of these bounds [1/m]. @pre the hull is not empty
 [[nodiscard]] Interval slope_along(const GradientBounds& bounds, const Vec3& direction);

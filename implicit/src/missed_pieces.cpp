@@ -103,68 +103,76 @@ class Labels {
 class BlockSearch {
  public:
   BlockSearch(std::span<const Claim> claims, const Lattice& fine)
-      : unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine) {}
+      : claims_(claims), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine) {}
 
-  /// @param candidates  bodies that may have a part of the block
-  void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> candidates, std::vector<Seed>& seeds, MissedPieces& counts) {
-    candidates_ = candidates;
+  /// @param bodies  that may have a part of the block
+  void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> bodies, std::vector<Seed>& seeds, MissedPieces& counts) {
+    bodies_ = bodies;
     seeds_ = &seeds;
     counts_ = &counts;
-    for (unsigned c = 0; c < 8; ++c) search_cells(corner_of(lowest_of(block), c, kEdge / 2), kEdge / 2);
+    find_candidates(claims_, box_of(lowest_of(block), kEdge), bodies, candidates_[0]);
+    search_eighths(lowest_of(block), kEdge, 0);
   }
 
   /// The same for some of its cells, of a single body.
   void search(const OpenCells& open, std::vector<Seed>& seeds, MissedPieces& counts) {
     static constexpr std::uint32_t kOnly = 0;
-    candidates_ = {&kOnly, 1};
+    bodies_ = {&kOnly, 1};
     seeds_ = &seeds;
     counts_ = &counts;
     const Node low = lowest_of(open.block);
+    find_candidates(claims_, box_of(low, kEdge), bodies_, candidates_[kLevels - 2]);
     for (const auto& [x, y, z] : open.cell) search_cell(stepped(low, kCell * x, kCell * y, kCell * z));
   }
 
  private:
   static constexpr int kCell = kParts * kUnits, kEdge = lattice::kCells * kCell;
+  static constexpr std::size_t kLevels = 4;  ///< of cubes from a block to a cell
 
   static Node lowest_of(const lattice::BlockCoord& block) {
     return {std::int64_t{kEdge} * block[0], std::int64_t{kEdge} * block[1], std::int64_t{kEdge} * block[2]};
   }
 
-  /// @param edge  of a cube of several cells
-  void search_cells(const Node& at, int edge) {
-    ++counts_->cubes;
-    const Box box = box_of(at, edge);
-    const Verdict verdict = bounds_(box, candidates_);
-    if (verdict.certain || verdict.flat) return;
-    const std::array<Verdict, 8> eighth = bounds_.eighths(box);
+  /// @param edge  of a cube of several cells  @param level  of its candidates
+  void search_eighths(const Node& at, int edge, std::size_t level) {
+    // Second derivatives vary too far over larger cubes.
+    const std::array<Verdict, 8> eighth = edge == 2 * kCell ? bounds_.eighths(box_of(at, edge)) : std::array<Verdict, 8>{};
     for (unsigned c = 0; c < 8; ++c) {
-      if (eighth[c].certain || eighth[c].flat) continue;
+      if (eighth[c].settled()) continue;
       const Node half = corner_of(at, c, edge / 2);
-      edge / 2 == kCell ? search_cell(half) : search_cells(half, edge / 2);
+      if (edge / 2 == kCell) {
+        search_cell(half);
+      } else if (!settled(half, edge / 2, level + 1).settled()) {
+        search_eighths(half, edge / 2, level + 1);
+      }
     }
   }
 
-  void search_cell(const Node& cell) {
+  Verdict settled(const Node& at, int edge, std::size_t level) {
     ++counts_->cubes;
-    const Verdict verdict = bounds_(box_of(cell, kCell), candidates_);
-    if (verdict.certain || verdict.flat) return;
+    const Box box = box_of(at, edge);
+    narrow_candidates(claims_, box, candidates_[level - 1], candidates_[level]);
+    return bounds_(box, candidates_[level], false);
+  }
+
+  void search_cell(const Node& cell) {
+    const Verdict verdict = settled(cell, kCell, kLevels - 1);
+    if (verdict.settled()) return;
     std::array<Node, 8> corner;
     for (unsigned c = 0; c < 8; ++c) corner[c] = node_near(corner_of(cell, c, kCell));
-    const std::vector<Label>& label = labels_(corner, candidates_);
+    const std::vector<Label>& label = labels_(corner, bodies_);
     std::copy(label.begin(), label.end(), corners_.begin());
     cell_ = corner[0];
     left_ = verdict.second_order ? kMostCubes : kMostByValues;
     open_ = kMostOpen;
     undecided_ = !verdict.second_order && std::any_of(corners_.begin(), corners_.end(), [&](Label l) { return l != corners_[0]; });
-    if (!undecided_) {
-      const std::array<Verdict, 8> eighth = bounds_.eighths(box_of(cell, kCell));
-      search_parts(cell, kCell, eighth);
-    }
+    if (!undecided_) search_parts(cell, kCell);
     counts_->undecided += undecided_ ? 1 : 0;
   }
 
-  /// @param eighth  what is known of its eighths already: only those that are flat need not be looked at themselves
-  void search_parts(const Node& at, int edge, const std::array<Verdict, 8>& eighth) {
+  /// @pre bounds_ were asked for it last
+  void search_parts(const Node& at, int edge) {
+    const std::array<Verdict, 8> eighth = bounds_.eighths(box_of(at, edge));
     for (unsigned c = 0; c < 8; ++c) {
       if (--left_ < 0) {
         undecided_ = true;
@@ -173,13 +181,13 @@ class BlockSearch {
       if (eighth[c].flat) continue;
       ++counts_->cubes;
       const Node part = corner_of(at, c, edge / 2);
-      const Box box = box_of(part, edge / 2);
-      const Verdict verdict = bounds_(box, candidates_);
+      // An eighth of the cell has a node of its own: what is certain of it need not be flat.
+      const Verdict verdict = bounds_(box_of(part, edge / 2), candidates_[kLevels - 1], edge < kCell);
       if (verdict.flat) continue;
       if (verdict.certain) {
         look_at(part, edge / 2, verdict.label);
       } else if (edge / 2 > 1) {
-        search_parts(part, edge / 2, bounds_.eighths(box));
+        search_parts(part, edge / 2);
       } else {
         undecided_ = true;
         look_around(part);
@@ -192,7 +200,7 @@ class BlockSearch {
   void look_at(const Node& part, int edge, Label label) {
     if (edge == kCell / 2) return;  // has one of its own
     const Node node = node_near(edge > kUnits ? stepped(part, edge / 2, edge / 2, edge / 2) : part);
-    if (edge >= kUnits || labels_({&node, 1}, candidates_)[0] == label) {
+    if (edge >= kUnits || labels_({&node, 1}, bodies_)[0] == label) {
       add_unless_joined(node, label);
     } else {
       look_around(part);
@@ -204,7 +212,7 @@ class BlockSearch {
   void look_around(const Node& part) {
     std::array<Node, 8> corner;
     for (unsigned k = 0; k < 8; ++k) corner[k] = corner_of({part[0] >> kShift, part[1] >> kShift, part[2] >> kShift}, k, 1);
-    const std::vector<Label> label = labels_(corner, candidates_);
+    const std::vector<Label> label = labels_(corner, bodies_);
     for (unsigned k = 0; k < 8; ++k) add_unless_joined(corner[k], label[k]);
   }
 
@@ -227,7 +235,7 @@ class BlockSearch {
           way_.push_back(next);
         }
       }
-      const std::vector<Label>& label = labels_(way_, candidates_);
+      const std::vector<Label>& label = labels_(way_, bodies_);
       if (std::all_of(label.begin(), label.end(), [&](Label l) { return l == own; })) return;
     }
     seeds_->push_back({node, own});
@@ -237,10 +245,12 @@ class BlockSearch {
     return {lattice::node_position(unit_, at[0], at[1], at[2]), lattice::node_position(unit_, at[0] + edge, at[1] + edge, at[2] + edge)};
   }
 
+  std::span<const Claim> claims_;
   Lattice unit_;
   CubeBounds bounds_;
   Labels labels_;
-  std::span<const std::uint32_t> candidates_;
+  std::span<const std::uint32_t> bodies_;
+  std::array<Candidates, kLevels> candidates_;
   std::vector<Seed>* seeds_ = nullptr;
   MissedPieces* counts_ = nullptr;
   Node cell_{};
