@@ -30,13 +30,13 @@ void find_candidates(std::span<const Claim> claims, const Box& box, std::span<co
   }
 }
 
-void narrow_candidates(std::span<const Claim> claims, const Box& box, const Candidates& from, Candidates& found) {
-  found.body = from.body;
-  found.offset.assign(1, 0);
-  found.primitive.clear();
-  for (std::size_t k = 0; k < from.body.size(); ++k) {
-    narrow_primitives(claims[from.body[k]].field(), box, from.primitives_of(k), found.primitive);
-    found.offset.push_back(static_cast<std::uint32_t>(found.primitive.size()));
+void CubeBounds::narrow(const Candidates& from, Candidates& narrowed) const {
+  narrowed.body = from.body;
+  narrowed.offset.assign(1, 0);
+  narrowed.primitive.clear();
+  for (const Entry& entry : entries().subspan(1)) {
+    for (const GradientBounds::Term& term : entry.bounds.term) narrowed.primitive.push_back(term.id);
+    narrowed.offset.push_back(static_cast<std::uint32_t>(narrowed.primitive.size()));
   }
 }
 
@@ -75,6 +75,7 @@ Verdict CubeBounds::operator()(const Box& box, const Candidates& candidates, boo
 }
 
 bool CubeBounds::is_flat() {
+  if (count_ == 2) return rises(entry_[1]);  // alone: space outside falls where it rises
   return std::all_of(entries().begin(), entries().end(),
       [&](const Entry& e) { return e.value.upper < most_ || rises(e) || (e.label == 0 && passes_round_bodies()); });
 }

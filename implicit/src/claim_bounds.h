@@ -64,8 +64,6 @@ struct Candidates {
   }
 };
 void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found);
-/// The same bodies with less primitives. @pre `from` are the candidates of a box around this one
-void narrow_candidates(std::span<const Claim> claims, const Box& box, const Candidates& from, Candidates& found);
 
 /// Takes the bounds of the claims on cubes; outside claims 0.
 class CubeBounds {
@@ -78,7 +76,9 @@ class CubeBounds {
   /// Step by step, until a cube is settled: by bounds of first order, by directions, by second derivatives.
   /// @param flat_anyway  whether one that is certain is flat matters, too
   [[nodiscard]] Verdict operator()(const Box& box, const Candidates& candidates, bool flat_anyway);
-  /// The same on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
+  /// The same bodies with those of their primitives that add to them on the box that was looked at last.
+  void narrow(const Candidates& from, Candidates& narrowed) const;
+  /// The same verdicts on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
   /// by values and gradients at their middles. Undecided where some claim is no sum, and between lone balls, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 

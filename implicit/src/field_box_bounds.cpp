@@ -282,11 +282,7 @@ GradientBounds bounds_with_gradient(const Field& field, const Box& box) {
 bool is_sum(const Field& field) { return !field.index().blend.active(); }
 
 void find_primitives(const Field& field, const Box& box, std::vector<std::uint32_t>& ids) {
-  narrow_primitives(field, box, candidates_of(field.index(), box), ids);
-}
-
-void narrow_primitives(const Field& field, const Box& box, std::span<const std::uint32_t> from, std::vector<std::uint32_t>& ids) {
-  for (const std::uint32_t id : from) {
+  for (const std::uint32_t id : candidates_of(field.index(), box)) {
     if (field.index().support[id].overlaps(box)) ids.push_back(id);
   }
 }

@@ -48,7 +48,8 @@ struct GradientBounds : Field::BoxBounds {
 [[nodiscard]] GradientBounds bounds_with_gradient(const Field& field, const Box& box);
 
 /// The same in steps, of which each costs more than the one before. `bounds` keeps its memory.
-/// First by distances alone: the value; of a blend all at once. @param ids  of all primitives whose supports may meet the box, ascending
+/// First by distances alone: the value, and as terms the primitives that may add to it; of a blend all at once.
+/// @param ids  of all primitives that may add to F on the box, ascending
 void start_bounds(const Field& field, const Box& box, std::span<const std::uint32_t> ids, GradientBounds& bounds);
 /// Then by nearest points: slope_along.
 void add_slopes(const Field& field, const Box& box, GradientBounds& bounds);
@@ -57,10 +58,8 @@ void add_curvature(const Field& field, const Box& box, GradientBounds& bounds);
 
 /// Whether fields are sums, whose bounds come in steps.
 [[nodiscard]] bool is_sum(const Field& field);
-/// Ids of the primitives whose supports meet a box, ascending.
+/// Ids of the primitives whose supports meet a box, ascending, behind those there.
 void find_primitives(const Field& field, const Box& box, std::vector<std::uint32_t>& ids);
-/// Those of `from`. @pre they are all that meet a box around this one
-void narrow_primitives(const Field& field, const Box& box, std::span<const std::uint32_t> from, std::vector<std::uint32_t>& ids);
 
 /// Of grad F along a unit vector, on the box of these bounds [1/m]. @pre the hull is not empty
 [[nodiscard]] Interval slope_along(const GradientBounds& bounds, const Vec3& direction);

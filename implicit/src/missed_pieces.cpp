@@ -127,13 +127,13 @@ class BlockSearch {
 
  private:
   static constexpr int kCell = kParts * kUnits, kEdge = lattice::kCells * kCell;
-  static constexpr std::size_t kLevels = 4;  ///< of cubes from a block to a cell
+  static constexpr std::size_t kLevels = 4;  ///< of cubes from a block to a cell, each with candidates for its parts
 
   static Node lowest_of(const lattice::BlockCoord& block) {
     return {std::int64_t{kEdge} * block[0], std::int64_t{kEdge} * block[1], std::int64_t{kEdge} * block[2]};
   }
 
-  /// @param edge  of a cube of several cells  @param level  of its candidates
+  /// @param edge  of a cube of several cells  @param level  its own
   void search_eighths(const Node& at, int edge, std::size_t level) {
     // Second derivatives vary too far over larger cubes.
     const std::array<Verdict, 8> eighth = edge == 2 * kCell ? bounds_.eighths(box_of(at, edge)) : std::array<Verdict, 8>{};
@@ -142,21 +142,21 @@ class BlockSearch {
       const Node half = corner_of(at, c, edge / 2);
       if (edge / 2 == kCell) {
         search_cell(half);
-      } else if (!settled(half, edge / 2, level + 1).settled()) {
+      } else if (!look(half, edge / 2, level + 1).settled()) {
         search_eighths(half, edge / 2, level + 1);
       }
     }
   }
 
-  Verdict settled(const Node& at, int edge, std::size_t level) {
+  Verdict look(const Node& at, int edge, std::size_t level) {
     ++counts_->cubes;
-    const Box box = box_of(at, edge);
-    narrow_candidates(claims_, box, candidates_[level - 1], candidates_[level]);
-    return bounds_(box, candidates_[level], false);
+    const Verdict verdict = bounds_(box_of(at, edge), candidates_[level - 1], false);
+    if (!verdict.settled()) bounds_.narrow(candidates_[level - 1], candidates_[level]);
+    return verdict;
   }
 
   void search_cell(const Node& cell) {
-    const Verdict verdict = settled(cell, kCell, kLevels - 1);
+    const Verdict verdict = look(cell, kCell, kLevels - 1);
     if (verdict.settled()) return;
     std::array<Node, 8> corner;
     for (unsigned c = 0; c < 8; ++c) corner[c] = node_near(corner_of(cell, c, kCell));
