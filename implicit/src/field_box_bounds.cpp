@@ -92,15 +92,23 @@ void add_slope(const Field::Index& index, const Box& box, GradientBounds::Term& 
   const KernelSample kernel = evaluate(shape.kernel, sample.q);
   term.at_middle = kernel.value;
   term.gradient = term.to_local.transpose() * Vec3(2.0 * kernel.slope * sample.half_gradient);
-  const bool scalar = shape.foot == PackedFoot::Scalar;
-  if (scalar && shape.view.kind != ShapeKind::Triangle && shape.view.kind != ShapeKind::Polygon) return;
+  const bool scalar = shape.foot == PackedFoot::Scalar, curve = shape.view.kind == ShapeKind::Curve;
+  if (scalar && !curve && shape.view.kind != ShapeKind::Triangle && shape.view.kind != ShapeKind::Polygon) return;
   term.factor = slope_range(shape.kernel, term.near2, term.far2);
   if (!std::isfinite(term.factor.lower)) return;
   const Vec3 half = 0.5 * box.extent();
   const Vec3 step = (1.0 + 1e-12) * (term.to_local.cwiseAbs() * half);
   term.low = term.high = sample.half_gradient;
   term.spread = std::sqrt(metric2_of(term.to_local)) * half.norm() * (1.0 + 1e-12);
-  if (shape.foot == PackedFoot::Slab) {
+  if (curve) {
+    // With the width w of its nearest point, grad d^2 = 2 gap / w^2.
+    const NearestCurvePoints nearest = nearest_curve_points(shape.view, {.centre = y, .reach = term.spread, .far = 0.0});
+    for (std::size_t k = 0; k < nearest.count; ++k) term.gap[k] = y - nearest.hull[k];
+    term.gaps = nearest.count;
+    term.spread += 1e-12 * (y.norm() + shape.kernel.radius);  // polynomials cancel
+    const double least = nearest.least_width * (1.0 - 1e-12), largest = nearest.largest_width * (1.0 + 1e-12);
+    term.factor = {term.factor.lower / (least * least), term.factor.upper / (largest * largest)};
+  } else if (shape.foot == PackedFoot::Slab) {
     for (int k = 0; k < 3; ++k) {
       const double h = shape.half[static_cast<std::size_t>(k)], low = y[k] - step[k], high = y[k] + step[k];
       term.low[k] = low - std::clamp(low, -h, h);
@@ -339,6 +347,10 @@ void add_slopes(const Field& field, const Box& box, GradientBounds& bounds) {
     gradient += term.gradient;
   }
   bounds.hull.assign(1, {gradient, kInfinity});
+  // Where two parts of a lone curve are as near, some direction between their gradients.
+  if (bounds.term.size() != 1 || bounds.term[0].gaps == 0) return;
+  const GradientBounds::Term& curve = bounds.term[0];
+  for (std::size_t k = 0; k < curve.gaps; ++k) bounds.hull.push_back({curve.factor.lower * (curve.to_local.transpose() * curve.gap[k]), kInfinity});
 }
 
 void add_curvature(const Field& field, const Box& box, GradientBounds& bounds) {
@@ -370,7 +382,12 @@ Interval slope_along(const GradientBounds& bounds, const Vec3& direction) {
       const Vec3 local = term.to_local * direction;
       const Vec3 from = local.cwiseProduct(term.low), to = local.cwiseProduct(term.high);
       const double spread = term.spread * std::sqrt(local.head<2>().squaredNorm() + term.across * local.z() * local.z());
-      const double least = from.cwiseMin(to).sum() - spread, most = from.cwiseMax(to).sum() + spread;
+      Interval way{from.cwiseMin(to).sum(), from.cwiseMax(to).sum()};
+      for (std::size_t k = 0; k < term.gaps; ++k) {
+        const double one_way = local.dot(term.gap[k]);
+        way = k == 0 ? Interval{one_way, one_way} : Interval{std::min(way.lower, one_way), std::max(way.upper, one_way)};
+      }
+      const double least = way.lower - spread, most = way.upper + spread;
       one = intersection(one, {(most > 0.0 ? term.factor.lower : term.factor.upper) * most,
                                (least > 0.0 ? term.factor.upper : term.factor.lower) * least});
     }

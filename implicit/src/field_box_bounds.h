@@ -1,6 +1,9 @@
 /// @file field_box_bounds.h
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -23,8 +26,8 @@ struct GradientBounds : Field::BoxBounds {
     double round_off = 0.0;      ///< of values [1]
   };
   Curved curved;
-  /// One primitive's part of a sum. Its gradient is `factor` times a vector A^T v, v in [low, high] and up to `spread` away, and lies within
-  /// `turn` of `gradient`. A support that ends in the box leaves the first of some use.
+  /// One primitive's part of a sum. Its gradient is `factor` times a vector A^T v and lies within `turn` of `gradient`; v is up to `spread` away
+  /// from the box [low, high] or, of curves, from the hull of some points. A support that ends in the box leaves the first of some use.
   struct Term {
     std::uint32_t id = 0;
     double near2 = 0.0, far2 = 0.0;  ///< of squared distances
@@ -34,6 +37,8 @@ struct GradientBounds : Field::BoxBounds {
     Vec3 gradient = Vec3::Zero();    ///< at the middle [1/m]
     Mat3 to_local = Mat3::Zero();    ///< A
     Vec3 low = Vec3::Zero(), high = Vec3::Zero();
+    std::array<Vec3, 4> gap{};       ///< corners of the hull
+    std::size_t gaps = 0;
     double spread = 0.0, turn = 0.0;
     double across = 1.0;             ///< share of the third axis in the spread: 0 where v is known exactly along it
   };

@@ -171,4 +171,21 @@ CurvatureRange shape_curvature(const ShapeView& shape, const ShapeBall& ball, co
   }
 }
 
+NearestCurvePoints nearest_curve_points(const ShapeView& shape, const ShapeBall& ball) noexcept {
+  const NearestPart part(shape, ball);
+  const double first = part.width(part.low), last = part.width(part.high);
+  NearestCurvePoints nearest{.hull = {}, .count = shape.control.size(), .least_width = std::min(first, last), .largest_width = std::max(first, last)};
+  // The blossom of the curve at k times `high` and else `low` is control point k of the part.
+  for (std::size_t k = 0; k < nearest.count; ++k) {
+    std::array<Vec3, 4> p;
+    std::copy(shape.control.begin(), shape.control.end(), p.begin());
+    for (std::size_t step = 1; step < nearest.count; ++step) {
+      const double t = step <= k ? part.high : part.low;
+      for (std::size_t i = 0; i + step < nearest.count; ++i) p[i] += t * (p[i + 1] - p[i]);
+    }
+    nearest.hull[k] = p[0];
+  }
+  return nearest;
+}
+
 }  // namespace supple::implicit

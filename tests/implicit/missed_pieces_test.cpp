@@ -261,6 +261,23 @@ TEST(MissedPieces, AreDecidedForCurvedAndTaperedShapes) {
   EXPECT_TRUE(s.found.complete()) << s.found.undecided;
 }
 
+// Inside a bend that is tighter than the curve is thick, gradients jump where its two sides are as near; both lead out of the bend.
+TEST(MissedPieces, AreDecidedWhereTwoSidesOfABendAreAsNear) {
+  Primitive curve = wyvill_point(0.4);
+  curve.shape = ShapeKind::Curve;
+  for (const double taper : {1.0, 1.4}) {
+    curve.taper = taper;
+    for (const std::vector<Vec3>& control : {std::vector{Vec3(-0.5, -0.4, 0.1), Vec3(0.0, 0.9, 0.0), Vec3(0.5, -0.4, 0.0)},
+                                             std::vector{Vec3(-0.2, -0.4, 0.1), Vec3(-0.3, 0.5, 0.2), Vec3(0.4, 0.5, 0.0), Vec3(0.3, -0.4, 0.0)}}) {
+      curve.control = control;
+      const Searched s = search(body_of({{curve, Vec3::Zero()}, {wyvill_point(0.03), Vec3(0.03, -0.1, 0.9)}}), lattice_of(0.05));
+      EXPECT_EQ(s.found.pieces, 1u);  // the crumb
+      EXPECT_TRUE(s.found.complete()) << s.found.undecided;
+      EXPECT_LT(s.found.cubes, 20'000u);
+    }
+  }
+}
+
 /// Bodies that divide space, as a scene's do: claims are weight * F.
 struct Divided {
   std::vector<Mesh> coarse, mesh;
