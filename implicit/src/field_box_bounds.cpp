@@ -38,8 +38,6 @@ struct Expansion {
 
 Interval added(const Interval& a, const Interval& b) { return {a.lower + b.lower, a.upper + b.upper}; }
 
-using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 /// In the frame of the shape.
 Vec3 local_middle(const PackedPrimitive& p, const Mat3& to_local, const Box& box) {
   return to_local * (box.centre() - Vec3(p.position[0], p.position[1], p.position[2]));
@@ -78,7 +76,7 @@ bool start_term(const Field::Index& index, std::uint32_t id, const Box& box, Gra
 /// shapes, each component of those to boxes depends on its coordinate alone and rises no faster, and so does that across a disc.
 void add_slope(const Field::Index& index, const Box& box, GradientBounds::Term& term) {
   const PackedShape& shape = index.shape[term.id];
-  term.to_local = Eigen::Map<const RowMajor>(shape.to_local.data());
+  term.to_local = to_local_of(index.primitive[term.id], shape);
   term.turn = kInfinity;
   term.spread = kInfinity;
   const Vec3 y = local_middle(index.primitive[term.id], term.to_local, box);

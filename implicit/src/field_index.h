@@ -149,6 +149,12 @@ void blended_part_rows(const Field::Index& index, std::span<const Vec3> points, 
 [[nodiscard]] Interval blended_bound(const Field::Index& index, const Box& box);
 [[nodiscard]] double blended_gradient_bound(const Field::Index& index, const Box& box);
 
+/// A; the identity for balls, of which boxes of the world then are boxes, too.
+[[nodiscard]] inline Mat3 to_local_of(const PackedPrimitive& p, const PackedShape& shape) noexcept {
+  if (p.kind == PackedKind::PointWyvill || p.kind == PackedKind::PointGascuel) return Mat3::Identity();
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(shape.to_local.data());
+}
+
 /// One rounded box as slot of a pack.
 inline void set_slot(LeafPack& pack, std::size_t slot, const RoundedBox& box, std::uint32_t id) noexcept {
   for (std::size_t k = 0; k < 3; ++k) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "claim_bounds.h"
+#include "eighth_bounds.h"
 #include "march_cases.h"
 #include "missed_blobs.h"
 #include "polygonise_blocks.h"
@@ -103,7 +104,8 @@ class Labels {
 class BlockSearch {
  public:
   BlockSearch(std::span<const Claim> claims, const Lattice& fine)
-      : claims_(claims), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine) {}
+      : claims_(claims), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine),
+        by_eighths_(claims.size() == 1 && EighthBounds::know(claims[0].field())) {}
 
   /// @param bodies  that may have a part of the block
   void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> bodies, std::vector<Seed>& seeds, MissedPieces& counts) {
@@ -111,7 +113,7 @@ class BlockSearch {
     seeds_ = &seeds;
     counts_ = &counts;
     find_candidates(claims_, box_of(lowest_of(block), kEdge), bodies, candidates_[0]);
-    search_eighths(lowest_of(block), kEdge, 0);
+    by_eighths_ ? halve(lowest_of(block), kEdge, 0) : search_eighths(lowest_of(block), kEdge, 0);
   }
 
   /// The same for some of its cells, of a single body.
@@ -131,6 +133,26 @@ class BlockSearch {
 
   static Node lowest_of(const lattice::BlockCoord& block) {
     return {std::int64_t{kEdge} * block[0], std::int64_t{kEdge} * block[1], std::int64_t{kEdge} * block[2]};
+  }
+
+  /// search_eighths of a single body, eight cubes side by side; cells that are left are looked at by all bounds.
+  void halve(const Node& at, int edge, std::size_t level) {
+    EighthBounds& bounds = eighths_[level];
+    const unsigned settled = bounds(claims_[0].field(), box_of(at, edge), candidates_[level].primitive).settled();
+    counts_->cubes += 8;
+    for (unsigned c = 0; c < 8; ++c) {
+      if ((settled >> c & 1u) != 0) continue;
+      const Node half = corner_of(at, c, edge / 2);
+      if (edge / 2 == kCell) {
+        search_cell(half);
+        continue;
+      }
+      Candidates& candidates = candidates_[level + 1];
+      bounds.narrow(c, candidates.primitive);
+      candidates.body = candidates_[level].body;
+      candidates.offset = {0, static_cast<std::uint32_t>(candidates.primitive.size())};
+      halve(half, edge / 2, level + 1);
+    }
   }
 
   /// @param edge  of a cube of several cells  @param level  its own
@@ -249,6 +271,8 @@ class BlockSearch {
   Lattice unit_;
   CubeBounds bounds_;
   Labels labels_;
+  bool by_eighths_;
+  std::array<EighthBounds, kLevels - 1> eighths_;
   std::span<const std::uint32_t> bodies_;
   std::array<Candidates, kLevels> candidates_;
   std::vector<Seed>* seeds_ = nullptr;
