@@ -69,8 +69,25 @@ bool decides(const Skeleton& skeleton) {
                                                    : std::any_of(skeleton.blend.node.begin(), skeleton.blend.node.end(),
                                                                  [&](std::uint32_t n) { return n != skeleton.blend.node.front(); });
   if (skeleton.blend.rule == BlendRule::Gradient && several) return false;
-  return std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), [&](const Primitive& p) {
+  // Where two sides of a lone curve are as near, directions between both are tried.
+  return skeleton.primitive.size() == 1 || std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), [&](const Primitive& p) {
     return p.shape == ShapeKind::Curve && bend_of(p, skeleton.iso).within_surface;
+  });
+}
+
+/// Whether eight cubes are looked at side by side: EighthBounds::know.
+bool goes_by_eighths(const Skeleton& skeleton) {
+  return skeleton.blend.rule == BlendRule::Sum && std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(), [](const Primitive& p) {
+    if (p.convolved || (p.kernel.kind != KernelKind::Wyvill && p.kernel.kind != KernelKind::Gascuel)) return false;
+    switch (p.shape) {
+      case ShapeKind::Segment: return p.taper == 1.0;
+      case ShapeKind::Point:
+      case ShapeKind::Rectangle:
+      case ShapeKind::Box:
+      case ShapeKind::Ellipsoid:
+      case ShapeKind::Disc: return true;
+      default: return false;
+    }
   });
 }
 
@@ -92,7 +109,8 @@ double local_overlap(std::span<const Box> supports) {
 struct SearchWork {
   double lattice = 0.0, alone = 0.0, overlapping = 0.0;
 };
-constexpr SearchWork kBlobSearch{.lattice = 0.5, .alone = 0.0, .overlapping = 6.0};
+constexpr SearchWork kBlobSearch{.lattice = 0.5, .alone = 0.0, .overlapping = 5.0};
+constexpr SearchWork kEighthSearch{.lattice = 0.1, .alone = 12.0, .overlapping = 8.0};
 constexpr SearchWork kSumSearch{.lattice = 0.2, .alone = 130.0, .overlapping = 85.0};
 /// Of a primitive smaller than a cell, about a thousand cubes [ms].
 constexpr double kLeastHalved = 1.0;
@@ -100,9 +118,9 @@ constexpr double kLeastHalved = 1.0;
 constexpr double kOtherShapes = 2.5;
 /// Of tetrahedra: of a leaf, and of the rim of a contact [ms].
 constexpr double kDividedLeaf = 0.04, kRim = 0.8;
-/// Of two bodies that touch, for some thousand cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
+/// Of two bodies that touch, for some hundred cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
 /// there, of balls and of shapes with edges.
-constexpr double kContact = 2.0, kMoreBalls = 1.0, kMoreShapes = 170.0;
+constexpr double kContact = 0.2, kMoreBalls = 1.0, kMoreShapes = 170.0;
 
 /// CPU time of marching cubes [ms].
 double cubes_ms(const Skeleton& skeleton, std::span<const Box> supports, double cell) {
@@ -154,7 +172,7 @@ SearchEstimate estimate_search(const Skeleton& skeleton, std::span<const Box> su
   const bool blobs = is_blobs(skeleton);
   const double mesh_ms = cubes_ms(skeleton, supports, cell);
   return {.decides = blobs || decides(skeleton),
-          .search_ms = search_ms(blobs ? kBlobSearch : kSumSearch, skeleton, local_overlap(supports), mesh_ms, cell),
+          .search_ms = search_ms(blobs ? kBlobSearch : goes_by_eighths(skeleton) ? kEighthSearch : kSumSearch, skeleton, local_overlap(supports), mesh_ms, cell),
           .mesh_ms = mesh_ms};
 }
 

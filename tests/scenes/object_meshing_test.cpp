@@ -113,7 +113,7 @@ std::string lone(const std::string& particles, const std::string& skeleton, cons
 TEST(ObjectMeshing, SearchIsLeftOutWhereItsSkeletonSaysThatItDecidesNothing) {
   const std::string row = "arrange: line, count: 3, spacing: 0.4", ball = "{shape: point, kernel: {radius: 0.5}}";
   const std::string bend = "{shape: curve, points: [[-0.25, -0.1, 0], [-0.1, 0.55, 0], [0.1, -0.55, 0], [0.25, 0.1, 0]], kernel: {radius: 0.28}}";
-  for (const std::string& text : {lone(row, ball, "    blend: {rule: gradient}\n"), lone("at: [0, 0, 0]", bend, "")}) {
+  for (const std::string& text : {lone(row, ball, "    blend: {rule: gradient}\n"), lone("at: [0, 0, 0]", bend + ", " + ball, "")}) {
     const auto make = [&](const std::string& search) {
       return Simulation(parse_scene(text + "output: {mesh: ply, cell: 0.05, meshing: {search: " + search + "}}\n", "test.yaml", "."));
     };
@@ -134,7 +134,7 @@ TEST(ObjectMeshing, SearchIsLeftOutWhereItsSkeletonSaysThatItDecidesNothing) {
 
 TEST(ObjectMeshing, SearchIsLeftOutWhereItWouldTakeFarLongerThanTheMesh) {
   const auto make = [](const std::string& cell, const std::string& meshing) {
-    return Simulation(parse_scene(lone("arrange: grid, columns: 12, rows: 12, spacing: 0.15", "{shape: square, half_size: 0.06, kernel: {radius: 0.3}}",
+    return Simulation(parse_scene(lone("arrange: grid, columns: 12, rows: 12, spacing: 0.15", "{shape: triangle, points: [[-0.06, -0.06, 0], [0.06, -0.06, 0], [0, 0.06, 0]], kernel: {radius: 0.3}}",
                                        "output: {mesh: ply, cell: " + cell + ", meshing: {" + meshing + "}}\n"), "test.yaml", "."));
   };
   Simulation coarse = make("0.1", ""), off = make("0.1", "search: false"), fine = make("0.02", ""), other = make("0.1", "method: tetrahedra");
@@ -155,7 +155,7 @@ TEST(ObjectMeshing, SearchIsLeftOutWhereItWouldTakeFarLongerThanTheMesh) {
 
 TEST(ObjectMeshing, SearchOfBodiesThatTouchInManyPlacesIsLeftOutUnlessAsked) {
   const auto make = [](const std::string& search) {
-    return Simulation(parse_scene(lone("arrange: line, count: 12, spacing: 0.4, mass: 1", "{shape: point, kernel: {radius: 0.5}}",
+    return Simulation(parse_scene(lone("arrange: line, count: 12, spacing: 0.4, mass: 1", "{shape: square, half_size: 0.05, kernel: {radius: 0.5}}, {shape: segment, half_length: 0.05, kernel: {radius: 0.5}}",
                                        "    separate: true\n    contact: {modulus: 1e4}\noutput: {mesh: ply, cell: 0.3, meshing: {search: " + search + "}}\n"),
                                   "test.yaml", "."));
   };

@@ -33,8 +33,8 @@ struct SearchEstimate {
 };
 
 /// Cubes are halved where supports span few cells and where many overlap, down to about a thousand a primitive. Fitted to `mesh_bench`,
-/// every shape and all bundled scenes, most often right within a factor of two. Not decided are blends by gradients of several nodes and
-/// curves that bend within their own thickness.
+/// every shape and all bundled scenes, most often right within a factor of two. Not decided are blends by gradients of several nodes and,
+/// beside other primitives, curves that bend within their own thickness.
 /// @param supports  of the placed primitives [m]   @param cell  of the lattice [m], > 0
 [[nodiscard]] SearchEstimate estimate_search(const Skeleton& skeleton, std::span<const Box> supports, double cell);
 
