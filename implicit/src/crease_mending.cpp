@@ -8,7 +8,7 @@
 namespace supple::implicit {
 namespace {
 
-using Triangle = std::array<std::uint32_t, 3>;
+using Triangle = TriangleSteps::Triangle;
 
 constexpr int kGrowths = 4;
 constexpr std::size_t kMostTaken = 60;  // triangles of a hole
@@ -88,15 +88,12 @@ struct Border {
 
 class Mending {
  public:
-  Mending(Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex)
-      : mesh_(mesh), owner_(owner), cell_(cell), add_vertex_(add_vertex) {}
+  Mending(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps)
+      : mesh_(mesh), owner_(owner), cell_(cell), add_vertex_(add_vertex), steps_(steps) {}
 
   void run() {
     constexpr int kPasses = 3;
-    const std::size_t vertices = mesh_.vertex_count();
-    bool changed = false;
-    for (int pass = 0; pass < kPasses && mend_all(); ++pass) changed = true;
-    if (changed || mesh_.vertex_count() != vertices) leave_out_unused();
+    for (int pass = 0; pass < kPasses && mend_all(); ++pass) continue;
   }
 
  private:
@@ -106,38 +103,34 @@ class Mending {
 
   /// @return whether a hole was filled
   bool mend_all() {
+    number_ = steps_.numbers();
+    triangle_.clear();
+    for (const std::uint32_t n : number_) triangle_.push_back(steps_[n]);
     std::vector<std::uint32_t> crossed;
-    for (std::uint32_t i = 0; i < mesh_.triangle_count(); ++i) {
-      if (is_crossed(mesh_.triangle[i])) crossed.push_back(i);
+    for (std::uint32_t i = 0; i < triangle_.size(); ++i) {
+      if (is_crossed(triangle_[i])) crossed.push_back(i);
     }
     if (crossed.empty()) return false;
     list_stars();
     touched_.assign(mesh_.vertex_count(), false);
-    gone_.assign(mesh_.triangle_count(), false);
-    fresh_.clear();
+    gone_.assign(triangle_.size(), false);
+    bool any = false;
     for (const std::uint32_t i : crossed) {
-      if (!gone_[i]) mend(i);
+      if (!gone_[i] && mend(i)) any = true;
     }
-    if (fresh_.empty()) return false;
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < gone_.size(); ++i) {
-      if (!gone_[i]) mesh_.triangle[kept++] = mesh_.triangle[i];
-    }
-    mesh_.triangle.resize(kept);
-    mesh_.triangle.insert(mesh_.triangle.end(), fresh_.begin(), fresh_.end());
-    return true;
+    return any;
   }
 
   void list_stars() {
     first_.assign(mesh_.vertex_count() + 1, 0);
-    for (const Triangle& t : mesh_.triangle) {
+    for (const Triangle& t : triangle_) {
       for (const std::uint32_t v : t) ++first_[v + 1];
     }
     for (std::size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
-    star_.resize(3 * mesh_.triangle_count());
+    star_.resize(3 * triangle_.size());
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-    for (std::uint32_t i = 0; i < mesh_.triangle_count(); ++i) {
-      for (const std::uint32_t v : mesh_.triangle[i]) star_[next[v]++] = i;
+    for (std::uint32_t i = 0; i < triangle_.size(); ++i) {
+      for (const std::uint32_t v : triangle_[i]) star_[next[v]++] = i;
     }
   }
   [[nodiscard]] std::span<const std::uint32_t> star(std::uint32_t v) const {
@@ -146,7 +139,7 @@ class Mending {
   /// The triangle that runs through an edge from a to b.
   [[nodiscard]] std::optional<std::uint32_t> triangle_at(std::uint32_t a, std::uint32_t b) const {
     for (const std::uint32_t i : star(a)) {
-      const Triangle& t = mesh_.triangle[i];
+      const Triangle& t = triangle_[i];
       for (std::size_t k = 0; k < 3; ++k) {
         if (t[k] == a && t[(k + 1) % 3] == b) return i;
       }
@@ -158,7 +151,7 @@ class Mending {
   [[nodiscard]] std::vector<Edge> open_edges() const {
     std::vector<Edge> open;
     for (const std::uint32_t i : hole_) {
-      const Triangle& t = mesh_.triangle[i];
+      const Triangle& t = triangle_[i];
       for (std::size_t k = 0; k < 3; ++k) {
         const Edge edge{t[k], t[(k + 1) % 3]};
         const auto reverse = std::find(open.begin(), open.end(), Edge{edge.second, edge.first});
@@ -172,15 +165,17 @@ class Mending {
     return open;
   }
 
-  void mend(std::uint32_t start) {
+  /// @return whether a hole was filled
+  bool mend(std::uint32_t start) {
     hole_ = {start};
     for (int growth = 0; growth <= kGrowths; ++growth) {
-      if (!(growth == 0 || grow_along_crease()) || !grow_across()) return;
+      if (!(growth == 0 || grow_along_crease()) || !grow_across()) return false;
       const std::vector<Edge> open = open_edges();
-      if (std::any_of(open.begin(), open.end(), [&](const Edge& e) { return touched_[e.first]; })) return;
+      if (std::any_of(open.begin(), open.end(), [&](const Edge& e) { return touched_[e.first]; })) return false;
       const std::optional<Border> border = border_of(open);
-      if (border && fill(*border)) return;
+      if (border && fill(*border)) return true;
     }
+    return false;
   }
 
   /// @return whether a triangle may be taken and the hole is not too large
@@ -222,7 +217,7 @@ class Mending {
       if (next == open.end() || loop.size() > open.size()) return std::nullopt;
       v = next->second;
     }
-    for (const std::uint32_t i : hole_) inside.insert(inside.end(), mesh_.triangle[i].begin(), mesh_.triangle[i].end());
+    for (const std::uint32_t i : hole_) inside.insert(inside.end(), triangle_[i].begin(), triangle_[i].end());
     std::sort(inside.begin(), inside.end());
     inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
     // Of a disc: V - E + F = 1, with 2 E = 3 F + the edges of its border.
@@ -254,11 +249,13 @@ class Mending {
     std::vector<Triangle> out;
     Ears ears(mesh_, owner_, joined);
     if (!ears.fill(left, out) || !ears.fill(right, out)) return false;
+    std::vector<std::uint32_t> taken;
     for (const std::uint32_t i : hole_) {
+      taken.push_back(number_[i]);
       gone_[i] = true;
-      for (const std::uint32_t v : mesh_.triangle[i]) touched_[v] = true;
+      for (const std::uint32_t v : triangle_[i]) touched_[v] = true;
     }
-    fresh_.insert(fresh_.end(), out.begin(), out.end());
+    steps_.replace(taken, out);
     return true;
   }
 
@@ -281,46 +278,28 @@ class Mending {
     if (a + 1 >= first_.size() || b + 1 >= first_.size()) return false;  // made for this hole
     const auto around = star(a);
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t i) {
-      const Triangle& t = mesh_.triangle[i];
+      const Triangle& t = triangle_[i];
       return std::find(t.begin(), t.end(), b) != t.end() && std::find(hole_.begin(), hole_.end(), i) == hole_.end();
     });
   }
 
-  void leave_out_unused() {
-    constexpr std::uint32_t kUnused = ~std::uint32_t{0};
-    std::vector<std::uint32_t> number(mesh_.vertex_count(), kUnused);
-    for (const Triangle& t : mesh_.triangle) {
-      for (const std::uint32_t v : t) number[v] = 0;
-    }
-    std::uint32_t count = 0;
-    for (std::size_t v = 0; v < number.size(); ++v) {
-      if (number[v] == kUnused) continue;
-      mesh_.position[count] = mesh_.position[v];
-      mesh_.normal[count] = mesh_.normal[v];
-      number[v] = count++;
-    }
-    mesh_.position.resize(count);
-    mesh_.normal.resize(count);
-    for (Triangle& t : mesh_.triangle) {
-      for (std::uint32_t& v : t) v = number[v];
-    }
-  }
-
-  Mesh& mesh_;
+  const Mesh& mesh_;
   std::span<const std::uint32_t> owner_;
   double cell_;
   const CreaseVertex& add_vertex_;
+  TriangleSteps& steps_;
+  std::vector<std::uint32_t> number_;        ///< of the triangles that are there when a pass begins
+  std::vector<Triangle> triangle_;
   std::vector<std::uint32_t> first_, star_;  ///< triangles at each vertex
   std::vector<std::uint32_t> hole_;          ///< triangles that are taken out
   std::vector<bool> touched_;                ///< vertices of holes that were filled in this pass
   std::vector<bool> gone_;
-  std::vector<Triangle> fresh_;
 };
 
 }  // namespace
 
-void mend_creases(Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex) {
-  Mending(mesh, owner, cell, add_vertex).run();
+void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps) {
+  Mending(mesh, owner, cell, add_vertex, steps).run();
 }
 
 }  // namespace supple::implicit

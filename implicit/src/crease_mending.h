@@ -9,6 +9,7 @@
 #include <span>
 
 #include "supple/core/mesh.h"
+#include "triangle_steps.h"
 
 namespace supple::implicit {
 
@@ -19,10 +20,11 @@ using CreaseVertex = std::function<std::optional<std::uint32_t>(const std::array
 /// all of them would turn triangles over. Here the triangles at such an edge are taken out, up to four times with all around the vertices
 /// at which their border meets the crease, until that border meets the crease twice and the two sides of the hole can be filled by ears
 /// (Meisters 1975), with vertices on the crease a cell apart between them. What that cannot fill with triangles that face outward stays.
-/// Vertices no longer used are left out, all others keep their order. The result depends on the triangles around such edges, at most
-/// kMostTaken to a hole, and where holes would meet, on the order of triangles.
+/// Each hole is a step. The result depends on the triangles around such edges, at most kMostTaken to a hole, and where holes would meet,
+/// on the order of triangles.
+/// @param mesh   vertices; its triangles are those of the steps
 /// @param owner  the node of each of the first vertices; all others lie on the crease
 /// @param cell   [m]
-void mend_creases(Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex);
+void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps);
 
 }  // namespace supple::implicit

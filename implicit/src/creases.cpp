@@ -5,17 +5,20 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
 
+#include "crease_crossings.h"
 #include "crease_mending.h"
 #include "error_search.h"
 #include "field_index.h"
 #include "march_mesher.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "triangle_steps.h"
 
 namespace supple::implicit {
 namespace {
@@ -163,7 +166,7 @@ std::optional<Vec3> meeting_point(std::span<const FieldView> fields, std::span<c
   return std::nullopt;
 }
 
-using Triangle = std::array<std::uint32_t, 3>;
+using Triangle = TriangleSteps::Triangle;
 
 /// Where nodes meet on the surface, sought from a point between two vertices or in the middle of a cell, where both ends are one.
 struct CreaseSearch {
@@ -271,46 +274,30 @@ std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
 
 /// Puts a vertex onto the crease in every cell whose vertices belong to several nodes, turns edges that cross the crease, and cuts those
 /// that still do
-/// (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here).
+/// (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here). What crosses then is
+/// taken back.
 class Sharpener {
  public:
   /// @param owner    of the vertices   @param changes  since the memory was last used
   Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
             const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh)
-      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), changes_(changes), memory_(memory), mesh_(mesh) {}
+      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), changes_(changes), memory_(memory), mesh_(mesh),
+        steps_(std::move(mesh.triangle)), safe_(steps_.triangles().size(), true) {}
 
-  void run() {
-    struct Piece {
-      std::array<std::int64_t, 3> cell;
-      std::uint32_t triangle;
-    };
-    std::vector<Piece> pieces;
-    for (std::uint32_t i = 0; i < mesh_.triangle_count(); ++i) {
-      const Triangle& t = mesh_.triangle[i];
-      const Vec3 centre = (mesh_.position[t[0]] + mesh_.position[t[1]] + mesh_.position[t[2]]) / 3.0;
-      const Vec3 at = (centre - lattice_.origin) / lattice_.cell;
-      pieces.push_back({{static_cast<std::int64_t>(std::floor(at.x())), static_cast<std::int64_t>(std::floor(at.y())),
-                         static_cast<std::int64_t>(std::floor(at.z()))}, i});
-    }
-    std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
-      return a.cell != b.cell ? a.cell < b.cell : a.triangle < b.triangle;
-    });
-    std::vector<Triangle> kept, cell;
-    for (std::size_t begin = 0, end = 0; begin < pieces.size(); begin = end) {
-      cell.clear();
-      for (end = begin; end < pieces.size() && pieces[end].cell == pieces[begin].cell; ++end) {
-        cell.push_back(mesh_.triangle[pieces[end].triangle]);
-      }
-      if (!star(cell, pieces[begin].cell)) kept.insert(kept.end(), cell.begin(), cell.end());
-    }
+  /// @return cells that keep a crease cut off
+  std::uint64_t run() {
+    add_points();
     turn_edges();
-    mesh_.triangle = std::move(kept);
-    mesh_.triangle.insert(mesh_.triangle.end(), star_.begin(), star_.end());
     cut_edges();
     mend_creases(mesh_, owner_, lattice_.cell, [this](const std::array<std::uint32_t, 2>& nodes, const Vec3& near) {
       const std::optional<CreasePoint>& point = crease_point({near, near, nodes});
       return point ? std::optional(add_vertex(*point)) : std::nullopt;
-    });
+    }, steps_);
+    const std::vector<std::uint32_t> back = take_back_crossings(mesh_.position, safe_, lattice_.cell, steps_);
+    mesh_.triangle.clear();
+    for (const std::uint32_t t : steps_.numbers()) mesh_.triangle.push_back(steps_[t]);
+    leave_out_unused();
+    return cut_off(back);
   }
 
  private:
@@ -324,33 +311,66 @@ class Sharpener {
     std::uint32_t low, high, vertex;
   };
 
-  /// Replaces the triangles of a cell by those around a point of the crease. @return whether that was done
-  bool star(std::span<const Triangle> triangles, const std::array<std::int64_t, 3>& cell) {
+  using CellPlace = std::array<std::int64_t, 3>;
+  /// Where the middle of a triangle lies: all triangles of marching cubes lie in their cell.
+  [[nodiscard]] CellPlace cell_of(const Triangle& t) const {
+    const Vec3 centre = (mesh_.position[t[0]] + mesh_.position[t[1]] + mesh_.position[t[2]]) / 3.0;
+    const Vec3 at = (centre - lattice_.origin) / lattice_.cell;
+    return {static_cast<std::int64_t>(std::floor(at.x())), static_cast<std::int64_t>(std::floor(at.y())), static_cast<std::int64_t>(std::floor(at.z()))};
+  }
+
+  void add_points() {
+    struct Piece {
+      CellPlace cell;
+      std::uint32_t triangle;
+    };
+    std::vector<Piece> pieces;
+    for (std::uint32_t i = 0; i < steps_.triangles().size(); ++i) pieces.push_back({cell_of(steps_[i]), i});
+    std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+      return a.cell != b.cell ? a.cell < b.cell : a.triangle < b.triangle;
+    });
+    std::vector<std::uint32_t> cell;
+    for (std::size_t begin = 0, end = 0; begin < pieces.size(); begin = end) {
+      cell.clear();
+      for (end = begin; end < pieces.size() && pieces[end].cell == pieces[begin].cell; ++end) cell.push_back(pieces[end].triangle);
+      star(cell, pieces[begin].cell);
+    }
+  }
+
+  /// Replaces the triangles of a cell by those around a point of the crease, if there is one.
+  void star(std::span<const std::uint32_t> numbers, const CellPlace& cell) {
+    std::vector<Triangle> triangles;
+    for (const std::uint32_t t : numbers) triangles.push_back(steps_[t]);
     std::vector<std::uint32_t> nodes;
     for (const Triangle& t : triangles) {
       for (const std::uint32_t v : t) nodes.push_back(owner_[v]);
     }
     std::sort(nodes.begin(), nodes.end());
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    if (nodes.size() < 2 || nodes.size() > 3) return false;
+    if (nodes.size() < 2 || nodes.size() > 3) return;
     const std::vector<std::uint32_t> loop = border(triangles);
-    if (loop.empty()) return false;
+    if (loop.empty()) return;
     Vec3 middle = Vec3::Zero();
     for (const std::uint32_t v : loop) middle += mesh_.position[v] / static_cast<double>(loop.size());
     const std::optional<CreasePoint>& point = crease_point({middle, middle, nodes});
-    if (!point) return false;
-    // In its own cell a cone over the loop crosses nothing; a little beyond, its triangles must face outward.
+    if (!point) return;
+    // In its own cell a cone over the loop, whose edges lie in the cell's faces, crosses nothing; a little beyond, its triangles must face outward.
+    constexpr double kInside = 1e-9;
+    bool inside = true;
     const Vec3 at = (point->position - lattice_.origin) / lattice_.cell;
     for (int k = 0; k < 3; ++k) {
       const double offset = at[k] - static_cast<double>(cell[static_cast<std::size_t>(k)]);
-      if (offset < -kBeyond || offset > 1.0 + kBeyond) return false;
+      if (offset < -kBeyond || offset > 1.0 + kBeyond) return;
+      inside = inside && offset > kInside && offset < 1.0 - kInside;
     }
     for (std::size_t k = 0; k < loop.size(); ++k) {
-      if (!faces_out(loop[k], loop[(k + 1) % loop.size()], point->position)) return false;
+      if (!faces_out(loop[k], loop[(k + 1) % loop.size()], point->position)) return;
     }
     const std::uint32_t fresh = add_vertex(*point);
-    for (std::size_t k = 0; k < loop.size(); ++k) star_.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
-    return true;
+    std::vector<Triangle> around;
+    for (std::size_t k = 0; k < loop.size(); ++k) around.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
+    steps_.replace(numbers, around);
+    safe_.resize(steps_.triangles().size(), inside);
   }
 
   /// As the last call found it, where that cannot be different: all that a search looks at lies this near.
@@ -390,25 +410,40 @@ class Sharpener {
   /// An edge between two nodes' vertices and two points of the crease becomes the edge between the points.
   void turn_edges() {
     std::vector<Side> sides;
-    for (std::uint32_t i = 0; i < star_.size(); ++i) {
-      const auto [a, b, top] = star_[i];
-      if (owner_[a] != owner_[b]) sides.push_back({std::min(a, b), std::max(a, b), i});
+    for (std::uint32_t i = 0; i < steps_.triangles().size(); ++i) {
+      const auto [a, b, top] = steps_[i];
+      if (on_crease(top) && owner_[a] != owner_[b]) sides.push_back({std::min(a, b), std::max(a, b), i});
     }
     std::sort(sides.begin(), sides.end());
+    struct Turn {
+      std::uint32_t low, high;  ///< points of the crease
+      std::array<std::uint32_t, 2> triangle;
+    };
+    std::vector<Turn> turns;
     for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
       if (sides[i].low != sides[i + 1].low || sides[i].high != sides[i + 1].high) continue;
-      Triangle &s = star_[sides[i].triangle], &t = star_[sides[i + 1].triangle];
-      const auto [p, q, x] = s;
-      const std::uint32_t y = t[2];
+      const std::uint32_t x = steps_[sides[i].triangle][2], y = steps_[sides[i + 1].triangle][2];
+      turns.push_back({std::min(x, y), std::max(x, y), {sides[i].triangle, sides[i + 1].triangle}});
+      ++i;
+    }
+    std::stable_sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
+    const auto same_points = [](const Turn& a, const Turn& b) { return a.low == b.low && a.high == b.high; };
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+      // Two edges in the face between two cells would both become the same one.
+      if ((i > 0 && same_points(turns[i - 1], turns[i])) || (i + 1 < turns.size() && same_points(turns[i], turns[i + 1]))) continue;
+      const auto [s, t] = turns[i].triangle;
+      const auto [p, q, x] = steps_[s];
+      const std::uint32_t y = steps_[t][2];
       const auto out = [&](std::uint32_t a, std::uint32_t b, std::uint32_t own, std::uint32_t c) {
         const Vec3& origin = mesh_.position[a];
         return (mesh_.position[b] - origin).cross(mesh_.position[c] - origin).dot(mesh_.normal[own]) > 0.0;
       };
-      if (out(x, p, p, y) && out(y, q, q, x)) {
-        s = {x, p, y};
-        t = {y, q, x};
-      }
-      ++i;
+      if (!out(x, p, p, y) || !out(y, q, q, x)) continue;
+      // Of two points each in its own cell: both triangles lie in the two cells, and in each of these on the cone over its loop with the edge in
+      // the face between the cells laid through another point of that face, which no other edge crosses.
+      const bool safe = safe_[s] && safe_[t];
+      steps_.replace(turns[i].triangle, std::array{Triangle{x, p, y}, Triangle{y, q, x}});
+      safe_.resize(steps_.triangles().size(), safe);
     }
   }
 
@@ -428,26 +463,58 @@ class Sharpener {
   /// An edge that crosses a crease still is cut at a point of it, unless a triangle would turn over.
   void cut_edges() {
     std::vector<Side> sides;
-    for (std::uint32_t i = 0; i < mesh_.triangle.size(); ++i) {
+    for (std::uint32_t i = 0; i < steps_.triangles().size(); ++i) {
+      if (!steps_.is_there(i)) continue;
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t a = mesh_.triangle[i][k], b = mesh_.triangle[i][(k + 1) % 3];
+        const std::uint32_t a = steps_[i][k], b = steps_[i][(k + 1) % 3];
         if (crosses(a, b)) sides.push_back({std::min(a, b), std::max(a, b), i});
       }
     }
     std::sort(sides.begin(), sides.end());
     std::vector<Cut> cuts;
+    std::vector<std::array<std::uint32_t, 2>> joined;
     for (std::size_t i = 0; i + 1 < sides.size(); i += 2) {
       const auto [low, high, left] = sides[i];
+      const std::uint32_t right = sides[i + 1].triangle;
       const std::array nodes{owner_[low], owner_[high]};
       const std::optional<CreasePoint>& x = crease_point({mesh_.position[low], mesh_.position[high], nodes});
-      if (x && can_cut(mesh_.triangle[left], low, high, x->position) &&
-          can_cut(mesh_.triangle[sides[i + 1].triangle], low, high, x->position)) {
+      if (x && can_cut(steps_[left], low, high, x->position) && can_cut(steps_[right], low, high, x->position)) {
         cuts.push_back({low, high, add_vertex(*x)});
+        joined.push_back({left, right});
       }
     }
+    // A step for triangles that share cut edges, directly or by way of others.
     std::vector<Triangle> pieces;
-    for (const Triangle& t : mesh_.triangle) cut(t, cuts, pieces);
-    mesh_.triangle = std::move(pieces);
+    for (const std::vector<std::uint32_t>& group : groups_of(joined)) {
+      pieces.clear();
+      for (const std::uint32_t t : group) cut(steps_[t], cuts, pieces);
+      steps_.replace(group, pieces);
+    }
+  }
+
+  /// What pairs join, directly or by way of others.
+  static std::vector<std::vector<std::uint32_t>> groups_of(std::span<const std::array<std::uint32_t, 2>> pairs) {
+    std::vector<std::uint32_t> member;
+    for (const auto& pair : pairs) member.insert(member.end(), pair.begin(), pair.end());
+    std::sort(member.begin(), member.end());
+    member.erase(std::unique(member.begin(), member.end()), member.end());
+    std::vector<std::size_t> root(member.size());
+    std::iota(root.begin(), root.end(), std::size_t{0});
+    const auto root_of = [&](std::uint32_t m) {
+      auto k = static_cast<std::size_t>(std::lower_bound(member.begin(), member.end(), m) - member.begin());
+      while (root[k] != k) k = root[k] = root[root[k]];
+      return k;
+    };
+    for (const auto& [a, b] : pairs) {
+      const std::size_t i = root_of(a), k = root_of(b);
+      root[std::max(i, k)] = std::min(i, k);
+    }
+    std::vector<std::vector<std::uint32_t>> groups, by_root(member.size());
+    for (const std::uint32_t m : member) by_root[root_of(m)].push_back(m);
+    for (std::vector<std::uint32_t>& group : by_root) {
+      if (!group.empty()) groups.push_back(std::move(group));
+    }
+    return groups;
   }
 
   /// Where the fields of the nodes of two vertices, taken to be linear, are equal on the edge between them.
@@ -505,6 +572,38 @@ class Sharpener {
     return at->vertex;
   }
 
+  /// Cells with an edge across a crease among triangles that are there again.
+  [[nodiscard]] std::uint64_t cut_off(std::span<const std::uint32_t> back) const {
+    std::vector<CellPlace> cells;
+    for (const std::uint32_t n : back) {
+      const auto [a, b, c] = steps_[n];
+      if (crosses(a, b) || crosses(b, c) || crosses(c, a)) cells.push_back(cell_of(steps_[n]));
+    }
+    std::sort(cells.begin(), cells.end());
+    return static_cast<std::uint64_t>(std::unique(cells.begin(), cells.end()) - cells.begin());
+  }
+
+  /// Vertices that no triangle has; all others keep their order.
+  void leave_out_unused() {
+    constexpr std::uint32_t kUnused = ~std::uint32_t{0};
+    std::vector<std::uint32_t> number(mesh_.vertex_count(), kUnused);
+    for (const Triangle& t : mesh_.triangle) {
+      for (const std::uint32_t v : t) number[v] = 0;
+    }
+    std::uint32_t count = 0;
+    for (std::size_t v = 0; v < number.size(); ++v) {
+      if (number[v] == kUnused) continue;
+      mesh_.position[count] = mesh_.position[v];
+      mesh_.normal[count] = mesh_.normal[v];
+      number[v] = count++;
+    }
+    mesh_.position.resize(count);
+    mesh_.normal.resize(count);
+    for (Triangle& t : mesh_.triangle) {
+      for (std::uint32_t& v : t) v = number[v];
+    }
+  }
+
   static constexpr double kBeyond = 1.0, kFarthest = 2.0;  // [cells]
   FieldView whole_;
   std::span<const FieldView> fields_;  ///< of the nodes
@@ -513,7 +612,8 @@ class Sharpener {
   const march::ViewMemory& changes_;
   CreaseMemory& memory_;
   Mesh& mesh_;
-  std::vector<Triangle> star_;
+  TriangleSteps steps_;
+  std::vector<bool> safe_;  ///< see take_back_crossings; of points and turned edges only
 };
 
 }  // namespace
@@ -567,7 +667,7 @@ void CreaseMesher::Impl::make(const Field& field, const Lattice& lattice, bool s
   find_owners(views, others || changes.all, executor);
   memory.begin_call(others || changes.all);
   mesh = marcher.mesh;
-  Sharpener(field, views, lattice, owner, changes, memory, mesh).run();
+  counts.blunt_cells = Sharpener(field, views, lattice, owner, changes, memory, mesh).run();
   memory.end_call();
   node = std::move(present);
   counts.bytes += memory.bytes() + owner.capacity() * sizeof(owner[0]) + marcher.mesh.position.capacity() * 2 * sizeof(Vec3) +

@@ -14,7 +14,6 @@
 
 #include "patch_coarsen.h"
 #include "patch_complex.h"
-#include "patch_crossings.h"
 #include "patch_refine.h"
 #include "patch_surface.h"
 #include "polygonise_blocks.h"
@@ -22,6 +21,7 @@
 #include "supple/core/interrupt.h"
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/polygonise.h"
+#include "triangle_crossings.h"
 
 namespace supple::implicit {
 namespace {
@@ -68,6 +68,25 @@ class HeedingField {
   FieldView field_;
   const std::atomic<int>* interrupt_;
 };
+
+/// Pairs of triangles of which an edge of one passes through the other, ascending.
+std::vector<std::array<std::uint32_t, 2>> find_crossings(const PatchComplex& complex) {
+  std::vector<std::array<std::uint32_t, 3>> corners;
+  std::vector<std::uint32_t> alive;
+  for (const PatchComplex::Triangle& t : complex.triangles()) {
+    if (t.alive) alive.push_back(static_cast<std::uint32_t>(corners.size()));
+    corners.push_back(t.vertex);
+  }
+  const TriangleBoxes boxes(complex.positions(), corners, alive);
+  std::vector<std::array<std::uint32_t, 2>> found;
+  for (const std::uint32_t s : alive) {
+    boxes.each_near(box_of(complex.positions(), corners[s]), [&](std::uint32_t t) {
+      if (s < t && triangles_cross(complex.positions(), corners[s], corners[t])) found.push_back({s, t});
+    });
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
 
 /// Refines where triangles cross, nearer and nearer to the surface. @return false as refine_patches
 /// @throws Error{Limit} when most_vertices do not reach the bounds without a thought of crossings

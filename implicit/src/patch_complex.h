@@ -48,6 +48,7 @@ class PatchComplex {
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangle_; }
   [[nodiscard]] const Triangle& triangle(std::uint32_t t) const { return triangle_[t]; }
   [[nodiscard]] const Vec3& position(Vertex v) const { return position_[v]; }
+  [[nodiscard]] std::span<const Vec3> positions() const { return position_; }
   [[nodiscard]] std::size_t vertex_count() const { return position_.size(); }  ///< those of none included
   [[nodiscard]] PatchPlace place(Vertex v) const { return place_[v]; }
   [[nodiscard]] std::span<const std::uint32_t> star(Vertex v) const { return star_[v]; }

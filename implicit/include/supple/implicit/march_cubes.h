@@ -27,6 +27,7 @@ struct MarchCounts {
   double cell = 0.0;                ///< edge of a cell that was used [m]
   int refinements = 0;
   double error = 0.0;               ///< when one was asked for: the largest found [m]
+  std::uint64_t blunt_cells = 0;    ///< of march_creases: cells whose crease stays cut off, as triangles would cross
 };
 
 /// Lattice nodes in the box of a body that may be asked for.
