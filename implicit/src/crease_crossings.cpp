@@ -1,7 +1,10 @@
 #include "crease_crossings.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <numeric>
 
 #include "triangle_crossings.h"
 
@@ -10,43 +13,64 @@ namespace {
 
 using Triangle = TriangleSteps::Triangle;
 
-/// Cells that boxes touch, by a hash: some more than these.
-class TouchedCells {
+/// Boxes in the cells of a lattice that they touch, by a hash of these.
+class CellsOfBoxes {
  public:
-  explicit TouchedCells(double cell) : per_cell_(1.0 / cell), bit_(kBits, false) {}
-
-  void add(const Box& box) {
-    (void)any(box, [this](std::size_t place) {
-      bit_[place] = true;
-      return false;
-    });
+  /// @param number  of each box
+  CellsOfBoxes(std::span<const Box> boxes, std::span<const std::uint32_t> number, double cell) : per_cell_(1.0 / cell) {
+    std::size_t count = 0;
+    for (const Box& box : boxes) each_cell(box, [&](const Place&) { ++count; });
+    first_.assign(std::bit_ceil(count + 1) + 1, 0);
+    for (const Box& box : boxes) each_cell(box, [&](const Place& place) { ++first_[bucket(place) + 1]; });
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    entry_.resize(count);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      each_cell(boxes[i], [&](const Place& place) { entry_[next[bucket(place)]++] = {boxes[i], number[i]}; });
+    }
   }
-  [[nodiscard]] bool touch(const Box& box) const {
-    return any(box, [this](std::size_t place) { return static_cast<bool>(bit_[place]); });
+
+  /// Calls use(number) for each box that overlaps another one, rarely twice.
+  template <class Use>
+  void each_near(const Box& box, const Use& use) const {
+    each_cell(box, [&](const Place& place) {
+      const std::size_t in = bucket(place);
+      for (std::uint32_t i = first_[in]; i < first_[in + 1]; ++i) {
+        const Entry& entry = entry_[i];
+        // In the cell of the least corner that both have in common.
+        if (entry.box.overlaps(box) && place_of(entry.box.lower.cwiseMax(box.lower)) == place) use(entry.number);
+      }
+    });
   }
 
  private:
-  static constexpr std::size_t kBits = std::size_t{1} << 22;
+  using Place = std::array<std::int64_t, 3>;
+  struct Entry {
+    Box box;
+    std::uint32_t number;
+  };
 
+  [[nodiscard]] Place place_of(const Vec3& p) const {
+    Place place{};
+    for (std::size_t k = 0; k < 3; ++k) place[k] = static_cast<std::int64_t>(std::floor(p[static_cast<Eigen::Index>(k)] * per_cell_));
+    return place;
+  }
   template <class Use>
-  [[nodiscard]] bool any(const Box& box, const Use& use) const {
-    std::array<std::uint64_t, 3> low{}, high{};
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      low[static_cast<std::size_t>(k)] = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(box.lower[k] * per_cell_)));
-      high[static_cast<std::size_t>(k)] = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(box.upper[k] * per_cell_)));
-    }
-    for (std::uint64_t z = low[2]; z != high[2] + 1; ++z) {
-      for (std::uint64_t y = low[1]; y != high[1] + 1; ++y) {
-        for (std::uint64_t x = low[0]; x != high[0] + 1; ++x) {
-          if (use(static_cast<std::size_t>(x + 1031 * y + 1048583 * z) % kBits)) return true;
-        }
+  void each_cell(const Box& box, const Use& use) const {
+    const Place low = place_of(box.lower), high = place_of(box.upper);
+    for (std::int64_t z = low[2]; z <= high[2]; ++z) {
+      for (std::int64_t y = low[1]; y <= high[1]; ++y) {
+        for (std::int64_t x = low[0]; x <= high[0]; ++x) use(Place{x, y, z});
       }
     }
-    return false;
+  }
+  [[nodiscard]] std::size_t bucket(const Place& place) const {
+    return static_cast<std::size_t>(place[0] + 1031 * place[1] + 1048583 * place[2]) & (first_.size() - 2);
   }
 
   double per_cell_;
-  std::vector<bool> bit_;
+  std::vector<std::uint32_t> first_;  ///< entry of each bucket; their number is a power of two
+  std::vector<Entry> entry_;
 };
 
 class TakingBack {
@@ -60,12 +84,9 @@ class TakingBack {
     for (std::uint32_t t = 0; t < safe_.size(); ++t) {
       if (!safe_[t]) sought.push_back(t);
     }
-    if (sought.empty()) return all;
-    // A pair that crosses has a triangle that is not safe: all that could ever cross is near one.
-    const TriangleBoxes boxes(position_, steps_.triangles(), near(sought));
     while (!sought.empty()) {
       std::vector<std::uint32_t> back;
-      for (const auto& [s, t] : pairs(sought, boxes)) {
+      for (const auto& [s, t] : pairs(sought)) {
         if (!steps_.is_there(s) || !steps_.is_there(t)) continue;
         // Numbers of steps from 1 on, with 0 for what none made.
         steps_.take_back(std::max(steps_.maker(s) + 1, steps_.maker(t) + 1) - 1, back);
@@ -83,29 +104,24 @@ class TakingBack {
   [[nodiscard]] bool is_safe(std::uint32_t t) const { return t < safe_.size() && safe_[t]; }
   [[nodiscard]] Box box_of(std::uint32_t t) const { return implicit::box_of(position_, steps_[t]); }
 
-  /// Triangles that share a cell with one of some, or are one of them.
-  [[nodiscard]] std::vector<std::uint32_t> near(std::span<const std::uint32_t> some) const {
-    TouchedCells cells(cell_);
-    for (const std::uint32_t t : some) cells.add(box_of(t));
-    std::vector<std::uint32_t> near;
-    for (std::uint32_t t = 0; t < steps_.triangles().size(); ++t) {
-      if (cells.touch(box_of(t))) near.push_back(t);
+  /// Those that must not both be there, one of them sought.
+  [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> pairs(std::vector<std::uint32_t>& sought) {
+    std::erase_if(sought, [this](std::uint32_t t) { return !steps_.is_there(t); });
+    std::vector<Box> box;
+    is_sought_.assign(steps_.triangles().size(), false);
+    for (const std::uint32_t t : sought) {
+      box.push_back(box_of(t));
+      is_sought_[t] = true;
     }
-    return near;
-  }
-
-  /// Those that must not both be there, one of them sought, both there.
-  [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> pairs(std::span<const std::uint32_t> sought, const TriangleBoxes& boxes) const {
+    const CellsOfBoxes cells(box, sought, cell_);
     std::vector<std::array<std::uint32_t, 2>> found;
-    for (const std::uint32_t s : sought) {
+    for (std::uint32_t s = 0; s < steps_.triangles().size(); ++s) {
       if (!steps_.is_there(s)) continue;
-      boxes.each_near(box_of(s), [&](std::uint32_t t) {
-        if (s == t || !steps_.is_there(t) || (is_safe(s) && is_safe(t))) return;
-        if (share_a_way(steps_[s], steps_[t]) || triangles_cross(position_, steps_[s], steps_[t])) found.push_back({std::min(s, t), std::max(s, t)});
+      cells.each_near(box_of(s), [&](std::uint32_t t) {
+        if ((is_sought_[s] && s >= t) || (is_safe(s) && is_safe(t))) return;
+        if (share_a_way(steps_[s], steps_[t]) || triangles_cross(position_, steps_[s], steps_[t])) found.push_back({s, t});
       });
     }
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
     return found;
   }
 
@@ -126,6 +142,7 @@ class TakingBack {
   const std::vector<bool>& safe_;
   double cell_;
   TriangleSteps& steps_;
+  std::vector<bool> is_sought_;
 };
 
 }  // namespace

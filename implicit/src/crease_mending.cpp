@@ -148,31 +148,30 @@ class Mending {
   }
 
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
-  [[nodiscard]] std::vector<Edge> open_edges() const {
-    std::vector<Edge> open;
-    for (const std::uint32_t i : hole_) {
-      const Triangle& t = triangle_[i];
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Edge edge{t[k], t[(k + 1) % 3]};
-        const auto reverse = std::find(open.begin(), open.end(), Edge{edge.second, edge.first});
-        if (reverse != open.end()) {
-          open.erase(reverse);
-        } else {
-          open.push_back(edge);
-        }
+  /// Adds a triangle to the hole, and its edges to the border or takes them off it.
+  void add_to_hole(std::uint32_t triangle) {
+    hole_.push_back(triangle);
+    const Triangle& t = triangle_[triangle];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Edge edge{t[k], t[(k + 1) % 3]};
+      const auto reverse = std::find(open_.begin(), open_.end(), Edge{edge.second, edge.first});
+      if (reverse != open_.end()) {
+        open_.erase(reverse);
+      } else {
+        open_.push_back(edge);
       }
     }
-    return open;
   }
 
   /// @return whether a hole was filled
   bool mend(std::uint32_t start) {
-    hole_ = {start};
+    hole_.clear();
+    open_.clear();
+    add_to_hole(start);
     for (int growth = 0; growth <= kGrowths; ++growth) {
       if (!(growth == 0 || grow_along_crease()) || !grow_across()) return false;
-      const std::vector<Edge> open = open_edges();
-      if (std::any_of(open.begin(), open.end(), [&](const Edge& e) { return touched_[e.first]; })) return false;
-      const std::optional<Border> border = border_of(open);
+      if (std::any_of(open_.begin(), open_.end(), [&](const Edge& e) { return touched_[e.first]; })) return false;
+      const std::optional<Border> border = find_border();
       if (border && fill(*border)) return true;
     }
     return false;
@@ -181,7 +180,7 @@ class Mending {
   /// @return whether a triangle may be taken and the hole is not too large
   bool take(std::uint32_t triangle) {
     if (gone_[triangle]) return false;
-    if (std::find(hole_.begin(), hole_.end(), triangle) == hole_.end()) hole_.push_back(triangle);
+    if (std::find(hole_.begin(), hole_.end(), triangle) == hole_.end()) add_to_hole(triangle);
     return hole_.size() <= kMostTaken;
   }
   bool take_around(std::uint32_t v) {
@@ -190,7 +189,8 @@ class Mending {
   }
   /// Takes what lies around the vertices at which the border meets the crease.
   bool grow_along_crease() {
-    for (const auto& [a, b] : open_edges()) {
+    const std::vector<Edge> open = open_;
+    for (const auto& [a, b] : open) {
       if (on_crease(a) && !take_around(a)) return false;
     }
     return true;
@@ -199,7 +199,8 @@ class Mending {
   bool grow_across() {
     for (std::size_t before = 0; before != hole_.size();) {
       before = hole_.size();
-      for (const auto& [a, b] : open_edges()) {
+      const std::vector<Edge> open = open_;
+      for (const auto& [a, b] : open) {
         if (!crosses(a, b)) continue;
         const std::optional<std::uint32_t> beyond = triangle_at(b, a);
         if (!beyond || !take(*beyond)) return false;
@@ -209,19 +210,19 @@ class Mending {
   }
 
   /// None where the hole is not a disc, or where its border does not meet the crease at two vertices.
-  [[nodiscard]] std::optional<Border> border_of(const std::vector<Edge>& open) const {
-    std::vector<std::uint32_t> loop{open.front().first}, inside;
-    for (std::uint32_t v = open.front().second; v != loop.front();) {
+  [[nodiscard]] std::optional<Border> find_border() const {
+    std::vector<std::uint32_t> loop{open_.front().first}, inside;
+    for (std::uint32_t v = open_.front().second; v != loop.front();) {
       loop.push_back(v);
-      const auto next = std::find_if(open.begin(), open.end(), [v](const Edge& edge) { return edge.first == v; });
-      if (next == open.end() || loop.size() > open.size()) return std::nullopt;
+      const auto next = std::find_if(open_.begin(), open_.end(), [v](const Edge& edge) { return edge.first == v; });
+      if (next == open_.end() || loop.size() > open_.size()) return std::nullopt;
       v = next->second;
     }
     for (const std::uint32_t i : hole_) inside.insert(inside.end(), triangle_[i].begin(), triangle_[i].end());
     std::sort(inside.begin(), inside.end());
     inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
     // Of a disc: V - E + F = 1, with 2 E = 3 F + the edges of its border.
-    if (loop.size() != open.size() || 2 * inside.size() != hole_.size() + open.size() + 2) return std::nullopt;
+    if (loop.size() != open_.size() || 2 * inside.size() != hole_.size() + open_.size() + 2) return std::nullopt;
     std::vector<std::size_t> meets;
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (on_crease(loop[k])) meets.push_back(k);
@@ -292,6 +293,7 @@ class Mending {
   std::vector<Triangle> triangle_;
   std::vector<std::uint32_t> first_, star_;  ///< triangles at each vertex
   std::vector<std::uint32_t> hole_;          ///< triangles that are taken out
+  std::vector<Edge> open_;                   ///< its border
   std::vector<bool> touched_;                ///< vertices of holes that were filled in this pass
   std::vector<bool> gone_;
 };

@@ -11,21 +11,22 @@ using Triangle = std::array<std::uint32_t, 3>;
 /// Six times the signed volume of a tetrahedron.
 double volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) { return (b - a).cross(c - a).dot(d - a); }
 
-bool pierces(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
-  constexpr double kRounding = 1e-12;
-  const double length = std::max({(q - p).norm(), (b - a).norm(), (c - a).norm()}), least = kRounding * length * length * length;
-  const double at_p = volume(a, b, c, p), at_q = volume(a, b, c, q);
-  if (!((at_p > least && at_q < -least) || (at_p < -least && at_q > least))) return false;
-  const double u = volume(p, q, a, b), v = volume(p, q, b, c), w = volume(p, q, c, a);
-  return (u > least && v > least && w > least) || (u < -least && v < -least && w < -least);
-}
-
 /// Whether an edge of s passes through t.
 bool passes(std::span<const Vec3> position, const Triangle& s, const Triangle& t) {
+  constexpr double kRounding = 1e-12;
+  const Vec3 &a = position[t[0]], &b = position[t[1]], &c = position[t[2]];
+  std::array<double, 3> at{};
+  for (std::size_t k = 0; k < 3; ++k) at[k] = volume(a, b, c, position[s[k]]);
+  if (std::min({at[0], at[1], at[2]}) >= 0.0 || std::max({at[0], at[1], at[2]}) <= 0.0) return false;
   const auto has = [&](std::uint32_t v) { return t[0] == v || t[1] == v || t[2] == v; };
   for (std::size_t k = 0; k < 3; ++k) {
-    const std::uint32_t a = s[k], b = s[(k + 1) % 3];
-    if (!has(a) && !has(b) && pierces(position[a], position[b], position[t[0]], position[t[1]], position[t[2]])) return true;
+    const std::size_t next = (k + 1) % 3;
+    if (has(s[k]) || has(s[next])) continue;
+    const Vec3 &p = position[s[k]], &q = position[s[next]];
+    const double length = std::max({(q - p).norm(), (b - a).norm(), (c - a).norm()}), least = kRounding * length * length * length;
+    if (!((at[k] > least && at[next] < -least) || (at[k] < -least && at[next] > least))) continue;
+    const double u = volume(p, q, a, b), v = volume(p, q, b, c), w = volume(p, q, c, a);
+    if ((u > least && v > least && w > least) || (u < -least && v < -least && w < -least)) return true;
   }
   return false;
 }
