@@ -327,6 +327,7 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
     Mesh mesh = d.method == MeshingName::Auto && implicit::has_creases(field)
                     ? frame.creases[i].make(field, options, context.executor, &marched)
                     : frame.mesher[i].make(field, options, context.executor, &marched);
+    if (marched.blunt_cells > 0) frame.missed.blunt[object.name] += marched.blunt_cells;
     search_alone(context, i, marched.cell, bodies, frame, mesh);
     profile.visited += marched.tiles;
     profile.present += 64 * marched.blocks;

@@ -117,6 +117,13 @@ std::string searches_text(const ordered_json& searches) {
       }
     }
   }
+  if (searches.contains("blunt")) {
+    for (const auto& [object, cells] : searches["blunt"].items()) {
+      if (!cells.is_number()) continue;
+      const std::string what = "cells of " + object + " with a cut crease";
+      text += line("  %-34s %8.0f", what.c_str(), cells.get<double>());
+    }
+  }
   return text.empty() ? text : "pieces between the nodes of the lattice\n" + text;
 }
 

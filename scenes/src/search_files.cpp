@@ -21,7 +21,12 @@ std::uint64_t count_at(const ordered_json& object, std::string_view key) {
 }
 
 SearchCounts searches_of(const ordered_json& json) {
-  SearchCounts counts{.pieces = count_at(json, "pieces"), .undecided = count_at(json, "undecided"), .crossings = count_at(json, "crossings"), .unsearched = {}};
+  SearchCounts counts{.pieces = count_at(json, "pieces"), .undecided = count_at(json, "undecided"), .crossings = count_at(json, "crossings"), .unsearched = {}, .blunt = {}};
+  if (const auto blunt = json.find("blunt"); blunt != json.end() && blunt->is_object()) {
+    for (const auto& [object, cells] : blunt->items()) {
+      if (cells.is_number_unsigned()) counts.blunt[object] = cells.get<std::uint64_t>();
+    }
+  }
   const auto unsearched = json.find("unsearched");
   if (unsearched == json.end() || !unsearched->is_object()) return counts;
   for (const auto& [object, meshes] : unsearched->items()) {
@@ -40,7 +45,7 @@ ordered_json json_of(const SearchCounts& counts) {
       if (meshes[k] > 0) unsearched[object][std::string(kUnsearchedNames[k])] = meshes[k];
     }
   }
-  return {{"pieces", counts.pieces}, {"undecided", counts.undecided}, {"crossings", counts.crossings}, {"unsearched", unsearched}};
+  return {{"pieces", counts.pieces}, {"undecided", counts.undecided}, {"crossings", counts.crossings}, {"unsearched", unsearched}, {"blunt", counts.blunt}};
 }
 
 void write_searches(const fs::path& folder, const std::string& name, int frame, const SearchCounts& counts) {

@@ -12,7 +12,7 @@
 
 namespace supple::scenes {
 
-/// {"pieces": 1, "undecided": 0, "unsearched": {"ball": {"cost": 2}}}
+/// {"pieces": 1, "undecided": 0, "unsearched": {"ball": {"cost": 2}}, "blunt": {"ball": 3}}
 [[nodiscard]] nlohmann::ordered_json json_of(const SearchCounts& counts);
 
 /// searches/NAME.0012.json, which is absent where there is nothing to tell. @throws Error{Io}

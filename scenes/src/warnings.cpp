@@ -193,7 +193,10 @@ void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeSt
 
 void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings) {
   const std::string key = "output.meshing.search: ", crossing = "output.meshing.distance: ";
-  std::erase_if(warnings, [&](const std::string& warning) { return warning.starts_with(key) || warning.starts_with(crossing); });
+  const std::string blunt = "output.meshing.method: cells whose crease is cut off";
+  std::erase_if(warnings, [&](const std::string& warning) {
+    return warning.starts_with(key) || warning.starts_with(crossing) || warning.starts_with(blunt);
+  });
   std::string text;
   const auto add = [&](bool told, const char* what, std::uint64_t count) {
     if (told) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
@@ -211,6 +214,11 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
   if (all.crossings > 0) {
     warnings.push_back(crossing + "pairs of triangles that pass through each other where bodies touch: " + std::to_string(all.crossings) +
                        "; a smaller distance may part them");
+  }
+  if (!all.blunt.empty()) {
+    std::string cells;
+    for (const auto& [object, count] : all.blunt) cells += (cells.empty() ? "" : ", ") + std::to_string(count) + " of '" + object + '\'';
+    warnings.push_back(blunt + ", as triangles with vertices on it would cross, in the meshes of all frames: " + cells + "; smaller cells resolve more of it");
   }
 }
 

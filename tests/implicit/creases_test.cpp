@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "crease_crossings.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "support/mesh_distance.h"
@@ -80,15 +81,16 @@ TEST(Creases, LieOnTheCircleWhereTwoBallsMeet) {
   }
 }
 
-/// Distance to the surface of two balls of kRadius, `apart` from their middle along kAxis, united.
-double distance_to_two_balls(const Vec3& p, double apart) {
-  const double along = p.dot(kAxis), rim = std::sqrt(kRadius * kRadius - apart * apart);
-  const double to_rim = std::hypot(along, (p - along * kAxis).norm() - rim);
-  const Vec3 from = p - std::copysign(apart, along) * kAxis;
+/// Distance to the surface of two balls of a radius, `apart` from their middle along an axis, united.
+double distance_to_two_balls(const Vec3& p, const Vec3& axis, double radius, double apart) {
+  const double along = p.dot(axis), rim = std::sqrt(radius * radius - apart * apart);
+  const double to_rim = std::hypot(along, (p - along * axis).norm() - rim);
+  const Vec3 from = p - std::copysign(apart, along) * axis;
   // The foot on the ball of this side is on the surface where it stays on this side of the middle plane.
-  const double foot = std::copysign(apart, along) + kRadius * from.dot(kAxis) / from.norm();
-  return (foot > 0.0) == (along > 0.0) ? std::min(to_rim, std::abs(from.norm() - kRadius)) : to_rim;
+  const double foot = std::copysign(apart, along) + radius * from.dot(axis) / from.norm();
+  return (foot > 0.0) == (along > 0.0) ? std::min(to_rim, std::abs(from.norm() - radius)) : to_rim;
 }
+double distance_to_two_balls(const Vec3& p, double apart) { return distance_to_two_balls(p, kAxis, kRadius, apart); }
 
 // Beside the crease as elsewhere, the error falls with the square of the cell: no edge crosses the crease without a vertex there.
 TEST(Creases, AreMetToSecondOrder) {
@@ -169,6 +171,165 @@ TEST(Creases, AreMetWhereCapsulesCross) {
     EXPECT_TRUE(report.closed && report.oriented);
     EXPECT_EQ(report.euler_characteristic, 2);
     EXPECT_EQ(self_intersections(mesh, kCell), 0u) << seed;
+  }
+}
+
+/// Closed, oriented, of the topology of marching cubes, and nothing crosses. @return cells whose crease stays cut off
+std::uint64_t expect_apart(Body& body, const Lattice& lattice) {
+  MarchCounts counts;
+  const Mesh mesh = march_creases(body.field, {.lattice = lattice}, Executor(1), &counts);
+  const MeshReport report = inspect(mesh), cut_off = inspect(march_cubes(body.field, {.lattice = lattice}, Executor(1)));
+  EXPECT_TRUE(report.closed && report.oriented);
+  EXPECT_EQ(report.components, cut_off.components);
+  EXPECT_EQ(report.euler_characteristic, cut_off.euler_characteristic);
+  EXPECT_EQ(static_cast<long>(mesh.vertex_count()) - static_cast<long>(mesh.triangle_count() / 2), report.euler_characteristic);  // none is left over
+  EXPECT_EQ(self_intersections(mesh, lattice.cell), 0u);
+  if (counts.blunt_cells > 0) {  // what is kept, and on other threads
+    EXPECT_EQ(hash_of(march_creases(body.field, {.lattice = lattice}, Executor(3))), hash_of(mesh));
+    CreaseMesher mesher;
+    (void)mesher.make(body.field, {.lattice = lattice}, Executor(1));
+    const Vec3 place = body.parts[0].position;
+    body.parts[0].position += Vec3::Constant(0.1 * lattice.cell);
+    body.place();
+    const std::uint64_t kept = hash_of(mesher.make(body.field, {.lattice = lattice}, Executor(2)));
+    EXPECT_EQ(kept, hash_of(march_creases(body.field, {.lattice = lattice}, Executor(1))));
+    body.parts[0].position = place;
+    body.place();
+    EXPECT_EQ(hash_of(mesher.make(body.field, {.lattice = lattice}, Executor(2))), hash_of(mesh));
+  }
+  return counts.blunt_cells;
+}
+
+/// Two balls that meet in a circle of radius 1, their surfaces at twice an angle there.
+Body valley(double degrees, const Vec3& axis) {
+  const double lean = degrees * std::numbers::pi / 180.0, ball = 1.0 / std::sin(lean), apart = 1.0 / std::tan(lean);
+  Body body = body_of({{wyvill_point(ball / kRadius), apart * axis}, {wyvill_point(ball / kRadius), -apart * axis}});
+  body.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, 0.0}}};
+  body.place();
+  return body;
+}
+
+TEST(CreasesNeverCross, InValleys) {
+  std::uint64_t blunt = 0;
+  for (const double degrees : {3.0, 5.0, 8.0, 11.0, 14.0, 20.0}) {
+    for (std::uint64_t pose = 0; pose < (degrees < 6.0 ? 2u : 4u); ++pose) {
+      SCOPED_TRACE(::testing::Message() << degrees << ' ' << pose);
+      Random random(pose + static_cast<std::uint64_t>(100.0 * degrees));
+      const double cell = degrees < 6.0 ? 0.25 : std::array{0.11, 0.125, 0.15, 0.2}[pose];
+      Body body = valley(degrees, random.direction());
+      blunt += expect_apart(body, {.origin = random.in_box(cell), .cell = cell});
+    }
+  }
+  EXPECT_GT(blunt, 0u);
+}
+
+TEST(CreasesNeverCross, WhereThreeBallsMeetInACell) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(77 + seed);
+    const Quat turn = random.rotation();
+    std::vector<std::pair<Primitive, Vec3>> balls;
+    for (int k = 0; k < 3; ++k) {
+      const Quat third(Eigen::AngleAxisd(2.0 * std::numbers::pi * k / 3.0, Vec3::UnitZ()));
+      balls.emplace_back(wyvill_point(1.0), turn * (third * Vec3(random.uniform(0.25, 0.3), 0.0, 0.0)));
+    }
+    Body body = body_of(balls);
+    body.skeleton.blend.rule = BlendRule::Graph;
+    body.place();
+    for (const double cell : {0.03, 0.06, 0.1}) (void)expect_apart(body, {.origin = random.in_box(cell), .cell = cell});
+  }
+}
+
+// Each pair of three capsules about the same place has a crease of its own, and these cross.
+TEST(CreasesNeverCross, WhereThreeCapsulesDo) {
+  std::uint64_t blunt = 0;
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(177 + seed);
+    const Quat turn = random.rotation();
+    const double angle = random.uniform(0.1, 1.2);
+    std::vector<std::pair<Primitive, Vec3>> capsules;
+    for (const auto& [by, axis] : {std::pair{0.0, Vec3(Vec3::UnitZ())}, std::pair{angle, Vec3(Vec3::UnitZ())}, std::pair{-angle, Vec3(Vec3::UnitY())}}) {
+      Primitive one = wyvill_point(0.8);
+      one.shape = ShapeKind::Segment;
+      one.size = Vec3(1.5, 0.0, 0.0);
+      one.offset.orientation = turn * Quat(Eigen::AngleAxisd(by, axis));
+      capsules.emplace_back(one, random.in_box(0.02));
+    }
+    Body body = body_of(capsules);
+    body.skeleton.blend.rule = BlendRule::Graph;
+    body.place();
+    for (const double cell : {0.04, 0.08}) blunt += expect_apart(body, {.origin = random.in_box(cell), .cell = cell});
+  }
+  EXPECT_GT(blunt, 0u);
+}
+
+TEST(CreasesNeverCross, WhateverTheBody) {
+  std::uint64_t blunt = 0;
+  for (std::uint64_t seed = 1; seed <= 120; ++seed) {
+    for (const bool points : {true, false}) {
+      SCOPED_TRACE(::testing::Message() << seed << ' ' << points);
+      const std::uint32_t parts = points ? 8 : 10;
+      Body body = random_body({.seed = seed, .parts = parts, .half_width = points ? 0.5 : 0.6, .only_points = points});
+      Random random(seed);
+      body.skeleton.blend.rule = BlendRule::Graph;
+      for (std::uint32_t a = 0; a < parts; ++a) {
+        for (std::uint32_t b = a + 1; b < parts; ++b) {
+          if (random.below(3) == 0) body.skeleton.blend.edge.push_back({a, b, random.below(2) == 0 ? 1.0 : 0.4});
+        }
+      }
+      body.place();
+      const double cell = std::array{0.05, 0.07, 0.12}[seed % 3];
+      blunt += expect_apart(body, {.origin = random.in_box(cell), .cell = cell});
+    }
+  }
+  EXPECT_GT(blunt, 0u);
+}
+
+// A step after the other is taken back where what it had replaced crosses, too, and with a step all that came to replace what it made.
+TEST(CreasesNeverCross, TakesBackWhatCrossesStepByStep) {
+  using Triangle = TriangleSteps::Triangle;
+  // Level triangles one above the other, with corners 3 k, 3 k + 1, 3 k + 2 at height k, and upright ones through some of them.
+  std::vector<Vec3> position;
+  for (int k = 0; k < 6; ++k) {
+    for (const Vec3& corner : {Vec3(0, 0, k), Vec3(3, 0, k), Vec3(0, 3, k)}) position.push_back(corner);
+  }
+  const auto upright = [&](double x, double low, double high) {
+    const auto first = static_cast<std::uint32_t>(position.size());
+    for (const Vec3& corner : {Vec3(x, 0.3, low), Vec3(x, 0.3, high), Vec3(x, 0.5, high)}) position.push_back(corner);
+    return Triangle{first, first + 1, first + 2};
+  };
+  const auto level = [](std::uint32_t k) { return Triangle{3 * k, 3 * k + 1, 3 * k + 2}; };
+  const Triangle apart = upright(0.3, 2.2, 2.8), through = upright(0.3, 1.5, 2.5), sibling = upright(0.5, 5.5, 5.8), through_too = upright(0.7, 0.5, 1.5),
+                 far = upright(0.9, 5.5, 5.8), later = upright(1.1, 5.5, 5.8);
+  TriangleSteps steps({level(1), level(2), apart, far});
+  const std::uint32_t a = steps.replace(std::array{2u}, std::vector{through, sibling});
+  const std::uint32_t b = steps.replace(std::array{a}, std::vector{through_too});
+  const std::uint32_t c = steps.replace(std::array{a + 1}, std::vector{later});
+  const std::uint32_t d = steps.replace(std::array{3u}, std::vector{upright(1.3, 3.2, 3.8)});
+  ASSERT_TRUE(steps.is_there(b) && steps.is_there(c) && steps.is_there(d) && !steps.is_there(a) && !steps.is_there(2));
+  EXPECT_EQ(take_back_crossings(position, std::vector<bool>(4, true), 1.0, steps), (std::vector<std::uint32_t>{2}));
+  EXPECT_EQ(steps.numbers(), (std::vector<std::uint32_t>{0, 1, 2, d}));
+}
+
+// Where triangles on creases are taken back, their error is no longer theirs: finer cells follow, or a refusal.
+TEST(CreasesNeverCross, ToAnErrorEither) {
+  for (const double degrees : {8.0, 14.0}) {
+    Random random(static_cast<std::uint64_t>(degrees));
+    const Vec3 axis = random.direction();
+    const Body body = valley(degrees, axis);
+    const double apart = 1.0 / std::tan(degrees * std::numbers::pi / 180.0), ball = std::hypot(1.0, apart);
+    const double error = 0.02;
+    MarchCounts counts;
+    const Mesh mesh = march_creases(body.field, {.lattice = {.origin = random.in_box(0.1), .cell = 0.0}, .error = error}, Executor(2), &counts);
+    EXPECT_EQ(self_intersections(mesh, counts.cell), 0u);
+    double largest = 0.0;
+    for (const auto& t : mesh.triangle) {
+      const Vec3 p = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
+      largest = std::max(largest, distance_to_two_balls(p, axis, ball, apart));
+    }
+    EXPECT_LE(largest, error);
+    EXPECT_LE(counts.error, error);
   }
 }
 

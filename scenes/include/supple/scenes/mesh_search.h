@@ -1,6 +1,6 @@
 /// @file supple/scenes/mesh_search.h
 /// What is not as it should be in meshes: pieces that they miss (implicit/missed_pieces.h), by what searches found, which were not searched,
-/// and triangles that cross.
+/// triangles that cross, and creases that are cut off so that none do.
 #pragma once
 
 #include <array>
@@ -28,8 +28,9 @@ struct SearchCounts {
   std::uint64_t undecided = 0;  ///< cells where one may be missed
   std::uint64_t crossings = 0;  ///< pairs of triangles of method delaunay that pass through each other
   std::map<std::string, Meshes> unsearched;  ///< by object, where there are any
+  std::map<std::string, std::uint64_t> blunt;  ///< by object, where there are any: cells whose crease stays cut off, as triangles would cross
 
-  [[nodiscard]] bool empty() const { return pieces == 0 && undecided == 0 && crossings == 0 && unsearched.empty(); }
+  [[nodiscard]] bool empty() const { return pieces == 0 && undecided == 0 && crossings == 0 && unsearched.empty() && blunt.empty(); }
   [[nodiscard]] std::uint64_t not_searched(Unsearched why) const {
     std::uint64_t sum = 0;
     for (const auto& [object, meshes] : unsearched) sum += meshes[static_cast<std::size_t>(why)];
@@ -42,6 +43,7 @@ struct SearchCounts {
     for (const auto& [object, meshes] : other.unsearched) {
       for (std::size_t k = 0; k < meshes.size(); ++k) unsearched[object][k] += meshes[k];
     }
+    for (const auto& [object, cells] : other.blunt) blunt[object] += cells;
   }
 };
 
