@@ -20,8 +20,9 @@ namespace supple::implicit {
 /// vertex where their fields vanish together, and edges that cross the crease are turned onto it (Kobbelt et al. 2001).
 /// Where that point lies more than a cell beyond its cell, or a triangle would turn over, the cell stays as it was, and edges that cross
 /// the crease are cut there. Where that would turn triangles over, as in valleys that are steep for the cells, those around are made anew.
-/// Where cells bridge a valley several cells above its ground, as with an opening below about 30 degrees, the crease may still be cut off
-/// here and there. Closed and oriented. A vertex on a crease has the mean of the normals of
+/// Where triangles would cross then, as where cells bridge a valley with an opening below about 16 degrees several cells above its ground, or
+/// where creases meet, that is taken back, step by step, in the limit to the triangles of march_cubes: closed, oriented, and nothing crosses
+/// by more than rounding. The cells whose crease stays cut off for that are counted. A vertex on a crease has the mean of the normals of
 /// its sides. With options.error, cells get smaller by sqrt(2) until it is met, from those on that march_cubes would begin with.
 /// @pre the rule of the field's blend is Graph, options.refinements is 0   @throws Error{Limit} as CubeMesher::make
 [[nodiscard]] Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor,
