@@ -15,9 +15,10 @@
 #include "crease_mending.h"
 #include "error_search.h"
 #include "field_index.h"
-#include "march_mesher.h"
+#include "march_tried.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "triangle_errors.h"
 #include "triangle_steps.h"
 
 namespace supple::implicit {
@@ -637,19 +638,59 @@ bool has_creases(const Field& field) {
   return false;
 }
 
-struct CreaseMesher::Impl {
-  march::Marcher marcher;
-  std::vector<std::uint32_t> node;   ///< that the fields of the last mesh are of
-  std::vector<std::uint32_t> owner;  ///< of the vertices of the marched mesh, by place in `node`
-  CreaseMemory memory;
-  Mesh mesh;
+namespace {
 
-  void make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
+/// The mesh with creases on one lattice, and what is kept of it.
+class CreaseMarcher {
+ public:
+  /// @param field  to be kept until the next call
+  const Mesh& make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor);
+  /// centroid_error of the mesh that was made since the last call.
+  [[nodiscard]] double error(const Executor& executor);
+  /// Marches anew, with nothing of earlier calls: counts are then those of a fresh mesher. The mesh stays.
+  void march_anew(const Executor& executor);
+
+  [[nodiscard]] const MarchCounts& counts() const { return counts_; }
+  [[nodiscard]] bool whole() const { return marcher_.whole(); }
+  [[nodiscard]] MarchCounts most_counts() const { return marcher_.most_counts(counts_); }
+  /// Of all that is kept, the mesh too.
+  [[nodiscard]] std::uint64_t bytes() const { return counts_.bytes + march::bytes_of(mesh_) + march::bytes_of(last_mesh_) + errors_.bytes(); }
+  [[nodiscard]] Mesh take_mesh() { return std::move(mesh_); }
+
+ private:
+  void count_kept();
   /// Of the vertices that did not stay where they were and as they were.
   void find_owners(std::span<const FieldView> fields, bool all, const Executor& executor);
+
+  march::Marcher marcher_;
+  const Field* field_ = nullptr;
+  Lattice lattice_;
+  bool skip_ = true;
+  MarchCounts counts_;
+  std::vector<std::uint32_t> node_;   ///< that the fields of the last mesh are of
+  std::vector<std::uint32_t> owner_;  ///< of the vertices of the marched mesh, by place in `node_`
+  CreaseMemory memory_;
+  Mesh mesh_, last_mesh_;
+  TriangleErrors errors_;             ///< of last_mesh_, or mesh_ once they are asked for
+  double feature_ = 0.0;              ///< of the field when they were [m]
+  bool measured_ = false;             ///< errors_ are those of mesh_
+  bool comparable_ = false;           ///< errors_ are those of last_mesh_
 };
 
-void CreaseMesher::Impl::make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts) {
+void CreaseMarcher::march_anew(const Executor& executor) {
+  marcher_.kept = false;
+  marcher_.march(*field_, lattice_, skip_, executor, counts_);
+  count_kept();
+}
+
+void CreaseMarcher::count_kept() {
+  counts_.bytes += memory_.bytes() + owner_.capacity() * sizeof(owner_[0]) + march::bytes_of(marcher_.mesh);
+}
+
+const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor) {
+  field_ = &field;
+  lattice_ = lattice;
+  skip_ = skip;
   const Field::Index& index = field.index();
   const std::vector<Box> box = node_supports(index);
   std::vector<NodeField> nodes;
@@ -660,31 +701,42 @@ void CreaseMesher::Impl::make(const Field& field, const Lattice& lattice, bool s
     present.push_back(k);
   }
   const std::vector<FieldView> views(nodes.begin(), nodes.end());
-  const bool others = present != node;
-  node.clear();  // should the next lines throw
-  marcher.march(field, lattice, skip, executor, counts);
-  const march::ViewMemory& changes = marcher.memory.view;
+  const bool others = present != node_;
+  node_.clear();  // should the next lines throw
+  marcher_.march(field, lattice, skip, executor, counts_);
+  const march::ViewMemory& changes = marcher_.memory.view;
   find_owners(views, others || changes.all, executor);
-  memory.begin_call(others || changes.all);
-  mesh = marcher.mesh;
-  counts.blunt_cells = Sharpener(field, views, lattice, owner, changes, memory, mesh).run();
-  memory.end_call();
-  node = std::move(present);
-  counts.bytes += memory.bytes() + owner.capacity() * sizeof(owner[0]) + marcher.mesh.position.capacity() * 2 * sizeof(Vec3) +
-                  marcher.mesh.triangle.capacity() * sizeof(Triangle);
+  memory_.begin_call(others || changes.all);
+  comparable_ = std::exchange(measured_, false);
+  if (comparable_) std::swap(mesh_, last_mesh_);
+  mesh_ = marcher_.mesh;
+  counts_.blunt_cells = Sharpener(field, views, lattice, owner_, changes, memory_, mesh_).run();
+  memory_.end_call();
+  node_ = std::move(present);
+  count_kept();
+  return mesh_;
 }
 
-void CreaseMesher::Impl::find_owners(std::span<const FieldView> fields, bool all, const Executor& executor) {
-  const std::vector<Vec3>& position = marcher.mesh.position;
+double CreaseMarcher::error(const Executor& executor) {
+  const double feature = field_->feature_size();
+  const bool other = std::exchange(feature_, feature) != feature;
+  const auto differs = [this](const Box& asked) { return marcher_.memory.view.differs_at(asked); };
+  const double found = errors_.measure(*field_, mesh_, last_mesh_, !comparable_ || other, differs, executor);
+  measured_ = true;
+  return found;
+}
+
+void CreaseMarcher::find_owners(std::span<const FieldView> fields, bool all, const Executor& executor) {
+  const std::vector<Vec3>& position = marcher_.mesh.position;
   std::vector<std::uint32_t> found(position.size()), fresh;
   std::size_t known = 0;  // vertices so far
   const auto add_fresh = [&](std::size_t end) {
     for (; known < end; ++known) fresh.push_back(static_cast<std::uint32_t>(known));
   };
   if (!all) {
-    for (const march::Run& run : marcher.scratch.stayed) {
+    for (const march::Run& run : marcher_.scratch.stayed) {
       add_fresh(run.to);
-      std::copy_n(owner.begin() + static_cast<std::ptrdiff_t>(run.from), run.count, found.begin() + static_cast<std::ptrdiff_t>(run.to));
+      std::copy_n(owner_.begin() + static_cast<std::ptrdiff_t>(run.from), run.count, found.begin() + static_cast<std::ptrdiff_t>(run.to));
       known = run.to + run.count;
     }
   }
@@ -693,32 +745,68 @@ void CreaseMesher::Impl::find_owners(std::span<const FieldView> fields, bool all
   for (const std::uint32_t v : fresh) points.push_back(position[v]);
   const std::vector<std::uint32_t> of_points = owners(fields, points, executor);
   for (std::size_t i = 0; i < fresh.size(); ++i) found[fresh[i]] = of_points[i];
-  owner = std::move(found);
+  owner_ = std::move(found);
 }
 
-CreaseMesher::CreaseMesher() = default;
+}  // namespace
+
+struct CreaseMesher::Impl {
+  explicit Impl(std::uint64_t most_kept) : tried(most_kept) {}
+
+  CreaseMarcher fixed;  ///< of the last mesh without an error
+  march::TriedLattices<CreaseMarcher> tried;
+  Mesh alone;           ///< where nothing is kept of it
+
+  const Mesh& make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count);
+};
+
+CreaseMesher::CreaseMesher(std::uint64_t most_kept) : most_kept_(most_kept) {}
 CreaseMesher::~CreaseMesher() = default;
 CreaseMesher::CreaseMesher(CreaseMesher&&) noexcept = default;
 CreaseMesher& CreaseMesher::operator=(CreaseMesher&&) noexcept = default;
 
+const Mesh& CreaseMesher::Impl::make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count) {
+  const double first = first_cell(field, options.lattice.cell);
+  const Mesh* mesh = nullptr;
+  CreaseMarcher* last = nullptr;
+  double cell = 0.0;
+  std::uint64_t sampled = 0;  // of all meshes
+  tried.begin_call();
+  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+    cell = spacing_at(first, level);
+    CreaseMarcher& on = tried.use(cell).first;
+    last = &on;
+    mesh = &on.make(field, {.origin = options.lattice.origin, .cell = cell}, options.skip, executor);
+    const double error = on.error(executor);
+    count = on.counts();
+    count.error = error;
+    sampled += count.tiles_sampled;
+    tried.fit(cell);
+    return march::try_kept(error, *mesh, on, executor);
+  });
+  count.tiles_sampled = sampled;
+  const bool fits = tried.end_call(cell);
+  count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;
+  if (fits) return *mesh;
+  alone = last->take_mesh();
+  tried.clear();
+  return alone;
+}
+
 const Mesh& CreaseMesher::make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   SUPPLE_EXPECTS(field.packed().blend.rule() == BlendRule::Graph && options.refinements == 0 && options.error >= 0.0);
-  if (impl_ == nullptr) impl_ = std::make_unique<Impl>();
-  Impl& self = *impl_;
+  if (impl_ == nullptr) impl_ = std::make_unique<Impl>(most_kept_);
   MarchCounts local;
   MarchCounts& count = counts != nullptr ? *counts : local;
-  if (options.error == 0.0) {
-    self.make(field, options.lattice, options.skip, executor, count);
-    return self.mesh;
+  impl_->alone = {};
+  if (options.error > 0.0) {
+    impl_->fixed = {};
+    return impl_->make_to_error(field, options, executor, count);
   }
-  const double first = first_cell(field, options.lattice.cell);
-  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
-    self.marcher.memory.view.forget();  // as CubeMesher does
-    self.make(field, {.origin = options.lattice.origin, .cell = spacing_at(first, level)}, options.skip, executor, count);
-    count.error = centroid_error(field, self.mesh, executor);
-    return tried(count.error, self.mesh, count);
-  });
-  return self.mesh;
+  impl_->tried.clear();
+  const Mesh& mesh = impl_->fixed.make(field, options.lattice, options.skip, executor);
+  count = impl_->fixed.counts();
+  return mesh;
 }
 
 Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -17,6 +18,7 @@
 namespace supple::implicit {
 namespace {
 
+constexpr std::size_t kBatch = 512;  // triangles
 constexpr double kOrderTwo = 0.5, kOrderOne = 0.5 * std::numbers::sqrt2;  // by which errors shrink from level to level
 
 bool is_smooth(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, const Vec3& outward) {
@@ -25,10 +27,11 @@ bool is_smooth(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, c
 }
 
 /// Never below the distance from p to the surface, on which the mesh's vertices lie.
-double distance_by_points(const FieldView& field, const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, const Vec3& p) {
+double distance_by_points(const FieldView& field, const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, const Vec3& p, Box& asked) {
+  constexpr int kIterations = 50;
   double least = std::numeric_limits<double>::infinity();
   for (const std::uint32_t v : triangle) least = std::min(least, (mesh.position[v] - p).norm());
-  const Projection foot = project_to_surface(field, p);
+  const Projection foot = project_to_surface(field, p, kIterations, &asked);
   return foot.converged ? std::min(least, (foot.point - p).norm()) : least;
 }
 
@@ -95,25 +98,39 @@ class Order {
 
 }  // namespace
 
-double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& executor) {
-  constexpr std::size_t kBatch = 512;
-  std::vector<double> largest((mesh.triangle_count() + kBatch - 1) / kBatch, 0.0);
-  executor.for_blocks(mesh.triangle_count(), kBatch, [&](std::size_t begin, std::size_t end) {
+void centroid_errors(const FieldView& field, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::span<double> error,
+                     std::span<Box> asked) {
+  SUPPLE_EXPECTS(error.size() == triangles.size() && asked.size() == triangles.size());
+  for (std::size_t begin = 0; begin < triangles.size(); begin += kBatch) {
     std::array<Vec3, kBatch> points, gradients;
     std::array<double, kBatch> values;
-    const std::size_t n = end - begin;
+    const std::size_t n = std::min(kBatch, triangles.size() - begin);
     for (std::size_t i = 0; i < n; ++i) {
-      const auto& t = mesh.triangle[begin + i];
+      const auto& t = mesh.triangle[triangles[begin + i]];
       points[i] = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
     }
     field.evaluate(std::span(points).first(n), std::span(values).first(n), std::span(gradients).first(n));
-    double& most = largest[begin / kBatch];
     for (std::size_t i = 0; i < n; ++i) {
       const double slope = gradients[i].norm();
-      const auto& t = mesh.triangle[begin + i];
+      const auto& t = mesh.triangle[triangles[begin + i]];
       const bool smooth = slope > 0.0 && is_smooth(mesh, t, -gradients[i] / slope);
-      most = std::max(most, smooth ? std::abs(values[i]) / slope : distance_by_points(field, mesh, t, points[i]));
+      Box& box = asked[begin + i] = Box{points[i], points[i]};
+      error[begin + i] = smooth ? std::abs(values[i]) / slope : distance_by_points(field, mesh, t, points[i], box);
     }
+  }
+}
+
+double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& executor) {
+  std::vector<double> largest((mesh.triangle_count() + kBatch - 1) / kBatch, 0.0);
+  executor.for_blocks(mesh.triangle_count(), kBatch, [&](std::size_t begin, std::size_t end) {
+    std::array<std::uint32_t, kBatch> triangles;
+    std::array<double, kBatch> error;
+    std::array<Box, kBatch> asked;
+    const std::size_t n = end - begin;
+    std::iota(triangles.begin(), triangles.end(), static_cast<std::uint32_t>(begin));
+    centroid_errors(field, mesh, std::span(triangles).first(n), std::span(error).first(n), std::span(asked).first(n));
+    double& most = largest[begin / kBatch];
+    for (std::size_t i = 0; i < n; ++i) most = std::max(most, error[i]);
   });
   return largest.empty() ? 0.0 : *std::max_element(largest.begin(), largest.end());
 }
@@ -165,11 +182,15 @@ void make_within(const ErrorGoal& goal, const std::function<LevelTry(int level)>
     }
     if (now.error <= goal.error) return;
     order.add(level, now.error);
+    const int wanted = order.levels_to(kPromise * goal.error), even_levels = order.even() ? kEvenLevels : kLevels;
+    // What follows is the same for any more.
+    const int enough = std::max({order.least_levels_to(goal.error), std::min(wanted, even_levels), 1});
+    if (now.levels_left < enough && now.count_levels_left) now.levels_left = now.count_levels_left();
     const bool far = order.least_levels_to(goal.error) > now.levels_left, hopeless = far && now.telling;
     if (now.levels_left == 0 || (hopeless && order.known())) refuse(goal, now.error, level, order.most_after(std::max(now.levels_left - 1, 0)));
     last = level;
     const int most = hopeless ? 1 : order.even() && !far ? kEvenLevels : kLevels;
-    level += std::min({order.levels_to(kPromise * goal.error), most, now.levels_left});
+    level += std::min({wanted, most, now.levels_left});
   }
 }
 

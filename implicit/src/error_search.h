@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 
 #include "supple/core/executor.h"
@@ -19,6 +20,11 @@ struct MarchCounts;
 /// surface that Newton's method leads to, or to the nearest vertex, which is never below the distance.
 [[nodiscard]] double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& executor);
 
+/// centroid_error of some triangles, each by itself. It depends on the triangle, the feature size and the field in `asked` alone.
+/// @param triangles  their numbers, shape [n]   @param error  [m], shape [n]   @param asked  shape [n]
+void centroid_errors(const FieldView& field, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::span<double> error,
+                     std::span<Box> asked);
+
 /// Meshes get finer by levels: from one to the next, triangles get shorter by sqrt(2), and twice as many.
 /// Length of triangles at a level [m]. @param first  at level 0 [m]
 [[nodiscard]] double spacing_at(double first, int level);
@@ -31,6 +37,8 @@ struct LevelTry {
   double error = 0.0;    ///< found [m]
   bool telling = false;  ///< so fine that errors of finer ones follow from it and the two before
   int levels_left = 0;   ///< by which finer ones still fit
+  /// Where levels_left may be less than there are: gives what they are, at a cost.
+  std::function<int()> count_levels_left{};
 };
 
 /// A mesh of marching cubes: it may take 8 GB, around it kMarchNodes nodes.

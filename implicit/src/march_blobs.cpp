@@ -110,7 +110,7 @@ class BlobSampler final : public Sampler {
     work.near_block = nullptr;
   }
 
-  void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals) const override {
+  void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals, Box& asked) const override {
     if (points.empty()) return;
     // Points may lie this far beyond the tile's cells; leaves and blocks are cut to it too.
     constexpr int kAround = 1;
@@ -129,7 +129,14 @@ class BlobSampler final : public Sampler {
                         0.5F * kTile + static_cast<float>(kAround), work.tile);
     blobs::project_points(work.tile, iso_, placement_of(block), points.data()->data(), normals.data()->data(),
                           points.size(), work.near);
+    const Cells base = block.base();
+    const auto corner = corner_of(tile);
+    for (const int end : {-kAround, kTile + kAround}) {
+      asked.include(lattice::node_position(lattice_, base[0] + corner[0] + end, base[1] + corner[1] + end, base[2] + corner[2] + end));
+    }
   }
+
+  [[nodiscard]] std::uint64_t most_blocks(const BlockTable& table) const override { return table.block.size(); }
 
   [[nodiscard]] bool single_precision() const override { return true; }
 

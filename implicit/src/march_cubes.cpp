@@ -1,13 +1,12 @@
 #include "supple/implicit/march_cubes.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
 
 #include "error_search.h"
 #include "field_index.h"
-#include "march_mesher.h"
+#include "march_refined.h"
+#include "march_tried.h"
 #include "polygonise_block_edges.h"
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
@@ -16,90 +15,6 @@
 
 namespace supple::implicit {
 namespace march {
-
-void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles) {
-  tiles.clear();
-  for (const Block& block : table.block) {
-    for (const Tile& tile : block.tile) {
-      if (tile.triangles > 0) tiles.push_back({&block, tile.place, block.first_triangle + tile.first_triangle, tile.triangles});
-    }
-  }
-}
-
-void refine(const Sampler& sampler, const Lattice& lattice, const Executor& executor, MeshScratch& scratch, Mesh& mesh) {
-  constexpr std::size_t kTilesPerTask = 64;
-  const std::size_t vertices = mesh.vertex_count(), triangles = mesh.triangle_count();
-  const auto& triangle = mesh.triangle;
-  const auto end_of = [&](const std::array<std::uint32_t, 3>& t, std::size_t k) { return t[k == 2 ? 0 : k + 1]; };
-  // Every edge runs once from its lower vertex to its higher one: there it gets its number, in the order of triangles,
-  // and the triangle on the other side finds it among the edges of the lower vertex.
-  scratch.start.assign(vertices + 1, 0);
-  for (const auto& t : triangle) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (t[k] < end_of(t, k)) ++scratch.start[t[k] + 1];
-    }
-  }
-  for (std::size_t v = 0; v < vertices; ++v) scratch.start[v + 1] += scratch.start[v];
-  const std::size_t edges = scratch.start[vertices];
-  lattice::expect_indexable(vertices + edges, lattice);
-  scratch.target.resize(edges);
-  scratch.edge.resize(edges);
-  scratch.middle.resize(triangles);
-  auto number = static_cast<std::uint32_t>(vertices);
-  for (std::size_t i = 0; i < triangles; ++i) {
-    const auto& t = triangle[i];
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (t[k] >= end_of(t, k)) continue;
-      const std::uint32_t at = scratch.start[t[k]]++;
-      scratch.target[at] = end_of(t, k);
-      scratch.edge[at] = number;
-      scratch.middle[i][k] = number++;
-    }
-  }
-  mesh.position.resize(vertices + edges);
-  mesh.normal.resize(vertices + edges);
-  scratch.triangle.resize(4 * triangles);
-  executor.for_blocks(scratch.tiles.size(), kTilesPerTask, [&](std::size_t begin, std::size_t end) {
-    thread_local std::vector<Vec3> points, normals;
-    sampler.begin_projection();
-    for (std::size_t i = begin; i < end; ++i) {
-      const TileTriangles& tile = scratch.tiles[i];
-      std::size_t first = 0;
-      points.clear();
-      for (std::size_t n = tile.first; n < tile.first + tile.count; ++n) {
-        const auto& t = triangle[n];
-        auto& middle = scratch.middle[n];
-        for (std::size_t k = 0; k < 3; ++k) {
-          const std::uint32_t a = t[k], b = end_of(t, k);
-          if (a < b) {
-            if (points.empty()) first = middle[k];
-            // Middle of the cubic that is perpendicular to both normals (Vlachos et al. 2001, "Curved PN triangles").
-            const Vec3 edge = mesh.position[b] - mesh.position[a];
-            points.push_back(0.5 * (mesh.position[a] + mesh.position[b]) -
-                             0.125 * (edge.dot(mesh.normal[a]) * mesh.normal[a] - edge.dot(mesh.normal[b]) * mesh.normal[b]));
-          } else {
-            std::uint32_t at = b == 0 ? 0 : scratch.start[b - 1];  // starts have moved to the ends
-            while (scratch.target[at] != a) ++at;
-            middle[k] = scratch.edge[at];
-          }
-        }
-        scratch.triangle[4 * n] = {t[0], middle[0], middle[2]};
-        scratch.triangle[4 * n + 1] = {middle[0], t[1], middle[1]};
-        scratch.triangle[4 * n + 2] = {middle[2], middle[1], t[2]};
-        scratch.triangle[4 * n + 3] = middle;
-      }
-      normals.resize(points.size());
-      sampler.project(*tile.block, tile.tile, points, normals);
-      std::copy(points.begin(), points.end(), mesh.position.begin() + static_cast<std::ptrdiff_t>(first));
-      std::copy(normals.begin(), normals.end(), mesh.normal.begin() + static_cast<std::ptrdiff_t>(first));
-    }
-  });
-  mesh.triangle.swap(scratch.triangle);
-  for (TileTriangles& tile : scratch.tiles) {
-    tile.first *= 4;
-    tile.count *= 4;
-  }
-}
 
 void Marcher::march(const FieldView& field, const Lattice& on, bool skip, const Executor& executor, MarchCounts& counts) {
   const Field* points = field.as_field();
@@ -129,17 +44,27 @@ void Marcher::march(const FieldView& field, const Lattice& on, bool skip, const 
   counts.bytes = table.held.bytes + scratch.bytes() + memory.bytes();
 }
 
+MarchCounts Marcher::most_counts(const MarchCounts& counts) const {
+  constexpr std::uint64_t kTiles = 64;  // of a block
+  MarchCounts most = counts;
+  most.blocks = sampler->most_blocks(table);
+  most.tiles = kTiles * most.blocks;
+  return most;
+}
+
 }  // namespace march
 
 struct CubeMesher::Impl {
-  march::Marcher marcher;
-  Mesh refined;
+  explicit Impl(std::uint64_t most_kept) : tried(most_kept) {}
 
-  /// The last mesh, refined.
-  const Mesh& refine(int refinements, const Executor& executor, MarchCounts& counts);
+  march::RefinedMarcher fixed;  ///< of the last mesh without an error
+  march::TriedLattices<march::RefinedMarcher> tried;
+  march::CutScratch scratch;
+  Mesh alone;  ///< where nothing is kept of it
+  const Mesh& make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count);
 };
 
-CubeMesher::CubeMesher() : impl_(std::make_unique<Impl>()) {}
+CubeMesher::CubeMesher(std::uint64_t most_kept) : impl_(std::make_unique<Impl>(most_kept)) {}
 CubeMesher::~CubeMesher() = default;
 CubeMesher::CubeMesher(CubeMesher&&) noexcept = default;
 CubeMesher& CubeMesher::operator=(CubeMesher&&) noexcept = default;
@@ -159,44 +84,62 @@ LevelPlan plan_of(double first_cell, int level) {
 
 }  // namespace
 
+const Mesh& CubeMesher::Impl::make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count) {
+  const double first = first_cell(field, options.lattice.cell);
+  const Mesh* mesh = nullptr;
+  march::RefinedMarcher* last = nullptr;
+  LevelPlan plan;
+  std::uint64_t sampled = 0, values = 0;  // of all meshes
+  tried.begin_call();
+  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+    plan = plan_of(first, level);
+    const auto [on, first_time] = tried.use(plan.cell);
+    last = &on;
+    if (first_time) {
+      on.march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
+      sampled += on.counts().tiles_sampled;
+      values += on.counts().kernel_values;
+    }
+    mesh = &on.mesh(plan.refinements, executor, scratch);
+    const double error = on.error(plan.refinements, executor);
+    count = on.counts();
+    count.refinements = plan.refinements;
+    count.error = error;
+    tried.fit(plan.cell);
+    return march::try_kept(error, *mesh, on, executor);
+  });
+  count.tiles_sampled = sampled;
+  count.kernel_values = values;
+  const bool fits = tried.end_call(plan.cell);
+  count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;
+  if (fits) return *mesh;
+  alone = last->take_mesh(plan.refinements);
+  tried.clear();
+  return alone;
+}
+
 const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                              MarchCounts* counts) {
   SUPPLE_EXPECTS(options.refinements >= 0 && options.refinements <= kMostRefinements && options.error >= 0.0);
   MarchCounts local;
   MarchCounts& count = counts != nullptr ? *counts : local;
-  march::Marcher& marcher = impl_->marcher;
-  if (options.error == 0.0) {
-    marcher.march(field, options.lattice, options.skip, executor, count);
-    return options.refinements == 0 ? marcher.mesh : impl_->refine(options.refinements, executor, count);
+  impl_->alone = {};
+  if (options.error > 0.0) {
+    impl_->fixed = {};
+    return impl_->make_to_error(field, options, executor, count);
   }
-  const double first = first_cell(field, options.lattice.cell);
-  const Mesh* mesh = nullptr;
-  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
-    const LevelPlan plan = plan_of(first, level);
-    if (mesh == nullptr || plan.cell != marcher.lattice.cell) {
-      // What still fits is told by counts, and those of a mesh that was kept may be others than of a fresh one.
-      marcher.memory.view.forget();
-      marcher.march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor, count);
-      mesh = &marcher.mesh;
-    }
-    if (plan.refinements > 0) mesh = &impl_->refine(plan.refinements, executor, count);
-    count.error = centroid_error(field, *mesh, executor);
-    return tried(count.error, *mesh, count);
-  });
-  return *mesh;
+  impl_->tried.clear();
+  impl_->fixed.march(field, options.lattice, options.skip, executor);
+  const Mesh& mesh = impl_->fixed.mesh(options.refinements, executor, impl_->scratch);
+  count = impl_->fixed.counts();
+  count.refinements = options.refinements;
+  return mesh;
 }
 
-const Mesh& CubeMesher::Impl::refine(int refinements, const Executor& executor, MarchCounts& counts) {
-  refined = marcher.mesh;
-  march::list_tiles(marcher.table, marcher.scratch.tiles);
-  for (int level = 0; level < refinements; ++level) {
-    march::refine(*marcher.sampler, marcher.lattice, executor, marcher.scratch, refined);
-  }
-  counts.refinements = refinements;
-  return refined;
+void CubeMesher::forget() {
+  impl_->fixed.forget();
+  impl_->tried.clear();
 }
-
-void CubeMesher::forget() { impl_->marcher.kept = false; }
 
 Mesh march_cubes(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   CubeMesher mesher;

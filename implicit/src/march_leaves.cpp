@@ -48,13 +48,25 @@ std::size_t ChangedTiles::index(const BlockCoord& leaf) const {
   return (along(2) * count(1) + along(1)) * count(0) + along(0);
 }
 
+std::pair<double, double> ChangedTiles::along(std::size_t k, const Box& box, const Lattice& lattice) {
+  const auto axis = static_cast<Eigen::Index>(k);
+  // One cell more on each side, for round-off and because boxes are closed.
+  return {std::floor(((box.lower[axis] - lattice.origin[axis]) / lattice.cell - 1.0) / kLeafNodes),
+          std::floor(((box.upper[axis] - lattice.origin[axis]) / lattice.cell + 1.0) / kLeafNodes)};
+}
+
+bool ChangedTiles::covers(const Box& box, const Lattice& lattice) const {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto [low, high] = along(k, box, lattice);
+    if (!(low >= range_.lower[k] && high <= range_.upper[k])) return false;
+  }
+  return true;
+}
+
 lattice::BlockRange ChangedTiles::around(const Box& box, const Lattice& lattice) const {
   lattice::BlockRange found;
   for (std::size_t k = 0; k < 3; ++k) {
-    const auto axis = static_cast<Eigen::Index>(k);
-    // One cell more on each side, for round-off and because boxes are closed.
-    const double low = std::floor(((box.lower[axis] - lattice.origin[axis]) / lattice.cell - 1.0) / kLeafNodes);
-    const double high = std::floor(((box.upper[axis] - lattice.origin[axis]) / lattice.cell + 1.0) / kLeafNodes);
+    const auto [low, high] = along(k, box, lattice);
     found.lower[k] = static_cast<std::int32_t>(std::clamp<double>(low, range_.lower[k], range_.upper[k] + 1.0));
     found.upper[k] = static_cast<std::int32_t>(std::clamp<double>(high, range_.lower[k] - 1.0, range_.upper[k]));
   }

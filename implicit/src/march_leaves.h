@@ -27,11 +27,15 @@ class ChangedTiles {
   [[nodiscard]] std::uint8_t operator[](const BlockCoord& leaf) const;
   /// Whether a leaf that a box meets has tiles.
   [[nodiscard]] bool meets(const Box& box, const Lattice& lattice) const;
+  /// Whether all leaves that a box meets are in the range.
+  [[nodiscard]] bool covers(const Box& box, const Lattice& lattice) const;
   /// Leaves with tiles, in z, y, x order.
   [[nodiscard]] std::vector<BlockCoord> leaves() const;
   [[nodiscard]] std::size_t bytes() const { return tiles_.capacity(); }
 
  private:
+  /// The lowest and the highest leaf that a box meets along an axis, without end.
+  [[nodiscard]] static std::pair<double, double> along(std::size_t axis, const Box& box, const Lattice& lattice);
   /// The leaves of the range that a box meets, and no more than one beyond on each side.
   [[nodiscard]] lattice::BlockRange around(const Box& box, const Lattice& lattice) const;
   [[nodiscard]] std::size_t index(const BlockCoord& leaf) const;
@@ -51,6 +55,8 @@ struct ViewMemory {
   void forget() { changes.forget(); }
   /// Whether values next to the surface, as far as a leaf, may be different in a box.
   [[nodiscard]] bool differs(const Box& box) const { return all || changed.meets(box, lattice); }
+  /// The same anywhere.
+  [[nodiscard]] bool differs_at(const Box& asked) const { return all || !changed.covers(asked, lattice) || changed.meets(asked, lattice); }
   /// Sees what is different in a field that is to be sampled, and `leaf` as it was.
   void compare(const FieldView& field, const Lattice& now);
   [[nodiscard]] std::size_t bytes() const { return changes.bytes() + leaf.capacity() * sizeof(leaf[0]) + changed.bytes(); }

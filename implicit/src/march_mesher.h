@@ -21,6 +21,14 @@ struct Marcher {
 
   /// Makes `mesh`, unrefined.
   void march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
+  /// Whether nothing of the last but one was kept.
+  [[nodiscard]] bool whole() const { return sampler->single_precision() ? memory.grid.change().all : memory.view.all; }
+  /// What a fresh mesher counts at most. @param counts  of this one
+  [[nodiscard]] MarchCounts most_counts(const MarchCounts& counts) const;
 };
+
+[[nodiscard]] inline std::uint64_t bytes_of(const Mesh& mesh) {
+  return (mesh.position.capacity() + mesh.normal.capacity()) * sizeof(Vec3) + mesh.triangle.capacity() * sizeof(mesh.triangle[0]);
+}
 
 }  // namespace supple::implicit::march

@@ -35,8 +35,10 @@ class Sampler {
                      std::vector<EdgePoint>& points) const = 0;
   /// Called on a thread before it projects points.
   virtual void begin_projection() const {}
-  /// Moves points near a tile to the surface.
-  virtual void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals) const = 0;
+  /// Moves points near a tile to the surface. @param asked  grows by a box: where they come depends on the field in it, and its feature size
+  virtual void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals, Box& asked) const = 0;
+  /// Blocks that the table of any mesher has for this field at most, whatever is kept. @param table  that was laid out
+  [[nodiscard]] virtual std::uint64_t most_blocks(const BlockTable& table) const = 0;
   [[nodiscard]] virtual bool single_precision() const = 0;
 };
 
@@ -67,9 +69,11 @@ void lay_out(BlockTable& table, const blobs::Cells& lower, const blobs::Cells& u
 
 /// The triangles of one tile, a range of the mesh.
 struct TileTriangles {
+  static constexpr std::size_t kNone = ~std::size_t{0};
   const Block* block;
   unsigned tile;
   std::size_t first, count;
+  std::size_t last;  ///< where they began in the last mesh, if they and their vertices are as they were; else kNone
 };
 
 /// A run of numbers that moves as a whole.
@@ -83,25 +87,11 @@ struct Run {
 struct MeshScratch {
   std::vector<EdgePoint> point;      ///< of the vertices, block by block from Block::first_point on
   std::vector<Run> stayed;           ///< vertices that are those of the last mesh, in rising order
-  std::vector<TileTriangles> tiles;
-  std::vector<std::array<std::uint32_t, 3>> triangle, middle;
-  std::vector<std::uint32_t> start, target, edge;
-  [[nodiscard]] std::size_t bytes() const {
-    return point.capacity() * sizeof(EdgePoint) + stayed.capacity() * sizeof(Run) + tiles.capacity() * sizeof(TileTriangles) +
-           (triangle.capacity() + middle.capacity()) * sizeof(triangle[0]) +
-           (start.capacity() + target.capacity() + edge.capacity()) * sizeof(std::uint32_t);
-  }
+  [[nodiscard]] std::size_t bytes() const { return point.capacity() * sizeof(EdgePoint) + stayed.capacity() * sizeof(Run); }
 };
 
 /// Counts, numbers, solves and joins everything; what did not change is taken from the last mesh.
 void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice, const Executor& executor,
               MeshScratch& scratch, Mesh& mesh);
-
-/// The tiles that hold triangles, in their order.
-void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles);
-
-/// Cuts every triangle into four at the middles of its edges, which are moved to the surface.
-/// @pre the mesh is closed and oriented
-void refine(const Sampler& sampler, const Lattice& lattice, const Executor& executor, MeshScratch& scratch, Mesh& mesh);
 
 }  // namespace supple::implicit::march

@@ -90,9 +90,10 @@ class ViewSampler final : public Sampler {
     });
   }
 
-  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals) const override {
+  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals, Box& asked) const override {
+    constexpr int kIterations = 50;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Projection found = project_to_surface(field_, points[i]);
+      const Projection found = project_to_surface(field_, points[i], kIterations, &asked);
       if (!found.converged) {  // left where it is, in the middle between two vertices
         Vec3 gradient;
         (void)field_.value(points[i], gradient);
@@ -102,6 +103,15 @@ class ViewSampler final : public Sampler {
       points[i] = found.point;
       normals[i] = found.normal;
     }
+  }
+
+  [[nodiscard]] std::uint64_t most_blocks(const BlockTable&) const override {
+    const lattice::BlockRange range = lattice::block_range(field_.surface_box(), lattice_, 1);
+    if (range.empty()) return 0;
+    const auto [lower, upper] = nodes_of(std::array{range.lower, range.upper});
+    std::uint64_t blocks = 1;
+    for (std::size_t k = 0; k < 3; ++k) blocks *= static_cast<std::uint64_t>((upper[k] >> 4) - (lower[k] >> 4) + 1);
+    return blocks;
   }
 
   [[nodiscard]] bool single_precision() const override { return false; }

@@ -55,6 +55,33 @@ TEST(ErrorSearch, EndsAtTheFirstLevelThatIsSureToDoAndTriesFew) {
   EXPECT_EQ(search(2.0, kTwo, 0).level, std::vector<int>{0});
 }
 
+// A mesher that knows only that so many levels are left, at least, tries and refuses what one does that knows how many.
+TEST(ErrorSearch, CountsLevelsThatAreLeftOnlyWhereThatMayMatter) {
+  for (const double factor : {kTwo, kOne}) {
+    for (const double wanted : {0.3, 1e-2, 1e-3, 1e-12}) {
+      for (const int levels : {0, 1, 3, 6, 9, 20}) {
+        const Search known = search(wanted, factor, levels);
+        for (const int fewer : {0, 1, 2, 5, 30}) {
+          Search found;
+          int counted = 0;
+          try {
+            make_within({.error = wanted, .first = 1.0}, [&](int level) {
+              found.level.push_back(level);
+              return LevelTry{.error = std::pow(factor, level), .telling = level >= 4, .levels_left = std::max(levels - level - fewer, 0),
+                              .count_levels_left = [&counted, levels, level] { return ++counted, levels - level; }};
+            });
+          } catch (const Error& error) {
+            found.refused = error.what();
+          }
+          EXPECT_EQ(found.level, known.level) << factor << ' ' << wanted << ' ' << levels << ' ' << fewer;
+          EXPECT_EQ(found.refused, known.refused);
+          if (levels == 20 && fewer < 5 && known.refused.empty()) EXPECT_EQ(counted, 0) << wanted;
+        }
+      }
+    }
+  }
+}
+
 TEST(ErrorSearch, RefusesEarlyWithAHintThatHolds) {
   for (const double factor : {kTwo, kOne}) {
     for (const int levels : {5, 12, 23}) {

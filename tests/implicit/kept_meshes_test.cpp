@@ -9,6 +9,8 @@
 
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
+#include "supple/core/error.h"
+#include "supple/core/hash.h"
 #include "supple/implicit/convolution.h"
 #include "supple/implicit/creases.h"
 #include "supple/implicit/march_cubes.h"
@@ -144,6 +146,54 @@ TEST(KeptMeshes, WithCreasesAreThoseOfAFreshMesherWhateverMoves) {
   }
 }
 
+/// What a mesher makes to an error, or what it says where it makes nothing.
+template <class Mesher>
+std::string within_error(Mesher& mesher, const Body& body, double error, const Executor& executor, MarchCounts* counts = nullptr) {
+  MarchCounts local;
+  MarchCounts& count = counts != nullptr ? *counts : local;
+  try {
+    const Mesh& mesh = mesher.make(body.field, {.lattice = lattice_of(0.0), .error = error}, executor, &count);
+    return to_hex(hash_of(mesh)) + ' ' + std::to_string(count.cell) + ' ' + std::to_string(count.refinements) + ' ' + std::to_string(1e9 * count.error);
+  } catch (const Error& refused) {
+    return refused.what();
+  }
+}
+
+/// Meshes of a body that changes, to an error that does, too, and is out of reach once.
+template <class Mesher>
+void expect_fresh_to_an_error(Body body, double error, const Executor& executor, bool set_culling = false) {
+  Random random(43);
+  Mesher mesher;
+  for (std::uint32_t round = 0; round < kRounds; ++round) {
+    const std::string what = change(body, round, random);
+    body.place();
+    for (const double wanted : {error, round % 5 == 3 ? 1e-12 : error, round % 4 == 2 ? 0.4 * error : error}) {
+      const std::string kept = within_error(mesher, body, wanted, executor);
+      if (set_culling) body.field.set_culling(false);
+      Mesher fresh;
+      EXPECT_EQ(kept, within_error(fresh, body, wanted, Executor(1))) << round << ": " << what << " to " << wanted;
+      body.field.set_culling(true);
+    }
+  }
+}
+
+TEST_P(KeptMesh, ToAnErrorIsThatOfAFreshMesherWhateverMoves) {
+  const auto [rule, threads, parts] = GetParam();
+  if (parts > 64) GTEST_SKIP() << "few tell";
+  expect_fresh_to_an_error<CubeMesher>(mixed_body(1, rule, parts), 0.004, Executor(threads), true);
+}
+
+TEST(KeptMeshes, OfPointsToAnErrorAreThoseOfAFreshMesher) {
+  for (const int threads : {1, 2}) {
+    Body body = random_body({.seed = 5, .parts = 12, .half_width = 0.8, .least_radius = 0.35, .largest_radius = 0.5, .only_points = true});
+    expect_fresh_to_an_error<CubeMesher>(std::move(body), 0.0005, Executor(threads));
+  }
+}
+
+TEST(KeptMeshes, WithCreasesToAnErrorAreThoseOfAFreshMesher) {
+  for (const int threads : {1, 2}) expect_fresh_to_an_error<CreaseMesher>(mixed_body(3, BlendRule::Graph, 12), 0.01, Executor(threads));
+}
+
 // Values are sums of few primitives: those of other places, signs and roots are kept.
 TEST(KeptMeshes, SampleOnlyWhatMovedPrimitivesReach) {
   for (const BlendRule rule : kRules) {
@@ -221,10 +271,74 @@ TEST(KeptMeshes, WithCreasesFollowOneBallAfterTheOther) {
     EXPECT_LT(counts.tiles_sampled, all.tiles_sampled / 4);
     EXPECT_EQ(hash_of(kept), hash_of(march_creases(body.field, options, Executor(1)))) << i;
   }
-  // To an error nothing is kept, and from there on as before.
+  // Meshes to an error between them change nothing.
   const MarchOptions within{.lattice = {.origin = options.lattice.origin, .cell = 0.0}, .error = 0.02};
   EXPECT_EQ(hash_of(mesher.make(body.field, within, Executor(2))), hash_of(march_creases(body.field, within, Executor(1))));
   EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(2))), hash_of(march_creases(body.field, options, Executor(1))));
+}
+
+/// Calls use(body, mesher of its kind, which keeps at most so much) for bodies of every kind of sampler and mesher.
+template <class Use>
+void for_kinds(const Use& use) {
+  Body points = random_body({.seed = 5, .parts = 200, .half_width = 1.5, .least_radius = 0.25, .largest_radius = 0.3, .only_points = true});
+  use(points, [](auto... most) { return CubeMesher(most...); });
+  Body shapes = random_body({.seed = 3, .parts = 200, .half_width = 1.5, .least_radius = 0.25, .largest_radius = 0.35});
+  use(shapes, [](auto... most) { return CubeMesher(most...); });
+  Body rows = rows_of_balls();
+  use(rows, [](auto... most) { return CreaseMesher(most...); });
+}
+
+TEST(KeptMeshes, ToAnErrorAreMadeAnewOnlyWhereSomethingMoved) {
+  constexpr double kError = 0.004;
+  for_kinds([&](Body& body, const auto& mesher_of) {
+    auto mesher = mesher_of();
+    MarchCounts all, counts;
+    const std::string first = within_error(mesher, body, kError, Executor(1), &all);
+    EXPECT_EQ(within_error(mesher, body, kError, Executor(1), &counts), first);
+    EXPECT_EQ(counts.tiles_sampled, 0u);
+    EXPECT_GT(counts.bytes, 0u);
+    body.parts[7].position += Vec3(0.01, 0.0, 0.005);
+    body.place();
+    (void)within_error(mesher, body, kError, Executor(1), &counts);
+    EXPECT_GT(counts.tiles_sampled, 0u);
+    EXPECT_LT(counts.tiles_sampled, all.tiles_sampled / 3);
+  });
+}
+
+TEST(KeptMeshes, ToAnErrorTakeNoMoreThanAllowed) {
+  constexpr double kError = 0.004;
+  for_kinds([&](Body& body, const auto& mesher_of) {
+    auto mesher = mesher_of();
+    MarchCounts all, counts;
+    (void)within_error(mesher, body, kError, Executor(1), &all);
+    const std::string made = within_error(mesher, body, kError, Executor(1), &counts);
+    const std::uint64_t bytes = counts.bytes;
+    auto less = mesher_of(bytes), none = mesher_of(std::uint64_t{0});
+    for (int round = 0; round < 3; ++round) {
+      EXPECT_EQ(within_error(less, body, kError, Executor(1), &counts), made);
+      EXPECT_LT(counts.bytes, bytes);
+      EXPECT_GT(counts.bytes, 0u);
+      EXPECT_EQ(counts.tiles_sampled > 0 && counts.tiles_sampled < all.tiles_sampled, round > 0);  // the coarsest is made anew
+      EXPECT_EQ(within_error(none, body, kError, Executor(1), &counts), made);
+      EXPECT_EQ(counts.bytes, 0u);
+      EXPECT_GE(counts.tiles_sampled, all.tiles_sampled);
+    }
+  });
+}
+
+TEST(KeptMeshes, KeepRefinedVerticesWhereNothingMoved) {
+  Body body = random_body({.seed = 3, .parts = 100, .half_width = 1.2, .least_radius = 0.25, .largest_radius = 0.35});
+  for (const bool points : {false, true}) {
+    if (points) body = random_body({.seed = 4, .parts = 100, .half_width = 1.2, .least_radius = 0.25, .largest_radius = 0.35, .only_points = true});
+    CubeMesher mesher;
+    Random random(5);
+    for (int round = 0; round < 8; ++round) {
+      const MarchOptions options{.lattice = lattice_of(0.08), .refinements = std::array{1, 2, 0}[static_cast<std::size_t>(round % 3 == 2 && round > 4 ? 2 : round / 3 % 2)]};
+      if (round != 1) body.parts[random.below(100)].position += random.in_box(0.03);
+      body.place();
+      EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(2))), hash_of(march_cubes(body.field, options, Executor(1)))) << round;
+    }
+  }
 }
 
 // One mesher for a body of Wyvill points and another of capsules in turn, and on other lattices.

@@ -29,10 +29,12 @@ namespace supple::implicit {
                                  MarchCounts* counts = nullptr);
 
 /// Meshes one body with creases again and again: what moved primitives do not reach is kept as by CubeMesher, and so are the nodes that
-/// its vertices belong to and the points of its creases. The result is that of march_creases, bit by bit.
+/// its vertices belong to and the points of its creases. With options.error all meshes that are tried are kept so, and errors of their
+/// triangles. The result, and what is tried and refused, is that of march_creases, bit by bit.
 class CreaseMesher {
  public:
-  CreaseMesher();
+  /// @param most_kept  of all meshes that were tried with options.error [byte]; where they need more, the coarsest are made anew
+  explicit CreaseMesher(std::uint64_t most_kept = kMostKeptToError);
   ~CreaseMesher();
   CreaseMesher(CreaseMesher&&) noexcept;
   CreaseMesher& operator=(CreaseMesher&&) noexcept;
@@ -42,6 +44,7 @@ class CreaseMesher {
 
  private:
   struct Impl;
+  std::uint64_t most_kept_;
   std::unique_ptr<Impl> impl_;  ///< made with the first mesh
 };
 

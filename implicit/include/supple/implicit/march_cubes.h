@@ -33,6 +33,8 @@ struct MarchCounts {
 /// Lattice nodes in the box of a body that may be asked for.
 inline constexpr std::uint64_t kMarchNodes = 1'000'000'000;
 inline constexpr int kMostRefinements = 4;
+/// What a mesher of a body keeps at most of the meshes that it tried to reach an error [byte]. If the last alone needs more, nothing is kept.
+inline constexpr std::uint64_t kMostKeptToError = std::uint64_t{1} << 30;
 
 struct MarchOptions {
   Lattice lattice;
@@ -46,11 +48,13 @@ struct MarchOptions {
 
 /// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh that no moved
 /// primitive reaches; the result is what a fresh mesher gives, bit by bit. Primitives are compared by their numbers with those
-/// of the last call. All is made anew when half of them moved or another lattice, iso value or blend is given, and,
-/// but for Wyvill points, with options.error. Fields that are no Field are sampled anew in each call.
+/// of the last call. All is made anew when half of them moved or another lattice, iso value or blend is given. Refined meshes keep the
+/// vertices that such primitives do not reach. With options.error all meshes that are tried are kept, and errors of their triangles: meshes,
+/// what is tried and what is refused are those of a fresh mesher. Fields that are no Field are sampled anew in each call.
 class CubeMesher {
  public:
-  CubeMesher();
+  /// @param most_kept  of all meshes that were tried with options.error [byte]; where they need more, the coarsest are made anew
+  explicit CubeMesher(std::uint64_t most_kept = kMostKeptToError);
   ~CubeMesher();
   CubeMesher(CubeMesher&&) noexcept;
   CubeMesher& operator=(CubeMesher&&) noexcept;
