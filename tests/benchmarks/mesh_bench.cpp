@@ -7,6 +7,7 @@
 ///                                              and back, with a bounded error (needs the component supple_cgal)
 ///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
 ///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the primitives moved;
+///                                              /within: the same of meshes to an error of a tenth of a cell;
 ///                                              /field: the field stage against its floors; /searched, only by its whole name:
 ///                                              cubes and the pieces that they miss
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
@@ -204,7 +205,7 @@ void measure_grid(const std::string& name, Body& body, const Lattice& lattice) {
 
 /// @tparam Mesher  CubeMesher or CreaseMesher
 template <class Mesher>
-void measure_moved(const std::string& name, Body& body, const Lattice& lattice) {
+void measure_moved(const std::string& name, Body& body, const MarchOptions& options) {
   const Executor executor(1);
   Mesher mesher, fresh;
   MarchCounts counts;
@@ -226,20 +227,20 @@ void measure_moved(const std::string& name, Body& body, const Lattice& lattice) 
   for (int repeat = 0; repeat < 100 && (repeat < 4 || total < 1.5); ++repeat) {
     move_some(repeat);
     double begin = cpu_seconds();
-    const Mesh& kept = mesher.make(body.field, {.lattice = lattice}, executor, &counts);
+    const Mesh& kept = mesher.make(body.field, options, executor, &counts);
     const double once = cpu_seconds() - begin;
     if (repeat > 0) moved = std::min(moved, once);
     mesh = kept;
     start_afresh();
     begin = cpu_seconds();
-    const Mesh& made = fresh.make(body.field, {.lattice = lattice}, executor);
+    const Mesh& made = fresh.make(body.field, options, executor);
     const double all = cpu_seconds() - begin;
     whole = std::min(whole, all);
     if (hash_of(made) != hash_of(mesh)) std::printf("%s: differs from a fresh mesh\n", name.c_str());
     total += all;
   }
   // Above, what is kept has left the nearer caches from call to call; here frame follows frame.
-  double next = 1e300, next_whole = 1e300;
+  double next = 1e300, next_whole = 1e300, still = 1e300;
   for (const bool keeps : {true, false}) {
     double& best = keeps ? next : next_whole;
     total = 0.0;
@@ -247,17 +248,23 @@ void measure_moved(const std::string& name, Body& body, const Lattice& lattice) 
       move_some(repeat);
       if (!keeps) start_afresh();
       const double begin = cpu_seconds();
-      (void)(keeps ? mesher : fresh).make(body.field, {.lattice = lattice}, executor);
+      (void)(keeps ? mesher : fresh).make(body.field, options, executor);
       const double once = cpu_seconds() - begin;
       best = std::min(best, once);
       total += once;
     }
   }
+  const auto sampled = static_cast<unsigned long long>(counts.tiles_sampled);
+  for (int repeat = 0; repeat < 4; ++repeat) {
+    const double begin = cpu_seconds();
+    (void)mesher.make(body.field, options, executor, &counts);
+    if (repeat > 0) still = std::min(still, cpu_seconds() - begin);
+  }
   std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"whole_cpu_ms\": %.5g, "
-              "\"share\": %.3g, \"in_a_row_cpu_ms\": %.5g, \"whole_in_a_row_cpu_ms\": %.5g, \"share_in_a_row\": %.3g, "
-              "\"tiles_sampled\": %llu, \"items\": %zu, \"hash\": \"%s\"}\n",
-              name.c_str(), 1e3 * moved, 1e3 * whole, moved / whole, 1e3 * next, 1e3 * next_whole, next / next_whole,
-              static_cast<unsigned long long>(counts.tiles_sampled), mesh.triangle_count(), hash_of(mesh).c_str());
+              "\"share\": %.3g, \"in_a_row_cpu_ms\": %.5g, \"whole_in_a_row_cpu_ms\": %.5g, \"share_in_a_row\": %.3g, \"still_cpu_ms\": %.4g, "
+              "\"kept_mb\": %.4g, \"tiles_sampled\": %llu, \"items\": %zu, \"hash\": \"%s\"}\n",
+              name.c_str(), 1e3 * moved, 1e3 * whole, moved / whole, 1e3 * next, 1e3 * next_whole, next / next_whole, 1e3 * still,
+              1e-6 * static_cast<double>(counts.bytes), sampled, mesh.triangle_count(), hash_of(mesh).c_str());
   std::fflush(stdout);
 }
 
@@ -569,12 +576,16 @@ int main(int argc, char** argv) {
         if (name.compare(0, filter.size(), filter) != 0 || (method.refinements == -3 && name != filter)) continue;
         measure(name, body, frame.lattice(cells), method, two_sided);
       }
-      const std::string name = body_name + '/' + std::to_string(cells) + "/moved";
-      if (body_name != "w1" && name.compare(0, filter.size(), filter) == 0) {
+      const Lattice lattice = frame.lattice(cells);
+      for (const bool within : {false, true}) {
+        const std::string name = body_name + '/' + std::to_string(cells) + (within ? "/within" : "/moved");
+        if (body_name == "w1" || name.compare(0, filter.size(), filter) != 0 || (within && name != filter)) continue;
+        MarchOptions options{.lattice = lattice};
+        if (within) options = {.lattice = {.origin = lattice.origin, .cell = 0.0}, .error = 0.1 * lattice.cell};
         if (body.skeleton.blend.rule == BlendRule::Graph) {
-          measure_moved<CreaseMesher>(name, body, frame.lattice(cells));
+          measure_moved<CreaseMesher>(name, body, options);
         } else {
-          measure_moved<CubeMesher>(name, body, frame.lattice(cells));
+          measure_moved<CubeMesher>(name, body, options);
         }
       }
       const std::string field = body_name + '/' + std::to_string(cells) + "/field";
