@@ -757,7 +757,9 @@ struct CreaseMesher::Impl {
   march::TriedLattices<CreaseMarcher> tried;
   Mesh alone;           ///< where nothing is kept of it
 
-  const Mesh& make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count);
+  /// As CubeMesher::Impl::make_to_error
+  const Mesh* make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
+                            std::uint64_t most = ~std::uint64_t{0});
 };
 
 CreaseMesher::CreaseMesher(std::uint64_t most_kept) : most_kept_(most_kept) {}
@@ -765,15 +767,18 @@ CreaseMesher::~CreaseMesher() = default;
 CreaseMesher::CreaseMesher(CreaseMesher&&) noexcept = default;
 CreaseMesher& CreaseMesher::operator=(CreaseMesher&&) noexcept = default;
 
-const Mesh& CreaseMesher::Impl::make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count) {
+const Mesh* CreaseMesher::Impl::make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
+                                              std::uint64_t most) {
   const double first = first_cell(field, options.lattice.cell);
   const Mesh* mesh = nullptr;
   CreaseMarcher* last = nullptr;
   double cell = 0.0;
   std::uint64_t sampled = 0;  // of all meshes
+  march::TriedSize size(field, options.lattice.origin, most);
   tried.begin_call();
   make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
     cell = spacing_at(first, level);
+    if (size.exceeds(level, cell, executor)) return LevelTry{};  // ends the search
     CreaseMarcher& on = tried.use(cell).first;
     last = &on;
     mesh = &on.make(field, {.origin = options.lattice.origin, .cell = cell}, options.skip, executor);
@@ -781,16 +786,18 @@ const Mesh& CreaseMesher::Impl::make_to_error(const Field& field, const MarchOpt
     count = on.counts();
     count.error = error;
     sampled += count.tiles_sampled;
+    size.add(level, *mesh);
     tried.fit(cell);
     return march::try_kept(error, *mesh, on, executor);
   });
+  if (size.is_exceeded()) return nullptr;
   count.tiles_sampled = sampled;
   const bool fits = tried.end_call(cell);
   count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;
-  if (fits) return *mesh;
+  if (fits) return mesh;
   alone = last->take_mesh();
   tried.clear();
-  return alone;
+  return &alone;
 }
 
 const Mesh& CreaseMesher::make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
@@ -801,12 +808,19 @@ const Mesh& CreaseMesher::make(const Field& field, const MarchOptions& options, 
   impl_->alone = {};
   if (options.error > 0.0) {
     impl_->fixed = {};
-    return impl_->make_to_error(field, options, executor, count);
+    return *impl_->make_to_error(field, options, executor, count);
   }
   impl_->tried.clear();
   const Mesh& mesh = impl_->fixed.make(field, options.lattice, options.skip, executor);
   count = impl_->fixed.counts();
   return mesh;
+}
+
+void CreaseMesher::expect_error(const Field& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles) {
+  SUPPLE_EXPECTS(field.packed().blend.rule() == BlendRule::Graph && options.error > 0.0);
+  if (impl_ == nullptr) impl_ = std::make_unique<Impl>(most_kept_);
+  MarchCounts count;
+  (void)impl_->make_to_error(field, options, executor, count, most_triangles);
 }
 
 Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {

@@ -61,7 +61,9 @@ struct CubeMesher::Impl {
   march::TriedLattices<march::RefinedMarcher> tried;
   march::CutScratch scratch;
   Mesh alone;  ///< where nothing is kept of it
-  const Mesh& make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count);
+  /// @param most  triangles of a mesh that is made; where the search asks for more, it ends. @return null then
+  const Mesh* make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
+                            std::uint64_t most = ~std::uint64_t{0});
 };
 
 CubeMesher::CubeMesher(std::uint64_t most_kept) : impl_(std::make_unique<Impl>(most_kept)) {}
@@ -84,15 +86,18 @@ LevelPlan plan_of(double first_cell, int level) {
 
 }  // namespace
 
-const Mesh& CubeMesher::Impl::make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count) {
+const Mesh* CubeMesher::Impl::make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
+                                            std::uint64_t most) {
   const double first = first_cell(field, options.lattice.cell);
   const Mesh* mesh = nullptr;
   march::RefinedMarcher* last = nullptr;
   LevelPlan plan;
   std::uint64_t sampled = 0, values = 0;  // of all meshes
+  march::TriedSize size(field, options.lattice.origin, most);
   tried.begin_call();
   make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
     plan = plan_of(first, level);
+    if (size.exceeds(level, plan.cell, executor)) return LevelTry{};  // ends the search
     const auto [on, first_time] = tried.use(plan.cell);
     last = &on;
     if (first_time) {
@@ -105,17 +110,19 @@ const Mesh& CubeMesher::Impl::make_to_error(const FieldView& field, const MarchO
     count = on.counts();
     count.refinements = plan.refinements;
     count.error = error;
+    size.add(level, *mesh);
     tried.fit(plan.cell);
     return march::try_kept(error, *mesh, on, executor);
   });
+  if (size.is_exceeded()) return nullptr;
   count.tiles_sampled = sampled;
   count.kernel_values = values;
   const bool fits = tried.end_call(plan.cell);
   count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;
-  if (fits) return *mesh;
+  if (fits) return mesh;
   alone = last->take_mesh(plan.refinements);
   tried.clear();
-  return alone;
+  return &alone;
 }
 
 const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options, const Executor& executor,
@@ -126,7 +133,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   impl_->alone = {};
   if (options.error > 0.0) {
     impl_->fixed = {};
-    return impl_->make_to_error(field, options, executor, count);
+    return *impl_->make_to_error(field, options, executor, count);
   }
   impl_->tried.clear();
   impl_->fixed.march(field, options.lattice, options.skip, executor);
@@ -134,6 +141,12 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   count = impl_->fixed.counts();
   count.refinements = options.refinements;
   return mesh;
+}
+
+void CubeMesher::expect_error(const FieldView& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles) {
+  SUPPLE_EXPECTS(options.error > 0.0);
+  MarchCounts count;
+  (void)impl_->make_to_error(field, options, executor, count, most_triangles);
 }
 
 void CubeMesher::forget() {

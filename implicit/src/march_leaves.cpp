@@ -37,6 +37,11 @@ blobs::Cells first_node(const BlockCoord& leaf) {
 
 Box leaf_box(const BlockCoord& leaf, const Lattice& lattice) { return nodes_box(first_node(leaf), kLeafNodes, lattice); }
 
+bool may_meet(std::span<const Reach> reaches, const Box& box) {
+  constexpr std::size_t kMany = 256;
+  return reaches.size() > kMany || std::any_of(reaches.begin(), reaches.end(), [&](const Reach& reach) { return reach.meets(box); });
+}
+
 void ChangedTiles::reset(const lattice::BlockRange& range) {
   range_ = range;
   tiles_.assign(range.count(), 0);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,9 @@ using lattice::BlockCoord;
 
 /// The closed box of a leaf: it ends at the first nodes of the next ones.
 [[nodiscard]] Box leaf_box(const BlockCoord& leaf, const Lattice& lattice);
+
+/// Whether one of these meets a box, or they are so many that looking at each would not be worth it.
+[[nodiscard]] bool may_meet(std::span<const Reach> reaches, const Box& box);
 
 /// Tiles of leaves, those of a leaf as bits x + 2 y + 4 z; beyond a range of leaves there are none.
 class ChangedTiles {
@@ -55,8 +59,11 @@ struct ViewMemory {
   void forget() { changes.forget(); }
   /// Whether values next to the surface, as far as a leaf, may be different in a box.
   [[nodiscard]] bool differs(const Box& box) const { return all || changed.meets(box, lattice); }
-  /// The same anywhere.
-  [[nodiscard]] bool differs_at(const Box& asked) const { return all || !changed.covers(asked, lattice) || changed.meets(asked, lattice); }
+  /// Whether values anywhere in a box may be different.
+  [[nodiscard]] bool differs_at(const Box& asked) const {
+    if (all || !changed.covers(asked, lattice)) return true;
+    return changed.meets(asked, lattice) && may_meet(changes.reaches(), asked);
+  }
   /// Sees what is different in a field that is to be sampled, and `leaf` as it was.
   void compare(const FieldView& field, const Lattice& now);
   [[nodiscard]] std::size_t bytes() const { return changes.bytes() + leaf.capacity() * sizeof(leaf[0]) + changed.bytes(); }

@@ -88,6 +88,7 @@ void RefinedMarcher::find_changes() {
   all_differs_ = range.count() > kMostLeaves;
   if (all_differs_) return;
   blob_changes_.reset(range);
+  blob_reaches_.clear();
   for (const blobs::BlobGrid::Ball& ball : grid.change().balls) {
     const Vec3 centre = lattice.origin + lattice.cell * Vec3(ball.centre[0], ball.centre[1], ball.centre[2]);
     const double radius = ball.radius * lattice.cell;  // larger than the support by more than round-off
@@ -95,14 +96,16 @@ void RefinedMarcher::find_changes() {
     for (std::size_t k = 0; k < 3; ++k) reach.rounded.lower[k] = reach.rounded.upper[k] = centre[static_cast<Eigen::Index>(k)];
     reach.rounded.reach2 = radius * radius;
     blob_changes_.add(reach, lattice);
+    blob_reaches_.push_back(reach);
   }
 }
 
 bool RefinedMarcher::differs(const Box& asked) const {
   if (asked.empty()) return false;
   if (all_differs_) return true;
-  const ChangedTiles& changed = marcher_.sampler->single_precision() ? blob_changes_ : marcher_.memory.view.changed;
-  return !changed.covers(asked, marcher_.lattice) || changed.meets(asked, marcher_.lattice);
+  if (!marcher_.sampler->single_precision()) return marcher_.memory.view.differs_at(asked);
+  const Lattice& lattice = marcher_.lattice;
+  return !blob_changes_.covers(asked, lattice) || (blob_changes_.meets(asked, lattice) && may_meet(blob_reaches_, asked));
 }
 
 bool RefinedMarcher::is_same(const TileTriangles& tile, int step) {
@@ -261,7 +264,7 @@ double RefinedMarcher::error(int refinements, const Executor& executor) {
 
 std::uint64_t RefinedMarcher::bytes() const {
   std::uint64_t sum = counts_.bytes + bytes_of(marcher_.mesh) + bytes_of(tiles_) + bytes_of(first_) + bytes_of(last_first_) +
-                      bytes_of(last_tile_) + blob_changes_.bytes();
+                      bytes_of(last_tile_) + blob_changes_.bytes() + bytes_of(blob_reaches_);
   for (const auto* steps : {&now_, &last_}) {
     for (const Step& step : *steps) sum += bytes_of(step.mesh) + bytes_of(step.added) + bytes_of(step.error) + bytes_of(step.same);
   }

@@ -85,6 +85,7 @@ class RefinedMarcher {
   std::vector<std::size_t> first_, last_first_;  ///< of the triangles of tiles, now and in the last call
   std::vector<std::uint32_t> last_tile_;         ///< by tile: its number in the last call; kNone where its triangles are others
   ChangedTiles blob_changes_;         ///< of a body of Wyvill points
+  std::vector<Reach> blob_reaches_;   ///< that these are of
   bool all_differs_ = true;
   std::array<Step, kMostRefinements + 1> now_, last_;
 };

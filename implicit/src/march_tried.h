@@ -2,6 +2,7 @@
 /// What a mesher keeps of the meshes that its last call tried to reach an error.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -10,6 +11,9 @@
 
 #include "error_search.h"
 #include "march_mesher.h"
+#include "polygonise_blocks.h"
+#include "supple/core/error.h"
+#include "supple/implicit/mesh_limits.h"
 
 namespace supple::implicit::march {
 
@@ -50,6 +54,44 @@ class TriedLattices {
   };
   std::uint64_t most_;
   std::map<double, Entry, std::greater<>> on_;  ///< the coarsest first
+};
+
+/// How large the meshes of a search get, twice as large from level to level.
+class TriedSize {
+ public:
+  /// @param most  triangles
+  TriedSize(const FieldView& field, const Vec3& origin, std::uint64_t most) : field_(field), origin_(origin), most_(most) {}
+  /// Whether a level's mesh is to be expected to have more. @throws Error{Limit} as that of level 0 would
+  bool exceeds(int level, double cell, const Executor& executor) {
+    if (most_ == ~std::uint64_t{0}) return false;
+    exceeded_ = level == 0 ? exceeds_first({.origin = origin_, .cell = cell}, executor)
+                           : std::ldexp(static_cast<double>(triangles_), level - level_) > static_cast<double>(most_);
+    return exceeded_;
+  }
+  void add(int level, const Mesh& mesh) {
+    level_ = level;
+    triangles_ = mesh.triangle_count();
+  }
+  [[nodiscard]] bool is_exceeded() const { return exceeded_; }
+
+ private:
+  [[nodiscard]] bool exceeds_first(const Lattice& lattice, const Executor& executor) const {
+    expect_marchable(field_, lattice, executor);
+    constexpr std::uint64_t kTrianglesALeaf = 100;  // of 8^3 cells that a surface crosses
+    PolygoniseCounts counts;
+    try {
+      return kTrianglesALeaf * lattice::surface_blocks(field_, lattice, executor, most_ / kTrianglesALeaf + 1, counts).block.size() > most_;
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::Limit) throw;
+      return true;
+    }
+  }
+
+  FieldView field_;
+  Vec3 origin_;
+  std::uint64_t most_, triangles_ = 0;
+  int level_ = 0;
+  bool exceeded_ = false;
 };
 
 /// tried() of a mesh. Counts decide what is tried, and those of a mesh that was kept may be others than of a fresh one: then those

@@ -312,6 +312,15 @@ bool takes_cubes(const MeshingDesc& d, const ObjectModel& object, const implicit
   return d.search.value_or(false) || implicit::estimate_routes(skeleton, supports, object.cell).prefers_cubes();
 }
 
+/// The lattice and error of marching cubes for a body of an object.
+implicit::MarchOptions march_options(const ObjectModel& object, bool skip) {
+  implicit::MarchOptions options{.lattice = {.origin = Vec3::Zero(), .cell = object.cell}, .error = object.mesh_error.value_or(0.0), .skip = skip};
+  if (object.mesh_error && !object.cell_is_stated) options.lattice.cell = 0.0;
+  return options;
+}
+
+bool takes_creases(const MeshingDesc& d, const implicit::Field& field) { return d.method == MeshingName::Auto && implicit::has_creases(field); }
+
 /// The surface of a body that touches no other. @param bodies  that its object has
 Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, StageProfile& profile, Frame& frame) {
   const Model& model = context.model;
@@ -322,9 +331,8 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
   try {
     if (!takes_cubes(d, object, context.bodies[i].skeleton, frame.placed[i].support)) return mesh_otherwise(context, i, lattice, profile, frame);
     implicit::MarchCounts marched;
-    implicit::MarchOptions options{.lattice = lattice, .error = object.mesh_error.value_or(0.0), .skip = context.skip};
-    if (object.mesh_error && !object.cell_is_stated) options.lattice.cell = 0.0;
-    Mesh mesh = d.method == MeshingName::Auto && implicit::has_creases(field)
+    const implicit::MarchOptions options = march_options(object, context.skip);
+    Mesh mesh = takes_creases(d, field)
                     ? frame.creases[i].make(field, options, context.executor, &marched)
                     : frame.mesher[i].make(field, options, context.executor, &marched);
     if (marched.blunt_cells > 0) frame.missed.blunt[object.name] += marched.blunt_cells;
@@ -347,6 +355,18 @@ void expect_size_alone(const MeshingDesc& d, const ObjectModel& object, const im
     implicit::expect_divisible({&field, 1}, lattice, executor);
   } else {
     implicit::expect_griddable(field, {.lattice = lattice}, executor);
+  }
+}
+
+/// @throws Error{Limit} as mesh_alone would for the error asked for, as far as meshes tell that take about a second
+/// @param bodies  that share a few seconds
+void expect_error_alone(const MeshingDesc& d, const ObjectModel& object, const implicit::Field& field, std::size_t bodies, const Executor& executor) {
+  constexpr std::uint64_t kTrianglesASecond = 200'000, kSeconds = 10;
+  const std::uint64_t most = std::min(kTrianglesASecond, kSeconds * kTrianglesASecond / bodies);
+  if (takes_creases(d, field)) {
+    implicit::CreaseMesher().expect_error(field, march_options(object, true), executor, most);
+  } else {
+    implicit::CubeMesher().expect_error(field, march_options(object, true), executor, most);
   }
 }
 
@@ -493,14 +513,18 @@ void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Bo
   implicit::PlacedSkeleton placed;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     const ObjectModel& object = model.objects[bodies[i].object];
-    if (bodies[i].skeleton.primitive.empty() || object.mesh_error) continue;
+    if (bodies[i].skeleton.primitive.empty()) continue;
     if (std::binary_search(division.body.begin(), division.body.end(), i) || (shown && !shown(fields[i].surface_box()))) continue;
     core::gather_poses(simulation.state().particles, bodies[i].particle, pose);
     implicit::place_skeleton(bodies[i].skeleton, pose, placed);
     try {
-      expect_size_alone(d, object, bodies[i].skeleton, placed.support, fields[i], executor);
+      if (object.mesh_error && takes_cubes(d, object, bodies[i].skeleton, placed.support)) {
+        expect_error_alone(d, object, fields[i], bodies.size(), executor);
+      } else if (!object.mesh_error) {
+        expect_size_alone(d, object, bodies[i].skeleton, placed.support, fields[i], executor);
+      }
     } catch (const Error& failure) {
-      throw with_keys_of(model, failure, &object, nullptr);
+      throw with_keys_of(model, failure, &object, &object);
     }
   }
 } catch (const Error& failure) {

@@ -335,6 +335,24 @@ TEST(KeptMeshes, ToAnErrorTakeNoMoreThanAllowed) {
   });
 }
 
+TEST(MeshLimits, TellOfAnErrorOutOfReachOfABodyWhatItsMeshWouldWhereThatIsSoon) {
+  for_kinds([&](Body& body, const auto& mesher_of) {
+    const auto told = [&](double error, std::uint64_t most) -> std::string {
+      auto mesher = mesher_of();
+      try {
+        mesher.expect_error(body.field, {.lattice = lattice_of(0.0), .error = error}, Executor(1), most);
+      } catch (const Error& refused) {
+        return refused.what();
+      }
+      return {};
+    };
+    auto mesher = mesher_of();
+    EXPECT_EQ(told(1e-12, 1'000'000'000), within_error(mesher, body, 1e-12, Executor(1)));
+    EXPECT_EQ(told(1e-12, 100), "");
+    EXPECT_EQ(told(0.05, 1'000'000'000), "");
+  });
+}
+
 TEST(KeptMeshes, KeepRefinedVerticesWhereNothingMoved) {
   Body body = random_body({.seed = 3, .parts = 100, .half_width = 1.2, .least_radius = 0.25, .largest_radius = 0.35});
   for (const bool points : {false, true}) {

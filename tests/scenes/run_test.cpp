@@ -630,25 +630,27 @@ std::string told_at_the_start(const Scene& scene) {
   return "";
 }
 
-TEST_F(Run, TellsAnErrorOutOfReachWhereObjectsTouchBeforeAStepAsItRefusesIt) {
-  const auto scene_of = [](const std::string& own, const std::string& output) {
+TEST_F(Run, TellsAnErrorOutOfReachBeforeAStepAsItRefusesIt) {
+  const auto scene_of = [](const std::string& own, const std::string& output, const std::string& beside) {
     std::string objects;
-    for (const char* at : {"0", "0.8"}) {
-      objects += std::string("  - {name: ball") + (at == std::string("0") ? "" : "_beside") + ", particles: {at: [" + at +
+    for (const std::string& at : {std::string("0"), beside}) {
+      objects += std::string("  - {name: ball") + (at == "0" ? "" : "_beside") + ", particles: {at: [" + at +
                  ", 0, 0], mass: 1}, skeleton: [{shape: point, kernel: {radius: 1}}], contact: {modulus: 1e3}" + own + "}\n";
     }
     return parse_scene("schema: 1\nduration: 0.1 s\nframe_rate: 10\nobjects:\n" + objects + "output: " + output + '\n', "balls.yaml", ".");
   };
   for (const auto& [own, output, key] : {std::tuple{"", "{mesh: ply, meshing: {error: 1e-12}}", ": output.meshing.error: expected"},
                                          std::tuple{", meshing: {error: 1e-12}", "{mesh: ply}", ": objects.ball.meshing.error: expected"}}) {
-    const Scene scene = scene_of(own, output);
-    RunOptions o = options();
-    o.overwrite = true;
-    const std::string refused = run_scene(scene, o).reason;
-    EXPECT_NE(refused.find(key), std::string::npos) << refused;
-    EXPECT_EQ(told_at_the_start(scene), refused);
+    for (const char* beside : {"0.8", "3"}) {  // where they touch, and apart
+      const Scene scene = scene_of(own, output, beside);
+      RunOptions o = options();
+      o.overwrite = true;
+      const std::string refused = run_scene(scene, o).reason;
+      EXPECT_NE(refused.find(key), std::string::npos) << refused;
+      EXPECT_EQ(told_at_the_start(scene), refused);
+    }
   }
-  EXPECT_EQ(told_at_the_start(scene_of("", "{mesh: ply, meshing: {error: 0.01}}")), "");
+  for (const char* beside : {"0.8", "3"}) EXPECT_EQ(told_at_the_start(scene_of("", "{mesh: ply, meshing: {error: 0.01}}", beside)), "");
 }
 
 TEST_F(Run, TellsTooFineCellsBeforeAStepAsItRefusesThem) {

@@ -41,6 +41,8 @@ class CreaseMesher {
 
   /// @return as march_creases, valid until the next call   @pre, @throws as march_creases
   const Mesh& make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts = nullptr);
+  /// As CubeMesher::expect_error.
+  void expect_error(const Field& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles);
 
  private:
   struct Impl;

@@ -71,6 +71,8 @@ class CubeMesher {
                    MarchCounts* counts = nullptr);
   /// The next call keeps nothing but memory.
   void forget();
+  /// Makes no mesh of about most_triangles or more. @throws Error{Limit} as make, as far as that follows from coarser ones @pre options.error > 0
+  void expect_error(const FieldView& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles);
 
  private:
   struct Impl;
