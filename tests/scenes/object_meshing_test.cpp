@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <string>
 
+#include "search_files.h"
 #include "supple/core/error.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "warnings.h"
 
 namespace supple::scenes {
 namespace {
@@ -206,6 +209,25 @@ TEST(ObjectMeshing, ErrorKeepsCreasesUnlessTheyAreNotAskedFor) {
   }
   EXPECT_LE(largest, 1e-3);
   EXPECT_EQ(on_circle(meshes_of(creased("method: cubes, error: 5 mm")).front()), 0);
+}
+
+TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreCounted) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "blunt_cells";
+  for (const int frame : {1, 2}) {
+    SearchCounts counts;
+    counts.blunt["pair"] = static_cast<std::uint64_t>(2 + frame);
+    write_searches(folder, "pair", frame, counts);
+  }
+  const SearchCounts all = read_searches(folder, "pair", {}, 2);
+  EXPECT_EQ(all.blunt, (std::map<std::string, std::uint64_t>{{"pair", 7}}));
+  std::vector<std::string> warnings;
+  for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "output.meshing.method: cells whose crease is cut off, as triangles with vertices on it would cross, in the meshes of all frames: 7 of 'pair'; "
+                         "smaller cells resolve more of it");
+  set_missed(MeshingDesc{}, {}, warnings);
+  EXPECT_TRUE(warnings.empty());
+  std::filesystem::remove_all(folder);
 }
 
 TEST(ObjectMeshing, StatedCellIsTheCoarsestThatAnErrorMayTake) {
