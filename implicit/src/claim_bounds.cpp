@@ -94,7 +94,7 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
   std::array<Verdict, 8> verdict;
   if (!knows_eighths()) return verdict;
   const Vec3 half = 0.25 * box.extent();
-  const double reach = half.norm(), largest = half.maxCoeff();
+  const double reach = (half + rounding_of(box)).norm(), largest = half.maxCoeff();
   std::array<Vec3, 8> middle;
   for (unsigned c = 0; c < 8; ++c) {
     for (unsigned k = 0; k < 3; ++k) middle[c][k] = box.lower[k] + ((c >> k & 1u) != 0 ? 3.0 : 1.0) * half[k];
@@ -110,7 +110,7 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
       if (!bounds.curved.known) continue;  // the same everywhere
       bounds.term.clear();  // of the whole box
       const auto& [lower, upper] = bounds.curved.curvature;
-      const double first = slope_[i][c].cwiseAbs().dot(half) + bounds.curved.round_off, second = 0.5 * reach * reach;
+      const double first = slope_[i][c].cwiseAbs().dot(half + rounding_of(box)) + bounds.curved.round_off, second = 0.5 * reach * reach;
       bounds.value = {value_[i][c] - first + second * lower, value_[i][c] + first + second * upper};
       entry_[i].value = scaled(bounds.value, entry_[i].weight);
       bounds.hull[0] = {slope_[i][c], std::max(-lower, upper) * reach + bounds.curved.round_off / largest};

@@ -79,7 +79,7 @@ class CubeBounds {
   /// The same bodies with those of their primitives that add to them on the box that was looked at last.
   void narrow(const Candidates& from, Candidates& narrowed) const;
   /// The same verdicts on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
-  /// by values and gradients at their middles. Undecided where some claim is no sum, and between lone balls, where steps cost no more.
+  /// by values and gradients at their middles. Undecided where some claim has no bounds of second derivatives, and between lone balls, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:

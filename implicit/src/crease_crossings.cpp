@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "supple/core/error.h"
 #include "triangle_crossings.h"
 
 namespace supple::implicit {
@@ -89,7 +90,9 @@ class TakingBack {
       for (const auto& [s, t] : pairs(sought)) {
         if (!steps_.is_there(s) || !steps_.is_there(t)) continue;
         // Numbers of steps from 1 on, with 0 for what none made.
-        steps_.take_back(std::max(steps_.maker(s) + 1, steps_.maker(t) + 1) - 1, back);
+        const std::uint32_t later = std::max(steps_.maker(s) + 1, steps_.maker(t) + 1);
+        SUPPLE_EXPECTS(later > 0);
+        steps_.take_back(later - 1, back);
       }
       all.insert(all.end(), back.begin(), back.end());
       sought = std::move(back);

@@ -211,6 +211,7 @@ class Mending {
 
   /// None where the hole is not a disc, or where its border does not meet the crease at two vertices.
   [[nodiscard]] std::optional<Border> find_border() const {
+    if (open_.empty()) return std::nullopt;  // a whole component
     std::vector<std::uint32_t> loop{open_.front().first}, inside;
     for (std::uint32_t v = open_.front().second; v != loop.front();) {
       loop.push_back(v);

@@ -297,8 +297,9 @@ class Sharpener {
     const std::vector<std::uint32_t> back = take_back_crossings(mesh_.position, safe_, lattice_.cell, steps_);
     mesh_.triangle.clear();
     for (const std::uint32_t t : steps_.numbers()) mesh_.triangle.push_back(steps_[t]);
+    const std::uint64_t blunt = cut_off(back);
     leave_out_unused();
-    return cut_off(back);
+    return blunt;
   }
 
  private:
@@ -356,13 +357,14 @@ class Sharpener {
     const std::optional<CreasePoint>& point = crease_point({middle, middle, nodes});
     if (!point) return;
     // In its own cell a cone over the loop, whose edges lie in the cell's faces, crosses nothing; a little beyond, its triangles must face outward.
-    constexpr double kInside = 1e-9;
+    constexpr double kInside = 1e-9, kRounding = 1e-15;
     bool inside = true;
     const Vec3 at = (point->position - lattice_.origin) / lattice_.cell;
     for (int k = 0; k < 3; ++k) {
-      const double offset = at[k] - static_cast<double>(cell[static_cast<std::size_t>(k)]);
+      const auto place = static_cast<double>(cell[static_cast<std::size_t>(k)]);
+      const double offset = at[k] - place, margin = kInside + kRounding * std::abs(place);
       if (offset < -kBeyond || offset > 1.0 + kBeyond) return;
-      inside = inside && offset > kInside && offset < 1.0 - kInside;
+      inside = inside && offset > margin && offset < 1.0 - margin;
     }
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (!faces_out(loop[k], loop[(k + 1) % loop.size()], point->position)) return;
@@ -413,7 +415,7 @@ class Sharpener {
     std::vector<Side> sides;
     for (std::uint32_t i = 0; i < steps_.triangles().size(); ++i) {
       const auto [a, b, top] = steps_[i];
-      if (on_crease(top) && owner_[a] != owner_[b]) sides.push_back({std::min(a, b), std::max(a, b), i});
+      if (on_crease(top)) sides.push_back({std::min(a, b), std::max(a, b), i});
     }
     std::sort(sides.begin(), sides.end());
     struct Turn {
@@ -430,10 +432,11 @@ class Sharpener {
     std::stable_sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
     const auto same_points = [](const Turn& a, const Turn& b) { return a.low == b.low && a.high == b.high; };
     for (std::size_t i = 0; i < turns.size(); ++i) {
-      // Two edges in the face between two cells would both become the same one.
+      // Two edges in the face between two cells would both become the same one, or one of them would pass through the other.
       if ((i > 0 && same_points(turns[i - 1], turns[i])) || (i + 1 < turns.size() && same_points(turns[i], turns[i + 1]))) continue;
       const auto [s, t] = turns[i].triangle;
       const auto [p, q, x] = steps_[s];
+      if (owner_[p] == owner_[q]) continue;
       const std::uint32_t y = steps_[t][2];
       const auto out = [&](std::uint32_t a, std::uint32_t b, std::uint32_t own, std::uint32_t c) {
         const Vec3& origin = mesh_.position[a];

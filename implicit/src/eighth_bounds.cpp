@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "field_box_bounds.h"
 #include "field_index.h"
 
 namespace supple::implicit {
@@ -90,9 +91,9 @@ void EighthBounds::add(const Field::Index& index, const Box& box, Term& term, Su
   const Mat3 A = to_local_of(p, shape);
   const Vec3 half = 0.25 * box.extent(), middle = box.centre() - Vec3(p.position[0], p.position[1], p.position[2]);
   const Vec3 y0 = A * middle;
-  const double reach = half.norm();
+  const double reach = (half + rounding_of(box)).norm();
   // Turning the box takes some round-off.
-  const Vec3 step = A.cwiseAbs() * ((1.0 + 1e-12) * half + 16.0 * kEps * (middle.cwiseAbs() + half));
+  const Vec3 step = A.cwiseAbs() * ((1.0 + 1e-12) * half + rounding_of(box) + 16.0 * kEps * (middle.cwiseAbs() + half));
   static const std::array<Lanes, 3> kSide = [] {
     std::array<Lanes, 3> side;
     for (unsigned c = 0; c < 8; ++c) {

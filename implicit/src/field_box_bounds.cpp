@@ -94,7 +94,7 @@ void add_slope(const Field::Index& index, const Box& box, GradientBounds::Term& 
   if (scalar && !curve && shape.view.kind != ShapeKind::Triangle && shape.view.kind != ShapeKind::Polygon) return;
   term.factor = slope_range(shape.kernel, term.near2, term.far2);
   if (!std::isfinite(term.factor.lower)) return;
-  const Vec3 half = 0.5 * box.extent();
+  const Vec3 half = 0.5 * box.extent() + rounding_of(box);
   const Vec3 step = (1.0 + 1e-12) * (term.to_local.cwiseAbs() * half);
   term.low = term.high = sample.half_gradient;
   term.spread = std::sqrt(metric2_of(term.to_local)) * half.norm() * (1.0 + 1e-12);

@@ -52,6 +52,9 @@ struct GradientBounds : Field::BoxBounds {
 
 [[nodiscard]] GradientBounds bounds_with_gradient(const Field& field, const Box& box);
 
+/// What rounding of their corners may leave out between boxes side by side, far from the origin [m].
+inline Vec3 rounding_of(const Box& box) { return 4e-15 * (box.lower.cwiseAbs() + box.upper.cwiseAbs()); }
+
 /// The same in steps, of which each costs more than the one before. `bounds` keeps its memory.
 /// First by distances alone: the value, and as terms the primitives that may add to it; of a blend all at once.
 /// @param ids  of all primitives that may add to F on the box, ascending

@@ -69,9 +69,10 @@ bool decides(const Skeleton& skeleton) {
                                                    : std::any_of(skeleton.blend.node.begin(), skeleton.blend.node.end(),
                                                                  [&](std::uint32_t n) { return n != skeleton.blend.node.front(); });
   if (skeleton.blend.rule == BlendRule::Gradient && several) return false;
-  // Where two sides of a lone curve are as near, directions between both are tried.
-  return skeleton.primitive.size() == 1 || std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), [&](const Primitive& p) {
-    return p.shape == ShapeKind::Curve && bend_of(p, skeleton.iso).within_surface;
+  // Where two sides of a lone curve are as near, directions between both are tried, by a slope over squared distance that never vanishes.
+  const bool lone = skeleton.primitive.size() == 1;
+  return std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), [&](const Primitive& p) {
+    return p.shape == ShapeKind::Curve && (!lone || p.kernel.kind == KernelKind::BlancSchlick) && bend_of(p, skeleton.iso).within_surface;
   });
 }
 

@@ -26,7 +26,8 @@ bool passes(std::span<const Vec3> position, const Triangle& s, const Triangle& t
     const double length = std::max({(q - p).norm(), (b - a).norm(), (c - a).norm()}), least = kRounding * length * length * length;
     if (!((at[k] > least && at[next] < -least) || (at[k] < -least && at[next] > least))) continue;
     const double u = volume(p, q, a, b), v = volume(p, q, b, c), w = volume(p, q, c, a);
-    if ((u > least && v > least && w > least) || (u < -least && v < -least && w < -least)) return true;
+    // On an edge of t, too: else one could pass between two triangles that share it.
+    if ((u > -least && v > -least && w > -least) || (u < least && v < least && w < least)) return true;
   }
   return false;
 }
