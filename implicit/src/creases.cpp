@@ -706,11 +706,11 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
   const std::vector<FieldView> views(nodes.begin(), nodes.end());
   const bool others = present != node_;
   node_.clear();  // should the next lines throw
+  comparable_ = std::exchange(measured_, false);
   marcher_.march(field, lattice, skip, executor, counts_);
   const march::ViewMemory& changes = marcher_.memory.view;
   find_owners(views, others || changes.all, executor);
   memory_.begin_call(others || changes.all);
-  comparable_ = std::exchange(measured_, false);
   if (comparable_) std::swap(mesh_, last_mesh_);
   mesh_ = marcher_.mesh;
   counts_.blunt_cells = Sharpener(field, views, lattice, owner_, changes, memory_, mesh_).run();
@@ -779,7 +779,7 @@ const Mesh* CreaseMesher::Impl::make_to_error(const Field& field, const MarchOpt
   std::uint64_t sampled = 0;  // of all meshes
   march::TriedSize size(field, options.lattice.origin, most);
   tried.begin_call();
-  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+  tried.search({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
     cell = spacing_at(first, level);
     if (size.exceeds(level, cell, executor)) return LevelTry{};  // ends the search
     CreaseMarcher& on = tried.use(cell).first;
@@ -793,7 +793,10 @@ const Mesh* CreaseMesher::Impl::make_to_error(const Field& field, const MarchOpt
     tried.fit(cell);
     return march::try_kept(error, *mesh, on, executor);
   });
-  if (size.is_exceeded()) return nullptr;
+  if (size.is_exceeded()) {
+    tried.clear();
+    return nullptr;
+  }
   count.tiles_sampled = sampled;
   const bool fits = tried.end_call(cell);
   count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;

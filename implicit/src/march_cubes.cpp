@@ -21,8 +21,9 @@ void Marcher::march(const FieldView& field, const Lattice& on, bool skip, const 
   const double level = points != nullptr ? points->packed().iso : 0.0;
   const bool single = sampler != nullptr && sampler->single_precision();
   sampler = make_sampler(field, on, skip, memory);
-  if (!kept || level != iso || sampler->single_precision() != single) memory.forget();
+  if (!kept || level != iso || sampler->single_precision() != single || skip != skipped) memory.forget();
   kept = false;
+  skipped = skip;
   iso = level;
   sampler->prepare(executor, table);
   table.begin_call();
@@ -95,7 +96,7 @@ const Mesh* CubeMesher::Impl::make_to_error(const FieldView& field, const MarchO
   std::uint64_t sampled = 0, values = 0;  // of all meshes
   march::TriedSize size(field, options.lattice.origin, most);
   tried.begin_call();
-  make_within({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+  tried.search({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
     plan = plan_of(first, level);
     if (size.exceeds(level, plan.cell, executor)) return LevelTry{};  // ends the search
     const auto [on, first_time] = tried.use(plan.cell);
@@ -111,17 +112,21 @@ const Mesh* CubeMesher::Impl::make_to_error(const FieldView& field, const MarchO
     count.refinements = plan.refinements;
     count.error = error;
     size.add(level, *mesh);
-    tried.fit(plan.cell);
+    tried.fit(plan.cell, scratch.bytes());
     return march::try_kept(error, *mesh, on, executor);
   });
-  if (size.is_exceeded()) return nullptr;
+  if (size.is_exceeded()) {
+    tried.clear();
+    return nullptr;
+  }
   count.tiles_sampled = sampled;
   count.kernel_values = values;
-  const bool fits = tried.end_call(plan.cell);
-  count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;
+  const bool fits = tried.end_call(plan.cell, scratch.bytes());
+  count.bytes = fits ? tried.bytes() + scratch.bytes() - march::bytes_of(*mesh) : 0;
   if (fits) return mesh;
   alone = last->take_mesh(plan.refinements);
   tried.clear();
+  scratch = {};
   return &alone;
 }
 

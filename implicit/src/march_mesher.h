@@ -17,7 +17,8 @@ struct Marcher {
   std::unique_ptr<Sampler> sampler;  ///< of the last mesh
   Lattice lattice;                   ///< of the last mesh
   double iso = 0.0;
-  bool kept = false;  ///< table and mesh are those of the memory
+  bool kept = false;     ///< table and mesh are those of the memory
+  bool skipped = false;  ///< as the last mesh was asked for
 
   /// Makes `mesh`, unrefined.
   void march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);

@@ -16,6 +16,9 @@ namespace supple::implicit::march {
 struct CutScratch {
   std::vector<std::array<std::uint32_t, 3>> middle;
   std::vector<std::uint32_t> start, target, edge;
+  [[nodiscard]] std::uint64_t bytes() const {
+    return middle.capacity() * sizeof(middle[0]) + (start.capacity() + target.capacity() + edge.capacity()) * sizeof(std::uint32_t);
+  }
 };
 
 class RefinedMarcher {

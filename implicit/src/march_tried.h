@@ -33,16 +33,24 @@ class TriedLattices {
     return {on.mesher, !std::exchange(on.used, true)};
   }
   /// Leaves others than that of a cell out, the coarsest first, which take the least time to make anew, until the rest fits.
-  void fit(double cell) {
-    for (auto at = on_.begin(); at != on_.end() && bytes() > most_;) at = at->first == cell ? std::next(at) : on_.erase(at);
+  /// @param beside  what is kept beside them [byte]
+  void fit(double cell, std::uint64_t beside = 0) {
+    for (auto at = on_.begin(); at != on_.end() && bytes() + beside > most_;) at = at->first == cell ? std::next(at) : on_.erase(at);
   }
   /// Leaves out what this call did not use. @return whether all that is left fits
-  bool end_call(double cell) {
+  bool end_call(double cell, std::uint64_t beside = 0) {
     std::erase_if(on_, [](const auto& on) { return !on.second.used; });
-    fit(cell);
-    return bytes() <= most_;
+    fit(cell, beside);
+    return bytes() + beside <= most_;
   }
   void clear() { on_.clear(); }
+  /// make_within; keeps nothing when that refuses.
+  void search(const ErrorGoal& goal, const std::function<LevelTry(int level)>& make) try {
+    make_within(goal, make);
+  } catch (...) {
+    clear();
+    throw;
+  }
   [[nodiscard]] std::uint64_t bytes() const {
     return std::accumulate(on_.begin(), on_.end(), std::uint64_t{0}, [](std::uint64_t sum, const auto& on) { return sum + on.second.mesher.bytes(); });
   }

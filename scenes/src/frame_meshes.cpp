@@ -359,7 +359,7 @@ void expect_size_alone(const MeshingDesc& d, const ObjectModel& object, const im
 }
 
 /// @throws Error{Limit} as mesh_alone would for the error asked for, as far as meshes tell that take about a second
-/// @param bodies  that share a few seconds
+/// @param bodies  that share some ten seconds
 void expect_error_alone(const MeshingDesc& d, const ObjectModel& object, const implicit::Field& field, std::size_t bodies, const Executor& executor) {
   constexpr std::uint64_t kTrianglesASecond = 200'000, kSeconds = 10;
   const std::uint64_t most = std::min(kTrianglesASecond, kSeconds * kTrianglesASecond / bodies);

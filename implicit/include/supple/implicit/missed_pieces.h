@@ -40,7 +40,8 @@ struct SearchedBody {
 
 /// The same for meshes of polygonise_partition, by body: a piece between two bodies is added to both, with the same points. Pieces
 /// that meet two others or more are not made: they count as
-/// undecided.
+/// undecided. A piece that goes through a face between two blocks of 8^3 cells, of which one of its bodies reaches only one, may not be seen: leads
+/// are compared among the bodies that reach a block.
 MissedPieces add_missed_pieces(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor,
                                std::span<Mesh> meshes);
 
