@@ -475,7 +475,8 @@ TEST(SplitRule, KeepsItsBoundWhereTwoRulesAgreeOnAWrongAnswer) {
                         Case{Shapes::Blobs, 1234, 898, 1e-2}, Case{Shapes::Blobs, 831, 178, 1e-4}, Case{Shapes::Blobs, 901, 4, 1e-2},
                         Case{Shapes::Murakami, 1, 451, 1e-6}, Case{Shapes::Murakami, 5, 696, 1e-4}, Case{Shapes::DiscOnBox, 6102, 719, 1e-8},
                         Case{Shapes::DiscOnBox, 6103, 27, 1e-9}, Case{Shapes::DiscOnBox, 6103, 322, 1e-9}, Case{Shapes::Blobs, 1, 397, 1e-8},
-                        Case{Shapes::Murakami, 7, 13, 1e-5}, Case{Shapes::Blobs, 3, 219, 1e-6}, Case{Shapes::Blobs, 9601, 581, 1e-5}}) {
+                        Case{Shapes::Murakami, 7, 13, 1e-5}, Case{Shapes::Blobs, 3, 219, 1e-6}, Case{Shapes::Blobs, 9601, 581, 1e-5},
+                        Case{Shapes::Blobs, 77, 359, 1e-4}, Case{Shapes::Blobs, 2026, 156, 6e-5}}) {
     const bool disc = c.shapes == Shapes::DiscOnBox, blobs = c.shapes == Shapes::Blobs || c.shapes == Shapes::Murakami;
     const auto ten = [&](std::uint64_t seed) {
       implicit::Skeleton skeleton = benchmarks::ten_blobs(seed);
