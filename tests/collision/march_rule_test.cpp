@@ -293,7 +293,7 @@ TEST(MarchRule, LeavesNothingSidewaysToAnAxisOfSymmetry) {
     const implicit::HalfSpace plane{frame.position, frame.orientation * Vec3::UnitZ(), 1e3};
     const auto expect_straight = [&](Stage& stage, const char* what) {
       // As coarse as may be asked, and what orders 3, 4 and 5 must split pieces for.
-      for (const double asked : {0.1, 5e-3, 5e-5, 1e-6}) {
+      for (const double asked : {0.1, 5e-3, 5e-5, 1e-6, 1e-8}) {
         const ContactSurface::Summary s = stage.solve({.error = asked, .energy = false, .only = ContactRule::March}).summary.at(0);
         const Vec3 force = frame.orientation.conjugate() * s.force, centre = frame.to_body(s.centre_of_pressure);
         EXPECT_LE(std::hypot(force.x(), force.y()), 1e-12 * std::abs(force.z())) << what << ' ' << asked;
