@@ -1,7 +1,7 @@
 /// @file contact_poses.cpp
 /// Contact queries in many random poses: twelve cases, worst and middle CPU time and error over the poses, one JSON
 /// object a line. A query is broad phase, candidates and contact surface of two bodies, through the general path, with
-/// no state from another pose. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
+/// no state from another pose; its time is the least in three rounds of all poses. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are measured against the finest rule for the two bodies in the other order, which has other nodes; what it
 /// may itself be off by is added to the bounds. Poses whose patch a kink of a field crosses are told apart.
 ///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED]
@@ -52,12 +52,17 @@ struct Query {
 template <class MakePose>
 void measure(std::string_view name, int poses, const MakePose& make_pose) {
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
-  constexpr int kRepeats = 10;
+  constexpr int kRepeats = 10, kRounds = 3;
   struct Line {
     std::vector<double> cpu, error, ratio;  // ratio: bound over error, where the reference can tell
     int missed = 0, march = 0, sampled = 0, unmet = 0, bound_broken = 0;
   };
   std::array<std::array<Line, kErrors.size()>, 2> classes;  // smooth, crossed by kinks
+  struct Timed {
+    int pose;
+    std::size_t error, crossed, place;  // in Line::cpu
+  };
+  std::vector<Timed> timed;
   Hasher hasher;
   Draw draw(seed);
   for (int pose = 0; pose < poses; ++pose) {
@@ -84,6 +89,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
       Line& line = classes[crossed ? 1 : 0][k];
       hasher.add(std::span<const Vec3>(&s->force, 1));
       const double error = difference(*s, exact);
+      timed.push_back({pose, k, crossed ? 1u : 0u, line.cpu.size()});
       line.cpu.push_back(query.cpu_us);
       line.error.push_back(error);
       line.march += s->rule == collision::ContactRule::March ? 1 : 0;
@@ -91,6 +97,22 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
       line.unmet += s->error_estimate > kErrors[k] ? 1 : 0;
       if (error > 10.0 * floor) line.ratio.push_back(s->error_estimate / error);
       line.bound_broken += error > s->error_estimate + floor ? 1 : 0;
+    }
+  }
+  // What slows the machine down for a while would be the worst of a thousand poses: short queries are timed again when it is over.
+  constexpr double kShort = 1000.0;  // [us]
+  for (int round = 1; round < kRounds; ++round) {
+    Draw again(seed);
+    auto next = timed.begin();
+    for (int pose = 0; pose < poses; ++pose) {
+      const Pair pair = make_pose(again);
+      for (; next != timed.end() && next->pose == pose; ++next) {
+        double& least = classes[next->crossed][next->error].cpu[next->place];
+        if (least > kShort) continue;
+        Query query;
+        (void)query.ask(pair.bodies, kErrors[next->error], kRepeats, only_rule);
+        least = std::min(least, query.cpu_us);
+      }
     }
   }
   for (std::size_t i = 0; i < 2 * kErrors.size(); ++i) {
