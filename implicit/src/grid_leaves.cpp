@@ -1,5 +1,7 @@
 #include "grid_leaves.h"
 
+#include <openvdb/tools/ChangeBackground.h>
+
 #include "supple/core/error.h"
 
 namespace supple::implicit::gridding {
@@ -80,6 +82,8 @@ void fill(FloatTree& tree, const BlockBox& box, float value) {
   tree.fill({first_voxel(box.lower), first_voxel(box.upper).offsetBy(kCells - 1)}, value, false);
 }
 
+void change_beyond(FloatTree& tree, float inside) { openvdb::tools::changeBackground(tree, -inside); }
+
 void place(FloatTree& tree, const BlockCoord& block, SampledLeaf& sampled, float inside) {
   if (sampled.leaf) {
     tree.addLeaf(sampled.leaf.release());
@@ -105,6 +109,25 @@ BlockList band_leaves(const FieldView& field, const GridOptions& options, const 
   const double width = band_of(options);
   return band_leaves(range_of(field, options), options, 0, executor,
                      [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) { return look(field, width, box); });
+}
+
+void LargestValues::reset(std::span<const std::pair<BlockCoord, float>> by_leaf) {
+  by_leaf_.clear();
+  by_leaf_.insert(by_leaf.begin(), by_leaf.end());
+}
+
+void LargestValues::set(const BlockCoord& block, const SampledLeaf& sampled) {
+  if (sampled.leaf) {
+    by_leaf_[block] = sampled.largest;
+  } else {
+    by_leaf_.erase(block);
+  }
+}
+
+float LargestValues::of_all() const {
+  float largest = 0.0F;
+  for (const auto& [block, value] : by_leaf_) largest = std::max(largest, value);
+  return largest;
 }
 
 MadeGrid make_whole(const BlockList& list, const GridOptions& options, const Executor& executor,

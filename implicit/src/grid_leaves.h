@@ -9,10 +9,13 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <span>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "polygonise_blocks.h"
+#include "supple/core/hash.h"
 #include "supple/implicit/surface_grid.h"
 
 namespace supple::implicit {
@@ -68,6 +71,8 @@ struct SampledLeaf {
 
 void set_beyond(Leaf& leaf, float inside);
 void fill(openvdb::FloatTree& tree, const BlockBox& box, float value);
+/// Has another value stand for all voxels beyond the band.
+void change_beyond(openvdb::FloatTree& tree, float inside);
 /// Puts a sampled leaf, or the tile that stands for it, into the tree.
 void place(openvdb::FloatTree& tree, const BlockCoord& block, SampledLeaf& sampled, float inside);
 
@@ -78,6 +83,22 @@ struct MadeGrid {
   std::vector<std::pair<BlockCoord, float>> largest;  ///< |value| by leaf
   std::uint64_t looked_at = 0;
 };
+
+/// The largest |value| by leaf, of GridContent::Field: the largest of all stands for what is beyond the band.
+class LargestValues {
+ public:
+  void reset(std::span<const std::pair<BlockCoord, float>> by_leaf);
+  void set(const BlockCoord& block, const SampledLeaf& sampled);
+  void erase(const BlockCoord& block) { by_leaf_.erase(block); }
+  [[nodiscard]] float of_all() const;
+
+ private:
+  struct Hash {
+    std::size_t operator()(const BlockCoord& block) const { return static_cast<std::size_t>(hash_bytes(std::as_bytes(std::span<const std::int32_t>(block)))); }
+  };
+  std::unordered_map<BlockCoord, float, Hash> by_leaf_;
+};
+
 /// @param sample  leaf i of the list
 [[nodiscard]] MadeGrid make_whole(const BlockList& list, const GridOptions& options, const Executor& executor,
                                   const std::function<SampledLeaf(std::size_t)>& sample);

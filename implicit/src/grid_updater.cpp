@@ -1,11 +1,9 @@
 #include <algorithm>
-#include <unordered_map>
 #include <utility>
 
 #include "field_changes.h"
 #include "grid_leaves.h"
 #include "supple/core/error.h"
-#include "supple/core/hash.h"
 
 namespace supple::implicit {
 
@@ -18,12 +16,6 @@ namespace {
 
 /// Ranges of more are made anew: their differences would be too many blocks to look at.
 constexpr std::uint64_t kMostBlocksKept = 100'000'000;
-
-struct BlockHash {
-  std::size_t operator()(const BlockCoord& b) const {
-    return static_cast<std::size_t>(hash_bytes(std::as_bytes(std::span<const std::int32_t>(b))));
-  }
-};
 
 bool holds(const BlockRange& range, const BlockCoord& block) {
   for (std::size_t k = 0; k < 3; ++k) {
@@ -41,7 +33,7 @@ struct GridUpdater::Impl {
   BlockRange range;
   FieldChanges changes;
   float inside = 0.0F;
-  std::unordered_map<BlockCoord, float, BlockHash> largest;  ///< |value| by leaf, for GridContent::Field
+  LargestValues largest;  // with GridContent::Field
   std::vector<BlockCoord> touched;
   std::vector<SampledLeaf> sampled;
 
@@ -94,8 +86,7 @@ struct GridUpdater::Impl {
     touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   }
 
-  /// @return false when the largest value is another one
-  bool update(const FieldView& field, const Executor& executor, GridCounts& counts) {
+  void update(const FieldView& field, const Executor& executor, GridCounts& counts) {
     const double width = band_of(options);
     sampled.clear();
     sampled.resize(touched.size());
@@ -113,25 +104,16 @@ struct GridUpdater::Impl {
     });
     counts.leaves_looked_at = touched.size();
     counts.leaves_sampled = static_cast<std::uint64_t>(std::count(verdict.begin(), verdict.end(), Verdict::Keep));
-    if (options.content == GridContent::Field) {
-      for (std::size_t i = 0; i < touched.size(); ++i) {
-        if (sampled[i].leaf) {
-          largest[touched[i]] = sampled[i].largest;
-        } else {
-          largest.erase(touched[i]);
-        }
-      }
-      float most = 0.0F;
-      for (const auto& [block, value] : largest) most = std::max(most, value);
-      if (inside_value(options, most) != inside) return false;
-    }
     FloatTree& tree = result.impl_->grid->tree();
+    if (options.content == GridContent::Field) {
+      for (std::size_t i = 0; i < touched.size(); ++i) largest.set(touched[i], sampled[i]);
+      if (const float now = inside_value(options, largest.of_all()); now != inside) change_beyond(tree, inside = now);
+    }
     for (std::size_t i = 0; i < touched.size(); ++i) {
       if (sampled[i].leaf) set_beyond(*sampled[i].leaf, inside);
       place(tree, touched[i], sampled[i], inside);
     }
     tree.prune();
-    return true;
   }
 };
 
@@ -147,17 +129,14 @@ const SurfaceGrid& GridUpdater::make(const Field& field, const GridOptions& opti
   const bool comparable = std::exchange(self.usable, false) && same(options, self.options);
   self.changes.update(field.index());
   const BlockRange last = std::exchange(self.range, range_of(field, options));
-  bool done = false;
   if (comparable && self.list_touched(last)) {
-    executor.run([&] { done = self.update(field, executor, count); });
-  }
-  if (!done) {
+    executor.run([&] { self.update(field, executor, count); });
+  } else {
     MadeGrid made = make_whole(field, options, executor);
     count = {.leaves_looked_at = made.looked_at, .leaves_sampled = made.looked_at, .whole = true};
     self.result.impl_ = std::make_unique<SurfaceGrid::Impl>(std::move(made.grid));
     self.inside = made.inside;
-    self.largest.clear();
-    if (options.content == GridContent::Field) self.largest.insert(made.largest.begin(), made.largest.end());
+    self.largest.reset(made.largest);
     self.options = options;
   }
   self.usable = true;

@@ -133,18 +133,10 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
     }
   }
   divided_ = std::move(divided);
-  implicit::SurfaceGrid whole;
   if (!united.empty()) {
     options.name = "scene";
     options.lattice.cell = simulation.cell();
-    if (distance) {
-      grids.push_back(&united_.make(united, options, executor));
-    } else {
-      std::vector<implicit::FieldView> views;
-      for (const implicit::UnitedBody& body : united) views.push_back(body.depth);
-      whole = implicit::make_surface_grid(implicit::UnitedField(views), options, executor);
-      grids.push_back(&whole);
-    }
+    grids.push_back(&united_.make(united, options, executor));
   }
   implicit::write_grids(folder / "grids" / numbered(name, frame, ".vdb"), grids);
 } catch (const Error& error) {

@@ -14,7 +14,7 @@
 namespace supple::scenes {
 
 /// Writes the grids of frame after frame and keeps what nothing changed: leaves that no primitive reaches that moved, of bodies that touch
-/// no other; whole grids of bodies that touch, where neither they nor what they touch changed; of signed distances of all bodies, leaves
+/// no other; whole grids of bodies that touch, where neither they nor what they touch changed; of the grid of all bodies, leaves
 /// that no changed one reaches. What is kept holds for any state.
 class SceneGrids {
  public:

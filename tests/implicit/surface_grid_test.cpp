@@ -314,21 +314,32 @@ struct Crowd {
     member[i].body.place();
     member[i].version = next++;
   }
-  [[nodiscard]] std::vector<DepthField> depths() const {
-    std::vector<DepthField> out;
-    for (const Member& m : member) out.emplace_back(m.body.field);
-    return out;
-  }
-  [[nodiscard]] std::vector<UnitedBody> united(const std::vector<DepthField>& depths) const {
+  std::vector<DepthField> depths;
+
+  /// Valid until the next call.
+  [[nodiscard]] std::vector<UnitedBody> united(GridContent content) {
+    depths.clear();
+    for (const Member& m : member) depths.emplace_back(m.body.field);
     std::vector<UnitedBody> out;
-    for (std::size_t i = 0; i < member.size(); ++i) out.push_back({depths[i], member[i].version, i % 2 == 0 ? &member[i].body.field : nullptr});
+    for (std::size_t i = 0; i < member.size(); ++i) {
+      const Field& field = member[i].body.field;
+      out.push_back({content == GridContent::Field ? FieldView(field) : FieldView(depths[i]), member[i].version, i % 2 == 0 ? &field : nullptr});
+    }
     return out;
   }
 };
 
-TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
+UnitedField whole_of(std::span<const UnitedBody> bodies) {
+  std::vector<FieldView> views;
+  for (const UnitedBody& body : bodies) views.push_back(body.view);
+  return UnitedField(std::move(views));
+}
+
+class UnitedGrid : public ::testing::TestWithParam<GridContent> {};
+
+TEST_P(UnitedGrid, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
   const Folder folder;
-  const GridOptions options = options_of(GridContent::SignedDistance);
+  const GridOptions options = options_of(GetParam());
   Crowd crowd;
   Random random(31);
   for (std::uint64_t seed = 0; seed < 9; ++seed) crowd.add(seed, random.in_box(1.5));
@@ -348,10 +359,10 @@ TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
     if (step == 13) crowd.move(10, Vec3(3.0, 0.0, 0.0));  // and one that leaves the box of all
     if (step == 14) crowd.set_iso(0, 0.3);
     if (step == 15) crowd.member.pop_back();
-    const std::vector<DepthField> depths = crowd.depths();
     GridCounts counts;
-    const SurfaceGrid& grid = updater.make(crowd.united(depths), options, Executor(2), &counts);
-    const SurfaceGrid whole = make_surface_grid(UnitedField({depths.begin(), depths.end()}), options, Executor(1));
+    const std::vector<UnitedBody> bodies = crowd.united(options.content);
+    const SurfaceGrid& grid = updater.make(bodies, options, Executor(2), &counts);
+    const SurfaceGrid whole = make_surface_grid(whole_of(bodies), options, Executor(1));
     ASSERT_EQ(grid.hash(), whole.hash()) << step;
     ASSERT_EQ(content_of(bytes_of(folder, grid)), content_of(bytes_of(folder, whole))) << step;
     kept += counts.whole ? 0 : 1;
@@ -359,16 +370,16 @@ TEST(UnionUpdater, HasTheTreeOfAWholeGridWhateverMovesComesOrGoes) {
   EXPECT_GE(kept, 11);
 }
 
-TEST(UnionUpdater, TouchesOnlyLeavesNearBodiesThatChanged) {
-  GridOptions options = options_of(GridContent::SignedDistance);
+TEST_P(UnitedGrid, TouchesOnlyLeavesNearBodiesThatChanged) {
+  GridOptions options = options_of(GetParam());
   Crowd crowd;
   for (std::uint64_t i = 0; i < 20; ++i) crowd.add(2 * i, Vec3(1.5 * static_cast<double>(i), 0, 0));
   UnionUpdater updater;
   GridCounts counts;
   const auto make = [&] {
-    const std::vector<DepthField> depths = crowd.depths();
-    const std::uint64_t hash = updater.make(crowd.united(depths), options, Executor(1), &counts).hash();
-    EXPECT_EQ(hash, make_surface_grid(UnitedField({depths.begin(), depths.end()}), options, Executor(1)).hash());
+    const std::vector<UnitedBody> bodies = crowd.united(options.content);
+    const std::uint64_t hash = updater.make(bodies, options, Executor(1), &counts).hash();
+    EXPECT_EQ(hash, make_surface_grid(whole_of(bodies), options, Executor(1)).hash());
   };
   make();
   EXPECT_TRUE(counts.whole);
@@ -376,25 +387,26 @@ TEST(UnionUpdater, TouchesOnlyLeavesNearBodiesThatChanged) {
   make();
   EXPECT_FALSE(counts.whole);
   EXPECT_EQ(counts.leaves_sampled, 0u);
-  crowd.move(7, Vec3(0.01, 0, 0));
-  make();
-  EXPECT_FALSE(counts.whole);
-  EXPECT_GT(counts.leaves_sampled, 0u);
-  EXPECT_LT(counts.leaves_sampled, all / 10);
+  for (const std::size_t moved : {7u, 0u}) {  // the first also stands for all that are constant far away
+    crowd.move(moved, Vec3(0.01, 0, 0));
+    make();
+    EXPECT_FALSE(counts.whole);
+    EXPECT_GT(counts.leaves_sampled, 0u);
+    EXPECT_LT(counts.leaves_sampled, all / 10);
+  }
   options.half_width = 2.0;
   make();
   EXPECT_TRUE(counts.whole);
 }
 
-TEST(UnionUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
+TEST_P(UnitedGrid, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
   Crowd crowd;
   crowd.member.push_back({random_body({.seed = 8, .parts = 200, .half_width = 3.0, .only_points = true}), crowd.next++});
   crowd.add(2, Vec3(6.0, 0, 0));
   UnionUpdater updater;
   GridCounts counts;
   const auto make = [&] {
-    const std::vector<DepthField> depths = crowd.depths();
-    (void)updater.make(crowd.united(depths), options_of(GridContent::SignedDistance), Executor(1), &counts);
+    (void)updater.make(crowd.united(GetParam()), options_of(GetParam()), Executor(1), &counts);
     return counts.leaves_sampled;
   };
   const std::uint64_t all = make();
@@ -403,6 +415,9 @@ TEST(UnionUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
   EXPECT_GT(moved, 0u);
   EXPECT_LT(10 * moved, all);
 }
+
+INSTANTIATE_TEST_SUITE_P(EveryContent, UnitedGrid, ::testing::Values(GridContent::SignedDistance, GridContent::Field),
+                         [](const auto& content) { return content.param == GridContent::Field ? "Field" : "SignedDistance"; });
 
 TEST(SurfaceGrid, OfUnitedBodiesHasTheDistanceToTheNearest) {
   const FunctionField left = sphere(kOrigin, 0.4), right = sphere(kOrigin + Vec3(1.5, 0, 0), 0.3);

@@ -76,8 +76,7 @@ class GridUpdater {
   GridUpdater& operator=(GridUpdater&&) noexcept;
 
   /// Valid until the next call. Everything is made anew where options, iso value or blend are not those of the last call, where half of
-  /// the primitives moved, where more than half of the leaves would change, and with GridContent::Field where the largest
-  /// value does: it stands for all beyond the band.
+  /// the primitives moved and where more than half of the leaves would change.
   /// @throws as make_surface_grid; the next call then makes everything anew
   const SurfaceGrid& make(const Field& field, const GridOptions& options, const Executor& executor,
                           GridCounts* counts = nullptr);
@@ -127,13 +126,13 @@ class UnitedField {
 
 /// A body of a union.
 struct UnitedBody {
-  FieldView depth;            ///< of slope 1, as a DepthField; must outlive the call
-  std::uint64_t version = 0;  ///< no two the same: equal ones, of any calls, mean that the depth is the same bit for bit (core/content_versions.h)
-  const Field* field = nullptr;  ///< whose depth it is, if that of one: then leaves stay that none of its moved primitives reaches
+  FieldView view;             ///< for GridContent::SignedDistance its depth, of slope 1 (DepthField); must outlive the call
+  std::uint64_t version = 0;  ///< no two the same: equal ones, of any calls, mean that the view is the same bit for bit (core/content_versions.h)
+  const Field* field = nullptr;  ///< that it is, or is the depth of, if of one: then leaves stay that none of its moved primitives reaches
 };
 
-/// Makes the signed distances of several bodies again and again: only leaves are touched that a body may reach which is no longer, or was
-/// not, what it is. The grid is that of `make_surface_grid` of a UnitedField of the depths, in values, in its tree and so in its file.
+/// Makes the grid of several bodies as one again and again: only leaves are touched that a body may reach which is no longer, or was
+/// not, what it is. The grid is that of `make_surface_grid` of a UnitedField of the views, in values, in its tree and so in its file.
 class UnionUpdater {
  public:
   UnionUpdater();
@@ -142,7 +141,7 @@ class UnionUpdater {
   UnionUpdater& operator=(UnionUpdater&&) noexcept;
 
   /// Valid until the next call. Everything is made anew where options are not those of the last call and where more than half of the
-  /// leaves would change. @pre options.content is SignedDistance
+  /// leaves would change.
   /// @throws as make_surface_grid; the next call then makes everything anew
   const SurfaceGrid& make(std::span<const UnitedBody> bodies, const GridOptions& options, const Executor& executor,
                           GridCounts* counts = nullptr);
