@@ -241,6 +241,28 @@ TEST(GridUpdater, FollowsASurfaceThatGrowsAndShrinks) {
   }
 }
 
+TEST(GridUpdater, HasTheLargestValueOfAllBeyondTheBandWhicheverMoves) {
+  const GridOptions options = options_of(GridContent::Field);
+  Body body = random_body({.seed = 8, .parts = 60, .half_width = 2.0, .only_points = true});
+  GridUpdater updater;
+  int others = 0;
+  double last = 0.0;
+  for (std::size_t part = 0; part < 60; ++part) {
+    body.parts[part].position.x() += 0.05;
+    body.place();
+    GridCounts counts;
+    const SurfaceGrid& grid = updater.make(body.field, options, Executor(1), &counts);
+    const SurfaceGrid whole = make_surface_grid(body.field, options, Executor(1));
+    EXPECT_EQ(counts.whole, part == 0);
+    const double beyond = grid.value(1000, 1000, 1000);
+    ASSERT_EQ(beyond, whole.value(1000, 1000, 1000)) << part;
+    ASSERT_EQ(grid.hash(), whole.hash()) << part;
+    others += part > 0 && beyond != last ? 1 : 0;
+    last = beyond;
+  }
+  EXPECT_GE(others, 1);
+}
+
 TEST(GridUpdater, TouchesOnlyLeavesThatAMovedPrimitiveReaches) {
   Body body = random_body({.seed = 8, .parts = 200, .half_width = 3.0, .only_points = true});
   GridUpdater updater;
