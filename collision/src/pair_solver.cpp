@@ -1,0 +1,274 @@
+#include "pair_solver.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "boxes.h"
+#include "symmetry.h"
+
+namespace supple::collision {
+namespace {
+
+/// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
+bool clear_of(const ContactBody& body, const Box& box) {
+  const std::optional<implicit::CorePoint> core = body.field.core_point(box.centre());
+  return core && (core->point - box.centre()).norm() > core->radius + 0.5 * box.extent().norm();
+}
+
+/// Of balls and half-spaces.
+std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, const Vec3& near) {
+  std::optional<implicit::CorePoint> on_a = a.field.core_point(near);
+  if (!on_a || !on_a->round) return std::nullopt;
+  const std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
+  if (!on_b || !on_b->round) return std::nullopt;
+  on_a = a.field.core_point(on_b->point);
+  const Vec3 along = on_b->point - on_a->point;
+  const double length = along.norm();
+  if (!(length > 0.0)) return std::nullopt;
+  return CommonAxis{on_a->point, along / length};
+}
+
+/// Whether a bound is as good as asked, or as round-off lets it be.
+bool meets(const ContactSurface::Summary& summary, double error) {
+  constexpr double kRound = 1e-7, kSlack = 1.01;
+  return summary.error_estimate <= std::max(kSlack * error, kRound);
+}
+
+}  // namespace
+
+void Partners::build(std::size_t bodies, std::span<const BodyPair> pairs) {
+  offset.assign(bodies + 1, 0);
+  for (const BodyPair& p : pairs) {
+    ++offset[p.a + 1];
+    ++offset[p.b + 1];
+  }
+  for (std::size_t i = 0; i < bodies; ++i) offset[i + 1] += offset[i];
+  partner.resize(2 * pairs.size());
+  // Filled from the back, so that offset[i] ends as the begin of i.
+  for (std::size_t k = pairs.size(); k-- > 0;) {
+    partner[--offset[pairs[k].a + 1]] = pairs[k].b;
+    partner[--offset[pairs[k].b + 1]] = pairs[k].a;
+  }
+  for (std::size_t i = 0; i < bodies; ++i) offset[i] = offset[i + 1];
+  offset[bodies] = static_cast<std::uint32_t>(partner.size());
+}
+
+/// Partners of either body whose surfaces may reach the overlap.
+void PairSolver::find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap) {
+  const auto reaches = [&](std::uint32_t c) { return overlap_at_once(boxes[c], overlap); };
+  third_.clear();
+  third_bodies_.clear();
+  for (const std::uint32_t c : partners.of(pair.a)) {
+    if (reaches(c) && c != pair.b) third_.push_back(c);
+  }
+  for (const std::uint32_t c : partners.of(pair.b)) {
+    if (!reaches(c) || c == pair.a) continue;
+    const auto place = std::lower_bound(third_.begin(), third_.end(), c);
+    if (place == third_.end() || *place != c) third_.insert(place, c);
+  }
+}
+
+/// Whether a third body presses on the patches nearly as much as the pair does.
+bool PairSolver::thirds_press(const Job& job, const PairResult& out) {
+  Box patch;
+  for (const PolarCover& cover : patches_.covers()) {
+    for (const Vec3& x : cover.rim) patch.include(x);
+    patch.include(cover.frame.origin);
+  }
+  for (const Vec3& x : out.points.point) patch.include(x);
+  const double margin = 0.05 * out.summary.largest_pressure;
+  value_.resize(out.points.point.size());
+  bool press = false;
+  for (const std::uint32_t c : third_) {
+    const ContactBody& third = job.bodies[c];
+    if (!job.boxes[c].overlaps(patch) || clear_of(third, patch) || third.field.bound(patch).upper <= 0.0) continue;
+    third_bodies_.push_back(&third);
+    third.field.evaluate(out.points.point, value_);
+    for (std::size_t i = 0; i < value_.size(); ++i) {
+      const double p = third.material.modulus * value_[i];
+      press = press || p > out.points.pressure[i] - margin;
+    }
+    for (const PolarCover& cover : patches_.covers()) press = press || imprint_.find(job.polar.pressure, cover, third, margin).has_value();
+    // Beyond the outermost nodes the pressure of the pair falls to zero.
+    for (const PolarCover& cover : patches_.covers()) {
+      for (std::size_t k = 0; k < cover.rim.size() && !press; ++k) press = third.field.value(cover.rim[k]) > 0.0;
+    }
+  }
+  return press;
+}
+
+/// After a rule that did not fit; finds the third bodies that reach the overlap.
+void PairSolver::begin_anew(const Job& job, PairResult& out) {
+  out.clear();
+  third_bodies_.clear();
+  for (const std::uint32_t c : third_) {
+    if (job.bodies[c].field.bound(job.overlap).upper > 0.0) third_bodies_.push_back(&job.bodies[c]);
+  }
+}
+
+bool PairSolver::polar(const Job& job, PairResult& out) {
+  if (!patches_.solve(job.polar, out)) return false;
+  if (!job.convex || !patches_.empty()) return true;
+  // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
+  patches_.start_from(job.overlap, job.polar.pressure);
+  return patches_.solve(job.polar, out);
+}
+
+/// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit
+bool PairSolver::polar_cut(const Job& job, PairResult& out) {
+  out.clear();
+  PolarJob cut = job.polar;
+  cut.third = third_bodies_;
+  if (!patches_.solve(cut, out)) return false;
+  if (out.points.point.empty()) return true;  // all of it lies in a third body
+  out.summary.rule = ContactRule::Polar;
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  return true;
+}
+
+/// The summary of a rule that sees all patches at once.
+template <class Rule>
+void PairSolver::keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out) const {
+  out.add(rule.sums(), reference);
+  out.summary.rule = name;
+  out.summary.error_estimate = rule.estimate();
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  out.summary.largest_overlap = rule.thickness();
+  out.summary.patches = std::max(1u, static_cast<std::uint32_t>(patches_.covers().size()));
+}
+
+bool PairSolver::samples(const Job& job, PairResult& out) {
+  begin_anew(job, out);
+  const Vec3 reference = job.overlap.centre();
+  // The spacing of the kept samples, or what they would have.
+  constexpr double kAcrossFeature = 3.0;
+  const double first = job.polar.spacing > 0.0 ? job.polar.spacing : job.polar.pressure.feature_size() / kAcrossFeature;
+  if (!samples_.solve(job.polar.pressure, job.a, job.b, third_bodies_, job.overlap, first, job.settings(), job.polar.regions, reference,
+                      out.points)) {
+    return false;
+  }
+  keep(samples_, ContactRule::Samples, reference, out);
+  return true;
+}
+
+bool PairSolver::march(const Job& job, PairResult& out) {
+  begin_anew(job, out);
+  const Vec3 reference = job.overlap.centre();
+  const ContactSettings& settings = job.settings();
+  const bool alone = settings.symmetry && third_bodies_.empty();
+  const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(job.a, job.b, job.overlap) : std::nullopt;
+  if (!march_.solve(job.polar.pressure, third_bodies_, job.overlap, {settings.error, settings.max_refinement}, job.polar.regions, axis, reference, out.points)) {
+    return false;
+  }
+  keep(march_, ContactRule::March, reference, out);
+  return true;
+}
+
+/// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.
+/// @param have  `out` holds a result already   @return whether it holds one
+bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
+  // Few samples meet a coarse error with fewer points than marching begins with; finer ones they meet late or never.
+  constexpr double kCoarse = 1e-2, kFinestSampled = 1e-3;
+  const ContactSettings& settings = job.settings();
+  const auto set_aside = [&] {
+    std::swap(kept_, out);
+    out.summary.bodies = kept_.summary.bodies;
+  };
+  const std::array<ContactRule, 2> marched_first{ContactRule::March, ContactRule::Samples}, sampled_first{ContactRule::Samples, ContactRule::March};
+  for (const ContactRule rule : settings.error >= kCoarse ? sampled_first : marched_first) {
+    if (settings.only != ContactRule::None && settings.only != rule) continue;
+    if (have && (meets(out.summary, settings.error) || (rule == ContactRule::Samples && out.summary.error_estimate <= kFinestSampled))) continue;
+    if (have) set_aside();
+    const bool fits = rule == ContactRule::March ? march(job, out) : samples(job, out);
+    if (have && (!fits || kept_.summary.error_estimate <= out.summary.error_estimate)) set_aside();
+    have = have || fits;
+  }
+  return have;
+}
+
+void PairSolver::choose(const Job& job, PairResult& out) {
+  const ContactRule only = job.settings().only;
+  const bool any = only == ContactRule::None;
+  bool fits = (any || only == ContactRule::Polar) && polar(job, out);
+  RuleReason reason = !any ? RuleReason::Asked : fits ? RuleReason::Fits : RuleReason::NoGraph;
+  if (fits && !patches_.empty()) {
+    out.summary.rule = ContactRule::Polar;
+    if (any && !third_.empty() && thirds_press(job, out)) {
+      // The squeezed regions of bodies with several parts are not cut that exactly.
+      fits = !job.parted() && polar_cut(job, out);
+      if (!fits) reason = RuleReason::ThirdBody;
+    }
+  }
+  if (!fits && only == ContactRule::Polar) {
+    begin_anew(job, out);
+    out.summary.error_estimate = 1.0;
+  } else if (!fits || (any && !patches_.empty() && !meets(out.summary, job.settings().error))) {
+    const bool polar_fits = fits;
+    fits = stand_in(job, polar_fits, out);
+    if (polar_fits && out.summary.rule != ContactRule::Polar) reason = RuleReason::Unmet;
+    if (any && !polar_fits && out.summary.rule == ContactRule::March && job.a.skeleton == nullptr && job.b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
+    if (!fits) {
+      begin_anew(job, out);
+      if (only == ContactRule::Samples && patches_.any_touches(job.polar.pressure, job.polar.extent, job.convex)) out.summary.error_estimate = 1.0;
+    }
+  }
+  out.summary.reason = reason;
+}
+
+/// Where patches are looked for first.
+void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
+  if (job.convex) {
+    patches_.start_from(seeds.front(), job.polar.pressure);
+  } else if (seeds.empty()) {
+    patches_.start_from(job.overlap, job.polar.pressure);
+  } else {
+    patches_.start_from(seeds, job.polar.spacing, job.polar.pressure);
+  }
+}
+
+void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
+                       std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out) {
+  const BodyPair pair = candidates.pair[k];
+  const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
+  PairPressure pressure(a, b);
+  out.summary.bodies = pair;
+  out.clear();
+  patches_.forget();
+
+  const Box& overlap = candidates.overlap[k];
+  const std::span<const Vec3> seeds =
+      std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
+  const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
+  const bool convex = candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
+  const double diagonal = overlap.extent().norm();
+  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
+  // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
+  extent = std::max(extent, convex ? pressure.feature_size() : 2.0 * spacing);
+  if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
+  if (!std::isfinite(extent)) return;  // two half-spaces
+
+  find_thirds(pair, partners, boxes, overlap);
+  const Region least = settings.energy ? Region::Sums : Region::None;
+  Job job{bodies, boxes, overlap, a, b, {pressure, settings, {}, extent, spacing, {}, nullptr, {}}, convex};
+  job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
+  if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
+  if (convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite()) job.polar.faces = &overlap;
+  find_patches(job, seeds);
+  choose(job, out);
+
+  ContactSurface::Summary& summary = out.summary;
+  summary.load = out.load;
+  if (out.load > 0.0) summary.centre_of_pressure = out.first / out.load;
+  summary.energy = out.points.energy;
+  summary.displaced_a = out.points.displaced[0];
+  summary.displaced_b = out.points.displaced[1];
+  summary.residual = out.points.residual / pressure.largest_modulus();
+  summary.points = out.points.point.size();
+  summary.evaluations = pressure.evaluations();
+}
+
+}  // namespace supple::collision

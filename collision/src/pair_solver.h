@@ -1,0 +1,71 @@
+/// @file pair_solver.h
+/// The contact surface of one pair: which rule fits, the polar one first.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "imprint.h"
+#include "march_rule.h"
+#include "pair_result.h"
+#include "polar_patches.h"
+#include "sample_rule.h"
+#include "supple/collision/find_contacts.h"
+
+namespace supple::collision {
+
+/// Bodies by pair, to find third ones: the partners of body i are partner[offset[i] .. offset[i + 1]), rising.
+struct Partners {
+  std::vector<std::uint32_t> offset, partner;
+
+  void build(std::size_t bodies, std::span<const BodyPair> pairs);
+  [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t i) const {
+    return std::span(partner).subspan(offset[i], offset[i + 1] - offset[i]);
+  }
+};
+
+/// The solver of one thread; its buffers are reused.
+class PairSolver {
+ public:
+  /// @param boxes  of the bodies' surfaces   @param k  of the candidate pairs
+  void solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
+             std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out);
+
+ private:
+  /// A pair as the rules need it.
+  struct Job {
+    std::span<const ContactBody> bodies;
+    std::span<const Box> boxes;
+    const Box& overlap;
+    const ContactBody &a, &b;
+    PolarJob polar;
+    bool convex;
+    [[nodiscard]] const ContactSettings& settings() const { return polar.settings; }
+    [[nodiscard]] bool parted() const { return a.pose.size() > 1 || b.pose.size() > 1; }
+  };
+
+  void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
+  bool thirds_press(const Job& job, const PairResult& out);
+  void find_patches(const Job& job, std::span<const Vec3> seeds);
+  bool polar(const Job& job, PairResult& out);
+  bool polar_cut(const Job& job, PairResult& out);
+  bool samples(const Job& job, PairResult& out);
+  bool march(const Job& job, PairResult& out);
+  bool stand_in(const Job& job, bool have, PairResult& out);
+  void choose(const Job& job, PairResult& out);
+  void begin_anew(const Job& job, PairResult& out);
+  template <class Rule>
+  void keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out) const;
+
+  PolarPatches patches_;
+  ImprintFinder imprint_;
+  SampleRuleSolver samples_;
+  MarchRuleSolver march_;
+  std::vector<std::uint32_t> third_;
+  std::vector<const ContactBody*> third_bodies_;
+  std::vector<double> value_;
+  PairResult kept_;  ///< what another rule has left
+};
+
+}  // namespace supple::collision

@@ -1,0 +1,180 @@
+#include "polar_patches.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace supple::collision {
+namespace {
+
+/// A patch reaches so much farther than its rim, over its radius, where places are told from those of others.
+constexpr double kBesideRim = 0.05;
+
+constexpr std::size_t kMostPatches = 16;
+
+}  // namespace
+
+void PolarPatches::start_from(const Vec3& seed, PairPressure& pressure) {
+  starts_.hill.assign(1, seed);
+  starts_.inside.clear();
+  starts_.beside.clear();
+  batch_.resize(1);
+  batch_.point[0] = seed;
+  pressure.evaluate_values(batch_);
+  if (std::min(batch_.a[0], batch_.b[0]) > 0.0) starts_.inside.push_back(seed);
+}
+
+bool PolarPatches::solve(const PolarJob& job, PairResult& out) {
+  bool unseen = false;
+  if (solve(job, false, unseen, out)) return true;
+  if (!unseen) return false;
+  // A rim that is followed all around leaves nothing out.
+  out.clear();
+  return solve(job, true, unseen, out);
+}
+
+/// @param follow  all rims   @param unseen  whether there is a place of a patch that its rim leaves out
+bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out) {
+  forget();
+  for (const Vec3& hill : starts_.hill) {
+    if (add_patch(job, hill, follow, out) == Patch::Unfit) return false;
+  }
+  // Two patches may lie so near to each other that their seeds have one hill.
+  for (std::size_t more = 0; const std::optional<Vec3> x = outside(job.pressure, job.extent); ++more) {
+    const Patch found = more < kMostPatches ? add_patch(job, *x, follow, out) : Patch::Unfit;
+    unseen = found == Patch::Known && !empty();
+    if (found != Patch::Added) return false;
+  }
+  crossing_.clear();
+  if (!job.pressure.convex()) find_crossings(job.pressure, job.spacing);
+  for (const Vec3& x : crossing_) {
+    if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
+  }
+  out.summary.patches = static_cast<std::uint32_t>(cover_count_);
+  return !overlap();
+}
+
+bool PolarPatches::any_touches(PairPressure& pressure, double extent, bool convex) {
+  return std::any_of(starts_.hill.begin(), starts_.hill.end(),
+                     [&](const Vec3& hill) { return finder_.climb(pressure, hill, extent, convex, false).has_value(); });
+}
+
+bool PolarPatches::covered(const Vec3& x, double slack) const {
+  const std::span<const PolarCover> all = covers();
+  return std::any_of(all.begin(), all.end(), [&](const PolarCover& cover) { return cover.contains(x, slack); });
+}
+
+PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const Vec3& hill, bool follow, PairResult& out) {
+  if (covered(hill, 0.0)) return Patch::Known;
+  std::optional<PeakFrame> frame;
+  if (job.axis && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *job.axis, hill, job.extent);
+  const bool on_axis = frame.has_value();
+  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, job.faces != nullptr);
+  if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
+  const auto fits = [&] {
+    return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
+  };
+  if (!fits()) {
+    if (!frame->flat) return Patch::Unfit;
+    frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, false);
+    if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
+    if (!fits()) return Patch::Unfit;
+  }
+  out.add(polar_.sums(), polar_.origin());
+  out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
+  out.summary.kinks += polar_.kinks();
+  if (polar_.largest() > out.summary.largest_pressure) {
+    out.summary.largest_pressure = polar_.largest();
+    out.summary.largest_overlap = polar_.thickness();
+  }
+  if (covers_.size() == cover_count_) covers_.emplace_back();
+  polar_.cover(covers_[cover_count_++]);
+  return Patch::Added;
+}
+
+bool PolarPatches::overlap() const {
+  for (const PolarCover& one : covers()) {
+    for (const PolarCover& other : covers()) {
+      if (&one == &other) continue;
+      for (const Vec3& x : one.rim) {
+        if (other.contains(x, 0.0)) return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// A place of Sigma where both bodies press that belongs to no patch, from the points inside both.
+std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent) {
+  batch_.point.clear();
+  for (const Vec3& x : starts_.inside) {
+    if (!covered(x, kBesideRim)) batch_.point.push_back(x);
+  }
+  if (batch_.point.empty()) return std::nullopt;
+  // The rest may only seem to lie outside, by a slanted axis: what counts is their foot on Sigma.
+  batch_.resize(batch_.point.size());
+  double peak = 0.0;
+  for (const PolarCover& cover : covers()) peak = std::max(peak, cover.frame.peak);
+  constexpr int kSteps = 6;
+  for (int step = 0; step < kSteps; ++step) {
+    pressure.evaluate(batch_);
+    if (step + 1 == kSteps) break;
+    for (std::size_t i = 0; i < batch_.size(); ++i) {
+      const Vec3 slope = batch_.slope_a[i] - batch_.slope_b[i];
+      const double square = slope.squaredNorm();
+      if (!(square > 0.0)) continue;
+      Vec3 move = ((batch_.b[i] - batch_.a[i]) / square) * slope;
+      const double length = move.norm();
+      if (length > extent) move *= extent / length;
+      batch_.point[i] += move;
+    }
+  }
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    if (std::min(batch_.a[i], batch_.b[i]) <= 1e-3 * peak) continue;
+    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
+    if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
+  }
+  return std::nullopt;
+}
+
+/// Fills `crossing_`: places near seeds where the surfaces cross, or all but touch, and that belong to no patch. A patch may lie between samples, and
+/// beside a larger one, whose hill then is the only one.
+void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
+  constexpr int kSteps = 6;
+  constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05;  // of the spacing
+  crossing_.clear();
+  batch_.point.clear();
+  from_.clear();
+  const auto keep = [&](const Vec3& x, const Vec3& from) {
+    if (covered(x, kBesideRim)) return;
+    batch_.point.push_back(x);
+    from_.push_back(from);
+  };
+  for (const Vec3& x : starts_.beside) keep(x, x);
+  for (int step = 0; step < kSteps && !batch_.point.empty(); ++step) {
+    batch_.resize(batch_.point.size());
+    pressure.evaluate(batch_);
+    point_.swap(batch_.point);
+    before_.swap(from_);
+    batch_.point.clear();
+    from_.clear();
+    for (std::size_t i = 0; i < point_.size(); ++i) {
+      const double steep_a = batch_.slope_a[i].norm(), steep_b = batch_.slope_b[i].norm();
+      if (!(steep_a > 0.0) || !(steep_b > 0.0)) continue;
+      // Newton's method to p_A = p_B = 0, the shortest step: normals and distances of both surfaces, to first order.
+      const Vec3 normal_a = batch_.slope_a[i] / steep_a, normal_b = batch_.slope_b[i] / steep_b;
+      const double off_a = batch_.a[i] / steep_a, off_b = batch_.b[i] / steep_b, c = normal_a.dot(normal_b), square = 1.0 - c * c;
+      if (step + 1 == kSteps) {
+        if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back(point_[i]);
+        continue;
+      }
+      if (!(square > 0.0)) continue;
+      Vec3 move = ((c * off_b - off_a) / square) * normal_a + ((c * off_a - off_b) / square) * normal_b;
+      const double length = move.norm(), longest = kLongest * spacing;
+      if (length > longest) move *= longest / length;
+      const Vec3 next = point_[i] + move;
+      if ((next - before_[i]).norm() <= kFarthest * spacing) keep(next, before_[i]);
+    }
+  }
+}
+
+}  // namespace supple::collision

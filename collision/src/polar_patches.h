@@ -1,0 +1,66 @@
+/// @file polar_patches.h
+/// All contact patches of a pair by the polar rule: one for each hill of the pressure on Sigma, and those that no hill tells.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "find_peak.h"
+#include "imprint.h"
+#include "pair_pressure.h"
+#include "pair_result.h"
+#include "polar_rule.h"
+
+namespace supple::collision {
+
+/// A pair as its patches need it.
+struct PolarJob {
+  PairPressure& pressure;
+  const ContactSettings& settings;
+  Regions regions;
+  double extent = 0.0;     ///< longest half axis of a patch that is believed [m]
+  double spacing = 0.0;    ///< of the seeds [m]; 0 where there are none
+  std::optional<CommonAxis> axis;
+  const Box* faces = nullptr;                 ///< of convex bodies: a box of their overlap
+  std::span<const ContactBody* const> third;  ///< that patches are cut at
+};
+
+class PolarPatches {
+ public:
+  /// Where to look: from the nearest place of convex bodies, from surface samples, or from a grid.
+  void start_from(const Vec3& seed, PairPressure& pressure);
+  void start_from(std::span<const Vec3> seeds, double spacing, PairPressure& pressure) { finder_.start_from_seeds(pressure, seeds, spacing, starts_); }
+  void start_from(const Box& overlap, PairPressure& pressure) { finder_.start_from_scan(pressure, overlap, starts_); }
+
+  /// Adds all patches to an empty result. @return false where the rule does not fit
+  bool solve(const PolarJob& job, PairResult& out);
+
+  [[nodiscard]] std::span<const PolarCover> covers() const { return std::span(covers_).first(cover_count_); }
+  [[nodiscard]] bool empty() const { return cover_count_ == 0; }
+  /// No patches, whatever was found.
+  void forget() { cover_count_ = 0; }
+  /// Whether Newton's method finds a place where the bodies press from any of the hills.
+  [[nodiscard]] bool any_touches(PairPressure& pressure, double extent, bool convex);
+
+ private:
+  enum class Patch : std::uint8_t { Added, Known, Unfit };
+
+  bool solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out);
+  Patch add_patch(const PolarJob& job, const Vec3& hill, bool follow, PairResult& out);
+  [[nodiscard]] bool overlap() const;
+  std::optional<Vec3> outside(PairPressure& pressure, double extent);
+  void find_crossings(PairPressure& pressure, double spacing);
+  [[nodiscard]] bool covered(const Vec3& x, double slack) const;
+
+  PeakFinder finder_;
+  PolarRuleSolver polar_;
+  StartPoints starts_;
+  std::vector<Vec3> crossing_, from_, point_, before_;
+  std::vector<PolarCover> covers_;
+  std::size_t cover_count_ = 0;
+  PressureBatch batch_;
+};
+
+}  // namespace supple::collision
