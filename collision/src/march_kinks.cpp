@@ -11,10 +11,6 @@ namespace {
 constexpr double kMildError = 1e-4;  // asked for, from which on kinks of the third derivative are left uncut
 constexpr double kReach = 1.1;       // of the feet of a piece, that its image may extend to
 
-using Vec2 = Eigen::Vector2d;
-
-double cross(const Vec2& p, const Vec2& q) { return p.x() * q.y() - p.y() * q.x(); }
-
 }  // namespace
 
 /// Of the corners and the middles of the edges, at a place, in the quadratic polynomial through them.

@@ -39,6 +39,8 @@ class MarchRuleSolver {
 
  private:
   using Vec2 = Eigen::Vector2d;
+  static constexpr int kNewtonSteps = 30;
+  static double cross(const Vec2& p, const Vec2& q) { return p.x() * q.y() - p.y() * q.x(); }
   /// A place of a triangle's image.
   struct Foot {
     Vec2 at = Vec2::Zero();     // (s, t): corners of the triangle are (0, 0), (1, 0), (0, 1)
