@@ -5,7 +5,6 @@
 #include <limits>
 #include <numbers>
 
-#include "polar_rule.h"
 #include "supple/core/math.h"
 
 namespace supple::collision {

@@ -6,13 +6,10 @@
 #include <optional>
 #include <vector>
 
-#include "find_peak.h"
 #include "pair_pressure.h"
+#include "polar_cover.h"
 
 namespace supple::collision {
-
-using Vec2 = Eigen::Vector2d;
-struct PolarCover;
 
 /// An imprint as a polygon, in units of u and v of the patch's frame.
 struct Imprint {

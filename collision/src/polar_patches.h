@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "find_peak.h"
-#include "imprint.h"
 #include "pair_pressure.h"
 #include "pair_result.h"
 #include "polar_rule.h"

@@ -15,6 +15,7 @@
 #include "imprint.h"
 #include "pair_pressure.h"
 #include "patch_points.h"
+#include "polar_cover.h"
 #include "quadrature.h"
 #include "supple/collision/contact_surface.h"
 #include "supple/implicit/kinks.h"
@@ -28,24 +29,6 @@ inline constexpr std::size_t kFinestJudged = 3;
 inline constexpr double kLeastMild = 1e-6;
 /// Errors below which rays are parted at mild kinks, though angles are not.
 inline constexpr double kMildPartedBelow = 5e-5;
-
-/// The ground that a polar patch covers.
-struct PolarCover {
-  PeakFrame frame;
-  std::vector<double> radius, height;  ///< of the rim, by equally spaced angles; of `corner` where there are some
-  std::vector<Vec2> corner;            ///< of an outline about the origin, by angle, in units of u and v
-  std::vector<Vec3> rim;               ///< its points
-  double thickness = 0.0;
-  Vec3 rise = Vec3::Zero();            ///< of Sigma at the origin, over a step across the axis; about the peak there is none
-  /// Along the ray from the origin through a point, in units of u and v: the distance of the point over that of the rim, 0 where no
-  /// corner is near the ray, and the height of the rim there.
-  struct Reach {
-    double far = 0.0, rise = 0.0;
-  };
-  [[nodiscard]] Reach reach(const Vec2& at) const;
-  /// Whether x lies over the patch, near Sigma. @param slack  share of the radius that a point may lie outside
-  [[nodiscard]] bool contains(const Vec3& x, double slack) const;
-};
 
 class PolarRuleSolver {
  public:
@@ -83,14 +66,19 @@ class PolarRuleSolver {
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
   void start_outline(const PolarRule& rule);
-  bool widen_columns(int side, const Vec3& outward, const Vec3& across);
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
   void keep_along_axis(PatchSums& sums) const;
   void turn(const PolarRule& rule, bool slopes);
   bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
+  // Columns through the squeezed regions: polar_columns.cpp.
+  /// Cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it.
+  static constexpr double kUpright = 0.3;
+  bool widen_columns(int side, const Vec3& outward, const Vec3& across);
   bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
+  void add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points);
+  void add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
   void evaluate_on_lines(PairPressure& pressure, int side);
   bool start_columns(int side);

@@ -1,0 +1,178 @@
+#include "polar_rule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace supple::collision {
+namespace {
+
+constexpr double kLeastSight = 0.1;  // cosine of a body's normal to the ray, at the rim
+constexpr int kEndSteps = 40;
+constexpr int kMostOnColumn = 6;
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+/// Columns that hold the squeezed region of a body so deep that it is wider beyond Sigma spread so far that it falls away from them at the rim.
+/// @param outward  normal of the body at the rim   @param across  from the axis to the rim
+bool PolarRuleSolver::widen_columns(int side, const Vec3& outward, const Vec3& across) {
+  const double cosine = (side == 0 ? 1.0 : -1.0) * outward.dot(frame_.axis);
+  const double far = across.norm(), sight = outward.dot(across) / far, aim = std::min(kUpright, 0.5 * sight);
+  if (!(sight > kLeastSight)) return cosine > kLeastSight;
+  spread_[side] = std::max(spread_[side], (aim - cosine) / ((sight - aim) * far));
+  return true;
+}
+
+/// Distance from Sigma along the columns of a side, by their ways, to where the body's pressure vanishes; the last entry is the
+/// column through the peak.
+/// @param tolerance  of the last step, over the thickness   @param inside  the same of steps from where there is pressure
+bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double tolerance, double inside) {
+  const std::size_t n = node_.size() + 1;
+  std::vector<double>& end = end_[side];
+  end.resize(n);
+  line_point_.resize(n);
+  line_value_.resize(n);
+  line_slope_.resize(n);
+  low_.assign(n, 0.0);
+  high_.assign(n, extent_);
+  const double floor = 16.0 * kEpsilon * pressure.modulus(side);
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    const Vec3& g = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
+    const double fall = -g.dot(column(i).way);
+    end[i] = fall * frame_.depth[side] > 0.5 * pressure_[i] ? pressure_[i] / fall : 2.0 * frame_.depth[side];
+  }
+  end[n - 1] = frame_.depth[side];
+  reached_.resize(n);
+  open_.resize(n);
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
+  for (int iteration = 0; iteration < kEndSteps; ++iteration) {
+    for (const std::size_t i : open_) {
+      reached_[i] = end[i];
+      line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
+    }
+    evaluate_on_lines(pressure, side);
+    std::erase_if(open_, [&](std::size_t i) {
+      const double fall = -line_slope_[i].dot(column(i).way), newton = end[i] + line_value_[i] / fall;
+      (line_value_[i] > 0.0 ? low_[i] : high_[i]) = end[i];
+      // Where a body is deep its pressure rises first; far beyond its surface the support may have ended.
+      const double next = fall > 0.0 && newton >= low_[i] && newton <= high_[i] ? newton : 0.5 * (low_[i] + high_[i]);
+      const double enough = line_value_[i] >= 0.0 ? inside : tolerance;
+      const bool near = std::abs(next - end[i]) <= enough * frame_.thickness || std::abs(line_value_[i]) <= floor;
+      end[i] = next;
+      return near;
+    });
+    if (open_.empty()) return true;
+  }
+  return false;
+}
+
+/// Values and slopes of one body at the open points of lines.
+void PolarRuleSolver::evaluate_on_lines(PairPressure& pressure, int side) {
+  const std::size_t n = open_.size();
+  if (n == line_point_.size()) return pressure.evaluate(side, line_point_, line_value_, line_slope_);
+  some_.resize(n);
+  for (std::size_t k = 0; k < n; ++k) some_.point[k] = line_point_[open_[k]];
+  pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
+  for (std::size_t k = 0; k < n; ++k) {
+    line_value_[open_[k]] = some_.a[k];
+    line_slope_[open_[k]] = some_.slope_a[k];
+  }
+}
+
+/// Ways of the columns of a side, and how what they enclose widens; the last one is that through the peak. @return false where two of them meet
+bool PolarRuleSolver::start_columns(int side) {
+  const std::size_t n = node_.size();
+  const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
+  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, 0.0, 1.0});
+  if (spread == 0.0) return true;
+  for (std::size_t i = 0; i <= n; ++i) {
+    const Vec3 d = (i < n ? node_.point[i] : peak_) - frame_.origin, across = d - d.dot(frame_.axis) * frame_.axis;
+    Column& along = column_[i];
+    along.way += spread * across;
+    along.spread = spread;
+    if (i < n) along.narrow = 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis);
+    if (!(along.narrow > 0.0)) return false;
+  }
+  return true;
+}
+
+/// @param nodes  of Gauss along a column, or as many as would be as exact
+bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
+  // Pressures and slopes at both ends are known, but third bodies may press harder somewhere between.
+  const bool from_ends = region == Region::Sums && !cut_;
+  if (!start_columns(side)) return false;
+  if (spread_[side] > 0.0) nodes = kMostOnColumn;
+  // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
+  const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
+  if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
+  const std::size_t n = node_.size();
+  thickness_ += end_[side][summit_];
+  for (std::size_t i = 0; i < n; ++i) points.displaced[side] += weight_[i] * column(i).volume(end_[side][i]);
+  if (from_ends) {
+    add_energy_from_ends(pressure, nodes, side, points);
+  } else {
+    add_points(pressure, nodes, side, points);
+  }
+  return true;
+}
+
+/// The energy of a side, by the pressures and slopes at both ends of the columns, and by some between.
+void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points) {
+  const std::size_t n = node_.size();
+  const TwoEndRule& rule = two_end_rule(nodes - 2);
+  const std::size_t between = rule.node.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
+    const Column& along = column(i);
+    const double length = reached_[i], last = line_value_[i], slope = line_slope_[i].dot(along.way);
+    const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
+    const double width = along.width(0.0), width_there = along.width(length);
+    const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.widens(0.0);
+    const double last_slope = slope * width_there + last * along.widens(length);
+    const double sum = rule.end * (pressure_[i] * width + last * width_there) + rule.slope * length * (first_slope - last_slope);
+    points.energy += weight_[i] * (length * sum + rest * width_there);
+  }
+  if (between == 0) return;
+  line_point_.resize(n * between);
+  line_value_.resize(n * between);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < between; ++j) line_point_[i * between + j] = node_.point[i] + (reached_[i] * rule.node[j]) * column(i).way;
+  }
+  pressure.evaluate(side, line_point_, line_value_);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < between; ++j) {
+      const double width = column(i).width(reached_[i] * rule.node[j]);
+      points.energy += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
+    }
+  }
+}
+
+/// Points of a squeezed region, and its energy by them.
+void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points) {
+  const std::size_t n = node_.size();
+  const GaussRule& gauss = gauss_rule(nodes);
+  const std::size_t begin = points.volume_point.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double length = end_[side][i];
+    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+      points.volume_point.push_back(node_.point[i] + (length * gauss.node[j]) * column(i).way);
+      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).width(length * gauss.node[j]));
+      points.volume_side.push_back(static_cast<std::uint8_t>(side));
+    }
+  }
+  const std::size_t count = points.volume_point.size() - begin;
+  line_value_.resize(count);
+  const auto added = std::span(points.volume_point).subspan(begin);
+  pressure.evaluate(side, added, line_value_);
+  if (cut_) evaluate_thirds(added);
+  for (std::size_t i = 0; cut_ && i < third_value_.size(); ++i) {
+    if (third_value_[i] > line_value_[i % count]) points.volume_weight[begin + i % count] = 0.0;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
+  }
+}
+
+}  // namespace supple::collision
