@@ -1,0 +1,110 @@
+#include "simulation_impl.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "audits.h"
+#include "camera.h"
+#include "picture.h"
+#include "scene_places.h"
+#include "supple/core/error.h"
+
+namespace supple::scenes {
+
+/// Cameras that the scene leaves open see what is there now, and the ground below it.
+void Simulation::Impl::place_cameras() {
+  const std::span<const CameraDesc> cameras = cameras_of(scene);
+  Box seen;
+  if (std::any_of(cameras.begin(), cameras.end(), is_open)) {
+    pull_fields();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const LookDesc& look = scene.objects[bodies[i].object].look;
+      if (!bodies[i].skeleton.primitive.empty() && (look.surface || look.wireframe)) seen = seen.united(pulled.field[i].surface_box());
+    }
+    const std::vector<Mesh> obstacles = obstacle_meshes(scene, model, time());
+    for (std::size_t i = 0; i < obstacles.size(); ++i) {
+      if (scene.obstacles[i].shape == ObstacleName::Plane) continue;
+      for (const Vec3& p : obstacles[i].position) seen.include(p);
+    }
+    if (scene.ground && scene.ground->visible && !seen.empty()) seen.lower.z() = std::min(seen.lower.z(), scene.ground->height);
+  }
+  model.cameras = placed_cameras(scene, seen);
+}
+
+/// Nothing is pulled; meshers keep what they know, which holds for any state.
+void Simulation::Impl::renew_pulled() {
+  DivisionMeshers dividing = std::move(pulled.dividing);
+  pulled = Frame(model, bodies);
+  pulled.dividing = std::move(dividing);
+}
+
+void Simulation::Impl::drop_results() {
+  pulled_contacts = pulled_fields = pulled_meshes = false;
+  meshes.clear();
+  searches = {};
+}
+
+void Simulation::Impl::pull_contacts() {
+  if (pulled_contacts) return;
+  if (contact_on()) {
+    std::vector<implicit::SampleState> trial = state.samples;
+    Profile unused{};
+    StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
+    quiet.sticks = &state.sticks;
+    quiet.time = time();
+    quiet.step = held_step();
+    find_contact_surface(quiet, state.particles, trial, pulled, true);
+    pulled_sample.internal.reset(model.particles.size());
+    apply_reactions(quiet, pulled, pulled_sample);
+  }
+  pulled_contacts = true;
+  pulled_fields = false;
+}
+
+void Simulation::Impl::pull_fields() {
+  pull_contacts();
+  if (pulled_fields) return;
+  Profile unused{};
+  place_and_index_all({model, bodies, rules, executor, unused, options.skip, false}, state.particles, pulled);
+  pulled_fields = true;
+}
+
+const std::vector<Mesh>& Simulation::Impl::pull_meshes() {
+  if (pulled_meshes) return meshes;
+  pull_fields();
+  StageContext wanted = context();
+  if (shown) wanted.shown = &shown;
+  try {
+    meshes = polygonise_objects(wanted, state.particles, laws, pulled);
+    searches.add(pulled.missed);
+    all_searches.add(pulled.missed);
+    set_missed(scene.output.meshing, all_searches, warnings);
+  } catch (const Error& error) {
+    rethrow_with_places(scene, error);
+  }
+  pulled_meshes = true;
+  return meshes;
+}
+
+/// Of the present bodies as they touch now, without springs of friction [J]
+double Simulation::Impl::contact_energy() {
+  pull_contacts();
+  double sum = 0.0;
+  for (const auto& s : pulled.surface.summary) sum += s.energy;
+  return sum;
+}
+
+Energies Simulation::Impl::energies() {
+  Energies e;
+  e.kinetic = core::measure_motion(model.particles, state.particles).kinetic_energy;
+  e.interaction = core::potential_energy(model.particles, state.particles, laws);
+  e.contact = contact_energy() + collision::stick_energy(model.reaction.stick, state.sticks);
+  return e;
+}
+
+void Simulation::Impl::book_audits() {
+  const double energy = energies().total();  // and the contacts
+  scenes::book_audits(model, bodies, energy, pulled.surface, state);
+}
+
+}  // namespace supple::scenes
