@@ -20,7 +20,16 @@ constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
 constexpr int kFewNodes = 3;           // through a squeezed region
+constexpr int kMoreAcross = 2;         // columns out of an apex may go through most of the body
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
+
+/// The least t > 0 where c0 + t (c1 + t c2) vanishes, c0 > 0; infinity where it does not.
+double first_zero(const std::array<double, 3>& c) {
+  const double half = -0.5 * c[1], square = half * half - c[0] * c[2];
+  if (square < 0.0) return std::numeric_limits<double>::infinity();
+  const double root = half + std::sqrt(square);  // c2 t^2 - 2 half t + c0 = 0: t = c0 / root is the nearer one
+  return root > 0.0 ? c[0] / root : std::numeric_limits<double>::infinity();
+}
 
 int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
 
@@ -311,35 +320,37 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
   return sums_.load > 0.0;
 }
 
-/// Distance along the normal from the peak to where the pressure of one body vanishes; steps are at most a cell.
-double MarchRuleSolver::depth(PairPressure& pressure, int side, const Node& peak, double cell) {
+/// Ways through what one body loses: out of its apex, or along the interpolated normals, which fill the space beside Sigma without gaps as far as
+/// they do not meet.
+void MarchRuleSolver::start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak) {
   const double sign = side == 0 ? 1.0 : -1.0;
-  double t = 0.0;
-  constexpr int kMostSteps = 200;
-  for (int i = 0; i < kMostSteps; ++i) {
-    const Vec3 x = peak.point + (sign * t) * peak.normal;
-    double p;
-    Vec3 slope;
-    pressure.evaluate(side, {&x, 1}, {&p, 1}, {&slope, 1});
-    const double fall = -sign * slope.dot(peak.normal);
-    const double step = fall > 0.0 ? std::clamp(p / fall, -cell, cell) : std::copysign(cell, p);
-    t += step;
-    if (std::abs(step) < 1e-6 * cell) break;
+  apex_ = find_apex(pressure, side, third, peak.point, sign * peak.normal);
+  columns_.assign(nodes_.size(), {});
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    const Node& node = nodes_[i];
+    Column& c = columns_[i];
+    if (apex_) {
+      c.way = apex_->way(node.point);
+      const double flux = sign * node.weight * node.normal.dot(c.way), bend = 1.0 / apex_->distance(node.point);
+      c.swept = {flux, 2.0 * bend * flux, bend * bend * flux};
+    } else {
+      c.way = sign * node.along;
+      c.swept = {node.swept[0], sign * node.swept[1], node.swept[2]};
+      c.high = first_zero(c.swept);
+    }
   }
-  return t;
 }
 
-/// Gauss points in the squeezed region of one body, along the interpolated normals: they fill the space beside Sigma without gaps.
-void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, int nodes,
+/// Gauss points in what one body loses.
+void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak,
                                   PatchPoints& points) {
-  const double sign = side == 0 ? 1.0 : -1.0;
+  start_columns(pressure, side, third, peak);
   const std::size_t n = nodes_.size();
-  columns_.assign(n, {});
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
   for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
     place_.clear();
-    for (const std::size_t i : open_) place_.push_back(nodes_[i].point + (sign * columns_[i].at) * nodes_[i].along);
+    for (const std::size_t i : open_) place_.push_back(nodes_[i].point + columns_[i].at * columns_[i].way);
     value_.resize(open_.size());
     slope_.resize(open_.size());
     pressure.evaluate(side, place_, value_, slope_);
@@ -348,36 +359,33 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
       const std::size_t i = open_[k];
       Column& c = columns_[i];
       (value_[k] > 0.0 ? c.low : c.high) = c.at;
-      const double fall = -sign * slope_[k].dot(nodes_[i].along);
-      double next = fall > 0.0 ? c.at + std::clamp(value_[k] / fall, -cell_, cell_) : c.at + cell_;
-      if (!(next >= c.low && next <= c.high)) next = std::isfinite(c.high) ? 0.5 * (c.low + c.high) : c.low + cell_;
+      const double fall = -slope_[k].dot(c.way), longest = apex_ ? std::max(cell_, c.at) : cell_;
+      double next = fall > 0.0 ? c.at + std::clamp(value_[k] / fall, -longest, longest) : c.at + longest;
+      if (!(next >= c.low && next <= c.high)) next = std::isfinite(c.high) ? 0.5 * (c.low + c.high) : c.low + longest;
       const bool moves = std::abs(next - c.at) > 1e-9 * cell_;
       c.at = next;
       if (moves) open_[left++] = i;
     }
     open_.resize(left);
   }
-  const GaussRule& gauss = gauss_rule(nodes);
+  const GaussRule& gauss = gauss_rule(std::max(order_for(error) - 1, kFewNodes) + (apex_ ? kMoreAcross : 0));
   const std::size_t begin = points.volume_point.size();
   for (std::size_t i = 0; i < n; ++i) {
-    const auto& [v0, v1, v2] = nodes_[i].swept;
+    const Column& c = columns_[i];
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
-      const double y = sign * columns_[i].at * gauss.node[j];
-      points.volume_point.push_back(nodes_[i].point + y * nodes_[i].along);
-      points.volume_weight.push_back(std::max(v0 + y * (v1 + y * v2), 0.0) * columns_[i].at * gauss.weight[j]);
+      const double t = c.at * gauss.node[j];
+      points.volume_point.push_back(nodes_[i].point + t * c.way);
+      points.volume_weight.push_back(c.width(t) * c.at * gauss.weight[j]);
       points.volume_side.push_back(static_cast<std::uint8_t>(side));
     }
+  }
+  if (apex_ && apex_->lost) {
+    fill_body(pressure, side, apex_->at, error, points.volume_point, points.volume_weight);
+    points.volume_side.resize(points.volume_point.size(), static_cast<std::uint8_t>(side));
   }
   const auto added = std::span(points.volume_point).subspan(begin);
   value_.resize(added.size());
   pressure.evaluate(side, added, value_);
-  third_.resize(added.size());
-  for (const ContactBody* body : third) {
-    body->field.evaluate(added, third_);
-    for (std::size_t i = 0; i < added.size(); ++i) {
-      if (body->material.modulus * third_[i] > value_[i]) points.volume_weight[begin + i] = 0.0;
-    }
-  }
   for (std::size_t i = 0; i < added.size(); ++i) {
     points.displaced[side] += points.volume_weight[begin + i];
     points.energy += points.volume_weight[begin + i] * std::max(value_[i], 0.0);
@@ -434,8 +442,9 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
     if (node.pressure > nodes_[peak].pressure) peak = i;
   }
   for (const int side : {0, 1}) {
-    if (regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, std::max(order_for(limits.error) - 1, kFewNodes), points);
-    thickness_ += depth(pressure, side, nodes_[peak], cell_);
+    const Node& top = nodes_[peak];
+    if (regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, limits.error, top, points);
+    thickness_ += pressure.overlap_out_of(side, top.point, (side == 0 ? 1.0 : -1.0) * top.normal, cell_);
   }
   // What rounding of the coordinates does to so thin an overlap.
   if (thickness_ > 0.0) estimate_ = std::min(1.0, estimate_ + 32.0 * kEpsilon * (1.0 + coordinates / thickness_));

@@ -6,9 +6,11 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "apex.h"
 #include "pair_pressure.h"
 #include "patch_points.h"
 #include "sigma_mesh.h"
@@ -107,9 +109,12 @@ class MarchRuleSolver {
     double weight, pressure, residual;
     std::array<double, 3> swept;  // area across `along` over the distance along it, as a polynomial
   };
-  /// How far a squeezed region reaches along a node's way, between places on both sides of its end.
+  /// How far a squeezed region reaches along a node's way, between places on both sides of its end, and the area across it over that distance.
   struct Column {
+    Vec3 way = Vec3::Zero();
+    std::array<double, 3> swept{};  // a polynomial
     double at = 0.0, low = 0.0, high = std::numeric_limits<double>::infinity();
+    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
   };
   /// A kink that may cross a leaf, by its s at the corners and at the middles of the edges.
   struct Crossing {
@@ -184,8 +189,8 @@ class MarchRuleSolver {
   static double share_of(const Leaf& leaf, int order);
   void weigh(int order);
   bool refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference);
-  void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, int nodes, PatchPoints& points);
-  static double depth(PairPressure& pressure, int side, const Node& peak, double cell);
+  void start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak);
+  void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak, PatchPoints& points);
 
   SigmaMesher mesher_;
   SigmaMesh mesh_;
@@ -208,6 +213,7 @@ class MarchRuleSolver {
   std::vector<Ray> rays_, cuts_;
   std::vector<Node> nodes_, kept_;
   std::vector<Column> columns_;
+  std::optional<Apex> apex_;  // that they come out of
   std::vector<std::uint32_t> order_;
   PatchSums sums_;
   double estimate_ = 1.0;

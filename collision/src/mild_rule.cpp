@@ -87,7 +87,7 @@ bool PolarRuleSolver::solve_mild_sectors(PairPressure& pressure, const ContactSe
 bool PolarRuleSolver::refine_rings(PairPressure& pressure, double error) {
   const std::span<const PolarRule> rules = polar_rules();
   double last = 0.0;  // what the rule before was off by, by its difference from the one before it
-  spread_ = {};
+  spread_ = widest_ = {};
   for (std::size_t r = 1; r <= kFinestRings; ++r) {
     if (r == 1) {
       start_outline(rules[r]);

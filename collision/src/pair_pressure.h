@@ -95,12 +95,15 @@ class PairPressure {
     return all;
   }
 
+  [[nodiscard]] const implicit::FieldView& field(int side) const noexcept { return field_[side]; }
   [[nodiscard]] double modulus(int side) const noexcept { return modulus_[side]; }
   [[nodiscard]] double largest_modulus() const noexcept { return std::max(modulus_[0], modulus_[1]); }
   /// Length [m] that steps are limited by: the smaller feature size of the two bodies.
   [[nodiscard]] double feature_size() const {
     return std::min(field_[0].feature_size(), field_[1].feature_size());
   }
+  /// Distance from a place of Sigma along the way [unit] out of a body to where it ends, or the other one before. @param longest  step [m]
+  [[nodiscard]] double overlap_out_of(int side, const Vec3& from, const Vec3& way, double longest);
   [[nodiscard]] std::uint64_t evaluations() const noexcept { return evaluations_; }
 
  private:

@@ -8,7 +8,9 @@
 namespace supple::collision {
 namespace {
 
+constexpr double kLeastAlong = 0.1;  // cosine of a way out of the apex to the axis
 constexpr double kLeastSight = 0.1;  // cosine of a body's normal to the ray, at the rim
+constexpr double kWidest = 1.3;      // across over along at the rim: energies by wider columns are off by more than asked
 constexpr int kEndSteps = 40;
 constexpr int kMostOnColumn = 6;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
@@ -21,7 +23,9 @@ bool PolarRuleSolver::widen_columns(int side, const Vec3& outward, const Vec3& a
   const double cosine = (side == 0 ? 1.0 : -1.0) * outward.dot(frame_.axis);
   const double far = across.norm(), sight = outward.dot(across) / far, aim = std::min(kUpright, 0.5 * sight);
   if (!(sight > kLeastSight)) return cosine > kLeastSight;
-  spread_[side] = std::max(spread_[side], (aim - cosine) / ((sight - aim) * far));
+  const double widened = (aim - cosine) / (sight - aim);
+  spread_[side] = std::max(spread_[side], widened / far);
+  widest_[side] = std::max(widest_[side], widened);
   return true;
 }
 
@@ -85,25 +89,39 @@ void PolarRuleSolver::evaluate_on_lines(PairPressure& pressure, int side) {
 bool PolarRuleSolver::start_columns(int side) {
   const std::size_t n = node_.size();
   const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
-  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, 0.0, 1.0});
+  if (apex_[side] && start_out_of(*apex_[side], sign)) return true;
+  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {1.0, 0.0, 0.0}});
   if (spread == 0.0) return true;
   for (std::size_t i = 0; i <= n; ++i) {
     const Vec3 d = (i < n ? node_.point[i] : peak_) - frame_.origin, across = d - d.dot(frame_.axis) * frame_.axis;
     Column& along = column_[i];
     along.way += spread * across;
-    along.spread = spread;
-    if (i < n) along.narrow = 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis);
-    if (!(along.narrow > 0.0)) return false;
+    const double narrow = i < n ? 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis) : 1.0;
+    if (!(narrow > 0.0)) return false;
+    along.swept = {narrow, spread * (1.0 + narrow), spread * spread};
+  }
+  return true;
+}
+
+/// @return false where the rule's axis does not lead out of the apex
+bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
+  const std::size_t n = node_.size();
+  column_.resize(n + 1);
+  for (std::size_t i = 0; i <= n; ++i) {
+    const Vec3 x = i < n ? node_.point[i] : peak_, way = apex.way(x), normal = i < n ? normal_[i] : frame_.axis;
+    const double along = sign * way.dot(frame_.axis);
+    if (!(along > kLeastAlong)) return false;
+    const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
+    column_[i] = {way / along, {flux, 2.0 * bend * flux, bend * bend * flux}};
   }
   return true;
 }
 
 /// @param nodes  of Gauss along a column, or as many as would be as exact
 bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
-  // Pressures and slopes at both ends are known, but third bodies may press harder somewhere between.
-  const bool from_ends = region == Region::Sums && !cut_;
-  if (!start_columns(side)) return false;
-  if (spread_[side] > 0.0) nodes = kMostOnColumn;
+  const bool from_ends = region == Region::Sums;
+  if (widest_[side] > kWidest || !start_columns(side)) return false;
+  if (spread_[side] > 0.0 || apex_[side]) nodes = kMostOnColumn;
   // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
   const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
   if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
@@ -166,10 +184,6 @@ void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, Pa
   line_value_.resize(count);
   const auto added = std::span(points.volume_point).subspan(begin);
   pressure.evaluate(side, added, line_value_);
-  if (cut_) evaluate_thirds(added);
-  for (std::size_t i = 0; cut_ && i < third_value_.size(); ++i) {
-    if (third_value_[i] > line_value_[i % count]) points.volume_weight[begin + i % count] = 0.0;
-  }
   for (std::size_t i = 0; i < count; ++i) {
     points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
   }

@@ -309,6 +309,10 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   imprints_.clear();
   uneven_ = false;
   peak_ = frame.origin;
+  for (const int side : {0, 1}) {
+    const bool wanted = !third.empty() && regions[static_cast<std::size_t>(side)] != Region::None;
+    apex_[side] = wanted ? find_apex(pressure, side, third, frame.origin, (side == 0 ? 1.0 : -1.0) * frame.axis) : std::nullopt;
+  }
   const PatchPoints::Mark before = points.mark();
   const auto anew = [&] {
     points.back_to(before);
@@ -332,7 +336,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   cut_ = false;
   about_middle_ = by_sectors_ = mild_ = false;
   rise_.setZero();
-  spread_ = {};
+  spread_ = widest_ = {};
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;

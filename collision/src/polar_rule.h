@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "apex.h"
 #include "find_peak.h"
 #include "imprint.h"
 #include "pair_pressure.h"
@@ -82,6 +83,7 @@ class PolarRuleSolver {
   bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
   void evaluate_on_lines(PairPressure& pressure, int side);
   bool start_columns(int side);
+  bool start_out_of(const Apex& apex, double sign);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
@@ -259,15 +261,17 @@ class PolarRuleSolver {
   /// A line from a node through a squeezed region. Where columns spread, X = node + t way, across from the axis by 1 + t spread times as far as the
   /// node, and t has the area of the node's foot times (1 + t spread)(narrow + t spread).
   struct Column {
-    Vec3 way;  // of length 1 along the axis
-    double spread = 0.0, narrow = 1.0;
-    [[nodiscard]] double width(double t) const { return (1.0 + spread * t) * (narrow + spread * t); }
-    [[nodiscard]] double widens(double t) const { return spread * (1.0 + narrow + 2.0 * spread * t); }
-    [[nodiscard]] double volume(double t) const { return t * (narrow + spread * t * (0.5 * (1.0 + narrow) + spread * t / 3.0)); }
+    Vec3 way;                       // of length 1 along the axis
+    std::array<double, 3> swept{};  // area across it over the distance along it, a polynomial; over that across the axis
+    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
+    [[nodiscard]] double widens(double t) const { return swept[1] + 2.0 * t * swept[2]; }
+    [[nodiscard]] double volume(double t) const { return t * (swept[0] + t * (0.5 * swept[1] + t * swept[2] / 3.0)); }
   };
 
   PeakFrame frame_;
+  std::array<std::optional<Apex>, 2> apex_;  // of each side, where third bodies take their part
   std::array<double, 2> spread_{};  // of the columns of each side, across over along [1/m], a metre from the axis
+  std::array<double, 2> widest_{};  // the same at the rim [1]
   std::vector<Column> column_;  // by node, and that through the peak; one for all where they do not spread
   [[nodiscard]] const Column& column(std::size_t i) const { return column_[column_.size() == 1 ? 0 : i]; }
   Vec3 peak_ = Vec3::Zero();

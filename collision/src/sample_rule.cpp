@@ -281,7 +281,8 @@ void SampleRuleSolver::place_points(PairPressure& pressure, std::span<const Cont
   }
 }
 
-/// Gauss points on the stretches of the rays of one body beyond Sigma, where its pressure is the smaller one.
+/// Gauss points on the stretches of the rays of one body beyond Sigma, where its pressure is the smaller one. Where a third body presses harder the
+/// stretch begins on another Sigma, with whose pair it counts.
 void SampleRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third,
                                    PatchPoints& points) {
   const Rays& rays = rays_[static_cast<std::size_t>(side)];
@@ -292,9 +293,14 @@ void SampleRuleSolver::add_columns(PairPressure& pressure, int side, std::span<c
   for (std::uint32_t r = 0; r < rays.size(); ++r) {
     const double last = rays.reach[r];
     const bool own_smaller = sign * rays.gap[rays.first[r]] < 0.0;
-    if (rays.begin[r] == 0.0 && own_smaller && rays.own[rays.first[r]] > 0.0) column_.push_back({r, rays.begin[r], last});
+    if (rays.begin[r] == 0.0 && own_smaller && rays.own[rays.first[r]] > 0.0) {
+      const double other = rays.own[rays.first[r]] + std::abs(rays.gap[rays.first[r]]);
+      const auto harder = [&](const ContactBody* body) { return body->material.modulus * body->field.value(rays.foot[r]) > other; };
+      if (std::none_of(third.begin(), third.end(), harder)) column_.push_back({r, rays.begin[r], last});
+    }
     for (; c < crossings_.size() && crossings_[c].side == static_cast<std::uint32_t>(side) && crossings_[c].ray == r; ++c) {
       const bool enters = crossings_[c].falls == (side == 0);
+      if (third_[c] > at_.a[c]) continue;
       if (enters) {
         column_.push_back({r, crossings_[c].t, last});
       } else if (!column_.empty() && column_.back().ray == r) {
@@ -367,17 +373,6 @@ void SampleRuleSolver::add_columns(PairPressure& pressure, int side, std::span<c
       points.volume_weight[begin + i] *= sum > 0.0 ? own / sum : 0.0;
     }
   }
-  if (!third.empty()) {
-    value_.resize(added.size());
-    weight_.resize(added.size());
-    pressure.evaluate(side, added, weight_);
-    for (const ContactBody* body : third) {
-      body->field.evaluate(added, value_);
-      for (std::size_t i = 0; i < added.size(); ++i) {
-        if (body->material.modulus * value_[i] > weight_[i]) points.volume_weight[begin + i] = 0.0;
-      }
-    }
-  }
   sum_columns(pressure, side, begin, points);
 }
 
@@ -411,24 +406,6 @@ void SampleRuleSolver::sum_columns(PairPressure& pressure, int side, std::size_t
     points.displaced[side] += points.volume_weight[begin + i];
     points.energy += points.volume_weight[begin + i] * std::max(value_[i], 0.0);
   }
-}
-
-/// Distance along the normal from the peak to where the pressure of one body vanishes.
-double SampleRuleSolver::depth(PairPressure& pressure, int side, const Vec3& peak, const Vec3& normal, double longest) {
-  const double sign = side == 0 ? 1.0 : -1.0;
-  double t = 0.0;
-  constexpr int kSteps = 100;
-  for (int i = 0; i < kSteps; ++i) {
-    const Vec3 x = peak + (sign * t) * normal;
-    double p;
-    Vec3 slope;
-    pressure.evaluate(side, {&x, 1}, {&p, 1}, {&slope, 1});
-    const double fall = -sign * slope.dot(normal);
-    const double step = fall > 0.0 ? std::clamp(p / fall, -longest, longest) : std::copysign(longest, p);
-    t += step;
-    if (std::abs(step) < 1e-6 * longest) break;
-  }
-  return t;
 }
 
 bool SampleRuleSolver::solve(PairPressure& pressure, const ContactBody& a, const ContactBody& b,
@@ -477,7 +454,7 @@ bool SampleRuleSolver::solve(PairPressure& pressure, const ContactBody& a, const
     }
   }
   const auto peak = static_cast<std::size_t>(std::max_element(points.pressure.begin(), points.pressure.end()) - points.pressure.begin());
-  for (const int side : {0, 1}) thickness_ += depth(pressure, side, points.point[peak], points.normal[peak], spacing_);
+  for (const int side : {0, 1}) thickness_ += pressure.overlap_out_of(side, points.point[peak], (side == 0 ? 1.0 : -1.0) * points.normal[peak], spacing_);
   return true;
 }
 

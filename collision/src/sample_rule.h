@@ -73,7 +73,6 @@ class SampleRuleSolver {
   void for_contributions(int side, std::size_t point, const Vec3& x, const Use& use) const;
   void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, PatchPoints& points);
   void add_columns_across(PairPressure& pressure, int side, PatchPoints& points);
-  [[nodiscard]] double depth(PairPressure& pressure, int side, const Vec3& peak, const Vec3& normal, double step);
   void sum_columns(PairPressure& pressure, int side, std::size_t begin, PatchPoints& points);
 
   std::array<const ContactBody*, 2> body_{};

@@ -490,7 +490,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   along_.clear();
   changes_.clear();
   residual_ = lift_ = rim_error_ = 0.0;
-  spread_ = {};
+  spread_ = widest_ = {};
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
   const bool beside = about_middle_ && cut_;

@@ -67,7 +67,7 @@ struct ContactSurface {
     double area = 0.0;                     ///< [m^2]
     double load = 0.0;                     ///< integral of p dA [N]
     Vec3 centre_of_pressure = Vec3::Zero();  ///< integral x p dA / integral p dA [m]
-    double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]
+    double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]; all pairs sum to that of all pressures but the largest
     double largest_pressure = 0.0;         ///< at the peak; of faces on faces at the best of the points [Pa]
     double largest_overlap = 0.0;          ///< to first order without `ContactSettings::energy`: thickness of {p_A > 0, p_B > 0} through the point of largest pressure [m]
     double displaced_a = 0.0;              ///< volume of V_A [m^3]: what A loses to B
