@@ -378,6 +378,26 @@ TEST(MissedPieces, BetweenTwoBodiesBelongToBoth) {
   EXPECT_NEAR(expect_closed(d.mesh[1]).volume - inspect(d.coarse[1]).volume, hole, 1e-12);
 }
 
+// An island beside a ball, near a face between two blocks of 8^3 cells, of which the ball and its steep crumb reach one only. There it is led by little
+// and its lead rises towards the other block; what holds in that block alone rises back.
+TEST(MissedPieces, AreFoundAtFacesOfBlocksThatABodyReachesFromOneSide) {
+  Random random(5);
+  const double surface = 0.454202019;  // of a radius
+  const Lattice lattice{.origin = Vec3::Zero(), .cell = kCell};
+  for (int i = 0; i < 60; ++i) {
+    const double r = random.uniform(0.25, 0.35), R = random.uniform(0.8, 1.0);  // the first holds no node, the second some; apart by more than a cell / 16
+    const Vec3 at(random.uniform(0.0, 0.1), random.uniform(0.17, 0.23), random.uniform(0.17, 0.23));
+    const Vec3 beside = at + (surface * (r + R) + random.uniform(0.03, 0.06)) * (Vec3::UnitX() + random.in_box(0.2)).normalized();
+    const Body island = body_of({{wyvill_point(r), at}}), ball = body_of({{wyvill_point(R), beside}, {wyvill_point(0.04), Vec3(2.0, 0.4, 0.4)}});
+    const std::array bodies{SearchedBody{&island.field, 1.0}, SearchedBody{&ball.field, std::exp(random.uniform(0.0, 2.5))}};
+    const Divided d = search_divided(bodies, lattice, 1);
+    EXPECT_EQ(inspect(d.coarse[0]).components, 0u);
+    EXPECT_EQ(d.found.pieces, 1u) << i;
+    EXPECT_TRUE(d.found.complete()) << i;
+    EXPECT_NEAR(expect_closed(d.mesh[0]).volume / (4.0 / 3.0 * 3.141592653589793 * std::pow(surface * r, 3)), 1.0, 0.05);
+  }
+}
+
 /// Balls of radius 0.454 m around these centres. @return pieces, undecided cells and cubes between them
 MissedPieces search_balls(std::span<const Vec3> centres) {
   std::vector<Body> balls;
