@@ -95,17 +95,17 @@ Verdict CubeBounds::operator()(const Box& box, const Candidates& candidates, boo
 bool CubeBounds::is_flat() {
   if (count_ == 2) return rises(entry_[1]);  // alone: space outside falls where it rises
   return std::all_of(entries().begin(), entries().end(),
-      [&](const Entry& e) { return !may_have_part(e) || rises(e) || (e.label == 0 && passes_round_bodies()); });
+      [&](const Entry& e) { return !may_have_part(e) || rises(e) || (e.label == 0 && passes_convex_primitives()); });
 }
 
 bool CubeBounds::knows_eighths() const {
-  bool all_round = true;
+  bool all_lone = true;
   for (const Entry& e : entries().subspan(1)) {
     if (!e.bounds.term.empty() && !e.bounds.curved.known) return false;
     if (e.bounds.hull.size() != 1) return false;
-    all_round = all_round && (e.bounds.term.empty() || e.bounds.round);
+    all_lone = all_lone && (e.bounds.term.empty() || e.bounds.convex == 1);
   }
-  return !all_round;
+  return !all_lone;
 }
 
 std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
@@ -154,13 +154,17 @@ Verdict CubeBounds::judge() {
   return verdict;
 }
 
-bool CubeBounds::passes_round_bodies() const {
-  return lead_.size() <= 3 && std::all_of(lead_.begin(), lead_.end(), [](const Lead& l) {
+bool CubeBounds::passes_convex_primitives() const {
+  std::size_t primitives = 0;
+  for (const Lead& l : lead_) {
     const GradientBounds& bounds = l.other->bounds;
-    if (!bounds.round || bounds.hull.size() != 1) return false;
+    primitives += bounds.convex;
+    if (bounds.convex == 0 || primitives > 3 || bounds.hull.size() != 1) return false;
     const double length = bounds.hull[0].gradient.norm();
-    return length > (1.0 + 1e-12) * bounds.hull[0].turn || (length > 0.0 && slope_along(bounds, bounds.hull[0].gradient / length).lower > 0.0);
-  });
+    if (length > (1.0 + 1e-12) * bounds.hull[0].turn) continue;
+    if (!(length > 0.0 && slope_along(bounds, bounds.hull[0].gradient / length).lower > 0.0)) return false;
+  }
+  return true;
 }
 
 void CubeBounds::find_leads(const Entry& own) {

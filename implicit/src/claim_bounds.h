@@ -87,7 +87,7 @@ class CubeBounds {
   /// Bodies that matter on parts of the box that was looked at last, with those of their primitives that add to them there.
   void narrow(Candidates& narrowed) const;
   /// The same verdicts on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
-  /// by values and gradients at their middles. Undecided where some claim has no bounds of second derivatives, and between lone balls, where steps cost no more.
+  /// by values and gradients at their middles. Undecided where some claim has no bounds of second derivatives, and between lone primitives, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:
@@ -120,9 +120,11 @@ class CubeBounds {
   [[nodiscard]] bool is_flat();
   /// Whether there is a direction along which all leads rise that may be the least of a claim.
   [[nodiscard]] bool rises(const Entry& own);
-  /// Whether space outside has no maximum of its least lead: over one, two or three round bodies. Where no direction leads away from
-  /// all, their normals lie in a plane, and along its normal all of them fall. @pre rises(outside) was looked at last
-  [[nodiscard]] bool passes_round_bodies() const;
+  /// Whether no maximum of the least lead of space outside is there, since it is next to three convex primitives at most. Where no direction leads
+  /// away from all bodies, some multiples of the slopes of squared distances cancel, so that those of three lie in a plane. By convexity no distance
+  /// falls along the normal of that plane, and so no lead: maxima would go on both ways, but that farthest from the origin does not.
+  /// @pre rises(outside) was looked at last
+  [[nodiscard]] bool passes_convex_primitives() const;
 
   std::span<const Claim> claims_;
   std::vector<Entry> entry_;  ///< the first is outside; they keep their memory
