@@ -384,9 +384,9 @@ TEST(MissedPieces, AreFoundAtFacesOfBlocksThatABodyReachesFromOneSide) {
   Random random(5);
   const double surface = 0.454202019;  // of a radius
   const Lattice lattice{.origin = Vec3::Zero(), .cell = kCell};
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 150; ++i) {
     const double r = random.uniform(0.25, 0.35), R = random.uniform(0.8, 1.0);  // the first holds no node, the second some; apart by more than a cell / 16
-    const Vec3 at(random.uniform(0.0, 0.1), random.uniform(0.17, 0.23), random.uniform(0.17, 0.23));
+    const Vec3 at(0.1 * std::pow(random.uniform(0.0, 1.0), 3), random.uniform(0.17, 0.23), random.uniform(0.17, 0.23));
     const Vec3 beside = at + (surface * (r + R) + random.uniform(0.03, 0.06)) * (Vec3::UnitX() + random.in_box(0.2)).normalized();
     const Body island = body_of({{wyvill_point(r), at}}), ball = body_of({{wyvill_point(R), beside}, {wyvill_point(0.04), Vec3(2.0, 0.4, 0.4)}});
     const std::array bodies{SearchedBody{&island.field, 1.0}, SearchedBody{&ball.field, std::exp(random.uniform(0.0, 2.5))}};
@@ -453,7 +453,7 @@ TEST(MissedPieces, AreLeftOpenWhereFourRoundBodiesEncloseThem) {
 // The last blob of the hollow body is a ball of another one: two bodies enclose the cavity, of which one is not convex.
 TEST(MissedPieces, AreLeftOpenWhereTwoBodiesEncloseThem) {
   Body body = hollow();
-  const Body lid = body_of({{wyvill_point(1.3), 0.69 * body.parts.back().position.normalized()}});
+  const Body lid = body_of({{wyvill_point(1.3), 0.57 * body.parts.back().position.normalized()}});
   body.skeleton.primitive.pop_back();
   body.place();
   const std::array bodies{SearchedBody{&body.field, 1.0}, SearchedBody{&lid.field, 1.0}};
