@@ -378,8 +378,8 @@ TEST(MissedPieces, BetweenTwoBodiesBelongToBoth) {
   EXPECT_NEAR(expect_closed(d.mesh[1]).volume - inspect(d.coarse[1]).volume, hole, 1e-12);
 }
 
-// An island beside a ball, near a face between two blocks of 8^3 cells, of which the ball and its steep crumb reach one only. There it is led by little
-// and its lead rises towards the other block; what holds in that block alone rises back.
+// An island beside a ball, near a face between two blocks of 8^3 cells, of which the surfaces of ball and crumb reach one only. If the ball were not
+// looked at in the other one, too, the maximum of the island's lead could lie beyond the face from either side.
 TEST(MissedPieces, AreFoundAtFacesOfBlocksThatABodyReachesFromOneSide) {
   Random random(5);
   const double surface = 0.454202019;  // of a radius
