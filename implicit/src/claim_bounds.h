@@ -1,5 +1,11 @@
 /// @file claim_bounds.h
 /// Bodies that divide space, and what bounds tell of who has a cube. Label 0 is outside, m + 1 is body m.
+///
+/// With claims c_m = weight F_m, p_m = c_m + phi_m >= 0 is the claim above its least value, which it has beyond the supports of m. Label a has the points where
+///   M_a = c_a (1 - max over m != a of p_m / (c_a + phi_m)),  M_0 = 1 - max over m of p_m / phi_m
+/// are above 0: where c_a > 0 and c_a > c_m, and where all c_m < 0. Nothing there depends on a cube, so each M_a is one continuous function all over space
+/// and has a maximum in every closed piece of a's; and a body tells nothing where it does not reach, as p_m is 0. So cubes need only know bodies that
+/// reach them. Each lead c_a (1 - p_m / (c_a + phi_m)) rises along a direction if c_a - rho c_m does, with rho = 1 / (1 + phi_m (c_a - c_m) / (c_a (c_a + phi_m))) held.
 #pragma once
 
 #include <array>
@@ -17,10 +23,9 @@ using lattice::Label;
 /// weight * F.
 class Claim {
  public:
-  /// @param alone  without others, to whose claims its own would be compared
-  Claim(const SearchedBody& body, bool alone);
-  /// About how much it changes over a length near its surface, > 0; 1 where it is alone.
-  [[nodiscard]] double steepness() const { return steepness_; }
+  explicit Claim(const SearchedBody& body);
+  /// phi: beyond all supports it is -phi.
+  [[nodiscard]] double depth() const { return depth_; }
   void evaluate(std::span<const Vec3> points, std::span<double> values) const {
     field_->evaluate(points, values);
     for (double& v : values) v *= weight_;
@@ -35,13 +40,15 @@ class Claim {
   [[nodiscard]] double gradient_bound(const Box& box) const { return weight_ * field_->gradient_bound(box); }
   [[nodiscard]] Box surface_box() const { return field_->surface_box(); }
   [[nodiscard]] double feature_size() const { return field_->feature_size(); }
+  /// Beyond it the claim is at its least.
+  [[nodiscard]] Box support_box() const;
   [[nodiscard]] const Field& field() const { return *field_; }
   [[nodiscard]] double weight() const { return weight_; }
 
  private:
   [[nodiscard]] Interval scaled(const Interval& value) const { return {weight_ * value.lower, weight_ * value.upper}; }
   const Field* field_;
-  double weight_, steepness_ = 1.0;
+  double weight_, depth_;
 };
 
 /// What bounds tell of a cube.
@@ -53,7 +60,7 @@ struct Verdict {
   [[nodiscard]] bool settled() const { return certain || flat; }
 };
 
-/// Bodies that may have a part of a cube, each with those of its primitives that may reach it, where it is a sum.
+/// Bodies that may decide who has a part of a cube, and by how much, each with those of its primitives that may reach it, where it is a sum.
 struct Candidates {
   std::vector<std::uint32_t> body;    ///< ascending
   std::vector<std::uint32_t> offset;  ///< of their primitives, body.size() + 1 of them
@@ -63,6 +70,7 @@ struct Candidates {
     return std::span(primitive).subspan(offset[k], offset[k + 1] - offset[k]);
   }
 };
+/// Those of some bodies whose supports reach a box.
 void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found);
 
 /// Takes the bounds of the claims on cubes; outside claims 0.
@@ -76,27 +84,33 @@ class CubeBounds {
   /// Step by step, until a cube is settled: by bounds of first order, by directions, by second derivatives.
   /// @param flat_anyway  whether one that is certain is flat matters, too
   [[nodiscard]] Verdict operator()(const Box& box, const Candidates& candidates, bool flat_anyway);
-  /// The same bodies with those of their primitives that add to them on the box that was looked at last.
-  void narrow(const Candidates& from, Candidates& narrowed) const;
+  /// Bodies that matter on parts of the box that was looked at last, with those of their primitives that add to them there.
+  void narrow(Candidates& narrowed) const;
   /// The same verdicts on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
-  /// by values and gradients at their middles. Undecided where some claim has no bounds of second derivatives, and between lone balls, where steps cost no more.
+  /// by values and gradients at their middles. Undecided where some claim has no bounds of second derivatives, and between lone primitives, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:
   struct Entry {
     Label label = 0;
-    double steepness = 0.0, weight = 1.0;
+    double weight = 1.0, depth = 0.0;
     GradientBounds bounds;              ///< of the field
     Interval value{};                   ///< of the claim
+    bool matters = false;
   };
-  /// How far a claim is ahead of another one.
+  /// Of a claim over another one.
   struct Lead {
-    const Entry* other;
-    Interval value;  ///< [m], to first order
+    Entry* other;
+    Interval rho;
   };
   using Step = void (*)(const Field& field, const Box& box, GradientBounds& bounds);
   void start(const Box& box, const Candidates& candidates);
   void add(Step step, const Box& box);
+  [[nodiscard]] bool may_have_part(const Entry& e) const { return !(e.value.upper < most_) && (e.label == 0 || e.value.upper > 0.0); }
+  /// Leaves out bodies that neither have a part of the cube nor are next to one that has. @pre judge() was asked
+  void drop_others();
+  /// The leads of a claim that may be its least where it has a part of the cube.
+  void find_leads(const Entry& own);
   [[nodiscard]] std::span<Entry> entries() { return std::span(entry_).first(count_); }
 
   [[nodiscard]] std::span<const Entry> entries() const { return std::span(entry_).first(count_); }
@@ -104,12 +118,13 @@ class CubeBounds {
   [[nodiscard]] bool knows_eighths() const;
   [[nodiscard]] Verdict judge();
   [[nodiscard]] bool is_flat();
-  /// Whether there is a direction along which all leads rise that may be the least of a claim. They are divided by how steep their
-  /// claims are, so that in most cubes on an interface no lead over a third competes.
+  /// Whether there is a direction along which all leads rise that may be the least of a claim.
   [[nodiscard]] bool rises(const Entry& own);
-  /// Whether space outside has no maximum of its least lead: over one, two or three round bodies. Where no direction leads away from
-  /// all, their normals lie in a plane, and along its normal all of them fall. @pre rises(outside) was looked at last
-  [[nodiscard]] bool passes_round_bodies() const;
+  /// Whether no maximum of the least lead of space outside is there, since it is next to three convex primitives at most. Where no direction leads
+  /// away from all bodies, some multiples of the slopes of squared distances cancel, so that those of three lie in a plane. By convexity no distance
+  /// falls along the normal of that plane, and so no lead: maxima would go on both ways, but that farthest from the origin does not.
+  /// @pre rises(outside) was looked at last
+  [[nodiscard]] bool passes_convex_primitives() const;
 
   std::span<const Claim> claims_;
   std::vector<Entry> entry_;  ///< the first is outside; they keep their memory

@@ -334,7 +334,10 @@ void start_bounds(const Field& field, const Box& box, std::span<const std::uint3
   const double largest = 0.5 * box.extent().maxCoeff();
   bounds.stepwise = largest > 0.0;
   bounds.slack = Expansion{.scale = bounds.scale, .terms = n}.round_off() / largest;
-  bounds.round = bounds.term.size() == 1 && index.shape[bounds.term[0].id].view.kind == ShapeKind::Point;  // a lone ball or ellipsoid
+  const bool convex = std::all_of(bounds.term.begin(), bounds.term.end(), [&](const GradientBounds::Term& term) {
+    return index.shape[term.id].foot == PackedFoot::Slab || index.shape[term.id].foot == PackedFoot::Disc;
+  });
+  if (convex) bounds.convex = bounds.term.size();
 }
 
 void add_slopes(const Field& field, const Box& box, GradientBounds& bounds) {

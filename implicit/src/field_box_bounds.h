@@ -43,7 +43,7 @@ struct GradientBounds : Field::BoxBounds {
     double across = 1.0;             ///< share of the third axis in the spread: 0 where v is known exactly along it
   };
   std::vector<Ball> hull{};  ///< of these balls holds Clarke's gradients of F on all of the box; several where parts win in turn, empty: not known
-  bool round = false;  ///< {F >= F(x)} is strictly convex for each point x of the box where the gradient is not 0
+  std::size_t convex = 0;  ///< primitives that may add to a sum on the box, if the squared distances to all of them are convex
   std::vector<Term> term{};  ///< of a sum; empty: not known, or none
   double scale = 0.0;        ///< of round-off of the sum [1]
   double slack = 0.0;        ///< and of slopes [1/m]

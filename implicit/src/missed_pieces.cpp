@@ -107,12 +107,13 @@ class BlockSearch {
       : claims_(claims), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine),
         by_eighths_(claims.size() == 1 && EighthBounds::know(claims[0].field())) {}
 
-  /// @param bodies  that may have a part of the block
-  void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> bodies, std::vector<Seed>& seeds, MissedPieces& counts) {
+  /// @param bodies  that may have a part of the block  @param reaching  all whose supports may reach it
+  void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> bodies, std::span<const std::uint32_t> reaching,
+      std::vector<Seed>& seeds, MissedPieces& counts) {
     bodies_ = bodies;
     seeds_ = &seeds;
     counts_ = &counts;
-    find_candidates(claims_, box_of(lowest_of(block), kEdge), bodies, candidates_[0]);
+    find_candidates(claims_, box_of(lowest_of(block), kEdge), reaching, candidates_[0]);
     by_eighths_ ? halve(lowest_of(block), kEdge, 0) : search_eighths(lowest_of(block), kEdge, 0);
   }
 
@@ -173,7 +174,7 @@ class BlockSearch {
   Verdict look(const Node& at, int edge, std::size_t level) {
     ++counts_->cubes;
     const Verdict verdict = bounds_(box_of(at, edge), candidates_[level - 1], false);
-    if (!verdict.settled()) bounds_.narrow(candidates_[level - 1], candidates_[level]);
+    if (!verdict.settled()) bounds_.narrow(candidates_[level]);
     return verdict;
   }
 
@@ -437,6 +438,39 @@ void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet
   if (outer != 0) add_to(meshes[outer - 1], false, inner);
 }
 
+/// For each block of a list, ascending, the claims whose supports may reach it: those of block i are claim[offset[i]] up to claim[offset[i + 1]].
+struct Reaching {
+  std::vector<std::size_t> offset;
+  std::vector<std::uint32_t> claim;
+};
+Reaching find_reaching(std::span<const Claim> claims, const Lattice& lattice, std::span<const lattice::BlockCoord> blocks) {
+  Box all;
+  const auto corner = [&](const lattice::BlockCoord& at, int add) {
+    return lattice::node_position(lattice, lattice::kCells * (std::int64_t{at[0]} + add), lattice::kCells * (std::int64_t{at[1]} + add),
+                                  lattice::kCells * (std::int64_t{at[2]} + add));
+  };
+  for (const lattice::BlockCoord& at : blocks) all = all.united({corner(at, 0), corner(at, 1)});
+  std::vector<std::vector<std::uint32_t>> reach(blocks.size());
+  for (std::uint32_t c = 0; c < claims.size(); ++c) {
+    const auto [low, high] = lattice::block_range(claims[c].support_box().intersection(all), lattice, 0);
+    for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+      for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+        auto at = std::lower_bound(blocks.begin(), blocks.end(), lattice::BlockCoord{low[0], y, z}, lattice::before);
+        for (; at != blocks.end() && (*at)[2] == z && (*at)[1] == y && (*at)[0] <= high[0]; ++at) {
+          reach[static_cast<std::size_t>(at - blocks.begin())].push_back(c);
+        }
+      }
+    }
+  }
+  Reaching found;
+  found.offset.assign(1, 0);
+  for (const std::vector<std::uint32_t>& some : reach) {
+    found.claim.insert(found.claim.end(), some.begin(), some.end());
+    found.offset.push_back(found.claim.size());
+  }
+  return found;
+}
+
 /// What the searches of blocks found.
 struct BlockSeeds {
   std::vector<Seed> seeds;
@@ -454,11 +488,13 @@ std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Latti
   }
   PolygoniseCounts blocks_looked_at;
   const lattice::BlockList blocks = lattice::find_label_blocks(views, surface, lattice, executor, kMostBlocks, blocks_looked_at);
+  const Reaching reaching = find_reaching(claims, lattice, blocks.block);
   std::vector<BlockSeeds> found(blocks.block.size());
   executor.for_blocks(found.size(), 1, [&](std::size_t begin, std::size_t end) {
     BlockSearch search(claims, fine);
     for (std::size_t b = begin; b < end; ++b) {
       search.search(blocks.block[b], std::span(blocks.candidate).subspan(blocks.offset[b], blocks.offset[b + 1] - blocks.offset[b]),
+                    std::span(reaching.claim).subspan(reaching.offset[b], reaching.offset[b + 1] - reaching.offset[b]),
                     found[b].seeds, found[b].counts);
     }
   });
@@ -482,7 +518,7 @@ std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> 
 MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor, std::span<Mesh> meshes) {
   const Lattice fine{.origin = lattice.origin, .cell = lattice.cell / kParts};
   std::vector<Claim> claims;
-  for (const SearchedBody& body : bodies) claims.emplace_back(body, bodies.size() == 1);
+  for (const SearchedBody& body : bodies) claims.emplace_back(body);
   const bool blobs = bodies.size() == 1 && is_sum_of_blobs(*bodies[0].field);
   const std::vector<BlockSeeds> blocks =
       blobs ? search_blobs(*bodies[0].field, claims, lattice, fine, executor)

@@ -378,6 +378,26 @@ TEST(MissedPieces, BetweenTwoBodiesBelongToBoth) {
   EXPECT_NEAR(expect_closed(d.mesh[1]).volume - inspect(d.coarse[1]).volume, hole, 1e-12);
 }
 
+// An island beside a ball, near a face between two blocks of 8^3 cells, of which the surfaces of ball and crumb reach one only. If the ball were not
+// looked at in the other one, too, the maximum of the island's lead could lie beyond the face from either side.
+TEST(MissedPieces, AreFoundAtFacesOfBlocksThatABodyReachesFromOneSide) {
+  Random random(5);
+  const double surface = 0.454202019;  // of a radius
+  const Lattice lattice{.origin = Vec3::Zero(), .cell = kCell};
+  for (int i = 0; i < 150; ++i) {
+    const double r = random.uniform(0.25, 0.35), R = random.uniform(0.8, 1.0);  // the first holds no node, the second some; apart by more than a cell / 16
+    const Vec3 at(0.1 * std::pow(random.uniform(0.0, 1.0), 3), random.uniform(0.17, 0.23), random.uniform(0.17, 0.23));
+    const Vec3 beside = at + (surface * (r + R) + random.uniform(0.03, 0.06)) * (Vec3::UnitX() + random.in_box(0.2)).normalized();
+    const Body island = body_of({{wyvill_point(r), at}}), ball = body_of({{wyvill_point(R), beside}, {wyvill_point(0.04), Vec3(2.0, 0.4, 0.4)}});
+    const std::array bodies{SearchedBody{&island.field, 1.0}, SearchedBody{&ball.field, std::exp(random.uniform(0.0, 2.5))}};
+    const Divided d = search_divided(bodies, lattice, 1);
+    EXPECT_EQ(inspect(d.coarse[0]).components, 0u);
+    EXPECT_EQ(d.found.pieces, 1u) << i;
+    EXPECT_TRUE(d.found.complete()) << i;
+    EXPECT_NEAR(expect_closed(d.mesh[0]).volume / (4.0 / 3.0 * 3.141592653589793 * std::pow(surface * r, 3)), 1.0, 0.05);
+  }
+}
+
 /// Balls of radius 0.454 m around these centres. @return pieces, undecided cells and cubes between them
 MissedPieces search_balls(std::span<const Vec3> centres) {
   std::vector<Body> balls;
@@ -400,11 +420,46 @@ TEST(MissedPieces, AreDecidedWhereRoundBodiesHardlyTouchOrPass) {
   }
 }
 
+// A ball hardly touches or passes two plates of one body, over the fold on either side and beside it.
+TEST(MissedPieces, AreDecidedBetweenABallAndAFold) {
+  Primitive plate = wyvill_point(0.4);
+  plate.shape = ShapeKind::Box;
+  plate.size = Vec3(0.6, 0.5, 0.0);
+  for (const double side : {-1.0, 1.0}) {
+    Primitive left = plate, right = plate;
+    left.offset = {Vec3(-0.5, 0.0, 0.0), Quat(Eigen::AngleAxisd(side * 0.35, Vec3::UnitY()))};
+    right.offset = {Vec3(0.5, 0.0, 0.0), Quat(Eigen::AngleAxisd(-side * 0.35, Vec3::UnitY()))};
+    const Body fold = body_of({{left, Vec3::Zero()}, {right, Vec3::Zero()}});
+    for (const double x : {0.0, 0.17}) {
+      double top = 0.0, above = 2.0;  // the surface of the fold at x
+      for (int i = 0; i < 60; ++i) (FieldView(fold.field).value(Vec3(x, 0.0, 0.5 * (top + above))) > 0.0 ? top : above) = 0.5 * (top + above);
+      for (const double gap : {-2e-3, -2e-5, 2e-5, 2e-3}) {
+        const Body ball = body_of({{wyvill_point(1.0), Vec3(x, 0.0, top + 0.454202019 + gap)}});
+        const std::array bodies{SearchedBody{&fold.field, 1.0}, SearchedBody{&ball.field, 0.2}};
+        const MissedPieces found = search_divided(bodies, lattice_around({0.382, 0.236, 0.447})).found;
+        EXPECT_TRUE(found.complete() && found.pieces == 0) << side << ' ' << x << ' ' << gap << ": " << found.undecided;
+      }
+    }
+  }
+}
+
 TEST(MissedPieces, AreLeftOpenWhereFourRoundBodiesEncloseThem) {
   const double d = 0.454202019 / 0.59;  // a pocket, which opens at 0.577 and closes at 0.612
   const std::array<Vec3, 4> centres{0.5 * d * Vec3(1, 0, -std::sqrt(0.5)), 0.5 * d * Vec3(-1, 0, -std::sqrt(0.5)),
                                     0.5 * d * Vec3(0, 1, std::sqrt(0.5)), 0.5 * d * Vec3(0, -1, std::sqrt(0.5))};
   EXPECT_FALSE(search_balls(centres).complete());
+}
+
+// The last blob of the hollow body is a ball of another one: two bodies enclose the cavity, of which one is not convex.
+TEST(MissedPieces, AreLeftOpenWhereTwoBodiesEncloseThem) {
+  Body body = hollow();
+  const Body lid = body_of({{wyvill_point(1.3), 0.57 * body.parts.back().position.normalized()}});
+  body.skeleton.primitive.pop_back();
+  body.place();
+  const std::array bodies{SearchedBody{&body.field, 1.0}, SearchedBody{&lid.field, 1.0}};
+  const Lattice lattice = lattice_around({0.31, 0.42, 0.47});
+  EXPECT_EQ(count_missed(bodies, lattice, {Vec3::Constant(-0.9), Vec3::Constant(0.9)}), 1u);
+  EXPECT_FALSE(search_divided(bodies, lattice).found.complete());
 }
 
 void expect_touch_decided(const Body& a, const Body& b) {

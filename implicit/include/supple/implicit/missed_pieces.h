@@ -1,9 +1,9 @@
 /// @file supple/implicit/missed_pieces.h
 /// What a lattice misses of surfaces: closed pieces around no node, cavities in a body and islands beside it or in another body that
-/// lie between the nodes. Space belongs to the largest of the bodies' claims and 0 (outside); where a piece is, the difference of its claim and the
-/// next has an extremum. So cubes are halved until bounds show who has all of a cube, or that no such difference has an extremum in it: for a single
-/// body that its gradient does not vanish, for several that there is a direction along which the claim of each label that is possible
-/// rises more than all others. What is left has pieces nearby or remains undecided.
+/// lie between the nodes. Space belongs to the largest of the bodies' claims and 0 (outside); in a piece, how far its claim leads all others has a
+/// maximum: of one continuous function all over space (claim_bounds.h). So cubes are halved until bounds show who has all of a cube, or that there is no
+/// such maximum in it: for a single body that its gradient does not vanish, for several that there is a direction along which the claim of each label
+/// that is possible rises more than all others, or that outside there passes convex shapes. What is left has pieces nearby or remains undecided.
 #pragma once
 
 #include <cstdint>
@@ -39,9 +39,7 @@ struct SearchedBody {
 };
 
 /// The same for meshes of polygonise_partition, by body: a piece between two bodies is added to both, with the same points. Pieces
-/// that meet two others or more are not made: they count as
-/// undecided. A piece that goes through a face between two blocks of 8^3 cells, of which one of its bodies reaches only one, may not be seen: leads
-/// are compared among the bodies that reach a block.
+/// that meet two others or more are not made: they count as undecided.
 MissedPieces add_missed_pieces(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor,
                                std::span<Mesh> meshes);
 
