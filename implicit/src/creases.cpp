@@ -662,6 +662,11 @@ class CreaseMarcher {
 
  private:
   void count_kept();
+  /// Whether nothing is different since the last mesh was made.
+  [[nodiscard]] bool stayed(bool others) const {
+    const march::ViewMemory& changes = marcher_.memory.view;
+    return !others && !changes.all && changes.changes.reaches().empty();
+  }
   /// Of the vertices that did not stay where they were and as they were.
   void find_owners(std::span<const FieldView> fields, bool all, const Executor& executor);
 
@@ -670,11 +675,14 @@ class CreaseMarcher {
   Lattice lattice_;
   bool skip_ = true;
   MarchCounts counts_;
-  std::vector<std::uint32_t> node_;   ///< that the fields of the last mesh are of
+  bool made_ = false;                 ///< a mesh, of which the following is
+  std::vector<std::uint32_t> node_;   ///< that its fields are of
   std::vector<std::uint32_t> owner_;  ///< of the vertices of the marched mesh, by place in `node_`
   CreaseMemory memory_;
   Mesh mesh_, last_mesh_;
   TriangleErrors errors_;             ///< of last_mesh_, or mesh_ once they are asked for
+  std::uint64_t blunt_cells_ = 0;     ///< of mesh_
+  double error_ = 0.0;                ///< the largest of them [m]
   double feature_ = 0.0;              ///< of the field when they were [m]
   bool measured_ = false;             ///< errors_ are those of mesh_
   bool comparable_ = false;           ///< errors_ are those of last_mesh_
@@ -687,6 +695,7 @@ void CreaseMarcher::march_anew(const Executor& executor) {
 }
 
 void CreaseMarcher::count_kept() {
+  counts_.blunt_cells = blunt_cells_;
   counts_.bytes += memory_.bytes() + owner_.capacity() * sizeof(owner_[0]) + march::bytes_of(marcher_.mesh);
 }
 
@@ -704,18 +713,24 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
     present.push_back(k);
   }
   const std::vector<FieldView> views(nodes.begin(), nodes.end());
-  const bool others = present != node_;
-  node_.clear();  // should the next lines throw
-  comparable_ = std::exchange(measured_, false);
+  const bool others = !std::exchange(made_, false) || present != node_;  // made_: should the next lines throw
   marcher_.march(field, lattice, skip, executor, counts_);
+  if (stayed(others)) {
+    made_ = true;
+    comparable_ = false;  // differences are counted from this call on
+    count_kept();
+    return mesh_;
+  }
+  comparable_ = std::exchange(measured_, false);
   const march::ViewMemory& changes = marcher_.memory.view;
   find_owners(views, others || changes.all, executor);
   memory_.begin_call(others || changes.all);
   if (comparable_) std::swap(mesh_, last_mesh_);
   mesh_ = marcher_.mesh;
-  counts_.blunt_cells = Sharpener(field, views, lattice, owner_, changes, memory_, mesh_).run();
+  blunt_cells_ = Sharpener(field, views, lattice, owner_, changes, memory_, mesh_).run();
   memory_.end_call();
   node_ = std::move(present);
+  made_ = true;
   count_kept();
   return mesh_;
 }
@@ -723,10 +738,11 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
 double CreaseMarcher::error(const Executor& executor) {
   const double feature = field_->feature_size();
   const bool other = std::exchange(feature_, feature) != feature;
+  if (measured_ && !other) return error_;
   const auto differs = [this](const Box& asked) { return marcher_.memory.view.differs_at(asked); };
-  const double found = errors_.measure(*field_, mesh_, last_mesh_, !comparable_ || other, differs, executor);
+  error_ = errors_.measure(*field_, mesh_, last_mesh_, !comparable_ || other, differs, executor);
   measured_ = true;
-  return found;
+  return error_;
 }
 
 void CreaseMarcher::find_owners(std::span<const FieldView> fields, bool all, const Executor& executor) {
