@@ -17,37 +17,41 @@ using Triangle = TriangleSteps::Triangle;
 /// Boxes in the cells of a lattice that they touch, by a hash of these.
 class CellsOfBoxes {
  public:
-  /// @param number  of each box
-  CellsOfBoxes(std::span<const Box> boxes, std::span<const std::uint32_t> number, double cell) : per_cell_(1.0 / cell) {
+  explicit CellsOfBoxes(double cell) : per_cell_(1.0 / cell) {}
+  void add(const Box& box, std::uint32_t number) { item_.push_back({box, place_of(box.lower), number}); }
+  /// @pre all are added
+  void sort() {
     std::size_t count = 0;
-    for (const Box& box : boxes) each_cell(box, [&](const Place&) { ++count; });
+    for (const Item& item : item_) each_cell(item.box, [&](const Place&) { ++count; });
     first_.assign(std::bit_ceil(count + 1) + 1, 0);
-    for (const Box& box : boxes) each_cell(box, [&](const Place& place) { ++first_[bucket(place) + 1]; });
+    for (const Item& item : item_) each_cell(item.box, [&](const Place& place) { ++first_[bucket(place) + 1]; });
     std::partial_sum(first_.begin(), first_.end(), first_.begin());
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
     entry_.resize(count);
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-      each_cell(boxes[i], [&](const Place& place) { entry_[next[bucket(place)]++] = {boxes[i], number[i]}; });
-    }
+    for (std::uint32_t i = 0; i < item_.size(); ++i) each_cell(item_[i].box, [&](const Place& place) { entry_[next[bucket(place)]++] = i; });
   }
 
-  /// Calls use(number) for each box that overlaps another one, rarely twice.
-  template <class Use>
-  void each_near(const Box& box, const Use& use) const {
+  /// Calls use(number) for each box that overlaps another one and for which wanted(number), rarely twice.
+  template <class Wanted, class Use>
+  void each_near(const Box& box, const Wanted& wanted, const Use& use) const {
+    const Place low = place_of(box.lower);
     each_cell(box, [&](const Place& place) {
       const std::size_t in = bucket(place);
       for (std::uint32_t i = first_[in]; i < first_[in + 1]; ++i) {
-        const Entry& entry = entry_[i];
-        // In the cell of the least corner that both have in common.
-        if (entry.box.overlaps(box) && place_of(entry.box.lower.cwiseMax(box.lower)) == place) use(entry.number);
+        const Item& item = item_[entry_[i]];
+        if (!wanted(item.number) || !item.box.overlaps(box)) continue;
+        bool here = true;  // in the cell of the least corner that both have in common
+        for (std::size_t k = 0; k < 3; ++k) here = here && std::max(item.low[k], low[k]) == place[k];
+        if (here) use(item.number);
       }
     });
   }
 
  private:
   using Place = std::array<std::int64_t, 3>;
-  struct Entry {
+  struct Item {
     Box box;
+    Place low;  ///< of its least corner
     std::uint32_t number;
   };
 
@@ -70,8 +74,9 @@ class CellsOfBoxes {
   }
 
   double per_cell_;
+  std::vector<Item> item_;
   std::vector<std::uint32_t> first_;  ///< entry of each bucket; their number is a power of two
-  std::vector<Entry> entry_;
+  std::vector<std::uint32_t> entry_;  ///< items
 };
 
 class TakingBack {
@@ -110,26 +115,27 @@ class TakingBack {
   /// Those that must not both be there, one of them sought.
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> pairs(std::vector<std::uint32_t>& sought) {
     std::erase_if(sought, [this](std::uint32_t t) { return !steps_.is_there(t); });
-    std::vector<Box> box;
     is_sought_.assign(steps_.triangles().size(), false);
+    CellsOfBoxes cells(cell_);
     for (const std::uint32_t t : sought) {
-      box.push_back(box_of(t));
+      cells.add(box_of(t), t);
       is_sought_[t] = true;
     }
-    const CellsOfBoxes cells(box, sought, cell_);
+    cells.sort();
     std::vector<std::array<std::uint32_t, 2>> found;
     for (std::uint32_t s = 0; s < steps_.triangles().size(); ++s) {
       if (!steps_.is_there(s)) continue;
-      cells.each_near(box_of(s), [&](std::uint32_t t) {
-        if ((is_sought_[s] && s >= t) || (is_safe(s) && is_safe(t))) return;
-        if (share_a_way(steps_[s], steps_[t]) || triangles_cross(position_, steps_[s], steps_[t])) found.push_back({s, t});
+      const bool sought_too = is_sought_[s], safe = is_safe(s);
+      const auto wanted = [&](std::uint32_t t) { return !((sought_too && s >= t) || (safe && is_safe(t))); };
+      cells.each_near(box_of(s), wanted, [&](std::uint32_t t) {
+        if (collide(steps_[s], steps_[t])) found.push_back({s, t});
       });
     }
     return found;
   }
 
-  /// Whether two triangles run along an edge in the same direction, or have all corners in common.
-  static bool share_a_way(const Triangle& s, const Triangle& t) {
+  /// Whether two triangles cross, run along an edge in the same direction, or have all corners in common.
+  [[nodiscard]] bool collide(const Triangle& s, const Triangle& t) const {
     std::size_t common = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -138,7 +144,8 @@ class TakingBack {
         ++common;
       }
     }
-    return common == 3;
+    if (common >= 2) return common == 3;  // each edge ends at a corner of the other triangle
+    return triangles_cross(position_, s, t);
   }
 
   std::span<const Vec3> position_;

@@ -86,6 +86,27 @@ struct Border {
   std::vector<std::uint32_t> left, right;  ///< from first to second, and from second to first
 };
 
+/// Attempts to fill a hole around a triangle that failed, each with the vertices of the hole in the end.
+class Attempts {
+ public:
+  /// @param number  of the triangle, larger than all before
+  void add(std::uint32_t number, std::span<const std::uint32_t> vertices) {
+    vertex_.insert(vertex_.end(), vertices.begin(), vertices.end());
+    number_.push_back(number);
+    end_.push_back(vertex_.size());
+  }
+  [[nodiscard]] std::size_t size() const { return number_.size(); }
+  [[nodiscard]] std::uint32_t number(std::size_t k) const { return number_[k]; }
+  [[nodiscard]] std::span<const std::uint32_t> vertices(std::size_t k) const {
+    const std::size_t begin = k == 0 ? 0 : end_[k - 1];
+    return std::span(vertex_).subspan(begin, end_[k] - begin);
+  }
+
+ private:
+  std::vector<std::uint32_t> number_, vertex_;
+  std::vector<std::size_t> end_;
+};
+
 class Mending {
  public:
   Mending(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps)
@@ -112,13 +133,42 @@ class Mending {
     }
     if (crossed.empty()) return false;
     list_stars();
-    touched_.assign(mesh_.vertex_count(), false);
+    touched_before_ = std::exchange(touched_, std::vector<bool>(mesh_.vertex_count(), false));
+    touched_before_.resize(mesh_.vertex_count(), true);
     gone_.assign(triangle_.size(), false);
+    in_hole_.assign(triangle_.size(), 0);
+    seen_.resize(mesh_.vertex_count(), 0);
+    const Attempts last = std::exchange(failed_, {});
     bool any = false;
+    std::size_t known = 0;
     for (const std::uint32_t i : crossed) {
-      if (!gone_[i] && mend(i)) any = true;
+      if (gone_[i]) continue;
+      while (known < last.size() && last.number(known) < number_[i]) ++known;
+      if (known < last.size() && last.number(known) == number_[i] && fails_again(last.vertices(known))) {
+        failed_.add(number_[i], last.vertices(known));
+      } else if (mend(i)) {
+        any = true;
+      } else {
+        keep_failed(number_[i]);
+      }
     }
     return any;
+  }
+
+  /// An attempt depends on the triangles at the vertices of its hole, and on the holes that were filled there before it.
+  [[nodiscard]] bool fails_again(std::span<const std::uint32_t> vertices) const {
+    return std::none_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return touched_before_[v] || touched_[v]; });
+  }
+  /// The last attempt, from a triangle, if no hole was filled near it before.
+  void keep_failed(std::uint32_t number) {
+    around_.clear();
+    for (const std::uint32_t i : hole_) {
+      for (const std::uint32_t v : triangle_[i]) {
+        if (touched_[v]) return;
+        if (std::exchange(seen_[v], attempt_) != attempt_) around_.push_back(v);
+      }
+    }
+    failed_.add(number, around_);
   }
 
   void list_stars() {
@@ -151,6 +201,7 @@ class Mending {
   /// Adds a triangle to the hole, and its edges to the border or takes them off it.
   void add_to_hole(std::uint32_t triangle) {
     hole_.push_back(triangle);
+    in_hole_[triangle] = attempt_;
     const Triangle& t = triangle_[triangle];
     for (std::size_t k = 0; k < 3; ++k) {
       const Edge edge{t[k], t[(k + 1) % 3]};
@@ -165,6 +216,7 @@ class Mending {
 
   /// @return whether a hole was filled
   bool mend(std::uint32_t start) {
+    ++attempt_;
     hole_.clear();
     open_.clear();
     add_to_hole(start);
@@ -180,7 +232,7 @@ class Mending {
   /// @return whether a triangle may be taken and the hole is not too large
   bool take(std::uint32_t triangle) {
     if (gone_[triangle]) return false;
-    if (std::find(hole_.begin(), hole_.end(), triangle) == hole_.end()) add_to_hole(triangle);
+    if (in_hole_[triangle] != attempt_) add_to_hole(triangle);
     return hole_.size() <= kMostTaken;
   }
   bool take_around(std::uint32_t v) {
@@ -211,7 +263,8 @@ class Mending {
 
   /// None where the hole is not a disc, or where its border does not meet the crease at two vertices.
   [[nodiscard]] std::optional<Border> find_border() const {
-    if (open_.empty()) return std::nullopt;  // a whole component
+    // None is open of a whole component.
+    if (std::count_if(open_.begin(), open_.end(), [this](const Edge& edge) { return on_crease(edge.first); }) != 2) return std::nullopt;
     std::vector<std::uint32_t> loop{open_.front().first}, inside;
     for (std::uint32_t v = open_.front().second; v != loop.front();) {
       loop.push_back(v);
@@ -228,7 +281,6 @@ class Mending {
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (on_crease(loop[k])) meets.push_back(k);
     }
-    if (meets.size() != 2) return std::nullopt;
     std::rotate(loop.begin(), loop.begin() + static_cast<std::ptrdiff_t>(meets[0]), loop.end());
     const auto second = loop.begin() + static_cast<std::ptrdiff_t>(meets[1] - meets[0]);
     Border border{.first = loop.front(), .second = *second, .left = {loop.begin() + 1, second}, .right = {second + 1, loop.end()}};
@@ -281,7 +333,7 @@ class Mending {
     const auto around = star(a);
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t i) {
       const Triangle& t = triangle_[i];
-      return std::find(t.begin(), t.end(), b) != t.end() && std::find(hole_.begin(), hole_.end(), i) == hole_.end();
+      return std::find(t.begin(), t.end(), b) != t.end() && in_hole_[i] != attempt_;
     });
   }
 
@@ -296,7 +348,13 @@ class Mending {
   std::vector<std::uint32_t> hole_;          ///< triangles that are taken out
   std::vector<Edge> open_;                   ///< its border
   std::vector<bool> touched_;                ///< vertices of holes that were filled in this pass
+  std::vector<bool> touched_before_;         ///< the same of the last pass
   std::vector<bool> gone_;
+  Attempts failed_;                          ///< of this pass
+  std::vector<std::uint32_t> around_;
+  std::uint32_t attempt_ = 0;                ///< counts them
+  std::vector<std::uint32_t> in_hole_;       ///< the last attempt that took a triangle
+  std::vector<std::uint32_t> seen_;          ///< the last one for which a vertex was listed
 };
 
 }  // namespace
