@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "triangle_borders.h"
+
 namespace supple::implicit {
 namespace {
 
@@ -109,8 +111,8 @@ class Attempts {
 
 class Mending {
  public:
-  Mending(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps)
-      : mesh_(mesh), owner_(owner), cell_(cell), add_vertex_(add_vertex), steps_(steps) {}
+  Mending(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, bool skip, const CreaseVertex& add_vertex, TriangleSteps& steps)
+      : mesh_(mesh), owner_(owner), cell_(cell), skip_(skip), add_vertex_(add_vertex), steps_(steps) {}
 
   void run() {
     constexpr int kPasses = 3;
@@ -148,7 +150,7 @@ class Mending {
         failed_.add(number_[i], last.vertices(known));
       } else if (mend(i)) {
         any = true;
-      } else {
+      } else if (skip_) {
         keep_failed(number_[i]);
       }
     }
@@ -197,21 +199,11 @@ class Mending {
     return std::nullopt;
   }
 
-  using Edge = std::pair<std::uint32_t, std::uint32_t>;
   /// Adds a triangle to the hole, and its edges to the border or takes them off it.
   void add_to_hole(std::uint32_t triangle) {
     hole_.push_back(triangle);
     in_hole_[triangle] = attempt_;
-    const Triangle& t = triangle_[triangle];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Edge edge{t[k], t[(k + 1) % 3]};
-      const auto reverse = std::find(open_.begin(), open_.end(), Edge{edge.second, edge.first});
-      if (reverse != open_.end()) {
-        open_.erase(reverse);
-      } else {
-        open_.push_back(edge);
-      }
-    }
+    join_border(triangle_[triangle], open_);
   }
 
   /// @return whether a hole was filled
@@ -222,7 +214,7 @@ class Mending {
     add_to_hole(start);
     for (int growth = 0; growth <= kGrowths; ++growth) {
       if (!(growth == 0 || grow_along_crease()) || !grow_across()) return false;
-      if (std::any_of(open_.begin(), open_.end(), [&](const Edge& e) { return touched_[e.first]; })) return false;
+      if (std::any_of(open_.begin(), open_.end(), [&](const BorderEdge& e) { return touched_[e.first]; })) return false;
       const std::optional<Border> border = find_border();
       if (border && fill(*border)) return true;
     }
@@ -241,7 +233,7 @@ class Mending {
   }
   /// Takes what lies around the vertices at which the border meets the crease.
   bool grow_along_crease() {
-    const std::vector<Edge> open = open_;
+    const std::vector<BorderEdge> open = open_;
     for (const auto& [a, b] : open) {
       if (on_crease(a) && !take_around(a)) return false;
     }
@@ -251,7 +243,7 @@ class Mending {
   bool grow_across() {
     for (std::size_t before = 0; before != hole_.size();) {
       before = hole_.size();
-      const std::vector<Edge> open = open_;
+      const std::vector<BorderEdge> open = open_;
       for (const auto& [a, b] : open) {
         if (!crosses(a, b)) continue;
         const std::optional<std::uint32_t> beyond = triangle_at(b, a);
@@ -264,19 +256,14 @@ class Mending {
   /// None where the hole is not a disc, or where its border does not meet the crease at two vertices.
   [[nodiscard]] std::optional<Border> find_border() const {
     // None is open of a whole component.
-    if (std::count_if(open_.begin(), open_.end(), [this](const Edge& edge) { return on_crease(edge.first); }) != 2) return std::nullopt;
-    std::vector<std::uint32_t> loop{open_.front().first}, inside;
-    for (std::uint32_t v = open_.front().second; v != loop.front();) {
-      loop.push_back(v);
-      const auto next = std::find_if(open_.begin(), open_.end(), [v](const Edge& edge) { return edge.first == v; });
-      if (next == open_.end() || loop.size() > open_.size()) return std::nullopt;
-      v = next->second;
-    }
+    if (std::count_if(open_.begin(), open_.end(), [this](const BorderEdge& edge) { return on_crease(edge.first); }) != 2) return std::nullopt;
+    std::vector<std::uint32_t> loop = loop_of(open_), inside;
+    if (loop.empty()) return std::nullopt;
     for (const std::uint32_t i : hole_) inside.insert(inside.end(), triangle_[i].begin(), triangle_[i].end());
     std::sort(inside.begin(), inside.end());
     inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
     // Of a disc: V - E + F = 1, with 2 E = 3 F + the edges of its border.
-    if (loop.size() != open_.size() || 2 * inside.size() != hole_.size() + open_.size() + 2) return std::nullopt;
+    if (2 * inside.size() != hole_.size() + open_.size() + 2) return std::nullopt;
     std::vector<std::size_t> meets;
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (on_crease(loop[k])) meets.push_back(k);
@@ -340,13 +327,14 @@ class Mending {
   const Mesh& mesh_;
   std::span<const std::uint32_t> owner_;
   double cell_;
+  bool skip_;
   const CreaseVertex& add_vertex_;
   TriangleSteps& steps_;
   std::vector<std::uint32_t> number_;        ///< of the triangles that are there when a pass begins
   std::vector<Triangle> triangle_;
   std::vector<std::uint32_t> first_, star_;  ///< triangles at each vertex
   std::vector<std::uint32_t> hole_;          ///< triangles that are taken out
-  std::vector<Edge> open_;                   ///< its border
+  std::vector<BorderEdge> open_;                   ///< its border
   std::vector<bool> touched_;                ///< vertices of holes that were filled in this pass
   std::vector<bool> touched_before_;         ///< the same of the last pass
   std::vector<bool> gone_;
@@ -359,8 +347,8 @@ class Mending {
 
 }  // namespace
 
-void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps) {
-  Mending(mesh, owner, cell, add_vertex, steps).run();
+void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, bool skip, const CreaseVertex& add_vertex, TriangleSteps& steps) {
+  Mending(mesh, owner, cell, skip, add_vertex, steps).run();
 }
 
 }  // namespace supple::implicit

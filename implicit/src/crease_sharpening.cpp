@@ -11,6 +11,7 @@
 
 #include "crease_crossings.h"
 #include "crease_mending.h"
+#include "triangle_borders.h"
 #include "triangle_steps.h"
 
 namespace supple::implicit {
@@ -20,34 +21,16 @@ using Triangle = TriangleSteps::Triangle;
 
 /// The border of a disc of triangles as a loop of vertices, counter-clockwise; empty when they are not one disc.
 std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> open;
-  for (const Triangle& t : triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::pair edge{t[k], t[(k + 1) % 3]};
-      const auto reverse = std::find(open.begin(), open.end(), std::pair{edge.second, edge.first});
-      if (reverse != open.end()) {
-        open.erase(reverse);
-      } else {
-        open.push_back(edge);
-      }
-    }
-  }
-  if (open.size() != triangles.size() + 2) return {};
-  std::vector<std::uint32_t> loop{open.front().first};
-  for (std::uint32_t v = open.front().second; v != loop.front();) {
-    loop.push_back(v);
-    const auto next = std::find_if(open.begin(), open.end(), [v](const auto& edge) { return edge.first == v; });
-    if (next == open.end() || loop.size() > open.size()) return {};
-    v = next->second;
-  }
-  return loop.size() == open.size() ? loop : std::vector<std::uint32_t>{};
+  std::vector<BorderEdge> open;
+  for (const Triangle& t : triangles) join_border(t, open);
+  return open.size() == triangles.size() + 2 ? loop_of(open) : std::vector<std::uint32_t>{};
 }
 
 class Sharpener {
  public:
   Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-            const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh)
-      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), changes_(changes), memory_(memory), mesh_(mesh),
+            bool skip, const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh)
+      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), skip_(skip), changes_(changes), memory_(memory), mesh_(mesh),
         steps_(std::move(mesh.triangle)), safe_(steps_.triangles().size(), true) {}
 
   /// @return cells that keep a crease cut off
@@ -55,7 +38,7 @@ class Sharpener {
     add_points();
     turn_edges();
     cut_edges();
-    mend_creases(mesh_, owner_, lattice_.cell, [this](const std::array<std::uint32_t, 2>& nodes, const Vec3& near) {
+    mend_creases(mesh_, owner_, lattice_.cell, skip_, [this](const std::array<std::uint32_t, 2>& nodes, const Vec3& near) {
       const std::optional<CreasePoint>& point = crease_point({near, near, nodes});
       return point ? std::optional(add_vertex(*point)) : std::nullopt;
     }, steps_);
@@ -378,6 +361,7 @@ class Sharpener {
   std::span<const FieldView> fields_;  ///< of the nodes
   const Lattice& lattice_;
   std::span<const std::uint32_t> owner_;
+  bool skip_;
   const march::ViewMemory& changes_;
   CreaseMemory& memory_;
   Mesh& mesh_;
@@ -388,8 +372,8 @@ class Sharpener {
 }  // namespace
 
 std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh) {
-  return Sharpener(whole, fields, lattice, owner, changes, memory, mesh).run();
+                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh) {
+  return Sharpener(whole, fields, lattice, owner, skip, changes, memory, mesh).run();
 }
 
 }  // namespace supple::implicit

@@ -16,9 +16,9 @@ namespace supple::implicit {
 /// that still do (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here). What
 /// crosses then is taken back.
 /// @param whole    F   @param fields  F_k of the nodes   @param owner  of the vertices, by place in `fields`
-/// @param changes  since the memory was last used
+/// @param changes  since the memory was last used   @param skip  as MarchOptions::skip
 /// @return cells that keep a crease cut off
 std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh);
+                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh);
 
 }  // namespace supple::implicit

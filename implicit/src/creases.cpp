@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bytes_of.h"
 #include "crease_nodes.h"
 #include "crease_points.h"
 #include "crease_sharpening.h"
@@ -49,7 +50,7 @@ class CreaseMarcher {
   [[nodiscard]] bool whole() const { return marcher_.whole(); }
   [[nodiscard]] MarchCounts most_counts() const { return marcher_.most_counts(counts_); }
   /// Of all that is kept, the mesh too.
-  [[nodiscard]] std::uint64_t bytes() const { return counts_.bytes + march::bytes_of(mesh_) + march::bytes_of(last_mesh_) + errors_.bytes(); }
+  [[nodiscard]] std::uint64_t bytes() const { return counts_.bytes + bytes_of(mesh_) + bytes_of(last_mesh_) + errors_.bytes(); }
   [[nodiscard]] Mesh take_mesh() { return std::move(mesh_); }
 
  private:
@@ -88,7 +89,7 @@ void CreaseMarcher::march_anew(const Executor& executor) {
 
 void CreaseMarcher::count_kept() {
   counts_.blunt_cells = blunt_cells_;
-  counts_.bytes += memory_.bytes() + owner_.capacity() * sizeof(owner_[0]) + march::bytes_of(marcher_.mesh);
+  counts_.bytes += memory_.bytes() + bytes_of(owner_) + bytes_of(marcher_.mesh);
 }
 
 const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor) {
@@ -119,7 +120,7 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
   memory_.begin_call(others || changes.all);
   if (comparable_) std::swap(mesh_, last_mesh_);
   mesh_ = marcher_.mesh;
-  blunt_cells_ = sharpen(field, views, lattice, owner_, changes, memory_, mesh_);
+  blunt_cells_ = sharpen(field, views, lattice, owner_, skip, changes, memory_, mesh_);
   memory_.end_call();
   node_ = std::move(present);
   made_ = true;
@@ -207,7 +208,7 @@ const Mesh* CreaseMesher::Impl::make_to_error(const Field& field, const MarchOpt
   }
   count.tiles_sampled = sampled;
   const bool fits = tried.end_call(cell);
-  count.bytes = fits ? tried.bytes() - march::bytes_of(*mesh) : 0;
+  count.bytes = fits ? tried.bytes() - bytes_of(*mesh) : 0;
   if (fits) return mesh;
   alone = last->take_mesh();
   tried.clear();
@@ -236,6 +237,13 @@ void CreaseMesher::expect_error(const Field& field, const MarchOptions& options,
   MarchCounts count;
   (void)impl_->make_to_error(field, options, executor, count, most_triangles);
 }
+
+void CreaseMesher::keep_at_most(std::uint64_t most_kept) {
+  most_kept_ = most_kept;
+  if (impl_ != nullptr) impl_->tried.keep_at_most(most_kept);
+}
+
+std::uint64_t CreaseMesher::kept_to_error() const { return impl_ != nullptr ? impl_->tried.bytes() : 0; }
 
 Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   CreaseMesher mesher;

@@ -24,6 +24,7 @@ class TriedLattices {
   /// @param most  that is kept [byte]
   explicit TriedLattices(std::uint64_t most) : most_(most) {}
 
+  void keep_at_most(std::uint64_t most) { most_ = most; }
   void begin_call() {
     for (auto& [cell, on] : on_) on.used = false;
   }

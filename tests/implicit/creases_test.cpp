@@ -447,6 +447,19 @@ TEST(Creases, HaveTheNodeWhoseFieldIsTheLargest) {
   EXPECT_GT(ties, 0u);
 }
 
+// Balls so dense that most edges across a crease cannot be mended, and that others next to them are in a later pass.
+TEST(Creases, AreTheSameWhereAttemptsThatWouldFailAgainAreMade) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Body body = random_body({.seed = seed, .parts = 150, .half_width = 0.6, .least_radius = 0.3, .largest_radius = 0.45, .only_points = true});
+    body.skeleton.blend.rule = BlendRule::Graph;
+    body.place();
+    for (const double cell : {0.03, 0.05}) {
+      const MarchOptions options{.lattice = lattice_of(cell)}, all{.lattice = options.lattice, .skip = false};
+      EXPECT_EQ(hash_of(march_creases(body.field, options, Executor(2))), hash_of(march_creases(body.field, all, Executor(2)))) << seed << ' ' << cell;
+    }
+  }
+}
+
 TEST(Creases, DoNotDependOnThreads) {
   const Body body = two_balls(0.5);
   const std::uint64_t expected = hash_of(march_creases(body.field, {.lattice = lattice_of(0.05)}, Executor(1)));

@@ -278,6 +278,20 @@ TEST(KeptMeshes, WithCreasesFollowOneBallAfterTheOther) {
   EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(2))), hash_of(march_creases(body.field, options, Executor(1))));
 }
 
+// Refined, the coarser meshes are held besides the finest.
+TEST(KeptMeshes, CountWhatRefinementsHold) {
+  const Body body = random_body({.seed = 3, .parts = 12, .half_width = 0.8});
+  std::uint64_t coarser = 0, unrefined = 0;
+  for (const int refinements : {0, 1, 2}) {
+    CubeMesher mesher;
+    MarchCounts counts;
+    const Mesh& mesh = mesher.make(body.field, {.lattice = lattice_of(0.08), .refinements = refinements}, Executor(1), &counts);
+    if (refinements == 0) unrefined = counts.bytes;
+    EXPECT_GE(counts.bytes, unrefined + coarser) << refinements;
+    coarser += mesh.vertex_count() * 2 * sizeof(Vec3) + mesh.triangle_count() * sizeof(mesh.triangle[0]);
+  }
+}
+
 /// Balls and shapes that meet at every angle, so that creases stay cut off in some cells of this size.
 constexpr double kBluntCell = 0.07;
 Body steep_body(std::uint64_t seed, std::uint32_t parts) {
