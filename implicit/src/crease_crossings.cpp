@@ -5,7 +5,10 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <span>
+#include <utility>
 
+#include "same_triangles.h"
 #include "supple/core/error.h"
 #include "triangle_crossings.h"
 
@@ -81,18 +84,14 @@ class CellsOfBoxes {
 
 class TakingBack {
  public:
-  TakingBack(std::span<const Vec3> position, const std::vector<bool>& safe, double cell, TriangleSteps& steps)
-      : position_(position), safe_(safe), cell_(cell), steps_(steps) {}
+  TakingBack(const Mesh& mesh, const std::vector<bool>& safe, double cell, CrossingMemory& memory, TriangleSteps& steps)
+      : mesh_(mesh), position_(mesh.position), safe_(safe), cell_(cell), memory_(memory), steps_(steps) {}
 
   std::vector<std::uint32_t> run() {
-    std::vector<std::uint32_t> sought, all;
-    for (auto t = static_cast<std::uint32_t>(safe_.size()); t < steps_.triangles().size(); ++t) sought.push_back(t);
-    for (std::uint32_t t = 0; t < safe_.size(); ++t) {
-      if (!safe_[t]) sought.push_back(t);
-    }
-    while (!sought.empty()) {
-      std::vector<std::uint32_t> back;
-      for (const auto& [s, t] : pairs(sought)) {
+    std::vector<std::uint32_t> back, all;
+    for (std::vector<Pair> found = first_pairs(); !found.empty(); found = pairs(back)) {
+      back.clear();
+      for (const auto& [s, t] : found) {
         if (!steps_.is_there(s) || !steps_.is_there(t)) continue;
         // Numbers of steps from 1 on, with 0 for what none made.
         const std::uint32_t later = std::max(steps_.maker(s) + 1, steps_.maker(t) + 1);
@@ -100,7 +99,6 @@ class TakingBack {
         steps_.take_back(later - 1, back);
       }
       all.insert(all.end(), back.begin(), back.end());
-      sought = std::move(back);
     }
     std::sort(all.begin(), all.end());
     all.erase(std::unique(all.begin(), all.end()), all.end());
@@ -109,29 +107,99 @@ class TakingBack {
   }
 
  private:
+  using Pair = CrossingMemory::Pair;
   [[nodiscard]] bool is_safe(std::uint32_t t) const { return t < safe_.size() && safe_[t]; }
   [[nodiscard]] Box box_of(std::uint32_t t) const { return implicit::box_of(position_, steps_[t]); }
 
-  /// Those that must not both be there, one of them sought.
-  [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> pairs(std::vector<std::uint32_t>& sought) {
+  /// Those that must not both be there before any step was taken back, of which one is not safe.
+  [[nodiscard]] std::vector<Pair> first_pairs() {
+    const std::vector<std::uint32_t> number = steps_.numbers();
+    Mesh now{.position = mesh_.position, .normal = mesh_.normal, .triangle = {}, .columns = {}};
+    std::vector<std::uint8_t> safe;
+    for (const std::uint32_t t : number) {
+      now.triangle.push_back(steps_[t]);
+      safe.push_back(is_safe(t) ? 1 : 0);
+    }
+    const std::vector<std::uint32_t> last = same_as_last(now, safe);
+    std::vector<std::uint32_t> sought;
+    for (std::size_t i = 0; i < number.size(); ++i) {
+      if (last[i] == kNoneSame) sought.push_back(number[i]);
+    }
+    std::vector<Pair> found = pairs(sought);
+    std::vector<std::uint32_t> now_of(memory_.mesh.triangle_count(), kNoneSame);
+    for (std::size_t i = 0; i < number.size(); ++i) {
+      if (last[i] != kNoneSame) now_of[last[i]] = number[i];
+    }
+    for (const auto& [s, t] : memory_.pair) {
+      if (now_of[s] != kNoneSame && now_of[t] != kNoneSame) found.push_back({now_of[s], now_of[t]});
+    }
+    sort(found);
+    memory_.mesh = std::move(now);
+    memory_.safe = std::move(safe);
+    memory_.pair = found;
+    for (Pair& pair : memory_.pair) {
+      for (std::uint32_t& t : pair) t = static_cast<std::uint32_t>(std::lower_bound(number.begin(), number.end(), t) - number.begin());
+    }
+    return found;
+  }
+
+  /// For each triangle the one of the last call that has its corners and is as safe, none twice, nor any vertex: whether two of them collide is
+  /// as it was then.
+  [[nodiscard]] std::vector<std::uint32_t> same_as_last(const Mesh& now, std::span<const std::uint8_t> safe) const {
+    if (memory_.mesh.triangle.empty()) return std::vector<std::uint32_t>(now.triangle_count(), kNoneSame);
+    std::vector<std::uint32_t> vertex = same_vertices(now, memory_.mesh);
+    leave_once(vertex, memory_.mesh.vertex_count());
+    std::vector<std::uint32_t> same = same_triangles(now, memory_.mesh, vertex);
+    for (std::size_t i = 0; i < same.size(); ++i) {
+      if (same[i] != kNoneSame && memory_.safe[same[i]] != safe[i]) same[i] = kNoneSame;
+    }
+    leave_once(same, memory_.mesh.triangle_count());
+    return same;
+  }
+  /// Leaves the first of equal numbers.
+  static void leave_once(std::vector<std::uint32_t>& numbers, std::size_t count) {
+    std::vector<bool> taken(count, false);
+    for (std::uint32_t& n : numbers) {
+      if (n == kNoneSame) continue;
+      if (taken[n]) {
+        n = kNoneSame;
+      } else {
+        taken[n] = true;
+      }
+    }
+  }
+
+  /// Those that must not both be there, one of them sought and one not safe, in rising order.
+  [[nodiscard]] std::vector<Pair> pairs(std::vector<std::uint32_t>& sought) {
     std::erase_if(sought, [this](std::uint32_t t) { return !steps_.is_there(t); });
+    if (sought.empty()) return {};
     is_sought_.assign(steps_.triangles().size(), false);
     CellsOfBoxes cells(cell_);
+    Box all;
     for (const std::uint32_t t : sought) {
-      cells.add(box_of(t), t);
+      const Box box = box_of(t);
+      cells.add(box, t);
+      all = all.united(box);
       is_sought_[t] = true;
     }
     cells.sort();
-    std::vector<std::array<std::uint32_t, 2>> found;
+    std::vector<Pair> found;
     for (std::uint32_t s = 0; s < steps_.triangles().size(); ++s) {
       if (!steps_.is_there(s)) continue;
+      const Box box = box_of(s);
+      if (!box.overlaps(all)) continue;
       const bool sought_too = is_sought_[s], safe = is_safe(s);
       const auto wanted = [&](std::uint32_t t) { return !((sought_too && s >= t) || (safe && is_safe(t))); };
-      cells.each_near(box_of(s), wanted, [&](std::uint32_t t) {
+      cells.each_near(box, wanted, [&](std::uint32_t t) {
         if (collide(steps_[s], steps_[t])) found.push_back({s, t});
       });
     }
+    sort(found);
     return found;
+  }
+  static void sort(std::vector<Pair>& found) {
+    for (Pair& pair : found) pair = {std::min(pair[0], pair[1]), std::max(pair[0], pair[1])};
+    std::sort(found.begin(), found.end());
   }
 
   /// Whether two triangles cross, run along an edge in the same direction, or have all corners in common.
@@ -148,17 +216,20 @@ class TakingBack {
     return triangles_cross(position_, s, t);
   }
 
+  const Mesh& mesh_;
   std::span<const Vec3> position_;
   const std::vector<bool>& safe_;
   double cell_;
+  CrossingMemory& memory_;
   TriangleSteps& steps_;
   std::vector<bool> is_sought_;
 };
 
 }  // namespace
 
-std::vector<std::uint32_t> take_back_crossings(std::span<const Vec3> position, const std::vector<bool>& safe, double cell, TriangleSteps& steps) {
-  return TakingBack(position, safe, cell, steps).run();
+std::vector<std::uint32_t> take_back_crossings(const Mesh& mesh, const std::vector<bool>& safe, double cell, CrossingMemory& memory,
+                                               TriangleSteps& steps) {
+  return TakingBack(mesh, safe, cell, memory, steps).run();
 }
 
 }  // namespace supple::implicit

@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "crease_crossings.h"
 #include "crease_mending.h"
 #include "triangle_borders.h"
 #include "triangle_steps.h"
@@ -29,8 +28,8 @@ std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
 class Sharpener {
  public:
   Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-            bool skip, const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh)
-      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), skip_(skip), changes_(changes), memory_(memory), mesh_(mesh),
+            bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh)
+      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), skip_(skip), changes_(changes), memory_(memory), crossings_(crossings), mesh_(mesh),
         steps_(std::move(mesh.triangle)), safe_(steps_.triangles().size(), true) {}
 
   /// @return cells that keep a crease cut off
@@ -42,7 +41,7 @@ class Sharpener {
       const std::optional<CreasePoint>& point = crease_point({near, near, nodes});
       return point ? std::optional(add_vertex(*point)) : std::nullopt;
     }, steps_);
-    const std::vector<std::uint32_t> back = take_back_crossings(mesh_.position, safe_, lattice_.cell, steps_);
+    const std::vector<std::uint32_t> back = take_back_crossings(mesh_, safe_, lattice_.cell, crossings_, steps_);
     mesh_.triangle.clear();
     for (const std::uint32_t t : steps_.numbers()) mesh_.triangle.push_back(steps_[t]);
     const std::uint64_t blunt = cut_off(back);
@@ -364,6 +363,7 @@ class Sharpener {
   bool skip_;
   const march::ViewMemory& changes_;
   CreaseMemory& memory_;
+  CrossingMemory& crossings_;
   Mesh& mesh_;
   TriangleSteps steps_;
   std::vector<bool> safe_;  ///< see take_back_crossings; of points and turned edges only
@@ -372,8 +372,8 @@ class Sharpener {
 }  // namespace
 
 std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh) {
-  return Sharpener(whole, fields, lattice, owner, skip, changes, memory, mesh).run();
+                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh) {
+  return Sharpener(whole, fields, lattice, owner, skip, changes, memory, crossings, mesh).run();
 }
 
 }  // namespace supple::implicit

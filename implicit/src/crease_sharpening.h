@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "crease_crossings.h"
 #include "crease_points.h"
 #include "march_leaves.h"
 #include "supple/core/mesh.h"
@@ -19,6 +20,6 @@ namespace supple::implicit {
 /// @param changes  since the memory was last used   @param skip  as MarchOptions::skip
 /// @return cells that keep a crease cut off
 std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, Mesh& mesh);
+                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh);
 
 }  // namespace supple::implicit

@@ -72,6 +72,7 @@ class CreaseMarcher {
   std::vector<std::uint32_t> node_;   ///< that its fields are of
   std::vector<std::uint32_t> owner_;  ///< of the vertices of the marched mesh, by place in `node_`
   CreaseMemory memory_;
+  CrossingMemory crossings_;
   Mesh mesh_, last_mesh_;
   TriangleErrors errors_;             ///< of last_mesh_, or mesh_ once they are asked for
   std::uint64_t blunt_cells_ = 0;     ///< of mesh_
@@ -89,7 +90,7 @@ void CreaseMarcher::march_anew(const Executor& executor) {
 
 void CreaseMarcher::count_kept() {
   counts_.blunt_cells = blunt_cells_;
-  counts_.bytes += memory_.bytes() + bytes_of(owner_) + bytes_of(marcher_.mesh);
+  counts_.bytes += memory_.bytes() + crossings_.bytes() + bytes_of(owner_) + bytes_of(marcher_.mesh);
 }
 
 const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor) {
@@ -120,7 +121,7 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
   memory_.begin_call(others || changes.all);
   if (comparable_) std::swap(mesh_, last_mesh_);
   mesh_ = marcher_.mesh;
-  blunt_cells_ = sharpen(field, views, lattice, owner_, skip, changes, memory_, mesh_);
+  blunt_cells_ = sharpen(field, views, lattice, owner_, skip, changes, memory_, crossings_, mesh_);
   memory_.end_call();
   node_ = std::move(present);
   made_ = true;
