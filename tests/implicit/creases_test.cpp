@@ -310,7 +310,8 @@ TEST(CreasesNeverCross, TakesBackWhatCrossesStepByStep) {
   const std::uint32_t d = steps.replace(std::array{3u}, std::vector{upright(1.3, 3.2, 3.8)});
   ASSERT_TRUE(steps.is_there(b) && steps.is_there(c) && steps.is_there(d) && !steps.is_there(a) && !steps.is_there(2));
   CrossingMemory memory;
-  EXPECT_EQ(take_back_crossings({.position = position, .normal = position, .triangle = {}, .columns = {}}, std::vector<bool>(4, true), 1.0, memory, steps), (std::vector<std::uint32_t>{2}));
+  const Mesh mesh{.position = position, .normal = position, .triangle = {}, .columns = {}};
+  EXPECT_EQ(take_back_crossings(mesh, std::vector<bool>(4, true), 1.0, memory, steps), (std::vector<std::uint32_t>{2}));
   EXPECT_EQ(steps.numbers(), (std::vector<std::uint32_t>{0, 1, 2, d}));
 }
 
