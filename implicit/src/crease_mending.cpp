@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "triangle_borders.h"
+
 namespace supple::implicit {
 namespace {
 
@@ -86,10 +88,31 @@ struct Border {
   std::vector<std::uint32_t> left, right;  ///< from first to second, and from second to first
 };
 
+/// Attempts to fill a hole around a triangle that failed, each with the vertices of the hole in the end.
+class Attempts {
+ public:
+  /// @param number  of the triangle, larger than all before
+  void add(std::uint32_t number, std::span<const std::uint32_t> vertices) {
+    vertex_.insert(vertex_.end(), vertices.begin(), vertices.end());
+    number_.push_back(number);
+    end_.push_back(vertex_.size());
+  }
+  [[nodiscard]] std::size_t size() const { return number_.size(); }
+  [[nodiscard]] std::uint32_t number(std::size_t k) const { return number_[k]; }
+  [[nodiscard]] std::span<const std::uint32_t> vertices(std::size_t k) const {
+    const std::size_t begin = k == 0 ? 0 : end_[k - 1];
+    return std::span(vertex_).subspan(begin, end_[k] - begin);
+  }
+
+ private:
+  std::vector<std::uint32_t> number_, vertex_;
+  std::vector<std::size_t> end_;
+};
+
 class Mending {
  public:
-  Mending(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps)
-      : mesh_(mesh), owner_(owner), cell_(cell), add_vertex_(add_vertex), steps_(steps) {}
+  Mending(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, bool skip, const CreaseVertex& add_vertex, TriangleSteps& steps)
+      : mesh_(mesh), owner_(owner), cell_(cell), skip_(skip), add_vertex_(add_vertex), steps_(steps) {}
 
   void run() {
     constexpr int kPasses = 3;
@@ -112,13 +135,42 @@ class Mending {
     }
     if (crossed.empty()) return false;
     list_stars();
-    touched_.assign(mesh_.vertex_count(), false);
+    touched_before_ = std::exchange(touched_, std::vector<bool>(mesh_.vertex_count(), false));
+    touched_before_.resize(mesh_.vertex_count(), true);
     gone_.assign(triangle_.size(), false);
+    in_hole_.assign(triangle_.size(), 0);
+    seen_.resize(mesh_.vertex_count(), 0);
+    const Attempts last = std::exchange(failed_, {});
     bool any = false;
+    std::size_t known = 0;
     for (const std::uint32_t i : crossed) {
-      if (!gone_[i] && mend(i)) any = true;
+      if (gone_[i]) continue;
+      while (known < last.size() && last.number(known) < number_[i]) ++known;
+      if (known < last.size() && last.number(known) == number_[i] && fails_again(last.vertices(known))) {
+        failed_.add(number_[i], last.vertices(known));
+      } else if (mend(i)) {
+        any = true;
+      } else if (skip_) {
+        keep_failed(number_[i]);
+      }
     }
     return any;
+  }
+
+  /// An attempt depends on the triangles at the vertices of its hole, and on the holes that were filled there before it.
+  [[nodiscard]] bool fails_again(std::span<const std::uint32_t> vertices) const {
+    return std::none_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return touched_before_[v] || touched_[v]; });
+  }
+  /// The last attempt, from a triangle, if no hole was filled near it before.
+  void keep_failed(std::uint32_t number) {
+    around_.clear();
+    for (const std::uint32_t i : hole_) {
+      for (const std::uint32_t v : triangle_[i]) {
+        if (touched_[v]) return;
+        if (std::exchange(seen_[v], attempt_) != attempt_) around_.push_back(v);
+      }
+    }
+    failed_.add(number, around_);
   }
 
   void list_stars() {
@@ -147,30 +199,22 @@ class Mending {
     return std::nullopt;
   }
 
-  using Edge = std::pair<std::uint32_t, std::uint32_t>;
   /// Adds a triangle to the hole, and its edges to the border or takes them off it.
   void add_to_hole(std::uint32_t triangle) {
     hole_.push_back(triangle);
-    const Triangle& t = triangle_[triangle];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Edge edge{t[k], t[(k + 1) % 3]};
-      const auto reverse = std::find(open_.begin(), open_.end(), Edge{edge.second, edge.first});
-      if (reverse != open_.end()) {
-        open_.erase(reverse);
-      } else {
-        open_.push_back(edge);
-      }
-    }
+    in_hole_[triangle] = attempt_;
+    join_border(triangle_[triangle], open_);
   }
 
   /// @return whether a hole was filled
   bool mend(std::uint32_t start) {
+    ++attempt_;
     hole_.clear();
     open_.clear();
     add_to_hole(start);
     for (int growth = 0; growth <= kGrowths; ++growth) {
       if (!(growth == 0 || grow_along_crease()) || !grow_across()) return false;
-      if (std::any_of(open_.begin(), open_.end(), [&](const Edge& e) { return touched_[e.first]; })) return false;
+      if (std::any_of(open_.begin(), open_.end(), [&](const BorderEdge& e) { return touched_[e.first]; })) return false;
       const std::optional<Border> border = find_border();
       if (border && fill(*border)) return true;
     }
@@ -180,7 +224,7 @@ class Mending {
   /// @return whether a triangle may be taken and the hole is not too large
   bool take(std::uint32_t triangle) {
     if (gone_[triangle]) return false;
-    if (std::find(hole_.begin(), hole_.end(), triangle) == hole_.end()) add_to_hole(triangle);
+    if (in_hole_[triangle] != attempt_) add_to_hole(triangle);
     return hole_.size() <= kMostTaken;
   }
   bool take_around(std::uint32_t v) {
@@ -189,7 +233,7 @@ class Mending {
   }
   /// Takes what lies around the vertices at which the border meets the crease.
   bool grow_along_crease() {
-    const std::vector<Edge> open = open_;
+    const std::vector<BorderEdge> open = open_;
     for (const auto& [a, b] : open) {
       if (on_crease(a) && !take_around(a)) return false;
     }
@@ -199,7 +243,7 @@ class Mending {
   bool grow_across() {
     for (std::size_t before = 0; before != hole_.size();) {
       before = hole_.size();
-      const std::vector<Edge> open = open_;
+      const std::vector<BorderEdge> open = open_;
       for (const auto& [a, b] : open) {
         if (!crosses(a, b)) continue;
         const std::optional<std::uint32_t> beyond = triangle_at(b, a);
@@ -211,24 +255,19 @@ class Mending {
 
   /// None where the hole is not a disc, or where its border does not meet the crease at two vertices.
   [[nodiscard]] std::optional<Border> find_border() const {
-    if (open_.empty()) return std::nullopt;  // a whole component
-    std::vector<std::uint32_t> loop{open_.front().first}, inside;
-    for (std::uint32_t v = open_.front().second; v != loop.front();) {
-      loop.push_back(v);
-      const auto next = std::find_if(open_.begin(), open_.end(), [v](const Edge& edge) { return edge.first == v; });
-      if (next == open_.end() || loop.size() > open_.size()) return std::nullopt;
-      v = next->second;
-    }
+    // None is open of a whole component.
+    if (std::count_if(open_.begin(), open_.end(), [this](const BorderEdge& edge) { return on_crease(edge.first); }) != 2) return std::nullopt;
+    std::vector<std::uint32_t> loop = loop_of(open_), inside;
+    if (loop.empty()) return std::nullopt;
     for (const std::uint32_t i : hole_) inside.insert(inside.end(), triangle_[i].begin(), triangle_[i].end());
     std::sort(inside.begin(), inside.end());
     inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
     // Of a disc: V - E + F = 1, with 2 E = 3 F + the edges of its border.
-    if (loop.size() != open_.size() || 2 * inside.size() != hole_.size() + open_.size() + 2) return std::nullopt;
+    if (2 * inside.size() != hole_.size() + open_.size() + 2) return std::nullopt;
     std::vector<std::size_t> meets;
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (on_crease(loop[k])) meets.push_back(k);
     }
-    if (meets.size() != 2) return std::nullopt;
     std::rotate(loop.begin(), loop.begin() + static_cast<std::ptrdiff_t>(meets[0]), loop.end());
     const auto second = loop.begin() + static_cast<std::ptrdiff_t>(meets[1] - meets[0]);
     Border border{.first = loop.front(), .second = *second, .left = {loop.begin() + 1, second}, .right = {second + 1, loop.end()}};
@@ -281,28 +320,35 @@ class Mending {
     const auto around = star(a);
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t i) {
       const Triangle& t = triangle_[i];
-      return std::find(t.begin(), t.end(), b) != t.end() && std::find(hole_.begin(), hole_.end(), i) == hole_.end();
+      return std::find(t.begin(), t.end(), b) != t.end() && in_hole_[i] != attempt_;
     });
   }
 
   const Mesh& mesh_;
   std::span<const std::uint32_t> owner_;
   double cell_;
+  bool skip_;
   const CreaseVertex& add_vertex_;
   TriangleSteps& steps_;
   std::vector<std::uint32_t> number_;        ///< of the triangles that are there when a pass begins
   std::vector<Triangle> triangle_;
   std::vector<std::uint32_t> first_, star_;  ///< triangles at each vertex
   std::vector<std::uint32_t> hole_;          ///< triangles that are taken out
-  std::vector<Edge> open_;                   ///< its border
+  std::vector<BorderEdge> open_;                   ///< its border
   std::vector<bool> touched_;                ///< vertices of holes that were filled in this pass
+  std::vector<bool> touched_before_;         ///< the same of the last pass
   std::vector<bool> gone_;
+  Attempts failed_;                          ///< of this pass
+  std::vector<std::uint32_t> around_;
+  std::uint32_t attempt_ = 0;                ///< counts them
+  std::vector<std::uint32_t> in_hole_;       ///< the last attempt that took a triangle
+  std::vector<std::uint32_t> seen_;          ///< the last one for which a vertex was listed
 };
 
 }  // namespace
 
-void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps) {
-  Mending(mesh, owner, cell, add_vertex, steps).run();
+void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, bool skip, const CreaseVertex& add_vertex, TriangleSteps& steps) {
+  Mending(mesh, owner, cell, skip, add_vertex, steps).run();
 }
 
 }  // namespace supple::implicit

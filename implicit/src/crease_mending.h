@@ -25,6 +25,7 @@ using CreaseVertex = std::function<std::optional<std::uint32_t>(const std::array
 /// @param mesh   vertices; its triangles are those of the steps
 /// @param owner  the node of each of the first vertices; all others lie on the crease
 /// @param cell   [m]
-void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, const CreaseVertex& add_vertex, TriangleSteps& steps);
+/// @param skip   whether attempts that would fail again are left out
+void mend_creases(const Mesh& mesh, std::span<const std::uint32_t> owner, double cell, bool skip, const CreaseVertex& add_vertex, TriangleSteps& steps);
 
 }  // namespace supple::implicit

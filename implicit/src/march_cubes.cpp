@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <bit>
 
+#include "bytes_of.h"
 #include "error_search.h"
 #include "field_index.h"
 #include "march_refined.h"
 #include "march_tried.h"
-#include "polygonise_block_edges.h"
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
 #include "supple/implicit/field.h"
@@ -122,7 +122,7 @@ const Mesh* CubeMesher::Impl::make_to_error(const FieldView& field, const MarchO
   count.tiles_sampled = sampled;
   count.kernel_values = values;
   const bool fits = tried.end_call(plan.cell, scratch.bytes());
-  count.bytes = fits ? tried.bytes() + scratch.bytes() - march::bytes_of(*mesh) : 0;
+  count.bytes = fits ? tried.bytes() + scratch.bytes() - bytes_of(*mesh) : 0;
   if (fits) return mesh;
   alone = last->take_mesh(plan.refinements);
   tried.clear();
@@ -145,6 +145,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   const Mesh& mesh = impl_->fixed.mesh(options.refinements, executor, impl_->scratch);
   count = impl_->fixed.counts();
   count.refinements = options.refinements;
+  count.bytes = impl_->fixed.bytes() + impl_->scratch.bytes() - bytes_of(mesh);
   return mesh;
 }
 
@@ -152,6 +153,13 @@ void CubeMesher::expect_error(const FieldView& field, const MarchOptions& option
   SUPPLE_EXPECTS(options.error > 0.0);
   MarchCounts count;
   (void)impl_->make_to_error(field, options, executor, count, most_triangles);
+}
+
+void CubeMesher::keep_at_most(std::uint64_t most_kept) { impl_->tried.keep_at_most(most_kept); }
+
+std::uint64_t CubeMesher::kept_to_error() const {
+  const std::uint64_t tried = impl_->tried.bytes();
+  return tried > 0 ? tried + impl_->scratch.bytes() : 0;
 }
 
 void CubeMesher::forget() {

@@ -10,9 +10,6 @@ namespace supple::implicit::march {
 
 namespace {
 
-/// Ranges of more leaves than these are searched from above.
-constexpr std::uint64_t kMostLeaves = 1'000'000;
-
 template <class Use>
 void for_range(const lattice::BlockRange& range, const Use& use) {
   for (std::int32_t z = range.lower[2]; z <= range.upper[2]; ++z) {

@@ -15,6 +15,9 @@ namespace supple::implicit::march {
 
 using lattice::BlockCoord;
 
+/// Leaves with surface, of about 7 kB each with their part of the mesh; where more are in reach, nothing is kept of each.
+inline constexpr std::uint64_t kMostLeaves = 1'000'000;
+
 /// The closed box of a leaf: it ends at the first nodes of the next ones.
 [[nodiscard]] Box leaf_box(const BlockCoord& leaf, const Lattice& lattice);
 

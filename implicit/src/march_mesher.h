@@ -28,8 +28,4 @@ struct Marcher {
   [[nodiscard]] MarchCounts most_counts(const MarchCounts& counts) const;
 };
 
-[[nodiscard]] inline std::uint64_t bytes_of(const Mesh& mesh) {
-  return (mesh.position.capacity() + mesh.normal.capacity()) * sizeof(Vec3) + mesh.triangle.capacity() * sizeof(mesh.triangle[0]);
-}
-
 }  // namespace supple::implicit::march

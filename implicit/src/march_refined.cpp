@@ -1,9 +1,9 @@
 #include "march_refined.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include "bytes_of.h"
 #include "error_search.h"
 #include "polygonise_block_edges.h"
 
@@ -27,11 +27,6 @@ void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles) {
 }
 
 std::uint32_t end_of(const std::array<std::uint32_t, 3>& triangle, std::size_t edge) { return triangle[edge == 2 ? 0 : edge + 1]; }
-
-template <class T>
-std::uint64_t bytes_of(const std::vector<T>& items) {
-  return items.capacity() * sizeof(T);
-}
 
 }  // namespace
 
@@ -73,7 +68,6 @@ void RefinedMarcher::list() {
 }
 
 void RefinedMarcher::find_changes() {
-  constexpr std::uint64_t kMostLeaves = 1'000'000;
   const double feature = field_.feature_size();
   const bool other = std::exchange(feature_, feature) != feature;
   all_differs_ = other || whole();

@@ -24,6 +24,7 @@ class TriedLattices {
   /// @param most  that is kept [byte]
   explicit TriedLattices(std::uint64_t most) : most_(most) {}
 
+  void keep_at_most(std::uint64_t most) { most_ = most; }
   void begin_call() {
     for (auto& [cell, on] : on_) on.used = false;
   }
@@ -32,15 +33,14 @@ class TriedLattices {
     Entry& on = on_[cell];
     return {on.mesher, !std::exchange(on.used, true)};
   }
-  /// Leaves others than that of a cell out, the coarsest first, which take the least time to make anew, until the rest fits.
+  /// Leaves others than that of a cell out, the coarsest first, which take the least time to make anew, until they fit without it: it may
+  /// be the next to go, and finer ones are still to be tried.
   /// @param beside  what is kept beside them [byte]
-  void fit(double cell, std::uint64_t beside = 0) {
-    for (auto at = on_.begin(); at != on_.end() && bytes() + beside > most_;) at = at->first == cell ? std::next(at) : on_.erase(at);
-  }
-  /// Leaves out what this call did not use. @return whether all that is left fits
+  void fit(double cell, std::uint64_t beside = 0) { leave_out(cell, beside, on_.contains(cell) ? on_.at(cell).mesher.bytes() : 0); }
+  /// Leaves out what this call did not use, and others as above until all fits. @return whether it does
   bool end_call(double cell, std::uint64_t beside = 0) {
     std::erase_if(on_, [](const auto& on) { return !on.second.used; });
-    fit(cell, beside);
+    leave_out(cell, beside, 0);
     return bytes() + beside <= most_;
   }
   void clear() { on_.clear(); }
@@ -60,6 +60,9 @@ class TriedLattices {
     OnLattice mesher;
     bool used = false;  ///< in this call
   };
+  void leave_out(double cell, std::uint64_t beside, std::uint64_t without) {
+    for (auto at = on_.begin(); at != on_.end() && bytes() - without + beside > most_;) at = at->first == cell ? std::next(at) : on_.erase(at);
+  }
   std::uint64_t most_;
   std::map<double, Entry, std::greater<>> on_;  ///< the coarsest first
 };

@@ -18,8 +18,6 @@ namespace {
 using blobs::Cells;
 
 constexpr std::size_t kBlocksPerTask = 8;
-/// Leaves with surface, of about 7 kB each with their part of the mesh.
-constexpr std::uint64_t kMostLeaves = 1'000'000;
 /// Vertices stay this far from the nodes [cells].
 constexpr double kLeast = 0x1p-17;
 

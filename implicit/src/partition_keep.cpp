@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "bytes_of.h"
+
 namespace supple::implicit::lattice {
 namespace {
 
@@ -94,11 +96,6 @@ void for_tetrahedra(std::span<const Facet> facets, const Use& use) {
 template <class Is>
 bool has_vertex(std::span<const Facet> facets, const Is& is) {
   return std::any_of(facets.begin(), facets.end(), [&](const Facet& facet) { return std::any_of(facet.vertex.begin(), facet.vertex.end(), is); });
-}
-
-template <class T>
-std::uint64_t bytes_of(const std::vector<T>& items) {
-  return items.capacity() * sizeof(T);  // NOLINT: items may be pointers
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "bytes_of.h"
 #include "error_search.h"
 #include "polygonise_blocks.h"
 #include "supple/core/error.h"
@@ -131,10 +132,6 @@ class KeptErrors {
   template <class T>
   static bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
     return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
-  }
-  template <class T>
-  static std::uint64_t bytes_of(const std::vector<T>& items) {
-    return items.capacity() * sizeof(T);
   }
 
   std::map<std::uint64_t, Entry> entry_;  ///< by the version of the body's own field

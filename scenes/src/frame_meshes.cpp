@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "frame.h"
+#include "kept_budget.h"
 #include "look_columns.h"
 #include "mesh_sizes.h"
 #include "read_scene_faults.h"
@@ -322,7 +323,7 @@ implicit::MarchOptions march_options(const ObjectModel& object, bool skip) {
 bool takes_creases(const MeshingDesc& d, const implicit::Field& field) { return d.method == MeshingName::Auto && implicit::has_creases(field); }
 
 /// The surface of a body that touches no other. @param bodies  that its object has
-Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, StageProfile& profile, Frame& frame) {
+Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, KeptBudget& budget, StageProfile& profile, Frame& frame) {
   const Model& model = context.model;
   const MeshingDesc& d = model.meshing;
   const ObjectModel& object = model.objects[context.bodies[i].object];
@@ -332,9 +333,8 @@ Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, 
     if (!takes_cubes(d, object, context.bodies[i].skeleton, frame.placed[i].support)) return mesh_otherwise(context, i, lattice, profile, frame);
     implicit::MarchCounts marched;
     const implicit::MarchOptions options = march_options(object, context.skip);
-    Mesh mesh = takes_creases(d, field)
-                    ? frame.creases[i].make(field, options, context.executor, &marched)
-                    : frame.mesher[i].make(field, options, context.executor, &marched);
+    const auto make = [&](auto& mesher) -> const Mesh& { return mesher.make(field, options, context.executor, &marched); };
+    Mesh mesh = takes_creases(d, field) ? budget.use(frame.creases[i], make) : budget.use(frame.mesher[i], make);
     if (marched.blunt_cells > 0) frame.missed.blunt[object.name] += marched.blunt_cells;
     search_alone(context, i, marched.cell, bodies, frame, mesh);
     profile.visited += marched.tiles;
@@ -449,12 +449,15 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   mesh_divided(context, division, profile, frame, surfaces);
   std::vector<std::size_t> pieces(model.objects.size());
   for (const Body& body : bodies) ++pieces[body.object];
+  KeptBudget budget(implicit::kMostKeptToError);
+  for (const implicit::CubeMesher& mesher : frame.mesher) budget.add(mesher);
+  for (const implicit::CreaseMesher& mesher : frame.creases) budget.add(mesher);
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {
       profile.present += 1;
     } else {
-      surfaces[i] = mesh_alone(context, i, pieces[bodies[i].object], profile, frame);
+      surfaces[i] = mesh_alone(context, i, pieces[bodies[i].object], budget, profile, frame);
     }
   }
   for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "crease_crossings.h"
+#include "crease_nodes.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "support/mesh_distance.h"
@@ -308,7 +309,9 @@ TEST(CreasesNeverCross, TakesBackWhatCrossesStepByStep) {
   const std::uint32_t c = steps.replace(std::array{a + 1}, std::vector{later});
   const std::uint32_t d = steps.replace(std::array{3u}, std::vector{upright(1.3, 3.2, 3.8)});
   ASSERT_TRUE(steps.is_there(b) && steps.is_there(c) && steps.is_there(d) && !steps.is_there(a) && !steps.is_there(2));
-  EXPECT_EQ(take_back_crossings(position, std::vector<bool>(4, true), 1.0, steps), (std::vector<std::uint32_t>{2}));
+  CrossingMemory memory;
+  const Mesh mesh{.position = position, .normal = position, .triangle = {}, .columns = {}};
+  EXPECT_EQ(take_back_crossings(mesh, std::vector<bool>(4, true), 1.0, memory, steps), (std::vector<std::uint32_t>{2}));
   EXPECT_EQ(steps.numbers(), (std::vector<std::uint32_t>{0, 1, 2, d}));
 }
 
@@ -403,6 +406,58 @@ TEST(Creases, AreTheSurfaceOfOtherMeshersForAnyGraph) {
     for (std::size_t v = 0; v < values.size(); ++v) {
       ASSERT_LT(distance(mesh.position[v]), 2.0 * cell) << seed;
       ASSERT_LT(std::abs(values[v]), 1e-4 * cell * gradients[v].norm()) << seed;
+    }
+  }
+}
+
+// By sums of all nodes at a point or by the field of each node alone; of nodes with the same value the first.
+TEST(Creases, HaveTheNodeWhoseFieldIsTheLargest) {
+  std::uint64_t ties = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Body body = random_body({.seed = seed, .parts = 24, .half_width = 0.5});
+    Random random(seed);
+    body.skeleton.blend.rule = BlendRule::Graph;
+    for (std::uint32_t k = 0; k < 22; ++k) body.skeleton.blend.node.push_back(2 * ((7 * k) % 9));  // none of odd numbers
+    body.skeleton.blend.node.insert(body.skeleton.blend.node.end(), {30, 28});
+    body.skeleton.primitive[23] = body.skeleton.primitive[22];
+    body.skeleton.primitive[23].part = 23;
+    body.parts[23] = body.parts[22];
+    for (std::uint32_t a = 0; a < 18; a += 2) {
+      for (std::uint32_t b = a + 2; b < 18; b += 2) {
+        if (random.below(3) == 0) body.skeleton.blend.edge.push_back({a, b, random.below(2) == 0 ? 1.0 : 0.4});
+      }
+    }
+    body.place();
+    const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.06)}, Executor(1));
+    const std::vector<Box> supports = node_supports(body.field.index());
+    std::vector<std::uint32_t> nodes, expected(mesh.vertex_count());
+    std::vector<double> best(mesh.vertex_count(), -1e300), value(mesh.vertex_count());
+    for (std::uint32_t k = 0; k < supports.size(); ++k) {
+      if (supports[k].empty()) continue;
+      NodeField(body.field, k, supports[k]).evaluate(mesh.position, value);
+      for (std::size_t v = 0; v < value.size(); ++v) {
+        if (value[v] == best[v] && value[v] > -0.1) ++ties;
+        if (value[v] > best[v]) {
+          best[v] = value[v];
+          expected[v] = static_cast<std::uint32_t>(nodes.size());
+        }
+      }
+      nodes.push_back(k);
+    }
+    EXPECT_EQ(largest_nodes(body.field, nodes, mesh.position, Executor(2)), expected) << seed;
+  }
+  EXPECT_GT(ties, 0u);
+}
+
+// Balls so dense that most edges across a crease cannot be mended, and that others next to them are in a later pass.
+TEST(Creases, AreTheSameWhereAttemptsThatWouldFailAgainAreMade) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Body body = random_body({.seed = seed, .parts = 150, .half_width = 0.6, .least_radius = 0.3, .largest_radius = 0.45, .only_points = true});
+    body.skeleton.blend.rule = BlendRule::Graph;
+    body.place();
+    for (const double cell : {0.03, 0.05}) {
+      const MarchOptions options{.lattice = lattice_of(cell)}, all{.lattice = options.lattice, .skip = false};
+      EXPECT_EQ(hash_of(march_creases(body.field, options, Executor(2))), hash_of(march_creases(body.field, all, Executor(2)))) << seed << ' ' << cell;
     }
   }
 }

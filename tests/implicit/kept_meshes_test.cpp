@@ -278,6 +278,57 @@ TEST(KeptMeshes, WithCreasesFollowOneBallAfterTheOther) {
   EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(2))), hash_of(march_creases(body.field, options, Executor(1))));
 }
 
+// Refined, the coarser meshes are held besides the finest.
+TEST(KeptMeshes, CountWhatRefinementsHold) {
+  const Body body = random_body({.seed = 3, .parts = 12, .half_width = 0.8});
+  std::uint64_t coarser = 0, unrefined = 0;
+  for (const int refinements : {0, 1, 2}) {
+    CubeMesher mesher;
+    MarchCounts counts;
+    const Mesh& mesh = mesher.make(body.field, {.lattice = lattice_of(0.08), .refinements = refinements}, Executor(1), &counts);
+    if (refinements == 0) unrefined = counts.bytes;
+    EXPECT_GE(counts.bytes, unrefined + coarser) << refinements;
+    coarser += mesh.vertex_count() * 2 * sizeof(Vec3) + mesh.triangle_count() * sizeof(mesh.triangle[0]);
+  }
+}
+
+/// Balls and shapes that meet at every angle, so that creases stay cut off in some cells of this size.
+constexpr double kBluntCell = 0.07;
+Body steep_body(std::uint64_t seed, std::uint32_t parts) {
+  Body body = random_body({.seed = seed, .parts = parts, .half_width = parts > 64 ? 1.0 : 0.6});
+  body.skeleton.blend.rule = BlendRule::Graph;
+  Random random(seed);
+  link(body, random);
+  body.place();
+  return body;
+}
+
+// Meshes of fields that stay are as they were, also after others to an error, whose errors are known or not.
+TEST(KeptMeshes, WithCreasesThatStay) {
+  std::uint64_t blunt = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Body body = steep_body(seed, 10);
+    const MarchOptions fixed{.lattice = lattice_of(kBluntCell)}, within{.lattice = fixed.lattice, .error = 0.5 * kBluntCell};
+    CreaseMesher mesher;
+    const auto expect_fresh = [&](const MarchOptions& options) {
+      MarchCounts counts, expected;
+      const std::uint64_t kept = hash_of(mesher.make(body.field, options, Executor(2), &counts));
+      EXPECT_EQ(kept, hash_of(march_creases(body.field, options, Executor(1), &expected))) << seed;
+      EXPECT_EQ(counts.blunt_cells, expected.blunt_cells) << seed;
+      EXPECT_EQ(counts.error, expected.error) << seed;
+      blunt += counts.blunt_cells;
+    };
+    for (int round = 0; round < 2; ++round) {
+      for (const MarchOptions& options : {fixed, within}) {
+        for (int call = 0; call < 3; ++call) expect_fresh(options);
+      }
+      body.parts[seed % body.parts.size()].position += Vec3(0.004, -0.003, 0.007);
+      body.place();
+    }
+  }
+  EXPECT_GT(blunt, 0u);
+}
+
 /// Calls use(body, mesher of its kind, which keeps at most so much) for bodies of every kind of sampler and mesher.
 template <class Use>
 void for_kinds(const Use& use) {

@@ -2,8 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <utility>
+#include <vector>
 
+#include "implicit/bodies.h"
+#include "kept_budget.h"
 #include "run_scenes.h"
+#include "supple/implicit/creases.h"
+#include "supple/implicit/march_cubes.h"
 
 namespace supple::scenes {
 namespace {
@@ -24,6 +30,49 @@ void expect_same(const std::vector<Mesh>& kept, const std::vector<Mesh>& alone) 
     for (std::size_t c = 0; c < kept[m].columns.size(); ++c) {
       ASSERT_TRUE(same_bits(kept[m].columns[c].values, alone[m].columns[c].values)) << m << " " << kept[m].columns[c].name;
     }
+  }
+}
+
+/// A ball, or two that unite without blending.
+implicit::testing::Body small_body(bool creased) {
+  std::vector<std::pair<implicit::Primitive, Vec3>> balls;
+  for (int k = 0; k < (creased ? 2 : 1); ++k) balls.emplace_back(implicit::testing::wyvill_point(1.0), Vec3(0.5 * k, 0.1 * k, 0.0));
+  implicit::testing::Body body = implicit::testing::body_of(balls);
+  if (creased) body.skeleton.blend.rule = implicit::BlendRule::Graph;
+  body.place();
+  return body;
+}
+
+// Of both kinds of meshers, in frames that ask for more and for less: together they keep no more than allowed, whoever is meshed first.
+TEST(KeptMeshes, ToAnErrorShareWhatTheyMayKeep) {
+  const implicit::testing::Body ball = small_body(false), pair = small_body(true);
+  const Executor executor(1);
+  const auto mesh_with = [&](KeptBudget& budget, auto& mesher, const implicit::Field& field, double error) {
+    return budget.use(mesher, [&](auto& m) -> const Mesh& { return m.make(field, {.lattice = {.origin = Vec3::Zero(), .cell = 0.0}, .error = error}, executor); });
+  };
+  const auto frame = [&](std::uint64_t most, double error, std::vector<implicit::CubeMesher>& cubes, std::vector<implicit::CreaseMesher>& creases) {
+    KeptBudget budget(most);
+    for (const auto& mesher : cubes) budget.add(mesher);
+    for (const auto& mesher : creases) budget.add(mesher);
+    std::vector<Mesh> meshes;
+    for (auto& mesher : cubes) meshes.push_back(mesh_with(budget, mesher, ball.field, error));
+    for (auto& mesher : creases) meshes.push_back(mesh_with(budget, mesher, pair.field, error));
+    std::uint64_t kept = 0;
+    for (const auto& mesher : cubes) kept += mesher.kept_to_error();
+    for (const auto& mesher : creases) kept += mesher.kept_to_error();
+    EXPECT_EQ(budget.kept(), kept);
+    return std::pair{meshes, kept};
+  };
+  std::vector<implicit::CubeMesher> cubes(2), all_cubes(2);
+  std::vector<implicit::CreaseMesher> creases(2), all_creases(2);
+  const std::uint64_t all = frame(~std::uint64_t{0}, 0.005, all_cubes, all_creases).second, most = all / 2;
+  for (const double error : {0.005, 0.005, 0.002, 0.02, 0.005}) {
+    std::vector<implicit::CubeMesher> fresh_cubes(2);
+    std::vector<implicit::CreaseMesher> fresh_creases(2);
+    const auto [meshes, kept] = frame(most, error, cubes, creases);
+    expect_same(meshes, frame(~std::uint64_t{0}, error, fresh_cubes, fresh_creases).first);
+    EXPECT_LE(kept, most);
+    EXPECT_GT(kept, error == 0.005 ? all / 4 : 0u);
   }
 }
 

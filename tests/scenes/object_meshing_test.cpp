@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <string>
 
+#include "implicit/bodies.h"
 #include "search_files.h"
 #include "supple/core/error.h"
+#include "supple/implicit/creases.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
@@ -209,6 +212,25 @@ TEST(ObjectMeshing, ErrorKeepsCreasesUnlessTheyAreNotAskedFor) {
   }
   EXPECT_LE(largest, 1e-3);
   EXPECT_EQ(on_circle(meshes_of(creased("method: cubes, error: 5 mm")).front()), 0);
+}
+
+// Balls in disorder, with valleys that are steep for the cells.
+TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreReported) {
+  constexpr double kCell = 0.15;
+  Simulation simulation(parse_scene("schema: 1\nduration: 1\nobjects:\n  - name: a\n    particles: {arrange: grid, columns: 5, rows: 5, layers: 3, spacing: 0.6, "
+                                    "disorder: 0.3, inertia_radius: .1}\n    blend: {rule: graph}\n    skeleton: [{shape: point, kernel: {radius: 1}}]\n"
+                                    "output: {mesh: ply, cell: 0.15, meshing: {method: auto, search: false}}\n",
+                                    "test.yaml", "."));
+  const Mesh mesh = simulation.meshes().front();
+  std::vector<std::pair<implicit::Primitive, Vec3>> balls;
+  for (const Vec3& at : simulation.state().particles.position) balls.emplace_back(implicit::testing::wyvill_point(1.0), at);
+  implicit::testing::Body body = implicit::testing::body_of(balls);
+  body.skeleton.blend.rule = implicit::BlendRule::Graph;
+  body.place();
+  implicit::MarchCounts counts;
+  EXPECT_TRUE(same(mesh, implicit::march_creases(body.field, {.lattice = {.origin = Vec3::Zero(), .cell = kCell}}, Executor(2), &counts)));
+  EXPECT_GT(counts.blunt_cells, 0u);
+  EXPECT_EQ(simulation.searches().blunt, (std::map<std::string, std::uint64_t>{{"a", counts.blunt_cells}}));
 }
 
 TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreCounted) {

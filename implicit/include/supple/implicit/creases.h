@@ -41,6 +41,9 @@ class CreaseMesher {
 
   /// @return as march_creases, valid until the next call   @pre, @throws as march_creases
   const Mesh& make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts = nullptr);
+  /// As those of CubeMesher.
+  void keep_at_most(std::uint64_t most_kept);
+  [[nodiscard]] std::uint64_t kept_to_error() const;
   /// As CubeMesher::expect_error.
   void expect_error(const Field& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles);
 

@@ -33,7 +33,8 @@ struct MarchCounts {
 /// Lattice nodes in the box of a body that may be asked for.
 inline constexpr std::uint64_t kMarchNodes = 1'000'000'000;
 inline constexpr int kMostRefinements = 4;
-/// What a mesher of a body keeps at most of the meshes that it tried to reach an error [byte]. If the last alone needs more, nothing is kept.
+/// What a mesher of a body keeps at most of the meshes that it tried to reach an error [byte], unless it is told otherwise. If the last alone needs more,
+/// nothing is kept.
 inline constexpr std::uint64_t kMostKeptToError = std::uint64_t{1} << 30;
 
 struct MarchOptions {
@@ -42,7 +43,7 @@ struct MarchOptions {
   /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
   /// chosen, with cells of at most half the field's feature size and, if that is stated, lattice.cell; see `make`.
   double error = 0.0;
-  /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them. Changes no bit.
+  /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them; what failed to mend creases is not tried again. Changes no bit.
   bool skip = true;
 };
 
@@ -71,6 +72,10 @@ class CubeMesher {
                    MarchCounts* counts = nullptr);
   /// The next call keeps nothing but memory.
   void forget();
+  /// From the next call on, as the constructor's. Changes no bit of a mesh. [byte]
+  void keep_at_most(std::uint64_t most_kept);
+  /// What is kept of meshes that were tried [byte], the last one among them.
+  [[nodiscard]] std::uint64_t kept_to_error() const;
   /// Makes no mesh of about most_triangles or more. @throws Error{Limit} as make, as far as that follows from coarser ones @pre options.error > 0
   void expect_error(const FieldView& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles);
 
