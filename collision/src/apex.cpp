@@ -72,32 +72,36 @@ std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const 
 }
 
 void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error, std::vector<Vec3>& point, std::vector<double>& volume) {
-  constexpr int kFewest = 8, kMost = 64, kAlong = 8;
+  constexpr int kFewest = 8, kInPanel = 16, kMost = 64, kAlong = 8;
   const double longest = pressure.field(side).surface_box().extent().norm();
   const std::size_t begin = point.size();
   std::vector<Vec3> way;
-  std::vector<double> end, value;
+  std::vector<double> share, end, value;
   double before = 0.0;
   for (int n = kFewest; n <= kMost; n *= 2) {
-    // Gauss in the height, equal angles around it: exact of spherical harmonics.
-    const GaussRule &height = gauss_rule(n), &along = gauss_rule(kAlong);
+    // Gauss in the height, in panels, equal angles around it: exact of spherical harmonics of a low degree.
+    const int panels = std::max(1, n / kInPanel);
+    const GaussRule &height = gauss_rule(n / panels), &along = gauss_rule(kAlong);
     way.clear();
-    for (const double h : height.node) {
-      const double z = 2.0 * h - 1.0, across = std::sqrt(1.0 - z * z);
-      for (int k = 0; k < 2 * n; ++k) {
-        const math::SinCos turn = math::sin_cos(std::numbers::pi * (k + 0.5) / n);
-        way.push_back(Vec3(across * turn.cos, across * turn.sin, z));
+    share.clear();
+    for (int panel = 0; panel < panels; ++panel) {
+      for (std::size_t h = 0; h < height.node.size(); ++h) {
+        const double z = 2.0 * (panel + height.node[h]) / panels - 1.0, across = std::sqrt(1.0 - z * z);
+        for (int k = 0; k < 2 * n; ++k) {
+          const math::SinCos turn = math::sin_cos(std::numbers::pi * (k + 0.5) / n);
+          way.push_back(Vec3(across * turn.cos, across * turn.sin, z));
+          share.push_back(2.0 * std::numbers::pi / n * height.weight[h] / panels);
+        }
       }
     }
     find_ends(pressure, side, apex, way, longest, end);
     point.resize(begin);
     volume.resize(begin);
     for (std::size_t i = 0; i < way.size(); ++i) {
-      const double share = height.weight[i / static_cast<std::size_t>(2 * n)] * 2.0 * std::numbers::pi / n;
       for (std::size_t j = 0; j < along.node.size(); ++j) {
         const double s = end[i] * along.node[j];
         point.push_back(apex + s * way[i]);
-        volume.push_back(share * end[i] * along.weight[j] * s * s);
+        volume.push_back(share[i] * end[i] * along.weight[j] * s * s);
       }
     }
     const auto added = std::span(point).subspan(begin);

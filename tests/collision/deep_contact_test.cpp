@@ -156,30 +156,52 @@ TEST(DeepContact, OfABallInASoftPlaneHasItsEnergyHoweverDeep) {
   }
 }
 
-TEST(DeepContact, OfARingAroundAStiffBallHasAboutItsEnergy) {
-  // The ring is not convex: its columns go along the normals of Sigma, which is nearly the ball's surface, and must end where they meet.
-  constexpr double kRing = 0.5, kThick = 0.4, kSmall = 0.15, kSoft = 1e4, kStiff = 1e7;
-  benchmarks::Rigid ring(benchmarks::wyvill_shape(implicit::ShapeKind::Ring, Vec3(kRing, 0.0, 0.0), kThick), kSoft, 0.03);
-  benchmarks::Rigid ball(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), kSmall), kStiff, 0.03);
-  for (const double out : {0.05, 0.1, 0.14}) {
-    const Vec3 centre(kRing + out, 0.0, 0.0);
-    ring.put({});
-    ball.put({centre, Quat::Identity()});
-    constexpr int kCells = 120;
-    const double cell = kSmall / kCells;
-    double exact = 0.0;
-    for (int k = 0; k < kCells; ++k) {
-      for (int j = 0; j < kCells; ++j) {
-        for (int i = 0; i < kCells; ++i) {
-          const Vec3 x = centre + cell * Vec3(i + 0.5, j + 0.5, k + 0.5) - Vec3::Constant(0.5 * kSmall);
-          exact += std::max(std::min(kSoft * ring.body().field.value(x), kStiff * ball.body().field.value(x)), 0.0);
-        }
+/// The integral of the smaller pressure of two bodies over a box, by the midpoints of cells.
+double energy_in(const Box& box, const ContactBody& a, const ContactBody& b) {
+  constexpr int kCells = 120;
+  const Vec3 cell = box.extent() / kCells;
+  double sum = 0.0;
+  for (int k = 0; k < kCells; ++k) {
+    for (int j = 0; j < kCells; ++j) {
+      for (int i = 0; i < kCells; ++i) {
+        const Vec3 x = box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
+        sum += std::max(std::min(a.material.modulus * a.field.value(x), b.material.modulus * b.field.value(x)), 0.0);
       }
     }
-    exact *= cell * cell * cell;
+  }
+  return sum * cell.prod();
+}
+
+TEST(DeepContact, OfOtherShapesInASoftPlaneHasItsEnergyHoweverDeep) {
+  for (const implicit::ShapeKind shape : {implicit::ShapeKind::Box, implicit::ShapeKind::Segment, implicit::ShapeKind::Disc}) {
+    benchmarks::Rigid body(benchmarks::wyvill_shape(shape, Vec3(0.2, 0.12, 0.08), 0.3), kModulus, 0.03);
+    body.put({Vec3::Zero(), Quat(0.9, 0.2, -0.3, 0.1).normalized()});
+    const Box box = body.body().field.surface_box();
+    for (const double share : {0.4, 0.6, 0.8}) {
+      const implicit::HalfSpace plane{box.lower + share * box.extent(), Vec3::UnitZ(), 1.0};
+      const Pose still;
+      const ContactBody ground = benchmarks::single_part(plane, 5e4, still);
+      const double exact = energy_in(box, body.body(), ground);
+      for (const double error : {1e-3, 1e-5}) {
+        const ContactSurface::Summary s = query({body.body(), ground}, error);
+        EXPECT_NEAR(s.energy, exact, (4.0 * error + 1e-3) * exact) << static_cast<int>(shape) << ' ' << share << ' ' << error;  // cells: (1 / 120)^2 times 10
+      }
+    }
+  }
+}
+
+TEST(DeepContact, OfARingAroundAStiffBallHasAboutItsEnergy) {
+  // The ring is not convex: its columns go along the normals of Sigma, which is nearly the ball's surface, and must end where they meet.
+  constexpr double kRing = 0.5;
+  benchmarks::Rigid ring(benchmarks::wyvill_shape(implicit::ShapeKind::Ring, Vec3(kRing, 0.0, 0.0), 0.4), 1e4, 0.03);
+  benchmarks::Rigid ball(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), 0.15), 1e7, 0.03);
+  for (const double out : {0.05, 0.1, 0.14}) {
+    ring.put({});
+    ball.put({Vec3(kRing + out, 0.0, 0.0), Quat::Identity()});
+    const double exact = energy_in(ball.body().field.surface_box(), ring.body(), ball.body());
     const ContactSurface::Summary s = query({ring.body(), ball.body()}, 1e-3);
     EXPECT_NEAR(s.energy, exact, 0.35 * exact) << out;  // where they end they need not fill the space
-    EXPECT_LE(s.largest_overlap, 0.14) << out;  // the ball is .137 m wide
+    EXPECT_LE(s.largest_overlap, 0.14) << out;          // the ball is .137 m wide
   }
 }
 
