@@ -76,10 +76,9 @@ bool takes(const FieldInfo& info, const Node& scalar) {
 }  // namespace
 
 std::string ReadArchive::mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty) {
-  const FieldInfo* meant = nullptr;  // by a scalar: the first key that takes it, of those that are required if any does
+  const FieldInfo* meant = nullptr;  // by a scalar: the first key that takes it
   for (const FieldInfo& info : keys) {
-    if (node.kind != Node::Kind::Scalar || !info.rule.when.applies() || !takes(info, node)) continue;
-    if (meant == nullptr || (info.required && !meant->required)) meant = &info;
+    if (meant == nullptr && node.kind == Node::Kind::Scalar && info.rule.when.applies() && takes(info, node)) meant = &info;
   }
   if (meant == nullptr && may_be_empty) return "write {} for the defaults";
   std::string mapping, rest;
@@ -87,8 +86,7 @@ std::string ReadArchive::mapping_hint(const Node& node, const std::vector<FieldI
     const When& when = info.rule.when;
     const bool selected = meant != nullptr && when.selector == meant->key && !when.choices.empty();
     const bool applies = selected ? std::find(when.choices.begin(), when.choices.end(), node.text) != when.choices.end() : when.applies();
-    const bool wanted = &info == meant || (info.required && applies);
-    if (!wanted) continue;
+    if (&info != meant && !(info.required && applies)) continue;
     mapping += (mapping.empty() ? "" : ", ") + std::string(info.key) + ": " + (&info == meant ? shown(node.text) : "...");
     if (&info != meant) rest += (rest.empty() ? "" : ", ") + std::string(info.key) + ": " + expectation(info.type, info.choices, info.rule);
   }
