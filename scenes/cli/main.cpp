@@ -119,6 +119,13 @@ scenes::SimulationOptions simulation_options(int threads) {
   return options;
 }
 
+/// Of a simulation that is looked at only.
+scenes::SimulationOptions question_options(int threads) {
+  scenes::SimulationOptions options = simulation_options(threads);
+  options.questions = true;
+  return options;
+}
+
 scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folder, tool::ProgressBar& bar) {
   scenes::RunOptions options;
   options.folder = folder;
@@ -210,13 +217,14 @@ int compare(const Arguments& arguments) {
 int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   scenes::check_pictures(scene);
-  scenes::Simulation simulation(scene, simulation_options(1));
+  scenes::Simulation simulation(scene, question_options(1));
   try {
     scenes::expect_output_sizes(simulation, scenes::requested_outputs(scene));
   } catch (const Error& error) {
     throw Error(ErrorKind::Scene, error.faults());
   }
   for (const std::string& warning : simulation.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  simulation.expect_steps();
   if (!arguments.quiet) {
     const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
     const std::size_t objects = scene.objects.size(), particles = simulation.model().particles.size();
@@ -229,7 +237,7 @@ int check(const Arguments& arguments) {
 int explain(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.simulate_only) scene.output = {};
-  scenes::Simulation simulation(std::move(scene), simulation_options(1));
+  scenes::Simulation simulation(std::move(scene), question_options(1));
   std::fputs(scenes::explain(simulation).c_str(), stdout);
   return 0;
 }
@@ -238,7 +246,7 @@ int query(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.error > 0.0) scene.contact.error = arguments.error;
   const std::uint64_t fingerprint = scene.content_hash;
-  scenes::Simulation simulation(std::move(scene), simulation_options(arguments.threads));
+  scenes::Simulation simulation(std::move(scene), question_options(arguments.threads));
   if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, fingerprint));
   std::string answer;
   if (arguments.query == "forces") {

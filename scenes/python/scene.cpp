@@ -37,7 +37,7 @@ std::vector<std::string> check(const Scene& scene) {
 
 std::string explain(const Scene& scene) {
   const py::gil_scoped_release others_run;
-  scenes::Simulation simulation(scene);
+  scenes::Simulation simulation(scene, {.questions = true});
   return scenes::explain(simulation);
 }
 

@@ -157,8 +157,10 @@ void check_names(Archive& archive, const Scene& d) {
     for (std::size_t side = 0; side < two.size(); ++side) {
       const bool known = index.contains(two[side]) || (two[side] == "ground" && d.ground);
       const std::string near = known ? "" : nearest_word(two[side], names);
-      archive.check(known, key + '[' + std::to_string(side) + ']', "expected the name of an object", '\'' + shown(two[side]) + '\'',
-                    (near.empty() ? "" : "did you mean '" + near + "'? ") + "(known: " + shown(joined(names)) + ")");
+      std::string hint = (near.empty() ? "" : "did you mean '" + near + "'? ") + "(known: " + shown(joined(names)) + ")";
+      if (two[side] == "ground") hint = "the scene has none: add 'ground: true'";
+      archive.check(known, key + '[' + std::to_string(side) + ']', "expected the name of an object or obstacle, or 'ground'",
+                    '\'' + shown(two[side]) + '\'', hint);
     }
     if (two.size() != 2) continue;
     std::sort(two.begin(), two.end());

@@ -57,6 +57,10 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("bulge_width", d.bulge_width, up_to(1.0, kNumber), "share of the other body's feature size");
   archive("bulge_literal", d.bulge_literal, {}, "as published: by distance instead of pressure, of one width; it pops up at first touch and bulges may cross");
   archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "of the surface samples; auto: a sixth of the smallest feature");
+  const bool bulges = archive.given("bulge") || archive.given("bulge_volume");
+  for (const char* key : {"bulge_width", "bulge_literal"}) {
+    archive.check(bulges || !archive.given(key), key, "expected 'bulge' or 'bulge_volume' beside it", "neither", "add one of the two");
+  }
   archive.check(!d.bulge_volume || d.bulge == 0.0, "bulge", "expected no height beside 'bulge_volume'", number_text(d.bulge), "leave out one of the two");
   archive.check(!d.bulge_volume || !d.bulge_literal, "bulge_literal", "expected false beside 'bulge_volume'", "true", "leave out one of the two");
 }

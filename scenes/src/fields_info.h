@@ -21,6 +21,7 @@ struct FieldInfo {
   FieldType type = FieldType::Number;
   bool required = false;
   bool may_be_absent = false;                ///< std::optional, so false or auto (by the rule) stand for none
+  bool may_be_empty = false;                 ///< Mapping: {} is complete
   std::string default_text;                  ///< "" without default
   Rule rule;
   std::span<const std::string_view> choices; ///< Choice, Choices
@@ -66,6 +67,23 @@ class InfoArchive {
   static std::string default_of(const T& value, const Rule& /*rule*/) {
     if constexpr (std::is_enum_v<T>) return std::string(name_of(value));
     return "";
+  }
+};
+
+/// Tells whether a mapping without keys is complete.
+class EmptyArchive {
+ public:
+  bool complete = true;
+
+  template <class T>
+  void operator()(std::string_view /*key*/, T& /*value*/, const Rule& /*rule*/, std::string_view /*meaning*/) {}
+  template <class T>
+  void required(std::string_view /*key*/, T& /*value*/, const Rule& rule, std::string_view /*meaning*/) {
+    complete = complete && !rule.when.applies();
+  }
+  [[nodiscard]] static bool given(std::string_view /*key*/) { return false; }
+  void check(bool holds, const std::string& /*key*/, const std::string& /*expected*/, const std::string& /*found*/, const std::string& /*hint*/) {
+    complete = complete && holds;
   }
 };
 
@@ -116,6 +134,10 @@ FieldInfo& InfoArchive::add(std::string_view key, T& /*value*/, const Rule& rule
     Value value{};
     fields(inner, value);
     info.children = std::move(inner.list);
+    EmptyArchive empty;
+    Value defaults{};
+    fields(empty, defaults);
+    info.may_be_empty = empty.complete;
   }
   return info;
 }

@@ -20,7 +20,7 @@ void write_tables(const std::vector<FieldInfo>& list, const std::string& path, s
   for (const FieldInfo& info : list) {
     out += "| `" + std::string(info.key) + "` | " + expectation(info.type, info.choices, info.rule);
     if (info.rule.automatic) out += ", or `auto`";
-    if (info.may_be_absent && info.type == FieldType::Mapping) out += ", or `true`, `false`";
+    if (info.may_be_absent && info.type == FieldType::Mapping) out += info.may_be_empty ? ", or `true`, `false`" : ", or `false`";
     out += " | " + required_text(info) + " | " + std::string(info.meaning);
     if (!info.rule.when.choices.empty()) {
       out += " (with `" + std::string(info.rule.when.selector) + "`: " + joined(info.rule.when.choices) + ')';
@@ -83,7 +83,8 @@ Json value_schema(const FieldInfo& info) {
     case FieldType::Mapping: {
       Json mapping = mapping_schema(info.children);
       if (!info.may_be_absent) return mapping;
-      return {{"anyOf", Json::array({mapping, {{"type", "boolean"}}})}};
+      const Json word = info.may_be_empty ? Json{{"type", "boolean"}} : Json{{"const", false}};
+      return {{"anyOf", Json::array({mapping, word})}};
     }
     case FieldType::Mappings: return list_schema(mapping_schema(info.children), info.rule, 0, kAny);
   }

@@ -83,6 +83,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
   ordered_json json;
   json["time_s"] = simulation.time();
   json["cpu_us"] = 1e6 * cpu_s;
+  const double asked = simulation.model().contact.error;
   ordered_json pairs = ordered_json::array();
   for (std::size_t k = 0; k < surface.summary.size(); ++k) {
     const auto& s = surface.summary[k];
@@ -100,6 +101,8 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},
                          {"error_bound", s.error_estimate},
+                         {"error_asked", asked},
+                         {"error_met", !misses_error(s, asked)},
                          {"patches", s.patches},
                          {"points", s.points},
                          {"evaluations", s.evaluations}};
@@ -292,6 +295,11 @@ std::string explain(Simulation& simulation) {
          plural(o.last - o.first), primitives, plural(primitives), o.samples.size(), o.collides ? "" : ", no contact");
     if (const std::string text = self_contact_text(o); !text.empty()) line("  %-16s %s", "", text.c_str());
   }
+  try {
+    simulation.expect_steps();
+  } catch (const Error& refused) {
+    line("no step can be made: %s", refused.what());
+  }
   line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
        scene.time_step.substeps ? ", fixed by the scene"
                                 : scene.time_step.size ? ", by time_step.size and the stability limits at frame 1"
@@ -307,12 +315,14 @@ std::string explain(Simulation& simulation) {
   if (!plan.on(Stage::SolveContactSurface)) return out;
   const std::vector<collision::ContactSurface::Summary>& pairs = simulation.contacts().summary;
   constexpr std::size_t kMostShown = 10;
+  const double asked = model.contact.error;
   line("\n%zu contact%s at frame %d", pairs.size(), plural(pairs.size()), simulation.frame());
   for (std::size_t k = 0; k < std::min(pairs.size(), kMostShown); ++k) {
     const auto& s = pairs[k];
-    line("  %s, %s: %s (%s), %llu points, error at most %.1e", body_name(simulation, s.bodies.a).c_str(),
+    const std::string missed = misses_error(s, asked) ? ", above the " + short_text(asked) + " asked for" : "";
+    line("  %s, %s: %s (%s), %llu points, error at most %.1e%s", body_name(simulation, s.bodies.a).c_str(),
          body_name(simulation, s.bodies.b).c_str(), rule_name(s.rule), reason_text(s.reason).c_str(),
-         static_cast<unsigned long long>(s.points), s.error_estimate);
+         static_cast<unsigned long long>(s.points), s.error_estimate, missed.c_str());
   }
   if (pairs.size() > kMostShown) line("  and %zu more", pairs.size() - kMostShown);
   return out;

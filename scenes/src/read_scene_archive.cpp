@@ -54,7 +54,47 @@ std::string home_of(std::string_view key, const std::vector<FieldInfo>& list, co
   return "";
 }
 
+/// Whether a key may hold what the scalar says.
+bool takes(const FieldInfo& info, const Node& scalar) {
+  const std::string_view text = scalar.text;
+  switch (info.type) {
+    case FieldType::Number: {
+      const QuantityText number = read_quantity(text, info.rule.quantity);
+      return number.ok && info.rule.holds(number.value);
+    }
+    case FieldType::Whole: {
+      const WholeText number = read_whole(text);
+      return number.ok && info.rule.holds(static_cast<double>(number.value));
+    }
+    case FieldType::Choice:
+    case FieldType::Choices: return std::find(info.choices.begin(), info.choices.end(), text) != info.choices.end();
+    case FieldType::Text: return info.required && info.rule.name && is_identifier(text);
+    default: return false;
+  }
+}
+
 }  // namespace
+
+std::string ReadArchive::mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty) {
+  const FieldInfo* meant = nullptr;  // by a scalar: the first key that takes it
+  for (const FieldInfo& info : keys) {
+    if (meant == nullptr && node.kind == Node::Kind::Scalar && info.rule.when.applies() && takes(info, node)) meant = &info;
+  }
+  if (meant == nullptr && may_be_empty) return "write {} for the defaults";
+  std::string mapping, rest;
+  for (const FieldInfo& info : keys) {
+    const When& when = info.rule.when;
+    const bool selected = meant != nullptr && when.selector == meant->key && !when.choices.empty();
+    const bool applies = selected ? std::find(when.choices.begin(), when.choices.end(), node.text) != when.choices.end() : when.applies();
+    if (&info != meant && !(info.required && applies)) continue;
+    mapping += (mapping.empty() ? "" : ", ") + std::string(info.key) + ": " + (&info == meant ? shown(node.text) : "...");
+    if (&info != meant) rest += (rest.empty() ? "" : ", ") + std::string(info.key) + ": " + expectation(info.type, info.choices, info.rule);
+  }
+  if (!mapping.empty()) return "write {" + mapping + '}' + (rest.empty() ? "" : " (" + rest + ')');
+  std::vector<std::string_view> names;
+  for (const FieldInfo& info : keys) names.push_back(info.key);
+  return "write {key: value} with one or more of " + joined(names) + ',';
+}
 
 void ReadArchive::check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) {
   if (holds) return;
@@ -208,7 +248,7 @@ void ReadArchive::read(const Node& node, const std::string& path, std::vector<st
 }
 
 std::optional<std::size_t> ReadArchive::read_choice(const Node& node, const std::string& path,
-                                                    std::span<const std::string_view> names) {
+                                                    std::span<const std::string_view> names, FieldType type) {
   std::string hint;
   if (node.kind == Node::Kind::Scalar) {
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -217,7 +257,7 @@ std::optional<std::size_t> ReadArchive::read_choice(const Node& node, const std:
     const std::string near = nearest_word(node.text, names);
     if (!near.empty()) hint = "did you mean '" + near + "'?";
   }
-  fault(node, path, "expected one of " + joined(names), hint);
+  fault(node, path, "expected " + expectation(type, names, {}), hint);
   return std::nullopt;
 }
 

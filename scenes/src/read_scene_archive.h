@@ -72,8 +72,9 @@ class ReadArchive {
   void read(const Node& node, const std::string& path, std::vector<int>& value, const Rule& rule);
   void read(const Node& node, const std::string& path, std::vector<std::string>& value, const Rule& rule);
   [[nodiscard]] bool read_items(const Node& node, const std::string& path, const Rule& rule, std::string_view noun);
-  /// Index of the word in names, or none with a fault.
-  std::optional<std::size_t> read_choice(const Node& node, const std::string& path, std::span<const std::string_view> names);
+  /// Index of the word in names, or none with a fault. @param type  Choice or Choices: what else the fault says may stand there
+  std::optional<std::size_t> read_choice(const Node& node, const std::string& path, std::span<const std::string_view> names,
+                                         FieldType type = FieldType::Choice);
 
   template <class E>
     requires std::is_enum_v<E>
@@ -87,9 +88,7 @@ class ReadArchive {
     value.clear();
     if (node.kind != Node::Kind::List) {
       if (node.kind == Node::Kind::Scalar && node.text == "none") return;
-      E one{};
-      read(node, path, one, rule);
-      value = {one};
+      if (const auto index = read_choice(node, path, EnumNames<E>::names, FieldType::Choices)) value = {static_cast<E>(*index)};
       return;
     }
     for (std::size_t i = 0; i < node.items.size(); ++i) {
@@ -112,7 +111,7 @@ class ReadArchive {
   template <Described D>
   void read(const Node& node, const std::string& path, D& value, const Rule& /*rule*/) {
     if (node.kind != Node::Kind::Mapping) {
-      fault(node, path, "expected a mapping", node.kind == Node::Kind::Null ? "write {} for the defaults" : "");
+      refuse<D>(node, path, false);
       return;
     }
     ReadArchive inner(faults_, node, path);
@@ -130,7 +129,7 @@ class ReadArchive {
       empty.mark = node.mark;
       read(empty, path, *value, rule);
     } else if (node.kind != Node::Kind::Mapping) {
-      fault(node, path, "expected a mapping", "write {} for the defaults or false for none");
+      refuse<D>(node, path, true);
     } else {
       read(node, path, *value, rule);
     }
@@ -143,6 +142,19 @@ class ReadArchive {
       read(*node.items[i], path + '[' + std::to_string(i) + ']', value.emplace_back(), rule);
     }
   }
+
+  /// A fault at what is no mapping.
+  template <Described D>
+  void refuse(const Node& node, const std::string& path, bool may_be_absent) {
+    InfoArchive keys;
+    EmptyArchive empty;
+    D listed{}, defaults{};
+    fields(keys, listed);
+    fields(empty, defaults);
+    fault(node, path, "expected a mapping", mapping_hint(node, keys.list, empty.complete) + (may_be_absent ? " or false for none" : ""));
+  }
+  /// What to write instead of `node`. @param may_be_empty  {} is complete
+  static std::string mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty);
 
   struct Idle {
     std::string_view key;

@@ -43,11 +43,11 @@ Simulation::Impl::Impl(Scene s, SimulationOptions o)
   for (const Body& body : bodies) state.samples.push_back(fresh_samples(body));
   if (scene.sleep) state.sleep.reset(bodies.size());
   form_awake();
-  state.halvings = first_halvings(scene, model, integrator, laws, state);
+  state.halvings = (options.questions ? wanted_halvings : first_halvings)(scene, model, integrator, laws, state);
   leave_overlapping();
   book_audits();
   place_cameras();
-  warnings = find_odd_start(context(), state.particles, pulled);
+  warnings = find_odd_start(scene, context(), state.particles, pulled);
 }
 
 StageContext Simulation::Impl::context() {
@@ -207,6 +207,9 @@ int Simulation::frame() const { return impl_->state.frame; }
 double Simulation::time() const { return impl_->time(); }
 double Simulation::time_step() const { return impl_->dt(); }
 std::uint64_t Simulation::state_hash() const { return impl_->state.hash(); }
+void Simulation::expect_steps() const {
+  (void)first_halvings(impl_->scene, impl_->model, impl_->integrator, impl_->laws, impl_->state);
+}
 void Simulation::step() { impl_->step(); }
 
 void Simulation::step_frame() { advance_to(impl_->state.frame + 1); }

@@ -11,6 +11,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kStepsPerRefinement = 4;
+constexpr int kMostHalvings = 20;      // 2^20 substeps, the most that a scene may allow
 constexpr double kDampedShare = 0.4;  // of the inverse of d v: what a step may take of a speed by damping
 
 int log2_of(int n) {
@@ -58,15 +59,19 @@ int least_halvings(const Scene& scene) {
   return (desc.size ? core::halvings(1.0 / scene.frame_rate, *desc.size) : 0) + (desc.substeps ? log2_of(*desc.substeps) : 0);
 }
 
+/// Of the coarsest step [s] that is stable, none coarser than the scene lets be taken; 0: of those.
+int halvings_for(const Scene& scene, double step) {
+  const double frame_time = 1.0 / scene.frame_rate;
+  return std::max(least_halvings(scene), step > 0.0 && step < frame_time ? core::halvings(frame_time, step) : 0);
+}
+
 /// Of the coarsest step that is stable now.
 int stable_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                     const State& state) {
-  const double frame_time = 1.0 / scene.frame_rate;
   const core::StepLimits limits = limits_of(scene, model, integrator, laws, state.particles);
   const double step = core::stable_step(limits);
   const bool possible = step > 0.0;
-  const int least = least_halvings(scene);
-  const int k = std::max(least, possible && step < frame_time ? core::halvings(frame_time, step) : 0);
+  const int least = least_halvings(scene), k = halvings_for(scene, step);
   const int most = scene.time_step.max_substeps;
   if (!possible || (k > least && k > log2_of(most))) {
     const core::Speeds speeds = core::largest_speeds(model.particles, state.particles);
@@ -87,6 +92,13 @@ int stable_halvings(const Scene& scene, const Model& model, const IntegratorPlan
 int first_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                    const State& state) {
   return fixes_step(scene) ? least_halvings(scene) : stable_halvings(scene, model, integrator, laws, state);
+}
+
+int wanted_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
+                    const State& state) {
+  if (fixes_step(scene)) return least_halvings(scene);
+  const double step = core::stable_step(limits_of(scene, model, integrator, laws, state.particles));
+  return step > 0.0 ? std::min(halvings_for(scene, step), kMostHalvings) : kMostHalvings;
 }
 
 int next_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,

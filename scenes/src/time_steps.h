@@ -16,6 +16,10 @@ namespace supple::scenes {
 [[nodiscard]] int first_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                                  const State& state);
 
+/// As `first_halvings`, but refuses nothing: for questions about a state from which no step is made. None is finer than a frame's time over 2^20.
+[[nodiscard]] int wanted_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
+                                  const State& state);
+
 /// The same for the steps that follow: laws get stiffer where particles come close. Within a frame steps only become finer, as
 /// they stay on its grid.
 [[nodiscard]] int next_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,

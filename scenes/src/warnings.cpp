@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
 #include "fields_rules.h"
@@ -91,6 +92,23 @@ void add_missed(const Model& model, std::vector<std::string>& warnings) {
   }
 }
 
+/// Where the scene says how far apart the samples of contact are [m].
+void add_wide_samples(const Model& model, double spacing, std::vector<std::string>& warnings) {
+  const std::string key = "contact.sample_spacing: ";
+  if (std::all_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.samples.size() == 0; })) {
+    warnings.push_back(key + "it has no effect, as no contact is looked for by samples: convex bodies need none");
+    return;
+  }
+  double solids = std::numeric_limits<double>::infinity();  // obstacles have no samples: those of the objects must meet them
+  for (const FixedBody& body : model.fixed) solids = std::min(solids, body.iso_radius);
+  for (const ObjectModel& object : model.objects) {
+    const double thickness = 2.0 * std::min(object.iso_radius, solids);
+    if (object.samples.size() == 0 || spacing <= thickness) continue;
+    warnings.push_back(key + "samples " + number_text(spacing) + " m apart may miss contacts of '" + object.name + "', as " +
+                       (solids < object.iso_radius ? "an obstacle" : "it") + " is " + number_text(thickness) + " m thick");
+  }
+}
+
 }  // namespace
 
 bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair) {
@@ -112,12 +130,13 @@ std::string passing_text(const ObjectModel& object) {
                              : "what its blending graph joins only by way of others does not blend, but passes through itself";
 }
 
-std::vector<std::string> find_odd_start(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
+std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   std::vector<std::string> warnings;
   add_deep(context, frame, warnings);
   add_passing(context.model, warnings);
   add_without_surface(context, particles, frame, warnings);
   add_missed(context.model, warnings);
+  if (scene.contact.sample_spacing) add_wide_samples(context.model, *scene.contact.sample_spacing, warnings);
   return warnings;
 }
 
@@ -132,13 +151,18 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
   }
 }
 
+bool misses_error(const collision::ContactSurface::Summary& contact, double asked) {
+  constexpr double kSlack = 1.01;  // rules end a little above what they were asked for
+  return contact.error_estimate > kSlack * asked;
+}
+
 void UnmetContacts::look(const StageContext& context, const collision::ContactSurface& surface, double time) {
   const double asked = context.model.contact.error;
   const auto kind = [&](std::uint32_t body) -> const std::string& {
     return body < context.bodies.size() ? context.model.objects[context.bodies[body].object].name : body_name(context.model, context.bodies, body);
   };
   for (const auto& s : surface.summary) {
-    if (s.error_estimate <= kSlack * asked || s.force.norm() == 0.0) continue;  // without force: the rule asked for does not fit
+    if (!misses_error(s, asked) || s.force.norm() == 0.0) continue;  // without force: the rule asked for does not fit
     Worst& worst = worst_[{kind(s.bodies.a), kind(s.bodies.b)}];
     if (worst.times++ == 0) worst.first = time;
     if (s.error_estimate > worst.bound) worst = {s.error_estimate, time, worst.first, worst.times};

@@ -18,13 +18,17 @@ namespace supple::scenes {
 [[nodiscard]] std::string passing_text(const ObjectModel& object);
 
 /// What is odd about the start: bodies deep in one another, parts of an object that pass through each other, objects without a
-/// surface, cells that miss objects.
+/// surface, cells and samples of contact that miss objects, and a spacing of samples where there are none.
 /// @param frame  of the contacts at the start
-[[nodiscard]] std::vector<std::string> find_odd_start(const StageContext& context, const core::ParticleState& particles, Frame& frame);
+[[nodiscard]] std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles,
+                                                      Frame& frame);
 
 /// Adds, once each, contacts that the only rule allowed does not fit: they push nobody.
 void add_unresolved(const StageContext& context, RuleName only, const collision::ContactSurface& surface,
                     std::vector<std::string>& warnings);
+
+/// Whether a contact's bound of the error is above what was asked by more than rules end at.
+[[nodiscard]] bool misses_error(const collision::ContactSurface::Summary& contact, double asked);
 
 /// Contacts whose bound of the error is larger than asked, by the objects that touch. Starts anew after a restart.
 class UnmetContacts {
@@ -35,7 +39,6 @@ class UnmetContacts {
   void add_to(double asked, std::vector<std::string>& warnings) const;
 
  private:
-  static constexpr double kSlack = 1.01;  // rules end a little above what they were asked for
   struct Worst {
     double bound = 0.0, time = 0.0, first = 0.0;
     std::uint64_t times = 0;

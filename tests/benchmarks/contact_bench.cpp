@@ -20,6 +20,7 @@
 #include "supple/core/hash.h"
 #include "supple/core/math.h"
 #include "supple/implicit/field.h"
+#include "usage.h"
 
 namespace {
 
@@ -110,10 +111,11 @@ void measure(const std::string& name, const std::vector<collision::ContactBody>&
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "contact_bench [FILE.svg]    the file: a plot of time against error of all rules, by contact_rules", 1);
   namespace fs = std::filesystem;
   const fs::path plot = argc > 1 ? argv[1] : "";
-  if (argc > 2 || (argc > 1 && plot.extension() != ".svg")) {
-    std::fprintf(stderr, "error: contact_bench: expected nothing, or the name of a plot FILE.svg; found '%s'\n", argv[argc - 1]);
+  if (argc > 1 && plot.extension() != ".svg") {
+    std::fprintf(stderr, "error: contact_bench: expected nothing, or the name of a plot FILE.svg; found '%s'\n", argv[1]);
     return 2;
   }
   const double none = std::numeric_limits<double>::quiet_NaN();

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "scenes/contact_gas.h"
+#include "usage.h"
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "contact_conservation [STEPS] [BALLS]", 2);
   using namespace supple::scenes;
   const int steps = argc > 1 ? std::atoi(argv[1]) : 100000;
   const std::vector<int> counts = argc > 2 ? std::vector<int>{std::atoi(argv[2])} : std::vector<int>{2, 10, 100};

@@ -17,6 +17,7 @@
 #include "supple/core/hash.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "usage.h"
 
 namespace {
 
@@ -98,6 +99,7 @@ void measure(int count, bool sleeps, int threads) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "contact_pile [BALLS ...] [--threads N]", std::numeric_limits<std::size_t>::max(), {{"--threads", 1}});
   std::vector<int> counts;
   int threads = 1;
   for (int i = 1; i < argc; ++i) {

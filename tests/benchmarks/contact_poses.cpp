@@ -14,6 +14,7 @@
 
 #include "contact_shapes.h"
 #include "supple/core/hash.h"
+#include "usage.h"
 
 namespace {
 
@@ -138,6 +139,7 @@ Pose random_pose(Draw& draw, const Vec3& position) { return {position, draw.rota
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED]", 4);
   const int poses = argc > 1 ? std::atoi(argv[1]) : 1000;
   const std::string_view only = argc > 2 ? argv[2] : "";
   const std::string_view rule = argc > 3 ? argv[3] : "auto";

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "scenes/contact_stress.h"
+#include "usage.h"
 
 namespace {
 
@@ -82,6 +83,7 @@ void draw(const std::vector<Block>& blocks, const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "contact_stress [--seed N] [FILE.svg]", 3, {{"--seed", 1}});
   std::string map;
   unsigned seed = std::random_device{}();
   for (int i = 1; i < argc; ++i) {

@@ -22,6 +22,7 @@
 #include "supple/core/hash.h"
 #include "supple/core/integrate.h"
 #include "supple/core/neighbour_list.h"
+#include "usage.h"
 
 namespace {
 
@@ -536,6 +537,8 @@ void bench_spiral(int count, bool rubs) {
 /// @param argv  melt [FILE [STEPS]], melt_single [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, surface, lists,
 ///              spiral; all when absent
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "core_bench [melt|melt_single|ellipsoids [FILE [STEPS]]]\n"
+                                   "       core_bench threads|surface|lists|spiral", 3);
   const std::string_view what = argc > 1 ? argv[1] : "";
   const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };
   for (const Precision precision : {Precision::Double, Precision::SingleForces}) {

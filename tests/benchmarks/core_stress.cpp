@@ -14,6 +14,7 @@
 #include "core/support.h"
 #include "supple/core/integrate.h"
 #include "supple/core/lennard_jones.h"
+#include "usage.h"
 
 namespace {
 
@@ -163,6 +164,7 @@ const char* colour(Outcome outcome) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "core_stress [FILE.svg]", 1);
   constexpr double kCell = 14.0;
   std::string svg;
   int bad = 0, total = 0;

@@ -18,6 +18,7 @@
 #include "supple/implicit/field.h"
 #include "supple/implicit/project.h"
 #include "supple/implicit/surface_samples.h"
+#include "usage.h"
 
 namespace {
 
@@ -198,6 +199,7 @@ void measure_few(std::string_view filter, std::uint32_t count, ShapeKind shape) 
 
 /// @param argv  beginning of the names to run, e.g. w3/values; all when absent
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "field_bench [PREFIX]    of the names to run, e.g. w3/values", 1);
   const std::string_view filter = argc > 1 ? argv[1] : "";
   if (wanted(filter, "few/")) {
     for (const std::uint32_t count : {1u, 4u, 16u}) {

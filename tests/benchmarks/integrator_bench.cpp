@@ -13,6 +13,7 @@
 #include "supple/core/arrange.h"
 #include "supple/core/hash.h"
 #include "supple/core/integrators.h"
+#include "usage.h"
 
 namespace {
 
@@ -168,6 +169,7 @@ class Panel {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "integrator_bench [FILE.svg]", 1);
   std::string svg;
   double left = 50.0;
   for (const System& s : {stiff_spiral(), tumbling_cluster(), ringing_shell()}) {

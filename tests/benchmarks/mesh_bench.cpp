@@ -35,6 +35,7 @@
 #include "supple/implicit/surface_grid.h"
 #ifdef SUPPLE_HAS_CGAL
 #include "supple/cgal/surface_meshes.h"
+#include "usage.h"
 #endif
 
 namespace {
@@ -546,6 +547,10 @@ bool starts_alike(std::string_view a, std::string_view b) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "mesh_bench [PREFIX [--both]]          of the names to run, e.g. w3/128; --both: errors both ways\n"
+                                   "       mesh_bench --bounded BODY CELLS\n"
+                                   "       mesh_bench --grid BODY CELLS FILE\n"
+                                   "       mesh_bench --errors BODY CELLS FILE", 4, {{"--both"}, {"--bounded", 2}, {"--grid", 3}, {"--errors", 3}});
   if (argc == 4 && std::string_view(argv[1]) == "--bounded") {
 #ifdef SUPPLE_HAS_CGAL
     const Body body = make_body(argv[2]);

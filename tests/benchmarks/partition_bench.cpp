@@ -24,6 +24,7 @@
 #include "supple/implicit/delaunay.h"
 #include "supple/implicit/partition_mesher.h"
 #include "supple/implicit/polygonise.h"
+#include "usage.h"
 
 namespace {
 
@@ -295,6 +296,9 @@ void moved(int count, double cell, double error) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::benchmarks::answer_usage(argc, argv, "partition_bench [rims] [SETS] [CELL]\n"
+                                   "       partition_bench delaunay [SETS] [SIZE]\n"
+                                   "       partition_bench moved [BALLS] [CELL] [ERROR]", 4);
   const std::string_view what = argc > 1 ? argv[1] : "rims";
   const int sets = argc > 2 ? std::atoi(argv[2]) : 50;
   if (what == "delaunay") {

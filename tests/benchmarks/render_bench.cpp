@@ -24,6 +24,7 @@
 #include "supple/core/hash.h"
 #include "supple/core/io/mesh_files.h"
 #include "supple/render/renderer.h"
+#include "usage.h"
 
 namespace {
 
@@ -195,6 +196,8 @@ int write_studio(const fs::path& folder) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const char* usage = "render_bench [gl] | rate [AT_ONCE] [NOISE] | path [NOISE] [OUT.png] | studio FOLDER";
+  supple::benchmarks::answer_usage(argc, argv, usage, 3);
   const std::string what = argc > 1 ? argv[1] : "gl";
   try {
     if (what == "gl") return bench_gl();
@@ -213,6 +216,6 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", error.what());
     return static_cast<int>(error.kind());
   }
-  std::fprintf(stderr, "usage: render_bench [gl] | rate [AT_ONCE] [NOISE] | path [NOISE] [OUT.png] | studio FOLDER\n");
+  std::fprintf(stderr, "usage: %s\n", usage);
   return 2;
 }

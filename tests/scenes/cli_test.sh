@@ -58,6 +58,10 @@ expect 0 '' bench --list
 expect 2 '--list' bench cores
 expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
+expect 6 'time_step.max_substeps' check too_fine.yaml
+expect 0 '' query forces too_fine.yaml
+expect 0 '' explain too_fine.yaml
+grep -qF 'no step can be made' out.txt || { echo 'explain too_fine.yaml: expected why no step can be made'; failures=$((failures + 1)); }
 printf 'schema: 1\nduration: 5 ms\nframe_rate: 1000\nground: {modulus: 1e9}\ntime_step: {substeps: 1}\nobjects:\n' > passes.yaml
 printf '  - name: ball\n    particles: {at: [0, 0, 0.2], velocity: [0, 0, -600], mass: 0.001}\n' >> passes.yaml
 printf '    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]\n    contact: {modulus: 1e8}\n' >> passes.yaml

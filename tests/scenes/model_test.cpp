@@ -192,6 +192,26 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   EXPECT_NE(thin[0].find("'a' may have no surface"), std::string::npos) << thin[0];
 }
 
+TEST(Warnings, TellOfSamplesThatAreTooFarApartOrOfNoUse) {
+  const auto warnings_of = [](const std::string& spacing, const std::string& shape, const std::string& obstacles = "") {
+    return Simulation(parse_scene("schema: 1\nduration: 1 s\nground: {}\ncontact: {sample_spacing: " + spacing + "}\n" + obstacles +
+                                  "objects:\n  - {name: a, particles: {at: [0, 0, 1], inertia_radius: 0.1}, skeleton: [{shape: " + shape +
+                                  ", kernel: {radius: 0.2}}], contact: {}}\n", "test.yaml", ".")).warnings();
+  };
+  // 2 (1 - 2^(-1/3))^(1/2) 0.2 = 0.1817 m thick
+  EXPECT_TRUE(warnings_of("0.18", "ring, radius: 0.3").empty());
+  const auto wide = warnings_of("1000", "ring, radius: 0.3");
+  ASSERT_EQ(wide.size(), 1u);
+  EXPECT_NE(wide[0].find("contact.sample_spacing: samples 1000 m apart may miss contacts of 'a', as it is 0.1816"), std::string::npos) << wide[0];
+  const auto thin = warnings_of("0.18", "ring, radius: 0.3",
+                                "obstacles: [{name: bar, shape: implicit, at: [0, 0, 3], skeleton: [{shape: segment, half_length: 1, kernel: {radius: 0.05}}]}]\n");
+  ASSERT_EQ(thin.size(), 1u);
+  EXPECT_NE(thin[0].find("may miss contacts of 'a', as an obstacle is 0.0454"), std::string::npos) << thin[0];
+  const auto idle = warnings_of("0.1", "point");
+  ASSERT_EQ(idle.size(), 1u);
+  EXPECT_NE(idle[0].find("contact.sample_spacing: it has no effect"), std::string::npos) << idle[0];
+}
+
 TEST(Warnings, TellOfContactsThatAreNotSolvedAsWellAsAsked) {
   // The patch of a ring on the ground: samples end at a bound of 8e-2, marching goes as far as is asked.
   const auto warnings_of = [](const std::string& rule) {

@@ -23,5 +23,17 @@ TEST(SceneReference, SchemaIsJsonAndKnowsTheTopLevelKeys) {
   }
 }
 
+TEST(SceneReference, OffersTrueOnlyWhereAMappingNeedsNoKey) {
+  const std::string page = scene_reference();
+  for (const char* row : {"| `restitution` | a mapping, or `false` |", "| `stick` | a mapping, or `false` |", "| `breaking` | a mapping, or `false` |",
+                          "| `sleep` | a mapping, or `true`, `false` |", "| `ground` | a mapping, or `true`, `false` |"}) {
+    EXPECT_NE(page.find(row), std::string::npos) << row;
+  }
+  const auto schema = nlohmann::json::parse(scene_json_schema());
+  const auto& objects = schema.at("properties").at("objects").at("items").at("properties");
+  EXPECT_EQ(objects.at("yielding").at("anyOf").at(1), nlohmann::json({{"const", false}}));
+  EXPECT_EQ(objects.at("medium").at("anyOf").at(1), nlohmann::json({{"type", "boolean"}}));
+}
+
 }  // namespace
 }  // namespace supple::scenes

@@ -12,7 +12,8 @@ namespace supple::scenes {
 /// Force, torque and energy by law, particle by particle; contact included as law "contact".
 [[nodiscard]] std::string query_forces(Simulation& simulation);
 
-/// For each pair: force, moment about the origin, area, centre of pressure, energy, error bound, points, cpu_us.
+/// For each pair: force, moment about the origin, area, centre of pressure, energy, points, cpu_us, and the bound of the error, with the one
+/// asked for and whether it is met.
 [[nodiscard]] std::string query_contact(Simulation& simulation, bool samples);
 
 /// Value, gradient and owner at each point of a CSV file, of each object. @throws Error{Io}, Error{Scene}
@@ -25,7 +26,7 @@ struct MeshQuery {
 /// Counts, closed or not, area, volume, cpu_ms, by object. @throws Error{Io}, Error{Usage} for a file of another kind
 [[nodiscard]] std::string query_mesh(Simulation& simulation, const MeshQuery& query);
 
-/// The plan as text (`supple explain`): stages with reasons, time step, sizes.
+/// The plan as text (`supple explain`): stages with reasons, time step (or why none can be made), sizes, contacts.
 [[nodiscard]] std::string explain(Simulation& simulation);
 
 }  // namespace supple::scenes

@@ -34,6 +34,7 @@ struct SimulationOptions {
   bool profile = false;        ///< time every step, not every 64th
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps go on
+  bool questions = false;      ///< about states only: a start that needs finer steps than time_step.max_substeps is refused by the first step, not before
 };
 
 /// Work of one stage so far.
@@ -79,8 +80,7 @@ struct ParticleChange {
 
 class Simulation {
  public:
-  /// @throws Error{Scene} when the model cannot be built, Error{Limit} when the time step would need more than
-  /// max_substeps.
+  /// @throws Error{Scene} when the model cannot be built; unless `options.questions`, Error{Limit} as `expect_steps`
   explicit Simulation(Scene scene, SimulationOptions options = {});
   ~Simulation();
   Simulation(Simulation&&) noexcept;
@@ -101,6 +101,8 @@ class Simulation {
   /// What the steps of this object needed so far: sums, the largest last correction, and whether all met the tolerance.
   [[nodiscard]] const core::StepReport& integration() const;
 
+  /// @throws Error{Limit} when a step from here would have to be finer than time_step.max_substeps allows
+  void expect_steps() const;
   /// One time step, frame time / 2^halvings; one that ends a frame books its audits. @throws Error{Diverged} naming particle, cause and value; the state is then
   /// that of the last frame. Nothing ends at the scene's last frame, of which `scene().duration` tells runs and turntables only:
   /// later steps are those of a scene that lasts longer, to the bit.

@@ -1,0 +1,55 @@
+// What benchmark programs answer before they measure anything, and that all of them do.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "benchmarks/usage.h"
+
+namespace supple::benchmarks {
+namespace {
+
+/// Ends with 7 where the arguments are taken.
+void call(std::vector<std::string> words) {
+  words.insert(words.begin(), "program");
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  answer_usage(static_cast<int>(argv.size()), argv.data(), "program [--seed N] [--both] [FILE]", 3, {{"--seed", 1}, {"--both"}});
+  std::exit(7);
+}
+
+TEST(BenchmarkUsage, IsAnsweredBeforeAnythingElse) {
+  using testing::ExitedWithCode;
+  for (const char* word : {"-h", "--help"}) {
+    EXPECT_EXIT(call({word}), ExitedWithCode(0), "");
+    EXPECT_EXIT(call({"plot.svg", word}), ExitedWithCode(0), "");
+  }
+  EXPECT_EXIT(call({"--sede", "3"}), ExitedWithCode(2), "found '--sede'\nusage: program \\[--seed N\\]");
+  EXPECT_EXIT(call({"-v"}), ExitedWithCode(2), "found '-v'");
+  EXPECT_EXIT(call({"plot.svg", "--seed"}), ExitedWithCode(2), "expected a value after every option, found '--seed'");
+  EXPECT_EXIT(call({"a", "b", "c", "d"}), ExitedWithCode(2), "expected no more arguments, found 'd'");
+  for (const std::vector<std::string>& taken : {std::vector<std::string>{}, {"plot.svg"}, {"--seed", "3", "plot.svg"}, {"--both"}, {"-1"}, {"-.5"}, {"-"}}) {
+    EXPECT_EXIT(call(taken), ExitedWithCode(7), "");
+  }
+}
+
+TEST(BenchmarkUsage, IsAskedForByEveryProgram) {
+  int programs = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(SUPPLE_SOURCE_DIR) / "tests/benchmarks")) {
+    if (entry.path().extension() != ".cpp") continue;
+    std::ifstream file(entry.path());
+    std::stringstream text;
+    text << file.rdbuf();
+    if (text.str().find("int main(") == std::string::npos) continue;
+    ++programs;
+    EXPECT_NE(text.str().find("answer_usage(argc, argv"), std::string::npos) << entry.path();
+  }
+  EXPECT_GE(programs, 13);
+}
+
+}  // namespace
+}  // namespace supple::benchmarks
