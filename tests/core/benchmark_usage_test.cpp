@@ -22,7 +22,7 @@ void call(std::vector<std::string> words) {
   std::exit(7);
 }
 
-TEST(BenchmarkUsage, IsAnsweredBeforeAnythingElse) {
+TEST(BenchmarkUsageDeathTest, IsAnsweredBeforeAnythingElse) {
   using testing::ExitedWithCode;
   for (const char* word : {"-h", "--help"}) {
     EXPECT_EXIT(call({word}), ExitedWithCode(0), "");
