@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "bulge_volume.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
@@ -180,6 +182,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
     // All bulges together stay below half of what would lift the empty space around the body onto its surface.
     const auto touching = static_cast<double>(std::count_if(surface.summary.begin(), surface.summary.end(), is_own));
     highest_ = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
+    std::vector<WantedBulge> wanted;
     for (const ContactSurface::Summary& s : surface.summary) {
       if (!is_own(s)) continue;
       const std::uint32_t other = s.bodies.a == body ? s.bodies.b : s.bodies.a;
@@ -198,15 +201,11 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       if (std::isnan(width)) width = kInfinity;
       // Where the kernels of the other body end, the bulge must have ended too.
       width = std::min(width, 0.9 * depth_outside(b));
-      double height = settings.attenuation * s.largest_pressure;
       if (settings.keep_volume) {
-        Vec3 own;
-        static_cast<void>(bodies[body].field.value(s.centre_of_pressure, own));
-        const double across = (b.material.modulus * slope - bodies[body].material.modulus * own).norm();
-        const double displaced = s.bodies.a == body ? s.displaced_a : s.displaced_b;
-        height = volume_keeping_height(displaced, s.area, s.load, across, width);
+        want_volume(s, other, width, wanted);
+        continue;
       }
-      height = std::min(height, highest_);
+      double height = std::min(settings.attenuation * s.largest_pressure, highest_);
       width = effective_width(width, height, 1.0);
       // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
       height = std::min(height, width / 3.0);
@@ -214,6 +213,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       neighbours_.push_back({other, {.stiffness = 1.0, .height = height, .width = width}});
       rise_ += height;
     }
+    keep_volumes(wanted);
   }
   bool certain;
   box_ = bounding_box(bodies[body], rise_, certain);
@@ -222,10 +222,61 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
     for (const Neighbour& n : neighbours_) box_ = box_.united(bodies[n.body].field.surface_box().inflated(n.profile.width));
   }
   if (neighbours_.empty() || literal_) return;
-  for (std::uint32_t j = 0; j < bodies.size(); ++j) {
-    if (j == body || bodies[j].material.modulus * bodies[j].field.bound(box_).upper < -rise_) continue;
+  find_limiting();
+}
+
+void ClaimField::find_limiting() {
+  limiting_.clear();
+  for (std::uint32_t j = 0; j < bodies_.size(); ++j) {
+    if (j == body_ || bodies_[j].material.modulus * bodies_[j].field.bound(box_).upper < -rise_) continue;
     limiting_.push_back(j);
   }
+}
+
+void ClaimField::want_volume(const ContactSurface::Summary& s, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const {
+  const double displaced = s.bodies.a == body_ ? s.displaced_a : s.displaced_b;
+  if (!(displaced > 0.0)) return;
+  const ContactBody& b = bodies_[other];
+  const ContactBody& a = bodies_[body_];
+  Vec3 slope, own_slope;
+  static_cast<void>(b.field.value(s.centre_of_pressure, slope));
+  static_cast<void>(a.field.value(s.centre_of_pressure, own_slope));
+  const double steepness = a.material.modulus * own_slope.norm();
+  const double across = (b.material.modulus * slope - a.material.modulus * own_slope).norm();
+  // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3; together they stay below half of what would fill the space around.
+  double highest = std::min(0.5 * depth_outside(a), width / 3.0);
+  const double size = a.field.feature_size();
+  if (!std::isfinite(highest)) highest = steepness * size;
+  double guess = volume_keeping_height(displaced, s.area, s.load, across, width);
+  if (!(guess > 0.0)) guess = s.largest_pressure;
+  guess = std::min(guess, highest);
+  // Along the surface of the body -p of the other rises by as much more than along Sigma as |grad(p_A - p_B)| / |grad p_A|.
+  const double slope_at_rim = 4.0 * s.load / s.area * std::sqrt(std::numbers::pi / s.area) * across / steepness;
+  double zone = effective_width(width, guess, 1.0) / slope_at_rim;
+  if (!(zone < size)) zone = size;
+  wanted.push_back({.other = other, .volume = displaced, .highest = highest, .width = width, .guess = guess, .zone = zone, .centre = s.centre_of_pressure});
+}
+
+void ClaimField::keep_volumes(std::span<const WantedBulge> wanted) {
+  if (wanted.empty()) return;
+  for (const WantedBulge& w : wanted) rise_ += w.highest;
+  together_ = 0.5 * depth_outside(bodies_[body_]);
+  rise_ = std::min(rise_, together_);
+  bool certain;
+  box_ = bounding_box(bodies_[body_], rise_, certain);
+  if (!box_.lower.allFinite() || !box_.upper.allFinite()) {
+    for (const WantedBulge& w : wanted) box_ = box_.intersection(bounding_box(bodies_[w.other], w.width, certain));
+  }
+  find_limiting();
+  const std::vector<FoundBulge> found = find_bulges({.bodies = bodies_, .body = body_, .limiting = limiting_, .most = rise_, .box = box_}, wanted);
+  rise_ = 0.0;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const double height = found[k].height;
+    neighbours_.push_back({wanted[k].other, {.stiffness = 1.0, .height = height, .width = effective_width(wanted[k].width, height, 1.0)}});
+    volumes_.push_back({wanted[k].other, wanted[k].volume, found[k].held});
+    rise_ += height;
+  }
+  rise_ = std::min(rise_, together_);
 }
 
 double ClaimField::literal_rise(const Neighbour& neighbour, const Box& box) const {
@@ -259,7 +310,7 @@ void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double>
   Borrowed scratch;
   scratch->value.resize(n);
   scratch->bulge.assign(n, 0.0);
-  scratch->limit.assign(n, kInfinity);
+  scratch->limit.assign(n, together_);
   scratch->slope.resize(n);
   if (with_gradients) {
     scratch->bulge_slope.assign(n, Vec3::Zero());
@@ -372,6 +423,7 @@ void ClaimField::add_content(const std::function<std::uint64_t(std::uint32_t)>& 
   words.add(literal_);
   words.add(highest_);
   words.add(rise_);
+  words.add(together_);
   words.add(box_.lower);
   words.add(box_.upper);
 }
