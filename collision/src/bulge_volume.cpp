@@ -10,9 +10,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTolerance = 1e-3;       // of a volume
-constexpr int kFinest = 6;                // halvings of the first cubes
-constexpr std::size_t kMostCubes = 400'000;
-constexpr int kAcross = 2;                // lines through a cube along each of two axes
+constexpr int kFinest = 8;                // halvings of the first spacing of lines
+constexpr std::size_t kMostLines = 1'000'000;
 constexpr std::size_t kBatch = 1024;      // points
 
 /// The cubic through values and slopes at t = 0 and 1.
@@ -23,25 +22,37 @@ struct Cubic {
       : c0(value0), c1(slope0), c2(3.0 * (value1 - value0) - 2.0 * slope0 - slope1), c3(2.0 * (value0 - value1) + slope0 + slope1) {}
   [[nodiscard]] double at(double t) const { return c0 + t * (c1 + t * (c2 + t * c3)); }
   [[nodiscard]] double slope(double t) const { return c1 + t * (2.0 * c2 + 3.0 * t * c3); }
+  /// Of the corners of its control polygon, which hold it for t in [0, 1].
+  [[nodiscard]] Interval range() const {
+    const double b1 = c0 + c1 / 3.0, b2 = c0 + (2.0 * c1 + c2) / 3.0, b3 = c0 + c1 + c2 + c3;
+    return {std::min({c0, b1, b2, b3}), std::max({c0, b1, b2, b3})};
+  }
 };
 
-/// Where a cubic that is below `level` at t = 0 and above it at 1 has it: Newton's method within what bisection leaves.
-double where(const Cubic& u, double level) {
-  double low = 0.0, high = 1.0, t = 0.5;
+/// Where a cubic that is below `level` at `low` and above it at 1 has it: Newton's method within what bisection leaves.
+double where(const Cubic& u, double level, double low) {
+  double high = 1.0, t = low;
   for (int k = 0; k < 60; ++k) {
     const double off = u.at(t) - level;
     (off < 0.0 ? low : high) = t;
     double next = t - off / u.slope(t);
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (!(next >= low && next <= high)) next = 0.5 * (low + high);
     if (std::abs(next - t) < 1e-12) return next;
     t = next;
   }
   return t;
 }
 
+/// How lines lie: `across` of them through a cube along each of two axes.
+struct Spacing {
+  double size = 0.0;  ///< of the cubes [m]
+  int across = 2;
+};
+
 /// Lines through the cubes in which the bulge around one neighbour may hold something, one array per attribute.
 struct Lines {
   std::vector<double> weight;  ///< area for which a line stands times its length [m^3]
+  std::vector<double> begin;   ///< where they leave the own body, or 0
   std::vector<Cubic> depth;    ///< -p of the own body, which rises, then of the others of the quadrature, shape [lines * (1 + others)]
   [[nodiscard]] std::size_t size() const { return weight.size(); }
 };
@@ -63,13 +74,14 @@ class Quadrature {
   [[nodiscard]] double height(std::size_t bulge) const { return profile_[bulge].height; }
 
   /// Lines through cubes of a size, enough for heights up to `height`. @return false where there would be too many
-  [[nodiscard]] bool lay(std::size_t bulge, double size, double height, Lines& out) const {
+  [[nodiscard]] bool lay(std::size_t bulge, const Spacing& spacing, double height, Lines& out) const {
     std::vector<Vec3> cubes;
-    if (!find_cubes(bulge, size, height, cubes)) return false;
+    if (!find_cubes(bulge, spacing, height, cubes)) return false;
     out.weight.clear();
+    out.begin.clear();
     out.depth.clear();
     for (std::size_t first = 0; first < cubes.size(); first += kBatch) {
-      add_lines(std::span(cubes).subspan(first, std::min(kBatch, cubes.size() - first)), size, out);
+      add_lines(bulge, std::span(cubes).subspan(first, std::min(kBatch, cubes.size() - first)), spacing, height, out);
     }
     return true;
   }
@@ -78,7 +90,7 @@ class Quadrature {
   [[nodiscard]] double volume(std::size_t bulge, const Lines& lines, bool& meets) const {
     double sum = 0.0;
     for (std::size_t line = 0; line < lines.size(); ++line) {
-      const double length = length_of(bulge, &lines.depth[line * (1 + others_.size())], meets);
+      const double length = length_of(bulge, lines.begin[line], &lines.depth[line * (1 + others_.size())], meets);
       if (length > 0.0) sum += lines.weight[line] * length;
     }
     return sum;
@@ -86,8 +98,10 @@ class Quadrature {
 
  private:
   /// Centres of the cubes of a lattice about the centre of pressure.
-  [[nodiscard]] bool find_cubes(std::size_t bulge, double size, double height, std::vector<Vec3>& out) const {
+  [[nodiscard]] bool find_cubes(std::size_t bulge, const Spacing& spacing, double height, std::vector<Vec3>& out) const {
     const WantedBulge& w = wanted_[bulge];
+    const double size = spacing.size;
+    const std::size_t most = kMostLines / static_cast<std::size_t>(spacing.across * spacing.across);
     const ContactBody& own = body_.bodies[body_.body];
     const ContactBody& other = body_.bodies[w.other];
     const double width = effective_width(w.width, height, 1.0);
@@ -108,7 +122,7 @@ class Quadrature {
       const Interval inside = own.field.bound(box);
       if (inside.lower >= 0.0 || own.material.modulus * inside.upper <= -highest_in(bulge, height, box)) continue;
       if (cube.half < 0.75 * size) {
-        if (out.size() == kMostCubes) return false;
+        if (out.size() == most) return false;
         out.push_back(cube.centre);
         continue;
       }
@@ -130,45 +144,82 @@ class Quadrature {
     return std::min(sum, body_.most);
   }
 
-  void add_lines(std::span<const Vec3> cubes, double size, Lines& out) const {
-    const ContactBody& own = body_.bodies[body_.body];
-    std::vector<double> value(cubes.size());
-    std::vector<Vec3> slope(cubes.size()), end;
-    own.field.evaluate(cubes, value, slope);
-    std::vector<int> axis;
-    constexpr int kLines = kAcross * kAcross;
-    for (std::size_t n = 0; n < cubes.size(); ++n) {
-      int a = 0;
-      slope[n].cwiseAbs().maxCoeff(&a);
-      axis.push_back(a);
-      for (int k = 0; k < kLines; ++k) {
-        Vec3 at = cubes[n];
-        at[(a + 1) % 3] += ((k % kAcross + 0.5) / kAcross - 0.5) * size;
-        at[(a + 2) % 3] += ((k / kAcross + 0.5) / kAcross - 0.5) * size;
-        for (const double side : {-0.5, 0.5}) end.push_back(at + side * size * Vec3::Unit(a));
-      }
-    }
-    const std::size_t first = out.size(), lines = kLines * cubes.size(), each = 1 + others_.size();
-    out.weight.resize(first + lines, size * size * size / kLines);
-    out.depth.resize((first + lines) * each);
-    value.resize(end.size());
-    slope.resize(end.size());
-    std::vector<std::uint8_t> turned(lines);  // so that -p of the own body rises
+  /// A piece of a line.
+  struct Piece {
+    Vec3 from, to;
+    [[nodiscard]] Vec3 at(double t) const { return from + t * (to - from); }
+  };
+
+  /// -p along pieces of lines, shape [pieces * (1 + others)].
+  [[nodiscard]] std::vector<Cubic> depths(std::span<const Piece> pieces) const {
+    const std::size_t each = 1 + others_.size();
+    std::vector<Vec3> end, slope(2 * pieces.size());
+    std::vector<double> value(2 * pieces.size());
+    for (const Piece& piece : pieces) end.insert(end.end(), {piece.from, piece.to});
+    std::vector<Cubic> depth(pieces.size() * each);
     for (std::size_t which = 0; which < each; ++which) {
-      const ContactBody& body = which == 0 ? own : body_.bodies[others_[which - 1]];
+      const ContactBody& body = body_.bodies[which == 0 ? body_.body : others_[which - 1]];
       const double scale = -body.material.modulus;
       body.field.evaluate(end, value, slope);
-      for (std::size_t line = 0; line < lines; ++line) {
-        const int a = axis[line / kLines];
-        std::size_t from = 2 * line, to = from + 1;
-        if (which == 0) turned[line] = value[from] < value[to] ? 1 : 0;
-        const bool turn = turned[line] != 0;
-        if (turn) std::swap(from, to);
-        const double along = turn ? -size : size;
-        out.depth[(first + line) * each + which] =
-            Cubic(scale * value[from], scale * along * slope[from][a], scale * value[to], scale * along * slope[to][a]);
+      for (std::size_t k = 0; k < pieces.size(); ++k) {
+        const Vec3 along = scale * (pieces[k].to - pieces[k].from);
+        depth[k * each + which] = Cubic(scale * value[2 * k], along.dot(slope[2 * k]), scale * value[2 * k + 1], along.dot(slope[2 * k + 1]));
       }
     }
+    return depth;
+  }
+
+  /// Adds what of the lines through cubes may hold something with bulges up to a height.
+  void add_lines(std::size_t bulge, std::span<const Vec3> cubes, const Spacing& spacing, double height, Lines& out) const {
+    const ContactBody& own = body_.bodies[body_.body];
+    const double size = spacing.size;
+    const int across = spacing.across;
+    std::vector<double> value(cubes.size());
+    std::vector<Vec3> slope(cubes.size());
+    own.field.evaluate(cubes, value, slope);
+    std::vector<Piece> line;
+    for (std::size_t n = 0; n < cubes.size(); ++n) {
+      int axis = 0;
+      slope[n].cwiseAbs().maxCoeff(&axis);
+      const Vec3 half = std::copysign(0.5 * size, -slope[n][axis]) * Vec3::Unit(axis);  // outwards
+      for (int k = 0; k < across * across; ++k) {
+        Vec3 at = cubes[n];
+        at[(axis + 1) % 3] += ((k % across + 0.5) / across - 0.5) * size;
+        at[(axis + 2) % 3] += ((k / across + 0.5) / across - 0.5) * size;
+        line.push_back({at - half, at + half});
+      }
+    }
+    // Only the way from the surface to the highest bulge counts: cubics through its ends.
+    const std::size_t each = 1 + others_.size();
+    const double width = effective_width(wanted_[bulge].width, height, 1.0), most = std::min(others_most(bulge) + height, body_.most);
+    const std::vector<Cubic> whole = depths(line);
+    std::vector<Piece> piece;
+    std::vector<std::uint8_t> begins;  // 1: at the surface
+    for (std::size_t k = 0; k < line.size(); ++k) {
+      const Cubic* of = &whole[k * each];
+      const bool within = of[0].at(0.0) < 0.0;
+      if (of[0].at(0.0) >= most || of[0].at(1.0) <= 0.0) continue;
+      const Interval range = of[1 + bulge].range();
+      if (range.lower >= width || range.upper <= 0.0) continue;
+      const double begin = within ? where(of[0], 0.0, 0.0) : 0.0, end = of[0].at(1.0) > most ? where(of[0], most, begin) : 1.0;
+      if (!(begin < end)) continue;
+      piece.push_back({line[k].at(begin), line[k].at(end)});
+      begins.push_back(within ? 1 : 0);
+    }
+    const std::vector<Cubic> depth = depths(piece);
+    const double area = size * size / (across * across);
+    for (std::size_t k = 0; k < piece.size(); ++k) {
+      const Cubic& u = depth[k * each];
+      out.weight.push_back(area * (piece[k].to - piece[k].from).norm());
+      out.begin.push_back(begins[k] != 0 && u.c1 > 0.0 ? -u.c0 / u.c1 : 0.0);
+    }
+    out.depth.insert(out.depth.end(), depth.begin(), depth.end());
+  }
+
+  [[nodiscard]] double others_most(std::size_t bulge) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < wanted_.size(); ++k) sum += k != bulge ? wanted_[k].highest : 0.0;
+    return sum;
   }
 
   struct Lift {
@@ -195,15 +246,14 @@ class Quadrature {
   }
 
   /// Length of the part of a line in {p < 0 < p^}, times the share of a bulge in the sum there.
-  [[nodiscard]] double length_of(std::size_t bulge, const Cubic* depth, bool& meets) const {
-    constexpr int kParts = 8;
+  [[nodiscard]] double length_of(std::size_t bulge, double begin, const Cubic* depth, bool& meets) const {
+    constexpr int kParts = 5;
     double most = 0.0;
     for (const BulgeProfile& h : profile_) most += h.height;
     most = std::min(most, body_.most);
     const Cubic& own = depth[0];
-    const double first = own.at(0.0), last = own.at(1.0);
-    if (first >= most || last <= 0.0) return 0.0;
-    const double begin = first < 0.0 ? where(own, 0.0) : 0.0, end = last > most ? where(own, most) : 1.0;
+    if (own.at(0.0) >= most) return 0.0;
+    const double end = own.at(1.0) > most ? where(own, most, begin) : 1.0;
     if (!(begin < end)) return 0.0;
     const double step = (end - begin) / kParts;
     double length = 0.0;
@@ -251,7 +301,7 @@ class Quadrature {
 
 /// One bulge on its way to its height.
 struct Search {
-  double size = 0.0;       ///< of the cubes [m]
+  Spacing spacing;
   double laid = 0.0;       ///< the highest a0 that the lines hold [Pa]
   double volume = 0.0;     ///< at the present height
   bool meets = false;      ///< another bulge takes part
@@ -269,7 +319,7 @@ void solve(Quadrature& quadrature, std::size_t k, const WantedBulge& wanted, dou
   for (int n = 0; n < kMost; ++n) {
     if (height > search.laid) {
       search.laid = std::min(wanted.highest, 2.0 * height);
-      while (!quadrature.lay(k, search.size, search.laid, search.lines)) search.size *= 2.0;
+      while (!quadrature.lay(k, search.spacing, search.laid, search.lines)) search.spacing.size *= 2.0;
     }
     quadrature.set_height(k, height);
     search.volume = quadrature.volume(k, search.lines, search.meets);
@@ -288,16 +338,18 @@ void solve(Quadrature& quadrature, std::size_t k, const WantedBulge& wanted, dou
   search.solved = true;
 }
 
-/// Halves the cubes of a search, which is settled where that changes little, or there would be too many.
+/// Halves the spacing of a search's lines, by turns in the cubes and with these, which is settled where that changes little, or there would be too many.
 void refine(const Quadrature& quadrature, std::size_t k, double wanted, Search& search) {
   Lines finer;
-  if (!quadrature.lay(k, 0.5 * search.size, search.laid, finer)) {
+  Spacing spacing = search.spacing;
+  spacing.across *= 2;
+  if (!quadrature.lay(k, spacing, search.laid, finer)) {
     search.settled = true;
     return;
   }
   const double volume = quadrature.volume(k, finer, search.meets);
   search.settled = std::abs(volume - search.volume) <= kTolerance * wanted;
-  search.size *= 0.5;
+  search.spacing = spacing;
   search.volume = volume;
   search.lines = std::move(finer);
   search.solved = false;
@@ -311,7 +363,7 @@ std::vector<FoundBulge> find_bulges(const BulgingBody& body, std::span<const Wan
   Quadrature quadrature(body, wanted);
   std::vector<Search> search(wanted.size());
   for (std::size_t k = 0; k < wanted.size(); ++k) {
-    search[k].size = 0.5 * wanted[k].zone;
+    search[k].spacing.size = 0.5 * wanted[k].zone;
     quadrature.set_height(k, std::min(wanted[k].guess, wanted[k].highest));
   }
   for (int level = 0;; ++level) {
