@@ -69,7 +69,8 @@ class Quadrature {
   }
 
   void set_height(std::size_t bulge, double height) {
-    profile_[bulge] = {.stiffness = 1.0, .height = height, .width = effective_width(wanted_[bulge].width, height, 1.0)};
+    const double stiffness = wanted_[bulge].stiffness;
+    profile_[bulge] = {.stiffness = stiffness, .height = height, .width = effective_width(wanted_[bulge].width, height, stiffness)};
   }
   [[nodiscard]] double height(std::size_t bulge) const { return profile_[bulge].height; }
 
@@ -104,7 +105,7 @@ class Quadrature {
     const std::size_t most = kMostLines / static_cast<std::size_t>(spacing.across * spacing.across);
     const ContactBody& own = body_.bodies[body_.body];
     const ContactBody& other = body_.bodies[w.other];
-    const double width = effective_width(w.width, height, 1.0);
+    const double width = effective_width(w.width, height, w.stiffness);
     const double reach = std::max((body_.box.upper - w.centre).maxCoeff(), (w.centre - body_.box.lower).maxCoeff());
     double half = 0.5 * size;
     while (half < reach) half *= 2.0;
@@ -191,7 +192,7 @@ class Quadrature {
     }
     // Only the way from the surface to the highest bulge counts: cubics through its ends.
     const std::size_t each = 1 + others_.size();
-    const double width = effective_width(wanted_[bulge].width, height, 1.0), most = std::min(others_most(bulge) + height, body_.most);
+    const double width = effective_width(wanted_[bulge].width, height, wanted_[bulge].stiffness), most = std::min(others_most(bulge) + height, body_.most);
     const std::vector<Cubic> whole = depths(line);
     std::vector<Piece> piece;
     std::vector<std::uint8_t> begins;  // 1: at the surface
@@ -247,7 +248,6 @@ class Quadrature {
 
   /// Length of the part of a line in {p < 0 < p^}, times the share of a bulge in the sum there.
   [[nodiscard]] double length_of(std::size_t bulge, double begin, const Cubic* depth, bool& meets) const {
-    constexpr int kParts = 5;
     double most = 0.0;
     for (const BulgeProfile& h : profile_) most += h.height;
     most = std::min(most, body_.most);
@@ -255,7 +255,11 @@ class Quadrature {
     if (own.at(0.0) >= most) return 0.0;
     const double end = own.at(1.0) > most ? where(own, most, begin) : 1.0;
     if (!(begin < end)) return 0.0;
-    const double step = (end - begin) / kParts;
+    // Samples so close together that none leaps over the bulge of a steep neighbour.
+    constexpr int kLeast = 5, kMost = 40;
+    const double passed = std::abs(depth[1 + bulge].at(end) - depth[1 + bulge].at(begin)) / profile_[bulge].width;
+    const int parts = static_cast<int>(std::clamp(8.0 * passed, double{kLeast}, double{kMost}));
+    const double step = (end - begin) / parts;
     double length = 0.0;
     const auto excess = [&](double t, Lift& up) {
       up = lift(bulge, depth, t, meets);
@@ -264,7 +268,7 @@ class Quadrature {
     const auto share = [](const Lift& up) { return up.all > 0.0 ? up.own / up.all : 0.0; };
     Lift before, after;
     double t = begin, left = excess(t, before);
-    for (int k = 1; k <= kParts; ++k) {
+    for (int k = 1; k <= parts; ++k) {
       const double u = begin + k * step, right = excess(u, after);
       if (left > 0.0 || right > 0.0) {
         double from = t, to = u;

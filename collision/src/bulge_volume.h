@@ -10,10 +10,11 @@
 
 namespace supple::collision {
 
-/// A bulge to be found, of k = 1 and width min(w, 6 a0).
+/// A bulge to be found, of width min(w, 6 a0 / k).
 struct WantedBulge {
   std::uint32_t other = 0;  ///< the body that it lies around
   double volume = 0.0;      ///< that it should hold [m^3], > 0
+  double stiffness = 1.0;   ///< k, in (0, 1]
   double highest = 0.0;     ///< a0 at most [Pa], > 0
   double width = 0.0;       ///< w at most [Pa]
   double guess = 0.0;       ///< of a0 [Pa], > 0

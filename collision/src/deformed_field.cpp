@@ -12,6 +12,9 @@ namespace supple::collision {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Bulges that keep volumes join the compression with one slope unless the other body is steeper than this many times: with k = 1 they would
+/// be narrower than they are high, and nothing around what is rigid.
+constexpr double kSteepestOther = 4.0;
 
 /// How far the pressure of a body falls below zero [Pa]: P c where the kernels are compact, infinite else.
 double depth_outside(const ContactBody& body) {
@@ -134,6 +137,36 @@ double width_within(const ContactBody& body, const Vec3& place, double width) {
   return low;
 }
 
+/// Means of |grad p| of the bodies of a contact and of |grad(p_A - p_B)| [Pa/m].
+struct SigmaSlopes {
+  double own = 0.0, other = 0.0, across = 0.0;
+};
+
+/// At some of the points of Sigma.
+SigmaSlopes slopes_on(const ContactSurface& surface, std::size_t contact, const ContactBody& own, const ContactBody& other) {
+  constexpr std::size_t kMost = 64;
+  const auto pair = static_cast<std::uint32_t>(contact);
+  const auto first = std::lower_bound(surface.pair.begin(), surface.pair.end(), pair), last = std::upper_bound(first, surface.pair.end(), pair);
+  const auto begin = static_cast<std::size_t>(first - surface.pair.begin()), count = static_cast<std::size_t>(last - first);
+  std::vector<Vec3> at, own_slope, other_slope;
+  for (std::size_t k = 0; k < count; k += 1 + count / kMost) at.push_back(surface.point[begin + k]);
+  if (at.empty()) at.push_back(surface.summary[contact].centre_of_pressure);
+  own_slope.resize(at.size());
+  other_slope.resize(at.size());
+  std::vector<double> value(at.size());
+  own.field.evaluate(at, value, own_slope);
+  other.field.evaluate(at, value, other_slope);
+  SigmaSlopes mean;
+  const double share = 1.0 / static_cast<double>(at.size());
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const Vec3 a = own.material.modulus * own_slope[k], b = other.material.modulus * other_slope[k];
+    mean.own += share * a.norm();
+    mean.other += share * b.norm();
+    mean.across += share * (a - b).norm();
+  }
+  return mean;
+}
+
 /// Adds the literal bulge around a body to `bulge`, at most `highest`, and to `bulge_slope` where that is wanted.
 void add_literal(const ContactBody& body, BulgeProfile h, double highest, std::span<const Vec3> points, bool with_gradients,
                  Buffers& out) {
@@ -183,7 +216,8 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
     const auto touching = static_cast<double>(std::count_if(surface.summary.begin(), surface.summary.end(), is_own));
     highest_ = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
     std::vector<WantedBulge> wanted;
-    for (const ContactSurface::Summary& s : surface.summary) {
+    for (std::size_t contact = 0; contact < surface.summary.size(); ++contact) {
+      const ContactSurface::Summary& s = surface.summary[contact];
       if (!is_own(s)) continue;
       const std::uint32_t other = s.bodies.a == body ? s.bodies.b : s.bodies.a;
       const ContactBody& b = bodies[other];
@@ -194,6 +228,11 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
         rise_ += literal_rise(neighbours_.back(), b.field.surface_box());
         continue;
       }
+      if (settings.keep_volume) {
+        const double width = settings.width * b.field.feature_size();
+        want_volume(surface, contact, other, std::isnan(width) ? kInfinity : width, wanted);
+        continue;
+      }
       Vec3 slope;
       static_cast<void>(b.field.value(s.centre_of_pressure, slope));
       const double steepness = b.material.modulus * slope.norm();
@@ -201,10 +240,6 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       if (std::isnan(width)) width = kInfinity;
       // Where the kernels of the other body end, the bulge must have ended too.
       width = std::min(width, 0.9 * depth_outside(b));
-      if (settings.keep_volume) {
-        want_volume(s, other, width, wanted);
-        continue;
-      }
       double height = std::min(settings.attenuation * s.largest_pressure, highest_);
       width = effective_width(width, height, 1.0);
       // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
@@ -233,28 +268,26 @@ void ClaimField::find_limiting() {
   }
 }
 
-void ClaimField::want_volume(const ContactSurface::Summary& s, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const {
+void ClaimField::want_volume(const ContactSurface& surface, std::size_t contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const {
+  const ContactSurface::Summary& s = surface.summary[contact];
   const double displaced = s.bodies.a == body_ ? s.displaced_a : s.displaced_b;
-  if (!(displaced > 0.0)) return;
-  const ContactBody& b = bodies_[other];
-  const ContactBody& a = bodies_[body_];
-  Vec3 slope, own_slope;
-  static_cast<void>(b.field.value(s.centre_of_pressure, slope));
-  static_cast<void>(a.field.value(s.centre_of_pressure, own_slope));
-  const double steepness = a.material.modulus * own_slope.norm();
-  const double across = (b.material.modulus * slope - a.material.modulus * own_slope).norm();
+  const SigmaSlopes slopes = slopes_on(surface, contact, bodies_[body_], bodies_[other]);
+  if (!(displaced > 0.0) || !(slopes.own > 0.0) || !(slopes.other > 0.0)) return;
+  const double stiffness = std::min(1.0, kSteepestOther * slopes.own / slopes.other);
+  width = std::min(width * slopes.other, 0.9 * depth_outside(bodies_[other]));
   // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3; together they stay below half of what would fill the space around.
-  double highest = std::min(0.5 * depth_outside(a), width / 3.0);
-  const double size = a.field.feature_size();
-  if (!std::isfinite(highest)) highest = steepness * size;
-  double guess = volume_keeping_height(displaced, s.area, s.load, across, width);
+  const double size = bodies_[body_].field.feature_size();
+  const double filling = 0.5 * depth_outside(bodies_[body_]);
+  const double highest = std::min(std::isfinite(filling) ? filling : slopes.own * size, width / 3.0);
+  double guess = volume_keeping_height(displaced, s.area, s.load, slopes.across, width);
   if (!(guess > 0.0)) guess = s.largest_pressure;
   guess = std::min(guess, highest);
   // Along the surface of the body -p of the other rises by as much more than along Sigma as |grad(p_A - p_B)| / |grad p_A|.
-  const double slope_at_rim = 4.0 * s.load / s.area * std::sqrt(std::numbers::pi / s.area) * across / steepness;
-  double zone = effective_width(width, guess, 1.0) / slope_at_rim;
-  if (!(zone < size)) zone = size;
-  wanted.push_back({.other = other, .volume = displaced, .highest = highest, .width = width, .guess = guess, .zone = zone, .centre = s.centre_of_pressure});
+  const double radius = std::sqrt(s.area / std::numbers::pi);
+  const double slope_at_rim = 4.0 * s.load / (s.area * radius) * slopes.across / slopes.own;
+  const double zone = std::clamp(effective_width(width, guess, stiffness) / slope_at_rim, radius / 32.0, std::max(size, radius / 32.0));
+  wanted.push_back({.other = other, .volume = displaced, .stiffness = stiffness, .highest = highest, .width = width, .guess = guess, .zone = zone,
+                    .centre = s.centre_of_pressure});
 }
 
 void ClaimField::keep_volumes(std::span<const WantedBulge> wanted) {
@@ -272,7 +305,8 @@ void ClaimField::keep_volumes(std::span<const WantedBulge> wanted) {
   rise_ = 0.0;
   for (std::size_t k = 0; k < found.size(); ++k) {
     const double height = found[k].height;
-    neighbours_.push_back({wanted[k].other, {.stiffness = 1.0, .height = height, .width = effective_width(wanted[k].width, height, 1.0)}});
+    const double stiffness = wanted[k].stiffness;
+    neighbours_.push_back({wanted[k].other, {.stiffness = stiffness, .height = height, .width = effective_width(wanted[k].width, height, stiffness)}});
     volumes_.push_back({wanted[k].other, wanted[k].volume, found[k].held});
     rise_ += height;
   }

@@ -48,6 +48,7 @@ struct BulgeVolume {
   std::uint32_t other = 0;  ///< the body that it lies around
   double displaced = 0.0;   ///< [m^3]
   double held = 0.0;        ///< [m^3]
+  [[nodiscard]] bool falls_short() const { return held < (1.0 - 2e-3) * displaced; }
 };
 
 /// Height a0 [Pa] of a bulge of k = 1 that holds the volume `displaced` [m^3], to first order. The rim of Sigma holds
@@ -85,8 +86,8 @@ class ClaimField {
     std::uint32_t body;
     BulgeProfile profile;  ///< in pressure units, k = 1; literal: w [m], k of each point its own
   };
-  /// Adds the bulge around a neighbour that should hold what their contact displaces. @param width  at most [Pa]
-  void want_volume(const ContactSurface::Summary& contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const;
+  /// Adds the bulge around a neighbour that should hold what their contact displaces. @param contact  in `summary`  @param width  at most [m]
+  void want_volume(const ContactSurface& surface, std::size_t contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const;
   void keep_volumes(std::span<const WantedBulge> wanted);
   void find_limiting();
   /// Values, and gradients where `gradients` is not empty.
