@@ -22,6 +22,11 @@ struct Cubic {
       : c0(value0), c1(slope0), c2(3.0 * (value1 - value0) - 2.0 * slope0 - slope1), c3(2.0 * (value0 - value1) + slope0 + slope1) {}
   [[nodiscard]] double at(double t) const { return c0 + t * (c1 + t * (c2 + t * c3)); }
   [[nodiscard]] double slope(double t) const { return c1 + t * (2.0 * c2 + 3.0 * t * c3); }
+  [[nodiscard]] Cubic times(double factor) const {
+    Cubic out = *this;
+    for (double* c : {&out.c0, &out.c1, &out.c2, &out.c3}) *c *= factor;
+    return out;
+  }
   /// Of the corners of its control polygon, which hold it for t in [0, 1].
   [[nodiscard]] Interval range() const {
     const double b1 = c0 + c1 / 3.0, b2 = c0 + (2.0 * c1 + c2) / 3.0, b3 = c0 + c1 + c2 + c3;
@@ -29,9 +34,9 @@ struct Cubic {
   }
 };
 
-/// Where a cubic that is below `level` at `low` and above it at 1 has it: Newton's method within what bisection leaves.
-double where(const Cubic& u, double level, double low) {
-  double high = 1.0, t = low;
+/// Where a cubic that is below `level` at `low` and above it at `high` has it: Newton's method within what bisection leaves.
+double where(const Cubic& u, double level, double low, double high) {
+  double t = low;
   for (int k = 0; k < 60; ++k) {
     const double off = u.at(t) - level;
     (off < 0.0 ? low : high) = t;
@@ -202,7 +207,7 @@ class Quadrature {
       if (of[0].at(0.0) >= most || of[0].at(1.0) <= 0.0) continue;
       const Interval range = of[1 + bulge].range();
       if (range.lower >= width || range.upper <= 0.0) continue;
-      const double begin = within ? where(of[0], 0.0, 0.0) : 0.0, end = of[0].at(1.0) > most ? where(of[0], most, begin) : 1.0;
+      const double begin = within ? where(of[0], 0.0, 0.0, 1.0) : 0.0, end = of[0].at(1.0) > most ? where(of[0], most, begin, 1.0) : 1.0;
       if (!(begin < end)) continue;
       piece.push_back({line[k].at(begin), line[k].at(end)});
       begins.push_back(within ? 1 : 0);
@@ -253,13 +258,17 @@ class Quadrature {
     most = std::min(most, body_.most);
     const Cubic& own = depth[0];
     if (own.at(0.0) >= most) return 0.0;
-    const double end = own.at(1.0) > most ? where(own, most, begin) : 1.0;
+    const double end = own.at(1.0) > most ? where(own, most, begin, 1.0) : 1.0;
     if (!(begin < end)) return 0.0;
-    // Samples so close together that none leaps over the bulge of a steep neighbour.
-    constexpr int kLeast = 5, kMost = 40;
-    const double passed = std::abs(depth[1 + bulge].at(end) - depth[1 + bulge].at(begin)) / profile_[bulge].width;
-    const int parts = static_cast<int>(std::clamp(8.0 * passed, double{kLeast}, double{kMost}));
-    const double step = (end - begin) / parts;
+    // The way may lead into the bulge from beyond it.
+    const Cubic& away = depth[1 + bulge];
+    const double width = profile_[bulge].width;
+    if (away.at(begin) >= width) {
+      if (away.at(end) >= width) return 0.0;
+      begin = where(away.times(-1.0), -width, begin, end);
+    }
+    constexpr int kParts = 6;
+    const double step = (end - begin) / kParts;
     double length = 0.0;
     const auto excess = [&](double t, Lift& up) {
       up = lift(bulge, depth, t, meets);
@@ -268,7 +277,7 @@ class Quadrature {
     const auto share = [](const Lift& up) { return up.all > 0.0 ? up.own / up.all : 0.0; };
     Lift before, after;
     double t = begin, left = excess(t, before);
-    for (int k = 1; k <= parts; ++k) {
+    for (int k = 1; k <= kParts; ++k) {
       const double u = begin + k * step, right = excess(u, after);
       if (left > 0.0 || right > 0.0) {
         double from = t, to = u;
@@ -343,16 +352,18 @@ void solve(Quadrature& quadrature, std::size_t k, const WantedBulge& wanted, dou
 }
 
 /// Halves the spacing of a search's lines, by turns in the cubes and with these, which is settled where that changes little, or there would be too many.
-void refine(const Quadrature& quadrature, std::size_t k, double wanted, Search& search) {
+void refine(const Quadrature& quadrature, std::size_t k, const WantedBulge& wanted, Search& search) {
   Lines finer;
   Spacing spacing = search.spacing;
   spacing.across *= 2;
-  if (!quadrature.lay(k, spacing, search.laid, finer)) {
+  const double laid = std::min(wanted.highest, 1.1 * quadrature.height(k));  // the shorter the pieces, the better their cubics
+  if (!quadrature.lay(k, spacing, laid, finer)) {
     search.settled = true;
     return;
   }
+  search.laid = laid;
   const double volume = quadrature.volume(k, finer, search.meets);
-  search.settled = std::abs(volume - search.volume) <= kTolerance * wanted;
+  search.settled = std::abs(volume - search.volume) <= kTolerance * wanted.volume;
   search.spacing = spacing;
   search.volume = volume;
   search.lines = std::move(finer);
@@ -383,7 +394,7 @@ std::vector<FoundBulge> find_bulges(const BulgingBody& body, std::span<const Wan
     }
     if (level == kFinest || std::all_of(search.begin(), search.end(), [](const Search& s) { return s.settled; })) break;
     for (std::size_t k = 0; k < wanted.size(); ++k) {
-      if (!search[k].settled) refine(quadrature, k, wanted[k].volume, search[k]);
+      if (!search[k].settled) refine(quadrature, k, wanted[k], search[k]);
     }
   }
   std::vector<FoundBulge> found;

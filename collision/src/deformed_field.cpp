@@ -12,9 +12,6 @@ namespace supple::collision {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Bulges that keep volumes join the compression with one slope unless the other body is steeper than this many times: with k = 1 they would
-/// be narrower than they are high, and nothing around what is rigid.
-constexpr double kSteepestOther = 4.0;
 
 /// How far the pressure of a body falls below zero [Pa]: P c where the kernels are compact, infinite else.
 double depth_outside(const ContactBody& body) {
@@ -273,13 +270,16 @@ void ClaimField::want_volume(const ContactSurface& surface, std::size_t contact,
   const double displaced = s.bodies.a == body_ ? s.displaced_a : s.displaced_b;
   const SigmaSlopes slopes = slopes_on(surface, contact, bodies_[body_], bodies_[other]);
   if (!(displaced > 0.0) || !(slopes.own > 0.0) || !(slopes.other > 0.0)) return;
-  const double stiffness = std::min(1.0, kSteepestOther * slopes.own / slopes.other);
+  // On the way from the body to a steep other one h rises as fast as p falls, and a tongue comes off the surface, where 3 a0 / w, of the outer half of h,
+  // times the ratio of slopes is 1. With k = 1 / ratio that is half as much for w = 6 a0 / k.
+  const double ratio = std::max(1.0, slopes.other / slopes.own), stiffness = 1.0 / ratio;
   width = std::min(width * slopes.other, 0.9 * depth_outside(bodies_[other]));
-  // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3; together they stay below half of what would fill the space around.
+  // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3; no tongue, too, iff 3 a0 / w <= 1 / ratio. Together they stay below half of what
+  // would fill the space around.
   const double size = bodies_[body_].field.feature_size();
   const double filling = 0.5 * depth_outside(bodies_[body_]);
-  const double highest = std::min(std::isfinite(filling) ? filling : slopes.own * size, width / 3.0);
-  double guess = volume_keeping_height(displaced, s.area, s.load, slopes.across, width);
+  const double highest = std::min(std::isfinite(filling) ? filling : slopes.own * size, width / (3.0 * ratio));
+  double guess = std::sqrt(stiffness) * volume_keeping_height(displaced, s.area, s.load, slopes.across, width);  // w = 6 a0 / k is longer by 1 / k
   if (!(guess > 0.0)) guess = s.largest_pressure;
   guess = std::min(guess, highest);
   // Along the surface of the body -p of the other rises by as much more than along Sigma as |grad(p_A - p_B)| / |grad p_A|.

@@ -43,7 +43,8 @@ struct BulgeSettings {
 };
 
 /// What a bulge of `BulgeSettings::keep_volume` should hold, and holds. They agree to 1e-3 unless the bulge is as high as it may be: a third
-/// of its width, or half of what would fill the empty space around the body.
+/// of its width, less beside what is steeper, or half of what would fill the empty space around the body. Its slope k at the rim is 1, so that it joins the compression
+/// with one slope, unless the other body is steeper: k is |grad p_i| / |grad p_j| then, which leaves a crease at the rim.
 struct BulgeVolume {
   std::uint32_t other = 0;  ///< the body that it lies around
   double displaced = 0.0;   ///< [m^3]
