@@ -240,6 +240,7 @@ TEST(ObjectMeshing, BulgesHoldTheVolumeOfEachBodyOrAWarningTells) {
                                           "contact: {error: 1e-6" + contact + "}\noutput: {mesh: ply, cell: 6 mm}\n",
                                       "test.yaml", "."));
     const std::vector<Mesh> meshes = simulation.meshes();
+    EXPECT_EQ(query_mesh(simulation, {}).find("\"held\"") == std::string::npos, simulation.warnings().empty());
     return std::tuple{inspect(meshes[0]).volume, simulation.warnings(), simulation.searches().short_bulges};
   };
   const auto [whole, none, nothing] = meshed("", "[0, 0, 1]");
