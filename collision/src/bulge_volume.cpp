@@ -22,11 +22,6 @@ struct Cubic {
       : c0(value0), c1(slope0), c2(3.0 * (value1 - value0) - 2.0 * slope0 - slope1), c3(2.0 * (value0 - value1) + slope0 + slope1) {}
   [[nodiscard]] double at(double t) const { return c0 + t * (c1 + t * (c2 + t * c3)); }
   [[nodiscard]] double slope(double t) const { return c1 + t * (2.0 * c2 + 3.0 * t * c3); }
-  [[nodiscard]] Cubic times(double factor) const {
-    Cubic out = *this;
-    for (double* c : {&out.c0, &out.c1, &out.c2, &out.c3}) *c *= factor;
-    return out;
-  }
   /// Of the corners of its control polygon, which hold it for t in [0, 1].
   [[nodiscard]] Interval range() const {
     const double b1 = c0 + c1 / 3.0, b2 = c0 + (2.0 * c1 + c2) / 3.0, b3 = c0 + c1 + c2 + c3;
@@ -34,9 +29,9 @@ struct Cubic {
   }
 };
 
-/// Where a cubic that is below `level` at `low` and above it at `high` has it: Newton's method within what bisection leaves.
-double where(const Cubic& u, double level, double low, double high) {
-  double t = low;
+/// Where a cubic that is below `level` at `low` and above it at 1 has it: Newton's method within what bisection leaves.
+double where(const Cubic& u, double level, double low) {
+  double high = 1.0, t = low;
   for (int k = 0; k < 60; ++k) {
     const double off = u.at(t) - level;
     (off < 0.0 ? low : high) = t;
@@ -207,7 +202,7 @@ class Quadrature {
       if (of[0].at(0.0) >= most || of[0].at(1.0) <= 0.0) continue;
       const Interval range = of[1 + bulge].range();
       if (range.lower >= width || range.upper <= 0.0) continue;
-      const double begin = within ? where(of[0], 0.0, 0.0, 1.0) : 0.0, end = of[0].at(1.0) > most ? where(of[0], most, begin, 1.0) : 1.0;
+      const double begin = within ? where(of[0], 0.0, 0.0) : 0.0, end = of[0].at(1.0) > most ? where(of[0], most, begin) : 1.0;
       if (!(begin < end)) continue;
       piece.push_back({line[k].at(begin), line[k].at(end)});
       begins.push_back(within ? 1 : 0);
@@ -258,15 +253,10 @@ class Quadrature {
     most = std::min(most, body_.most);
     const Cubic& own = depth[0];
     if (own.at(0.0) >= most) return 0.0;
-    const double end = own.at(1.0) > most ? where(own, most, begin, 1.0) : 1.0;
+    const double end = own.at(1.0) > most ? where(own, most, begin) : 1.0;
     if (!(begin < end)) return 0.0;
-    // The way may lead into the bulge from beyond it.
     const Cubic& away = depth[1 + bulge];
-    const double width = profile_[bulge].width;
-    if (away.at(begin) >= width) {
-      if (away.at(end) >= width) return 0.0;
-      begin = where(away.times(-1.0), -width, begin, end);
-    }
+    if (std::min(away.at(begin), away.at(end)) >= profile_[bulge].width) return 0.0;
     constexpr int kParts = 6;
     const double step = (end - begin) / kParts;
     double length = 0.0;
