@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "bulge_volume.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
@@ -132,6 +134,36 @@ double width_within(const ContactBody& body, const Vec3& place, double width) {
   return low;
 }
 
+/// Means of |grad p| of the bodies of a contact and of |grad(p_A - p_B)| [Pa/m].
+struct SigmaSlopes {
+  double own = 0.0, other = 0.0, across = 0.0;
+};
+
+/// At some of the points of Sigma.
+SigmaSlopes slopes_on(const ContactSurface& surface, std::size_t contact, const ContactBody& own, const ContactBody& other) {
+  constexpr std::size_t kMost = 64;
+  const auto pair = static_cast<std::uint32_t>(contact);
+  const auto first = std::lower_bound(surface.pair.begin(), surface.pair.end(), pair), last = std::upper_bound(first, surface.pair.end(), pair);
+  const auto begin = static_cast<std::size_t>(first - surface.pair.begin()), count = static_cast<std::size_t>(last - first);
+  std::vector<Vec3> at, own_slope, other_slope;
+  for (std::size_t k = 0; k < count; k += 1 + count / kMost) at.push_back(surface.point[begin + k]);
+  if (at.empty()) at.push_back(surface.summary[contact].centre_of_pressure);
+  own_slope.resize(at.size());
+  other_slope.resize(at.size());
+  std::vector<double> value(at.size());
+  own.field.evaluate(at, value, own_slope);
+  other.field.evaluate(at, value, other_slope);
+  SigmaSlopes mean;
+  const double share = 1.0 / static_cast<double>(at.size());
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const Vec3 a = own.material.modulus * own_slope[k], b = other.material.modulus * other_slope[k];
+    mean.own += share * a.norm();
+    mean.other += share * b.norm();
+    mean.across += share * (a - b).norm();
+  }
+  return mean;
+}
+
 /// Adds the literal bulge around a body to `bulge`, at most `highest`, and to `bulge_slope` where that is wanted.
 void add_literal(const ContactBody& body, BulgeProfile h, double highest, std::span<const Vec3> points, bool with_gradients,
                  Buffers& out) {
@@ -180,7 +212,9 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
     // All bulges together stay below half of what would lift the empty space around the body onto its surface.
     const auto touching = static_cast<double>(std::count_if(surface.summary.begin(), surface.summary.end(), is_own));
     highest_ = touching > 0.0 ? 0.5 * depth_outside(bodies[body]) / touching : 0.0;
-    for (const ContactSurface::Summary& s : surface.summary) {
+    std::vector<WantedBulge> wanted;
+    for (std::size_t contact = 0; contact < surface.summary.size(); ++contact) {
+      const ContactSurface::Summary& s = surface.summary[contact];
       if (!is_own(s)) continue;
       const std::uint32_t other = s.bodies.a == body ? s.bodies.b : s.bodies.a;
       const ContactBody& b = bodies[other];
@@ -191,6 +225,11 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
         rise_ += literal_rise(neighbours_.back(), b.field.surface_box());
         continue;
       }
+      if (settings.keep_volume) {
+        const double width = settings.width * b.field.feature_size();
+        want_volume(surface, contact, other, std::isnan(width) ? kInfinity : width, wanted);
+        continue;
+      }
       Vec3 slope;
       static_cast<void>(b.field.value(s.centre_of_pressure, slope));
       const double steepness = b.material.modulus * slope.norm();
@@ -198,15 +237,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       if (std::isnan(width)) width = kInfinity;
       // Where the kernels of the other body end, the bulge must have ended too.
       width = std::min(width, 0.9 * depth_outside(b));
-      double height = settings.attenuation * s.largest_pressure;
-      if (settings.keep_volume) {
-        Vec3 own;
-        static_cast<void>(bodies[body].field.value(s.centre_of_pressure, own));
-        const double across = (b.material.modulus * slope - bodies[body].material.modulus * own).norm();
-        const double displaced = s.bodies.a == body ? s.displaced_a : s.displaced_b;
-        height = volume_keeping_height(displaced, s.area, s.load, across, width);
-      }
-      height = std::min(height, highest_);
+      double height = std::min(settings.attenuation * s.largest_pressure, highest_);
       width = effective_width(width, height, 1.0);
       // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
       height = std::min(height, width / 3.0);
@@ -214,6 +245,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       neighbours_.push_back({other, {.stiffness = 1.0, .height = height, .width = width}});
       rise_ += height;
     }
+    keep_volumes(wanted);
   }
   bool certain;
   box_ = bounding_box(bodies[body], rise_, certain);
@@ -222,10 +254,63 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
     for (const Neighbour& n : neighbours_) box_ = box_.united(bodies[n.body].field.surface_box().inflated(n.profile.width));
   }
   if (neighbours_.empty() || literal_) return;
-  for (std::uint32_t j = 0; j < bodies.size(); ++j) {
-    if (j == body || bodies[j].material.modulus * bodies[j].field.bound(box_).upper < -rise_) continue;
+  find_limiting();
+}
+
+void ClaimField::find_limiting() {
+  limiting_.clear();
+  for (std::uint32_t j = 0; j < bodies_.size(); ++j) {
+    if (j == body_ || bodies_[j].material.modulus * bodies_[j].field.bound(box_).upper < -rise_) continue;
     limiting_.push_back(j);
   }
+}
+
+void ClaimField::want_volume(const ContactSurface& surface, std::size_t contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const {
+  const ContactSurface::Summary& s = surface.summary[contact];
+  const double displaced = s.bodies.a == body_ ? s.displaced_a : s.displaced_b;
+  const SigmaSlopes slopes = slopes_on(surface, contact, bodies_[body_], bodies_[other]);
+  if (!(displaced > 0.0) || !(slopes.own > 0.0) || !(slopes.other > 0.0)) return;
+  // On the way from the body to a steep other one h rises as fast as p falls, and a tongue comes off the surface, where 3 a0 / w, of the outer half of h,
+  // times the ratio of slopes is 1. With k = 1 / ratio that is half as much for w = 6 a0 / k.
+  const double ratio = std::max(1.0, slopes.other / slopes.own), stiffness = 1.0 / ratio;
+  width = std::min(width * slopes.other, 0.9 * depth_outside(bodies_[other]));
+  // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3; no tongue, too, iff 3 a0 / w <= 1 / ratio. Together they stay below half of what
+  // would fill the space around.
+  const double size = bodies_[body_].field.feature_size();
+  const double filling = 0.5 * depth_outside(bodies_[body_]);
+  const double highest = std::min(std::isfinite(filling) ? filling : slopes.own * size, width / (3.0 * ratio));
+  double guess = std::sqrt(stiffness) * volume_keeping_height(displaced, s.area, s.load, slopes.across, width);  // w = 6 a0 / k is longer by 1 / k
+  if (!(guess > 0.0)) guess = s.largest_pressure;
+  guess = std::min(guess, highest);
+  // Along the surface of the body -p of the other rises by as much more than along Sigma as |grad(p_A - p_B)| / |grad p_A|.
+  const double radius = std::sqrt(s.area / std::numbers::pi);
+  const double slope_at_rim = 4.0 * s.load / (s.area * radius) * slopes.across / slopes.own;
+  const double zone = std::clamp(effective_width(width, guess, stiffness) / slope_at_rim, radius / 32.0, std::max(size, radius / 32.0));
+  wanted.push_back({.other = other, .volume = displaced, .stiffness = stiffness, .highest = highest, .width = width, .guess = guess, .zone = zone,
+                    .centre = s.centre_of_pressure});
+}
+
+void ClaimField::keep_volumes(std::span<const WantedBulge> wanted) {
+  if (wanted.empty()) return;
+  for (const WantedBulge& w : wanted) rise_ += w.highest;
+  together_ = 0.5 * depth_outside(bodies_[body_]);
+  rise_ = std::min(rise_, together_);
+  bool certain;
+  box_ = bounding_box(bodies_[body_], rise_, certain);
+  if (!box_.lower.allFinite() || !box_.upper.allFinite()) {
+    for (const WantedBulge& w : wanted) box_ = box_.intersection(bounding_box(bodies_[w.other], w.width, certain));
+  }
+  find_limiting();
+  const std::vector<FoundBulge> found = find_bulges({.bodies = bodies_, .body = body_, .limiting = limiting_, .most = rise_, .box = box_}, wanted);
+  rise_ = 0.0;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const double height = found[k].height;
+    const double stiffness = wanted[k].stiffness;
+    neighbours_.push_back({wanted[k].other, {.stiffness = stiffness, .height = height, .width = effective_width(wanted[k].width, height, stiffness)}});
+    volumes_.push_back({wanted[k].other, wanted[k].volume, found[k].held});
+    rise_ += height;
+  }
+  rise_ = std::min(rise_, together_);
 }
 
 double ClaimField::literal_rise(const Neighbour& neighbour, const Box& box) const {
@@ -259,7 +344,7 @@ void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double>
   Borrowed scratch;
   scratch->value.resize(n);
   scratch->bulge.assign(n, 0.0);
-  scratch->limit.assign(n, kInfinity);
+  scratch->limit.assign(n, together_);
   scratch->slope.resize(n);
   if (with_gradients) {
     scratch->bulge_slope.assign(n, Vec3::Zero());
@@ -372,6 +457,7 @@ void ClaimField::add_content(const std::function<std::uint64_t(std::uint32_t)>& 
   words.add(literal_);
   words.add(highest_);
   words.add(rise_);
+  words.add(together_);
   words.add(box_.lower);
   words.add(box_.upper);
 }

@@ -53,8 +53,8 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out; pairs that a time step would turn back, to and fro, have a higher one");
   archive("stick", d.stick, {}, "friction by springs that hold up to the Coulomb limit: what should stay stays; absent: it creeps");
   archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
-  archive("bulge_volume", d.bulge_volume, {}, "in place of 'bulge': as high as holds the volume that the contact displaces");
-  archive("bulge_width", d.bulge_width, up_to(1.0, kNumber), "share of the other body's feature size");
+  archive("bulge_volume", d.bulge_volume, {}, "in place of 'bulge': as high as holds the volume that the contact displaces, to 1e-3 of it; a warning tells where the fields or 'bulge_width' do not let it");
+  archive("bulge_width", d.bulge_width, up_to(1.0, kNumber).or_auto(), "width of the bulge at most, as a share of the other body's feature size; auto: 0.15, with 'bulge_volume' as wide as it takes");
   archive("bulge_literal", d.bulge_literal, {}, "as published: by distance instead of pressure, of one width; it pops up at first touch and bulges may cross");
   archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "of the surface samples; auto: a sixth of the smallest feature");
   const bool bulges = archive.given("bulge") || archive.given("bulge_volume");

@@ -170,6 +170,9 @@ struct Division {
 [[nodiscard]] Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
                               std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface);
 
+/// Bulges of a division that hold less than they should, by objects.
+[[nodiscard]] std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(const StageContext& context, const Division& division);
+
 /// All that the field of a body depends on, bit by bit; fixed ones follow those that move.
 void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words);
 

@@ -428,6 +428,20 @@ Division division_of(const Model& model, const std::vector<Body>& bodies, std::s
   return out;
 }
 
+std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(const StageContext& context, const Division& division) {
+  const auto object = [&](std::uint32_t body) {
+    return body < context.bodies.size() ? context.model.objects[context.bodies[body].object].name : body_name(context.model, context.bodies, body);
+  };
+  std::map<std::string, std::map<std::string, ShortBulges>> found;
+  for (std::size_t k = 0; k < division.body.size(); ++k) {
+    for (const collision::BulgeVolume& bulge : division.claim[k].volumes()) {
+      if (!bulge.falls_short()) continue;
+      found[object(division.body[k])][object(bulge.other)].add({.count = 1, .held = bulge.held / bulge.displaced, .time = context.time});
+    }
+  }
+  return found;
+}
+
 std::vector<std::size_t> Division::others_of(std::size_t k) const {
   std::vector<std::size_t> others;
   for (std::size_t j = 0; j < claim.size(); ++j) {
@@ -446,6 +460,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   std::vector<Mesh> surfaces(bodies.size());
   frame.missed = {};
   const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
+  frame.missed.short_bulges = find_short_bulges(context, division);
   mesh_divided(context, division, profile, frame, surfaces);
   std::vector<std::size_t> pieces(model.objects.size());
   for (const Body& body : bodies) ++pieces[body.object];

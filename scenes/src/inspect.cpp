@@ -127,6 +127,18 @@ std::string searches_text(const ordered_json& searches) {
   return text.empty() ? text : "pieces between the nodes of the lattice\n" + text;
 }
 
+/// Empty where there is nothing to tell.
+std::string short_bulges_text(const ordered_json& searches) {
+  if (!searches.contains("short_bulges")) return {};
+  std::string text;
+  for (const auto& bulges : searches["short_bulges"]) {
+    if (!bulges.is_object()) continue;
+    const std::string what = text_at(bulges, "of") + " around " + text_at(bulges, "around");
+    text += line("  %-34s %8.3g at %.6g s", what.c_str(), number_at(bulges, "held"), number_at(bulges, "time_s"));
+  }
+  return text.empty() ? text : "shares of what contacts displace that bulges hold, the least\n" + text;
+}
+
 struct FrameName {
   std::string name;
   int frame = 0;
@@ -193,7 +205,7 @@ std::string describe_run(const fs::path& folder) {
       text += volumes_text(object);
     }
   }
-  if (report.contains("searches")) text += searches_text(report["searches"]);
+  if (report.contains("searches")) text += searches_text(report["searches"]) + short_bulges_text(report["searches"]);
   if (report.contains("stages")) {
     text += "stages                                  calls      cpu s\n";
     for (const auto& [name, stage] : report["stages"].items()) {

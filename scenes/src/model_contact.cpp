@@ -369,8 +369,9 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   if (scene.contact.stick) {
     model.reaction.stick = {.stiffness = scene.contact.stick->stiffness, .damping = scene.contact.stick->damping};
   }
-  model.bulge = {.attenuation = scene.contact.bulge, .width = scene.contact.bulge_width, .keep_volume = scene.contact.bulge_volume,
-                 .literal = scene.contact.bulge_literal};
+  model.bulge = {.attenuation = scene.contact.bulge, .keep_volume = scene.contact.bulge_volume, .literal = scene.contact.bulge_literal};
+  const double free_width = model.bulge.keep_volume ? std::numeric_limits<double>::infinity() : model.bulge.width;
+  model.bulge.width = scene.contact.bulge_width.value_or(free_width);
 
   std::vector<BodyPair> forbidden;
   add_pairs(scene, model, faults, forbidden);

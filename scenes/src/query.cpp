@@ -8,6 +8,7 @@
 
 #include "read_scene_faults.h"
 #include "search_choice.h"
+#include "search_files.h"
 #include "warnings.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
@@ -191,6 +192,7 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
     }
   }
   json["objects"] = objects;
+  json["searches"] = json_of(simulation.searches());
   return text(json);
 }
 

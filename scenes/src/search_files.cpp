@@ -20,11 +20,23 @@ std::uint64_t count_at(const ordered_json& object, std::string_view key) {
   return at != object.end() && at->is_number_unsigned() ? at->get<std::uint64_t>() : 0;
 }
 
+double number_at(const ordered_json& object, std::string_view key, double otherwise) {
+  const auto at = object.find(key);
+  return at != object.end() && at->is_number() ? at->get<double>() : otherwise;
+}
+
 SearchCounts searches_of(const ordered_json& json) {
-  SearchCounts counts{.pieces = count_at(json, "pieces"), .undecided = count_at(json, "undecided"), .crossings = count_at(json, "crossings"), .unsearched = {}, .blunt = {}};
+  SearchCounts counts{.pieces = count_at(json, "pieces"), .undecided = count_at(json, "undecided"), .crossings = count_at(json, "crossings"), .unsearched = {}, .blunt = {}, .short_bulges = {}};
   if (const auto blunt = json.find("blunt"); blunt != json.end() && blunt->is_object()) {
     for (const auto& [object, cells] : blunt->items()) {
       if (cells.is_number_unsigned()) counts.blunt[object] = cells.get<std::uint64_t>();
+    }
+  }
+  if (const auto bulges = json.find("short_bulges"); bulges != json.end() && bulges->is_array()) {
+    for (const ordered_json& b : *bulges) {
+      if (!b.is_object() || !b.contains("of") || !b["of"].is_string() || !b.contains("around") || !b["around"].is_string()) continue;
+      const ShortBulges read{.count = count_at(b, "contacts"), .held = number_at(b, "held", 1.0), .time = number_at(b, "time_s", 0.0)};
+      counts.short_bulges[b["of"].get<std::string>()][b["around"].get<std::string>()] = read;
     }
   }
   const auto unsearched = json.find("unsearched");
@@ -45,7 +57,12 @@ ordered_json json_of(const SearchCounts& counts) {
       if (meshes[k] > 0) unsearched[object][std::string(kUnsearchedNames[k])] = meshes[k];
     }
   }
-  return {{"pieces", counts.pieces}, {"undecided", counts.undecided}, {"crossings", counts.crossings}, {"unsearched", unsearched}, {"blunt", counts.blunt}};
+  ordered_json bulges = ordered_json::array();
+  for (const auto& [object, around] : counts.short_bulges) {
+    for (const auto& [body, b] : around) bulges.push_back({{"of", object}, {"around", body}, {"contacts", b.count}, {"held", b.held}, {"time_s", b.time}});
+  }
+  return {{"pieces", counts.pieces},   {"undecided", counts.undecided}, {"crossings", counts.crossings},
+          {"unsearched", unsearched}, {"blunt", counts.blunt},         {"short_bulges", bulges}};
 }
 
 void write_searches(const fs::path& folder, const std::string& name, int frame, const SearchCounts& counts) {

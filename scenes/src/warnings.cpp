@@ -217,9 +217,10 @@ void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeSt
 
 void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings) {
   const std::string key = "output.meshing.search: ", crossing = "output.meshing.distance: ";
-  const std::string blunt = "output.meshing.method: cells whose crease is cut off";
+  const std::string blunt = "output.meshing.method: cells whose crease is cut off", bulging = "contact.bulge_volume: ";
   std::erase_if(warnings, [&](const std::string& warning) {
-    return warning.starts_with(key) || warning.starts_with(crossing) || warning.starts_with(blunt);
+    return warning.starts_with(key) || warning.starts_with(crossing) || warning.starts_with(blunt) ||
+           warning.starts_with(bulging);
   });
   std::string text;
   const auto add = [&](bool told, const char* what, std::uint64_t count) {
@@ -243,6 +244,15 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
     std::string cells;
     for (const auto& [object, count] : all.blunt) cells += (cells.empty() ? "" : ", ") + std::to_string(count) + " of '" + object + '\'';
     warnings.push_back(blunt + ", as triangles with vertices on it would cross, in the meshes of all frames: " + cells + "; smaller cells resolve more of it");
+  }
+  for (const auto& [object, around] : all.short_bulges) {
+    for (const auto& [body, lacking] : around) {
+      std::array<char, 160> numbers{};
+      std::snprintf(numbers.data(), numbers.size(), " holds %.3g of what the contact displaces at t = %.6g s, and %llu in all meshes hold too little",
+                    lacking.held, lacking.time, static_cast<unsigned long long>(lacking.count));
+      warnings.push_back(bulging + "the bulge of '" + object + "' around '" + body + '\'' + numbers.data() +
+                         "; 'bulge_width' and how far the fields reach beyond the surfaces limit its height");
+    }
   }
 }
 

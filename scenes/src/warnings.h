@@ -51,7 +51,7 @@ class UnmetContacts {
 void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeState>& volumes, std::vector<std::string>& warnings);
 
 /// What searches for missed pieces of meshes found in all frames, in one sentence that takes the place of the last; none for none.
-/// Another one counts triangles that cross.
+/// Another one counts triangles that cross, others tell of bulges that hold too little.
 /// Other meshers than those that are searched are left to the report: the scene asks for them.
 void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings);
 

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <tuple>
 
 #include "implicit/bodies.h"
 #include "search_files.h"
 #include "supple/core/error.h"
+#include "supple/core/mesh.h"
 #include "supple/implicit/creases.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
@@ -247,6 +249,59 @@ TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreCounted) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0], "output.meshing.method: cells whose crease is cut off, as triangles with vertices on it would cross, in the meshes of all frames: 7 of 'pair'; "
                          "smaller cells resolve more of it");
+  set_missed(MeshingDesc{}, {}, warnings);
+  EXPECT_TRUE(warnings.empty());
+  std::filesystem::remove_all(folder);
+}
+
+TEST(ObjectMeshing, BulgesHoldTheVolumeOfEachBodyOrAWarningTells) {
+  // Two balls of radius 0.1 that lose a fiftieth of their volume to each other; meshes of 4 mm cells lose 1e-3 of it, with and without bulges.
+  const auto meshed = [](const std::string& contact, const std::string& at) {
+    const std::string ball = ", mass: 1}\n    contact: {modulus: 1e4}\n    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]\n";
+    Simulation simulation(parse_scene("schema: 1\nduration: 1\nobjects:\n  - name: low\n    particles: {at: [0, 0, 0]" + ball + "  - name: high\n    particles: {at: " + at + ball +
+                                          "contact: {error: 1e-6" + contact + "}\noutput: {mesh: ply, cell: 4 mm}\n",
+                                      "test.yaml", "."));
+    const std::vector<Mesh> meshes = simulation.meshes();
+    std::vector<std::string> told = simulation.warnings();
+    std::erase_if(told, [](const std::string& warning) { return !warning.starts_with("contact.bulge_volume: "); });
+    EXPECT_EQ(query_mesh(simulation, {}).find("\"held\"") == std::string::npos, told.empty());
+    return std::tuple{inspect(meshes[0]).volume, told, simulation.searches().short_bulges};
+  };
+  const auto [whole, none, nothing] = meshed("", "[0, 0, 1]");
+  const auto [cut, unasked, no_bulges] = meshed("", "[0, 0.02, 0.165]");
+  const auto [held, quiet, enough] = meshed(", bulge_volume: true", "[0, 0.02, 0.165]");
+  EXPECT_LT(cut, 0.985 * whole);
+  EXPECT_NEAR(held, whole, 0.05 * (whole - cut));
+  EXPECT_TRUE(quiet.empty() && enough.empty());
+  const auto [narrow, told, lacking] = meshed(", bulge_volume: true, bulge_width: 0.15", "[0, 0.02, 0.165]");
+  EXPECT_GT(narrow, cut);
+  EXPECT_LT(narrow, whole - 0.5 * (whole - cut));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_TRUE(told[0].starts_with("contact.bulge_volume: the bulge of 'high' around 'low' holds 0.")) << told[0];
+  EXPECT_TRUE(told[0].ends_with(" of what the contact displaces at t = 0 s, and 1 in all meshes hold too little; 'bulge_width' and how far the fields reach beyond the surfaces "
+                                "limit its height"))
+      << told[0];
+  const ShortBulges& low = lacking.at("low").at("high");
+  EXPECT_EQ(low.count, 1u);
+  EXPECT_NEAR(low.held, (narrow - cut) / (whole - cut), 0.05);
+}
+
+TEST(ObjectMeshing, BulgesThatHoldTooLittleAreToldOnceForAllFrames) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "short_bulges";
+  for (const int frame : {1, 2, 3}) {
+    SearchCounts counts;
+    counts.short_bulges["ball"]["ground"] = {.count = 2, .held = frame == 2 ? 0.5 : 0.75, .time = 0.1 * frame};
+    write_searches(folder, "drop", frame, counts);
+  }
+  const SearchCounts all = read_searches(folder, "drop", {}, 3);
+  const ShortBulges& read = all.short_bulges.at("ball").at("ground");
+  EXPECT_EQ(read.count, 6u);
+  EXPECT_EQ(read.held, 0.5);
+  EXPECT_EQ(read.time, 0.2);
+  std::vector<std::string> warnings;
+  for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(warnings[0].starts_with("contact.bulge_volume: the bulge of 'ball' around 'ground' holds 0.5 of what the contact displaces at t = 0.2 s, and 6 in all meshes"));
   set_missed(MeshingDesc{}, {}, warnings);
   EXPECT_TRUE(warnings.empty());
   std::filesystem::remove_all(folder);

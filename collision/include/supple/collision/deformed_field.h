@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,8 @@
 #include "supple/core/content_versions.h"
 
 namespace supple::collision {
+
+struct WantedBulge;
 
 /// Bulge of the propagation zone, h(x) for x in [0, w]: h(0) = 0, h'(0) = k, h(w/2) = a0, h'(w/2) = 0, h(w) = h'(w) = 0;
 /// C^1. Its maximum is a0 iff w k <= 6 a0. (Gascuel 1993; Wyvill, FCG 22.7, with two misprints corrected.)
@@ -28,8 +32,8 @@ struct BulgeProfile {
 
 struct BulgeSettings {
   double attenuation = 0.4;  ///< alpha: a0 = alpha times the largest contact pressure; 0 switches bulges off
-  double width = 0.15;       ///< w: zone width as a share of the other body's feature size [1], > 0
-  bool keep_volume = false;  ///< a0 in place of `attenuation` such that the bulge holds what the contact displaces, to first order
+  double width = 0.15;       ///< w: zone width at most as a share of the other body's feature size [1], > 0; infinite: w is 6 a0 as far as its kernels reach
+  bool keep_volume = false;  ///< a0 in place of `attenuation` such that the bulge holds what the contact displaces, see `BulgeVolume`
   /// The term as published, for comparison; not beside `keep_volume`. x [m] is the distance to the surface of the other body j
   /// along grad p_j, k = |grad p_j| where that path ends, and w is `width` times the feature size of j, or of the body
   /// itself where j has none, whatever a0. Its defects: the bulge pops up at first touch (2 k w / 27 for a0 = 0), rises
@@ -38,7 +42,17 @@ struct BulgeSettings {
   bool literal = false;
 };
 
-/// Height a0 [Pa] of a bulge of k = 1 that holds the volume `displaced` [m^3]. The rim of Sigma holds
+/// What a bulge of `BulgeSettings::keep_volume` should hold, and holds. They agree to 1e-3 unless the bulge is as high as it may be: a third
+/// of its width, less beside what is steeper, or half of what would fill the empty space around the body. Its slope k at the rim is 1, so that it joins the compression
+/// with one slope, unless the other body is steeper: k is |grad p_i| / |grad p_j| then, which leaves a crease at the rim.
+struct BulgeVolume {
+  std::uint32_t other = 0;  ///< the body that it lies around
+  double displaced = 0.0;   ///< [m^3]
+  double held = 0.0;        ///< [m^3]
+  [[nodiscard]] bool falls_short() const { return held < (1.0 - 2e-3) * displaced; }
+};
+
+/// Height a0 [Pa] of a bulge of k = 1 that holds the volume `displaced` [m^3], to first order. The rim of Sigma holds
 /// w (24 a0 + w) / 48 times the integral of ds / (|grad_Sigma p| |grad(p_A - p_B)|), which is area^2 / (2 load steepness) for
 /// pressures that fall as a paraboloid; a sphere on a plane is Gascuel's case.
 /// @param width  of the zone at most [Pa]: beyond it a lower one grows instead
@@ -63,6 +77,7 @@ class ClaimField {
   [[nodiscard]] double gradient_bound(const Box& box) const;
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
+  [[nodiscard]] std::span<const BulgeVolume> volumes() const { return volumes_; }  ///< of `BulgeSettings::keep_volume`, else none
   /// All that the claim depends on, bit by bit. @param field  a number for the field of a body, by index in `bodies`: equal ones mean
   /// equal fields
   void add_content(const std::function<std::uint64_t(std::uint32_t)>& field, ContentWords& words) const;
@@ -72,6 +87,10 @@ class ClaimField {
     std::uint32_t body;
     BulgeProfile profile;  ///< in pressure units, k = 1; literal: w [m], k of each point its own
   };
+  /// Adds the bulge around a neighbour that should hold what their contact displaces. @param contact  in `summary`  @param width  at most [m]
+  void want_volume(const ContactSurface& surface, std::size_t contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const;
+  void keep_volumes(std::span<const WantedBulge> wanted);
+  void find_limiting();
   /// Values, and gradients where `gradients` is not empty.
   void evaluate_claims(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
   /// What the literal bulge around a neighbour adds in a box at most [Pa]
@@ -81,8 +100,10 @@ class ClaimField {
   std::uint32_t body_;
   std::vector<Neighbour> neighbours_;
   std::vector<std::uint32_t> limiting_;  ///< other bodies that a bulge could reach
+  std::vector<BulgeVolume> volumes_;
   bool literal_ = false;
-  double highest_ = 0.0;                 ///< of one bulge [Pa]
+  double highest_ = 0.0;                 ///< of one bulge; not where volumes are kept [Pa]
+  double together_ = std::numeric_limits<double>::infinity();  ///< all bulges are cut off there [Pa]
   double rise_ = 0.0;                    ///< largest possible sum of the bulges [Pa]
   Box box_;                              ///< of {claim >= 0}
 };

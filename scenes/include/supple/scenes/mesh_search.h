@@ -1,6 +1,6 @@
 /// @file supple/scenes/mesh_search.h
 /// What is not as it should be in meshes: pieces that they miss (implicit/missed_pieces.h), by what searches found, which were not searched,
-/// triangles that cross, and creases that are cut off so that none do.
+/// triangles that cross, creases that are cut off so that none do, and bulges that hold less than they should.
 #pragma once
 
 #include <array>
@@ -21,6 +21,19 @@ enum class Unsearched : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 4> kUnsearchedNames{"bulges", "undecided", "cost", "mesher"};
 
+/// Bulges that hold less than their contacts displace though they should (collision::BulgeVolume), of one object around another.
+struct ShortBulges {
+  std::uint64_t count = 0;  ///< of contacts
+  double held = 1.0;        ///< the least share of what a contact displaces [1]
+  double time = 0.0;        ///< of that one [s]
+  void add(const ShortBulges& other) {
+    count += other.count;
+    if (!(other.held < held)) return;
+    held = other.held;
+    time = other.time;
+  }
+};
+
 /// Of the meshes of one state, or of several.
 struct SearchCounts {
   using Meshes = std::array<std::uint64_t, kUnsearchedNames.size()>;  ///< by reason
@@ -30,7 +43,11 @@ struct SearchCounts {
   std::map<std::string, Meshes> unsearched;  ///< by object, where there are any
   std::map<std::string, std::uint64_t> blunt;  ///< by object, where there are any: cells whose crease stays cut off, as triangles would cross
 
-  [[nodiscard]] bool empty() const { return pieces == 0 && undecided == 0 && crossings == 0 && unsearched.empty() && blunt.empty(); }
+  std::map<std::string, std::map<std::string, ShortBulges>> short_bulges;  ///< by the object that bulges and the one it bulges around, where there are any
+
+  [[nodiscard]] bool empty() const {
+    return pieces == 0 && undecided == 0 && crossings == 0 && unsearched.empty() && blunt.empty() && short_bulges.empty();
+  }
   [[nodiscard]] std::uint64_t not_searched(Unsearched why) const {
     std::uint64_t sum = 0;
     for (const auto& [object, meshes] : unsearched) sum += meshes[static_cast<std::size_t>(why)];
@@ -44,6 +61,9 @@ struct SearchCounts {
       for (std::size_t k = 0; k < meshes.size(); ++k) unsearched[object][k] += meshes[k];
     }
     for (const auto& [object, cells] : other.blunt) blunt[object] += cells;
+    for (const auto& [object, around] : other.short_bulges) {
+      for (const auto& [body, bulges] : around) short_bulges[object][body].add(bulges);
+    }
   }
 };
 

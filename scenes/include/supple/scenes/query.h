@@ -23,7 +23,7 @@ struct MeshQuery {
   int cells = 0;                   ///< cells along the longest side of all surfaces; 0: the scene's cell
   std::filesystem::path out;       ///< .ply or .obj file, or folder, for the meshes; empty: none
 };
-/// Counts, closed or not, area, volume, cpu_ms, by object. @throws Error{Io}, Error{Usage} for a file of another kind
+/// Counts, closed or not, area, volume, cpu_ms, by object, and what the meshes lack as in result.json. @throws Error{Io}, Error{Usage} for a file of another kind
 [[nodiscard]] std::string query_mesh(Simulation& simulation, const MeshQuery& query);
 
 /// The plan as text (`supple explain`): stages with reasons, time step (or why none can be made), sizes, contacts.

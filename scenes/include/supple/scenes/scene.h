@@ -305,7 +305,7 @@ struct ContactDesc {
   std::optional<StickDesc> stick;     ///< absent: friction is viscous below `friction_speed`
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
   bool bulge_volume = false;          ///< bulges that hold what the contact displaces
-  double bulge_width = 0.15;          ///< share of the other body's feature size
+  std::optional<double> bulge_width;  ///< share of the other body's feature size; absent: 0.15, or as wide as volumes need
   bool bulge_literal = false;         ///< the published term, with its defects
   std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
 };
