@@ -191,14 +191,15 @@ TEST(KeptVolumes, AreHeldByARingOnABall) {
   EXPECT_NEAR(b.gained, b.bulges[0].displaced, 2e-3 * b.bulges[0].displaced);
 }
 
-// The bulges of the second and third contact meet; by rays that err by less than 1e-3 of what is lost.
+// Two contacts whose rims lie 9 degrees apart, and a third one of another kernel; by rays that err by less than 1e-3 of what is lost.
 TEST(KeptVolumes, AreThoseOfTheBodyWhereBulgesMeet) {
-  const Solid ball(ShapeKind::Point, kernel(0), Vec3::Zero()), right(ShapeKind::Point, kernel(0), Vec3(1.7, 0.3, 0.0)), top(ShapeKind::Point, kernel(0), Vec3(1.1, 1.35, 0.2)),
-      below(ShapeKind::Point, kernel(1), Vec3(-0.2, 0.1, -1.8));
+  const Kernel small = Kernel::wyvill(0.45 / 0.454202019);
+  const Solid ball(ShapeKind::Point, kernel(0), Vec3::Zero()), right(ShapeKind::Point, small, Vec3(1.21, 0.475, 0.05)), left(ShapeKind::Point, small, Vec3(1.21, -0.475, 0.05)),
+      below(ShapeKind::Point, kernel(1), Vec3(-1.8, 0.1, -0.2));
   Stage stage;
   stage.add(ball.field, {Vec3::Zero()}, 1e4);
   stage.add(right.field, {Vec3::Zero()}, 1e4);
-  stage.add(top.field, {Vec3::Zero()}, 1e4);
+  stage.add(left.field, {Vec3::Zero()}, 1e4);
   stage.add(below.field, {Vec3::Zero()}, 2e4);
   stage.solve({.error = 1e-6});
   const Balance b = balance_of(stage, kAsNeeded, [&](const implicit::FieldView& f) { return volume_about(f, Vec3::Zero(), 1.6, 100); });
