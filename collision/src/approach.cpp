@@ -150,15 +150,24 @@ double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& 
   const Box of_a = a.field.surface_box(), of_b = b.field.surface_box();
   const double front = reach(of_a, direction), back = -reach(of_a, -direction);
   const double near = -reach(of_b, -direction), far = reach(of_b, direction);
-  // From where A's front meets the near side of B to where its back has left it, or where A is wholly inside.
+  const int coarse = std::max(8, cells / 2);
+  // From where A's front meets the near side of B to where its back has left it. An unbounded B presses the harder the deeper A is: until all of A's
+  // pressure is gone.
   double first = near - front, last = far - back;
   if (!std::isfinite(first)) first = 0.0;
   if (!std::isfinite(last)) {
-    // A point of A's box that is deep enough below an unbounded B takes no part of its pressure away.
-    last = std::isfinite(near) ? near - back : 2.0 * (front - back);
+    constexpr int kDoublings = 20;
+    constexpr double kGrows = 1.01;
+    double way = front - back, energy = shifted_energy(a, b, (first + way) * direction, coarse);
+    for (int i = 0; i < kDoublings; ++i) {
+      const double deeper = shifted_energy(a, b, (first + 2.0 * way) * direction, coarse);
+      if (!(deeper > kGrows * energy)) break;
+      energy = deeper;
+      way *= 2.0;
+    }
+    last = first + 2.0 * way;
   }
   constexpr int kScan = 12;
-  const int coarse = std::max(8, cells / 2);
   const double step = (last - first) / kScan;
   double best = 0.0, at = first;
   for (int i = 0; i <= kScan; ++i) {

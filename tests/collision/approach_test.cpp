@@ -41,6 +41,18 @@ TEST(ContactCapacity, OfABallOnARigidPlaneIsAllOfItsPressure) {
   }
 }
 
+TEST(ContactCapacity, OfABallInSoftGroundIsAllOfItsPressureWhateverTheNormal) {
+  const double R = 0.5, E = 1e4;
+  const LinearSphere ball{Vec3(0, 0, 0.45), Linear{R, 1.0 / R}};
+  const implicit::HalfSpace ground{Vec3::Zero(), Vec3::UnitZ(), 1.0};  // as hard as the middle of the ball at a depth of 10 m
+  Stage stage;
+  stage.add(ball, {ball.centre}, E);
+  stage.add(ground, {Vec3::Zero()}, 1e3).fixed = true;
+  for (const Vec3& way : {Vec3(0, 0, -1), Vec3(1e-9, -1e-9, -1), Vec3(1e-3, 0, -1)}) {
+    EXPECT_NEAR(contact_capacity(stage.bodies()[0], stage.bodies()[1], way.normalized()) / (kPi * E * R * R * R / 3.0), 1.0, 2e-2);
+  }
+}
+
 TEST(ContactCapacity, HasTheEnergyOfTheContactAtItsStart) {
   const LinearSphere a{Vec3::Zero(), Linear{1.0, 1.0}}, b{Vec3(0.3, 0.1, 0.9), Linear{0.7, 1.0}};
   Stage stage;

@@ -34,7 +34,7 @@ struct Approach {
 [[nodiscard]] double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, int cells);
 
 /// U_max: the largest contact energy [J] that the pair can reach when A is moved into B along `direction` (unit) until it
-/// is through, or for an unbounded B, until it is wholly inside. What approaches with more kinetic energy passes.
+/// is through, or for an unbounded B, as deep as it still grows. What approaches with more kinetic energy passes, if B has another side.
 /// Two equal linear balls of pressure E (1 - r/R) hold pi E R^3 / 3. @param cells  see `shifted_energy`
 [[nodiscard]] double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells = 32);
 
