@@ -312,6 +312,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   for (const int side : {0, 1}) {
     const bool wanted = !third.empty() && regions[static_cast<std::size_t>(side)] != Region::None;
     apex_[side] = wanted ? find_apex(pressure, side, third, frame.origin, (side == 0 ? 1.0 : -1.0) * frame.axis) : std::nullopt;
+    if (apex_[side] && apex_[side]->lost) apex_[side].reset();  // ways out of it would lead against the axis
   }
   const PatchPoints::Mark before = points.mark();
   const auto anew = [&] {

@@ -92,6 +92,10 @@ const std::string& body_name(const Model& model, const std::vector<Body>& bodies
   return body < bodies.size() ? bodies[body].name : model.fixed[body - bodies.size()].name;
 }
 
+const std::string& object_name(const Model& model, const std::vector<Body>& bodies, std::size_t body) {
+  return body < bodies.size() ? model.objects[bodies[body].object].name : body_name(model, bodies, body);
+}
+
 core::LinkState parted_links(const Model& model, const core::LinkState& links, std::span<const double> broken_for) {
   core::LinkState parted = links;
   for (std::size_t k = 0; k < broken_for.size(); ++k) {

@@ -16,12 +16,11 @@ std::size_t find_camera(const Simulation& simulation, const std::string& name) {
   for (const CameraDesc& camera : simulation.model().cameras) names.emplace_back(camera.name);
   const auto at = std::find(names.begin(), names.end(), name);
   if (at != names.end()) return static_cast<std::size_t>(at - names.begin());
-  const std::string near = nearest_word(name, names);
   throw Error(ErrorKind::Usage, Fault{.place = "camera",
                                       .key = {},
                                       .expected = "expected the name of a camera",
                                       .found = '\'' + shown(name) + '\'',
-                                      .hint = (near.empty() ? "" : "did you mean '" + near + "'? ") + "(known: " + shown(joined(names)) + ")"});
+                                      .hint = known_hint(name, names)});
 }
 
 /// Gives a simulation its meshes back as they were.

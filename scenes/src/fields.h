@@ -156,9 +156,7 @@ void check_names(Archive& archive, const Scene& d) {
     const std::string key = "pairs[" + std::to_string(k) + "].objects";
     for (std::size_t side = 0; side < two.size(); ++side) {
       const bool known = index.contains(two[side]) || (two[side] == "ground" && d.ground);
-      const std::string near = known ? "" : nearest_word(two[side], names);
-      std::string hint = (near.empty() ? "" : "did you mean '" + near + "'? ") + "(known: " + shown(joined(names)) + ")";
-      if (two[side] == "ground") hint = "the scene has none: add 'ground: true'";
+      const std::string hint = two[side] == "ground" ? "the scene has none: add 'ground: true'" : known_hint(two[side], names);
       archive.check(known, key + '[' + std::to_string(side) + ']', "expected the name of an object or obstacle, or 'ground'",
                     '\'' + shown(two[side]) + '\'', hint);
     }

@@ -429,9 +429,7 @@ Division division_of(const Model& model, const std::vector<Body>& bodies, std::s
 }
 
 std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(const StageContext& context, const Division& division) {
-  const auto object = [&](std::uint32_t body) {
-    return body < context.bodies.size() ? context.model.objects[context.bodies[body].object].name : body_name(context.model, context.bodies, body);
-  };
+  const auto object = [&](std::uint32_t body) -> const std::string& { return object_name(context.model, context.bodies, body); };
   std::map<std::string, std::map<std::string, ShortBulges>> found;
   for (std::size_t k = 0; k < division.body.size(); ++k) {
     for (const collision::BulgeVolume& bulge : division.claim[k].volumes()) {

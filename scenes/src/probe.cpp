@@ -42,9 +42,7 @@ std::uint32_t find_body(const Simulation& simulation, std::string_view name) {
   for (std::size_t i = 0; i < body_count(simulation); ++i) names.emplace_back(name_of(simulation, i));
   const auto at = std::find(names.begin(), names.end(), name);
   if (at != names.end()) return static_cast<std::uint32_t>(at - names.begin());
-  const std::string near = nearest_word(name, names);
-  refuse("body", "expected the name of a body", '\'' + shown(name) + '\'',
-         (near.empty() ? "" : "did you mean '" + near + "'? ") + "(known: " + shown(joined(names)) + ")");
+  refuse("body", "expected the name of a body", '\'' + shown(name) + '\'', known_hint(name, names));
 }
 
 void evaluate_field(Simulation& simulation, std::uint32_t body, std::span<const Vec3> points, std::span<double> values,

@@ -144,4 +144,9 @@ std::string nearest_word(std::string_view word, std::span<const std::string_view
   return std::string(best);
 }
 
+std::string known_hint(std::string_view name, std::span<const std::string_view> names) {
+  const std::string near = nearest_word(name, names), known = "known: " + shown(joined(names));
+  return near.empty() ? known : "did you mean '" + near + "'? (" + known + ')';
+}
+
 }  // namespace supple::scenes

@@ -75,5 +75,7 @@ class FaultList {
 [[nodiscard]] std::string joined(std::span<const std::string_view> words);
 /// The word nearest to `word` by edit distance (with transpositions), or "" when none is near.
 [[nodiscard]] std::string nearest_word(std::string_view word, std::span<const std::string_view> words);
+/// Hint for a name that there is not: the nearest one, if one is near, and all.
+[[nodiscard]] std::string known_hint(std::string_view name, std::span<const std::string_view> names);
 
 }  // namespace supple::scenes

@@ -158,9 +158,7 @@ bool misses_error(const collision::ContactSurface::Summary& contact, double aske
 
 void UnmetContacts::look(const StageContext& context, const collision::ContactSurface& surface, double time) {
   const double asked = context.model.contact.error;
-  const auto kind = [&](std::uint32_t body) -> const std::string& {
-    return body < context.bodies.size() ? context.model.objects[context.bodies[body].object].name : body_name(context.model, context.bodies, body);
-  };
+  const auto kind = [&](std::uint32_t body) -> const std::string& { return object_name(context.model, context.bodies, body); };
   for (const auto& s : surface.summary) {
     if (!misses_error(s, asked) || s.force.norm() == 0.0) continue;  // without force: the rule asked for does not fit
     Worst& worst = worst_[{kind(s.bodies.a), kind(s.bodies.b)}];

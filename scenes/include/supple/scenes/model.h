@@ -156,6 +156,8 @@ using ApartPairs = std::vector<collision::BodyPair>;
 
 /// Name of a contact body: of a body, or of a fixed one.
 [[nodiscard]] const std::string& body_name(const Model& model, const std::vector<Body>& bodies, std::size_t body);
+/// Name of its object, or of a fixed one.
+[[nodiscard]] const std::string& object_name(const Model& model, const std::vector<Body>& bodies, std::size_t body);
 /// Links as bodies see them: those that broke less than their object's `fade` ago still join.
 /// @param broken_for  time since each link broke [s], shape of the links
 [[nodiscard]] core::LinkState parted_links(const Model& model, const core::LinkState& links, std::span<const double> broken_for);
