@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "quadrature.h"
+#include "squeezed_region.h"
 
 namespace supple::collision {
 namespace {
@@ -20,6 +21,8 @@ constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
 constexpr int kFewNodes = 3;           // through a squeezed region
+constexpr double kBeforeTheyMeet = 0.8;  // columns end, of the way
+constexpr double kWidest = 20.0;         // their ends, over where they begin
 constexpr int kMoreAcross = 2;         // columns out of an apex may go through most of the body
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
 
@@ -336,12 +339,34 @@ void MarchRuleSolver::start_columns(PairPressure& pressure, int side, std::span<
     } else {
       c.way = sign * node.along;
       c.swept = {node.swept[0], sign * node.swept[1], node.swept[2]};
-      c.high = first_zero(c.swept);
     }
   }
 }
 
-/// Gauss points in what one body loses.
+/// Whether the body's pressure falls along the columns from where they begin, by its slopes there.
+bool MarchRuleSolver::lead_out() const {
+  const double least = apex_ ? 0.0 : kLeastFall;
+  for (std::size_t i = 0; i < slope_.size(); ++i) {
+    if (!(-slope_[i].dot(columns_[i].way) > least * slope_[i].norm())) return false;
+  }
+  return true;
+}
+
+/// Whether columns end before they meet or widen too much for their points, and within the other body, which ways out of an apex may leave.
+bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
+  place_.clear();
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const Column& c = columns_[i];
+    if (!(c.width(c.at) / c.width(0.0) < kWidest) || !(apex_ || c.at < kBeforeTheyMeet * first_zero(c.swept))) return false;
+    place_.push_back(nodes_[i].point + c.at * c.way);
+  }
+  if (apex_) return true;
+  value_.resize(place_.size());
+  pressure.evaluate(1 - side, place_, value_);
+  return std::all_of(value_.begin(), value_.end(), [](double p) { return p >= 0.0; });
+}
+
+/// Gauss points in what one body loses, unless columns do not hold it.
 void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak,
                                   PatchPoints& points) {
   start_columns(pressure, side, third, peak);
@@ -354,6 +379,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
     value_.resize(open_.size());
     slope_.resize(open_.size());
     pressure.evaluate(side, place_, value_, slope_);
+    if (step == 0) points.unsure[side] = !lead_out();
     std::size_t left = 0;
     for (std::size_t k = 0; k < value_.size(); ++k) {
       const std::size_t i = open_[k];
@@ -368,6 +394,8 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
     }
     open_.resize(left);
   }
+  points.unsure[side] = points.unsure[side] || !hold(pressure, side);
+  if (points.unsure[side]) return;
   const GaussRule& gauss = gauss_rule(std::max(order_for(error) - 1, kFewNodes) + (apex_ ? kMoreAcross : 0));
   const std::size_t begin = points.volume_point.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -376,20 +404,10 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
       const double t = c.at * gauss.node[j];
       points.volume_point.push_back(nodes_[i].point + t * c.way);
       points.volume_weight.push_back(c.width(t) * c.at * gauss.weight[j]);
-      points.volume_side.push_back(static_cast<std::uint8_t>(side));
     }
   }
-  if (apex_ && apex_->lost) {
-    fill_body(pressure, side, apex_->at, error, points.volume_point, points.volume_weight);
-    points.volume_side.resize(points.volume_point.size(), static_cast<std::uint8_t>(side));
-  }
-  const auto added = std::span(points.volume_point).subspan(begin);
-  value_.resize(added.size());
-  pressure.evaluate(side, added, value_);
-  for (std::size_t i = 0; i < added.size(); ++i) {
-    points.displaced[side] += points.volume_weight[begin + i];
-    points.energy += points.volume_weight[begin + i] * std::max(value_[i], 0.0);
-  }
+  if (apex_ && apex_->lost) fill_body(pressure, side, apex_->at, error, points.volume_point, points.volume_weight);
+  add_to_region(pressure, side, begin, value_, points);
 }
 
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press.

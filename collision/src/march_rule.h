@@ -190,6 +190,8 @@ class MarchRuleSolver {
   void weigh(int order);
   bool refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference);
   void start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak);
+  [[nodiscard]] bool lead_out() const;
+  bool hold(PairPressure& pressure, int side);
   void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak, PatchPoints& points);
 
   SigmaMesher mesher_;

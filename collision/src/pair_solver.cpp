@@ -101,13 +101,18 @@ bool PairSolver::thirds_press(const Job& job, const PairResult& out) {
   return press;
 }
 
-/// After a rule that did not fit; finds the third bodies that reach the overlap.
-void PairSolver::begin_anew(const Job& job, PairResult& out) {
-  out.clear();
+/// The third bodies that reach the overlap.
+void PairSolver::take_all_thirds(const Job& job) {
   third_bodies_.clear();
   for (const std::uint32_t c : third_) {
     if (job.bodies[c].field.bound(job.overlap).upper > 0.0) third_bodies_.push_back(&job.bodies[c]);
   }
+}
+
+/// After a rule that did not fit.
+void PairSolver::begin_anew(const Job& job, PairResult& out) {
+  out.clear();
+  take_all_thirds(job);
 }
 
 bool PairSolver::polar(const Job& job, PairResult& out) {
@@ -219,6 +224,22 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   out.summary.reason = reason;
 }
 
+/// Squeezed regions that columns from Sigma may not hold are filled as they are.
+void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
+  // Forces and moments are the sums on Sigma: how regions share them out among the parts of a body need not be better.
+  constexpr double kFinest = 1e-4, kToShare = 1e-2;
+  const double error = std::max(job.settings().error, job.settings().energy ? kFinest : kToShare);
+  PatchPoints& points = out.points;
+  if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
+  take_all_thirds(job);
+  const auto peak = static_cast<std::size_t>(std::max_element(points.pressure.begin(), points.pressure.end()) - points.pressure.begin());
+  for (const int side : {0, 1}) {
+    if (!points.unsure[side]) continue;
+    points.drop_region(side);
+    region_.fill({job.polar.pressure, side, third_bodies_, error}, job.overlap, points.normal[peak], points);
+  }
+}
+
 /// Where patches are looked for first.
 void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
   if (job.convex) {
@@ -259,11 +280,12 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite()) job.polar.faces = &overlap;
   find_patches(job, seeds);
   choose(job, out);
+  fill_unsure_regions(job, out);
 
   ContactSurface::Summary& summary = out.summary;
   summary.load = out.load;
   if (out.load > 0.0) summary.centre_of_pressure = out.first / out.load;
-  summary.energy = out.points.energy;
+  summary.energy = out.points.energy[0] + out.points.energy[1];
   summary.displaced_a = out.points.displaced[0];
   summary.displaced_b = out.points.displaced[1];
   summary.residual = out.points.residual / pressure.largest_modulus();

@@ -11,6 +11,7 @@
 #include "pair_result.h"
 #include "polar_patches.h"
 #include "sample_rule.h"
+#include "squeezed_region.h"
 #include "supple/collision/find_contacts.h"
 
 namespace supple::collision {
@@ -54,7 +55,9 @@ class PairSolver {
   bool march(const Job& job, PairResult& out);
   bool stand_in(const Job& job, bool have, PairResult& out);
   void choose(const Job& job, PairResult& out);
+  void take_all_thirds(const Job& job);
   void begin_anew(const Job& job, PairResult& out);
+  void fill_unsure_regions(const Job& job, PairResult& out);
   template <class Rule>
   void keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out) const;
 
@@ -62,6 +65,7 @@ class PairSolver {
   ImprintFinder imprint_;
   SampleRuleSolver samples_;
   MarchRuleSolver march_;
+  SqueezedRegion region_;
   std::vector<std::uint32_t> third_;
   std::vector<const ContactBody*> third_bodies_;
   std::vector<double> value_;

@@ -67,8 +67,9 @@ struct PatchPoints {
   std::vector<Vec3> volume_point;
   std::vector<double> volume_weight;
   std::vector<std::uint8_t> volume_side;
-  double energy = 0.0;
-  double displaced[2] = {0.0, 0.0};  ///< volumes of V_A and V_B
+  double energy[2] = {0.0, 0.0};     ///< integrals of the own pressure over V_A and V_B
+  double displaced[2] = {0.0, 0.0};  ///< volumes of these
+  bool unsure[2] = {false, false};   ///< whether columns from Sigma may miss some of them, or hold it twice
 
   void clear() {
     point.clear();
@@ -79,15 +80,36 @@ struct PatchPoints {
     volume_point.clear();
     volume_weight.clear();
     volume_side.clear();
-    energy = displaced[0] = displaced[1] = 0.0;
+    for (const int side : {0, 1}) {
+      energy[side] = displaced[side] = 0.0;
+      unsure[side] = false;
+    }
+  }
+
+  /// Takes all of a squeezed region away.
+  void drop_region(int side) {
+    energy[side] = displaced[side] = 0.0;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < volume_side.size(); ++i) {
+      if (volume_side[i] == side) continue;
+      volume_point[kept] = volume_point[i];
+      volume_weight[kept] = volume_weight[i];
+      volume_side[kept++] = volume_side[i];
+    }
+    volume_point.resize(kept);
+    volume_weight.resize(kept);
+    volume_side.resize(kept);
   }
 
   /// How much there is, to come back to.
   struct Mark {
     std::size_t points, volumes;
-    double residual, energy, displaced[2];
+    double residual, energy[2], displaced[2];
+    bool unsure[2];
   };
-  [[nodiscard]] Mark mark() const { return {point.size(), volume_point.size(), residual, energy, {displaced[0], displaced[1]}}; }
+  [[nodiscard]] Mark mark() const {
+    return {point.size(), volume_point.size(), residual, {energy[0], energy[1]}, {displaced[0], displaced[1]}, {unsure[0], unsure[1]}};
+  }
   void back_to(const Mark& mark) {
     point.resize(mark.points);
     normal.resize(mark.points);
@@ -97,9 +119,11 @@ struct PatchPoints {
     volume_weight.resize(mark.volumes);
     volume_side.resize(mark.volumes);
     residual = mark.residual;
-    energy = mark.energy;
-    displaced[0] = mark.displaced[0];
-    displaced[1] = mark.displaced[1];
+    for (const int side : {0, 1}) {
+      energy[side] = mark.energy[side];
+      displaced[side] = mark.displaced[side];
+      unsure[side] = mark.unsure[side];
+    }
   }
 };
 

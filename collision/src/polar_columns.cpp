@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "squeezed_region.h"
+
 namespace supple::collision {
 namespace {
 
@@ -117,17 +119,32 @@ bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
   return true;
 }
 
+/// Whether the body's pressure falls along all columns from where they begin. Where it rises first, Sigma lies beyond the middle of a body that may end
+/// elsewhere, too.
+bool PolarRuleSolver::lead_out(int side) const {
+  const std::vector<Vec3>& slope = side == 0 ? node_.slope_a : node_.slope_b;
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    const Vec3& way = column(i).way;
+    if (!(-slope[i].dot(way) > kLeastFall * slope[i].norm() * way.norm())) return false;
+  }
+  return true;
+}
+
 /// @param nodes  of Gauss along a column, or as many as would be as exact
 bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
   const bool from_ends = region == Region::Sums;
-  if (widest_[side] > kWidest || !start_columns(side)) return false;
+  const bool fits = widest_[side] <= kWidest && start_columns(side);
+  if (!pressure.field(side).convex() && !(fits && lead_out(side))) {
+    points.unsure[side] = true;
+    thickness_ += frame_.depth[side];
+    return true;
+  }
+  if (!fits) return false;
   if (spread_[side] > 0.0 || apex_[side]) nodes = kMostOnColumn;
   // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
   const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
   if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
-  const std::size_t n = node_.size();
   thickness_ += end_[side][summit_];
-  for (std::size_t i = 0; i < n; ++i) points.displaced[side] += weight_[i] * column(i).volume(end_[side][i]);
   if (from_ends) {
     add_energy_from_ends(pressure, nodes, side, points);
   } else {
@@ -136,7 +153,7 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, d
   return true;
 }
 
-/// The energy of a side, by the pressures and slopes at both ends of the columns, and by some between.
+/// Volume and energy of a side, these by the pressures and slopes at both ends of the columns, and by some between.
 void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points) {
   const std::size_t n = node_.size();
   const TwoEndRule& rule = two_end_rule(nodes - 2);
@@ -144,13 +161,14 @@ void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, in
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
     const Column& along = column(i);
+    points.displaced[side] += weight_[i] * along.volume(end_[side][i]);
     const double length = reached_[i], last = line_value_[i], slope = line_slope_[i].dot(along.way);
     const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
     const double width = along.width(0.0), width_there = along.width(length);
     const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.widens(0.0);
     const double last_slope = slope * width_there + last * along.widens(length);
     const double sum = rule.end * (pressure_[i] * width + last * width_there) + rule.slope * length * (first_slope - last_slope);
-    points.energy += weight_[i] * (length * sum + rest * width_there);
+    points.energy[side] += weight_[i] * (length * sum + rest * width_there);
   }
   if (between == 0) return;
   line_point_.resize(n * between);
@@ -162,12 +180,12 @@ void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, in
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < between; ++j) {
       const double width = column(i).width(reached_[i] * rule.node[j]);
-      points.energy += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
+      points.energy[side] += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
     }
   }
 }
 
-/// Points of a squeezed region, and its energy by them.
+/// Points of a squeezed region, and its sums by them.
 void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points) {
   const std::size_t n = node_.size();
   const GaussRule& gauss = gauss_rule(nodes);
@@ -177,16 +195,9 @@ void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, Pa
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       points.volume_point.push_back(node_.point[i] + (length * gauss.node[j]) * column(i).way);
       points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).width(length * gauss.node[j]));
-      points.volume_side.push_back(static_cast<std::uint8_t>(side));
     }
   }
-  const std::size_t count = points.volume_point.size() - begin;
-  line_value_.resize(count);
-  const auto added = std::span(points.volume_point).subspan(begin);
-  pressure.evaluate(side, added, line_value_);
-  for (std::size_t i = 0; i < count; ++i) {
-    points.energy += points.volume_weight[begin + i] * std::max(line_value_[i], 0.0);
-  }
+  add_to_region(pressure, side, begin, line_value_, points);
 }
 
 }  // namespace supple::collision

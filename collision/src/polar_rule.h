@@ -77,6 +77,7 @@ class PolarRuleSolver {
   /// Cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it.
   static constexpr double kUpright = 0.3;
   bool widen_columns(int side, const Vec3& outward, const Vec3& across);
+  [[nodiscard]] bool lead_out(int side) const;
   bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
   void add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points);
   void add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points);

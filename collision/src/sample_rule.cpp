@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "quadrature.h"
+#include "squeezed_region.h"
 
 namespace supple::collision {
 namespace {
@@ -355,7 +356,6 @@ void SampleRuleSolver::add_columns(PairPressure& pressure, int side, std::span<c
       const double t = column_[k].begin + length * gauss.node[j];
       points.volume_point.push_back(rays.at(r, t));
       points.volume_weight.push_back(rays.swept(r, t) * length * gauss.weight[j]);
-      points.volume_side.push_back(static_cast<std::uint8_t>(side));
       if (all.size() > 1) open_.push_back(rays.primitive[r]);
     }
   }
@@ -373,7 +373,7 @@ void SampleRuleSolver::add_columns(PairPressure& pressure, int side, std::span<c
       points.volume_weight[begin + i] *= sum > 0.0 ? own / sum : 0.0;
     }
   }
-  sum_columns(pressure, side, begin, points);
+  add_to_region(pressure, side, begin, value_, points);
 }
 
 /// The same for a body without rays, along its slope from the points on Sigma: exact where level sets are planes.
@@ -392,20 +392,9 @@ void SampleRuleSolver::add_columns_across(PairPressure& pressure, int side, Patc
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       points.volume_point.push_back(points.point[i] + (length * gauss.node[j]) * along);
       points.volume_weight.push_back(points.area[i] * std::abs(points.normal[i].dot(along)) * length * gauss.weight[j]);
-      points.volume_side.push_back(static_cast<std::uint8_t>(side));
     }
   }
-  sum_columns(pressure, side, begin, points);
-}
-
-void SampleRuleSolver::sum_columns(PairPressure& pressure, int side, std::size_t begin, PatchPoints& points) {
-  const auto added = std::span(points.volume_point).subspan(begin);
-  value_.resize(added.size());
-  pressure.evaluate(side, added, value_);
-  for (std::size_t i = 0; i < added.size(); ++i) {
-    points.displaced[side] += points.volume_weight[begin + i];
-    points.energy += points.volume_weight[begin + i] * std::max(value_[i], 0.0);
-  }
+  add_to_region(pressure, side, begin, value_, points);
 }
 
 bool SampleRuleSolver::solve(PairPressure& pressure, const ContactBody& a, const ContactBody& b,

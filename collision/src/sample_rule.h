@@ -73,7 +73,6 @@ class SampleRuleSolver {
   void for_contributions(int side, std::size_t point, const Vec3& x, const Use& use) const;
   void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, PatchPoints& points);
   void add_columns_across(PairPressure& pressure, int side, PatchPoints& points);
-  void sum_columns(PairPressure& pressure, int side, std::size_t begin, PatchPoints& points);
 
   std::array<const ContactBody*, 2> body_{};
   std::array<Rays, 2> rays_;

@@ -66,6 +66,44 @@ TEST(React, GivesEveryPartMinusTheDerivativeOfTheEnergy) {
   }
 }
 
+TEST(React, GivesPartsBeyondTheMiddleOfAStiffBodyMinusTheDerivativeOfTheEnergy) {
+  // By the midpoints of cells that stay where they are.
+  const std::vector<Vec3> soft{Vec3(-0.35, 0.0, 0.0), Vec3(0.3, 0.05, 0.02)}, stiff{Vec3(0.02, 0.1, 0.05)};
+  constexpr double kSoft = 1.0, kStiff = 10.0, kStep = 1e-2;
+  const Blobs ball(stiff, 1.0);
+  const auto energy = [&](const std::vector<Vec3>& at) {
+    constexpr int kCells = 100;
+    const Blobs blobs(at, 0.5);
+    const Box box = ball.field.surface_box();
+    const Vec3 cell = box.extent() / kCells;
+    double sum = 0.0;
+    for (int k = 0; k < kCells; ++k) {
+      for (int j = 0; j < kCells; ++j) {
+        for (int i = 0; i < kCells; ++i) {
+          const Vec3 x = box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
+          sum += std::max(std::min(kSoft * implicit::FieldView(blobs.field).value(x), kStiff * implicit::FieldView(ball.field).value(x)), 0.0) * cell.prod();
+        }
+      }
+    }
+    return sum;
+  };
+  const Blobs blobs(soft, 0.5);
+  Stage stage;
+  stage.add(blobs.field, soft, kSoft);
+  stage.add(ball.field, stiff, kStiff);
+  stage.solve({.error = 1e-3, .energy = false});
+  const std::vector<Vec3> force = stage.react()[0].force;
+  const double size = force[0].norm() + force[1].norm();
+  for (std::size_t k = 0; k < soft.size(); ++k) {
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<Vec3> back = soft, forth = soft;
+      back[k][axis] -= kStep;
+      forth[k][axis] += kStep;
+      EXPECT_NEAR(force[k][axis], -(energy(forth) - energy(back)) / (2.0 * kStep), 2e-2 * size) << k << ' ' << axis;
+    }
+  }
+}
+
 TEST(React, GivesABodyOfOnePartTheForceAndTorqueOfSigma) {
   // Parts away from the middles of their spheres, in motion, with friction and damping.
   const LinearSphere left{Vec3(-0.4, 0, 0), Linear{0.6, 1.0}}, right{Vec3(0.5, 0.2, 0.1), Linear{0.5, 2.0}};
