@@ -21,18 +21,9 @@ constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
 constexpr int kFewNodes = 3;           // through a squeezed region
-constexpr double kBeforeTheyMeet = 0.8;  // columns end, of the way
-constexpr double kWidest = 20.0;         // their ends, over where they begin
+constexpr double kWidest = 20.0;       // ends of columns, over where they begin
 constexpr int kMoreAcross = 2;         // columns out of an apex may go through most of the body
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
-
-/// The least t > 0 where c0 + t (c1 + t c2) vanishes, c0 > 0; infinity where it does not.
-double first_zero(const std::array<double, 3>& c) {
-  const double half = -0.5 * c[1], square = half * half - c[0] * c[2];
-  if (square < 0.0) return std::numeric_limits<double>::infinity();
-  const double root = half + std::sqrt(square);  // c2 t^2 - 2 half t + c0 = 0: t = c0 / root is the nearer one
-  return root > 0.0 ? c[0] / root : std::numeric_limits<double>::infinity();
-}
 
 int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
 
@@ -352,12 +343,13 @@ bool MarchRuleSolver::lead_out() const {
   return true;
 }
 
-/// Whether columns end before they meet or widen too much for their points, and within the other body, which ways out of an apex may leave.
+/// Whether columns do not widen too much for their points, and end within the other body, which ways out of an apex may leave. Where they meet, and from
+/// there on count as less than nothing, they hold what they enclose all the same.
 bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
   place_.clear();
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const Column& c = columns_[i];
-    if (!(c.width(c.at) / c.width(0.0) < kWidest) || !(apex_ || c.at < kBeforeTheyMeet * first_zero(c.swept))) return false;
+    if (!(std::abs(c.width(c.at)) < kWidest * std::abs(c.width(0.0)))) return false;
     place_.push_back(nodes_[i].point + c.at * c.way);
   }
   if (apex_) return true;

@@ -224,12 +224,15 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   out.summary.reason = reason;
 }
 
-/// Squeezed regions that columns from Sigma may not hold are filled as they are.
+/// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
 void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   // Forces and moments are the sums on Sigma: how regions share them out among the parts of a body need not be better.
-  constexpr double kFinest = 1e-4, kToShare = 1e-2;
-  const double error = std::max(job.settings().error, job.settings().energy ? kFinest : kToShare);
+  constexpr double kFinest = 1e-4, kToShare = 1e-2, kPoor = 1e-3;
+  const ContactSettings& settings = job.settings();
+  const double error = std::max(settings.error, settings.energy ? kFinest : kToShare);
   PatchPoints& points = out.points;
+  const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
+  for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || points.unsure[side]);
   if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
   take_all_thirds(job);
   const auto peak = static_cast<std::size_t>(std::max_element(points.pressure.begin(), points.pressure.end()) - points.pressure.begin());

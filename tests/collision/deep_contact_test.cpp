@@ -245,10 +245,12 @@ std::vector<DeepPair> deep_pairs() {
           {"stiff ring in ball", ring, 1e5, ball, 1e4, {Vec3(0.3, 0.01, 0.02), Quat::Identity()}},
           {"soft ring through plate", ring, 1e3, plate, 1e4, upright},
           {"stiff ring through plate", ring, 1e5, plate, 1e4, upright},
+          {"soft ring within plate", ring, 1e3, plate, 1e4, {Vec3(0.01, 0.02, 0.05), Quat::Identity()}},
           {"stiff ring within plate", ring, 1e5, plate, 1e4, {Vec3(0.01, 0.02, 0.0), Quat::Identity()}},
           {"ring in ring", ring, 1e3, ring, 1e4, leaning},
           {"ring as stiff as stick", ring, 1e4, stick, 1e4, leaning},
           {"two soft balls in ball", two, 1e3, ball, 1e4, {Vec3(0.01, 0.05, 0.03), Quat::Identity()}},
+          {"one of two soft balls beyond its middle", two, 1e3, ball, 1e4, {Vec3(0.01, 0.1, 0.03), Quat::Identity()}},
           {"ten soft balls in ten", benchmarks::ten_blobs(3), 1e3, benchmarks::ten_blobs(4), 1e4, {Vec3(0.03, 0.01, 0.02), Quat::Identity()}}};
 }
 
