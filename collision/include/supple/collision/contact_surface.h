@@ -79,7 +79,9 @@ struct ContactSurface {
     std::uint64_t points = 0;              ///< quadrature points on Sigma
     std::uint64_t evaluations = 0;         ///< field evaluations spent
   };
-  std::vector<Summary> summary;            ///< one per candidate pair that touches, sorted by bodies
+  /// One per candidate pair that touches, sorted by bodies. A body wholly within one that presses harder all over has no Sigma with it: no force, no entry,
+  /// and no energy, though it took some to get there (the pair is overloaded by then).
+  std::vector<Summary> summary;
 
   void clear();
 };
