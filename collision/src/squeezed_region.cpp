@@ -92,6 +92,11 @@ void SqueezedRegion::find_changes(const Lost& lost) {
 
 /// The sums of cells by their columns, whose points are appended.
 void SqueezedRegion::measure(const Lost& lost, std::span<Cell> cells) {
+  constexpr std::size_t kTogether = 32;  // as many places as stay near
+  for (std::size_t i = 0; i < cells.size(); i += kTogether) measure_block(lost, cells.subspan(i, std::min(kTogether, cells.size() - i)));
+}
+
+void SqueezedRegion::measure_block(const Lost& lost, std::span<Cell> cells) {
   const GaussRule& across = gauss_rule(kAcross);
   constexpr std::size_t kColumns = kAcross * kAcross;
   from_.clear();

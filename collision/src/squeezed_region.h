@@ -58,6 +58,7 @@ class SqueezedRegion {
   void find_margins(const Lost& lost, std::span<const Vec3> at);
   void find_changes(const Lost& lost);
   void measure(const Lost& lost, std::span<Cell> cells);
+  void measure_block(const Lost& lost, std::span<Cell> cells);
   void add_piece(std::size_t column, double low, double high);
   void quarter(const Lost& lost);
   bool choose(double error);
