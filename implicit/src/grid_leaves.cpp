@@ -96,6 +96,13 @@ std::uint64_t most_leaves(const GridOptions& options) { return std::max<std::uin
 
 BlockList band_leaves(const BlockRange& range, const GridOptions& options, std::uint32_t bodies, const Executor& executor,
                       const Decide& decide) {
+  if (options.lattice.cell < kLeastGridCell) {
+    throw Error(ErrorKind::Limit, {.place = "",
+                                   .key = "lattice.cell",
+                                   .expected = "expected a cell of a size that OpenVDB takes, whose smallest is " + three_digits(kLeastGridCell) + " m",
+                                   .found = three_digits(options.lattice.cell) + " m",
+                                   .hint = "use cells of at least " + three_digits(kLeastGridCell) + " m, or lengths in a larger unit"});
+  }
   const RefineOptions refine{.limit = most_leaves(options),
                              .look_factor = 8,  // up to eight for each that is kept
                              .last_node = kCells - 1,

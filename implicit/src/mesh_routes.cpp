@@ -8,6 +8,7 @@
 #include "field_index.h"
 #include "shapes.h"
 #include "supple/core/error.h"
+#include "supple/implicit/surface_grid.h"
 
 namespace supple::implicit {
 namespace {
@@ -165,6 +166,10 @@ RouteEstimate estimate_routes(const Skeleton& skeleton, std::span<const Box> sup
   const double value = is_blobs(skeleton) ? kSingleValue : kValue;
   estimate.cubes_ms = 1e-6 * (find + estimate.leaves * (at_nodes * value + kCubesLeaf));
   const double at_vertices = kLooksAtVertex * kGridVertices * estimate.overlap * kGradient;
+  if (cell < kLeastGridCell) {
+    estimate.openvdb_ms = std::numeric_limits<double>::infinity();  // there is no such grid
+    return estimate;
+  }
   estimate.openvdb_ms = 1e-6 * (find + estimate.leaves * (kBandLeaves * (at_nodes * kGradient + kGridLeaf) + at_vertices));
   return estimate;
 }

@@ -275,6 +275,42 @@ TEST(Intersect, MissesNoSurfaceOfAnyShape) {
   EXPECT_GT(hits, 80);
 }
 
+TEST(Intersect, MeetsTheSurfaceOfEveryBlendAndNothingElse) {
+  // Against 4,000 samples along each ray. Blends by gradients have no bound of |grad F| where two nodes meet, which must not count as a hit.
+  for (const BlendRule rule : {BlendRule::Graph, BlendRule::Ricci, BlendRule::Gradient}) {
+    int hits = 0, passes = 0;
+    for (const std::uint64_t seed : {71u, 72u, 73u}) {
+      Body body = random_body({.seed = seed, .parts = 6, .half_width = 0.7, .every_shape = true});
+      body.skeleton.blend.rule = rule;
+      if (rule == BlendRule::Graph) body.skeleton.blend.edge = {{0, 1, 1.0}, {1, 2, 0.5}, {3, 4, 1.0}};
+      body.place();
+      Random random(seed + 100);
+      constexpr int kSamples = 4000;
+      constexpr double kMost = 5.0;
+      for (int ray = 0; ray < 40; ++ray) {
+        const Vec3 origin = 2.2 * random.direction();
+        const Vec3 direction = (random.in_box(1.2) - origin).normalized();
+        const double at_start = FieldView(body.field).value(origin);
+        int first = 0;
+        while (first <= kSamples && (FieldView(body.field).value(origin + kMost * first / kSamples * direction) > 0.0) == (at_start > 0.0)) ++first;
+        const std::optional<double> t = intersect(body.field, origin, direction, kMost);
+        if (first <= kSamples) {
+          ASSERT_TRUE(t.has_value()) << static_cast<int>(rule) << ' ' << seed << ' ' << ray;
+          EXPECT_LE(*t, kMost * first / kSamples) << static_cast<int>(rule) << ' ' << seed << ' ' << ray;
+          ++hits;
+        } else {
+          ++passes;
+        }
+        if (t) {
+          EXPECT_LT(std::abs(FieldView(body.field).value(origin + *t * direction)), 1e-9) << static_cast<int>(rule) << ' ' << seed << ' ' << ray;
+        }
+      }
+    }
+    EXPECT_GT(hits, 30);
+    EXPECT_GT(passes, 10);
+  }
+}
+
 TEST(Intersect, MeetsAHalfSpace) {
   const HalfSpace ground{};
   const std::optional<double> t = intersect(ground, Vec3(0, 0, 2), Vec3(0.6, 0, -0.8), 100.0);

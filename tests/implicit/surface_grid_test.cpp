@@ -667,6 +667,23 @@ TEST(SurfaceGrid, RefusesMoreVoxelsThanAllowedAndNamesTheCellThatFits) {
   expect_error([&] { (void)make_surface_grid(below(0.0), options, Executor(1)); }, ErrorKind::Usage, "bounded box");
 }
 
+TEST(SurfaceGrid, RefusesCellsThatOpenVdbTakesForNone) {
+  // A transform whose determinant, cell^3, is below 3e-15 is singular to OpenVDB: 1.4423e-5 m.
+  const FunctionField ball = sphere(Vec3::Zero(), 1e-4);
+  GridOptions options = options_of(GridContent::SignedDistance);
+  options.lattice = {.origin = Vec3::Zero(), .cell = 1.46e-5};
+  const SurfaceGrid grid = make_surface_grid(ball, options, Executor(1));
+  EXPECT_GT(grid.active_voxels(), 0u);
+  const Body body = body_of({{wyvill_point(1e-3), Vec3::Zero()}});
+  const Skeleton& skeleton = body.skeleton;
+  const std::vector<Box>& support = body.placed.support;
+  EXPECT_TRUE(std::isfinite(estimate_routes(skeleton, support, options.lattice.cell).openvdb_ms));
+  options.lattice.cell = 1.44e-5;
+  expect_error([&] { (void)make_surface_grid(ball, options, Executor(1)); }, ErrorKind::Limit, "a size that OpenVDB takes");
+  EXPECT_TRUE(estimate_routes(skeleton, support, options.lattice.cell).prefers_cubes());
+  EXPECT_FALSE(std::isfinite(estimate_routes(skeleton, support, options.lattice.cell).openvdb_ms));
+}
+
 TEST(SurfaceGrid, RefusesFilesThatAreAbsentForeignOrChanged) {
   const Folder folder;
   expect_error([&] { (void)read_grid(folder / "none.vdb", "ball"); }, ErrorKind::Io, "none.vdb");

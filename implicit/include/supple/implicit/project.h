@@ -28,8 +28,9 @@ struct Projection {
 /// First point of F = 0 on the ray origin + t direction, t in [0, t_max]. A Field that sums kernels of distances is met exactly:
 /// intervals of the ray are dropped only where bounds of F or F' along the ray exclude a root, so neither thin nor grazed
 /// surfaces are missed; a ray that touches to within the rounding of F counts as meeting. Any other field: segment tracing
-/// by local gradient bounds (Galin et al. 2020), which never steps across, then a bracketed root; two roots nearer to each
-/// other than 1e-6 features may be missed. @pre direction is a unit vector
+/// by local gradient bounds (Galin et al. 2020), which never steps across, or over what bounds of F exclude, then a bracketed root; two
+/// roots nearer to each other than 1e-6 features may be missed, where blends by gradients leave gradients unbounded 1e-3 features.
+/// @pre direction is a unit vector
 [[nodiscard]] std::optional<double> intersect(const FieldView& field, const Vec3& origin, const Vec3& direction,
                                               double t_max);
 

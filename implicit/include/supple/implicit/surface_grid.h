@@ -22,6 +22,9 @@ enum class GridContent : std::uint8_t {
   SignedDistance,  ///< first-order distance -F/|grad F| [m], < 0 inside, clamped to the band; grid class level set
 };
 
+/// Smallest cell of a grid [m]: OpenVDB takes a transform as singular whose determinant is below 3e-15.
+inline constexpr double kLeastGridCell = 1.45e-5;
+
 struct GridOptions {
   Lattice lattice;
   GridContent content = GridContent::SignedDistance;
@@ -56,7 +59,8 @@ class SurfaceGrid {
 };
 
 /// Samples the band {|F| <= half_width cell |grad F|}: only leaves that bounds cannot exclude are evaluated.
-/// @throws Error{Limit} before allocating when the band could exceed max_voxels, naming the cell size that would fit.
+/// @throws Error{Limit} before allocating when the band could exceed max_voxels, naming the cell size that would fit, and for cells below
+/// kLeastGridCell.
 [[nodiscard]] SurfaceGrid make_surface_grid(const FieldView& field, const GridOptions& options,
                                             const Executor& executor);
 
