@@ -95,13 +95,17 @@ std::string meshing_of(const Scene& scene, const Model& model) {
   }
   if (d.error) return "marching cubes to the error asked for" + touching;
   const implicit::RouteEstimate routes = routes_of(model);
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), "auto: %s (by counts marching cubes %.2g ms, by way of OpenVDB %.2g ms)",
-                routes.prefers_cubes() ? "marching cubes" : "OpenVDB", routes.cubes_ms, routes.openvdb_ms);
+  const auto time = [](double ms) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.2g ms", ms);
+    return std::string(text.data());
+  };
+  const std::string other = std::isfinite(routes.openvdb_ms) ? "by way of OpenVDB " + time(routes.openvdb_ms) : "cells are too small for OpenVDB";
+  const std::string text = std::string("auto: ") + (routes.prefers_cubes() ? "marching cubes" : "OpenVDB") + " (by counts marching cubes " + time(routes.cubes_ms) + ", " + other + ")";
   const bool graph = std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) {
     return o.skeleton.blend.rule == implicit::BlendRule::Graph;
   });
-  return text.data() + std::string(graph ? ", vertices on creases" : "") + touching;
+  return text + (graph ? ", vertices on creases" : "") + touching;
 }
 
 /// Which rule samples the contact surface, and why.
