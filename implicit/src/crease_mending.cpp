@@ -157,16 +157,16 @@ class Mending {
     return any;
   }
 
-  /// An attempt depends on the triangles at the vertices of its hole, and on the holes that were filled there before it.
+  /// An attempt depends on the triangles at the vertices of its hole when the pass began. Holes that were filled there since let it fail, too,
+  /// and it is made again in the next pass.
   [[nodiscard]] bool fails_again(std::span<const std::uint32_t> vertices) const {
-    return std::none_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return touched_before_[v] || touched_[v]; });
+    return std::none_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return touched_before_[v]; });
   }
-  /// The last attempt, from a triangle, if no hole was filled near it before.
+  /// The last attempt, from a triangle.
   void keep_failed(std::uint32_t number) {
     around_.clear();
     for (const std::uint32_t i : hole_) {
       for (const std::uint32_t v : triangle_[i]) {
-        if (touched_[v]) return;
         if (std::exchange(seen_[v], attempt_) != attempt_) around_.push_back(v);
       }
     }

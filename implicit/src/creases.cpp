@@ -170,51 +170,22 @@ struct CreaseMesher::Impl {
   march::TriedLattices<CreaseMarcher> tried;
   Mesh alone;           ///< where nothing is kept of it
 
-  /// As CubeMesher::Impl::make_to_error
-  const Mesh* make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
-                            std::uint64_t most = ~std::uint64_t{0});
+  // For make_to_error.
+  static march::LevelPlan plan_of(double first, int level) { return {.cell = spacing_at(first, level)}; }
+  static const Mesh& mesh_on(CreaseMarcher& on, bool /*first_time*/, const march::LevelPlan& plan, const Field& field, const MarchOptions& options,
+                             const Executor& executor) {
+    return on.make(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
+  }
+  static double error_on(CreaseMarcher& on, const march::LevelPlan& /*plan*/, const Executor& executor) { return on.error(executor); }
+  static Mesh take_mesh(CreaseMarcher& on, const march::LevelPlan& /*plan*/) { return on.take_mesh(); }
+  static std::uint64_t bytes_beside() { return 0; }
+  static void forget_beside() {}
 };
 
 CreaseMesher::CreaseMesher(std::uint64_t most_kept) : most_kept_(most_kept) {}
 CreaseMesher::~CreaseMesher() = default;
 CreaseMesher::CreaseMesher(CreaseMesher&&) noexcept = default;
 CreaseMesher& CreaseMesher::operator=(CreaseMesher&&) noexcept = default;
-
-const Mesh* CreaseMesher::Impl::make_to_error(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
-                                              std::uint64_t most) {
-  const double first = first_cell(field, options.lattice.cell);
-  const Mesh* mesh = nullptr;
-  CreaseMarcher* last = nullptr;
-  double cell = 0.0;
-  std::uint64_t sampled = 0;  // of all meshes
-  march::TriedSize size(field, options.lattice.origin, most);
-  tried.begin_call();
-  tried.search({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
-    cell = spacing_at(first, level);
-    if (size.exceeds(level, cell, executor)) return LevelTry{};  // ends the search
-    CreaseMarcher& on = tried.use(cell).first;
-    last = &on;
-    mesh = &on.make(field, {.origin = options.lattice.origin, .cell = cell}, options.skip, executor);
-    const double error = on.error(executor);
-    count = on.counts();
-    count.error = error;
-    sampled += count.tiles_sampled;
-    size.add(level, *mesh);
-    tried.fit(cell);
-    return march::try_kept(error, *mesh, on, executor);
-  });
-  if (size.is_exceeded()) {
-    tried.clear();
-    return nullptr;
-  }
-  count.tiles_sampled = sampled;
-  const bool fits = tried.end_call(cell);
-  count.bytes = fits ? tried.bytes() - bytes_of(*mesh) : 0;
-  if (fits) return mesh;
-  alone = last->take_mesh();
-  tried.clear();
-  return &alone;
-}
 
 const Mesh& CreaseMesher::make(const Field& field, const MarchOptions& options, const Executor& executor, MarchCounts* counts) {
   SUPPLE_EXPECTS(field.packed().blend.rule() == BlendRule::Graph && options.refinements == 0 && options.error >= 0.0);
@@ -224,7 +195,7 @@ const Mesh& CreaseMesher::make(const Field& field, const MarchOptions& options, 
   impl_->alone = {};
   if (options.error > 0.0) {
     impl_->fixed = {};
-    return *impl_->make_to_error(field, options, executor, count);
+    return *march::make_to_error(*impl_, field, options, executor, count);
   }
   impl_->tried.clear();
   const Mesh& mesh = impl_->fixed.make(field, options.lattice, options.skip, executor);
@@ -236,7 +207,7 @@ void CreaseMesher::expect_error(const Field& field, const MarchOptions& options,
   SUPPLE_EXPECTS(field.packed().blend.rule() == BlendRule::Graph && options.error > 0.0);
   if (impl_ == nullptr) impl_ = std::make_unique<Impl>(most_kept_);
   MarchCounts count;
-  (void)impl_->make_to_error(field, options, executor, count, most_triangles);
+  (void)march::make_to_error(*impl_, field, options, executor, count, most_triangles);
 }
 
 void CreaseMesher::keep_at_most(std::uint64_t most_kept) {

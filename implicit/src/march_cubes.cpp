@@ -62,73 +62,28 @@ struct CubeMesher::Impl {
   march::TriedLattices<march::RefinedMarcher> tried;
   march::CutScratch scratch;
   Mesh alone;  ///< where nothing is kept of it
-  /// @param most  triangles of a mesh that is made; where the search asks for more, it ends. @return null then
-  const Mesh* make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
-                            std::uint64_t most = ~std::uint64_t{0});
+
+  // For make_to_error. Triangles are cut, up to twice, before cells get smaller.
+  static march::LevelPlan plan_of(double first, int level) {
+    constexpr int kRefinements = 2;
+    const int refinements = std::min(level / 2, kRefinements);
+    return {spacing_at(first, level - 2 * refinements), refinements};
+  }
+  const Mesh& mesh_on(march::RefinedMarcher& on, bool first_time, const march::LevelPlan& plan, const FieldView& field, const MarchOptions& options,
+                      const Executor& executor) {
+    if (first_time) on.march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
+    return on.mesh(plan.refinements, executor, scratch);
+  }
+  static double error_on(march::RefinedMarcher& on, const march::LevelPlan& plan, const Executor& executor) { return on.error(plan.refinements, executor); }
+  static Mesh take_mesh(march::RefinedMarcher& on, const march::LevelPlan& plan) { return on.take_mesh(plan.refinements); }
+  [[nodiscard]] std::uint64_t bytes_beside() const { return scratch.bytes(); }
+  void forget_beside() { scratch = {}; }
 };
 
 CubeMesher::CubeMesher(std::uint64_t most_kept) : impl_(std::make_unique<Impl>(most_kept)) {}
 CubeMesher::~CubeMesher() = default;
 CubeMesher::CubeMesher(CubeMesher&&) noexcept = default;
 CubeMesher& CubeMesher::operator=(CubeMesher&&) noexcept = default;
-
-namespace {
-
-/// How a mesh of a level is made: triangles are cut, up to twice, before cells get smaller.
-struct LevelPlan {
-  double cell = 0.0;  ///< [m]
-  int refinements = 0;
-};
-LevelPlan plan_of(double first_cell, int level) {
-  constexpr int kRefinements = 2;
-  const int refinements = std::min(level / 2, kRefinements);
-  return {spacing_at(first_cell, level - 2 * refinements), refinements};
-}
-
-}  // namespace
-
-const Mesh* CubeMesher::Impl::make_to_error(const FieldView& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
-                                            std::uint64_t most) {
-  const double first = first_cell(field, options.lattice.cell);
-  const Mesh* mesh = nullptr;
-  march::RefinedMarcher* last = nullptr;
-  LevelPlan plan;
-  std::uint64_t sampled = 0, values = 0;  // of all meshes
-  march::TriedSize size(field, options.lattice.origin, most);
-  tried.begin_call();
-  tried.search({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
-    plan = plan_of(first, level);
-    if (size.exceeds(level, plan.cell, executor)) return LevelTry{};  // ends the search
-    const auto [on, first_time] = tried.use(plan.cell);
-    last = &on;
-    if (first_time) {
-      on.march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
-      sampled += on.counts().tiles_sampled;
-      values += on.counts().kernel_values;
-    }
-    mesh = &on.mesh(plan.refinements, executor, scratch);
-    const double error = on.error(plan.refinements, executor);
-    count = on.counts();
-    count.refinements = plan.refinements;
-    count.error = error;
-    size.add(level, *mesh);
-    tried.fit(plan.cell, scratch.bytes());
-    return march::try_kept(error, *mesh, on, executor);
-  });
-  if (size.is_exceeded()) {
-    tried.clear();
-    return nullptr;
-  }
-  count.tiles_sampled = sampled;
-  count.kernel_values = values;
-  const bool fits = tried.end_call(plan.cell, scratch.bytes());
-  count.bytes = fits ? tried.bytes() + scratch.bytes() - bytes_of(*mesh) : 0;
-  if (fits) return mesh;
-  alone = last->take_mesh(plan.refinements);
-  tried.clear();
-  scratch = {};
-  return &alone;
-}
 
 const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                              MarchCounts* counts) {
@@ -138,7 +93,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   impl_->alone = {};
   if (options.error > 0.0) {
     impl_->fixed = {};
-    return *impl_->make_to_error(field, options, executor, count);
+    return *march::make_to_error(*impl_, field, options, executor, count);
   }
   impl_->tried.clear();
   impl_->fixed.march(field, options.lattice, options.skip, executor);
@@ -152,7 +107,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
 void CubeMesher::expect_error(const FieldView& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles) {
   SUPPLE_EXPECTS(options.error > 0.0);
   MarchCounts count;
-  (void)impl_->make_to_error(field, options, executor, count, most_triangles);
+  (void)march::make_to_error(*impl_, field, options, executor, count, most_triangles);
 }
 
 void CubeMesher::keep_at_most(std::uint64_t most_kept) { impl_->tried.keep_at_most(most_kept); }

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "bytes_of.h"
 #include "error_search.h"
 #include "march_mesher.h"
 #include "polygonise_blocks.h"
@@ -117,6 +118,61 @@ template <class Of>
     return tried(error, mesh, of.counts()).levels_left;
   };
   return now;
+}
+
+/// How a mesh of a level is made.
+struct LevelPlan {
+  double cell = 0.0;  ///< [m]
+  int refinements = 0;
+};
+
+/// Makes meshes of rising level until one has options.error, and keeps of them what may be kept.
+/// @param of    has `tried`, TriedLattices<OnLattice>; `alone`, the mesh where nothing is kept of it; plan_of(first cell, level);
+///              mesh_on(on, first_time, plan, field, options, executor), where first_time says that this call makes the first mesh of the
+///              lattice; error_on(on, plan, executor); take_mesh(on, plan); and bytes_beside() and forget_beside() of what is kept
+///              beside the lattices [byte]
+/// @param most  triangles of a mesh that is made; where the search asks for more, it ends. @return null then
+template <class Of, class AnyField>
+const Mesh* make_to_error(Of& of, const AnyField& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
+                          std::uint64_t most = ~std::uint64_t{0}) {
+  const double first = first_cell(field, options.lattice.cell);
+  const Mesh* mesh = nullptr;
+  decltype(&of.tried.use(first).first) last = nullptr;
+  LevelPlan plan;
+  std::uint64_t sampled = 0, values = 0;  // of all meshes
+  TriedSize size(field, options.lattice.origin, most);
+  of.tried.begin_call();
+  of.tried.search({.error = options.error, .first = first, .stated = first == options.lattice.cell}, [&](int level) {
+    plan = of.plan_of(first, level);
+    if (size.exceeds(level, plan.cell, executor)) return LevelTry{};  // ends the search
+    const auto [on, first_time] = of.tried.use(plan.cell);
+    last = &on;
+    mesh = &of.mesh_on(on, first_time, plan, field, options, executor);
+    const double error = of.error_on(on, plan, executor);
+    count = on.counts();
+    count.refinements = plan.refinements;
+    count.error = error;
+    if (first_time) {
+      sampled += count.tiles_sampled;
+      values += count.kernel_values;
+    }
+    size.add(level, *mesh);
+    of.tried.fit(plan.cell, of.bytes_beside());
+    return try_kept(error, *mesh, on, executor);
+  });
+  if (size.is_exceeded()) {
+    of.tried.clear();
+    return nullptr;
+  }
+  count.tiles_sampled = sampled;
+  count.kernel_values = values;
+  const bool fits = of.tried.end_call(plan.cell, of.bytes_beside());
+  count.bytes = fits ? of.tried.bytes() + of.bytes_beside() - bytes_of(*mesh) : 0;
+  if (fits) return mesh;
+  of.alone = of.take_mesh(*last, plan);
+  of.tried.clear();
+  of.forget_beside();
+  return &of.alone;
 }
 
 }  // namespace supple::implicit::march

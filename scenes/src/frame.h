@@ -123,6 +123,7 @@ struct StageContext {
   const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all
   const collision::StickState* sticks = nullptr;
   const std::function<bool(const Box&)>* shown = nullptr;  ///< which surfaces a mesh is wanted of, by their boxes; null: all
+  std::uint64_t most_kept = implicit::kMostKeptToError;  ///< of meshes to an error, by all meshers of bodies that touch no other together [byte]
 };
 
 /// The body whose smallest particle this is; or the first one after it.

@@ -462,7 +462,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const core::Pa
   mesh_divided(context, division, profile, frame, surfaces);
   std::vector<std::size_t> pieces(model.objects.size());
   for (const Body& body : bodies) ++pieces[body.object];
-  KeptBudget budget(implicit::kMostKeptToError);
+  KeptBudget budget(context.most_kept);
   for (const implicit::CubeMesher& mesher : frame.mesher) budget.add(mesher);
   for (const implicit::CreaseMesher& mesher : frame.creases) budget.add(mesher);
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {

@@ -128,6 +128,36 @@ inline Body random_body(const BodyOptions& options) {
   return body;
 }
 
+/// Primitives of one kind, turned and some of them stretched, each a part of its own.
+struct KindOptions {
+  std::uint64_t seed = 1;
+  ShapeKind shape = ShapeKind::Point;
+  Kernel kernel = Kernel::wyvill(0.5);
+  double taper = 1.0;
+  bool convolved = false;  ///< none is stretched then
+};
+inline constexpr std::uint32_t kPartsOfAKind = 24;
+inline Body body_of_kind(const KindOptions& kind) {
+  Random random(kind.seed);
+  Body body;
+  body.skeleton.part_count = kPartsOfAKind;
+  for (std::uint32_t i = 0; i < kPartsOfAKind; ++i) {
+    Primitive p;
+    p.part = i;
+    p.shape = kind.shape;
+    p.kernel = kind.kernel;
+    p.convolved = kind.convolved;
+    p.size = 0.5 * Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1));
+    set_details(p, random, 0.5);
+    p.taper = kind.taper;
+    if (kind.convolved) p.stretch = Vec3::Ones();
+    body.skeleton.primitive.push_back(p);
+    body.parts.push_back({random.in_box(0.9), random.rotation()});
+  }
+  body.place();
+  return body;
+}
+
 /// Primitives given in world axes, one part each.
 inline Body body_of(const std::vector<std::pair<Primitive, Vec3>>& primitives) {
   Body body;

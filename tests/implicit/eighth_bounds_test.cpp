@@ -24,27 +24,6 @@ struct Case {
 };
 std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
 
-/// Primitives of one kind, stretched, each a part of its own.
-Body body_of_case(const Case& c) {
-  constexpr std::uint32_t kParts = 24;
-  Random random(41);
-  Body body;
-  body.skeleton.part_count = kParts;
-  for (std::uint32_t i = 0; i < kParts; ++i) {
-    Primitive p;
-    p.part = i;
-    p.shape = c.shape;
-    p.kernel = c.kernel;
-    p.size = 0.5 * Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1));
-    testing::set_details(p, random, 0.5);
-    p.taper = 1.0;
-    body.skeleton.primitive.push_back(p);
-    body.parts.push_back({random.in_box(0.9), random.rotation()});
-  }
-  body.place();
-  return body;
-}
-
 Box eighth_of(const Box& box, unsigned c) {
   Box part = box;
   for (int k = 0; k < 3; ++k) ((c >> k & 1) != 0 ? part.lower : part.upper)[k] = box.centre()[k];
@@ -56,7 +35,7 @@ class EighthsOfBoxes : public ::testing::TestWithParam<Case> {};
 // All points of an eighth that is settled have its sign, or F rises there along the gradient of its middle; and where the bounds of single
 // boxes settle it by the same steps, so do these.
 TEST_P(EighthsOfBoxes, AreSettledAsTheyAreOneByOne) {
-  const Body body = body_of_case(GetParam());
+  const Body body = testing::body_of_kind({.seed = 41, .shape = GetParam().shape, .kernel = GetParam().kernel});
   ASSERT_TRUE(EighthBounds::know(body.field));
   Random random(6);
   EighthBounds bounds;

@@ -28,28 +28,13 @@ struct Case {
 std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
 
 Body body_of_case(const Case& c) {
-  constexpr std::uint32_t kParts = 24;
-  Random random(31);
-  Body body;
-  body.skeleton.part_count = kParts;
-  for (std::uint32_t i = 0; i < kParts; ++i) {
-    Primitive p;
-    p.part = i;
-    p.shape = c.shape;
-    p.kernel = c.kernel;
-    p.convolved = c.convolved;
-    p.size = 0.5 * Vec3(random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1));
-    testing::set_details(p, random, 0.5);
-    p.taper = c.taper;
-    if (c.convolved) p.stretch = Vec3::Ones();
-    body.skeleton.primitive.push_back(p);
-    body.parts.push_back({random.in_box(0.9), random.rotation()});
-    body.skeleton.blend.node.push_back(i / c.group);
-  }
+  using testing::kPartsOfAKind;
+  Body body = testing::body_of_kind({.seed = 31, .shape = c.shape, .kernel = c.kernel, .taper = c.taper, .convolved = c.convolved});
   Blend& blend = body.skeleton.blend;
   blend.rule = c.rule;
-  for (std::uint32_t a = 0; a < kParts / c.group; ++a) {
-    for (std::uint32_t b = a + 1; b < kParts / c.group; ++b) {
+  for (std::uint32_t i = 0; i < kPartsOfAKind; ++i) blend.node.push_back(i / c.group);
+  for (std::uint32_t a = 0; a < kPartsOfAKind / c.group; ++a) {
+    for (std::uint32_t b = a + 1; b < kPartsOfAKind / c.group; ++b) {
       if ((a + b) % 3 != 0) blend.edge.push_back({a, b, a % 2 == 0 ? 1.0 : 0.4});
     }
   }

@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "frame.h"
 #include "implicit/bodies.h"
 #include "kept_budget.h"
 #include "run_scenes.h"
@@ -73,6 +75,40 @@ TEST(KeptMeshes, ToAnErrorShareWhatTheyMayKeep) {
     expect_same(meshes, frame(~std::uint64_t{0}, error, fresh_cubes, fresh_creases).first);
     EXPECT_LE(kept, most);
     EXPECT_GT(kept, error == 0.005 ? all / 4 : 0u);
+  }
+}
+
+// Pairs of balls, with creases and without: meshers of a frame share one budget, in the frames after the first one, too.
+TEST(KeptMeshes, ToAnErrorOfAFrameShareWhatTheyMayKeep) {
+  for (const char* blend : {"", ", blend: {rule: graph}"}) {
+    std::string text = "schema: 1\nduration: 1 s\nframe_rate: 10\noutput: {meshing: {error: 0.0005, search: false}}\nobjects:\n";
+    for (int k = 0; k < 4; ++k) {
+      text += "  - {name: pair" + std::to_string(k) + ", particles: {arrange: line, count: 2, spacing: 0.08, mass: 0.1, at: [0, " + std::to_string(k) +
+              ", 0]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.2}}]" + blend + "}\n";
+    }
+    Simulation simulation = make(text);
+    const Model& model = simulation.model();
+    const Executor executor(1);
+    Profile unused{};
+    const auto kept_within = [&](std::uint64_t most) {
+      Frame frame(model, simulation.bodies());
+      StageContext context{model, simulation.bodies(), model.rules, executor, unused};
+      context.most_kept = most;
+      place_contact_bodies(context, simulation.state().particles, frame);
+      place_and_index_all(context, simulation.state().particles, frame);
+      std::uint64_t kept = 0;
+      for (int round = 0; round < 2; ++round) {
+        expect_same(polygonise_objects(context, simulation.state().particles, simulation.laws(), frame), simulation.meshes());
+        kept = 0;
+        for (const auto& mesher : frame.mesher) kept += mesher.kept_to_error();
+        for (const auto& mesher : frame.creases) kept += mesher.kept_to_error();
+        EXPECT_LE(kept, most) << blend << ' ' << round;
+      }
+      return kept;
+    };
+    const std::uint64_t all = kept_within(~std::uint64_t{0});
+    EXPECT_GT(all, 0u);
+    EXPECT_GE(kept_within(all / 2), all / 4);  // those of one body are a quarter of all
   }
 }
 
