@@ -156,6 +156,18 @@ TEST(DeepContact, OfABallInASoftPlaneHasItsEnergyHoweverDeep) {
   }
 }
 
+TEST(DeepContact, OfABallInASoftPlaneHasTheWorkOfItsForceAsEnergyToFineErrors) {
+  constexpr double kStep = 5e-3, kError = 1e-8;  // Simpson's rule: h^5 / 90 times a fourth derivative of about F / R^4
+  for (const double stiffness : {3e3, 3e4, 3e5}) {
+    for (const double height : {0.0, 0.1, 0.15, 0.19}) {
+      const auto at = [&](double more) { return ball_on_plane(height + more, kError, stiffness); };
+      const ContactSurface::Summary low = at(-kStep), middle = at(0.0), high = at(kStep);
+      const double work = kStep / 3.0 * (low.force.z() + 4.0 * middle.force.z() + high.force.z());
+      EXPECT_NEAR(high.energy - low.energy, work, 1e-6 * middle.energy) << stiffness << ' ' << height;
+    }
+  }
+}
+
 /// The integral of the smaller pressure of two bodies over a box, and the volumes where each is the smaller one, by the midpoints of cells.
 struct Overlap {
   double energy = 0.0;
