@@ -96,6 +96,13 @@ std::uint64_t most_leaves(const GridOptions& options) { return std::max<std::uin
 
 BlockList band_leaves(const BlockRange& range, const GridOptions& options, std::uint32_t bodies, const Executor& executor,
                       const Decide& decide) {
+  const RefineOptions refine{.limit = most_leaves(options),
+                             .look_factor = 8,  // up to eight for each that is kept
+                             .last_node = kCells - 1,
+                             .keep_inside = true,
+                             .counted = "voxels",
+                             .per_block = kLeafVoxels};
+  BlockList list = refine_blocks(range, options.lattice, bodies, executor, refine, decide);  // refuses far larger cells where there are too many
   if (options.lattice.cell < kLeastGridCell) {
     throw Error(ErrorKind::Limit, {.place = "",
                                    .key = "lattice.cell",
@@ -103,13 +110,7 @@ BlockList band_leaves(const BlockRange& range, const GridOptions& options, std::
                                    .found = three_digits(options.lattice.cell) + " m",
                                    .hint = "use cells of at least " + three_digits(kLeastGridCell) + " m, or lengths in a larger unit"});
   }
-  const RefineOptions refine{.limit = most_leaves(options),
-                             .look_factor = 8,  // up to eight for each that is kept
-                             .last_node = kCells - 1,
-                             .keep_inside = true,
-                             .counted = "voxels",
-                             .per_block = kLeafVoxels};
-  return refine_blocks(range, options.lattice, bodies, executor, refine, decide);
+  return list;
 }
 
 BlockList band_leaves(const FieldView& field, const GridOptions& options, const Executor& executor) {
