@@ -248,13 +248,14 @@ TEST(Meshes, ByWayOfAGridAreNotThoseOfCubes) {
 
 TEST(Meshes, ThatAreLeftOpenTakeTheCheaperWayWhichThePlanNames) {
   const auto reason = [](const std::string& meshing) {
-    const Simulation simulation = make(two_balls("output: {mesh: ply, meshing: " + meshing + "}"));
+    const Simulation simulation = make(two_balls("output: {mesh: ply, " + (meshing[0] == '{' ? "meshing: " + meshing : meshing) + "}"));
     const StepPlan plan = plan_step(simulation.scene(), simulation.model(), requested_outputs(simulation.scene()));
     return plan.stages[static_cast<std::size_t>(Stage::Polygonise)].reason;
   };
   EXPECT_NE(reason("{}").find("auto: marching cubes (by counts marching cubes "), std::string::npos) << reason("{}");
   EXPECT_NE(reason("{}").find("by way of OpenVDB "), std::string::npos);
   EXPECT_NE(reason("{method: openvdb}").find("volumeToMesh"), std::string::npos);
+  EXPECT_NE(reason("cell: 1e-5").find(" ms, cells are too small for OpenVDB)"), std::string::npos) << reason("cell: 1e-5");
   EXPECT_EQ(reason("{method: cubes}").find("auto"), std::string::npos);
 }
 
