@@ -137,14 +137,13 @@ class Mending {
     list_stars();
     touched_before_ = std::exchange(touched_, std::vector<bool>(mesh_.vertex_count(), false));
     touched_before_.resize(mesh_.vertex_count(), true);
-    gone_.assign(triangle_.size(), false);
     in_hole_.assign(triangle_.size(), 0);
     seen_.resize(mesh_.vertex_count(), 0);
     const Attempts last = std::exchange(failed_, {});
     bool any = false;
     std::size_t known = 0;
     for (const std::uint32_t i : crossed) {
-      if (gone_[i]) continue;
+      if (touches_filled(i)) continue;
       while (known < last.size() && last.number(known) < number_[i]) ++known;
       if (known < last.size() && last.number(known) == number_[i] && fails_again(last.vertices(known))) {
         failed_.add(number_[i], last.vertices(known));
@@ -214,18 +213,21 @@ class Mending {
     add_to_hole(start);
     for (int growth = 0; growth <= kGrowths; ++growth) {
       if (!(growth == 0 || grow_along_crease()) || !grow_across()) return false;
-      if (std::any_of(open_.begin(), open_.end(), [&](const BorderEdge& e) { return touched_[e.first]; })) return false;
       const std::optional<Border> border = find_border();
       if (border && fill(*border)) return true;
     }
     return false;
   }
 
+  /// Whether a triangle is no longer there or lies beside a hole that was filled in this pass.
+  [[nodiscard]] bool touches_filled(std::uint32_t triangle) const {
+    const Triangle& t = triangle_[triangle];
+    return touched_[t[0]] || touched_[t[1]] || touched_[t[2]];
+  }
   /// @return whether a triangle may be taken and the hole is not too large
   bool take(std::uint32_t triangle) {
-    if (gone_[triangle]) return false;
     if (in_hole_[triangle] != attempt_) add_to_hole(triangle);
-    return hole_.size() <= kMostTaken;
+    return hole_.size() <= kMostTaken && !touches_filled(triangle);
   }
   bool take_around(std::uint32_t v) {
     const auto around = star(v);
@@ -293,7 +295,6 @@ class Mending {
     std::vector<std::uint32_t> taken;
     for (const std::uint32_t i : hole_) {
       taken.push_back(number_[i]);
-      gone_[i] = true;
       for (const std::uint32_t v : triangle_[i]) touched_[v] = true;
     }
     steps_.replace(taken, out);
@@ -337,7 +338,6 @@ class Mending {
   std::vector<BorderEdge> open_;                   ///< its border
   std::vector<bool> touched_;                ///< vertices of holes that were filled in this pass
   std::vector<bool> touched_before_;         ///< the same of the last pass
-  std::vector<bool> gone_;
   Attempts failed_;                          ///< of this pass
   std::vector<std::uint32_t> around_;
   std::uint32_t attempt_ = 0;                ///< counts them

@@ -43,6 +43,8 @@ FootSample circle(double r, bool only_outside, const Vec3& y, Mat3* second) noex
 
 FootSample arc(const ShapeView& shape, const Vec3& y, Mat3* second) noexcept {
   const auto [cos, sin] = shape.pair;
+  // On its axis all of an arc is equally near: less than half of a circle lies to the side of its middle.
+  if (cos > 0.0 && y.x() == 0.0 && y.y() == 0.0) return from_foot(y - shape.size.x() * Vec3::UnitX());
   const double side = std::copysign(1.0, y.y());
   // sin(angle - half angle) <= 0: the nearest point of the circle lies on the arc.
   if (cos * std::abs(y.y()) - sin * y.x() <= 0.0) return circle(shape.size.x(), false, y, second);

@@ -146,7 +146,8 @@ void fields(Archive& archive, BlendDesc& d) {
   const auto only = [&d](const Rule& rule, std::initializer_list<BlendName> rules) { return rule.only("rule", d.rule, rules); };
   archive("rule", d.rule, {},
           "sum: everything blends; graph: what neighbours or within name blends, the rest meets in a crease; ricci: the n-norm; "
-          "gradient: surfaces blend where they run into each other and not where they are parallel or face each other");
+          "gradient: surfaces blend where they run into each other and not where they are parallel or face each other, "
+          "and the field jumps where the gradient of a group vanishes, as half way between two of its balls");
   archive("groups", d.groups, {}, "particles of one group sum; particles in none are groups of their own");
   archive("neighbours", d.neighbours, only(between(1.0, 1000.0, kNumber), {Graph}),
           "groups blend that hold particles up to this many apart in their order");

@@ -139,6 +139,23 @@ TEST(Shapes, ArcsAgreeWithBruteForce) {
   }
 }
 
+TEST(Shapes, ArcsOfLessThanHalfACirclePullTowardsTheirMiddleFromTheirAxis) {
+  for (const double half_angle : {0.4, 1.3, 2.2}) {
+    for (const double z : {-0.3, 0.0, 0.5}) {
+      const Primitive p = shape_of(ShapeKind::Arc, {0.8, half_angle, 0});
+      const ShapeSample at = evaluate(p, {0.0, 0.0, z});
+      EXPECT_NEAR(at.q, 0.64 + z * z, 1e-15);
+      // Of three quarters of a circle none is nearer to one side than to the other.
+      const Vec3 expected(half_angle < 1.5 ? -1.6 : 0.0, 0.0, 2.0 * z);
+      EXPECT_LE((at.gradient - expected).norm(), 1e-15) << at.gradient.transpose();
+      // (0.8 - x)^2 + z^2 from there on.
+      if (half_angle < 1.5) {
+        EXPECT_NEAR((evaluate(p, {1e-6, 0.0, z}).q - at.q) / 1e-6, at.gradient.x(), 2e-6);
+      }
+    }
+  }
+}
+
 TEST(Shapes, SupportOfRadiiByDirectionReachesAsFarAsItsBoxWhereOneRadiusIsSmall) {
   // Along x the support bulges beyond its radius 0.2 there: the largest n_x r(n) is 0.43.
   Primitive p = shape_of(ShapeKind::Directed, {0.2, 1.0, 1.0}, {{0.2, 1.0, 1.0}});

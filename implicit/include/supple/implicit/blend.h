@@ -19,7 +19,8 @@ enum class BlendRule : std::uint8_t {
   Graph,
   Ricci,     ///< (sum f_k^n)^(1/n), between sum and union (Ricci 1973)
   /// max over pairs of the arc operator, opened by the angle between the gradients: where surfaces run into each other
-  /// they blend, where they are parallel or face each other they unite (after Gourmel et al. 2013)
+  /// they blend, where they are parallel or face each other they unite (after Gourmel et al. 2013). Where a gradient vanishes, as
+  /// half way between two blobs of a node, the angle has no limit and the field jumps
   Gradient,
 };
 
