@@ -19,6 +19,7 @@
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/partition_mesher.h"
 #include "supple/implicit/solids.h"
+#include "supple/scenes/division.h"
 #include "supple/scenes/mesh_search.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/simulation.h"
@@ -152,35 +153,13 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
 /// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
 
-/// Bodies that contact divides from each other, and pieces of one object that still overlap, with their claims on space.
-struct Division {
-  std::vector<std::uint32_t> body;             ///< ascending
-  std::vector<collision::BodyPair> pair;       ///< which of them divide each other
-  std::vector<collision::ContactBody> placed;  ///< all bodies, the fixed ones last; claims view it
-  std::vector<collision::ClaimField> claim;    ///< of each `body`
-  std::vector<std::vector<std::size_t>> stranger;  ///< of each `body`, those in reach that it must pass through, ascending; empty: no body has any
-  /// Whether body[k] passes through another one.
-  [[nodiscard]] bool passes(std::size_t k) const { return !stranger.empty() && !stranger[k].empty(); }
-  /// The claims that may take of that of body[k].
-  [[nodiscard]] std::vector<std::size_t> others_of(std::size_t k) const;
-  Division() = default;
-  Division(Division&&) = default;
-  Division& operator=(Division&&) = default;
-};
-/// @param placed  all bodies as contact sees them  @param fields, surface  to be kept as long as the result
-[[nodiscard]] Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
-                              std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface);
-
-/// Bulges of a division that hold less than they should, by objects.
-[[nodiscard]] std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(const StageContext& context, const Division& division);
-
 /// All that the field of a body depends on, bit by bit; fixed ones follow those that move.
 void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words);
 
 /// Stage 9 on the deformed fields, one mesh an object, with the columns its look needs; of several pieces the meshes lie
 /// side by side in it. @param laws  those that nothing has broken
-[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
-                                                   const core::Interactions& laws, Frame& frame);
+[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const Division& division,
+                                                   const core::ParticleState& particles, const core::Interactions& laws, Frame& frame);
 
 /// The names of meshers' and grids' arguments become those of the scene's keys, or of what these follow from.
 /// @param cell, error  objects that may ask for these themselves; null: the scene does

@@ -370,23 +370,6 @@ void expect_error_alone(const MeshingDesc& d, const ObjectModel& object, const i
   }
 }
 
-/// What must not touch may overlap, and divides nothing there.
-void find_strangers(const Model& model, const std::vector<Body>& bodies, Division& division) {
-  std::vector<std::vector<std::size_t>> stranger(division.body.size());
-  bool any = false;
-  for (std::size_t k = 0; k < stranger.size(); ++k) {
-    const std::uint32_t a = bodies[division.body[k]].object;
-    for (std::size_t j = k + 1; j < stranger.size(); ++j) {
-      const std::uint32_t b = bodies[division.body[j]].object;
-      if (a == b || model.rules.allowed(a, b) || !division.claim[k].surface_box().overlaps(division.claim[j].surface_box())) continue;
-      stranger[k].push_back(j);
-      stranger[j].push_back(k);
-      any = true;
-    }
-  }
-  if (any) division.stranger = std::move(stranger);
-}
-
 }  // namespace
 
 void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words) {
@@ -400,65 +383,13 @@ void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std:
   }
 }
 
-Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
-                     std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface) {
-  Division out;
-  for (const auto& s : surface.summary) {
-    for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
-      if (body < bodies.size()) out.body.push_back(body);
-    }
-    if (s.bodies.b < bodies.size()) out.pair.push_back(s.bodies);
-  }
-  out.placed.assign(placed.begin(), placed.end());
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (bodies[i].skeleton.primitive.empty()) continue;
-    if (out.placed[i].pose.empty()) out.placed[i].field = fields[i];
-    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-      if (bodies[j].skeleton.primitive.empty()) continue;
-      if (!fields[i].surface_box().overlaps(fields[j].surface_box())) continue;
-      out.body.insert(out.body.end(), {i, j});
-      out.pair.push_back({i, j});
-    }
-  }
-  std::sort(out.body.begin(), out.body.end());
-  out.body.erase(std::unique(out.body.begin(), out.body.end()), out.body.end());
-  out.claim.reserve(out.body.size());
-  for (const std::uint32_t i : out.body) out.claim.emplace_back(out.placed, i, surface, model.bulge);
-  if (model.rules.allowed) find_strangers(model, bodies, out);
-  return out;
-}
-
-std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(const StageContext& context, const Division& division) {
-  const auto object = [&](std::uint32_t body) -> const std::string& { return object_name(context.model, context.bodies, body); };
-  std::map<std::string, std::map<std::string, ShortBulges>> found;
-  for (std::size_t k = 0; k < division.body.size(); ++k) {
-    for (const collision::BulgeVolume& bulge : division.claim[k].volumes()) {
-      if (!bulge.falls_short()) continue;
-      found[object(division.body[k])][object(bulge.other)].add({.count = 1, .held = bulge.held / bulge.displaced, .time = context.time});
-    }
-  }
-  return found;
-}
-
-std::vector<std::size_t> Division::others_of(std::size_t k) const {
-  std::vector<std::size_t> others;
-  for (std::size_t j = 0; j < claim.size(); ++j) {
-    if (j == k || !claim[j].surface_box().overlaps(claim[k].surface_box())) continue;
-    if (stranger.empty() || !std::binary_search(stranger[k].begin(), stranger[k].end(), j)) others.push_back(j);
-  }
-  return others;
-}
-
-std::vector<Mesh> polygonise_objects(const StageContext& context, const core::ParticleState& particles,
+std::vector<Mesh> polygonise_objects(const StageContext& context, const Division& division, const core::ParticleState& particles,
                                      const core::Interactions& laws, Frame& frame) {
   const Model& model = context.model;
   const std::vector<Body>& bodies = context.bodies;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
-  StageTimer timer(profile, true);
   std::vector<Mesh> surfaces(bodies.size());
   frame.missed = {};
-  const Division division = division_of(model, bodies, frame.field, frame.bodies, frame.surface);
-  frame.missed.short_bulges = find_short_bulges(context, division);
   mesh_divided(context, division, profile, frame, surfaces);
   std::vector<std::size_t> pieces(model.objects.size());
   for (const Body& body : bodies) ++pieces[body.object];
@@ -508,7 +439,7 @@ void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Bo
   if (d.method == MeshingName::Delaunay) return;
   const std::vector<Body>& bodies = simulation.bodies();
   const std::vector<implicit::Field>& fields = simulation.fields();
-  const Division division = division_of(model, bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  const Division& division = simulation.division();
   for (const DivisionGroup& group : groups_of(model, bodies, division)) {
     constexpr std::uint64_t kBlocksASecond = 1000;
     std::vector<implicit::FieldView> views;

@@ -114,11 +114,17 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
   }
   if (draws) draw(simulation, report, done);
   const StageClock clock(simulation.profile(Stage::Export));
-  if (meshes != nullptr) write_searches(options_.folder, name_, frame, simulation.searches());
+  const bool grids = files && outputs_.grids;
+  if (meshes != nullptr) {
+    write_searches(options_.folder, name_, frame, simulation.searches());
+  } else if (grids) {
+    (void)simulation.division();  // finds bulges that hold too little
+    write_short_bulges(options_.folder, name_, frame, simulation.searches());
+  }
   if (animation_) add_to_animation(simulation, *meshes);
   if (!files) return;
   if (outputs_.meshes) write_meshes(simulation, *meshes);
-  if (outputs_.grids) grids_.write(options_.folder, name_, frame, simulation);
+  if (grids) grids_.write(options_.folder, name_, frame, simulation);
   write_tables(simulation);
 }
 

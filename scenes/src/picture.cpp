@@ -331,20 +331,20 @@ struct Pieces {
 void ScenePictures::add_fields(Simulation& simulation) {
   const std::vector<Body>& bodies = simulation.bodies();
   const std::vector<implicit::Field>& fields = simulation.fields();
-  division_ = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  const Division& division = simulation.division();
   std::vector<Pieces> pieces(scene_.objects.size());
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     std::vector<Piece>& of_object = pieces[bodies[i].object].piece;
-    const auto at = std::lower_bound(division_.body.begin(), division_.body.end(), i);
-    if (at == division_.body.end() || *at != i) {
+    const auto at = std::lower_bound(division.body.begin(), division.body.end(), i);
+    if (at == division.body.end() || *at != i) {
       of_object.push_back({.own = fields[i], .scale = 1.0, .others = {}});
       continue;
     }
-    const auto k = static_cast<std::size_t>(at - division_.body.begin());
-    Piece piece{.own = division_.claim[k], .scale = 1.0 / division_.placed[i].material.modulus, .others = {}};
-    for (const std::size_t j : division_.others_of(k)) {
-      const implicit::FieldView claim = division_.claim[j];
+    const auto k = static_cast<std::size_t>(at - division.body.begin());
+    Piece piece{.own = division.claim[k], .scale = 1.0 / division.placed[i].material.modulus, .others = {}};
+    for (const std::size_t j : division.others_of(k)) {
+      const implicit::FieldView claim = division.claim[j];
       piece.others.push_back({claim, claim.surface_box()});
     }
     of_object.push_back(std::move(piece));

@@ -57,7 +57,6 @@ class ScenePictures {
   std::unique_ptr<render::Renderer> renderer_;
   render::RenderSettings settings_;
   std::unique_ptr<render::LayerRenderer> layer_renderer_;  ///< made when layers are first asked for
-  Division division_;  ///< behind the fields of items
   std::vector<render::Item> items_;
   std::vector<std::string> item_names_;
   double cell_ = 0.0;        ///< of the scene

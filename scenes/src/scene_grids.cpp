@@ -92,7 +92,7 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
   options.content = content_of(gridding);
   const bool distance = options.content == implicit::GridContent::SignedDistance;
   const std::vector<implicit::Field>& fields = simulation.fields();
-  const Division division = division_of(model, bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  const Division& division = simulation.division();
   BodyVersions versions(simulation, division, versions_);
   std::vector<const implicit::SurfaceGrid*> grids;
   std::map<std::uint64_t, implicit::SurfaceGrid> divided;
@@ -148,7 +148,7 @@ void expect_grid_sizes(Simulation& simulation, const Executor& executor) try {
   const GriddingDesc& gridding = simulation.scene().output.gridding;
   if (gridding.of == GriddedName::Scene) return;
   const std::vector<implicit::Field>& fields = simulation.fields();
-  const Division division = division_of(simulation.model(), bodies, fields, simulation.contact_bodies(), simulation.contacts());
+  const Division& division = simulation.division();
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     const ObjectModel& object = simulation.model().objects[bodies[i].object];

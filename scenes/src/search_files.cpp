@@ -48,6 +48,14 @@ SearchCounts searches_of(const ordered_json& json) {
   return counts;
 }
 
+/// Counts in a file; none where it is absent or not ours.
+SearchCounts read_counts(const fs::path& path) {
+  if (!fs::exists(path)) return {};
+  std::ifstream file(path);
+  const ordered_json json = ordered_json::parse(file, nullptr, false);
+  return json.is_object() ? searches_of(json) : SearchCounts{};
+}
+
 }  // namespace
 
 ordered_json json_of(const SearchCounts& counts) {
@@ -76,14 +84,17 @@ void write_searches(const fs::path& folder, const std::string& name, int frame, 
   io::write_atomically(path, std::string_view(json_of(counts).dump() + "\n"));
 }
 
+void write_short_bulges(const fs::path& folder, const std::string& name, int frame, const SearchCounts& counts) {
+  SearchCounts all = read_counts(folder / kFolder / numbered(name, frame, ".json"));
+  all.short_bulges = counts.short_bulges;
+  write_searches(folder, name, frame, all);
+}
+
 SearchCounts read_searches(const fs::path& folder, const std::string& name, const std::set<int>& frames, int last) {
   SearchCounts all;
   for (int frame = 1; frame <= last; ++frame) {
     const fs::path path = folder / kFolder / numbered(name, frame, ".json");
-    if (!(frames.empty() || frames.contains(frame)) || !fs::exists(path)) continue;
-    std::ifstream file(path);
-    const ordered_json json = ordered_json::parse(file, nullptr, false);
-    if (json.is_object()) all.add(searches_of(json));
+    if (frames.empty() || frames.contains(frame)) all.add(read_counts(path));
   }
   return all;
 }

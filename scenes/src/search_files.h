@@ -18,6 +18,9 @@ namespace supple::scenes {
 /// searches/NAME.0012.json, which is absent where there is nothing to tell. @throws Error{Io}
 void write_searches(const std::filesystem::path& folder, const std::string& name, int frame, const SearchCounts& counts);
 
+/// The same of a frame of which no meshes are made: what the file says of meshes stays.
+void write_short_bulges(const std::filesystem::path& folder, const std::string& name, int frame, const SearchCounts& counts);
+
 /// Of frames 1 to `last` that are among `frames`, or of all where that is empty. What is absent or none of ours counts as nothing.
 [[nodiscard]] SearchCounts read_searches(const std::filesystem::path& folder, const std::string& name, const std::set<int>& frames, int last);
 

@@ -262,6 +262,8 @@ const std::vector<implicit::Field>& Simulation::fields() {
   return impl_->pulled.field;
 }
 
+const Division& Simulation::division() { return impl_->pull_division(); }
+
 void Simulation::add_field_content(std::uint32_t body, ContentWords& words) {
   impl_->pull_fields();
   impl_->pull_contacts();

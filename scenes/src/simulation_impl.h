@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct Simulation::Impl {
   core::ForceSample pulled_sample;
   bool pulled_contacts = false;
   bool pulled_fields = false;
+  std::optional<Division> division;  ///< views `pulled`
   std::vector<Mesh> meshes;
   bool pulled_meshes = false;
   std::function<bool(const Box&)> shown;
@@ -113,6 +115,7 @@ struct Simulation::Impl {
   void drop_results();
   void pull_contacts();
   void pull_fields();
+  const Division& pull_division();
   const std::vector<Mesh>& pull_meshes();
   double contact_energy();
   Energies energies();

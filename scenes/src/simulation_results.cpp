@@ -5,6 +5,7 @@
 
 #include "audits.h"
 #include "camera.h"
+#include "divide.h"
 #include "picture.h"
 #include "scene_places.h"
 #include "supple/core/error.h"
@@ -34,12 +35,14 @@ void Simulation::Impl::place_cameras() {
 /// Nothing is pulled; meshers keep what they know, which holds for any state.
 void Simulation::Impl::renew_pulled() {
   DivisionMeshers dividing = std::move(pulled.dividing);
+  division.reset();
   pulled = Frame(model, bodies);
   pulled.dividing = std::move(dividing);
 }
 
 void Simulation::Impl::drop_results() {
   pulled_contacts = pulled_fields = pulled_meshes = false;
+  division.reset();
   meshes.clear();
   searches = {};
 }
@@ -69,13 +72,27 @@ void Simulation::Impl::pull_fields() {
   pulled_fields = true;
 }
 
+const Division& Simulation::Impl::pull_division() {
+  pull_fields();
+  if (division) return *division;
+  division = division_of(model, bodies, pulled.field, pulled.bodies, pulled.surface, executor);
+  SearchCounts found;
+  found.short_bulges = find_short_bulges(model, bodies, *division, time());
+  searches.add(found);
+  all_searches.add(found);
+  set_missed(scene.output.meshing, all_searches, warnings);
+  return *division;
+}
+
 const std::vector<Mesh>& Simulation::Impl::pull_meshes() {
   if (pulled_meshes) return meshes;
   pull_fields();
+  const StageTimer timer(profile[static_cast<std::size_t>(Stage::Polygonise)], true);
+  pull_division();
   StageContext wanted = context();
   if (shown) wanted.shown = &shown;
   try {
-    meshes = polygonise_objects(wanted, state.particles, laws, pulled);
+    meshes = polygonise_objects(wanted, *division, state.particles, laws, pulled);
     searches.add(pulled.missed);
     all_searches.add(pulled.missed);
     set_missed(scene.output.meshing, all_searches, warnings);

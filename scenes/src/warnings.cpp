@@ -246,7 +246,7 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
   for (const auto& [object, around] : all.short_bulges) {
     for (const auto& [body, lacking] : around) {
       std::array<char, 160> numbers{};
-      std::snprintf(numbers.data(), numbers.size(), " holds %.3g of what the contact displaces at t = %.6g s, and %llu in all meshes hold too little",
+      std::snprintf(numbers.data(), numbers.size(), " holds %.3g of what the contact displaces at t = %.6g s, and %llu in all frames hold too little",
                     lacking.held, lacking.time, static_cast<unsigned long long>(lacking.count));
       warnings.push_back(bulging + "the bulge of '" + object + "' around '" + body + '\'' + numbers.data() +
                          "; 'bulge_width' and how far the fields reach beyond the surfaces limit its height");

@@ -64,6 +64,29 @@ TEST_F(GridFiles, AreObjectsOfTheSceneOrBoth) {
   EXPECT_GT(implicit::read_grid(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
 }
 
+TEST_F(GridFiles, TellOfBulgesThatHoldTooLittle) {
+  // Without a mesh, too; once for both grids.
+  const std::string ball = ", mass: 1}\n    contact: {modulus: 1e4}\n    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]\n";
+  const auto told_by = [&](const std::string& width) {
+    scene_ = parse_scene("schema: 1\nduration: 1e-3\nobjects:\n  - name: low\n    particles: {at: [0, 0, 0]" + ball +
+                             "  - name: high\n    particles: {at: [0, 0.02, 0.165]" + ball + "contact: {bulge_volume: true, bulge_width: " + width +
+                             "}\noutput: {grid: vdb, cell: 0.02}\n",
+                         "balls.yaml", ".");
+    scene_.source = "balls.yaml";
+    scene_.output.gridding.of = GriddedName::Both;
+    RunOptions again = options();
+    again.overwrite = true;
+    std::vector<std::string> told = run_scene(scene_, again).warnings;
+    std::erase_if(told, [](const std::string& warning) { return !warning.starts_with("contact.bulge_volume: the bulge of "); });
+    EXPECT_EQ(fs::exists(folder_ / "searches/balls.0001.json"), !told.empty());
+    return told;
+  };
+  const std::vector<std::string> narrow = told_by("0.15");
+  ASSERT_EQ(narrow.size(), 2u);
+  EXPECT_NE(narrow[0].find(" and 1 in all frames hold too little"), std::string::npos) << narrow[0];
+  EXPECT_TRUE(told_by("auto").empty());
+}
+
 TEST_F(GridFiles, OfBodiesThatTouchEndWhereTheyDo) {
   scene_.output.gridding.of = GriddedName::Both;
   scene_.output.cell = 0.02;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "divide.h"
 #include "frame.h"
 #include "implicit/bodies.h"
 #include "kept_budget.h"
@@ -96,9 +97,10 @@ TEST(KeptMeshes, ToAnErrorOfAFrameShareWhatTheyMayKeep) {
       context.most_kept = most;
       place_contact_bodies(context, simulation.state().particles, frame);
       place_and_index_all(context, simulation.state().particles, frame);
+      const Division division = division_of(model, simulation.bodies(), frame.field, frame.bodies, frame.surface, executor);
       std::uint64_t kept = 0;
       for (int round = 0; round < 2; ++round) {
-        expect_same(polygonise_objects(context, simulation.state().particles, simulation.laws(), frame), simulation.meshes());
+        expect_same(polygonise_objects(context, division, simulation.state().particles, simulation.laws(), frame), simulation.meshes());
         kept = 0;
         for (const auto& mesher : frame.mesher) kept += mesher.kept_to_error();
         for (const auto& mesher : frame.creases) kept += mesher.kept_to_error();

@@ -278,7 +278,7 @@ TEST(ObjectMeshing, BulgesHoldTheVolumeOfEachBodyOrAWarningTells) {
   EXPECT_LT(narrow, whole - 0.5 * (whole - cut));
   ASSERT_EQ(told.size(), 2u);
   EXPECT_TRUE(told[0].starts_with("contact.bulge_volume: the bulge of 'high' around 'low' holds 0.")) << told[0];
-  EXPECT_TRUE(told[0].ends_with(" of what the contact displaces at t = 0 s, and 1 in all meshes hold too little; 'bulge_width' and how far the fields reach beyond the surfaces "
+  EXPECT_TRUE(told[0].ends_with(" of what the contact displaces at t = 0 s, and 1 in all frames hold too little; 'bulge_width' and how far the fields reach beyond the surfaces "
                                 "limit its height"))
       << told[0];
   const ShortBulges& low = lacking.at("low").at("high");
@@ -301,9 +301,22 @@ TEST(ObjectMeshing, BulgesThatHoldTooLittleAreToldOnceForAllFrames) {
   std::vector<std::string> warnings;
   for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(warnings[0].starts_with("contact.bulge_volume: the bulge of 'ball' around 'ground' holds 0.5 of what the contact displaces at t = 0.2 s, and 6 in all meshes"));
+  EXPECT_TRUE(warnings[0].starts_with("contact.bulge_volume: the bulge of 'ball' around 'ground' holds 0.5 of what the contact displaces at t = 0.2 s, and 6 in all frames"));
   set_missed(MeshingDesc{}, {}, warnings);
   EXPECT_TRUE(warnings.empty());
+  // Grids alone say nothing of meshes that were made before.
+  SearchCounts counts;
+  counts.pieces = 3;
+  write_searches(folder, "drop", 4, counts);
+  counts = {};
+  counts.short_bulges["ball"]["ground"] = {.count = 1, .held = 0.5, .time = 0.4};
+  for (const std::size_t bulges : {1u, 0u}) {
+    write_short_bulges(folder, "drop", 4, counts);
+    const SearchCounts both = read_searches(folder, "drop", {4}, 4);
+    EXPECT_EQ(both.pieces, 3u);
+    EXPECT_EQ(both.short_bulges.size(), bulges);
+    counts = {};
+  }
   std::filesystem::remove_all(folder);
 }
 

@@ -34,7 +34,7 @@ struct ShortBulges {
   }
 };
 
-/// Of the meshes of one state, or of several.
+/// Of the meshes of one state, or of several; bulges of its grids, too.
 struct SearchCounts {
   using Meshes = std::array<std::uint64_t, kUnsearchedNames.size()>;  ///< by reason
   std::uint64_t pieces = 0;     ///< found and added

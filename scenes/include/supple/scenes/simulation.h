@@ -21,6 +21,7 @@
 #include "supple/core/content_versions.h"
 #include "supple/core/mesh.h"
 #include "supple/implicit/delaunay.h"
+#include "supple/scenes/division.h"
 #include "supple/scenes/mesh_search.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/plan.h"
@@ -141,6 +142,8 @@ class Simulation {
   [[nodiscard]] const core::Loads& contact_loads();
   /// Fields of the bodies at the current state; valid until the next step.
   [[nodiscard]] const std::vector<implicit::Field>& fields();
+  /// Who takes which space where bodies touch, the surfaces of `meshes`: claims of deformed fields, bulges included. Kept until the next step.
+  [[nodiscard]] const Division& division();
   /// All that the field of one of `contact_bodies` depends on at the current state, bit by bit.
   void add_field_content(std::uint32_t body, ContentWords& words);
 
