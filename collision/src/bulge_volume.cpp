@@ -49,22 +49,42 @@ struct Spacing {
   int across = 2;
 };
 
+/// -p of another body along a line.
+struct Around {
+  std::size_t other = 0;  ///< of the quadrature
+  Cubic depth;
+};
+
 /// Lines through the cubes in which the bulge around one neighbour may hold something, one array per attribute.
 struct Lines {
   std::vector<double> weight;  ///< area for which a line stands times its length [m^3]
   std::vector<double> begin;   ///< where they leave the own body, or 0
-  std::vector<Cubic> depth;    ///< -p of the own body, which rises, then of the others of the quadrature, shape [lines * (1 + others)]
+  std::vector<Cubic> depth;    ///< -p of the own body, which rises
+  std::vector<std::size_t> last;  ///< of each line's `around`
+  std::vector<Around> around;     ///< the neighbour, then others that may have a part
   [[nodiscard]] std::size_t size() const { return weight.size(); }
+  [[nodiscard]] std::span<const Around> around_of(std::size_t line) const {
+    const std::size_t first = line == 0 ? 0 : last[line - 1];
+    return std::span(around).subspan(first, last[line] - first);
+  }
+  void clear() {
+    weight.clear();
+    begin.clear();
+    depth.clear();
+    last.clear();
+    around.clear();
+  }
 };
 
 class Quadrature {
  public:
   Quadrature(const BulgingBody& body, std::span<const WantedBulge> wanted) : body_(body), wanted_(wanted), profile_(wanted.size()) {
-    for (const WantedBulge& w : wanted) others_.push_back(w.other);
+    for (const WantedBulge& w : wanted) others_.push_back({.body = w.other, .reach = w.width});
     for (const std::uint32_t j : body.limiting) {
-      const auto place = std::find(others_.begin(), others_.end(), j);
-      limiting_.push_back(static_cast<std::size_t>(place - others_.begin()));
-      if (place == others_.end()) others_.push_back(j);
+      auto place = std::find_if(others_.begin(), others_.end(), [j](const Other& o) { return o.body == j; });
+      if (place == others_.end()) place = others_.insert(place, {.body = j});
+      place->limits = true;
+      place->reach = std::max(place->reach, body.most);
     }
   }
 
@@ -78,9 +98,7 @@ class Quadrature {
   [[nodiscard]] bool lay(std::size_t bulge, const Spacing& spacing, double height, Lines& out) const {
     std::vector<Vec3> cubes;
     if (!find_cubes(bulge, spacing, height, cubes)) return false;
-    out.weight.clear();
-    out.begin.clear();
-    out.depth.clear();
+    out.clear();
     for (std::size_t first = 0; first < cubes.size(); first += kBatch) {
       add_lines(bulge, std::span(cubes).subspan(first, std::min(kBatch, cubes.size() - first)), spacing, height, out);
     }
@@ -91,13 +109,19 @@ class Quadrature {
   [[nodiscard]] double volume(std::size_t bulge, const Lines& lines, bool& meets) const {
     double sum = 0.0;
     for (std::size_t line = 0; line < lines.size(); ++line) {
-      const double length = length_of(bulge, lines.begin[line], &lines.depth[line * (1 + others_.size())], meets);
+      const double length = length_of(bulge, lines.begin[line], lines.depth[line], lines.around_of(line), meets);
       if (length > 0.0) sum += lines.weight[line] * length;
     }
     return sum;
   }
 
  private:
+  struct Other {
+    std::uint32_t body = 0;
+    bool limits = false;  ///< no bulge reaches into it
+    double reach = 0.0;   ///< -p from where on it has no part [Pa]
+  };
+
   /// Centres of the cubes of a lattice about the centre of pressure.
   [[nodiscard]] bool find_cubes(std::size_t bulge, const Spacing& spacing, double height, std::vector<Vec3>& out) const {
     const WantedBulge& w = wanted_[bulge];
@@ -151,21 +175,34 @@ class Quadrature {
     [[nodiscard]] Vec3 at(double t) const { return from + t * (to - from); }
   };
 
-  /// -p along pieces of lines, shape [pieces * (1 + others)].
-  [[nodiscard]] std::vector<Cubic> depths(std::span<const Piece> pieces) const {
-    const std::size_t each = 1 + others_.size();
+  /// -p of a body along pieces of lines, shape [pieces].
+  [[nodiscard]] static std::vector<Cubic> depths(const ContactBody& body, std::span<const Piece> pieces) {
     std::vector<Vec3> end, slope(2 * pieces.size());
     std::vector<double> value(2 * pieces.size());
+    end.reserve(2 * pieces.size());
     for (const Piece& piece : pieces) end.insert(end.end(), {piece.from, piece.to});
-    std::vector<Cubic> depth(pieces.size() * each);
-    for (std::size_t which = 0; which < each; ++which) {
-      const ContactBody& body = body_.bodies[which == 0 ? body_.body : others_[which - 1]];
-      const double scale = -body.material.modulus;
-      body.field.evaluate(end, value, slope);
-      for (std::size_t k = 0; k < pieces.size(); ++k) {
-        const Vec3 along = scale * (pieces[k].to - pieces[k].from);
-        depth[k * each + which] = Cubic(scale * value[2 * k], along.dot(slope[2 * k]), scale * value[2 * k + 1], along.dot(slope[2 * k + 1]));
-      }
+    body.field.evaluate(end, value, slope);
+    const double scale = -body.material.modulus;
+    std::vector<Cubic> depth;
+    depth.reserve(pieces.size());
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+      const Vec3 along = scale * (pieces[k].to - pieces[k].from);
+      depth.emplace_back(scale * value[2 * k], along.dot(slope[2 * k]), scale * value[2 * k + 1], along.dot(slope[2 * k + 1]));
+    }
+    return depth;
+  }
+
+  /// The same of all others of the quadrature; none of those that have no part in a box around the pieces.
+  [[nodiscard]] std::vector<std::vector<Cubic>> depths_around(std::size_t bulge, std::span<const Piece> pieces) const {
+    Box box;
+    for (const Piece& piece : pieces) {
+      box.include(piece.from);
+      box.include(piece.to);
+    }
+    std::vector<std::vector<Cubic>> depth(others_.size());
+    for (std::size_t j = 0; j < others_.size() && !pieces.empty(); ++j) {
+      const ContactBody& body = body_.bodies[others_[j].body];
+      if (j == bulge || -body.material.modulus * body.field.bound(box).upper < others_[j].reach) depth[j] = depths(body, pieces);
     }
     return depth;
   }
@@ -191,30 +228,34 @@ class Quadrature {
       }
     }
     // Only the way from the surface to the highest bulge counts: cubics through its ends.
-    const std::size_t each = 1 + others_.size();
     const double width = effective_width(wanted_[bulge].width, height, wanted_[bulge].stiffness), most = std::min(others_most(bulge) + height, body_.most);
-    const std::vector<Cubic> whole = depths(line);
+    const std::vector<Cubic> whole = depths(own, line), away = depths(body_.bodies[wanted_[bulge].other], line);
     std::vector<Piece> piece;
     std::vector<std::uint8_t> begins;  // 1: at the surface
     for (std::size_t k = 0; k < line.size(); ++k) {
-      const Cubic* of = &whole[k * each];
-      const bool within = of[0].at(0.0) < 0.0;
-      if (of[0].at(0.0) >= most || of[0].at(1.0) <= 0.0) continue;
-      const Interval range = of[1 + bulge].range();
+      const Cubic& of = whole[k];
+      const bool within = of.at(0.0) < 0.0;
+      if (of.at(0.0) >= most || of.at(1.0) <= 0.0) continue;
+      const Interval range = away[k].range();
       if (range.lower >= width || range.upper <= 0.0) continue;
-      const double begin = within ? where(of[0], 0.0, 0.0) : 0.0, end = of[0].at(1.0) > most ? where(of[0], most, begin) : 1.0;
+      const double begin = within ? where(of, 0.0, 0.0) : 0.0, end = of.at(1.0) > most ? where(of, most, begin) : 1.0;
       if (!(begin < end)) continue;
       piece.push_back({line[k].at(begin), line[k].at(end)});
       begins.push_back(within ? 1 : 0);
     }
-    const std::vector<Cubic> depth = depths(piece);
+    const std::vector<Cubic> depth = depths(own, piece);
+    const std::vector<std::vector<Cubic>> around = depths_around(bulge, piece);
     const double area = size * size / (across * across);
     for (std::size_t k = 0; k < piece.size(); ++k) {
-      const Cubic& u = depth[k * each];
       out.weight.push_back(area * (piece[k].to - piece[k].from).norm());
-      out.begin.push_back(begins[k] != 0 && u.c1 > 0.0 ? -u.c0 / u.c1 : 0.0);
+      out.begin.push_back(begins[k] != 0 && depth[k].c1 > 0.0 ? -depth[k].c0 / depth[k].c1 : 0.0);
+      out.depth.push_back(depth[k]);
+      out.around.push_back({bulge, around[bulge][k]});
+      for (std::size_t j = 0; j < others_.size(); ++j) {
+        if (j != bulge && !around[j].empty() && around[j][k].range().lower < others_[j].reach) out.around.push_back({j, around[j][k]});
+      }
+      out.last.push_back(out.around.size());
     }
-    out.depth.insert(out.depth.end(), depth.begin(), depth.end());
   }
 
   [[nodiscard]] double others_most(std::size_t bulge) const {
@@ -227,17 +268,19 @@ class Quadrature {
     double all = 0.0, own = 0.0;
   };
   /// Of all bulges together, and the share of one of them.
-  [[nodiscard]] Lift lift(std::size_t bulge, const Cubic* depth, double t, bool& meets) const {
+  [[nodiscard]] Lift lift(std::size_t bulge, std::span<const Around> around, double t, bool& meets) const {
     Lift out;
-    for (std::size_t k = 0; k < profile_.size(); ++k) {
-      const double h = profile_[k].value(depth[1 + k].at(t));
+    double limit = body_.most;
+    for (const Around& a : around) {
+      const double x = a.depth.at(t);
+      if (others_[a.other].limits) limit = std::min(limit, x);
+      if (a.other >= profile_.size()) continue;
+      const double h = profile_[a.other].value(x);
       out.all += h;
-      if (k == bulge) out.own = h;
+      if (a.other == bulge) out.own = h;
     }
     if (!(out.own > 0.0)) return {};
     meets = meets || out.all > out.own;
-    double limit = body_.most;
-    for (const std::size_t j : limiting_) limit = std::min(limit, depth[1 + j].at(t));
     if (limit < out.all) {
       limit = std::max(limit, 0.0);
       out.own *= limit / out.all;
@@ -247,21 +290,20 @@ class Quadrature {
   }
 
   /// Length of the part of a line in {p < 0 < p^}, times the share of a bulge in the sum there.
-  [[nodiscard]] double length_of(std::size_t bulge, double begin, const Cubic* depth, bool& meets) const {
+  [[nodiscard]] double length_of(std::size_t bulge, double begin, const Cubic& own, std::span<const Around> around, bool& meets) const {
     double most = 0.0;
     for (const BulgeProfile& h : profile_) most += h.height;
     most = std::min(most, body_.most);
-    const Cubic& own = depth[0];
     if (own.at(0.0) >= most) return 0.0;
     const double end = own.at(1.0) > most ? where(own, most, begin) : 1.0;
     if (!(begin < end)) return 0.0;
-    const Cubic& away = depth[1 + bulge];
+    const Cubic& away = around.front().depth;
     if (std::min(away.at(begin), away.at(end)) >= profile_[bulge].width) return 0.0;
     constexpr int kParts = 6;
     const double step = (end - begin) / kParts;
     double length = 0.0;
     const auto excess = [&](double t, Lift& up) {
-      up = lift(bulge, depth, t, meets);
+      up = lift(bulge, around, t, meets);
       return up.all - own.at(t);
     };
     const auto share = [](const Lift& up) { return up.all > 0.0 ? up.own / up.all : 0.0; };
@@ -298,8 +340,7 @@ class Quadrature {
   const BulgingBody& body_;
   std::span<const WantedBulge> wanted_;
   std::vector<BulgeProfile> profile_;
-  std::vector<std::uint32_t> others_;   ///< those with bulges first
-  std::vector<std::size_t> limiting_;   ///< places in `others_`
+  std::vector<Other> others_;  ///< those with bulges first, in their order
 };
 
 /// One bulge on its way to its height.
@@ -364,7 +405,7 @@ void refine(const Quadrature& quadrature, std::size_t k, const WantedBulge& want
 
 std::vector<FoundBulge> find_bulges(const BulgingBody& body, std::span<const WantedBulge> wanted) {
   constexpr int kMostRounds = 20;
-  constexpr double kStill = 1e-2 * kTolerance;
+  constexpr double kStill = 1e-2 * kTolerance;  // once the lines are settled
   Quadrature quadrature(body, wanted);
   std::vector<Search> search(wanted.size());
   for (std::size_t k = 0; k < wanted.size(); ++k) {
@@ -377,9 +418,9 @@ std::vector<FoundBulge> find_bulges(const BulgingBody& body, std::span<const Wan
       moved = false;
       for (std::size_t k = 0; k < wanted.size(); ++k) {
         if (search[k].solved && !search[k].meets) continue;
-        const double before = quadrature.height(k);
-        solve(quadrature, k, wanted[k], kStill, search[k]);
-        moved = moved || (search[k].meets && std::abs(quadrature.height(k) - before) > kStill * before);
+        const double before = quadrature.height(k), still = search[k].settled ? kStill : kTolerance;
+        solve(quadrature, k, wanted[k], still, search[k]);
+        moved = moved || (search[k].meets && std::abs(quadrature.height(k) - before) > still * before);
       }
     }
     if (level == kFinest || std::all_of(search.begin(), search.end(), [](const Search& s) { return s.settled; })) break;
