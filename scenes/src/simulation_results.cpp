@@ -75,7 +75,7 @@ const std::vector<Mesh>& Simulation::Impl::pull_meshes() {
   StageContext wanted = context();
   if (shown) wanted.shown = &shown;
   try {
-    meshes = polygonise_objects(wanted, state.particles, laws, pulled);
+    meshes = polygonise_objects(wanted, state, laws, pulled);
     searches.add(pulled.missed);
     all_searches.add(pulled.missed);
     set_missed(scene.output.meshing, all_searches, warnings);
