@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <numbers>
@@ -274,6 +275,26 @@ TEST(HausdorffDistance, IsThatOfPlaneFigures) {
   EXPECT_NEAR(one_sided_hausdorff_distance(square(0), square(0, 2.0), 1e-6), 0.0, 1e-6);
   EXPECT_EQ(one_sided_hausdorff_distance(Mesh{}, square(0), 1e-6), 0.0);
   EXPECT_TRUE(std::isinf(one_sided_hausdorff_distance(square(0), Mesh{}, 1e-6)));
+}
+
+// A segment in three orders of its corners, and a point, above a triangle.
+TEST(HausdorffDistance, OfTrianglesWithoutAreaIsThatOfSegmentsAndPoints) {
+  constexpr double kError = 1e-4;
+  Mesh flat;
+  flat.position = {{-10, -10, 0}, {10, -10, 0}, {0, 20, 0}};
+  flat.triangle = {{0, 1, 2}};
+  Mesh thin;
+  thin.position = {{0, 0, 1}, {1, 0, 2}, {2, 0, 3}};
+  for (const std::array<std::uint32_t, 3>& t : {std::array<std::uint32_t, 3>{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {2, 2, 0}}) {
+    thin.triangle = {t};
+    EXPECT_NEAR(one_sided_hausdorff_distance(thin, flat, kError), 3.0, kError);
+    Mesh end;
+    end.position = {{2, 0, 3}, {0, 0, 1}};
+    end.triangle = {{0, 0, 0}};
+    EXPECT_NEAR(one_sided_hausdorff_distance(end, thin, kError), 0.0, kError);
+    EXPECT_NEAR(one_sided_hausdorff_distance(thin, end, kError), std::sqrt(8.0), kError);
+    EXPECT_NEAR(one_sided_hausdorff_distance(end, flat, kError), 3.0, kError);
+  }
 }
 
 TEST(HausdorffDistance, ShowsAMissedPart) {
