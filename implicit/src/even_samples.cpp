@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kRemove = 0.5;           ///< samples nearer than this [spacings] are one too many
 constexpr double kAdd = 0.7;              ///< a place farther than this from all samples of its side gets one
-constexpr double kCell = 1.0 / 6.0;       ///< of the lattice whose vertices are such places: 0.7 + sqrt(3) / 6 < 1
+constexpr double kCell = 1.0 / 6.0;       ///< of the lattice whose vertices are such places, at most: 0.7 + sqrt(3) / 6 < 1
+constexpr double kCellOfFeature = 0.5;    ///< no ball of the surface passes through a cell of half the feature size
 constexpr double kFarthestMove = 0.5;     ///< a sample whose surface went farther away is lost
 constexpr double kSpacingByDensity = 1.28;  ///< d sqrt(n) of n samples a square metre on a plane, measured
 constexpr std::size_t kSamplesPerTask = 64;
@@ -100,13 +101,19 @@ double even_spacing(double density) {
 }
 
 void EvenSampler::expect_size(const Field& field, const Executor& executor) const {
-  expect_marchable(field, {.cell = kCell * spacing_}, executor);
+  expect_marchable(field, {.cell = cell(field)}, executor);
 }
+
+double EvenSampler::cell(const Field& field) const {
+  return is_cell_of_feature(field) ? kCellOfFeature * field.feature_size() : kCell * spacing_;
+}
+
+bool EvenSampler::is_cell_of_feature(const Field& field) const { return kCellOfFeature * field.feature_size() < kCell * spacing_; }
 
 EvenSampleCounts EvenSampler::update(const Field& field, std::span<const Pose> parts, const Executor& executor,
                                      EvenSampleSet& set) {
   EvenSampleCounts count;
-  const Mesh& mesh = mesher_.make(field, {.lattice = {.cell = kCell * spacing_}}, executor);
+  const Mesh& mesh = mesher_.make(field, {.lattice = {.cell = cell(field)}}, executor);
   const MeshReport report = inspect(mesh);
   count.remade = set.size() > 0 && (report.components != set.components || report.euler_characteristic != set.euler_characteristic);
 

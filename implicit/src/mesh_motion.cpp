@@ -7,14 +7,22 @@
 
 namespace supple::implicit {
 
-void add_motion(const FieldView& field, std::span<const PartMotion> parts, const Executor& executor, Mesh& mesh) {
+void add_motion(const FieldView& field, std::span<const PartMotion> parts, const Executor& executor, Mesh& mesh,
+                const FieldMoments* moments) {
+  SUPPLE_EXPECTS(moments == nullptr || moments->apart > 0.0);
   constexpr std::size_t kBatch = 256;
   const std::size_t n = mesh.vertex_count();
   std::array<std::vector<double>, 4> column;
   for (auto& values : column) values.assign(n, 0.0);
   executor.for_blocks(n, kBatch, [&](std::size_t begin, std::size_t end) {
     thread_local FieldParts shares;
-    field.evaluate_parts(std::span<const Vec3>(mesh.position).subspan(begin, end - begin), shares);
+    std::array<double, kBatch> before, after;
+    const auto points = std::span<const Vec3>(mesh.position).subspan(begin, end - begin);
+    field.evaluate_parts(points, shares);
+    if (moments != nullptr) {
+      moments->before.evaluate(points, std::span(before).first(points.size()));
+      moments->after.evaluate(points, std::span(after).first(points.size()));
+    }
     for (std::size_t v = begin; v < end; ++v) {
       const Vec3& x = mesh.position[v];
       double sum = 0.0, rate = 0.0, largest = 0.0;
@@ -35,6 +43,7 @@ void add_motion(const FieldView& field, std::span<const PartMotion> parts, const
       }
       if (!(sum > 0.0)) continue;
       velocity /= sum;
+      if (moments != nullptr) rate = (after[v - begin] - before[v - begin]) / moments->apart;
       const double slope2 = gradient.squaredNorm();
       if (slope2 > 0.0) velocity -= (rate + velocity.dot(gradient)) / slope2 * gradient;
       for (int k = 0; k < 3; ++k) column[static_cast<std::size_t>(k)][v] = velocity[k];

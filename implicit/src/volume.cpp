@@ -277,21 +277,26 @@ Primitive scaled(const Primitive& primitive, double scale) {
 void VolumeState::save(StateWriter& out) const {
   out.write(scale);
   out.write(volume);
+  out.write(rate);
 }
 void VolumeState::load(StateReader& in) {
   in.read(scale);
   in.read(volume);
+  in.read(rate);
 }
 void VolumeState::hash(Hasher& hasher) const {
   hasher.add(scale);
   hasher.add(volume);
+  hasher.add(rate);
 }
 
 void control_volume(const VolumeControl& control, double volume, double dt, VolumeState& state) noexcept {
   constexpr double kLargestChange = 0.02, kLargestGain = 1.0 / 3.0;
   const double change = state.volume > 0.0 ? volume - state.volume : 0.0;
   const double growth = (std::min(control.rate * dt, kLargestGain) * (control.target - volume) - control.damping * change) / control.target;
-  state.scale = std::clamp(state.scale * (1.0 + std::clamp(growth, -kLargestChange, kLargestChange)), kLeastScale, kLargestScale);
+  const double last = state.scale;
+  state.scale = std::clamp(last * (1.0 + std::clamp(growth, -kLargestChange, kLargestChange)), kLeastScale, kLargestScale);
+  state.rate = dt > 0.0 ? (state.scale / last - 1.0) / dt : 0.0;
   state.volume = volume;
 }
 

@@ -158,8 +158,8 @@ void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std:
 
 /// Stage 9 on the deformed fields, one mesh an object, with the columns its look needs; of several pieces the meshes lie
 /// side by side in it. @param laws  those that nothing has broken
-[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const Division& division,
-                                                   const core::ParticleState& particles, const core::Interactions& laws, Frame& frame);
+[[nodiscard]] std::vector<Mesh> polygonise_objects(const StageContext& context, const Division& division, const State& state,
+                                                   const core::Interactions& laws, Frame& frame);
 
 /// The names of meshers' and grids' arguments become those of the scene's keys, or of what these follow from.
 /// @param cell, error  objects that may ask for these themselves; null: the scene does

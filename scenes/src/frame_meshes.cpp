@@ -12,12 +12,12 @@
 #include "read_scene_faults.h"
 #include "scene_places.h"
 #include "search_choice.h"
+#include "surface_motion.h"
 #include "supple/collision/deformed_field.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 #include "supple/implicit/creases.h"
 #include "supple/implicit/mesh_limits.h"
-#include "supple/implicit/mesh_motion.h"
 #include "supple/implicit/mesh_routes.h"
 #include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/polygonise.h"
@@ -383,9 +383,10 @@ void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std:
   }
 }
 
-std::vector<Mesh> polygonise_objects(const StageContext& context, const Division& division, const core::ParticleState& particles,
-                                     const core::Interactions& laws, Frame& frame) {
+std::vector<Mesh> polygonise_objects(const StageContext& context, const Division& division, const State& state, const core::Interactions& laws,
+                                     Frame& frame) {
   const Model& model = context.model;
+  const core::ParticleState& particles = state.particles;
   const std::vector<Body>& bodies = context.bodies;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
   std::vector<Mesh> surfaces(bodies.size());
@@ -407,12 +408,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const Division
   for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {
     if (surfaces[i].position.empty()) continue;
     core::gather_motion(model.particles, particles, bodies[i].particle, frame.velocity[i], frame.spin[i]);
-    std::vector<implicit::PartMotion> parts(bodies[i].particle.size());
-    for (std::size_t k = 0; k < parts.size(); ++k) {
-      parts[k] = {.centre = frame.pose[i][k].position, .velocity = frame.velocity[i][k],
-                  .angular_velocity = frame.spin[i][k], .id = bodies[i].particle[k]};
-    }
-    implicit::add_motion(frame.field[i], parts, context.executor, surfaces[i]);
+    add_surface_motion(context, state, i, frame, surfaces[i]);
   }
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (surfaces[i].position.empty()) continue;

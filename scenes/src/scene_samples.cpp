@@ -20,11 +20,17 @@ double spacing_of(const SamplingDesc& sampling, double cell) {
   return cell > 0.0 ? kCellsApart * cell : 1.0;  // without a surface there is no cell, and nothing to sample
 }
 
-/// Cells become what the scene says of samples.
-[[noreturn]] void refuse(const Scene& scene, const Error& error) {
+/// Cells become what the scene says of samples, or the object whose features ask for smaller ones.
+[[noreturn]] void refuse(const Scene& scene, const Error& error, const std::string& object, bool by_feature) {
   std::vector<Fault> faults = error.faults();
   for (Fault& fault : faults) {
     if (fault.key != "lattice.cell") continue;
+    if (by_feature) {
+      fault.key = "output.samples";
+      fault.found += ", half the size of the smallest features of '" + object + "'";
+      fault.hint = "make these larger, or what they are parts of smaller";
+      continue;
+    }
     fault.hint += ", which are a sixth of the spacing";
     const std::optional<double> density = scene.output.sampling.density;
     fault.key = density ? "output.sampling.density" : "output.sampling.spacing";
@@ -39,7 +45,7 @@ double spacing_of(const SamplingDesc& sampling, double cell) {
 
 SceneSamples::SceneSamples(const SamplingDesc& sampling, double cell) : sampler_(spacing_of(sampling, cell)) {}
 
-void SceneSamples::follow(Simulation& simulation, const Executor& executor) try {
+void SceneSamples::follow(Simulation& simulation, const Executor& executor) {
   std::vector<OfBody> before = std::move(bodies_);
   bodies_.clear();
   std::sort(before.begin(), before.end(), [](const OfBody& a, const OfBody& b) { return a.particle < b.particle; });
@@ -52,18 +58,26 @@ void SceneSamples::follow(Simulation& simulation, const Executor& executor) try 
                                        [](const OfBody& a, const auto& particle) { return a.particle < particle; });
     if (same != before.end() && same->particle == body.particle) samples.set = std::move(same->set);
     core::gather_poses(simulation.state().particles, body.particle, pose);
-    (void)sampler_.update(simulation.fields()[i], pose, executor, samples.set);
+    const implicit::Field& field = simulation.fields()[i];
+    try {
+      (void)sampler_.update(field, pose, executor, samples.set);
+    } catch (const Error& error) {
+      refuse(simulation.scene(), error, body.name, sampler_.is_cell_of_feature(field));
+    }
   }
-} catch (const Error& error) {
-  refuse(simulation.scene(), error);
 }
 
-void SceneSamples::expect_sizes(Simulation& simulation, const Executor& executor) const try {
+void SceneSamples::expect_sizes(Simulation& simulation, const Executor& executor) const {
   for (std::size_t i = 0; i < simulation.bodies().size(); ++i) {
-    if (!simulation.bodies()[i].skeleton.primitive.empty()) sampler_.expect_size(simulation.fields()[i], executor);
+    const Body& body = simulation.bodies()[i];
+    if (body.skeleton.primitive.empty()) continue;
+    const implicit::Field& field = simulation.fields()[i];
+    try {
+      sampler_.expect_size(field, executor);
+    } catch (const Error& error) {
+      refuse(simulation.scene(), error, body.name, sampler_.is_cell_of_feature(field));
+    }
   }
-} catch (const Error& error) {
-  refuse(simulation.scene(), error);
 }
 
 io::PointSet SceneSamples::points() const {

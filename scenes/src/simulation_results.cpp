@@ -92,7 +92,7 @@ const std::vector<Mesh>& Simulation::Impl::pull_meshes() {
   StageContext wanted = context();
   if (shown) wanted.shown = &shown;
   try {
-    meshes = polygonise_objects(wanted, *division, state.particles, laws, pulled);
+    meshes = polygonise_objects(wanted, *division, state, laws, pulled);
     searches.add(pulled.missed);
     all_searches.add(pulled.missed);
     set_missed(scene.output.meshing, all_searches, warnings);

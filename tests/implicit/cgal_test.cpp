@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <numbers>
@@ -67,6 +68,26 @@ TEST(DelaunayMesh, HoldsItsBoundsAndIsClosedOrientedAndFreeOfSelfIntersection) {
     for (std::size_t v = 0; v < values.size(); ++v) {
       ASSERT_LE(std::abs(values[v]), 1e-13 * 20.0);
       ASSERT_NEAR(mesh.normal[v].dot(gradients[v]), -gradients[v].norm(), 1e-12 * gradients[v].norm());
+    }
+  }
+}
+
+// Four vertices of a flat side, as of a disc or a box, lie so nearly in a plane that their circumcentre is out of all proportion.
+TEST(DelaunayMesh, OfFlatSidesHasItsVerticesOnTheSurface) {
+  for (const ShapeKind shape : {ShapeKind::Disc, ShapeKind::Box, ShapeKind::Rectangle, ShapeKind::Segment}) {
+    Random random(7);
+    for (int i = 0; i < 4; ++i) {
+      Primitive primitive = wyvill_point(0.5);
+      primitive.shape = shape;
+      primitive.size = Vec3(random.uniform(0.3, 0.6), random.uniform(0.3, 0.6), random.uniform(0.1, 0.3));
+      Body body = body_of({{primitive, random.in_box(1.0)}});
+      if (i > 0) body.parts[0].orientation = random.rotation();
+      body.place();
+      const Mesh mesh = delaunay_mesh(body.field, {.angle = 22 * kDegree, .size = 0.08, .distance = 0.004, .cell = 0.05});
+      ASSERT_GT(mesh.vertex_count(), 300u);
+      std::vector<double> values(mesh.vertex_count());
+      body.field.evaluate(mesh.position, values);
+      for (const double f : values) ASSERT_LE(std::abs(f), 1e-13 * 20.0) << static_cast<int>(shape) << ", " << i;
     }
   }
 }
@@ -205,7 +226,7 @@ TEST(DelaunayMesh, NamesWhatTookTooManyVerticesWhereItStops) {
                                },
                            .lipschitz = 1.0,
                            .box = {Vec3(-0.11, -0.31, -0.3), Vec3(0.11, 0.33, 0.34)}};
-  const Fault edge = fault_of(lens, {.size = 0.3, .distance = 0.01, .cell = 0.02, .most_vertices = 180});
+  const Fault edge = fault_of(lens, {.size = 0.3, .distance = 0.002, .cell = 0.02, .most_vertices = 1000});
   EXPECT_EQ(edge.key, "mesh.angle");
   EXPECT_TRUE(edge.found.starts_with("more, where size and distance alone ask for less than ")) << edge.found;
 }
@@ -254,6 +275,26 @@ TEST(HausdorffDistance, IsThatOfPlaneFigures) {
   EXPECT_NEAR(one_sided_hausdorff_distance(square(0), square(0, 2.0), 1e-6), 0.0, 1e-6);
   EXPECT_EQ(one_sided_hausdorff_distance(Mesh{}, square(0), 1e-6), 0.0);
   EXPECT_TRUE(std::isinf(one_sided_hausdorff_distance(square(0), Mesh{}, 1e-6)));
+}
+
+// A segment in three orders of its corners, and a point, above a triangle.
+TEST(HausdorffDistance, OfTrianglesWithoutAreaIsThatOfSegmentsAndPoints) {
+  constexpr double kError = 1e-4;
+  Mesh flat;
+  flat.position = {{-10, -10, 0}, {10, -10, 0}, {0, 20, 0}};
+  flat.triangle = {{0, 1, 2}};
+  Mesh thin;
+  thin.position = {{0, 0, 1}, {1, 0, 2}, {2, 0, 3}};
+  for (const std::array<std::uint32_t, 3>& t : {std::array<std::uint32_t, 3>{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {2, 2, 0}}) {
+    thin.triangle = {t};
+    EXPECT_NEAR(one_sided_hausdorff_distance(thin, flat, kError), 3.0, kError);
+    Mesh end;
+    end.position = {{2, 0, 3}, {0, 0, 1}};
+    end.triangle = {{0, 0, 0}};
+    EXPECT_NEAR(one_sided_hausdorff_distance(end, thin, kError), 0.0, kError);
+    EXPECT_NEAR(one_sided_hausdorff_distance(thin, end, kError), std::sqrt(8.0), kError);
+    EXPECT_NEAR(one_sided_hausdorff_distance(end, flat, kError), 3.0, kError);
+  }
 }
 
 TEST(HausdorffDistance, ShowsAMissedPart) {

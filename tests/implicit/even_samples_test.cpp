@@ -25,7 +25,7 @@ Body row(double apart) {
   return body_of(blobs);
 }
 
-void expect_even(const EvenSampleSet& set, const Body& body) {
+void expect_even(const EvenSampleSet& set, const Body& body, double spacing = kSpacing, double cell = 0.25 * kSpacing) {
   std::vector<double> values(set.size());
   body.field.evaluate(set.point, values);
   for (std::size_t s = 0; s < set.size(); ++s) {
@@ -34,17 +34,17 @@ void expect_even(const EvenSampleSet& set, const Body& body) {
     ASSERT_LT((pose.position + pose.orientation * set.local[s] - set.point[s]).norm(), 1e-14);
     for (std::size_t t = 0; t < s; ++t) {
       if (set.normal[s].dot(set.normal[t]) > 0.0) {
-        ASSERT_GE((set.point[s] - set.point[t]).norm(), 0.5 * kSpacing - 1e-12);
+        ASSERT_GE((set.point[s] - set.point[t]).norm(), 0.5 * spacing - 1e-12);
       }
     }
   }
-  const Mesh fine = march_cubes(body.field, {.lattice = {.origin = Vec3(0.01, 0.02, 0.03), .cell = 0.25 * kSpacing}}, Executor(1));
+  const Mesh fine = march_cubes(body.field, {.lattice = {.origin = Vec3(0.01, 0.02, 0.03), .cell = cell}}, Executor(1));
   for (std::size_t v = 0; v < fine.vertex_count(); ++v) {
     double nearest = 1e9;
     for (std::size_t s = 0; s < set.size(); ++s) {
       if (set.normal[s].dot(fine.normal[v]) > 0.0) nearest = std::min(nearest, (fine.position[v] - set.point[s]).norm());
     }
-    ASSERT_LT(nearest, kSpacing);
+    ASSERT_LT(nearest, spacing);
   }
   EXPECT_TRUE(std::is_sorted(set.id.begin(), set.id.end()));
   EXPECT_EQ(std::set<std::uint64_t>(set.id.begin(), set.id.end()).size(), set.size());
@@ -169,6 +169,27 @@ TEST(EvenSamples, LieOnBothSidesOfASheet) {
     ++compared;
   }
   EXPECT_GT(compared, 30);
+}
+
+// Sheets and balls far thinner than a sixth of the spacing, wherever they lie between the nodes of a lattice.
+TEST(EvenSamples, SeeWhatIsThinnerThanTheirSpacing) {
+  constexpr double kFar = 0.9;
+  const Primitive plate = thin_plate();
+  const double e = iso_distance(plate.kernel, 0.5);
+  const double area = 2.0 * std::numbers::pi * 0.36 + 2.0 * std::numbers::pi * e * (std::numbers::pi * 0.6 + 2.0 * e);
+  Random random(4);
+  for (int i = 0; i < 4; ++i) {
+    Body body = body_of({{plate, random.in_box(0.2)}, {wyvill_point(0.12), Vec3(0.1, 0.2, 1.0) + random.in_box(0.1)}});
+    body.parts[0].orientation = random.rotation();
+    body.place();
+    EvenSampleSet set;
+    (void)EvenSampler(kFar).update(body.field, body.parts, Executor(1), set);
+    EXPECT_EQ(set.components, 2u);
+    expect_even(set, body, kFar, 0.015);
+    const double r = iso_distance(wyvill_point(0.12).kernel, 0.5);
+    const double sum = std::accumulate(set.area.begin(), set.area.end(), 0.0);
+    EXPECT_NEAR(sum, area + 4.0 * std::numbers::pi * r * r, 0.02 * area);
+  }
 }
 
 TEST(EvenSamples, ShareTheAreaOfTheSurface) {

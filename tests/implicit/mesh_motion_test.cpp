@@ -4,6 +4,7 @@
 
 #include "implicit/bodies.h"
 #include "supple/implicit/march_cubes.h"
+#include "supple/implicit/volume.h"
 
 namespace supple::implicit {
 namespace {
@@ -63,6 +64,40 @@ TEST(MeshMotion, KeepsVerticesOnTheMovingSurfaceToSecondOrder) {
     }
   }
   EXPECT_NEAR(largest[0] / largest[1], 4.0, 0.2);
+}
+
+// Kernels that grow move the surface of a ball outward; a blend by gradients sees its parts turn, though balls look the same.
+TEST(MeshMotion, ByMomentsIsThatOfSurfacesThatAreNotCarriedRigidly) {
+  constexpr double kRate = 0.7, kTime = 1e-5;
+  const auto moments = [&](const Body& before, const Body& after) { return FieldMoments{before.field, after.field, 2.0 * kTime}; };
+  Moving moving;
+  const Vec3 v(0.2, 0.4, -0.1);
+  const auto grown = [&](double time) { return body_of({{scaled(wyvill_point(1.0), 1.0 + time * kRate), Vec3(0.1, 0, 0) + time * v}}); };
+  moving.body = grown(0.0);
+  moving.motion = {{.velocity = v}};
+  moving.make();
+  {
+    const Body before = grown(-kTime), after = grown(kTime);
+    const FieldMoments found = moments(before, after);
+    moving.mesh.columns.clear();
+    add_motion(moving.body.field, moving.motion, Executor(1), moving.mesh, &found);
+  }
+  for (std::size_t i = 0; i < moving.mesh.vertex_count(); ++i) {
+    ASSERT_LT((moving.velocity(i) - v - kRate * (moving.mesh.position[i] - Vec3(0.1, 0, 0))).norm(), 1e-8);
+  }
+
+  moving.body = body_of({{wyvill_point(1.0), Vec3(-0.35, 0, 0)}, {wyvill_point(1.0), Vec3(0.35, 0, 0)}});
+  moving.body.skeleton.blend.rule = BlendRule::Gradient;
+  moving.body.place();
+  moving.motion = {{.angular_velocity = Vec3(0.3, 1.0, 0.5)}, {}};
+  moving.make();
+  const FieldMoments still = moments(moving.body, moving.body);
+  double rigid = 0.0;
+  for (std::size_t i = 0; i < moving.mesh.vertex_count(); ++i) rigid = std::max(rigid, std::abs(moving.velocity(i).dot(moving.mesh.normal[i])));
+  EXPECT_GT(rigid, 0.01);
+  moving.mesh.columns.clear();
+  add_motion(moving.body.field, moving.motion, Executor(1), moving.mesh, &still);
+  for (std::size_t i = 0; i < moving.mesh.vertex_count(); ++i) ASSERT_LT(std::abs(moving.velocity(i).dot(moving.mesh.normal[i])), 1e-12);
 }
 
 TEST(MeshMotion, NamesThePartWithTheLargestShare) {

@@ -211,6 +211,7 @@ TEST(Volume, ControlFollowsItsLaw) {
   control_volume(control, 1.98, 0.1, state);
   EXPECT_DOUBLE_EQ(state.scale, 1.5 * (1.0 + (0.5 * 0.02 * 0.1 + 0.1 * 0.01) / 2.0));
   EXPECT_EQ(state.volume, 1.98);
+  EXPECT_NEAR(state.rate, (0.5 * 0.02 * 0.1 + 0.1 * 0.01) / 2.0 / 0.1, 1e-12);
   VolumeState fresh;
   control_volume(control, 1.0, 100.0, fresh);  // limited
   EXPECT_DOUBLE_EQ(fresh.scale, 1.02);

@@ -100,7 +100,7 @@ TEST(KeptMeshes, ToAnErrorOfAFrameShareWhatTheyMayKeep) {
       const Division division = division_of(model, simulation.bodies(), frame.field, frame.bodies, frame.surface, executor);
       std::uint64_t kept = 0;
       for (int round = 0; round < 2; ++round) {
-        expect_same(polygonise_objects(context, division, simulation.state().particles, simulation.laws(), frame), simulation.meshes());
+        expect_same(polygonise_objects(context, division, simulation.state(), simulation.laws(), frame), simulation.meshes());
         kept = 0;
         for (const auto& mesher : frame.mesher) kept += mesher.kept_to_error();
         for (const auto& mesher : frame.creases) kept += mesher.kept_to_error();

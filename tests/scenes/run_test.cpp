@@ -594,6 +594,27 @@ output: )";
   }
 }
 
+TEST_F(Run, RefusesSamplesOfWhatIsFarTooThinWhateverTheirSpacing) {
+  const Scene foil = parse_scene(R"(
+schema: 1
+duration: 0.1 s
+frame_rate: 10
+objects:
+  - name: foil
+    particles: {mass: 1}
+    skeleton: [{shape: disc, radius: 20, kernel: {radius: 1 mm}}]
+output: {samples: csv, sampling: {spacing: 1}}
+)",
+                                 "foil.yaml", ".");
+  RunOptions o = options();
+  o.overwrite = true;
+  const RunResult refused = run_scene(foil, o);
+  EXPECT_EQ(refused.outcome, "limit");
+  EXPECT_EQ(refused.reason,
+            "foil.yaml:9:19: output.samples: expected a surface in at most 1000000 blocks of 8^3 cells, found about 1.57e+08 with cells of 0.0005 m, "
+            "half the size of the smallest features of 'foil'; make these larger, or what they are parts of smaller");
+}
+
 TEST_F(Run, RefusesThinSurfacesAndOwnCellsByTheirKeys) {
   const auto reason_of = [&](const std::string& object, const std::string& output) {
     RunOptions o = options();

@@ -84,24 +84,29 @@ class Oracle {
     }
     CGAL::Object operator()(const Surface& surface, const Ray_3& r) const {
       const Vec3 from = vec(r.source());
-      return between(surface, from, beyond(surface, from, vec(r.point(1)) - from));
+      return between(surface, from, from + beyond(surface, from) * (vec(r.point(1)) - from).normalized());
     }
     CGAL::Object operator()(const Surface& surface, const Line_3& l) const {
-      const Vec3 at = vec(l.point(0)), along = vec(l.point(1)) - at;
-      return between(surface, beyond(surface, at, -along), beyond(surface, at, along));
+      const Vec3 at = vec(l.point(0)), along = beyond(surface, at) * (vec(l.point(1)) - at).normalized();
+      return between(surface, at - along, at + along);
     }
 
    private:
-    static Vec3 beyond(const Surface& surface, const Vec3& from, const Vec3& along) {
-      return from + ((from - surface.centre).norm() + 1.01 * surface.radius) * along.normalized();
-    }
+    /// How far it is from a place to beyond the surface, whichever way [m].
+    static double beyond(const Surface& surface, const Vec3& from) { return (from - surface.centre).norm() + 1.01 * surface.radius; }
+
     // A dual edge counts when its ends lie on different sides; the triangles then bound the cells whose circumcentre lies
     // inside, and that is a closed surface.
     static CGAL::Object between(const Surface& surface, const Vec3& a, const Vec3& b) {
-      if ((surface.field.value(a) > 0.0) == (surface.field.value(b) > 0.0)) return {};
-      // An edge comes from either end; rounding must not tell which.
-      const bool forward = std::tie(a.x(), a.y(), a.z()) < std::tie(b.x(), b.y(), b.z());
-      return CGAL::make_object(point(implicit::root_on_segment(surface.field, forward ? a : b, forward ? b : a)));
+      const bool a_inside = surface.field.value(a) > 0.0;
+      if (a_inside == (surface.field.value(b) > 0.0)) return {};
+      // From the end inside, so that it does not matter which end an edge comes from, and no farther than there may be a surface: centres
+      // around four points near a plane are so far away that places on the way there round to none of the surface.
+      const Vec3 inside = a_inside ? a : b;
+      Vec3 outside = a_inside ? b : a;
+      const double length = (outside - inside).norm(), enough = beyond(surface, inside);
+      if (length > enough) outside = inside + enough / length * (outside - inside);
+      return CGAL::make_object(point(implicit::root_on_segment(surface.field, inside, outside)));
     }
   };
 

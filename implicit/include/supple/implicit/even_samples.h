@@ -36,7 +36,7 @@ struct EvenSampleCounts {
 /// Fits the samples of any number of bodies to their surfaces, again and again.
 class EvenSampler {
  public:
-  /// @param spacing  d [m]: no two samples are nearer than d/2, and no point of the surface that a lattice of cells d/6 sees
+  /// @param spacing  d [m]: no two samples are nearer than d/2, and no point of the surface that the lattice of cell() sees
   /// is farther than d from all of them; samples whose normals are more than a right angle apart, as on the two sides of a
   /// sheet, do not count for each other   @pre d > 0
   explicit EvenSampler(double spacing);
@@ -46,6 +46,10 @@ class EvenSampler {
   /// sampler has given to no other. Areas add up to that of the lattice's mesh.
   /// @param parts  world poses, shape [part_count]
   EvenSampleCounts update(const Field& field, std::span<const Pose> parts, const Executor& executor, EvenSampleSet& set);
+  /// Cells of the lattice on which the surface of a field is looked for [m]: d/6, or half its feature size where that is less, so
+  /// that thin sheets and small balls are seen, whatever the spacing.
+  [[nodiscard]] double cell(const Field& field) const;
+  [[nodiscard]] bool is_cell_of_feature(const Field& field) const;
   /// @throws Error{Limit} as update() would of this field
   void expect_size(const Field& field, const Executor& executor) const;
 

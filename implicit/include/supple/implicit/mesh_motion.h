@@ -19,10 +19,19 @@ struct PartMotion {
   std::uint32_t id = 0;                  ///< what "owner" says
 };
 
+/// The field a moment before and after now, between which its parts were carried and all else of it changed.
+struct FieldMoments {
+  FieldView before, after;
+  double apart = 0.0;  ///< [s], > 0
+};
+
 /// Adds the columns "velocity_x", "velocity_y", "velocity_z" [m/s] and "owner" (id of the part with the largest share of
 /// the field) to a mesh. Along the normal the velocity is that of the moving surface, dF/dt / |grad F| with every part's
 /// field carried rigidly (Witkin & Heckbert 1994, sec. 3); across it, the parts' velocities weighted by their fields.
-/// @param parts  by the field's part index
-void add_motion(const FieldView& field, std::span<const PartMotion> parts, const Executor& executor, Mesh& mesh);
+/// @param parts    by the field's part index
+/// @param moments  where dF/dt is not that of parts carried rigidly, by whose difference it is found: kernels grow, a blend fades, or a
+///                 blend by gradients has parts that turn; null: nowhere
+void add_motion(const FieldView& field, std::span<const PartMotion> parts, const Executor& executor, Mesh& mesh,
+                const FieldMoments* moments = nullptr);
 
 }  // namespace supple::implicit

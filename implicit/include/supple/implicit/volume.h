@@ -43,6 +43,7 @@ struct VolumeControl {
 struct VolumeState {
   double scale = 1.0;    ///< of the kernels
   double volume = 0.0;   ///< at the last step [m^3]; 0: not measured yet
+  double rate = 0.0;     ///< d(scale)/dt / scale of the last step [1/s]
   void save(StateWriter& out) const;
   void load(StateReader& in);
   void hash(Hasher& hasher) const;

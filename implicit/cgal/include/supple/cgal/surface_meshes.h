@@ -15,7 +15,8 @@ namespace supple::cgal {
                                  implicit::DelaunayReport* report = nullptr);
 
 /// Largest distance from a point of `from` to `to` [m], within `error` of the exact one (CGAL's branch and bound).
-/// Infinite when `to` alone is empty, 0 when `from` is. @pre error > 0
+/// Triangles without area count as the segments or points that they are. Infinite when `to` alone is empty, 0 when `from` is. @pre error > 0,
+/// corners are finite
 [[nodiscard]] double one_sided_hausdorff_distance(const Mesh& from, const Mesh& to, double error);
 
 }  // namespace supple::cgal
