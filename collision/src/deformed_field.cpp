@@ -403,6 +403,7 @@ void ClaimField::evaluate_parts(std::span<const Vec3> points, implicit::FieldPar
   own.field.evaluate_parts(points, parts);
   for (double& v : parts.value) v *= own.material.modulus;
   for (Vec3& g : parts.gradient) g *= own.material.modulus;
+  for (Vec3& g : parts.by_turn) g *= own.material.modulus;
 }
 
 Interval ClaimField::bound(const Box& box) const {
@@ -516,6 +517,7 @@ void DeformedField::evaluate_parts(std::span<const Vec3> points, implicit::Field
   own_.evaluate_parts(points, parts);
   for (double& v : parts.value) v /= modulus_;
   for (Vec3& g : parts.gradient) g /= modulus_;
+  for (Vec3& g : parts.by_turn) g /= modulus_;
 }
 
 Interval DeformedField::bound(const Box& box) const {

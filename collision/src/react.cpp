@@ -105,6 +105,7 @@ class Side {
         const Vec3 f = own_weight_[i] * volume_rows_.gradient[e];
         elastic_force_[k] += f;
         elastic_torque_[k] += (own_point_[i] - body_->pose[k].position).cross(f);
+        if (!volume_rows_.by_turn.empty()) elastic_torque_[k] -= own_weight_[i] * volume_rows_.by_turn[e];
       }
     }
     Vec3 force_left = total, moment_left = moment;

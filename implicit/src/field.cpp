@@ -263,6 +263,7 @@ std::span<const std::uint32_t> candidates_of(const Field::Index& index, const Bo
 }
 
 void Field::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
+  parts.by_turn.clear();
   if (index_->blend.active()) {
     blended_part_rows(index(), points, parts);
   } else {

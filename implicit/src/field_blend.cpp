@@ -16,6 +16,7 @@ struct Scratch {
   FieldParts parts;
   std::vector<NodeSample> nodes;
   std::vector<double> share;
+  std::vector<Vec3> own;  ///< gradients of the parts of a row
   std::vector<BlendIndex::NodeBound> bounds;
 
   static Scratch& of_thread() {
@@ -43,8 +44,8 @@ void gather(const BlendIndex& blend, const FieldParts& parts, std::size_t i, std
   }
 }
 
-/// Calls use(part, vector) for the parts of the winning pair: what the turning of the angle between their gradients adds to
-/// the gradient, split by whose second derivatives make it.
+/// Calls use(row, added, along) for the parts of the winning pair: what the turning of the angle between their gradients adds to
+/// the gradient, split by whose second derivatives make it, and dF / d(grad f) of their nodes [m].
 template <class Use>
 void for_turning(const Field::Index& index, const Combined& combined, std::span<const NodeSample> nodes, const FieldParts& parts,
                  std::size_t i, const Vec3& x, const Use& use) {
@@ -56,7 +57,7 @@ void for_turning(const Field::Index& index, const Combined& combined, std::span<
     const Vec3 turn = other.gradient.normalized() - combined.cosine / length * own.gradient;
     const Vec3 along = combined.by_cosine / length * turn;
     for (std::uint32_t r = parts.offset[i]; r < parts.offset[i + 1]; ++r) {
-      if (index.blend.node_of(parts.part[r]) == own.node) use(r, part_hessian(index, parts.part[r], x) * along);
+      if (index.blend.node_of(parts.part[r]) == own.node) use(r, part_hessian(index, parts.part[r], x) * along, along);
     }
   }
 }
@@ -79,7 +80,7 @@ void evaluate_blended(const Field::Index& index, std::span<const Vec3> points, d
       for (std::size_t k = 0; k < scratch.nodes.size(); ++k) gradient += scratch.share[k] * scratch.nodes[k].gradient;
       if (combined.by_cosine == 0.0) continue;
       for_turning(index, combined, scratch.nodes, scratch.parts, i, chunk[i],
-                  [&](std::uint32_t, const Vec3& extra) { gradient += extra; });
+                  [&](std::uint32_t, const Vec3& added, const Vec3&) { gradient += added; });
     }
   }
 }
@@ -87,31 +88,39 @@ void evaluate_blended(const Field::Index& index, std::span<const Vec3> points, d
 void blended_part_rows(const Field::Index& index, std::span<const Vec3> points, FieldParts& parts) {
   Scratch& scratch = Scratch::of_thread();
   part_rows(index, points, parts);
+  const bool turns = index.blend.rule() == BlendRule::Gradient;
+  if (turns) parts.by_turn.assign(parts.part.size(), Vec3::Zero());
   std::uint32_t kept = 0;
   std::uint32_t row_begin = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::uint32_t row_end = parts.offset[i + 1];
     gather(index.blend, parts, i, scratch.nodes);
     scratch.share.resize(scratch.nodes.size());
+    scratch.own.resize(row_end - row_begin);
     const Combined combined = index.blend.combine(scratch.nodes, scratch.share);
     for (std::uint32_t r = row_begin; r < row_end; ++r) {
       const std::uint32_t node = index.blend.node_of(parts.part[r]);
       const auto k = std::lower_bound(scratch.nodes.begin(), scratch.nodes.end(), node,
                                       [](const NodeSample& a, std::uint32_t b) { return a.node < b; });
       const double share = scratch.share[static_cast<std::size_t>(k - scratch.nodes.begin())];
+      scratch.own[r - row_begin] = parts.gradient[r];
       parts.value[r] *= share;
       parts.gradient[r] *= share;
     }
     if (combined.by_cosine != 0.0) {
-      for_turning(index, combined, scratch.nodes, parts, i, points[i],
-                  [&](std::uint32_t r, const Vec3& extra) { parts.gradient[r] += extra; });
+      for_turning(index, combined, scratch.nodes, parts, i, points[i], [&](std::uint32_t r, const Vec3& added, const Vec3& along) {
+        parts.gradient[r] += added;
+        parts.by_turn[r] = scratch.own[r - row_begin].cross(along);
+      });
     }
     parts.offset[i] = kept;
     for (std::uint32_t r = row_begin; r < row_end; ++r) {
       if (parts.value[r] == 0.0) continue;
       parts.part[kept] = parts.part[r];
       parts.value[kept] = parts.value[r];
-      parts.gradient[kept++] = parts.gradient[r];
+      parts.gradient[kept] = parts.gradient[r];
+      if (turns) parts.by_turn[kept] = parts.by_turn[r];
+      ++kept;
     }
     row_begin = row_end;
   }
@@ -119,6 +128,7 @@ void blended_part_rows(const Field::Index& index, std::span<const Vec3> points, 
   parts.part.resize(kept);
   parts.value.resize(kept);
   parts.gradient.resize(kept);
+  if (turns) parts.by_turn.resize(kept);
 }
 
 namespace {

@@ -36,6 +36,7 @@ void add_motion(const FieldView& field, std::span<const PartMotion> parts, const
         velocity += f * moves;
         gradient += shares.gradient[i];
         rate -= shares.gradient[i].dot(moves);
+        if (!shares.by_turn.empty()) rate += shares.by_turn[i].dot(part.angular_velocity);
         if (f > largest) {
           largest = f;
           column[3][v] = static_cast<double>(part.id);

@@ -293,6 +293,7 @@ void MovedField::evaluate(std::span<const Vec3> points, std::span<double> values
 void MovedField::evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
   field_.evaluate_parts(local(points), parts);
   for (Vec3& g : parts.gradient) g = rotation_ * g;
+  for (Vec3& g : parts.by_turn) g = rotation_ * g;
 }
 
 Box MovedField::surface_box() const {

@@ -25,10 +25,8 @@ class ChangingBody {
     for (std::size_t k = 0; k < state.broken_for.size(); ++k) {
       if (fades(k)) rate_ = std::max(rate_, 1.0 / object_.fade);
     }
-    turns_ = body.skeleton.blend.rule == implicit::BlendRule::Gradient &&
-             std::any_of(parts.begin(), parts.end(), [](const implicit::PartMotion& part) { return part.angular_velocity != Vec3::Zero(); });
   }
-  [[nodiscard]] bool any() const { return rate_ > 0.0 || turns_; }
+  [[nodiscard]] bool any() const { return rate_ > 0.0; }
 
   /// In which the surface moves by about that length, or the kernels change by that much [s].
   [[nodiscard]] double time_for(double length) const {
@@ -78,7 +76,6 @@ class ChangingBody {
   const ObjectModel& object_;
   std::span<const implicit::PartMotion> parts_;
   double rate_ = 0.0;  ///< of kernels and blends [1/s]
-  bool turns_ = false;
 };
 
 }  // namespace

@@ -6,8 +6,7 @@
 
 namespace supple::scenes {
 
-/// Adds the columns of implicit::add_motion to the mesh of a body, also where kernels grow to hold a volume, where blends fade, and where
-/// parts turn that blend by their gradients. @pre the frame has the body's field, poses, velocities and spins
+/// Adds the columns of implicit::add_motion to the mesh of a body, also where kernels grow to hold a volume or blends fade. @pre the frame has the body's field, poses, velocities and spins
 void add_surface_motion(const StageContext& context, const State& state, std::size_t body, const Frame& frame, Mesh& mesh);
 
 }  // namespace supple::scenes

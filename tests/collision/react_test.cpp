@@ -66,6 +66,54 @@ TEST(React, GivesEveryPartMinusTheDerivativeOfTheEnergy) {
   }
 }
 
+/// A stick and a ball that blend by their gradients, on a half-space.
+struct StickAndBallOnPlane {
+  static constexpr std::size_t kParts = 2;
+  implicit::Skeleton skeleton;
+  implicit::PlacedSkeleton placed;
+  implicit::Field field;
+  implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 6.0};
+  Stage stage;
+  double energy = 0.0;
+
+  explicit StickAndBallOnPlane(const std::array<Pose, kParts>& parts) {
+    skeleton.part_count = kParts;
+    skeleton.blend.rule = implicit::BlendRule::Gradient;
+    skeleton.primitive.resize(kParts);
+    for (std::uint32_t k = 0; k < kParts; ++k) {
+      skeleton.primitive[k].part = k;
+      skeleton.primitive[k].kernel = implicit::Kernel::wyvill(1.0);
+    }
+    skeleton.primitive[0].shape = implicit::ShapeKind::Segment;
+    skeleton.primitive[0].size = Vec3(0.3, 0.0, 0.0);
+    implicit::place_skeleton(skeleton, parts, placed);
+    implicit::index_field(skeleton, placed, field);
+    stage.add(field, {parts[0].position, parts[1].position});
+    stage.add(plane).fixed = true;
+    energy = stage.solve({.error = 1e-6}).summary.at(0).energy;
+  }
+};
+
+TEST(React, GivesPartsOfABlendByGradientsTheTorqueOfTheEnergy) {
+  // A blend by gradients sees the gradients of its parts turn: to leave that out would turn the ball, which looks the same all around.
+  const std::array<Pose, 2> parts{Pose{Vec3(-0.25, 0.05, 0.33), Quat(0.9, 0.2, -0.1, 0.4).normalized()}, Pose{Vec3(0.35, -0.05, 0.38), Quat::Identity()}};
+  StickAndBallOnPlane rest(parts);
+  const PartLoads loads = rest.stage.react()[0];
+  const double size = loads.torque[0].norm();
+  ASSERT_GT(size, 0.01);
+  EXPECT_LT(loads.torque[1].norm(), 1e-3 * size);
+  constexpr double kStep = 1e-2;
+  for (int axis = 0; axis < 3; ++axis) {
+    double at[2];
+    for (const int i : {0, 1}) {
+      std::array<Pose, 2> turned = parts;
+      turned[0].orientation = Quat(Eigen::AngleAxisd(i == 0 ? -kStep : kStep, Vec3::Unit(axis))) * parts[0].orientation;
+      at[i] = StickAndBallOnPlane(turned).energy;
+    }
+    EXPECT_NEAR(loads.torque[0][axis], -(at[1] - at[0]) / (2.0 * kStep), 2e-3 * size) << axis;
+  }
+}
+
 TEST(React, GivesPartsBeyondTheMiddleOfAStiffBodyMinusTheDerivativeOfTheEnergy) {
   // By the midpoints of cells that stay where they are.
   const std::vector<Vec3> soft{Vec3(-0.35, 0.0, 0.0), Vec3(0.3, 0.05, 0.02)}, stiff{Vec3(0.02, 0.1, 0.05)};

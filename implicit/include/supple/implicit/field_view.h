@@ -23,6 +23,9 @@ struct FieldParts {
   std::vector<std::uint32_t> part;    ///< index of the part within its body
   std::vector<double> value;          ///< f_k [1]
   std::vector<Vec3> gradient;         ///< grad f_k [1/m]
+  /// What F rises by where a part turns, beyond -grad f_k . (omega x r) of one that is carried [1/rad]: blends by gradients see its own
+  /// gradient turn. Empty: nothing.
+  std::vector<Vec3> by_turn{};
 };
 
 /// A convex body as seen from a place: its core is a convex set, around which all its level sets lie at equal distances.
@@ -74,7 +77,10 @@ class FieldView {
     table_->gradients(self_, points, values, gradients);
   }
   /// Contributions of the parts; replaces the content of `parts`, keeps its capacity.
-  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { table_->parts(self_, points, parts); }
+  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const {
+    parts.by_turn.clear();
+    table_->parts(self_, points, parts);
+  }
   /// Conservative bounds of F on a box.
   [[nodiscard]] Interval bound(const Box& box) const { return table_->bound(self_, box); }
   /// Conservative bound of |grad F| on a box [1/m].

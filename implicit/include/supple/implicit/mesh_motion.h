@@ -29,8 +29,8 @@ struct FieldMoments {
 /// the field) to a mesh. Along the normal the velocity is that of the moving surface, dF/dt / |grad F| with every part's
 /// field carried rigidly (Witkin & Heckbert 1994, sec. 3); across it, the parts' velocities weighted by their fields.
 /// @param parts    by the field's part index
-/// @param moments  where dF/dt is not that of parts carried rigidly, by whose difference it is found: kernels grow, a blend fades, or a
-///                 blend by gradients has parts that turn; null: nowhere
+/// @param moments  where dF/dt is not that of parts carried rigidly, by whose difference it is found: kernels grow, or a blend fades;
+///                 null: nowhere
 void add_motion(const FieldView& field, std::span<const PartMotion> parts, const Executor& executor, Mesh& mesh,
                 const FieldMoments* moments = nullptr);
 
