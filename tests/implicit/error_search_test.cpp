@@ -9,6 +9,7 @@
 
 #include "implicit/analytic_fields.h"
 #include "supple/core/error.h"
+#include "supple/implicit/march_cubes.h"
 
 namespace supple::implicit {
 namespace {
@@ -40,6 +41,18 @@ Search search(double wanted, double factor, int levels, int telling = 4) {
 }
 
 constexpr double kTwo = 0.5, kOne = 0.5 * std::numbers::sqrt2;  // factors of order two and one
+
+TEST(ErrorSearch, MemoryThatAMesherKeepsDoesNotDecideHowFineMeshesMayBe) {
+  const Mesh none;
+  const auto levels = [&](std::uint64_t tiles, std::uint64_t bytes) {
+    return tried(0.1, none, MarchCounts{.blocks = 1, .tiles = tiles, .bytes = bytes}).levels_left;
+  };
+  const int of_few = levels(10'000, 4'000'000);  // 400 bytes a tile: 2^10 of 8 GB remain
+  EXPECT_EQ(of_few, 10);
+  EXPECT_EQ(levels(10'000, 0), of_few);
+  EXPECT_EQ(levels(10'000, 8'000'000'000), of_few);
+  EXPECT_EQ(levels(10'000'000, 0), 1);
+}
 
 TEST(ErrorSearch, EndsAtTheFirstLevelThatIsSureToDoAndTriesFew) {
   for (const double factor : {kTwo, kOne}) {

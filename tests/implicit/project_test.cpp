@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "bodies.h"
 #include "supple/core/error.h"
+#include "supple/implicit/solids.h"
 
 namespace supple::implicit {
 namespace {
@@ -308,6 +310,24 @@ TEST(Intersect, MeetsTheSurfaceOfEveryBlendAndNothingElse) {
     }
     EXPECT_GT(hits, 30);
     EXPECT_GT(passes, 10);
+  }
+}
+
+TEST(Intersect, MeetsABoxThatRaysCutAtAnEdge) {
+  // Its slope is the same everywhere outside: steps longer than F / slope would leap over the edge.
+  constexpr double kHalf = 0.5, kRound = 0.05;
+  const Pose pose{Vec3(0.3, -0.2, 0.1), Quat(0.7, 0.3, -0.4, 0.5).normalized()};
+  const SolidBox box(pose, Vec3::Constant(kHalf), kRound, 6.0);
+  const Vec3 centre(kHalf - kRound, kHalf - kRound, 0.0);  // of the edge's circle
+  Random random(7);
+  for (int ray = 0; ray < 500; ++ray) {
+    const double turn = random.uniform(-0.3, 0.3), near = random.uniform(0.95, 0.9999) * kRound, away = random.uniform(0.5, 5.0);
+    const Vec3 outwards(std::cos(0.25 * std::numbers::pi + turn), std::sin(0.25 * std::numbers::pi + turn), 0.0), along(outwards.y(), -outwards.x(), 0.0);
+    const Vec3 origin = centre + near * outwards - away * along + Vec3(0.0, 0.0, random.uniform(-0.4, 0.4));
+    const std::optional<double> t = intersect(box, pose.to_world(origin), pose.orientation * along, 10.0);
+    ASSERT_TRUE(t.has_value()) << ray;
+    const double half_chord = std::sqrt(kRound * kRound - near * near);
+    EXPECT_NEAR(*t, away - half_chord, 1e-14 / half_chord) << ray;
   }
 }
 
