@@ -191,32 +191,6 @@ TEST(KeptMeshes, OfPointsToAnErrorAreThoseOfAFreshMesher) {
   }
 }
 
-// A small ball that reaches no node leaves all triangles as they are, and yet changes errors, and vertices that refinement adds.
-TEST(KeptMeshes, SeeWhatMovesWithinATriangle) {
-  for (const KernelKind kind : {KernelKind::Wyvill, KernelKind::SoftObject}) {
-    const auto ball = [kind](double radius) {
-      Primitive p = wyvill_point(radius);
-      if (kind == KernelKind::SoftObject) p.kernel = Kernel::soft_object(radius);
-      return p;
-    };
-    Body body = body_of({{ball(1.0), Vec3(0.01, 0.02, 0.03)}, {ball(0.05), Vec3::Zero()}});
-    const double surface = body.field.surface_box().upper.x() - 0.01;
-    Random random(17);
-    CubeMesher mesher, refined;
-    for (int round = 0; round < 40; ++round) {
-      body.parts[1].position = body.parts[0].position + surface * random.direction();
-      body.place();
-      MarchCounts kept, fresh;
-      const MarchOptions to_error{.lattice = lattice_of(0.12), .error = 0.004};
-      const std::uint64_t mesh = hash_of(mesher.make(body.field, to_error, Executor(1), &kept));
-      EXPECT_EQ(mesh, hash_of(march_cubes(body.field, to_error, Executor(1), &fresh))) << round;
-      EXPECT_EQ(kept.error, fresh.error) << round;
-      const MarchOptions twice{.lattice = lattice_of(0.12), .refinements = 1};
-      EXPECT_EQ(hash_of(refined.make(body.field, twice, Executor(1))), hash_of(march_cubes(body.field, twice, Executor(1)))) << round;
-    }
-  }
-}
-
 TEST(KeptMeshes, WithCreasesToAnErrorAreThoseOfAFreshMesher) {
   for (const int threads : {1, 2}) expect_fresh_to_an_error<CreaseMesher>(mixed_body(3, BlendRule::Graph, 12), 0.04, Executor(threads));
 }
