@@ -31,7 +31,7 @@ bool PolarRuleSolver::no_kinks_near(PairPressure& pressure) {
   smooth_ = {frame_.origin - half, frame_.origin + half};
   kinks_.clear();
   const bool known = pressure.kinks(smooth_, kinks_);
-  const double reach = half.norm();
+  const double reach = std::sqrt(square * (frame_.u.squaredNorm() + frame_.v.squaredNorm()) + 0.25 * square * square * height * height);
   const bool near = std::any_of(kinks_.begin(), kinks_.end(), [&](const implicit::Kink& kink) {
     return std::abs(kink.value(frame_.origin)) <= kink.change(frame_.origin, reach);
   });

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kMostHills = 16;
 constexpr int kMostSteps = 40;
+constexpr double kRound = 5e-3;  // of the curvatures: principal directions of less difference depend on rounding
 
 /// What slopes along the axis say. A body so deep in the other that its pressure hardly falls, or rises, from Sigma on has the extent.
 void set_depths(PeakFrame& frame, double fall, double rise, double extent) {
@@ -16,6 +17,12 @@ void set_depths(PeakFrame& frame, double fall, double rise, double extent) {
   frame.depth[0] = depth(fall);
   frame.depth[1] = depth(rise);
   frame.thickness = frame.depth[0] + frame.depth[1];
+}
+
+/// Of a direction across the axis: that in which the bodies say that it goes.
+double sign_of(const PairPressure& pressure, const Vec3& from, const Vec3& axis, const Vec3& direction) {
+  const std::optional<Vec3> way = pressure.tangent(from, axis, &direction);
+  return way && way->dot(direction) < 0.0 ? -1.0 : 1.0;
 }
 
 }  // namespace
@@ -139,7 +146,7 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
   Vec3 x = start;
   double before = -std::numeric_limits<double>::infinity();  // min(p_A, p_B) and |p_A - p_B| at the last point kept
   double gap_before = 0.0;
-  Vec3 kept = start, step = Vec3::Zero();
+  Vec3 kept = start, step = Vec3::Zero(), along = Vec3::Zero();
   bool lifted = false;
   batch_.resize(5);
   for (int iteration = 0; iteration < kMostSteps; ++iteration) {
@@ -153,8 +160,9 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
       if (!(norm > 0.0)) return std::nullopt;
       frame.axis /= norm;
       batch_.resize(5);
+      along = pressure.tangent(x, frame.axis).value_or(frame.axis.unitOrthogonal());
     }
-    Vec3 u = frame.axis.unitOrthogonal();
+    Vec3 u = (along - along.dot(frame.axis) * frame.axis).normalized();
     Vec3 v = frame.axis.cross(u);
     batch_.point[0] = x;
     batch_.point[1] = x + h * u;
@@ -202,11 +210,11 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     };
     const double a_uu = second(0, 0, u), a_uv = 0.5 * (second(0, 0, v) + second(0, 1, u)), a_vv = second(0, 1, v);
     const double b_uu = second(1, 0, u), b_uv = 0.5 * (second(1, 0, v) + second(1, 1, u)), b_vv = second(1, 1, v);
-    const Principal p = principal(-((1.0 - w) * a_uu + w * b_uu), -((1.0 - w) * a_uv + w * b_uv),
-                                  -((1.0 - w) * a_vv + w * b_vv));
-    const Vec3 first = p.cosine * u + p.sine * v, other = axis.cross(first);
+    const double q_uu = -((1.0 - w) * a_uu + w * b_uu), q_uv = -((1.0 - w) * a_uv + w * b_uv), q_vv = -((1.0 - w) * a_vv + w * b_vv);
     // A patch longer than `extent` along a direction of no curvature is not believed.
     const double flattest = 2.0 * std::max(std::abs(level), noise) / (extent * extent);
+    const Principal p = principal(q_uu, q_uv, q_vv);
+    const Vec3 first = p.cosine * u + p.sine * v, other = axis.cross(first);
     const double c1 = std::max(std::abs(p.first), flattest), c2 = std::max(std::abs(p.second), flattest);
     const double g1 = tangential.dot(first), g2 = tangential.dot(other);
     const double gain = 0.5 * (g1 * g1 / c1 + g2 * g2 / c2);
@@ -215,22 +223,29 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     step = ((a - b) / steepness) * axis;
     if (!flat) step += (g1 / c1) * first + (g2 / c2) * other;
     const bool on_sigma = gap <= 1e-6 * std::abs(level) + noise;
-    const bool at_top = gain <= 1e-12 * std::abs(level) + 1e-3 * noise;
+    // What rounding of the slopes leaves of a gain is of its square.
+    const bool at_top = gain <= 1e-16 * std::abs(level) + noise * std::min(1e-3, noise / std::abs(level));
     frame.axis = axis;
     frame.flat = flat && on_sigma;
     if (frame.flat || (on_sigma && at_top) || iteration + 1 == kMostSteps) {
       if (level <= noise || !on_sigma) return std::nullopt;
-      frame.origin = x;
+      frame.origin = at_top || frame.flat ? Vec3(x + step) : x;
       frame.peak = level;
-      frame.u = first / std::sqrt(c1);
-      frame.v = other / std::sqrt(c2);
+      const bool round = p.first - p.second <= kRound * (std::abs(q_uu) + std::abs(q_vv) + flattest);
+      const double cs = round ? 1.0 : p.cosine, sn = round ? 0.0 : p.sine;
+      const Vec3 one = cs * u + sn * v, two = axis.cross(one);
+      // Of faces as long as features are; where their rims lie is sought in any case.
+      const double face = frame.flat ? 2.0 * level / (pressure.feature_size() * pressure.feature_size()) : flattest;
+      const double scale_u = std::max(std::abs(round ? q_uu : p.first), face), scale_v = std::max(std::abs(round ? q_vv : p.second), face);
+      const double sign_u = sign_of(pressure, x, axis, one), sign_v = sign_of(pressure, x, axis, two);
+      frame.u = sign_u / std::sqrt(scale_u) * one;
+      frame.v = sign_v / std::sqrt(scale_v) * two;
       set_depths(frame, fall, rise, extent);
       // Sigma: (p_A - p_B)(x) = 0 with slope -steepness along the axis.
-      const double cs = p.cosine, sn = p.sine;
       const double d_uu = (a_uu - b_uu) / steepness, d_uv = (a_uv - b_uv) / steepness, d_vv = (a_vv - b_vv) / steepness;
-      frame.height_uu = (cs * cs * d_uu + 2.0 * cs * sn * d_uv + sn * sn * d_vv) / c1;
-      frame.height_uv = (-cs * sn * d_uu + (cs * cs - sn * sn) * d_uv + cs * sn * d_vv) / std::sqrt(c1 * c2);
-      frame.height_vv = (sn * sn * d_uu - 2.0 * cs * sn * d_uv + cs * cs * d_vv) / c2;
+      frame.height_uu = (cs * cs * d_uu + 2.0 * cs * sn * d_uv + sn * sn * d_vv) / scale_u;
+      frame.height_uv = sign_u * sign_v * (-cs * sn * d_uu + (cs * cs - sn * sn) * d_uv + cs * sn * d_vv) / std::sqrt(scale_u * scale_v);
+      frame.height_vv = (sn * sn * d_uu - 2.0 * cs * sn * d_uv + cs * cs * d_vv) / scale_v;
       return frame;
     }
     const double length = step.norm();

@@ -12,7 +12,9 @@ namespace supple::collision {
 
 /// A local frame of Sigma at its point of largest pressure: x = origin + rho (cos u + sin v) + t axis.
 /// u and v are orthogonal tangents along the principal directions of the pressure on Sigma, scaled such that
-/// p = peak - rho^2 / 2 to second order: an elongated patch becomes a circle.
+/// p = peak - rho^2 / 2 to second order: an elongated patch becomes a circle. What the curvatures do not tell is told by the bodies
+/// (PairPressure::tangent): the directions where both are nearly the same, and which way along them u and v go, so that u, v and the axis may be
+/// left-handed.
 struct PeakFrame {
   Vec3 origin = Vec3::Zero();
   Vec3 axis = Vec3::Zero();  ///< unit, out of A and into B

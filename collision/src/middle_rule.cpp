@@ -211,10 +211,11 @@ bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
   frame_.origin += centre.x() * along + centre.y() * across;
   if (!lift_to_sigma(pressure)) return false;
   // An ellipse has a quarter of the squares of its half axes as its second moments.
-  const Vec3 u = axes.cosine * along + axes.sine * across;
   frame_.axis = (rim_batch_.slope_b[0] - rim_batch_.slope_a[0]).normalized();
-  frame_.u = 2.0 * std::sqrt(axes.first) * (u - u.dot(frame_.axis) * frame_.axis).normalized();
-  frame_.v = 2.0 * std::sqrt(axes.second) * frame_.axis.cross(frame_.u).normalized();
+  const Vec3 u = axes.cosine * along + axes.sine * across, v = axes.cosine * across - axes.sine * along;
+  const Vec3 one = (u - u.dot(frame_.axis) * frame_.axis).normalized();
+  frame_.u = 2.0 * std::sqrt(axes.first) * one;
+  frame_.v = 2.0 * std::sqrt(axes.second) * (v - v.dot(frame_.axis) * frame_.axis - v.dot(one) * one).normalized();
   return true;
 }
 
@@ -430,22 +431,19 @@ void PolarRuleSolver::place_rays(const KronrodRule& rule, std::size_t first) {
 
 /// @param frame  of any place of the patch   @return false where no kink crosses, or this does not fit
 bool PolarRuleSolver::solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                         const Regions& regions, const Box& faces, PatchPoints& points) {
-  if (!part_about_middle(pressure, frame, settings, faces)) return false;
+                                         const Regions& regions, PatchPoints& points) {
+  if (!part_about_middle(pressure, frame, settings)) return false;
   parted_ = static_cast<std::uint32_t>(crossing_.size());
   return finish(pressure, column_of(settings.error), regions, settings.error, nullptr, points);
 }
 
-bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                        const Box& faces) {
+bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings) {
   frame_ = frame;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   static const std::vector<Vec2> few = circle(kFewRays), many = circle(kManyRays);
   kinks_.clear();
-  pressure.kinks(faces, kinks_);
-  const Vec3 centre = faces.centre();
-  const double radius = 0.5 * faces.extent().norm();
-  std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(centre)) > kink.change(centre, radius); });
+  // All of both bodies: which of them a box holds depends on how it lies.
+  pressure.kinks({Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)}, kinks_);
   if (kinks_.empty()) return false;
   frame_.u *= std::sqrt(2.0 * frame_.peak);
   frame_.v *= std::sqrt(2.0 * frame_.peak);

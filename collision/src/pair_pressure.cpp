@@ -5,6 +5,26 @@
 
 namespace supple::collision {
 
+std::optional<Vec3> PairPressure::tangent(const Vec3& from, const Vec3& normal, const Vec3* apart) const {
+  constexpr double kLeast = 1e-3;  // of the length: what rounding leaves is not a direction
+  constexpr int kToParts = 0, kWays = 4;  // to the first parts of both bodies, then along the axes of these
+  for (int way = kToParts; way < kWays; ++way) {
+    Vec3 sum = Vec3::Zero();
+    double scale = 0.0;
+    for (const ContactBody* body : body_) {
+      // What has no skeleton may lie otherwise than its pose says, and what does not move usually does.
+      if (body->pose.empty() || (body->skeleton == nullptr && (body->fixed || way != kToParts))) continue;
+      const Pose& first = body->pose.front();
+      const Vec3 to = way == kToParts ? Vec3(first.position - from) : first.orientation * Vec3::Unit(way - 1);
+      sum += to;
+      scale += to.norm();
+    }
+    const Vec3 across = sum - sum.dot(normal) * normal;
+    if ((apart != nullptr ? std::abs(across.dot(*apart)) : across.norm()) > kLeast * scale) return across.normalized();
+  }
+  return std::nullopt;
+}
+
 double PairPressure::overlap_out_of(int side, const Vec3& from, const Vec3& way, double longest) {
   constexpr int kMostSteps = 200, kHalvings = 40;
   constexpr double kEnough = 1e-6;  // of the longest step

@@ -33,7 +33,13 @@ struct PressureBatch {
 class PairPressure {
  public:
   PairPressure(const ContactBody& a, const ContactBody& b)
-      : field_{a.field, b.field}, modulus_{a.material.modulus, b.material.modulus} {}
+      : field_{a.field, b.field}, body_{&a, &b}, modulus_{a.material.modulus, b.material.modulus} {}
+
+  /// A direction across `normal` [unit] that is told by the bodies alone: it turns with them and is the same whichever comes first. So are what
+  /// is left of a result's error, then, and of a choice that nothing else decides.
+  /// @param apart  it is no closer to the plane across this direction, which lies across the normal itself, than that choice can bear; or null
+  /// @return nothing where bodies that are balls on each other, or do not say how they lie, tell none
+  [[nodiscard]] std::optional<Vec3> tangent(const Vec3& from, const Vec3& normal, const Vec3* apart = nullptr) const;
 
   /// Values and gradients of both bodies at batch.point.
   void evaluate(PressureBatch& batch) {
@@ -108,6 +114,7 @@ class PairPressure {
 
  private:
   implicit::FieldView field_[2];
+  const ContactBody* body_[2];
   double modulus_[2];
   std::uint64_t evaluations_ = 0;  // of one body at one point
 };

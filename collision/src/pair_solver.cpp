@@ -277,10 +277,10 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
 
   find_thirds(pair, partners, boxes, overlap);
   const Region least = settings.energy ? Region::Sums : Region::None;
-  Job job{bodies, boxes, overlap, a, b, {pressure, settings, {}, extent, spacing, {}, nullptr, {}}, convex};
+  Job job{bodies, boxes, overlap, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
-  if (convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite()) job.polar.faces = &overlap;
+  job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
   find_patches(job, seeds);
   choose(job, out);
   fill_unsure_regions(job, out);

@@ -68,14 +68,14 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const Vec3& hil
   std::optional<PeakFrame> frame;
   if (job.axis && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *job.axis, hill, job.extent);
   const bool on_axis = frame.has_value();
-  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, job.faces != nullptr);
+  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces, job.faces);
   if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
   const auto fits = [&] {
     return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };
   if (!fits()) {
     if (!frame->flat) return Patch::Unfit;
-    frame = finder_.climb(job.pressure, hill, job.extent, job.faces != nullptr, false);
+    frame = finder_.climb(job.pressure, hill, job.extent, job.faces, false);
     if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
     if (!fits()) return Patch::Unfit;
   }

@@ -22,7 +22,7 @@ struct PolarJob {
   double extent = 0.0;     ///< longest half axis of a patch that is believed [m]
   double spacing = 0.0;    ///< of the seeds [m]; 0 where there are none
   std::optional<CommonAxis> axis;
-  const Box* faces = nullptr;                 ///< of convex bodies: a box of their overlap
+  bool faces = false;      ///< the bodies are convex: they may touch with faces
   std::span<const ContactBody* const> third;  ///< that patches are cut at
 };
 

@@ -303,7 +303,7 @@ double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + plac
 
 bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                             const Regions& regions, double extent,
-                            std::span<const ContactBody* const> third, bool round, bool follow, const Box* faces, PatchPoints& points) {
+                            std::span<const ContactBody* const> third, bool round, bool follow, bool faces, PatchPoints& points) {
   extent_ = extent;
   third_ = third;
   imprints_.clear();
@@ -320,9 +320,9 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     return true;
   };
   // Samples of flat faces are near enough to a coarse error, and change more evenly as the faces lean.
-  const bool peaked = !frame.flat && (faces == nullptr || settings.error < kSplitBelow);
+  const bool peaked = !frame.flat && (!faces || settings.error < kSplitBelow);
   if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, peaked, points)) return true;
-  if (faces != nullptr && anew() && solve_about_middle(pressure, frame, settings, regions, *faces, points)) return true;
+  if (faces && anew() && solve_about_middle(pressure, frame, settings, regions, points)) return true;
   if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, follow, points)) return true;
   if (uneven_ && anew() && solve_about_peak(pressure, frame, settings, regions, round, false, false, points)) return true;
   if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, false, points)) return true;

@@ -39,12 +39,12 @@ class PolarRuleSolver {
   /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
   /// @param round  both pressures are the same all around the line through the frame's origin along its axis
   /// @param follow  the rim all around, whether the peak sees it or not
-  /// @param faces  of convex bodies, a box that holds the patch: where kinks cross it, it is parted about its middle
+  /// @param faces  the bodies are convex: where kinks cross the patch, it is parted about its middle
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
   [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                            const Regions& regions, double extent, std::span<const ContactBody* const> third,
-                           bool round, bool follow, const Box* faces, PatchPoints& points);
+                           bool round, bool follow, bool faces, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about `origin()`
   [[nodiscard]] const Vec3& origin() const noexcept { return frame_.origin; }
@@ -231,8 +231,8 @@ class PolarRuleSolver {
     Vec2 outward = Vec2::Zero();
   };
   bool solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                          const Regions& regions, const Box& faces, PatchPoints& points);
-  bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Box& faces);
+                          const Regions& regions, PatchPoints& points);
+  bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);

@@ -22,7 +22,7 @@ constexpr double kMostTurn = 0.35, kLittleTurn = 0.15;  // of the rim within a s
 constexpr double kClose = 1e-3;         // of Newton's method at the rim, in steps
 constexpr double kLeastCosine = 0.2;    // of Sigma's normal to the axis
 constexpr double kLeastSight = 0.01;    // distance of the centre from all tangents of the rim, over the radius of the patch
-constexpr double kMargin = 1.2;         // of boxes around the points of the rim
+constexpr double kMargin = 1.2;         // beyond the points of the rim
 
 double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -83,9 +83,16 @@ bool PolarRuleSolver::walk_to_rim(PairPressure& pressure, const Vec3& along, dou
 /// The rim as a polygon in `fine_rim_`, counterclockwise about the axis. @param fine  in steps that do not leap over the neck of a lobe
 bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure, bool fine) {
   const double radius = std::sqrt(2.0 * frame_.peak) * std::min(frame_.u.norm(), frame_.v.norm());
+  const double turns = frame_.u.cross(frame_.v).dot(frame_.axis) < 0.0 ? -1.0 : 1.0;
+  const auto move = [&](const Vec3& to, Vec3& at, Vec3& tangent, double step) {
+    at = to;
+    if (!move_to_rim(pressure, at, tangent, step)) return false;
+    tangent *= turns;
+    return true;
+  };
   Vec3 x, tangent;
   if (!walk_to_rim(pressure, frame_.v.normalized(), kWalk * radius, x)) return false;
-  if (!move_to_rim(pressure, x, tangent, radius)) return false;
+  if (!move(x, x, tangent, radius)) return false;
   fine_rim_.clear();
   const Vec3 first = x;
   double step = (fine ? kLongestFine : kWalk) * radius;
@@ -97,8 +104,8 @@ bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure, bool fine) {
     left = left || home > 2.0 * step;
     if (left && home <= 1.2 * step && tangent.dot(first - x) > 0.0) break;
     for (;;) {
-      Vec3 next = x + step * tangent, there;
-      const bool found = move_to_rim(pressure, next, there, step);
+      Vec3 next, there;
+      const bool found = move(x + step * tangent, next, there, step);
       const double turn = found ? (there - tangent).norm() : 2.0;
       if (turn <= kMostTurn && (next - x).dot(tangent) > 0.5 * step) {
         x = next;
@@ -221,9 +228,8 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   if (!(p > 0.0)) return false;
   frame_.origin = x;
   // An ellipse has a quarter of the squares of its half axes as its second moments.
-  const Vec3 u = axes.cosine * along + axes.sine * across;
-  frame_.u = 2.0 * std::sqrt(axes.first) * u;
-  frame_.v = 2.0 * std::sqrt(axes.second) * frame_.axis.cross(u);
+  frame_.u = 2.0 * std::sqrt(axes.first) * (axes.cosine * along + axes.sine * across);
+  frame_.v = 2.0 * std::sqrt(axes.second) * (axes.cosine * across - axes.sine * along);
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame_.axis);
   rise_ = (batch.slope_a[0] - batch.slope_b[0]) / rate;
@@ -237,14 +243,14 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   return true;
 }
 
-/// The kinks near the rim and what it encloses.
+/// The kinks that come as near to the frame's origin as the rim goes.
 void PolarRuleSolver::find_star_kinks(PairPressure& pressure) {
-  Box box;
-  for (const Vec3& x : fine_rim_) box.include(x);
-  const Vec3 grown = 0.5 * kMargin * box.extent(), centre = box.centre();
-  box = {centre - grown, centre + grown};
+  double square = 0.0;
+  for (const Vec3& x : fine_rim_) square = std::max(square, (x - frame_.origin).squaredNorm());
+  const double reach = kMargin * std::sqrt(square);
   kinks_.clear();
-  all_kinks_ = pressure.kinks(box, kinks_);
+  all_kinks_ = pressure.kinks({frame_.origin - Vec3::Constant(reach), frame_.origin + Vec3::Constant(reach)}, kinks_);
+  std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
 }
 
 /// Those of them that have points of rays to the rim on the other side than the centre; third bodies may all cross.

@@ -2,7 +2,7 @@
 /// Contact queries in many random poses: twelve cases, worst and middle CPU time and error over the poses, one JSON
 /// object a line. A query is broad phase, candidates and contact surface of two bodies, through the general path, with
 /// no state from another pose; its time is the least in three rounds of all poses. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
-/// other cases are measured against the finest rule for the two bodies in the other order, which has other nodes; what it
+/// other cases are measured against the finest rule for the two bodies seen otherwise, which has other nodes; what it
 /// may itself be off by is added to the bounds. Poses whose patch a kink of a field crosses are told apart.
 ///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED]
 #include <cstdio>
@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "contact_shapes.h"
+#include "contact_cases.h"
 #include "supple/core/hash.h"
 #include "usage.h"
 
@@ -72,8 +72,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
     Answer exact = pair.exact;
     double floor = 0.0;  // what the reference itself may be off by
     if (!pair.known) {
-      const std::array<collision::ContactBody, 2> swapped{pair.bodies[1], pair.bodies[0]};
-      const auto* s = query.ask(swapped, 1e-10, 1);
+      const auto* s = query.ask(seen_otherwise(pair.bodies), 1e-10, 1);
       if (s == nullptr) continue;  // apart: another pose
       exact = {s->force.norm(), s->area, s->centre_of_pressure};
       floor = s->error_estimate;
@@ -134,8 +133,6 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
   std::fflush(stdout);
 }
 
-Pose random_pose(Draw& draw, const Vec3& position) { return {position, draw.rotation()}; }
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -143,125 +140,9 @@ int main(int argc, char** argv) {
   const int poses = argc > 1 ? std::atoi(argv[1]) : 1000;
   const std::string_view only = argc > 2 ? argv[2] : "";
   const std::string_view rule = argc > 3 ? argv[3] : "auto";
-  only_rule = rule == "samples" ? collision::ContactRule::Samples
-              : rule == "polar" ? collision::ContactRule::Polar
-              : rule == "march" ? collision::ContactRule::March
-                                : collision::ContactRule::None;
+  only_rule = rule_named(rule);
   if (argc > 4) seed = std::strtoull(argv[4], nullptr, 10);
   const auto wanted = [&](std::string_view name) { return only.empty() || only == "all" || only == name; };
-  constexpr double kRadius = 0.1, kSpacing = 0.03, kShallow = 1e-3, kDeep = 0.3, kE = 1e6;
-
-  const auto two_spheres = [&](std::string_view name, double rb, double eb) {
-    if (!wanted(name)) return;
-    Rigid a(linear_sphere(kRadius), kLinearModulus * kE, kSpacing);
-    Rigid b(linear_sphere(rb), kLinearModulus * eb, kSpacing * rb / kRadius);
-    measure(name, poses, [&](Draw& draw) {
-      const Vec3 axis = draw.direction(), centre = draw.uniform(0.0, 1.0) * draw.direction();
-      const double D = kRadius + rb - draw.logarithmic(kShallow, kDeep) * std::min(kRadius, rb);
-      a.put(random_pose(draw, centre));
-      b.put(random_pose(draw, centre + D * axis));
-      return Pair{{a.body(), b.body()}, true, spheres(kRadius, kE, rb, eb, D, centre, axis)};
-    });
-  };
-  two_spheres("equal", kRadius, kE);
-  two_spheres("radii", 2.0 * kRadius, kE);
-  two_spheres("stiffness", kRadius, 3.0 * kE);
-
-  if (wanted("plane")) {
-    Rigid ball(linear_sphere(kRadius), kLinearModulus * kE, kSpacing);
-    implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
-    const Pose origin;
-    const double k = 100.0 * kE / kRadius;
-    measure("plane", poses, [&](Draw& draw) {
-      const Vec3 up = draw.direction(), centre = draw.uniform(0.0, 1.0) * draw.direction();
-      const double h = kRadius - draw.logarithmic(kShallow, kDeep) * kRadius;
-      ball.put(random_pose(draw, centre));
-      plane = {centre - h * up, up, 1.0};
-      collision::ContactBody ground = single_part(plane, k, origin);
-      ground.fixed = true;
-      return Pair{{ball.body(), ground}, true, sphere_on_flat(kRadius, kE, k, h, centre, -up)};
-    });
-  }
-  if (wanted("slab")) {
-    // The face of a box whose pressure rises linearly over its rounding.
-    constexpr double kRounding = 0.1;
-    Rigid ball(linear_sphere(kRadius), kLinearModulus * kE, kSpacing);
-    Rigid slab(linear_shape(implicit::ShapeKind::Box, Vec3(0.3, 0.3, 0.05), kRounding), kLinearModulus * kE, 2.0 * kSpacing);
-    measure("slab", poses, [&](Draw& draw) {
-      const Pose pose = random_pose(draw, draw.uniform(0.0, 1.0) * draw.direction());
-      slab.put(pose);
-      const double h = kRadius - draw.logarithmic(kShallow, kDeep) * kRadius;
-      const Vec3 at(draw.uniform(-0.15, 0.15), draw.uniform(-0.15, 0.15), 0.05 + kRounding + h);
-      const Vec3 centre = pose.position + pose.orientation * at;
-      ball.put(random_pose(draw, centre));
-      return Pair{{ball.body(), slab.body()},
-                  true,
-                  sphere_on_flat(kRadius, kE, kE / kRounding, h, centre, -(pose.orientation * Vec3::UnitZ()))};
-    });
-  }
-  // Faces on faces: a rounded box lies flat on a plane, and on the face of another one, turned and shifted.
-  const Vec3 half(0.1, 0.08, 0.05);
-  constexpr double kEdge = 0.02;
-  const auto overlap = [&](Draw& draw) { return draw.logarithmic(0.01, kDeep) * kEdge; };
-  if (wanted("face_on_plane")) {
-    Rigid box(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing);
-    implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
-    const Pose origin;
-    measure("face_on_plane", poses, [&](Draw& draw) {
-      const Pose pose = random_pose(draw, draw.uniform(0.0, 1.0) * draw.direction());
-      box.put(pose);
-      const Vec3 up = pose.orientation * Vec3::UnitZ();
-      const double h = kEdge - overlap(draw), k = 10.0 * kE / kEdge;
-      const Vec3 core = pose.position - half.z() * up;
-      plane = {core - h * up, up, 1.0};
-      collision::ContactBody ground = single_part(plane, k, origin);
-      ground.fixed = true;
-      return Pair{{box.body(), ground}, true, face_on_flat(half.x(), half.y(), kEdge, kE, k, h, core, -up)};
-    });
-  }
-  if (wanted("face_on_face")) {
-    Rigid a(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing);
-    Rigid b(linear_shape(implicit::ShapeKind::Box, half, kEdge), 2.0 * kLinearModulus * kE, kSpacing);
-    measure("face_on_face", poses, [&](Draw& draw) {
-      const Pose pose = random_pose(draw, draw.uniform(0.0, 1.0) * draw.direction());
-      a.put(pose);
-      const Vec3 at(draw.uniform(-1.0, 1.0) * half.x(), draw.uniform(-1.0, 1.0) * half.y(), 2.0 * (half.z() + kEdge) - overlap(draw));
-      const Quat turn = pose.orientation * Quat(Eigen::AngleAxisd(draw.uniform(0.0, kPi), Vec3::UnitZ()));
-      b.put({pose.position + pose.orientation * at, turn});
-      return Pair{{a.body(), b.body()}, false, {}};
-    });
-  }
-  /// Bodies without a closed form: a surface point of B is pressed into one of A, normal against normal.
-  const auto pressed = [&](std::string_view name, Rigid& a, Rigid& b, double size) {
-    if (!wanted(name)) return;
-    measure(name, poses, [&](Draw& draw) {
-      press(a, b, draw.logarithmic(0.01, kDeep) * size, draw);
-      return Pair{{a.body(), b.body()}, false, {}};
-    });
-  };
-  {
-    Rigid a(wyvill_shape(implicit::ShapeKind::Ellipsoid, Vec3(0.2, 0.3, 0.25), 0.2), kE, kSpacing);
-    Rigid b(wyvill_shape(implicit::ShapeKind::Ellipsoid, Vec3(0.25, 0.2, 0.2), 0.2), 2.0 * kE, kSpacing);
-    pressed("ellipsoids", a, b, 0.1);
-  }
-  {
-    Rigid ball(wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), 0.22), kE, kSpacing);
-    Rigid plate(wyvill_shape(implicit::ShapeKind::Rectangle, Vec3(0.15, 0.15, 0.0), 0.15), kE, kSpacing);
-    pressed("plate", ball, plate, 0.07);
-  }
-  {
-    Rigid a(wyvill_shape(implicit::ShapeKind::Segment, Vec3(0.2, 0.0, 0.0), 0.2), kE, kSpacing);
-    Rigid b(wyvill_shape(implicit::ShapeKind::Segment, Vec3(0.1, 0.0, 0.0), 0.25), 3.0 * kE, kSpacing);
-    pressed("capsules", a, b, 0.1);
-  }
-  {
-    Rigid disc(wyvill_shape(implicit::ShapeKind::Disc, Vec3(0.15, 0.0, 0.0), 0.15), kE, kSpacing);
-    Rigid box(wyvill_shape(implicit::ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15), 2.0 * kE, kSpacing);
-    pressed("disc_on_box", disc, box, 0.07);
-  }
-  {
-    Rigid a(ten_blobs(1), kE, kSpacing), b(ten_blobs(2), 2.0 * kE, kSpacing);
-    pressed("ten_blobs", a, b, 0.05);
-  }
+  for_cases({}, wanted, [poses](std::string_view name, const auto& make_pose) { measure(name, poses, make_pose); });
   return 0;
 }

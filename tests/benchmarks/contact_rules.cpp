@@ -3,7 +3,7 @@
 /// the peak, in tetrahedra; each refined step by step, over the same random poses at an overlap of a tenth of the smaller
 /// radius. A query is broad phase, candidates and contact surface. Errors are the largest of force, area (relative) and
 /// centre of pressure (over the root of the area), RMS over the poses, against closed forms or the finest polar rule for
-/// the bodies swapped. Tables; a file name gets the plot (SVG).
+/// the bodies seen otherwise. Tables; a file name gets the plot (SVG).
 ///   contact_rules [FILE.svg]
 #include <cstdio>
 #include <fstream>
@@ -115,8 +115,7 @@ std::string measure(const char* name, double left, double top, const MakePose& m
       for (int pose = 0; pose < kPoses; ++pose) {
         Pair pair = make_pose(draw);
         if (!pair.known) {
-          const std::array<collision::ContactBody, 2> swapped{pair.bodies[1], pair.bodies[0]};
-          const Asked finest = ask(swapped, {.error = 1e-10, .only = ContactRule::Polar});
+          const Asked finest = ask(seen_otherwise(pair.bodies), {.error = 1e-10, .only = ContactRule::Polar});
           if (!finest.found) continue;  // no polar patch to compare with
           pair.exact = finest.answer;
         }

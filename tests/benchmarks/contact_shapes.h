@@ -10,6 +10,7 @@
 #include <ctime>
 #include <numbers>
 #include <random>
+#include <string_view>
 
 #include "supple/collision/contact_surface.h"
 #include "supple/core/math.h"
@@ -40,6 +41,12 @@ class Draw {
   std::mt19937_64 engine_;
 };
 
+/// @param name  of a rule, as a command line has it; any other: the cheapest that fits
+inline collision::ContactRule rule_named(std::string_view name) {
+  using collision::ContactRule;
+  return name == "samples" ? ContactRule::Samples : name == "polar" ? ContactRule::Polar : name == "march" ? ContactRule::March : ContactRule::None;
+}
+
 /// One part of a body that moves as a whole; only pose and field differ.
 inline collision::ContactBody single_part(const implicit::FieldView& field, double modulus, const Pose& pose) {
   static const Vec3 kStill = Vec3::Zero();
@@ -52,24 +59,70 @@ inline collision::ContactBody single_part(const implicit::FieldView& field, doub
   return body;
 }
 
+/// The same two bodies in the other order and with poses that are not theirs: their contact is the same, but what a query chooses by
+/// how bodies lie comes out otherwise, so that its nodes are other points.
+inline std::array<collision::ContactBody, 2> seen_otherwise(const std::array<collision::ContactBody, 2>& bodies) {
+  static const Pose kElsewhere{Vec3(0.7, -1.1, 0.4), Quat(0.6, -0.2, 0.5, 0.3).normalized()};
+  std::array<collision::ContactBody, 2> others{bodies[1], bodies[0]};
+  for (collision::ContactBody& body : others) {
+    body.pose = {&kElsewhere, 1};
+    body.skeleton = nullptr;
+  }
+  return others;
+}
+
+/// Where all bodies of a scene are put, and in which size.
+struct Stage {
+  double length = 1.0;  ///< of a metre of theirs [m]
+  Pose pose;
+  [[nodiscard]] Pose place(const Pose& inner) const {
+    return {pose.position + length * (pose.orientation * inner.position), pose.orientation * inner.orientation};
+  }
+  [[nodiscard]] implicit::HalfSpace place(const implicit::HalfSpace& inner) const {
+    return {pose.position + length * (pose.orientation * inner.point), pose.orientation * inner.normal, inner.slope / length};
+  }
+  [[nodiscard]] implicit::Skeleton scaled(implicit::Skeleton skeleton) const {
+    if (length == 1.0) return skeleton;
+    for (implicit::Primitive& p : skeleton.primitive) {
+      p.size *= length;
+      p.offset.position *= length;
+      p.kernel.radius *= length;
+      p.kernel.thickness *= length;
+      p.kernel.slope /= length;
+      p.kernel.steepest *= length;
+    }
+    return skeleton;
+  }
+};
+
 /// A rigid body: its field and samples in the pose it was put in.
 class Rigid {
  public:
-  Rigid(implicit::Skeleton skeleton, double modulus, double spacing)
-      : skeleton_(std::move(skeleton)), modulus_(modulus), layout_(implicit::make_sample_layout(skeleton_, spacing)) {
-    put({});
+  Rigid(implicit::Skeleton skeleton, double modulus, double spacing, const Stage& stage = {})
+      : stage_(stage), skeleton_(stage.scaled(std::move(skeleton))), modulus_(modulus), layout_(implicit::make_sample_layout(skeleton_, stage.length * spacing)) {
+    implicit::place_skeleton(skeleton_, {&pose_, 1}, placed_);
+    implicit::index_field(skeleton_, placed_, field_);
     implicit::SampleState kept;
     implicit::sample_surface(skeleton_, layout_, {&pose_, 1}, field_, {}, {}, Executor(1), kept, rest_);
   }
+  /// @param pose  on the stage
   void put(const Pose& pose) {
-    pose_ = pose;
+    pose_ = stage_.place(pose);
     implicit::place_skeleton(skeleton_, {&pose_, 1}, placed_);
     implicit::index_field(skeleton_, placed_, field_);
     samples_ = rest_;
     for (std::size_t i = 0; i < samples_.point.size(); ++i) {
-      samples_.point[i] = pose.position + pose.orientation * rest_.point[i];
-      samples_.normal[i] = pose.orientation * rest_.normal[i];
+      samples_.point[i] = pose_.position + pose_.orientation * rest_.point[i];
+      samples_.normal[i] = pose_.orientation * rest_.normal[i];
     }
+  }
+  /// A random place of the surface and its normal, on the stage with the body at rest.
+  std::pair<Vec3, Vec3> surface_point(Draw& draw) const {
+    std::size_t i = 0;
+    do {
+      i = static_cast<std::size_t>(draw.uniform(0.0, 1.0) * static_cast<double>(rest_.point.size()));
+    } while (rest_.valid[i] == 0);
+    return {rest_.point[i] / stage_.length, rest_.normal[i]};
   }
   [[nodiscard]] collision::ContactBody body() const {
     collision::ContactBody b = single_part(field_, modulus_, pose_);
@@ -79,6 +132,7 @@ class Rigid {
   }
 
  private:
+  Stage stage_;
   implicit::Skeleton skeleton_;
   double modulus_;
   implicit::SampleLayout layout_;
@@ -228,17 +282,11 @@ struct Pair {
 
 /// Places B such that a surface point of it is pressed into one of A by `depth`, normal against normal.
 inline void press(Rigid& a, Rigid& b, double depth, Draw& draw) {
-  const auto point_of = [&](Rigid& body, const Pose& pose) {
-    body.put(pose);
-    const implicit::SurfaceSamples& samples = *body.body().samples;
-    std::size_t i = 0;
-    do {
-      i = static_cast<std::size_t>(draw.uniform(0.0, 1.0) * static_cast<double>(samples.point.size()));
-    } while (samples.valid[i] == 0);
-    return std::pair(samples.point[i], samples.normal[i]);
-  };
-  const auto [x, n] = point_of(a, {draw.uniform(0.0, 1.0) * draw.direction(), draw.rotation()});
-  const auto [y, m] = point_of(b, {});
+  const Pose pose{draw.uniform(0.0, 1.0) * draw.direction(), draw.rotation()};
+  a.put(pose);
+  const auto [rest, outward] = a.surface_point(draw);
+  const Vec3 x = pose.position + pose.orientation * rest, n = pose.orientation * outward;
+  const auto [y, m] = b.surface_point(draw);
   const Quat spin(Eigen::AngleAxisd(draw.uniform(-kPi, kPi), n));
   const Quat turn = (spin * Quat::FromTwoVectors(m, -n)).normalized();
   b.put({x - depth * n - turn * y, turn});

@@ -74,10 +74,10 @@ class Blobs {
  public:
   explicit Blobs(std::uint64_t seed) : draw_(seed) {}
   void next() { benchmarks::press(a_, b_, draw_.logarithmic(0.01, 0.3) * 0.05, draw_); }
-  [[nodiscard]] ContactSurface::Summary solve(double error, bool swap = false) const {
+  [[nodiscard]] ContactSurface::Summary solve(double error, bool otherwise = false) const {
     const Executor executor(1);
     std::array<ContactBody, 2> bodies{a_.body(), b_.body()};
-    if (swap) std::swap(bodies[0], bodies[1]);
+    if (otherwise) bodies = benchmarks::seen_otherwise(bodies);
     ContactCandidates candidates;
     ContactSurface surface;
     find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
@@ -145,7 +145,7 @@ TEST(MildKinks, AreCrossedByFewRaysWhereOutlinesAreUneven) {
         EXPECT_EQ(s.kinks, 0u) << c.seed << ' ' << pose;
         EXPECT_LE(s.points, asked > 1e-4 ? 700u : 6000u) << c.seed << ' ' << pose;
         // Panels that are not exact enough keep their rays; halved, they took up to 14,100 and 117,000.
-        EXPECT_LE(s.evaluations, asked > 1e-4 ? 13000u : 95000u) << c.seed << ' ' << pose;
+        EXPECT_LE(s.evaluations, asked > 1e-4 ? 13000u : 100000u) << c.seed << ' ' << pose;
         EXPECT_LE(s.error_estimate, asked) << c.seed << ' ' << pose;
         EXPECT_LE(off_by(s, exact), s.error_estimate + exact.error_estimate) << c.seed << ' ' << pose << ' ' << asked;
       }

@@ -1,0 +1,133 @@
+/// @file contact_cases.h
+/// The twelve cases of contact queries in random poses.
+#pragma once
+
+#include <string_view>
+
+#include "contact_shapes.h"
+
+namespace supple::benchmarks {
+
+/// Calls `visit(name, make_pose)` for each case that is wanted; `make_pose(draw)` puts its two bodies in the next random pose, the same ones
+/// on every stage. Spheres of linear pressure have closed forms, in the place and size of the bodies on the default stage.
+template <class Wanted, class Visit>
+void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
+  const auto turned = [](Draw& draw, const Vec3& position) { return Pose{position, draw.rotation()}; };
+  const auto somewhere = [](Draw& draw) -> Vec3 { return draw.uniform(0.0, 1.0) * draw.direction(); };
+  constexpr double kRadius = 0.1, kSpacing = 0.03, kShallow = 1e-3, kDeep = 0.3, kE = 1e6;
+
+  const auto two_spheres = [&](std::string_view name, double rb, double eb) {
+    if (!wanted(name)) return;
+    Rigid a(linear_sphere(kRadius), kLinearModulus * kE, kSpacing, stage);
+    Rigid b(linear_sphere(rb), kLinearModulus * eb, kSpacing * rb / kRadius, stage);
+    visit(name, [&](Draw& draw) {
+      const Vec3 axis = draw.direction(), centre = somewhere(draw);
+      const double D = kRadius + rb - draw.logarithmic(kShallow, kDeep) * std::min(kRadius, rb);
+      a.put(turned(draw, centre));
+      b.put(turned(draw, centre + D * axis));
+      return Pair{{a.body(), b.body()}, true, spheres(kRadius, kE, rb, eb, D, centre, axis)};
+    });
+  };
+  two_spheres("equal", kRadius, kE);
+  two_spheres("radii", 2.0 * kRadius, kE);
+  two_spheres("stiffness", kRadius, 3.0 * kE);
+
+  if (wanted("plane")) {
+    Rigid ball(linear_sphere(kRadius), kLinearModulus * kE, kSpacing, stage);
+    implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+    const Pose origin;
+    const double k = 100.0 * kE / kRadius;
+    visit("plane", [&](Draw& draw) {
+      const Vec3 up = draw.direction(), centre = somewhere(draw);
+      const double h = kRadius - draw.logarithmic(kShallow, kDeep) * kRadius;
+      ball.put(turned(draw, centre));
+      plane = stage.place(implicit::HalfSpace{centre - h * up, up, 1.0});
+      collision::ContactBody ground = single_part(plane, k, origin);
+      ground.fixed = true;
+      return Pair{{ball.body(), ground}, true, sphere_on_flat(kRadius, kE, k, h, centre, -up)};
+    });
+  }
+  if (wanted("slab")) {
+    // The face of a box whose pressure rises linearly over its rounding.
+    constexpr double kRounding = 0.1;
+    Rigid ball(linear_sphere(kRadius), kLinearModulus * kE, kSpacing, stage);
+    Rigid slab(linear_shape(implicit::ShapeKind::Box, Vec3(0.3, 0.3, 0.05), kRounding), kLinearModulus * kE, 2.0 * kSpacing, stage);
+    visit("slab", [&](Draw& draw) {
+      const Pose pose = turned(draw, somewhere(draw));
+      slab.put(pose);
+      const double h = kRadius - draw.logarithmic(kShallow, kDeep) * kRadius;
+      const Vec3 at(draw.uniform(-0.15, 0.15), draw.uniform(-0.15, 0.15), 0.05 + kRounding + h);
+      const Vec3 centre = pose.position + pose.orientation * at;
+      ball.put(turned(draw, centre));
+      return Pair{{ball.body(), slab.body()},
+                  true,
+                  sphere_on_flat(kRadius, kE, kE / kRounding, h, centre, -(pose.orientation * Vec3::UnitZ()))};
+    });
+  }
+  // Faces on faces: a rounded box lies flat on a plane, and on the face of another one, turned and shifted.
+  const Vec3 half(0.1, 0.08, 0.05);
+  constexpr double kEdge = 0.02;
+  const auto overlap = [&](Draw& draw) { return draw.logarithmic(0.01, kDeep) * kEdge; };
+  if (wanted("face_on_plane")) {
+    Rigid box(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing, stage);
+    implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+    const Pose origin;
+    visit("face_on_plane", [&](Draw& draw) {
+      const Pose pose = turned(draw, somewhere(draw));
+      box.put(pose);
+      const Vec3 up = pose.orientation * Vec3::UnitZ();
+      const double h = kEdge - overlap(draw), k = 10.0 * kE / kEdge;
+      const Vec3 core = pose.position - half.z() * up;
+      plane = stage.place(implicit::HalfSpace{core - h * up, up, 1.0});
+      collision::ContactBody ground = single_part(plane, k, origin);
+      ground.fixed = true;
+      return Pair{{box.body(), ground}, true, face_on_flat(half.x(), half.y(), kEdge, kE, k, h, core, -up)};
+    });
+  }
+  if (wanted("face_on_face")) {
+    Rigid a(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing, stage);
+    Rigid b(linear_shape(implicit::ShapeKind::Box, half, kEdge), 2.0 * kLinearModulus * kE, kSpacing, stage);
+    visit("face_on_face", [&](Draw& draw) {
+      const Pose pose = turned(draw, somewhere(draw));
+      a.put(pose);
+      const Vec3 at(draw.uniform(-1.0, 1.0) * half.x(), draw.uniform(-1.0, 1.0) * half.y(), 2.0 * (half.z() + kEdge) - overlap(draw));
+      const Quat turn = pose.orientation * Quat(Eigen::AngleAxisd(draw.uniform(0.0, kPi), Vec3::UnitZ()));
+      b.put({pose.position + pose.orientation * at, turn});
+      return Pair{{a.body(), b.body()}, false, {}};
+    });
+  }
+  /// Bodies without a closed form: a surface point of B is pressed into one of A, normal against normal.
+  const auto pressed = [&](std::string_view name, Rigid& a, Rigid& b, double size) {
+    if (!wanted(name)) return;
+    visit(name, [&](Draw& draw) {
+      press(a, b, draw.logarithmic(0.01, kDeep) * size, draw);
+      return Pair{{a.body(), b.body()}, false, {}};
+    });
+  };
+  {
+    Rigid a(wyvill_shape(implicit::ShapeKind::Ellipsoid, Vec3(0.2, 0.3, 0.25), 0.2), kE, kSpacing, stage);
+    Rigid b(wyvill_shape(implicit::ShapeKind::Ellipsoid, Vec3(0.25, 0.2, 0.2), 0.2), 2.0 * kE, kSpacing, stage);
+    pressed("ellipsoids", a, b, 0.1);
+  }
+  {
+    Rigid ball(wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), 0.22), kE, kSpacing, stage);
+    Rigid plate(wyvill_shape(implicit::ShapeKind::Rectangle, Vec3(0.15, 0.15, 0.0), 0.15), kE, kSpacing, stage);
+    pressed("plate", ball, plate, 0.07);
+  }
+  {
+    Rigid a(wyvill_shape(implicit::ShapeKind::Segment, Vec3(0.2, 0.0, 0.0), 0.2), kE, kSpacing, stage);
+    Rigid b(wyvill_shape(implicit::ShapeKind::Segment, Vec3(0.1, 0.0, 0.0), 0.25), 3.0 * kE, kSpacing, stage);
+    pressed("capsules", a, b, 0.1);
+  }
+  {
+    Rigid disc(wyvill_shape(implicit::ShapeKind::Disc, Vec3(0.15, 0.0, 0.0), 0.15), kE, kSpacing, stage);
+    Rigid box(wyvill_shape(implicit::ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15), 2.0 * kE, kSpacing, stage);
+    pressed("disc_on_box", disc, box, 0.07);
+  }
+  {
+    Rigid a(ten_blobs(1), kE, kSpacing, stage), b(ten_blobs(2), 2.0 * kE, kSpacing, stage);
+    pressed("ten_blobs", a, b, 0.05);
+  }
+}
+
+}  // namespace supple::benchmarks
