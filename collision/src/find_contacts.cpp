@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "body_order.h"
 #include "boxes.h"
 
 namespace supple::collision {
@@ -160,22 +161,6 @@ struct Between {
   bool apart = false;          ///< certainly no overlap
 };
 
-/// Where the search for the nearest points of two bodies begins.
-Vec3 begin_of(const ContactBody& body) { return body.pose.empty() ? Vec3::Zero().eval() : body.pose.front().position; }
-
-/// Whether that search should begin at the first of two bodies, of which one at least moves, whichever is named first: by what they are, then by
-/// how each sees the way to the other.
-bool leads(const ContactBody& one, const ContactBody& other) {
-  if (one.fixed != other.fixed) return other.fixed;
-  const double size = one.field.feature_size(), other_size = other.field.feature_size();
-  if (size != other_size) return size < other_size;
-  if (one.material.modulus != other.material.modulus) return one.material.modulus < other.material.modulus;
-  if (one.skeleton == nullptr || other.skeleton == nullptr) return true;
-  const Vec3 way = begin_of(other) - begin_of(one);
-  const auto key = [&way](const ContactBody& body) { return (body.pose.front().orientation.conjugate() * way).array().square().square().sum(); };
-  return key(one) <= key(other);
-}
-
 /// On the line between the nearest points of two cores, which are found by going from one to the other. None when the
 /// cores meet.
 std::optional<Between> between_cores(const ContactBody& one, const ContactBody& other) {
@@ -183,7 +168,7 @@ std::optional<Between> between_cores(const ContactBody& one, const ContactBody& 
   constexpr double kEnough = 1e-3;  // of the distance: the overlap is sought from here, not measured
   const bool leading = leads(one, other);
   const ContactBody &a = leading ? one : other, &b = leading ? other : one;
-  const Vec3 start = begin_of(a);
+  const Vec3 start = first_place(a);
   std::optional<implicit::CorePoint> on_a = a.field.core_point(start);
   if (!on_a) return std::nullopt;
   std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);

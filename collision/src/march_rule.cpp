@@ -15,8 +15,9 @@ namespace {
 /// Of a cell: a last step as long as this leaves its square, and normals as good as it.
 constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kMostCells = 1024.0;  // along the longest side of the overlap's box, before cells are halved
-constexpr int kMostHalvings = 4;       // of the cells of a mesh
+constexpr int kMostHalvings = 4;       // of the cells of a mesh at which something presses
+constexpr double kBeside = 2.0;        // from where it presses, in triangles: others need not be smooth
+constexpr double kSmallest = 1.0 / 512.0;  // cell, over the features, for small patches
 constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
@@ -406,13 +407,13 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
 void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
                                 const std::optional<CommonAxis>& axis) {
   const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, axis, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
-  const double longest = overlap.extent().maxCoeff();
-  cell_ = std::max(std::min(pressure.feature_size(), longest / kFewCells), longest / kMostCells);
+  // Halves of the features until something is seen to press, as how long the box of an overlap is depends on how it lies.
+  const double size = pressure.feature_size();
+  cell_ = size;
   bool coarse = false;
   for (; !mesh(); cell_ *= 2.0) coarse = true;
   begin(pressure, third, pieces_);
-  for (int halvings = 0; halvings < kMostHalvings && !coarse; ++halvings) {
-    if (std::all_of(pieces_.begin(), pieces_.end(), [&](const Piece& p) { return smooth(p) || !may_press(pressure, p); })) return;
+  const auto halve = [&] {
     cell_ *= 0.5;
     if (!mesh()) {
       cell_ *= 2.0;
@@ -420,6 +421,17 @@ void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactB
       coarse = true;
     }
     begin(pressure, third, pieces_);
+  };
+  // By what is known at the feet, as bounds of the fields in boxes depend on how these lie.
+  const auto presses_within = [](const Piece& p, double reach) {
+    const auto positive = [reach](const Foot& f) { return f.good && f.pressure + reach * f.slope.norm() > 0.0; };
+    return std::any_of(p.corner.begin(), p.corner.end(), positive) || std::any_of(p.middle.begin(), p.middle.end(), positive);
+  };
+  while (!coarse && cell_ > kSmallest * size && std::none_of(pieces_.begin(), pieces_.end(), [&](const Piece& p) { return presses_within(p, 0.0); })) halve();
+  const auto fits = [&](const Piece& p) { return smooth(p) || !presses_within(p, kBeside); };
+  for (int halvings = 0; halvings < kMostHalvings && !coarse; ++halvings) {
+    if (std::all_of(pieces_.begin(), pieces_.end(), fits)) return;
+    halve();
   }
 }
 

@@ -35,7 +35,6 @@ class MarchRuleSolver {
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< about the point of largest pressure [m]
 
-  static constexpr double kFewCells = 4.0;  ///< along the longest side of the overlap's box, at least
   /// Of images, all levels together: no more are split then.
   static constexpr std::size_t kMostPieces = 1u << 15;
 

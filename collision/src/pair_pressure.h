@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "supple/collision/bodies.h"
@@ -40,6 +41,14 @@ class PairPressure {
   /// @param apart  it is no closer to the plane across this direction, which lies across the normal itself, than that choice can bear; or null
   /// @return nothing where bodies that are balls on each other, or do not say how they lie, tell none
   [[nodiscard]] std::optional<Vec3> tangent(const Vec3& from, const Vec3& normal, const Vec3* apart = nullptr) const;
+
+  /// A becomes B.
+  void reverse() {
+    std::swap(field_[0], field_[1]);
+    std::swap(body_[0], body_[1]);
+    std::swap(modulus_[0], modulus_[1]);
+  }
+  [[nodiscard]] const ContactBody& body(int side) const noexcept { return *body_[side]; }
 
   /// Values and gradients of both bodies at batch.point.
   void evaluate(PressureBatch& batch) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "body_order.h"
 #include "boxes.h"
 #include "symmetry.h"
 
@@ -135,42 +136,53 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   return true;
 }
 
-/// The summary of a rule that sees all patches at once.
-template <class Rule>
-void PairSolver::keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out) const {
-  out.add(rule.sums(), reference);
+/// A rule that sees all patches at once, with the bodies in the order that they tell themselves: lattices and rays are the same then, whichever of
+/// them is named first.
+template <class Rule, class Solve>
+bool PairSolver::solve_in_order(const Job& job, Rule& rule, ContactRule name, const Solve& solve, PairResult& out) {
+  begin_anew(job, out);
+  const Vec3 reference = job.overlap.centre();
+  const bool reversed = !leads(job.a, job.b);
+  Regions regions = job.polar.regions;
+  if (reversed) {
+    job.polar.pressure.reverse();
+    std::swap(regions[0], regions[1]);
+  }
+  const bool fits = solve(regions, reference);
+  if (reversed) job.polar.pressure.reverse();
+  if (!fits) return false;
+  PatchSums sums = rule.sums();
+  if (reversed) {
+    sums.reverse();
+    out.points.reverse();
+  }
+  out.add(sums, reference);
   out.summary.rule = name;
   out.summary.error_estimate = rule.estimate();
   out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
   out.summary.largest_overlap = rule.thickness();
   out.summary.patches = std::max(1u, static_cast<std::uint32_t>(patches_.covers().size()));
+  return true;
 }
 
 bool PairSolver::samples(const Job& job, PairResult& out) {
-  begin_anew(job, out);
-  const Vec3 reference = job.overlap.centre();
   // The spacing of the kept samples, or what they would have.
   constexpr double kAcrossFeature = 3.0;
-  const double first = job.polar.spacing > 0.0 ? job.polar.spacing : job.polar.pressure.feature_size() / kAcrossFeature;
-  if (!samples_.solve(job.polar.pressure, job.a, job.b, third_bodies_, job.overlap, first, job.settings(), job.polar.regions, reference,
-                      out.points)) {
-    return false;
-  }
-  keep(samples_, ContactRule::Samples, reference, out);
-  return true;
+  PairPressure& pressure = job.polar.pressure;
+  const double first = job.polar.spacing > 0.0 ? job.polar.spacing : pressure.feature_size() / kAcrossFeature;
+  return solve_in_order(job, samples_, ContactRule::Samples, [&](const Regions& regions, const Vec3& reference) {
+    return samples_.solve(pressure, third_bodies_, job.overlap, first, job.settings(), regions, reference, out.points);
+  }, out);
 }
 
 bool PairSolver::march(const Job& job, PairResult& out) {
-  begin_anew(job, out);
-  const Vec3 reference = job.overlap.centre();
   const ContactSettings& settings = job.settings();
-  const bool alone = settings.symmetry && third_bodies_.empty();
-  const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(job.a, job.b, job.overlap) : std::nullopt;
-  if (!march_.solve(job.polar.pressure, third_bodies_, job.overlap, {settings.error, settings.max_refinement}, job.polar.regions, axis, reference, out.points)) {
-    return false;
-  }
-  keep(march_, ContactRule::March, reference, out);
-  return true;
+  PairPressure& pressure = job.polar.pressure;
+  return solve_in_order(job, march_, ContactRule::March, [&](const Regions& regions, const Vec3& reference) {
+    const bool alone = settings.symmetry && third_bodies_.empty();
+    const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(pressure.body(0), pressure.body(1), job.overlap) : std::nullopt;
+    return march_.solve(pressure, third_bodies_, job.overlap, {settings.error, settings.max_refinement}, regions, axis, reference, out.points);
+  }, out);
 }
 
 /// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.

@@ -58,8 +58,8 @@ class PairSolver {
   void take_all_thirds(const Job& job);
   void begin_anew(const Job& job, PairResult& out);
   void fill_unsure_regions(const Job& job, PairResult& out);
-  template <class Rule>
-  void keep(const Rule& rule, ContactRule name, const Vec3& reference, PairResult& out) const;
+  template <class Rule, class Solve>
+  bool solve_in_order(const Job& job, Rule& rule, ContactRule name, const Solve& solve, PairResult& out);
 
   PolarPatches patches_;
   ImprintFinder imprint_;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "supple/core/types.h"
@@ -29,6 +30,11 @@ struct PatchSums {
     load += weight * pressure;
     area += weight;
     spread += weight * pressure * from_reference.squaredNorm();
+  }
+  /// As A and B have it when they change places.
+  void reverse() {
+    force = -force;
+    moment = -moment;
   }
   void add(const PatchSums& other, double weight = 1.0) {
     force += weight * other.force;
@@ -84,6 +90,15 @@ struct PatchPoints {
       energy[side] = displaced[side] = 0.0;
       unsure[side] = false;
     }
+  }
+
+  /// A becomes B.
+  void reverse() {
+    for (Vec3& n : normal) n = -n;
+    for (std::uint8_t& side : volume_side) side = side == 0 ? 1 : 0;
+    std::swap(energy[0], energy[1]);
+    std::swap(displaced[0], displaced[1]);
+    std::swap(unsure[0], unsure[1]);
   }
 
   /// Takes all of a squeezed region away.

@@ -397,15 +397,13 @@ void SampleRuleSolver::add_columns_across(PairPressure& pressure, int side, Patc
   add_to_region(pressure, side, begin, value_, points);
 }
 
-bool SampleRuleSolver::solve(PairPressure& pressure, const ContactBody& a, const ContactBody& b,
-                             std::span<const ContactBody* const> third, const Box& overlap, double spacing,
-                             const ContactSettings& settings, const Regions& regions, const Vec3& reference,
-                             PatchPoints& points) {
-  body_ = {&a, &b};
+bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing,
+                             const ContactSettings& settings, const Regions& regions, const Vec3& reference, PatchPoints& points) {
+  body_ = {&pressure.body(0), &pressure.body(1)};
   estimate_ = 1.0;
   thickness_ = 0.0;
   points.clear();
-  if (a.skeleton == nullptr && b.skeleton == nullptr) return false;
+  if (body_[0]->skeleton == nullptr && body_[1]->skeleton == nullptr) return false;
   if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return false;
   const double scale = 1e-13 * pressure.largest_modulus();
   const std::size_t most = settings.only == ContactRule::Samples ? kMostRays : kFewRays;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body_order.h"
+
 namespace supple::collision {
 namespace {
 
@@ -58,7 +60,7 @@ std::uint32_t SigmaMesher::node_of(Key key) const {
 /// the border leave out then lies where nobody presses.
 bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
   unsigned level = 0;
-  const double reach = mirrored_ ? (overlap.centre() - origin_).norm() + 0.5 * overlap.extent().norm() : overlap.extent().maxCoeff();
+  const double reach = (overlap.centre() - origin_).norm() + 0.5 * overlap.extent().norm();
   while (std::ldexp(cell_, static_cast<int>(level)) < reach) {
     if (++level + 2 >= kBits) return false;
   }
@@ -221,9 +223,11 @@ bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, 
     axes_ << x, z.cross(x), z;
     origin_ = axis->point + ((overlap.centre() - axis->point).dot(z) + 0.4142136 * cell) * z;
   } else {
+    const Pose pose = common_pose(pressure.body(0), pressure.body(1));
     cell_ = cell;
-    axes_.setIdentity();
-    origin_ = overlap.centre() + cell * Vec3(0.2763932, 0.3819660, 0.4142136);
+    axes_ = pose.orientation.toRotationMatrix();
+    const Vec3 near = (axes_.transpose() * (overlap.centre() - pose.position) / cell).array().round();  // whole cells from there
+    origin_ = pose.position + axes_ * (cell * (near + Vec3(0.2763932, 0.3819660, 0.4142136)));
   }
   if (!find_cells(pressure, overlap)) return false;
   find_nodes(pressure);

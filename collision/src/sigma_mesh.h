@@ -27,7 +27,8 @@ struct SigmaMesh {
 class SigmaMesher {
  public:
   /// @param overlap  finite; holds all of Sigma where p > 0   @param cell  side of the lattice's cells [m], about
-  /// @param axis  of symmetry, if there is one: two planes through it, at right angles, mirror the triangles
+  /// @param axis  of symmetry, if there is one: two planes through it, at right angles, mirror the triangles; else the lattice is that of the
+  ///              bodies' common pose
   /// @return false where there would be more cells than kMostCells
   bool mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, SigmaMesh& out);
 
