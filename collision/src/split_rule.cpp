@@ -71,11 +71,12 @@ constexpr double kRound = 6e5;  // times its square
 constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
 constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
-constexpr double kRadial = 2.0, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
+constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 /// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
 constexpr double kMildAngle = 0.15, kMildByChance = 0.3, kMildRadius = 2.0;
 constexpr double kExtended = 100.0;  // over what it may be: a panel's doubt that twice as many rays are worth their while for; beyond it is halved
 constexpr std::size_t kFine = 15;  // rays
+constexpr int kFewOnFaces = 3;     // points on a ray, which are compared with two
 
 }  // namespace
 
@@ -373,7 +374,7 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) co
   }
   const double relative = panel.fine.area > 0.0 ? panel.by_radius * all.area / panel.fine.area : 0.0;
   const double slow = kSlowOnFaces * std::sqrt(std::sqrt(relative));
-  panel.by_radius *= panel.lost ? kHalf : fine ? kRadialOnFacesFine : std::clamp(slow, kRadialOnFaces, kHalf);
+  panel.by_radius *= panel.lost ? kHalf : fine ? kRadialOnFacesFine : std::clamp(slow, panel.nodes <= kFewOnFaces ? kRadialOnFacesFew : kRadialOnFaces, kHalf);
 }
 
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
