@@ -222,22 +222,28 @@ std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const 
 }
 
 /// Where a function changes its sign around a closed line, from its values at points of it: i + t lies between points i and i + 1.
-/// Between two changes that no point saw it is the parabola through three points.
+/// Between two changes that no point saw, or one alone, it is the parabola through three points.
 void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<double>& places) {
   const std::size_t n = values.size();
+  const auto at = [&](std::size_t i) { return values[i % n]; };
+  const auto alone = [&](std::size_t i) { return (at(i + n - 1) > 0.0) != (at(i) > 0.0) && (at(i + 1) > 0.0) != (at(i) > 0.0); };
+  /// The root of the parabola about point i on one side of it; not a number where there is none.
+  const auto root = [&](std::size_t i, double side) {
+    const double last = at(i + n - 1), here = at(i), next = at(i + 1);
+    const double bend = last - 2.0 * here + next, slope = 0.5 * (next - last);
+    return (side * std::copysign(std::sqrt(slope * slope - 2.0 * bend * here), bend) - slope) / bend;
+  };
+  const auto add = [&](double place) { places.push_back(place < 0.0 ? place + static_cast<double>(n) : place); };
   for (std::size_t i = 0; i < n; ++i) {
-    const double last = values[(i + n - 1) % n], here = values[i], next = values[(i + 1) % n];
+    const double last = at(i + n - 1), here = at(i), next = at(i + 1), begin = static_cast<double>(i);
     const bool side = here > 0.0;
     if ((next > 0.0) != side) {
-      places.push_back(static_cast<double>(i) + here / (here - next));
+      add(begin + (alone(i) ? root(i, 1.0) : alone(i + 1) ? 1.0 + root(i + 1, -1.0) : here / (here - next)));
       continue;
     }
     const double bend = last - 2.0 * here + next, slope = 0.5 * (next - last), square = slope * slope - 2.0 * bend * here;
     if ((last > 0.0) != side || !(bend * here > 0.0) || !(std::abs(slope) <= 0.5 * std::abs(bend)) || !(square > 0.0)) continue;
-    for (const double sign : {-1.0, 1.0}) {
-      const double at = static_cast<double>(i) + (sign * std::sqrt(square) - slope) / bend;
-      places.push_back(at < 0.0 ? at + static_cast<double>(n) : at);
-    }
+    for (const double which : {-1.0, 1.0}) add(begin + root(i, which));
   }
 }
 
