@@ -223,13 +223,12 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     step = ((a - b) / steepness) * axis;
     if (!flat) step += (g1 / c1) * first + (g2 / c2) * other;
     const bool on_sigma = gap <= 1e-6 * std::abs(level) + noise;
-    // What rounding of the slopes leaves of a gain is of its square.
-    const bool at_top = gain <= 1e-16 * std::abs(level) + noise * std::min(1e-3, noise / std::abs(level));
+    const bool at_top = gain <= 1e-12 * std::abs(level) + 1e-3 * noise;
     frame.axis = axis;
     frame.flat = flat && on_sigma;
     if (frame.flat || (on_sigma && at_top) || iteration + 1 == kMostSteps) {
       if (level <= noise || !on_sigma) return std::nullopt;
-      frame.origin = at_top || frame.flat ? Vec3(x + step) : x;
+      frame.origin = x;
       frame.peak = level;
       const bool round = p.first - p.second <= kRound * (std::abs(q_uu) + std::abs(q_vv) + flattest);
       const double cs = round ? 1.0 : p.cosine, sn = round ? 0.0 : p.sine;
