@@ -153,6 +153,20 @@ TEST(MildKinks, AreCrossedByFewRaysWhereOutlinesAreUneven) {
   }
 }
 
+TEST(MildKinks, LeaveBoundsTrueWhereTwoRulesOfAPanelAgreeByChance) {
+  struct Case {
+    std::uint64_t seed;
+    int pose;
+    double asked;
+  };
+  for (const Case& c : {Case{11, 1119, 3e-6}, Case{21, 1986, 1e-6}}) {
+    Blobs blobs(c.seed);
+    for (int pose = 0; pose <= c.pose; ++pose) blobs.next();
+    const ContactSurface::Summary exact = blobs.solve(1e-8, true), s = blobs.solve(c.asked);
+    EXPECT_LE(off_by(s, exact), s.error_estimate + exact.error_estimate) << c.seed;
+  }
+}
+
 TEST(MildKinks, AreNotTheOnlyOnesOfAPlate) {
   // At its edges second derivatives jump: there patches are parted at any error.
   benchmarks::Rigid ball(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), 0.22), 1e6, 0.03);
