@@ -50,6 +50,15 @@ Quat turned(double angle, const Vec3& axis) { return Quat(Eigen::AngleAxisd(angl
 /// Of bodies there the nodes are other points than of bodies that say where they lie.
 const Vec3 kElsewhere(0.7, -1.1, 0.4);
 
+ContactSurface::Summary solved(const std::array<ContactBody, 2>& bodies, double error) {
+  const Executor executor(1);
+  ContactCandidates candidates;
+  ContactSurface surface;
+  find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
+  solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
+  return surface.summary.at(0);
+}
+
 ContactSurface::Summary solve(const implicit::FieldView& a, const Vec3& at_a, const implicit::FieldView& b, const Vec3& at_b,
                               double modulus_b, double error) {
   Stage stage;
@@ -221,14 +230,6 @@ TEST(FacesOnFaces, AreNotTrustedWhereACornerOfTheRimIsNotFound) {
   benchmarks::Rigid box(benchmarks::wyvill_shape(implicit::ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15), 2e6, 0.03);
   benchmarks::Draw draw(11);
   for (int pose = 0; pose <= 681; ++pose) benchmarks::press(disc, box, draw.logarithmic(0.01, 0.3) * 0.07, draw);
-  const Executor executor(1);
-  const auto solved = [&](const std::array<ContactBody, 2>& bodies, double error) {
-    ContactCandidates candidates;
-    ContactSurface surface;
-    find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
-    solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-    return surface.summary.at(0);
-  };
   const ContactSurface::Summary exact = solved(benchmarks::seen_otherwise({disc.body(), box.body()}), 1e-9), s = solved({disc.body(), box.body()}, 1e-6);
   EXPECT_EQ(s.rule, ContactRule::Polar);
   EXPECT_LE(s.error_estimate, 1e-6);
@@ -241,14 +242,6 @@ TEST(FacesOnFaces, AreThoseOfTheBodiesSeenOtherwiseWhereAKinkHardlyReachesThePat
   struct Case {
     Pose lower, upper;
     double asked;
-  };
-  const Executor executor(1);
-  const auto solved = [&](const std::array<ContactBody, 2>& bodies, double error) {
-    ContactCandidates candidates;
-    ContactSurface surface;
-    find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
-    solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-    return surface.summary.at(0);
   };
   const implicit::Skeleton box = benchmarks::linear_shape(implicit::ShapeKind::Box, Vec3(0.1, 0.08, 0.05), 0.02);
   benchmarks::Rigid lower(box, 2e6, 0.03), upper(box, 4e6, 0.03);
@@ -293,20 +286,12 @@ TEST(FacesOnFaces, KeepTheirBoundsInPosesThatAskMost) {
     int pose;
     double asked;
   };
-  const Executor executor(1);
   for (const Case& c : {Case{"face_on_face", 1, 7, 1e-4}, Case{"face_on_face", 2, 9, 1e-4}, Case{"face_on_face", 2, 221, 1e-4},
                         Case{"face_on_face", 12, 350, 1e-10}, Case{"disc_on_box", 12, 50, 1e-8}, Case{"plate", 2026, 807, 1e-8}}) {
     benchmarks::for_cases({}, [&c](std::string_view name) { return name == c.name; }, [&](std::string_view, const auto& make_pose) {
       benchmarks::Draw draw(c.seed);
       for (int pose = 0; pose < c.pose; ++pose) (void)make_pose(draw);
       const benchmarks::Pair pair = make_pose(draw);
-      const auto solved = [&](const std::array<ContactBody, 2>& bodies, double error) {
-        ContactCandidates candidates;
-        ContactSurface surface;
-        find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
-        solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-        return surface.summary.at(0);
-      };
       const ContactSurface::Summary exact = solved(benchmarks::seen_otherwise(pair.bodies), 1e-10), s = solved(pair.bodies, c.asked);
       EXPECT_EQ(s.rule, ContactRule::Polar);
       EXPECT_LE(difference(s, -exact.force, exact.area, exact.centre_of_pressure), s.error_estimate + exact.error_estimate) << c.seed << ' ' << c.pose;
