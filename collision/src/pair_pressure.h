@@ -36,10 +36,11 @@ class PairPressure {
   PairPressure(const ContactBody& a, const ContactBody& b)
       : field_{a.field, b.field}, body_{&a, &b}, modulus_{a.material.modulus, b.material.modulus} {}
 
-  /// A direction across `normal` [unit] that is told by the bodies alone: it turns with them and is the same whichever comes first. So are what
-  /// is left of a result's error, then, and of a choice that nothing else decides.
-  /// @param apart  it is no closer to the plane across this direction, which lies across the normal itself, than that choice can bear; or null
-  /// @return nothing where bodies that are balls on each other, or do not say how they lie, tell none
+  /// A direction across `normal` that is told by the bodies alone: it turns with them and is the same whichever comes first, so that a choice that
+  /// nothing else decides, and what it leaves of the error asked for, are the same in every view.
+  /// @param from  the place [m] that bodies are seen from   @param normal  [unit]
+  /// @param apart  a direction across the normal [unit] that it is not at right angles to; or null
+  /// @return [unit]; nothing where bodies do not say how they lie, or lie alike all around
   [[nodiscard]] std::optional<Vec3> tangent(const Vec3& from, const Vec3& normal, const Vec3* apart = nullptr) const;
 
   /// A becomes B.

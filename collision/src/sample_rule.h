@@ -24,8 +24,8 @@ class SampleRuleSolver {
   /// @param regions  what is wanted of the squeezed regions
   /// @param reference  origin of the moments in `sums`
   /// @return whether Sigma was met; false too where neither body has a skeleton
-  bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing, const ContactSettings& settings, const Regions& regions,
-             const Vec3& reference, PatchPoints& points);
+  bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing,
+             const ContactSettings& settings, const Regions& regions, const Vec3& reference, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }

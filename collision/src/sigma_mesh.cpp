@@ -221,7 +221,8 @@ bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, 
     cell_ = 0.9472136 * cell;
     const Vec3 &z = axis->direction, x = z.unitOrthogonal();
     axes_ << x, z.cross(x), z;
-    origin_ = axis->point + ((overlap.centre() - axis->point).dot(z) + 0.4142136 * cell) * z;
+    const double near = std::round((overlap.centre() - axis->point).dot(z) / cell_);  // whole cells from there
+    origin_ = axis->point + cell_ * (near + 0.4142136) * z;
   } else {
     const Pose pose = common_pose(pressure.body(0), pressure.body(1));
     cell_ = cell;

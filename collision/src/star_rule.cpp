@@ -28,7 +28,8 @@ double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(
 
 }  // namespace
 
-/// Newton's method for p_A = p_B = 0 from x, across the curve where both vanish. @return whether it ended there
+/// Newton's method for p_A = p_B = 0 from x, across the curve where both vanish. @param tangent  of it [unit], counterclockwise as u and v have it
+/// @return whether it ended there
 bool PolarRuleSolver::move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step) {
   PressureBatch& batch = rim_batch_;
   batch.resize(1);
@@ -44,7 +45,7 @@ bool PolarRuleSolver::move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent
     if (!(length <= 2.0 * step)) return false;
     x += move;
     if (length <= kClose * step) {
-      tangent /= std::sqrt(square);
+      tangent /= std::copysign(std::sqrt(square), frame_.u.cross(frame_.v).dot(frame_.axis));
       return true;
     }
   }
@@ -80,19 +81,12 @@ bool PolarRuleSolver::walk_to_rim(PairPressure& pressure, const Vec3& along, dou
   return false;
 }
 
-/// The rim as a polygon in `fine_rim_`, counterclockwise about the axis. @param fine  in steps that do not leap over the neck of a lobe
+/// The rim as a polygon in `fine_rim_`, counterclockwise as u and v have it. @param fine  in steps that do not leap over the neck of a lobe
 bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure, bool fine) {
   const double radius = std::sqrt(2.0 * frame_.peak) * std::min(frame_.u.norm(), frame_.v.norm());
-  const double turns = frame_.u.cross(frame_.v).dot(frame_.axis) < 0.0 ? -1.0 : 1.0;
-  const auto move = [&](const Vec3& to, Vec3& at, Vec3& tangent, double step) {
-    at = to;
-    if (!move_to_rim(pressure, at, tangent, step)) return false;
-    tangent *= turns;
-    return true;
-  };
   Vec3 x, tangent;
   if (!walk_to_rim(pressure, frame_.v.normalized(), kWalk * radius, x)) return false;
-  if (!move(x, x, tangent, radius)) return false;
+  if (!move_to_rim(pressure, x, tangent, radius)) return false;
   fine_rim_.clear();
   const Vec3 first = x;
   double step = (fine ? kLongestFine : kWalk) * radius;
@@ -104,8 +98,8 @@ bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure, bool fine) {
     left = left || home > 2.0 * step;
     if (left && home <= 1.2 * step && tangent.dot(first - x) > 0.0) break;
     for (;;) {
-      Vec3 next, there;
-      const bool found = move(x + step * tangent, next, there, step);
+      Vec3 next = x + step * tangent, there;
+      const bool found = move_to_rim(pressure, next, there, step);
       const double turn = found ? (there - tangent).norm() : 2.0;
       if (turn <= kMostTurn && (next - x).dot(tangent) > 0.5 * step) {
         x = next;
