@@ -270,7 +270,8 @@ int query(const Arguments& arguments) {
 }
 
 int bench(const Arguments& arguments) {
-  if (!arguments.list && !arguments.group.empty()) tool::run_benchmark(arguments.group, arguments.words);
+  const std::string& group = arguments.group.empty() && !arguments.words.empty() ? arguments.words.front() : arguments.group;
+  if (!arguments.list && !group.empty()) tool::run_benchmark(group, arguments.words);
   std::fputs(tool::list_benchmarks().c_str(), stdout);
   return 0;
 }
@@ -377,8 +378,8 @@ int parse_and_call(int argc, char** argv) {
   query_verb->footer("Example: supple query contact scenes/library/contacts/two_balls.yaml --error 1e-6");
 
   CLI::App* bench_verb = app.add_subcommand("bench", "benchmarks of a source tree: time beside size, error and hash");
-  bench_verb->add_option("group", a.group, "group or group/name, e.g. core or core/melt");
-  bench_verb->add_option("words", a.words, "handed to the program of the group");
+  bench_verb->add_option("group", a.group, "group or group/name, e.g. core or core/melt; its program gets what follows, options too");
+  bench_verb->allow_extras();
   bench_verb->add_flag("--list", a.list, "the groups");
   bench_verb->add_flag("--json", a.json, "JSON lines (always where there are lines; accepted for scripts)");
   bench_verb->footer("Example: supple bench core/integrators integrators.svg");
@@ -395,6 +396,7 @@ int parse_and_call(int argc, char** argv) {
     app.exit(error);
     return kUsage;
   }
+  a.words = bench_verb->remaining();
   if (run_verb->parsed()) return a.render_only ? render(a) : run(a);
   if (render_verb->parsed()) return render(a);
   if (export_verb->parsed()) return export_files(a);

@@ -56,6 +56,16 @@ expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
 expect 2 '' query nonsense good.yaml
 expect 0 '' bench --list
 expect 2 '--list' bench cores
+expect 2 "found '--lst'" bench --lst
+# Programs of benchmarks get what follows their names, options too, in its order.
+mkdir bin
+ln "$supple" bin/supple 2> err.txt || cp "$supple" bin/supple
+printf '#!/bin/sh\necho "$@"\n' > bin/contact_stress
+chmod +x bin/contact_stress
+if [[ $(bin/supple bench collision/stability --seed 7 map.svg) != '--seed 7 map.svg' ]]; then
+  echo 'bench collision/stability --seed 7 map.svg: expected these words for its program'
+  failures=$((failures + 1))
+fi
 expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
 expect 6 'time_step.max_substeps' check too_fine.yaml
