@@ -17,6 +17,7 @@ constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kMostHalvings = 4;       // of the cells of a mesh at which something presses
 constexpr double kBeside = 2.0;        // from where it presses, in triangles: others need not be smooth
+constexpr double kBesideEnd = 0.7;     // the same at the end of both supports; not beyond the cells that are there in every view
 constexpr double kSmallest = 1.0 / 512.0;  // cell, over the features, for small patches
 constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
@@ -428,7 +429,12 @@ void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactB
     return std::any_of(p.corner.begin(), p.corner.end(), positive) || std::any_of(p.middle.begin(), p.middle.end(), positive);
   };
   while (!coarse && cell_ > kSmallest * size && std::none_of(pieces_.begin(), pieces_.end(), [&](const Piece& p) { return presses_within(p, 0.0); })) halve();
-  const auto fits = [&](const Piece& p) { return smooth(p) || !presses_within(p, kBeside); };
+  // Where supports end round-off says whether a piece is smooth.
+  const auto at_end = [this](const Piece& p) {
+    const auto& c = mesh_.triangle[p.triangle].corner;
+    return std::any_of(c.begin(), c.end(), [this](std::uint32_t v) { return mesh_.at_end[v] != 0; });
+  };
+  const auto fits = [&](const Piece& p) { return at_end(p) ? !presses_within(p, kBesideEnd) : smooth(p) || !presses_within(p, kBeside); };
   for (int halvings = 0; halvings < kMostHalvings && !coarse; ++halvings) {
     if (std::all_of(pieces_.begin(), pieces_.end(), fits)) return;
     halve();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "body_order.h"
 
@@ -12,6 +13,8 @@ using Key = std::uint64_t;
 constexpr unsigned kBits = 21;  // of a coordinate on the lattice
 constexpr std::int64_t kMiddle = std::int64_t{1} << (kBits - 1);
 constexpr Key kMask = (Key{1} << kBits) - 1;
+constexpr double kEnd = 1.0 - 1e-5;  // of the pressure outside a support: beside its end
+constexpr double kFar = 1e6;   // beyond every support, in the size of the body
 
 using Place = std::array<std::int64_t, 3>;
 
@@ -25,6 +28,14 @@ Place place_of(Key key) {
   Place at;
   for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<std::int64_t>(key >> (kBits * k) & kMask) - kMiddle;
   return at;
+}
+
+/// Pressure [Pa] of a body outside the support of its field; minus infinity where there is none.
+double outside_support(const PairPressure& pressure, int side) {
+  const implicit::FieldView& field = pressure.field(side);
+  if (field.as_field() == nullptr) return -std::numeric_limits<double>::infinity();
+  const Box box = field.surface_box();
+  return pressure.modulus(side) * field.value(box.upper + kFar * (box.extent() + Vec3::Constant(field.feature_size())));
 }
 
 void keep_unique(std::vector<Key>& keys) {
@@ -176,7 +187,8 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   const std::size_t n = unique_.size();
   vertex_.resize(n);
   edge_.resize(n);
-  out.valid.assign(n, 0);
+  met_.assign(n, 0);
+  out.at_end.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const auto [u, d] = unique_[i];
     const double above = node_.a[u] - node_.b[u], below = node_.a[d] - node_.b[d];
@@ -200,7 +212,7 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
       edge.at = next;
       vertex_.point[i] = from + next * way;
       if (std::abs(move) < 1e-7) {
-        out.valid[i] = 1;
+        met_[i] = 1;
       } else {
         open_[left++] = i;
       }
@@ -209,8 +221,10 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   }
   out.vertex = vertex_.point;
   out.normal.assign(n, Vec3::Zero());
+  const double end_a = kEnd * outside_support(pressure, 0), end_b = kEnd * outside_support(pressure, 1);
   for (std::size_t i = 0; i < n; ++i) {
-    if (out.valid[i] != 0) out.normal[i] = (vertex_.slope_b[i] - vertex_.slope_a[i]).normalized();
+    if (met_[i] != 0) out.normal[i] = (vertex_.slope_b[i] - vertex_.slope_a[i]).normalized();
+    out.at_end[i] = vertex_.a[i] < end_a && vertex_.b[i] < end_b ? 1 : 0;
   }
 }
 

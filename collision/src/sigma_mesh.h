@@ -16,8 +16,8 @@ namespace supple::collision {
 /// interpolated linearly. Two triangles at one edge share its image, so their images tile Sigma.
 struct SigmaMesh {
   std::vector<Vec3> vertex;               ///< on Sigma [m]
-  std::vector<Vec3> normal;               ///< unit, out of A and into B
-  std::vector<std::uint8_t> valid;        ///< 0: no place on Sigma was found, or no normal
+  std::vector<Vec3> normal;               ///< unit, out of A and into B; zero where no place on Sigma was found
+  std::vector<std::uint8_t> at_end;       ///< 1: beside the end of both supports, beyond which p_A - p_B is nothing, or round-off
   struct Triangle {
     std::array<std::uint32_t, 3> corner;  ///< seen from B's side counterclockwise
   };
@@ -60,6 +60,7 @@ class SigmaMesher {
   std::vector<Cut> cuts_, unique_;
   std::vector<Edge> edge_;
   std::vector<std::size_t> open_;
+  std::vector<std::uint8_t> met_;  // vertices that Newton's method placed
 };
 
 }  // namespace supple::collision
