@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "polar_rule.h"
@@ -140,13 +141,28 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   weight_.clear();
   ray_nodes_.clear();
   ray_check_.clear();
-  std::size_t next = 0;
+  std::vector<std::size_t> first_crossing(count + 1, 0);
+  for (const Crossing& x : crossings_) ++first_crossing[x.ray + 1];
+  std::partial_sum(first_crossing.begin(), first_crossing.end(), first_crossing.begin());
+  // That a piece's number of points goes by. Only every second ray is checked: those between have no fewer than either neighbour.
+  const auto share_of = [&](std::size_t ray, std::size_t piece, double width) {
+    const std::size_t k = ray % per_panel, pieces = first_crossing[ray + 1] - first_crossing[ray];
+    if (rule.gauss_weight[k] > 0.0) return width;
+    double most = width;
+    for (const std::size_t beside : {ray - (k > 0 ? 1 : 0), ray + (k + 1 < per_panel ? 1 : 0)}) {
+      if (beside == ray) continue;
+      const std::size_t begin = first_crossing[beside], end = first_crossing[beside + 1];
+      if (end - begin != pieces) return width;
+      const double left = piece > 0 ? crossings_[begin + piece - 1].radius : 0.0, right = piece < pieces ? crossings_[begin + piece].radius : 1.0;
+      most = std::max(most, right - left);
+    }
+    return most;
+  };
   for (std::size_t i = 0; i < count; ++i) {
     const Panel& panel = panels_[first + i / per_panel];
     const double rim = rays_.radius[i];
     const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
-    const std::size_t crossing_begin = next;
-    while (next < crossings_.size() && crossings_[next].ray == i) ++next;
+    const std::size_t crossing_begin = first_crossing[i], next = first_crossing[i + 1];
     const auto nodes = [&](bool check, double angle) {
       double left = 0.0, lift_left = 0.0;
       for (std::size_t c = crossing_begin; c <= next; ++c) {
@@ -156,7 +172,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
         // On faces it is the short last piece on which the pressure falls.
         const int all = about_middle_ ? panel.nodes
                         : mild_       ? nodes_between_mild(panel.nodes, right - left)
-                                      : nodes_on(panel.nodes, right - left);
+                                      : nodes_on(panel.nodes, share_of(i, c - crossing_begin, right - left));
         const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
         for (std::size_t j = 0; j < gauss.node.size(); ++j) {
           const double along = gauss.node[j], r = left + (right - left) * along;

@@ -4,7 +4,7 @@
 #include <array>
 #include <numbers>
 
-#include "benchmarks/contact_shapes.h"
+#include "benchmarks/contact_cases.h"
 #include "bodies.h"
 #include "supple/implicit/kinks.h"
 
@@ -600,6 +600,19 @@ TEST(SplitRule, HasBoundsNearItsErrors) {
   expect_near(of_plate[1], 20.0);
   expect_near(of_blobs[0], 30.0);
   expect_near(of_blobs[1], 30.0);
+}
+
+TEST(SplitRule, GivesRaysThatAreNotCheckedAsManyPoints) {
+  // Between two rays whose pieces are shorter and longer lies one with the longest piece that three points are given to.
+  for (const auto& [seed, pose] : {std::pair(1, 901), std::pair(2, 964), std::pair(22, 116)}) {
+    benchmarks::for_cases({}, [](std::string_view name) { return name == "disc_on_box"; }, [&, at = pose, from = seed](std::string_view, const auto& make_pose) {
+      benchmarks::Draw draw(static_cast<std::uint64_t>(from));
+      for (int i = 0; i < at; ++i) (void)make_pose(draw);
+      const benchmarks::Pair pair = make_pose(draw);
+      const ContactSurface::Summary exact = contact_of(benchmarks::seen_otherwise(pair.bodies), 1e-10), s = contact_of(pair.bodies, 1e-6);
+      EXPECT_LE(benchmarks::difference(s, {exact.force.norm(), exact.area, exact.centre_of_pressure}), s.error_estimate + exact.error_estimate) << from;
+    });
+  }
 }
 
 TEST(SmoothPatches, HaveBoundsNearTheirErrors) {
