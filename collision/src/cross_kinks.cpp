@@ -17,6 +17,7 @@ constexpr int kCornerSteps = 8;
 constexpr int kCrossingSteps = 8;
 constexpr int kBorderSteps = 16;         // of Illinois' method to the border of an imprint
 constexpr double kBorder = 0.01;         // of the way from its middle
+constexpr double kAtOrigin = 1e-9;       // radius of a crossing, over that of the rim: the kink goes through the origin
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 }  // namespace
@@ -520,6 +521,8 @@ std::optional<PolarRuleSolver::Touch> PolarRuleSolver::touch_between(std::span<c
 /// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
 void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
+  // Round-off says which rays meet a kink that goes through the origin.
+  std::erase_if(crossings_, [](const Crossing& x) { return x.radius < kAtOrigin; });
   for (const Crossing& x : crossings_) {
     if (!x.good) panels_[first + x.ray / per_panel].lost = true;
   }
