@@ -252,7 +252,7 @@ TEST(MarchRule, HasABoundThatCoversItsErrorAcrossKinks) {
   Pressed plate = ball_and_plate(), disc = disc_and_box();
   plate.pose(77, 6);
   expect_bound_holds(plate, 1e-6);
-  constexpr std::array<std::pair<std::uint64_t, int>, 4> kPoses{{{77, 11}, {5, 4}, {9001, 15}, {31, 3}}};
+  constexpr std::array<std::pair<std::uint64_t, int>, 5> kPoses{{{77, 11}, {5, 4}, {9001, 15}, {31, 3}, {77, 82}}};
   for (const auto& [seed, pose] : kPoses) {
     SCOPED_TRACE(seed);
     disc.pose(seed, pose);
