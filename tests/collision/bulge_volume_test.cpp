@@ -191,10 +191,10 @@ TEST(KeptVolumes, AreHeldByARingOnABall) {
   EXPECT_NEAR(b.gained, b.bulges[0].displaced, 2e-3 * b.bulges[0].displaced);
 }
 
-// Two contacts whose rims lie 9 degrees apart, and a third one of another kernel; by rays that err by less than 1e-3 of what is lost.
+// Two contacts whose rims lie so near that their bulges overlap, and a third one of another kernel; by rays that err by less than 1e-3 of what is lost.
 TEST(KeptVolumes, AreThoseOfTheBodyWhereBulgesMeet) {
   const Kernel small = Kernel::wyvill(0.45 / 0.454202019);
-  const Solid ball(ShapeKind::Point, kernel(0), Vec3::Zero()), right(ShapeKind::Point, small, Vec3(1.21, 0.475, 0.05)), left(ShapeKind::Point, small, Vec3(1.21, -0.475, 0.05)),
+  const Solid ball(ShapeKind::Point, kernel(0), Vec3::Zero()), right(ShapeKind::Point, small, Vec3(1.21, 0.45, 0.05)), left(ShapeKind::Point, small, Vec3(1.21, -0.45, 0.05)),
       below(ShapeKind::Point, kernel(1), Vec3(-1.8, 0.1, -0.2));
   Stage stage;
   stage.add(ball.field, {Vec3::Zero()}, 1e4);
