@@ -22,7 +22,7 @@ constexpr std::array<double, kFinestRings + 1> kFall{1.0, 0.1, 0.14, 0.13, 0.28,
 constexpr double kSafety = 12.0, kHalves = 0.5;
 constexpr double kUnseen = 5e-3;        // of the error asked for: two rules agree by chance, seldom to much less than that
 constexpr double kFine = 5e-6;           // errors for which rays have more points
-constexpr double kWide = 1.6, kNarrow = 0.8;  // sectors, and the bend of the rim within one [rad]
+constexpr double kWide = 1.6, kNarrow = 0.7;  // sectors, and the bend of the rim within one [rad]
 
 /// The coarsest rule that is believed: two that are coarse agree by chance where much is asked for.
 std::size_t least_rule(double error) { return error >= 1e-4 ? 2 : error >= 1e-5 ? 3 : 4; }

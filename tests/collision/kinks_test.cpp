@@ -599,7 +599,7 @@ TEST(SplitRule, HasBoundsNearItsErrors) {
   expect_near(of_plate[0], 30.0);
   expect_near(of_plate[1], 20.0);
   expect_near(of_blobs[0], 30.0);
-  expect_near(of_blobs[1], 30.0);
+  expect_near(of_blobs[1], 20.0);
 }
 
 TEST(SplitRule, GivesRaysThatAreNotCheckedAsManyPoints) {
