@@ -196,9 +196,7 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     before = lower;
     gap_before = gap;
 
-    // Round-off of the pressures, which that of the coordinates adds to.
-    const double noise = 16.0 * std::numeric_limits<double>::epsilon() *
-                         std::max(pressure.largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
+    const double noise = pressure.noise(x, steepness);
     u = (u - u.dot(axis) * axis).normalized();
     v = axis.cross(u);
     // Weights of the Lagrange function q = (1 - w) p_A + w p_B, whose gradient is tangential to Sigma.
@@ -267,8 +265,7 @@ std::optional<PeakFrame> PeakFinder::find_on_axis(PairPressure& pressure, const 
     const double a = batch_.a[0], b = batch_.b[0];
     const double fall = -batch_.slope_a[0].dot(frame.axis), rise = batch_.slope_b[0].dot(frame.axis), steepness = fall + rise;
     if (!(steepness > 0.0)) return std::nullopt;
-    const double noise = 16.0 * std::numeric_limits<double>::epsilon() *
-                         std::max(pressure.largest_modulus(), steepness * frame.origin.lpNorm<Eigen::Infinity>());
+    const double noise = pressure.noise(frame.origin, steepness);
     const double level = (a * rise + b * fall) / steepness;  // p at the foot on Sigma, to first order
     if (std::abs(a - b) > 1e-6 * std::abs(level) + noise) {
       frame.origin += std::clamp((a - b) / steepness, -reach, reach) * frame.axis;

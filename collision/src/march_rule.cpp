@@ -474,8 +474,7 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
     if (regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, limits.error, top, points);
     thickness_ += pressure.overlap_out_of(side, top.point, (side == 0 ? 1.0 : -1.0) * top.normal, cell_);
   }
-  // What rounding of the coordinates does to so thin an overlap.
-  if (thickness_ > 0.0) estimate_ = std::min(1.0, estimate_ + 32.0 * kEpsilon * (1.0 + coordinates / thickness_));
+  if (thickness_ > 0.0) estimate_ = std::min(1.0, estimate_ + 2.0 * rounding_error(coordinates, thickness_));
   return true;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -114,6 +115,10 @@ class PairPressure {
   [[nodiscard]] const implicit::FieldView& field(int side) const noexcept { return field_[side]; }
   [[nodiscard]] double modulus(int side) const noexcept { return modulus_[side]; }
   [[nodiscard]] double largest_modulus() const noexcept { return std::max(modulus_[0], modulus_[1]); }
+  /// Round-off of the pressures at x [Pa], which that of the coordinates adds to. @param steepness  of their difference [Pa/m]
+  [[nodiscard]] double noise(const Vec3& x, double steepness) const {
+    return 16.0 * std::numeric_limits<double>::epsilon() * std::max(largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
+  }
   /// Length [m] that steps are limited by: the smaller feature size of the two bodies.
   [[nodiscard]] double feature_size() const {
     return std::min(field_[0].feature_size(), field_[1].feature_size());

@@ -12,6 +12,7 @@ struct PairResult {
   PatchPoints points;
   Vec3 first = Vec3::Zero();  ///< integral of x p dA [N m]
   double load = 0.0;          ///< integral of p dA [N]
+  double rounding = 0.0;      ///< what of the estimate no polar or marched rule can help, as the overlap is so thin
 
   /// Forgets all but the bodies.
   void clear() {
@@ -20,7 +21,7 @@ struct PairResult {
     summary.bodies = pair;
     points.clear();
     first = Vec3::Zero();
-    load = 0.0;
+    load = rounding = 0.0;
   }
   /// @param reference  that the sums are about
   void add(const PatchSums& sums, const Vec3& reference) {

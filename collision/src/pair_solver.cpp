@@ -34,9 +34,10 @@ std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, co
 }
 
 /// Whether a bound is as good as asked, or as round-off lets it be.
-bool meets(const ContactSurface::Summary& summary, double error) {
+bool meets(const PairResult& result, double error) {
   constexpr double kRound = 1e-7, kSlack = 1.01;
-  return summary.error_estimate <= std::max(kSlack * error, kRound);
+  // Marching feels round-off twice as much as rings do: its estimate is not smaller than twice what theirs has of it.
+  return result.summary.error_estimate <= std::max({kSlack * error, kRound, 2.0 * result.rounding});
 }
 
 }  // namespace
@@ -198,7 +199,7 @@ bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
   const std::array<ContactRule, 2> marched_first{ContactRule::March, ContactRule::Samples}, sampled_first{ContactRule::Samples, ContactRule::March};
   for (const ContactRule rule : settings.error >= kCoarse ? sampled_first : marched_first) {
     if (settings.only != ContactRule::None && settings.only != rule) continue;
-    if (have && (meets(out.summary, settings.error) || (rule == ContactRule::Samples && out.summary.error_estimate <= kFinestSampled))) continue;
+    if (have && (meets(out, settings.error) || (rule == ContactRule::Samples && out.summary.error_estimate <= kFinestSampled))) continue;
     if (have) set_aside();
     const bool fits = rule == ContactRule::March ? march(job, out) : samples(job, out);
     if (have && (!fits || kept_.summary.error_estimate <= out.summary.error_estimate)) set_aside();
@@ -223,7 +224,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   if (!fits && only == ContactRule::Polar) {
     begin_anew(job, out);
     out.summary.error_estimate = 1.0;
-  } else if (!fits || (any && !patches_.empty() && !meets(out.summary, job.settings().error))) {
+  } else if (!fits || (any && !patches_.empty() && !meets(out, job.settings().error))) {
     const bool polar_fits = fits;
     fits = stand_in(job, polar_fits, out);
     if (polar_fits && out.summary.rule != ContactRule::Polar) reason = RuleReason::Unmet;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -55,6 +56,11 @@ inline double relative_difference(const PatchSums& fine, const PatchSums& coarse
   const double area = std::abs(fine.area - coarse.area) / fine.area;
   const double centre = (fine.centre() - coarse.centre()).norm() / std::sqrt(fine.area);
   return std::max({force, area, centre});
+}
+
+/// Round-off of coordinates [m] in the place of a surface, over how deep bodies overlap [m].
+inline double rounding_error(double coordinates, double thickness) {
+  return 16.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinates / thickness);
 }
 
 /// What is wanted of a squeezed region.

@@ -81,6 +81,7 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const Vec3& hil
   }
   out.add(polar_.sums(), polar_.origin());
   out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
+  out.rounding = std::max(out.rounding, polar_.rounding());
   out.summary.kinks += polar_.kinks();
   if (polar_.largest() > out.summary.largest_pressure) {
     out.summary.largest_pressure = polar_.largest();
@@ -129,7 +130,8 @@ std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent)
     }
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
-    if (std::min(batch_.a[i], batch_.b[i]) <= 1e-3 * peak) continue;
+    const double noise = pressure.noise(batch_.point[i], (batch_.slope_a[i] - batch_.slope_b[i]).norm());
+    if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, noise)) continue;
     if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
     if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
   }

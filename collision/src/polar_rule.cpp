@@ -291,12 +291,10 @@ void PolarRuleSolver::turn(const PolarRule& rule, bool slopes) {
   rim_.height.assign(angles, rim_.height.front());
 }
 
-/// What the heights are off by, and what rounding of the coordinates does to so thin an overlap.
-double PolarRuleSolver::placing_error() const {
-  const double coordinates = frame_.origin.lpNorm<Eigen::Infinity>() + size_;
-  const double rounding = 16.0 * kEpsilon * (1.0 + coordinates / frame_.thickness);
-  return lift_ / std::sqrt(fine_.area) + rounding;
-}
+double PolarRuleSolver::rounding() const { return rounding_error(frame_.origin.lpNorm<Eigen::Infinity>() + size_, frame_.thickness); }
+
+/// What the heights are off by, and what rounding of the coordinates does.
+double PolarRuleSolver::placing_error() const { return lift_ / std::sqrt(fine_.area) + rounding(); }
 
 /// The same, and what the rim is off by.
 double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + placing_error(); }

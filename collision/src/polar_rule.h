@@ -52,6 +52,7 @@ class PolarRuleSolver {
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] std::uint32_t kinks() const noexcept { return parted_; }  ///< that the patch was parted at
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< of the overlap there [m]
+  [[nodiscard]] double rounding() const;                                  ///< what round-off of the coordinates adds to the estimate
   void cover(PolarCover& out) const;                                      ///< of the last solve
 
  private:

@@ -209,6 +209,29 @@ TEST(ContactSurface, IsEmptyWhenBodiesDoNotTouch) {
   }
 }
 
+TEST(ContactSurface, OfBodiesThatBarelyTouchAsksForNoMoreThanRoundOffLets) {
+  // F = pi K a d^2 / 4 for equal balls that overlap by d << a. Where d is round-off of the coordinates no rule tells more than the first one,
+  // which with the search for hills costs some thousands of evaluations: marching costs a million.
+  const double ulp = std::numeric_limits<double>::epsilon();
+  for (double d = 1e-3; d > 1e-17; d *= 0.1) {
+    const LinearSphere left{Vec3(0, 0, 0.7), Linear{}}, right{Vec3(0, 0, 2.7 - d), Linear{}};
+    const double overlap = left.centre.z() + 2.0 - right.centre.z();
+    Stage stage;
+    stage.add(left);
+    stage.add(right);
+    const ContactSurface& s = stage.solve({.error = 1e-3});
+    const ContactSurface::Summary found = s.summary.empty() ? ContactSurface::Summary{} : s.summary.front();
+    const double force = std::numbers::pi / 4.0 * overlap * overlap;
+    EXPECT_LE(found.evaluations, 30000u) << d;
+    if (found.points > 0) {
+      EXPECT_NEAR(found.force.norm(), force, (found.error_estimate + overlap) * force) << d;
+      EXPECT_LE(found.error_estimate, std::max(1e-3, 100.0 * ulp / overlap)) << d;
+    } else {
+      EXPECT_LE(overlap, 100.0 * ulp) << d;
+    }
+  }
+}
+
 TEST(ContactSurface, TurnsMovesAndScalesWithTheBodies) {
   // F scales with P L^2, moments with P L^3, energy with P L^3; P is the same. 1e-9: round-off of the peak's frame.
   const ContactSurface::Summary rest = two_blobs(Quat::Identity(), Vec3::Zero(), 1.0);
