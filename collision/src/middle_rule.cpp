@@ -171,6 +171,19 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
   return true;
 }
 
+/// Rays that Newton's method loses, as the face on which they begin tells nothing of its edge.
+bool PolarRuleSolver::follow_rays(PairPressure& pressure) {
+  std::vector<Vec2> ways;
+  std::vector<RimPoint> found;
+  for (std::size_t i = 0; i < rays_.size(); ++i) ways.emplace_back(rays_.cosine[i], rays_.sine[i]);
+  if (!follow_outline(pressure, ways, kFine, found)) return false;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    rays_.radius[i] = walks_[i].at;
+    rays_.height[i] = found[i].height;
+  }
+  return true;
+}
+
 /// The frame's origin goes along the axis to Sigma, in `rim_batch_`, too. @return whether both press there
 bool PolarRuleSolver::lift_to_sigma(PairPressure& pressure) {
   PressureBatch& batch = rim_batch_;

@@ -20,6 +20,7 @@ constexpr std::size_t kMostCoarse = 3;   // the finest rule for others
 constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
+constexpr double kNearRim = 0.02;        // pressure where Newton's last step to the rim begins, over the peak: ten times what smooth patches have
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
 constexpr double kLeastOfBound = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
@@ -93,6 +94,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   std::iota(open_.begin(), open_.end(), std::size_t{0});
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
+  // Beside the edge of a face, where the pressure falls over a small part of the radius, the last step has to be small against that part.
+  const double low_enough = kNearRim * frame_.peak;
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
   rim_error_ = 0.0;
@@ -126,7 +129,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       if (iteration >= kFreeRimSteps) (on_sigma > 0.0 ? low_[k] : high_[k]) = radius;
       double next = along < 0.0 ? radius - on_sigma / along : 2.0 * radius;
       next = std::clamp(next, 0.4 * radius, 2.0 * radius);
-      const bool near = (next - radius) * (next - radius) <= enough * enough * radius * radius;
+      const bool near = (next - radius) * (next - radius) <= enough * enough * radius * radius && std::abs(on_sigma) <= low_enough;
       if (!near && (!(next > low_[k]) || !(next < high_[k]))) {
         next = std::isfinite(high_[k]) ? 0.5 * (low_[k] + high_[k]) : 1.5 * radius;
       }

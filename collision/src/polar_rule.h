@@ -235,6 +235,7 @@ class PolarRuleSolver {
                           const Regions& regions, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
+  bool follow_rays(PairPressure& pressure);
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
   bool move_off_kinks(PairPressure& pressure);

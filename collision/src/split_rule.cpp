@@ -106,7 +106,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
     }
   }
   const double rim_error = rim_error_;
-  if (!solve_rim(pressure, rays_, error, false)) return false;
+  if (!solve_rim(pressure, rays_, error, false) && !(about_middle_ && follow_rays(pressure) && solve_rim(pressure, rays_, error, false))) return false;
   rim_error_ = std::max(rim_error_, rim_error);
   for (std::size_t p = first; p < panels_.size(); ++p) {
     Panel& panel = panels_[p];
