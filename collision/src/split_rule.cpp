@@ -47,8 +47,9 @@ int check_of(int n) { return n < kMostRadial ? n + 1 : n - 2; }
 /// The same on faces, where pieces have polynomials on them: fewer.
 int check_on_faces(int n) { return n > 4 ? n - 2 : n - 1; }
 
-/// Kinks so near to another, to the peak or to the rim are left out: the error is of the square.
-double shortest_piece(double error) { return 3e-3 * std::sqrt(error); }
+/// Kinks so near to another, to the peak or to the rim are left out: the error is of the square; on a face, to whose edge the pressure is the same,
+/// of the length itself.
+double shortest_piece(double error, bool on_face) { return on_face ? 1e-3 * error : 3e-3 * std::sqrt(error); }
 
 void weigh(PatchSums& sums, const Vec3& x, const Vec3& normal, double weight, double pressure) {
   if (weight != 0.0) sums.add(x, normal, weight, pressure);
@@ -133,7 +134,7 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   }
   find_crossings(pressure, error);
   find_changes(pressure, rule, first);
-  const double shortest = shortest_piece(error);
+  const double shortest = shortest_piece(error, about_middle_);
   std::erase_if(crossings_, [&](const Crossing& x) { return x.radius < shortest || x.radius > 1.0 - shortest; });
 
   foot_.clear();
