@@ -452,7 +452,6 @@ bool PolarRuleSolver::solve_about_middle(PairPressure& pressure, const PeakFrame
 
 bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings) {
   frame_ = frame;
-  size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   static const std::vector<Vec2> few = circle(kFewRays), many = circle(kManyRays);
   kinks_.clear();
   // All of both bodies: which of them a box holds depends on how it lies.
@@ -485,7 +484,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8);
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
     const std::size_t crossing = crossing_.size();
-    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr, fine)) return false;
+    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr, true)) return false;
     if (crossing_.size() == crossing) return true;
   }
 }

@@ -36,8 +36,8 @@ std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, co
 /// Whether a bound is as good as asked, or as round-off lets it be.
 bool meets(const PairResult& result, double error) {
   constexpr double kRound = 1e-7, kSlack = 1.01;
-  // Marching feels round-off twice as much as rings do: its estimate is not smaller than twice what theirs has of it.
-  return result.summary.error_estimate <= std::max({kSlack * error, kRound, 2.0 * result.rounding});
+  const double reached = within_reach(error, result.rounding);
+  return result.summary.error_estimate <= std::max((reached > error ? 2.0 : kSlack) * reached, kRound);
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer on
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
 constexpr double kNearRim = 0.02;        // pressure where Newton's last step to the rim begins, over the peak: ten times what smooth patches have
+constexpr double kBelowRim = 0.01;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
 constexpr double kLeastOfBound = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
@@ -226,9 +227,10 @@ bool PolarRuleSolver::integrate() {
   pressure_.resize(n);
   // Copies of what is read and added to, which stay in registers.
   const Vec3 origin = frame_.origin, axis = frame_.axis;
-  const double residual = residual_;
+  // A kink so near to the rim that Newton's last step to the rim crossed it leaves a little more than round-off.
+  const double lowest = -residual_ - (about_middle_ ? kBelowRim * frame_.peak : 0.0);
   PatchSums sums;
-  double lift = 0.0;
+  double lift = 0.0, below = 0.0;
   const std::size_t thirds = cut_ ? third_.size() : 0;
   if (cut_) evaluate_thirds(node_.point);
   for (std::size_t i = 0; i < n; ++i) {
@@ -241,11 +243,12 @@ bool PolarRuleSolver::integrate() {
     const double fall = -slope_a.dot(axis), rise = slope_b.dot(axis);
     const double p = (a * rise + b * fall) / (rise + fall);
     lift = std::max(lift, std::abs(a - b) / (rise + fall));
-    if (!(cosine > kLeastCosine) || !(p > -residual)) return false;
+    if (!(cosine > kLeastCosine) || !(p > lowest)) return false;
     for (std::size_t t = 0; t < thirds; ++t) {
       if (third_value_[t * n + i] > p) weight_[i] = 0.0;
     }
     const double area = weight_[i] / cosine, pressure = std::max(p, 0.0);
+    below += std::max(-p, 0.0) * std::abs(area);
     normal_[i] = normal;
     area_[i] = area;
     pressure_[i] = pressure;
@@ -253,6 +256,7 @@ bool PolarRuleSolver::integrate() {
   }
   fine_ = sums;
   lift_ = lift;
+  below_ = below;
   return cut_ || sums.load > 0.0;
 }
 
@@ -302,9 +306,13 @@ double PolarRuleSolver::placing_error() const { return lift_ / std::sqrt(fine_.a
 /// The same, and what the rim is off by.
 double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + placing_error(); }
 
-bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& asked,
                             const Regions& regions, double extent,
                             std::span<const ContactBody* const> third, bool round, bool follow, bool faces, PatchPoints& points) {
+  size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
+  frame_ = frame;
+  ContactSettings settings = asked;
+  settings.error = within_reach(asked.error, rounding());
   extent_ = extent;
   third_ = third;
   imprints_.clear();
@@ -341,7 +349,6 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   spread_ = widest_ = {};
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
-  size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   estimate_ = 1.0;
   const std::span<const PolarRule> rules = polar_rules();
   const bool parts = error < kSplitBelow || !third_.empty();

@@ -296,6 +296,7 @@ class PolarRuleSolver {
   // Of rays: the square of the last step of Newton's method to the rim [m^2], and what the last two say is left of the way, over the radius.
   std::vector<double> moved_, rim_left_;
   double lift_ = 0.0;       // largest distance of a node from Sigma
+  double below_ = 0.0;      // load of nodes that lie just beyond the rim, which is left out
   double size_ = 0.0;       // of the bodies' features
   PatchSums fine_, coarse_;
   double estimate_ = 1.0;

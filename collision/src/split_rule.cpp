@@ -192,11 +192,12 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   }
   ray_nodes_.push_back(foot_.size());
   node_.resize(foot_.size());
-  const double residual = residual_, lift = lift_;
+  const double residual = residual_, lift = lift_, below = below_;
   if (!solve_heights(pressure, error)) return false;
   if (!integrate()) return false;
   residual_ = std::max(residual_, residual);
   lift_ = std::max(lift_, lift);
+  below_ += below;
   for (std::size_t p = first; p < panels_.size(); ++p) keep_panel(panels_[p], rule, (p - first) * per_panel);
   return true;
 }
@@ -507,7 +508,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   kept_rim_.clear();
   along_.clear();
   changes_.clear();
-  residual_ = lift_ = rim_error_ = 0.0;
+  residual_ = lift_ = below_ = rim_error_ = 0.0;
   spread_ = widest_ = {};
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
@@ -523,7 +524,8 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     all = {};
     for (const Panel& panel : panels_) all.add(panel.fine);
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
-    estimate_ = rim_error_ = 0.0;
+    estimate_ = below_ / all.load;
+    rim_error_ = 0.0;
     for (Panel& panel : panels_) {
       doubt(panel, all, error);
       estimate_ += panel.by_angle + panel.by_radius;
