@@ -117,12 +117,25 @@ void PairSolver::begin_anew(const Job& job, PairResult& out) {
   take_all_thirds(job);
 }
 
-bool PairSolver::polar(const Job& job, PairResult& out) {
-  if (!patches_.solve(job.polar, out)) return false;
-  if (!job.convex || !patches_.empty()) return true;
+bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out) {
+  if (!patches_.solve(job, out)) return false;
+  if (!convex || !patches_.empty()) return true;
   // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
-  patches_.start_from(job.overlap, job.polar.pressure);
-  return patches_.solve(job.polar, out);
+  patches_.start_from(overlap, job.pressure);
+  return patches_.solve(job, out);
+}
+
+bool PairSolver::polar(const Job& job, PairResult& out) {
+  constexpr double kFiner = 0.25;
+  if (!rings(job.polar, job.overlap, job.convex, out)) return false;
+  if (patches_.empty() || meets(out, job.settings().error)) return true;
+  // Rims and rounding may add a little to what panels are held to: finer ones cost far less than another rule.
+  out.clear();
+  PolarJob finer = job.polar;
+  finer.settings.error *= kFiner;
+  if (rings(finer, job.overlap, job.convex, out) && meets(out, job.settings().error)) return true;
+  out.clear();
+  return rings(job.polar, job.overlap, job.convex, out);
 }
 
 /// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit

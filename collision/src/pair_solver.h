@@ -49,6 +49,7 @@ class PairSolver {
   void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
   bool thirds_press(const Job& job, const PairResult& out);
   void find_patches(const Job& job, std::span<const Vec3> seeds);
+  bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
   bool polar(const Job& job, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
   bool samples(const Job& job, PairResult& out);

@@ -17,7 +17,7 @@ namespace supple::collision {
 /// A pair as its patches need it.
 struct PolarJob {
   PairPressure& pressure;
-  const ContactSettings& settings;
+  ContactSettings settings;
   Regions regions;
   double extent = 0.0;     ///< longest half axis of a patch that is believed [m]
   double spacing = 0.0;    ///< of the seeds [m]; 0 where there are none

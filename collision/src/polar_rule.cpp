@@ -21,6 +21,7 @@ constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer on
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
 constexpr double kNearRim = 0.02;        // pressure where Newton's last step to the rim begins, over the peak: ten times what smooth patches have
+constexpr double kFlat = 10.0;           // heights of rims, over the thickness, to which their last lifts may be compared
 constexpr double kBelowRim = 0.01;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -96,7 +97,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   // Beside the edge of a face, where the pressure falls over a small part of the radius, the last step has to be small against that part.
-  const double low_enough = kNearRim * frame_.peak;
+  const double low_enough = kNearRim * frame_.peak, round_off = 4.0 * kEpsilon * (frame_.origin.lpNorm<Eigen::Infinity>() + size_);
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
   rim_error_ = 0.0;
@@ -138,7 +139,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       const double lift = ((a - b) + (ar - br) * step) / rate;
       const double last_move = moved_[k];
       moved_[k] = step * step * e.squaredNorm() + lift * lift;
-      const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
+      const bool settled = std::abs(lift) <= std::max(enough * std::clamp(std::abs(rays.height[k]), thickness, kFlat * thickness), round_off);
       if (near && settled) {
         const double norm_a = ga.norm(), norm_b = gb.norm();
         if (!(-at > kUpright * norm_a) && !widen_columns(0, ga / -norm_a, radius * e)) return false;
