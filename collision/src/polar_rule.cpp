@@ -20,7 +20,7 @@ constexpr std::size_t kMostCoarse = 3;   // the finest rule for others
 constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
-constexpr double kNearRim = 0.02;        // pressure where Newton's last step to the rim begins, over the peak: ten times what smooth patches have
+constexpr double kNearRim = 10.0;        // pressure over the peak, by the step over the radius, where Newton's last step to the rim begins: on smooth patches it is 2
 constexpr double kFlat = 10.0;           // heights of rims, over the thickness, to which their last lifts may be compared
 constexpr double kBelowRim = 0.01;       // over the peak
 constexpr int kFreeRimSteps = 10;
@@ -97,7 +97,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   // Beside the edge of a face, where the pressure falls over a small part of the radius, the last step has to be small against that part.
-  const double low_enough = kNearRim * frame_.peak, round_off = 4.0 * kEpsilon * (frame_.origin.lpNorm<Eigen::Infinity>() + size_);
+  const double low_enough = kNearRim * enough * frame_.peak, round_off = 4.0 * kEpsilon * (frame_.origin.lpNorm<Eigen::Infinity>() + size_);
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
   rim_error_ = 0.0;
