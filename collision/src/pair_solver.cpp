@@ -126,7 +126,7 @@ bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, Pai
 }
 
 bool PairSolver::polar(const Job& job, PairResult& out) {
-  constexpr double kFiner = 0.25;
+  constexpr double kFiner = 0.1;
   if (!rings(job.polar, job.overlap, job.convex, out)) return false;
   if (patches_.empty() || meets(out, job.settings().error)) return true;
   // Rims and rounding may add a little to what panels are held to: finer ones cost far less than another rule.
