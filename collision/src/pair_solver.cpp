@@ -35,9 +35,9 @@ std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, co
 
 /// Whether a bound is as good as asked, or as round-off lets it be.
 bool meets(const PairResult& result, double error) {
-  constexpr double kRound = 1e-7, kSlack = 1.01;
-  const double reached = within_reach(error, result.rounding);
-  return result.summary.error_estimate <= std::max((reached > error ? 2.0 : kSlack) * reached, kRound);
+  constexpr double kRound = 1e-7, kSlack = 1.01, kOutOfReach = 2.0, kReached = 8.0;
+  const double within = error < kOutOfReach * result.rounding ? kReached * result.rounding : kSlack * error;
+  return result.summary.error_estimate <= std::max(within, kRound);
 }
 
 }  // namespace

@@ -63,9 +63,6 @@ inline double rounding_error(double coordinates, double thickness) {
   return 16.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinates / thickness);
 }
 
-/// What can be asked for in place of `error` where rounding leaves more than that. What comes of it is off by twice as much at most.
-inline double within_reach(double error, double rounding) { return error < 2.0 * rounding ? 4.0 * rounding : error; }
-
 /// What is wanted of a squeezed region.
 enum class Region : std::uint8_t {
   None,

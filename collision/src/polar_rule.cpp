@@ -21,7 +21,6 @@ constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer on
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
 constexpr double kNearRim = 10.0;        // pressure over the peak, by the step over the radius, where Newton's last step to the rim begins: on smooth patches it is 2
-constexpr double kFlat = 10.0;           // heights of rims, over the thickness, to which their last lifts may be compared
 constexpr double kBelowRim = 0.01;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -97,7 +96,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   // Beside the edge of a face, where the pressure falls over a small part of the radius, the last step has to be small against that part.
-  const double low_enough = kNearRim * enough * frame_.peak, round_off = 4.0 * kEpsilon * (frame_.origin.lpNorm<Eigen::Infinity>() + size_);
+  const double low_enough = kNearRim * enough * frame_.peak;
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
   rim_error_ = 0.0;
@@ -139,7 +138,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       const double lift = ((a - b) + (ar - br) * step) / rate;
       const double last_move = moved_[k];
       moved_[k] = step * step * e.squaredNorm() + lift * lift;
-      const bool settled = std::abs(lift) <= std::max(enough * std::clamp(std::abs(rays.height[k]), thickness, kFlat * thickness), round_off);
+      const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
       if (near && settled) {
         const double norm_a = ga.norm(), norm_b = gb.norm();
         if (!(-at > kUpright * norm_a) && !widen_columns(0, ga / -norm_a, radius * e)) return false;
@@ -307,13 +306,10 @@ double PolarRuleSolver::placing_error() const { return lift_ / std::sqrt(fine_.a
 /// The same, and what the rim is off by.
 double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + placing_error(); }
 
-bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& asked,
+bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                             const Regions& regions, double extent,
                             std::span<const ContactBody* const> third, bool round, bool follow, bool faces, PatchPoints& points) {
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
-  frame_ = frame;
-  ContactSettings settings = asked;
-  settings.error = within_reach(asked.error, rounding());
   extent_ = extent;
   third_ = third;
   imprints_.clear();
