@@ -19,6 +19,7 @@ constexpr double kWidestCoarse = 2.4;
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
+constexpr double kUnseenOnFaces = 1e-2;  // to whose edges the pressure is the same
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
 constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
@@ -609,7 +610,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     polygon_ = kept_rim_;
   }
   node_.resize(node_.point.size());
-  estimate_ += (cut_ ? kUnseenBesideThirds : kUnseen) * error + algebraic_error();
+  estimate_ += (cut_ ? kUnseenBesideThirds : about_middle_ ? kUnseenOnFaces : kUnseen) * error + algebraic_error();
   return true;
 }
 
