@@ -21,7 +21,7 @@ constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer on
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
 constexpr double kNearRim = 10.0;        // pressure over the peak, by the step over the radius, where Newton's last step to the rim begins: on smooth patches it is 2
-constexpr double kBelowRim = 0.01;       // over the peak
+constexpr double kBelowRim = 0.05;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
 constexpr double kLeastOfBound = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less

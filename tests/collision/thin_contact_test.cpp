@@ -75,7 +75,7 @@ TEST(ThinContacts, KeepTheirBoundsAndTakeNoMoreWorkThanDeeperOnes) {
     for (std::size_t j = i; j < shapes.size(); ++j) {
       Rigid a(shapes[i], 2.0 * kE, 0.03), b(shapes[j], 3.0 * kE, 0.03);
       Draw draw(31);
-      for (int pose = 0; pose < 40; ++pose) {
+      for (int pose = 0; pose < 100; ++pose) {
         press(a, b, draw.logarithmic(1e-8, 1e-3) * kRound, draw);
         for (const double error : {1e-3, 1e-6}) {
           const ContactSurface::Summary s = query({a.body(), b.body()}, error);
