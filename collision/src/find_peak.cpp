@@ -225,7 +225,7 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
     frame.axis = axis;
     frame.flat = flat && on_sigma;
     if (frame.flat || (on_sigma && at_top) || iteration + 1 == kMostSteps) {
-      if (level <= noise || !on_sigma) return std::nullopt;
+      if (level <= pressure.noise_on_sigma(x, fall, rise) || !on_sigma) return std::nullopt;
       frame.origin = x;
       frame.peak = level;
       const bool round = p.first - p.second <= kRound * (std::abs(q_uu) + std::abs(q_vv) + flattest);
@@ -271,7 +271,7 @@ std::optional<PeakFrame> PeakFinder::find_on_axis(PairPressure& pressure, const 
       frame.origin += std::clamp((a - b) / steepness, -reach, reach) * frame.axis;
       continue;
     }
-    if (level <= noise) return std::nullopt;
+    if (level <= pressure.noise_on_sigma(frame.origin, fall, rise)) return std::nullopt;
     // Beside the axis the gradients turn by the second derivatives, the same ones in all directions.
     const double h = 1e-4 * reach;
     batch_.point[0] = frame.origin + h * u;

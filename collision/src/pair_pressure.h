@@ -119,6 +119,11 @@ class PairPressure {
   [[nodiscard]] double noise(const Vec3& x, double steepness) const {
     return 16.0 * std::numeric_limits<double>::epsilon() * std::max(largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
   }
+  /// The same of what both are on Sigma, in which the softer body has the larger say. @param slope_a, slope_b  along the normal, either way [Pa/m]
+  [[nodiscard]] double noise_on_sigma(const Vec3& x, double slope_a, double slope_b) const {
+    const double a = std::abs(slope_a), b = std::abs(slope_b), modulus = modulus_[0] * b + modulus_[1] * a;
+    return 16.0 * std::numeric_limits<double>::epsilon() * std::max(modulus, 4.0 * a * b * x.lpNorm<Eigen::Infinity>()) / (a + b);
+  }
   /// Length [m] that steps are limited by: the smaller feature size of the two bodies.
   [[nodiscard]] double feature_size() const {
     return std::min(field_[0].feature_size(), field_[1].feature_size());

@@ -130,7 +130,7 @@ std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent)
     }
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
-    const double noise = pressure.noise(batch_.point[i], (batch_.slope_a[i] - batch_.slope_b[i]).norm());
+    const double noise = pressure.noise_on_sigma(batch_.point[i], batch_.slope_a[i].norm(), batch_.slope_b[i].norm());
     if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, noise)) continue;
     if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
     if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
