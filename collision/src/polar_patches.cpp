@@ -10,6 +10,7 @@ namespace {
 constexpr double kBesideRim = 0.05;
 
 constexpr std::size_t kMostPatches = 16;
+constexpr double kAboveNoise = 4.0;  // pressure of a place that is believed to belong to a patch; hills are believed from once the noise on
 
 }  // namespace
 
@@ -131,7 +132,7 @@ std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent)
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const double noise = pressure.noise_on_sigma(batch_.point[i], batch_.slope_a[i].norm(), batch_.slope_b[i].norm());
-    if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, noise)) continue;
+    if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, kAboveNoise * noise)) continue;
     if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
     if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
   }
