@@ -36,7 +36,7 @@ std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, co
 /// Whether a bound is as good as asked, or as round-off lets it be.
 bool meets(const PairResult& result, double error) {
   constexpr double kRound = 1e-7, kSlack = 1.01, kOfRounding = 5.0;  // marching has two of these at least
-  return result.summary.error_estimate <= std::max({kSlack * error, kRound, kOfRounding * result.rounding});
+  return result.rounding > kLostInRounding || result.summary.error_estimate <= std::max({kSlack * error, kRound, kOfRounding * result.rounding});
 }
 
 }  // namespace

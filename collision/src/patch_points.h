@@ -63,6 +63,9 @@ inline double rounding_error(double coordinates, double thickness) {
   return 16.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinates / thickness);
 }
 
+/// More of it than this, and no rule tells more than rings do, if they do.
+inline constexpr double kLostInRounding = 1e-2;
+
 /// What is wanted of a squeezed region.
 enum class Region : std::uint8_t {
   None,

@@ -10,7 +10,6 @@ namespace {
 constexpr double kBesideRim = 0.05;
 
 constexpr std::size_t kMostPatches = 16;
-constexpr double kAboveNoise = 4.0;  // pressure of a place that is believed to belong to a patch; hills are believed from once the noise on
 
 }  // namespace
 
@@ -42,6 +41,7 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
   // Two patches may lie so near to each other that their seeds have one hill.
   for (std::size_t more = 0; const std::optional<Vec3> x = outside(job.pressure, job.extent); ++more) {
     const Patch found = more < kMostPatches ? add_patch(job, *x, follow, out) : Patch::Unfit;
+    if (found == Patch::Lost) break;
     unseen = found == Patch::Known && !empty();
     if (found != Patch::Added) return false;
   }
@@ -75,6 +75,7 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const Vec3& hil
     return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };
   if (!fits()) {
+    if (polar_.rounding() > kLostInRounding) return Patch::Lost;
     if (!frame->flat) return Patch::Unfit;
     frame = finder_.climb(job.pressure, hill, job.extent, job.faces, false);
     if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
@@ -132,7 +133,7 @@ std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent)
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const double noise = pressure.noise_on_sigma(batch_.point[i], batch_.slope_a[i].norm(), batch_.slope_b[i].norm());
-    if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, kAboveNoise * noise)) continue;
+    if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, noise)) continue;
     if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
     if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
   }

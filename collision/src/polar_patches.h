@@ -44,7 +44,7 @@ class PolarPatches {
   [[nodiscard]] bool any_touches(PairPressure& pressure, double extent, bool convex);
 
  private:
-  enum class Patch : std::uint8_t { Added, Known, Unfit };
+  enum class Patch : std::uint8_t { Added, Known, Lost, Unfit };
 
   bool solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out);
   Patch add_patch(const PolarJob& job, const Vec3& hill, bool follow, PairResult& out);

@@ -63,6 +63,32 @@ TEST(ThinContacts, OfFlatCoresOnAPlaneAreSteinersPolynomials) {
   }
 }
 
+// Equal balls that overlap by d: F = pi E d^2 / 4. Where d is some round-offs of the coordinates and rings do not fit, no other rule does: marching takes a
+// million evaluations to say so.
+TEST(ThinContacts, OfBallsAreToldDownToRoundOff) {
+  Rigid a(linear_sphere(kRound), kLinearModulus * kE, 0.05), b(linear_sphere(kRound), kLinearModulus * kE, 0.05);
+  Draw draw(3);
+  int told = 0;
+  for (int pose = 0; pose < 2000; ++pose) {
+    const double depth = draw.logarithmic(1e-16, 1e-11);
+    const bool on_axis = pose % 2 == 0;
+    const Vec3 at(on_axis ? 0.0 : draw.uniform(0.0, 1.0), 0.0, draw.uniform(0.0, 1.0)), way = on_axis ? Vec3(Vec3::UnitZ()) : draw.direction();
+    a.put({at, Quat::Identity()});
+    b.put({at + (2.0 * kRound - depth) * way, Quat::Identity()});
+    const double d = 2.0 * kRound - (b.body().pose[0].position - a.body().pose[0].position).norm(), force = 0.25 * kPi * kE * d * d;
+    const ContactSurface::Summary s = query({a.body(), b.body()}, 1e-3);
+    EXPECT_NE(s.rule, ContactRule::March) << depth;
+    EXPECT_LE(s.evaluations, 100000u) << depth;
+    if (s.points == 0) {
+      EXPECT_LE(d, 2e-13) << depth;
+      continue;
+    }
+    ++told;
+    EXPECT_NEAR(s.force.norm(), force, s.error_estimate * force) << depth;
+  }
+  EXPECT_GT(told, 1000);
+}
+
 // In any pose in which surfaces lie on one another: edges on faces, faces on faces, sides of capsules. By marching, which one of some ten thousand such
 // queries still is left to, it takes a million evaluations.
 TEST(ThinContacts, KeepTheirBoundsAndTakeNoMoreWorkThanDeeperOnes) {
