@@ -23,7 +23,7 @@ struct Group {
   std::string_view measures;
 };
 
-constexpr std::array<Group, 13> kGroups{{
+constexpr std::array<Group, 14> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)"},
     {"core/integrators", "integrator_bench", "time against error of every integrator; a file name after it: plot (SVG)"},
     {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
@@ -32,6 +32,7 @@ constexpr std::array<Group, 13> kGroups{{
     {"collision", "contact_bench", "one contact query: time, points and error; a file name after it: that of collision/rules, too"},
     {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; after it: poses, case"},
     {"collision/invariance", "contact_invariance", "what changes in swapped, turned and scaled queries; after it: poses, case"},
+    {"collision/thin", "contact_thin", "contact queries of bodies that barely overlap; after it: poses, seed"},
     {"collision/rules", "contact_rules", "time against error of the rules of the contact surface; a file name after it: plot (SVG)"},
     {"collision/stability", "contact_stress", "contact tried hard; after it: --seed N, file name of a map (SVG)"},
     {"collision/pile", "contact_pile", "steps of settled balls and of 100,000; after it: numbers of balls"},

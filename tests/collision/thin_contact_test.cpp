@@ -5,13 +5,12 @@
 #include <array>
 #include <cmath>
 
-#include "benchmarks/contact_shapes.h"
+#include "benchmarks/thin_cases.h"
 
 namespace supple::collision {
 namespace {
 
 using namespace benchmarks;
-using implicit::ShapeKind;
 
 constexpr double kRound = 0.1, kE = 1e6;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
@@ -25,39 +24,25 @@ ContactSurface::Summary query(const std::array<ContactBody, 2>& bodies, double e
   return surface.summary.empty() ? ContactSurface::Summary{} : surface.summary.front();
 }
 
-/// A convex flat core and what lies within kRound of it.
-struct Flat {
-  const char* name;
-  ShapeKind shape;
-  Vec3 size;
-  double area, perimeter;  ///< of the core; of a segment, twice its length
-};
-const std::array kFlats{Flat{"point", ShapeKind::Point, Vec3::Zero(), 0.0, 0.0}, Flat{"segment", ShapeKind::Segment, Vec3(0.15, 0, 0), 0.0, 0.6},
-                        Flat{"rectangle", ShapeKind::Rectangle, Vec3(0.15, 0.08, 0), 4.0 * 0.15 * 0.08, 4.0 * (0.15 + 0.08)},
-                        Flat{"disc", ShapeKind::Disc, Vec3(0.12, 0, 0), kPi * 0.12 * 0.12, 2.0 * kPi * 0.12}};
-
-// Where both pressures are linear, that on Sigma is k (d - y^2 / 2 r) at y from where the core lies, with 1 / k the sum of both bodies' r / E. The sums
-// over the core, its edges and its corners are Steiner's; Sigma's slopes change them by some d / r.
-TEST(ThinContacts, OfFlatCoresOnAPlaneAreSteinersPolynomials) {
-  const double stiffness = 3.0 * kE / kRound;  // of the plane [Pa/m]
-  const double k = 1.0 / (kRound / kE + 1.0 / stiffness);
+TEST(ThinContacts, OfFlatCoresOnAPlaneAreTheClosedForm) {
+  const double steep = 3.0 * kE / kRound;  // of the plane [Pa/m]
+  const double stiffness = 1.0 / (kRound / kE + 1.0 / steep);
   const Pose still, turned{Vec3(0.3, 0.2, 0.7), Quat(Eigen::AngleAxisd(0.4, Vec3::UnitZ()))};
-  for (const Flat& flat : kFlats) {
-    Rigid body(linear_shape(flat.shape, flat.size, kRound), kLinearModulus * kE, 0.03);
+  for (const FlatCore& core : kFlatCores) {
+    Rigid body(linear_shape(core.shape, core.size, kRound), kLinearModulus * kE, 0.03);
     body.put(turned);
     for (double d = 1e-3 * kRound; d > 1e-11 * kRound; d *= 0.1) {
       const implicit::HalfSpace plane{Vec3(0, 0, turned.position.z() - kRound + d), Vec3::UnitZ(), 1.0};
-      const double overlap = plane.point.z() - (turned.position.z() - kRound), wide = std::sqrt(2.0 * kRound * overlap);
-      const double force = k * overlap * (flat.area + 2.0 / 3.0 * flat.perimeter * wide + kPi * kRound * overlap);
-      const double area = flat.area + flat.perimeter * wide + 2.0 * kPi * kRound * overlap;
+      const double overlap = plane.point.z() - (turned.position.z() - kRound);
+      const ForceAndArea exact = on_plane(core, kRound, stiffness, overlap);
       for (const double error : {1e-2, 1e-4, 1e-6}) {
-        const ContactSurface::Summary s = query({body.body(), single_part(plane, stiffness, still)}, error);
-        ASSERT_GT(s.points, 0u) << flat.name << d;
-        EXPECT_EQ(s.rule, ContactRule::Polar) << flat.name << d;
+        const ContactSurface::Summary s = query({body.body(), single_part(plane, steep, still)}, error);
+        ASSERT_GT(s.points, 0u) << core.name << d;
+        EXPECT_EQ(s.rule, ContactRule::Polar) << core.name << d;
         const double rounding = 8.0 * kEpsilon / overlap, bound = s.error_estimate + 2.0 * overlap / kRound + rounding;
-        EXPECT_LE(s.error_estimate, std::max(1.01 * error, 40.0 * rounding)) << flat.name << ' ' << d;
-        EXPECT_NEAR(s.force.norm(), force, bound * force) << flat.name << ' ' << d << ' ' << error;
-        EXPECT_NEAR(s.area, area, bound * area) << flat.name << ' ' << d << ' ' << error;
+        EXPECT_LE(s.error_estimate, std::max(1.01 * error, 40.0 * rounding)) << core.name << ' ' << d;
+        EXPECT_NEAR(s.force.norm(), exact.force, bound * exact.force) << core.name << ' ' << d << ' ' << error;
+        EXPECT_NEAR(s.area, exact.area, bound * exact.area) << core.name << ' ' << d << ' ' << error;
       }
     }
   }
@@ -92,12 +77,7 @@ TEST(ThinContacts, OfBallsAreToldDownToRoundOff) {
 // In any pose in which surfaces lie on one another: edges on faces, faces on faces, sides of capsules. By marching, which one of some ten thousand such
 // queries still is left to, it takes a million evaluations.
 TEST(ThinContacts, KeepTheirBoundsAndTakeNoMoreWorkThanDeeperOnes) {
-  std::vector<implicit::Skeleton> shapes;
-  shapes.push_back(linear_shape(ShapeKind::Box, Vec3(0.1, 0.08, 0.08), 0.02));
-  shapes.push_back(linear_shape(ShapeKind::Segment, Vec3(0.1, 0, 0), 0.1));
-  shapes.push_back(wyvill_shape(ShapeKind::Box, Vec3(0.2, 0.1, 0.1), 0.15));
-  shapes.push_back(wyvill_shape(ShapeKind::Segment, Vec3(0.2, 0, 0), 0.2));
-  shapes.push_back(wyvill_shape(ShapeKind::Disc, Vec3(0.15, 0, 0), 0.15));
+  const std::vector<implicit::Skeleton> shapes = flat_shapes();
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     for (std::size_t j = i; j < shapes.size(); ++j) {
       Rigid a(shapes[i], 2.0 * kE, 0.03), b(shapes[j], 3.0 * kE, 0.03);

@@ -1,0 +1,115 @@
+/// @file contact_thin.cpp
+/// Contact queries of bodies that overlap by a thousandth of their rounding and less, decade by decade of that share; one JSON object a line. Bodies
+/// with flat cores on a plane, against a closed form that is exact to that share; and pairs of boxes, capsules and discs whose surfaces lie on one another
+/// in random poses, against a query for a thousandth of the error.
+///   contact_thin [POSES] [SEED]
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "thin_cases.h"
+#include "usage.h"
+
+namespace {
+
+using namespace supple;
+using namespace supple::benchmarks;
+
+constexpr double kRound = 0.1, kE = 1e6;
+constexpr std::array<double, 2> kErrors{1e-3, 1e-6};
+
+struct Query {
+  collision::ContactCandidates candidates;
+  collision::ContactSurface surface;
+  double cpu_us = 0.0;
+
+  collision::ContactSurface::Summary ask(const std::array<collision::ContactBody, 2>& bodies, double error, int repeats) {
+    const Executor executor(1);
+    cpu_us = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < repeats; ++i) {
+      const double start = cpu_microseconds();
+      find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
+      solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
+      cpu_us = std::min(cpu_us, cpu_microseconds() - start);
+    }
+    return surface.summary.empty() ? collision::ContactSurface::Summary{} : surface.summary.front();
+  }
+};
+
+void measure_on_plane() {
+  const double steep = 3.0 * kE / kRound, stiffness = 1.0 / (kRound / kE + 1.0 / steep);
+  const Pose still, turned{Vec3(0.3, 0.2, 0.7), Quat(Eigen::AngleAxisd(0.4, Vec3::UnitZ()))};
+  Query query;
+  for (const FlatCore& core : kFlatCores) {
+    Rigid body(linear_shape(core.shape, core.size, kRound), kLinearModulus * kE, 0.03);
+    body.put(turned);
+    for (const double error : kErrors) {
+      for (int decade = -3; decade >= -11; --decade) {
+        const implicit::HalfSpace plane{Vec3(0, 0, turned.position.z() - kRound + std::pow(10.0, decade) * kRound), Vec3::UnitZ(), 1.0};
+        const double d = plane.point.z() - (turned.position.z() - kRound);
+        const ForceAndArea exact = on_plane(core, kRound, stiffness, d);
+        const collision::ContactSurface::Summary s = query.ask({body.body(), single_part(plane, steep, still)}, error, 10);
+        std::printf("{\"name\": \"collision/thin/%s/depth=1e%d/error=%g\", \"cpu_us\": %.1f, \"points\": %zu, \"evaluations\": %zu, \"error\": %.2g, "
+                    "\"bound\": %.2g}\n",
+                    std::string(core.name).c_str(), decade, error, query.cpu_us, std::size_t(s.points), std::size_t(s.evaluations),
+                    std::max(std::abs(s.force.norm() / exact.force - 1.0), std::abs(s.area / exact.area - 1.0)), s.error_estimate);
+      }
+    }
+  }
+}
+
+void measure_pairs(int poses, std::uint64_t seed) {
+  struct Line {
+    std::vector<double> cpu;
+    double worst_over_bound = 0.0;
+    int by_other_rules = 0, unmet = 0, below_error = 0, checked = 0, missed = 0;
+  };
+  const std::vector<implicit::Skeleton> shapes = flat_shapes();
+  std::map<std::pair<int, std::size_t>, Line> lines;  // by decade and error
+  Query query;
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    for (std::size_t j = i; j < shapes.size(); ++j) {
+      Rigid a(shapes[i], 2.0 * kE, 0.03), b(shapes[j], 3.0 * kE, 0.03);
+      Draw draw(seed);
+      for (int pose = 0; pose < poses; ++pose) {
+        const double depth = draw.logarithmic(1e-9, 1e-3);
+        press(a, b, depth * kRound, draw);
+        for (std::size_t e = 0; e < kErrors.size(); ++e) {
+          Line& line = lines[{static_cast<int>(std::floor(std::log10(depth))), e}];
+          const std::array<collision::ContactBody, 2> bodies{a.body(), b.body()};
+          const collision::ContactSurface::Summary s = query.ask(bodies, kErrors[e], 2);
+          line.cpu.push_back(query.cpu_us);
+          line.missed += s.points == 0 ? 1 : 0;
+          line.by_other_rules += s.rule != collision::ContactRule::Polar ? 1 : 0;
+          line.unmet += s.error_estimate > 1.01 * kErrors[e] ? 1 : 0;
+          const collision::ContactSurface::Summary fine = query.ask(bodies, 1e-3 * kErrors[e], 1);
+          if (!(fine.error_estimate <= 0.1 * s.error_estimate)) continue;  // round-off leaves no better answer
+          ++line.checked;
+          const double off = std::max((s.force - fine.force).norm() / fine.force.norm(), std::abs(s.area / fine.area - 1.0)) - fine.error_estimate;
+          line.worst_over_bound = std::max(line.worst_over_bound, off / s.error_estimate);
+          line.below_error += off > s.error_estimate ? 1 : 0;
+        }
+      }
+    }
+  }
+  for (auto& [key, line] : lines) {
+    std::sort(line.cpu.begin(), line.cpu.end());
+    std::printf("{\"name\": \"collision/thin/pairs/depth=1e%d/error=%g\", \"queries\": %zu, \"cpu_us_median\": %.1f, \"cpu_us_99_of_100\": %.1f, "
+                "\"cpu_us_worst\": %.1f, \"missed\": %d, \"by_other_rules\": %d, \"unmet\": %d, \"checked\": %d, \"bound_below_error\": %d, "
+                "\"worst_error_over_bound\": %.2g}\n",
+                key.first, kErrors[key.second], line.cpu.size(), line.cpu[line.cpu.size() / 2], line.cpu[line.cpu.size() * 99 / 100], line.cpu.back(),
+                line.missed, line.by_other_rules, line.unmet, line.checked, line.below_error, line.worst_over_bound);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  answer_usage(argc, argv, "contact_thin [POSES] [SEED]", 2);
+  measure_on_plane();
+  measure_pairs(argc > 1 ? std::atoi(argv[1]) : 300, argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 2026);
+  return 0;
+}
