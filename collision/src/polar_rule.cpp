@@ -139,7 +139,9 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       const double last_move = moved_[k];
       moved_[k] = step * step * e.squaredNorm() + lift * lift;
       const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
-      if (near && settled) {
+      const bool smooth = !near || !settled || !about_middle_ || std::abs(step) <= enough * enough * radius ||
+                          same_side(rim_batch_.point[k], rim_batch_.point[k] + step * e + lift * axis);
+      if (near && settled && smooth) {
         const double norm_a = ga.norm(), norm_b = gb.norm();
         if (!(-at > kUpright * norm_a) && !widen_columns(0, ga / -norm_a, radius * e)) return false;
         if (!(bt > kUpright * norm_b) && !widen_columns(1, gb / -norm_b, radius * e)) return false;
@@ -157,6 +159,13 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
     open_.resize(left);
   }
   return open_.empty();
+}
+
+/// Whether no kink that crosses the patch lies between two places, or at either.
+bool PolarRuleSolver::same_side(const Vec3& from, const Vec3& to) const {
+  constexpr double kAt = 0.01;  // of the way
+  const Vec3 a = from - kAt * (to - from), b = to + kAt * (to - from);
+  return std::none_of(crossing_.begin(), crossing_.end(), [&](std::size_t k) { return k < kinks_.size() && (kinks_[k].value(a) > 0.0) != (kinks_[k].value(b) > 0.0); });
 }
 
 void PolarRuleSolver::place_nodes(const PolarRule& rule) {

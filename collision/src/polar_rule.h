@@ -65,6 +65,7 @@ class PolarRuleSolver {
   bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
                         const Regions& regions, bool round, bool any, bool star, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error, bool again);
+  [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
   void start_outline(const PolarRule& rule);
