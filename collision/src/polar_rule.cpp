@@ -21,6 +21,7 @@ constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer on
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
 constexpr int kRimSteps = 30;
 constexpr double kNearRim = 10.0;        // pressure over the peak, by the step over the radius, where Newton's last step to the rim begins: on smooth patches it is 2
+constexpr double kNearRimOfFace = 1.0;   // beside whose edges the slope grows from little to much
 constexpr double kBelowRim = 0.05;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
@@ -96,7 +97,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   // Beside the edge of a face, where the pressure falls over a small part of the radius, the last step has to be small against that part.
-  const double low_enough = kNearRim * enough * frame_.peak;
+  const double low_enough = (about_middle_ ? kNearRimOfFace : kNearRim) * enough * frame_.peak;
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
   rim_error_ = 0.0;

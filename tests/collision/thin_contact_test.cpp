@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 #include "benchmarks/thin_cases.h"
 
@@ -82,7 +84,7 @@ TEST(ThinContacts, KeepTheirBoundsAndTakeNoMoreWorkThanDeeperOnes) {
     for (std::size_t j = i; j < shapes.size(); ++j) {
       Rigid a(shapes[i], 2.0 * kE, 0.03), b(shapes[j], 3.0 * kE, 0.03);
       Draw draw(31);
-      for (int pose = 0; pose < 80; ++pose) {
+      for (int pose = 0; pose < 100; ++pose) {
         press(a, b, draw.logarithmic(1e-8, 1e-3) * kRound, draw);
         for (const double error : {1e-3, 1e-6}) {
           const ContactSurface::Summary s = query({a.body(), b.body()}, error);
@@ -97,6 +99,32 @@ TEST(ThinContacts, KeepTheirBoundsAndTakeNoMoreWorkThanDeeperOnes) {
           EXPECT_NEAR(s.area, fine.area, bound * fine.area) << i << j << ' ' << pose;
         }
       }
+    }
+  }
+}
+
+// Bodies that stand on one another lean by what they are pressed in: the pressure of a face falls to nothing across it, or at the edges of another.
+TEST(ThinContacts, OfFacesThatLeanKeepTheirBounds) {
+  using implicit::ShapeKind;
+  const implicit::Skeleton box = linear_shape(ShapeKind::Box, Vec3(0.15, 0.12, 0.08), 0.02);
+  for (const auto& [shape, size, round] : {std::tuple(ShapeKind::Disc, Vec3(0.1, 0, 0), 0.04), std::tuple(ShapeKind::Segment, Vec3(0.08, 0, 0), 0.05),
+                                           std::tuple(ShapeKind::Rectangle, Vec3(0.06, 0.05, 0), 0.02)}) {
+    Rigid lower(box, kE, 0.03), upper(linear_shape(shape, size, round), kE, 0.03);
+    lower.put({});
+    Draw draw(7);
+    for (int pose = 0; pose < 60; ++pose) {
+      const double d = draw.logarithmic(1e-8, 1e-5), lean = draw.uniform(0.0, 3.0) * d / 0.1;
+      const auto [s, c] = math::sin_cos(draw.uniform(0.0, 2.0 * kPi));
+      const Quat tilt(Eigen::AngleAxisd(lean, Vec3(c, s, 0))), turn(Eigen::AngleAxisd(draw.uniform(0.0, kPi), Vec3::UnitZ()));
+      upper.put({Vec3(0.01, 0.02, 0.1 + round - d), tilt * turn});
+      const std::array<ContactBody, 2> bodies{upper.body(), lower.body()};
+      const ContactSurface::Summary found = query(bodies, 1e-4), fine = query(bodies, 1e-7);
+      EXPECT_EQ(found.rule, ContactRule::Polar) << pose;
+      EXPECT_LE(found.evaluations, 200000u) << pose;
+      EXPECT_LE(found.error_estimate, 1.01e-4) << pose;
+      const double bound = found.error_estimate + fine.error_estimate;
+      EXPECT_LE((found.force - fine.force).norm(), bound * fine.force.norm()) << pose;
+      EXPECT_NEAR(found.area, fine.area, bound * fine.area) << pose;
     }
   }
 }
