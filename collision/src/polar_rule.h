@@ -194,6 +194,7 @@ class PolarRuleSolver {
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
   static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all, double error) const;
+  [[nodiscard]] bool leans(const Panel& panel, const PatchSums& all) const;
   [[nodiscard]] double largest_to_leave(double most) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 

@@ -20,8 +20,10 @@ constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenOnFaces = 1e-2;  // to whose edges the pressure is the same
+constexpr double kUnseenWhereFacesLean = 0.5;  // whose rims leave an edge and come back to it between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
+constexpr double kEnoughWhereFacesLean = 0.45;
 constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSameTurn = 1e-7;       // [rad]
@@ -374,7 +376,7 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) co
   const double on_faces = fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
   if (!panel.even()) {
     const auto changes = static_cast<double>(panel.change_end - panel.change);
-    panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    panel.by_angle *= panel.lost ? kLost : about_middle_ && !leans(panel, all) ? on_faces : about_middle_ ? kHalf : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {
@@ -480,6 +482,12 @@ bool PolarRuleSolver::add_missed_kinks() {
   return true;
 }
 
+/// Whether a face presses less there than elsewhere: then what its rim is like counts, which may leave the edges.
+bool PolarRuleSolver::leans(const Panel& panel, const PatchSums& all) const {
+  constexpr double kEven = 0.97;  // mean pressure, over that of all
+  return about_middle_ && panel.fine.load * all.area < kEven * all.load * panel.fine.area;
+}
+
 /// What a panel may be off by in angle or radius so that all those which are not off by more are so by `most` together.
 double PolarRuleSolver::largest_to_leave(double most) const {
   std::vector<double> off;
@@ -514,6 +522,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
   const bool beside = about_middle_ && cut_;
+  bool faces_lean = false;
   const std::size_t most = beside ? kMostBesideThirds : mild_ ? kMostMild : kMostPanels;
   for (;;) {
     if (begin < panels_.size()) {
@@ -534,7 +543,8 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     }
     // Rules agree by chance where panels do not begin at the rim's corners.
     const auto unseen = [&](const Panel& panel) { return panel.leaves && !panel.halved && panel.rays >= kFine && !beside; };
-    const bool enough = estimate_ <= kEnough * error;
+    faces_lean = !cut_ && std::any_of(panels_.begin(), panels_.end(), [&](const Panel& panel) { return leans(panel, all); });
+    const bool enough = estimate_ <= (faces_lean ? kEnoughWhereFacesLean : kEnough) * error;
     if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
@@ -610,7 +620,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     polygon_ = kept_rim_;
   }
   node_.resize(node_.point.size());
-  estimate_ += (cut_ ? kUnseenBesideThirds : about_middle_ ? kUnseenOnFaces : kUnseen) * error + algebraic_error();
+  estimate_ += (cut_ ? kUnseenBesideThirds : faces_lean ? kUnseenWhereFacesLean : about_middle_ ? kUnseenOnFaces : kUnseen) * error + algebraic_error();
   return true;
 }
 
