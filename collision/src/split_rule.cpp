@@ -374,9 +374,13 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) co
     return;
   }
   const double on_faces = fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
-  if (!panel.even()) {
+  if (leans(panel, all) && !panel.lost) {
+    // Where a rim leaves an edge rays of two panels that were parted there beside it may see nothing of it.
+    panel.by_angle *= panel.halved ? kLost : kHalf;
+    panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
+  } else if (!panel.even()) {
     const auto changes = static_cast<double>(panel.change_end - panel.change);
-    panel.by_angle *= panel.lost ? kLost : about_middle_ && !leans(panel, all) ? on_faces : about_middle_ ? kHalf : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {
