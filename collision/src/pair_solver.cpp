@@ -125,8 +125,15 @@ bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, Pai
 }
 
 bool PairSolver::polar(const Job& job, PairResult& out) {
-  constexpr double kFiner = 0.1;
-  if (!rings(job.polar, job.overlap, job.convex, out)) return false;
+  constexpr double kFiner = 0.1, kCoarse = 1e-3;
+  if (!rings(job.polar, job.overlap, job.convex, out)) {
+    // Where rings are lost at a fine error, coarse ones are better than nothing: other rules may not find so thin an overlap.
+    if (!job.convex || job.settings().error >= kCoarse) return false;
+    out.clear();
+    PolarJob coarse = job.polar;
+    coarse.settings.error = kCoarse;
+    return rings(coarse, job.overlap, job.convex, out);
+  }
   if (patches_.empty() || meets(out, job.settings().error)) return true;
   // Rims and rounding may add a little to what panels are held to: finer ones cost far less than another rule.
   out.clear();
