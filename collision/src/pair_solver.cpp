@@ -116,6 +116,7 @@ void PairSolver::begin_anew(const Job& job, PairResult& out) {
   take_all_thirds(job);
 }
 
+/// Polar patches from where `find_patches` begins. @return false where the rule does not fit
 bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out) {
   if (!patches_.solve(job, out)) return false;
   if (!convex || !patches_.empty()) return true;
@@ -124,6 +125,7 @@ bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, Pai
   return patches_.solve(job, out);
 }
 
+/// The same, at another error where the one asked for is not met. @return false where the rule does not fit
 bool PairSolver::polar(const Job& job, PairResult& out) {
   constexpr double kFiner = 0.1, kCoarse = 1e-3;
   if (!rings(job.polar, job.overlap, job.convex, out)) {

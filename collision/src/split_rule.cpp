@@ -23,7 +23,7 @@ constexpr double kUnseenOnFaces = 1e-2;  // to whose edges the pressure is the s
 constexpr double kUnseenWhereFacesLean = 0.5;  // whose rims leave an edge and come back to it between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
-constexpr double kEnoughWhereFacesLean = 0.45;
+constexpr double kEnoughWhereFacesLean = 0.45;  // the same there
 constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSameTurn = 1e-7;       // [rad]

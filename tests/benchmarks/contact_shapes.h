@@ -273,6 +273,16 @@ inline double difference(const collision::ContactSurface::Summary& s, const Answ
                    (s.centre_of_pressure - exact.centre).norm() / std::sqrt(exact.area)});
 }
 
+/// One query of two bodies, from the broad phase on. @return a summary without points where they do not touch
+inline collision::ContactSurface::Summary contact_between(const std::array<collision::ContactBody, 2>& bodies, double error) {
+  const Executor executor(1);
+  collision::ContactCandidates candidates;
+  collision::ContactSurface surface;
+  find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
+  solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
+  return surface.summary.empty() ? collision::ContactSurface::Summary{} : surface.summary.front();
+}
+
 /// One pose: the bodies in it, and the closed form where there is one.
 struct Pair {
   std::array<collision::ContactBody, 2> bodies;

@@ -50,14 +50,7 @@ Quat turned(double angle, const Vec3& axis) { return Quat(Eigen::AngleAxisd(angl
 /// Of bodies there the nodes are other points than of bodies that say where they lie.
 const Vec3 kElsewhere(0.7, -1.1, 0.4);
 
-ContactSurface::Summary solved(const std::array<ContactBody, 2>& bodies, double error) {
-  const Executor executor(1);
-  ContactCandidates candidates;
-  ContactSurface surface;
-  find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
-  solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-  return surface.summary.at(0);
-}
+ContactSurface::Summary solved(const std::array<ContactBody, 2>& bodies, double error) { return benchmarks::contact_between(bodies, error); }
 
 ContactSurface::Summary solve(const implicit::FieldView& a, const Vec3& at_a, const implicit::FieldView& b, const Vec3& at_b,
                               double modulus_b, double error) {

@@ -17,15 +17,6 @@ using namespace benchmarks;
 constexpr double kRound = 0.1, kE = 1e6;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-ContactSurface::Summary query(const std::array<ContactBody, 2>& bodies, double error) {
-  const Executor executor(1);
-  ContactCandidates candidates;
-  ContactSurface surface;
-  find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
-  solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-  return surface.summary.empty() ? ContactSurface::Summary{} : surface.summary.front();
-}
-
 TEST(ThinContacts, OfFlatCoresOnAPlaneAreTheClosedForm) {
   const double steep = 3.0 * kE / kRound;  // of the plane [Pa/m]
   const double stiffness = 1.0 / (kRound / kE + 1.0 / steep);
@@ -38,7 +29,7 @@ TEST(ThinContacts, OfFlatCoresOnAPlaneAreTheClosedForm) {
       const double overlap = plane.point.z() - (turned.position.z() - kRound);
       const ForceAndArea exact = on_plane(core, kRound, stiffness, overlap);
       for (const double error : {1e-2, 1e-4, 1e-6}) {
-        const ContactSurface::Summary s = query({body.body(), single_part(plane, steep, still)}, error);
+        const ContactSurface::Summary s = contact_between({body.body(), single_part(plane, steep, still)}, error);
         ASSERT_GT(s.points, 0u) << core.name << d;
         EXPECT_EQ(s.rule, ContactRule::Polar) << core.name << d;
         const double rounding = 8.0 * kEpsilon / overlap, bound = s.error_estimate + 2.0 * overlap / kRound + rounding;
@@ -63,7 +54,7 @@ TEST(ThinContacts, OfBallsAreToldDownToRoundOff) {
     a.put({at, Quat::Identity()});
     b.put({at + (2.0 * kRound - depth) * way, Quat::Identity()});
     const double d = 2.0 * kRound - (b.body().pose[0].position - a.body().pose[0].position).norm(), force = 0.25 * kPi * kE * d * d;
-    const ContactSurface::Summary s = query({a.body(), b.body()}, 1e-3);
+    const ContactSurface::Summary s = contact_between({a.body(), b.body()}, 1e-3);
     EXPECT_NE(s.rule, ContactRule::March) << depth;
     EXPECT_LE(s.evaluations, 100000u) << depth;
     if (s.points == 0) {
@@ -87,12 +78,12 @@ TEST(ThinContacts, KeepTheirBoundsAndTakeNoMoreWorkThanDeeperOnes) {
       for (int pose = 0; pose < 100; ++pose) {
         press(a, b, draw.logarithmic(1e-8, 1e-3) * kRound, draw);
         for (const double error : {1e-3, 1e-6}) {
-          const ContactSurface::Summary s = query({a.body(), b.body()}, error);
+          const ContactSurface::Summary s = contact_between({a.body(), b.body()}, error);
           ASSERT_GT(s.points, 0u) << i << j << ' ' << pose;
           EXPECT_EQ(s.rule, ContactRule::Polar) << i << j << ' ' << pose << ' ' << error;
           EXPECT_LE(s.evaluations, 200000u) << i << j << ' ' << pose << ' ' << error;
           if (error < 1e-3) continue;
-          const ContactSurface::Summary fine = query({a.body(), b.body()}, 1e-3 * error);
+          const ContactSurface::Summary fine = contact_between({a.body(), b.body()}, 1e-3 * error);
           const double bound = s.error_estimate + fine.error_estimate;
           EXPECT_LE(s.error_estimate, 1.01 * error) << i << j << ' ' << pose;
           EXPECT_LE((s.force - fine.force).norm(), bound * fine.force.norm()) << i << j << ' ' << pose;
@@ -118,7 +109,7 @@ TEST(ThinContacts, OfFacesThatLeanKeepTheirBounds) {
       const Quat tilt(Eigen::AngleAxisd(lean, Vec3(c, s, 0))), turn(Eigen::AngleAxisd(draw.uniform(0.0, kPi), Vec3::UnitZ()));
       upper.put({Vec3(0.01, 0.02, 0.1 + round - d), tilt * turn});
       const std::array<ContactBody, 2> bodies{upper.body(), lower.body()};
-      const ContactSurface::Summary found = query(bodies, 1e-4), fine = query(bodies, 1e-7);
+      const ContactSurface::Summary found = contact_between(bodies, 1e-4), fine = contact_between(bodies, 1e-7);
       EXPECT_EQ(found.rule, ContactRule::Polar) << pose;
       EXPECT_LE(found.evaluations, 200000u) << pose;
       EXPECT_LE(found.error_estimate, 1.01e-4) << pose;
