@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kFarOff = 0.2;          // of the radius: crossings from where the heights that are guessed have them
 constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
-constexpr int kCornerSteps = 8;
 constexpr int kCrossingSteps = 8;
 constexpr int kBorderSteps = 16;         // of Illinois' method to the border of an imprint
 constexpr double kBorder = 0.01;         // of the way from its middle
@@ -222,95 +221,6 @@ std::array<double, 2> PolarRuleSolver::rim_at(double cosine, double sine) const 
   return {at[0][0], at[1][0]};
 }
 
-/// Where a function changes its sign around a closed line, from its values at points of it: i + t lies between points i and i + 1.
-/// Between two changes that no point saw, or one alone, it is the parabola through three points.
-void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<double>& places) {
-  const std::size_t n = values.size();
-  const auto at = [&](std::size_t i) { return values[i % n]; };
-  const auto alone = [&](std::size_t i) { return (at(i + n - 1) > 0.0) != (at(i) > 0.0) && (at(i + 1) > 0.0) != (at(i) > 0.0); };
-  /// The root of the parabola about point i on one side of it; not a number where there is none.
-  const auto root = [&](std::size_t i, double side) {
-    const double last = at(i + n - 1), here = at(i), next = at(i + 1);
-    const double bend = last - 2.0 * here + next, slope = 0.5 * (next - last);
-    return (side * std::copysign(std::sqrt(slope * slope - 2.0 * bend * here), bend) - slope) / bend;
-  };
-  const auto add = [&](double place) { places.push_back(place < 0.0 ? place + static_cast<double>(n) : place); };
-  for (std::size_t i = 0; i < n; ++i) {
-    const double last = at(i + n - 1), here = at(i), next = at(i + 1), begin = static_cast<double>(i);
-    const bool side = here > 0.0;
-    if ((next > 0.0) != side) {
-      add(begin + (alone(i) ? root(i, 1.0) : alone(i + 1) ? 1.0 + root(i + 1, -1.0) : here / (here - next)));
-      continue;
-    }
-    const double bend = last - 2.0 * here + next, slope = 0.5 * (next - last), square = slope * slope - 2.0 * bend * here;
-    if ((last > 0.0) != side || !(bend * here > 0.0) || !(std::abs(slope) <= 0.5 * std::abs(bend)) || !(square > 0.0)) continue;
-    for (const double which : {-1.0, 1.0}) add(begin + root(i, which));
-  }
-}
-
-/// Newton's method to where kinks meet the rim, p_A = p_B = s = 0. @param kink  of each point   @param last  lengths of the last steps
-void PolarRuleSolver::move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last) {
-  batch.resize(batch.point.size());
-  last.assign(kink.size(), 0.0);
-  for (int step = 0; step < kCornerSteps; ++step) {
-    pressure.evaluate(batch);
-    evaluate_thirds(batch.point);
-    bool moved = false;
-    for (std::size_t i = 0; i < kink.size(); ++i) {
-      Vec3 slope;
-      const double s = side_of(kink[i], batch, i, slope);
-      Mat3 rows;
-      rows.row(0) = batch.slope_a[i];
-      rows.row(1) = batch.slope_b[i];
-      rows.row(2) = slope;
-      const double volume = rows.determinant();
-      const Vec3 value(batch.a[i], batch.b[i], s);
-      const Vec3 &a = batch.slope_a[i], &b = batch.slope_b[i];
-      Vec3 move = -(value[0] * b.cross(slope) + value[1] * slope.cross(a) + value[2] * a.cross(b)) / volume;
-      last[i] = move.norm();
-      if (!(last[i] <= extent_)) move.setZero();
-      batch.point[i] += move;
-      moved = moved || last[i] > 1e-9 * extent_;
-    }
-    if (!moved) break;
-  }
-}
-
-/// Where a kink meets the rim, begun between points of `fine_rim_`.
-void PolarRuleSolver::find_corners(PairPressure& pressure, std::vector<Corner>& corners) {
-  const std::vector<Vec3>& rim = fine_rim_;
-  const std::size_t n = rim.size();
-  std::vector<std::size_t> kink;
-  std::vector<double> sides(n), places;
-  PressureBatch& batch = rim_batch_;
-  batch.point.clear();
-  for (const std::size_t k : crossing_) {
-    for (std::size_t i = 0; i < n; ++i) sides[i] = side_of(k, pressure, rim[i]);
-    places.clear();
-    follow_signs(sides, places);
-    for (const double place : places) {
-      const double whole = std::floor(place);
-      const auto i = static_cast<std::size_t>(whole) % n;
-      batch.point.push_back(rim[i] + (place - whole) * (rim[(i + 1) % n] - rim[i]));
-      kink.push_back(k);
-    }
-  }
-  for (const Imprint& imprint : imprints_) {
-    if (std::find(crossing_.begin(), crossing_.end(), kinks_.size() + imprint.third) == crossing_.end()) continue;
-    batch.point.insert(batch.point.end(), imprint.leaves.begin(), imprint.leaves.end());
-    kink.resize(batch.point.size(), kinks_.size() + imprint.third);
-  }
-  if (kink.empty()) return;
-  std::vector<double> last;
-  move_to_corners(pressure, kink, batch, last);
-  for (std::size_t i = 0; i < kink.size(); ++i) {
-    const auto same = [&](std::size_t j) { return kink[j] == kink[i] && (batch.point[j] - batch.point[i]).norm() <= 1e-6 * extent_; };
-    bool found = last[i] <= 1e-6 * extent_;  // the panels find others by being parted
-    for (std::size_t j = 0; j < i && found; ++j) found = !same(j);
-    if (found) corners.push_back({batch.point[i], kink[i]});
-  }
-}
-
 double PolarRuleSolver::model_height(std::size_t ray, double share) const {
   const double square = share * share;
   return share * linear_[ray] + square * (square_[ray] + (about_star_ ? share : square) * rest_[ray]);
@@ -479,28 +389,6 @@ std::array<double, 2> PolarRuleSolver::Panel::bend(double x) const {
   const double width = end - begin, y = 0.5 * (1.0 + x), z = 1.0 - y;
   if (touch_begin && touch_end) return {begin + width * y * y * (3.0 - 2.0 * y), 3.0 * width * y * z};
   return touch_begin ? std::array{begin + width * y * y, width * y} : std::array{end - width * z * z, width * z};
-}
-
-/// Share of the angle between a ray and the next one at which a kink meets the rim, where its sides say that it does.
-std::optional<double> PolarRuleSolver::corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray) {
-  const auto rim_point = [this](std::size_t i) -> Vec3 {
-    return frame_.origin + rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]) + rays_.height[i] * frame_.axis;
-  };
-  const Vec3 a = rim_point(ray), b = rim_point(ray + 1);
-  const double left = side_of(kink, pressure, a), right = side_of(kink, pressure, b);
-  if ((left > 0.0) == (right > 0.0)) return std::nullopt;
-  const double share = left / (left - right);
-  crossing_batch_.point.assign(1, a + share * (b - a));
-  std::vector<double> last;
-  move_to_corners(pressure, {&kink, 1}, crossing_batch_, last);
-  const Vec3 d = crossing_batch_.point[0] - frame_.origin;
-  const Vec2 way(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
-  const auto angle = [&](const Vec2& to) {
-    const double c = rays_.cosine[ray], s = rays_.sine[ray];
-    return math::atan2(c * to.y() - s * to.x(), c * to.x() + s * to.y());
-  };
-  const double exact = angle(way) / angle(Vec2(rays_.cosine[ray + 1], rays_.sine[ray + 1]));
-  return exact > 0.0 && exact < 1.0 ? exact : share;
 }
 
 /// A kink that one of two neighbouring rays meets twice where the other does not, while they meet the same ones besides.

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "supple/core/math.h"
+#include "turns.h"
 
 namespace supple::collision {
 namespace {
@@ -27,8 +28,6 @@ constexpr int kLeaveSteps = 5;
 constexpr int kTouchSteps = 12, kTouchNewton = 3;
 constexpr double kTouch = 1e-6;         // angle between ray and border [rad]: the ray is off by the square
 constexpr double kFarthest = 4.0;       // radii of the patch
-
-double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 Vec2 in_units(const PeakFrame& frame, const Vec3& from_origin) {
   return {from_origin.dot(frame.u) / frame.u.squaredNorm(), from_origin.dot(frame.v) / frame.v.squaredNorm()};

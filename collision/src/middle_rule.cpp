@@ -9,6 +9,7 @@
 
 #include "polar_rule.h"
 #include "supple/core/math.h"
+#include "turns.h"
 
 namespace supple::collision {
 namespace {
@@ -20,14 +21,13 @@ constexpr double kNear = 0.3;              // pressure at the rim, of that in th
 constexpr double kFar = 2.0;               // from Sigma, in the overlap: Newton's method is not believed
 constexpr std::size_t kFewRays = 8, kManyRays = 16;
 constexpr double kRough = 0.05, kFine = 1e-2;  // of the radius, to find the middle and the corners
-constexpr int kHiddenRounds = 3;
 constexpr int kSteps = 8;
 constexpr double kClear = 0.1;             // of the radius, from kinks to the middle
+constexpr double kSharp = 0.1;             // of a sector's length: strips whose width grows as a root from there on do so all over it
+constexpr double kStripsBelow = 1e-5;      // errors that take so few points otherwise that it does not pay
 constexpr double kWidest = 1.7;            // sector [rad] in units of u and v
 constexpr double kSameCorner = 1e-6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 std::vector<Vec2> circle(std::size_t n) {
   std::vector<Vec2> ways;
@@ -36,13 +36,6 @@ std::vector<Vec2> circle(std::size_t n) {
     ways.emplace_back(c, s);
   }
   return ways;
-}
-
-/// By angle in [0, 2 pi) without a trigonometric function.
-bool before(const Vec2& a, const Vec2& b) {
-  const auto lower = [](const Vec2& x) { return x.y() < 0.0 || (x.y() == 0.0 && x.x() < 0.0); };
-  if (lower(a) != lower(b)) return lower(b);
-  return cross(a, b) > 0.0;
 }
 
 /// Where the tangents at two points of the rim meet; nothing where that is not between the rays through them.
@@ -251,29 +244,6 @@ bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
   return lift_to_sigma(pressure);
 }
 
-/// A side of the outline may hide between two rays: then a kink passes beyond both, but not beyond where their tangents meet.
-void PolarRuleSolver::add_rays_at_hidden_sides(PairPressure& pressure) {
-  for (int round = 0; round < kHiddenRounds; ++round) {
-    std::vector<Vec2> ways;
-    for (std::size_t i = 0; i < outline_.size(); ++i) {
-      const RimPoint &a = outline_[i], &b = outline_[(i + 1) % outline_.size()];
-      const std::optional<Vec2> corner = between_tangents(a.at, a.outward, b.at, b.outward);
-      if (!corner) continue;
-      const auto place = [&](const Vec2& x, double height) -> Vec3 {
-        return frame_.origin + direction(x.x(), x.y()) + height * frame_.axis;
-      };
-      const auto hidden = [&](const implicit::Kink& kink) {
-        const bool side = kink.value(place(a.at, a.height)) > 0.0;
-        return (kink.value(place(b.at, b.height)) > 0.0) == side &&
-               (kink.value(place(*corner, 0.5 * (a.height + b.height))) > 0.0) != side;
-      };
-      if (std::any_of(kinks_.begin(), kinks_.end(), hidden)) ways.push_back(*corner / corner->norm());
-    }
-    if (ways.empty() || !follow_outline(pressure, ways, kFine, outline_)) return;
-    std::sort(outline_.begin(), outline_.end(), [](const RimPoint& a, const RimPoint& b) { return before(a.at, b.at); });
-  }
-}
-
 /// Which kinks have points of the outline on the other side than the middle; third bodies may all cross.
 void PolarRuleSolver::cross_outline() {
   crossing_.clear();
@@ -300,27 +270,18 @@ void PolarRuleSolver::follow_tangents() {
   }
 }
 
-/// Where kinks meet the rim, p_A = p_B = s = 0, begun on `fine_rim_`.
-void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners) {
-  std::vector<Corner> found;
-  find_corners(pressure, found);
-  for (const Corner& corner : found) {
-    const Vec3 d = corner.at - frame_.origin;
-    const Vec2 at(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
-    corners.push_back({at, d.dot(frame_.axis), Vec2::Zero()});
-  }
-}
-
 /// Sectors between corners of the outline, and between others of its points where these are too far apart.
 /// @param widest  as seen from the middle [rad]   @param most_bend  of the outline within one [rad]   @return whether rays through them turn one way
-bool PolarRuleSolver::make_sectors(std::span<const RimPoint> corners, double widest, double most_bend) {
+bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners, double widest, double most_bend) {
   // A polygon of all points known; of those that lie on one ray, corners are kept.
   struct Mark {
     RimPoint point;
-    bool corner, touch = false;
+    bool corner;
+    bool strip_before = false, strip_after = false, touch = false;
+    double root_within = 0.0;
   };
   std::vector<Mark> all;
-  for (const RimPoint& p : corners) all.push_back({p, true});
+  for (const RimCorner& c : corners) all.push_back({c.point, true, c.strip_before, c.strip_after, false, c.root_within});
   for (const RimPoint& p : outline_) all.push_back({p, false});
   std::stable_sort(all.begin(), all.end(), [](const Mark& a, const Mark& b) { return before(a.point.at, b.point.at); });
   std::vector<Mark> marks;
@@ -345,7 +306,7 @@ bool PolarRuleSolver::make_sectors(std::span<const RimPoint> corners, double wid
         const double beyond = cross(a.point.at, way), left = cross(way, b.point.at);
         if (!(beyond >= 0.0) || !(left > 0.0)) continue;
         const double s = beyond / (beyond + left);
-        Mark touch{{(1.0 - s) * a.point.at + s * b.point.at, (1.0 - s) * a.point.height + s * b.point.height, Vec2::Zero()}, true, true};
+        Mark touch{{(1.0 - s) * a.point.at + s * b.point.at, (1.0 - s) * a.point.height + s * b.point.height, Vec2::Zero()}, true, false, false, true};
         if (same(a, touch)) {
           marks[k].corner = marks[k].touch = true;
         } else if (same(touch, b)) {
@@ -392,10 +353,12 @@ bool PolarRuleSolver::make_sectors(std::span<const RimPoint> corners, double wid
       }
       if (to == n || marks[(begin + to) % n].corner) break;
     }
-    const RimPoint &a = marks[(begin + from) % n].point, &b = marks[(begin + to) % n].point;
+    const Mark &first = marks[(begin + from) % n], &last = marks[(begin + to) % n];
+    const RimPoint &a = first.point, &b = last.point;
     const RimPoint middle = along(0.5 * (a.at + b.at), (begin + from) % n, to - from);
-    sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height},
-                        marks[(begin + from) % n].touch, marks[(begin + to) % n].touch});
+    const double sharp = kSharp * direction(b.at.x() - a.at.x(), b.at.y() - a.at.y()).norm();
+    sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height}, first.touch, last.touch,
+                        first.strip_after && first.root_within < sharp, last.strip_before && last.root_within < sharp});
     from = to;
   }
   return std::all_of(sectors_.begin(), sectors_.end(), [](const Sector& sector) {
@@ -403,15 +366,15 @@ bool PolarRuleSolver::make_sectors(std::span<const RimPoint> corners, double wid
   });
 }
 
-/// A panel for each sector. @param nodes  on a ray
-void PolarRuleSolver::start_sectors(int nodes) {
+/// A panel for each sector. @param nodes  on a ray   @param strips  angles grow as a square from where they begin
+void PolarRuleSolver::start_sectors(int nodes, bool strips) {
   panels_.clear();
   for (std::size_t k = 0; k < sectors_.size(); ++k) {
     Panel panel;
     panel.begin = static_cast<double>(k);
     panel.end = static_cast<double>(k + 1);
-    panel.touch_begin = sectors_[k].touch_begin;
-    panel.touch_end = sectors_[k].touch_end;
+    panel.touch_begin = sectors_[k].touch_begin || (strips && sectors_[k].strip_begin);
+    panel.touch_end = sectors_[k].touch_end || (strips && sectors_[k].strip_end);
     panel.nodes = nodes;
     panels_.push_back(panel);
   }
@@ -466,10 +429,8 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     if (round == 1 && !move_off_kinks(pressure)) return false;
   }
   jacobian_ = frame_.u.norm() * frame_.v.norm();
-  add_rays_at_hidden_sides(pressure);
   cross_outline();
   find_imprints(pressure);
-  if (crossing_.empty()) return false;
   cut_ = !third_.empty();
   follow_tangents();
   about_middle_ = by_sectors_ = true;
@@ -478,14 +439,17 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   const double error = settings.error;
   const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
   for (;;) {
-    std::vector<RimPoint> corners;
+    std::vector<RimCorner> corners;
     find_outline_corners(pressure, corners);
+    if (crossing_.empty()) return false;
     if (!make_sectors(corners, kWidest, kInfinity)) return false;
-    start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8);
+    start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8, error < kStripsBelow);
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
     const std::size_t crossing = crossing_.size();
     if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr, true)) return false;
     if (crossing_.size() == crossing) return true;
+    outline_ = kept_rim_;  // they show kinks that the outline did not
+    std::sort(outline_.begin(), outline_.end(), [](const RimPoint& a, const RimPoint& b) { return before(a.at, b.at); });
   }
 }
 

@@ -74,7 +74,7 @@ bool PolarRuleSolver::solve_mild_sectors(PairPressure& pressure, const ContactSe
   const double width = parted ? kNarrow : kWide;
   bool fits = make_sectors({}, width, width);
   if (fits) {
-    start_sectors(!parted ? 5 : settings.error < kFine ? 8 : 7);
+    start_sectors(!parted ? 5 : settings.error < kFine ? 8 : 7, false);
     by_sectors_ = mild_ = true;
     cut_ = false;
     fits = solve_all_panels(pressure, settings, kronrod_rule(3), nullptr, false) && estimate_ <= settings.error;

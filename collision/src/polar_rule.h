@@ -156,6 +156,28 @@ class PolarRuleSolver {
     Vec3 at;                       // on the rim
     std::size_t kink;              // that meets it
   };
+  /// A kink where a ray meets it, on Sigma.
+  struct KinkOnRay {
+    std::size_t kink;
+    Vec2 way;                      // the ray's direction, of any length
+    double rim, height;            // rim near there, in units of `way`, as is `radius`
+    bool dip = false;               // the pressure along the kink comes near to 0 there
+    double radius = 0.0;
+    bool met = false;
+    bool positive = false;         // s at the rim, which lies beyond the kink where the pressure is above 0
+    double pressure = 0.0, rate = 0.0;  // over the angle
+  };
+  /// A corner is sought between the rays `left` and `right`: at left + place (right - left).
+  struct CornerSearch {
+    std::size_t kink;
+    Vec2 left, right;
+    double rim_left, rim_right;
+    bool positive_left;            // s at the rim on the left
+    bool beyond_left;              // the rim lies beyond the kink there
+    double place, height;
+    double from = 0.0, to = 1.0;
+    std::optional<Vec2> at = std::nullopt;
+  };
   struct Crossing {
     std::size_t ray, kink;
     double radius, height;  // radius over that of the rim
@@ -178,8 +200,10 @@ class PolarRuleSolver {
   template <class Directions>
   std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
   void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
-  void find_corners(PairPressure& pressure, std::vector<Corner>& corners);
+  void find_corners(PairPressure& pressure, std::size_t least, std::vector<Corner>& corners);
   [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
+  void meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays);
+  void find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches);
   void find_crossings(PairPressure& pressure, double error);
   bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
   void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
@@ -194,7 +218,7 @@ class PolarRuleSolver {
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
   static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all, double error) const;
-  [[nodiscard]] bool leans(const Panel& panel, const PatchSums& all) const;
+  [[nodiscard]] bool grows_as_root(const Panel& panel) const;
   [[nodiscard]] double largest_to_leave(double most) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
@@ -214,11 +238,17 @@ class PolarRuleSolver {
     double height = 0.0;
     Vec2 outward = Vec2::Zero();  // the pressure falls
   };
+  struct RimCorner {
+    RimPoint point;
+    bool strip_before = false, strip_after = false;  // there, as angles grow, the rim lies beyond an edge that it meets at the corner
+    double root_within = 0.0;                         // the strip's width grows as a root from this far across the rays on [m]
+  };
   /// Directions of rays as a parabola through three points near the rim, with heights.
   struct Sector {
     std::array<Vec2, 3> at;
     std::array<double, 3> height;
     bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
+    bool strip_begin = false, strip_end = false;  // a strip beyond an edge begins there
   };
   /// The search for the rim along one ray: the last place inside, and one outside.
   struct Walk {
@@ -241,11 +271,11 @@ class PolarRuleSolver {
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
   bool move_off_kinks(PairPressure& pressure);
-  void add_rays_at_hidden_sides(PairPressure& pressure);
   void follow_tangents();
-  void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
-  [[nodiscard]] bool make_sectors(std::span<const RimPoint> corners, double widest, double most_bend);
-  void start_sectors(int nodes);
+  void add_vertices(std::vector<RimPoint>& rays) const;
+  void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
+  [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners, double widest, double most_bend);
+  void start_sectors(int nodes, bool strips);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
   bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger, bool look);

@@ -19,11 +19,8 @@ constexpr double kWidestCoarse = 2.4;
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
-constexpr double kUnseenOnFaces = 1e-2;  // to whose edges the pressure is the same
-constexpr double kUnseenWhereFacesLean = 0.5;  // whose rims leave an edge and come back to it between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
-constexpr double kEnoughWhereFacesLean = 0.45;  // the same there
 constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSameTurn = 1e-7;       // [rad]
@@ -74,7 +71,7 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
 constexpr double kRound = 6e5;  // times its square
 constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
-constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2;
+constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 /// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
@@ -373,12 +370,8 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) co
     panel.by_radius *= share;
     return;
   }
-  const double on_faces = fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
-  if (leans(panel, all) && !panel.lost) {
-    // Where a rim leaves an edge rays of two panels that were parted there beside it may see nothing of it.
-    panel.by_angle *= panel.halved ? kLost : kHalf;
-    panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
-  } else if (!panel.even()) {
+  const double on_faces = grows_as_root(panel) ? kOnFacesAsRoot : fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
+  if (!panel.even()) {
     const auto changes = static_cast<double>(panel.change_end - panel.change);
     panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
   } else {
@@ -412,7 +405,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   about_middle_ = by_sectors_ = mild_ = false;
   for (;;) {
     std::vector<Corner> corners;
-    find_corners(pressure, corners);
+    find_corners(pressure, 0, corners);
     struct Turn {
       double angle;
       bool touch;
@@ -486,10 +479,12 @@ bool PolarRuleSolver::add_missed_kinks() {
   return true;
 }
 
-/// Whether a face presses less there than elsewhere: then what its rim is like counts, which may leave the edges.
-bool PolarRuleSolver::leans(const Panel& panel, const PatchSums& all) const {
-  constexpr double kEven = 0.97;  // mean pressure, over that of all
-  return about_middle_ && panel.fine.load * all.area < kEven * all.load * panel.fine.area;
+/// Whether a strip beyond an edge begins at one of a panel's ends, as the root of the angle.
+bool PolarRuleSolver::grows_as_root(const Panel& panel) const {
+  if (!by_sectors_) return false;
+  const double whole = std::floor(panel.begin);
+  const Sector& sector = sectors_[static_cast<std::size_t>(whole)];
+  return (sector.strip_begin && !panel.touch_begin && panel.begin == whole) || (sector.strip_end && !panel.touch_end && panel.end == whole + 1.0);
 }
 
 /// What a panel may be off by in angle or radius so that all those which are not off by more are so by `most` together.
@@ -526,7 +521,6 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
   const bool beside = about_middle_ && cut_;
-  bool faces_lean = false;
   const std::size_t most = beside ? kMostBesideThirds : mild_ ? kMostMild : kMostPanels;
   for (;;) {
     if (begin < panels_.size()) {
@@ -547,8 +541,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     }
     // Rules agree by chance where panels do not begin at the rim's corners.
     const auto unseen = [&](const Panel& panel) { return panel.leaves && !panel.halved && panel.rays >= kFine && !beside; };
-    faces_lean = !cut_ && std::any_of(panels_.begin(), panels_.end(), [&](const Panel& panel) { return leans(panel, all); });
-    const bool enough = estimate_ <= (faces_lean ? kEnoughWhereFacesLean : kEnough) * error;
+    const bool enough = estimate_ <= kEnough * error;
     if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
@@ -624,7 +617,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     polygon_ = kept_rim_;
   }
   node_.resize(node_.point.size());
-  estimate_ += (cut_ ? kUnseenBesideThirds : faces_lean ? kUnseenWhereFacesLean : about_middle_ ? kUnseenOnFaces : kUnseen) * error + algebraic_error();
+  estimate_ += (cut_ ? kUnseenBesideThirds : kUnseen) * error + algebraic_error();
   return true;
 }
 

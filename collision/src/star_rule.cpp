@@ -9,6 +9,7 @@
 
 #include "polar_rule.h"
 #include "supple/core/math.h"
+#include "turns.h"
 
 namespace supple::collision {
 namespace {
@@ -23,8 +24,6 @@ constexpr double kClose = 1e-3;         // of Newton's method at the rim, in ste
 constexpr double kLeastCosine = 0.2;    // of Sigma's normal to the axis
 constexpr double kLeastSight = 0.01;    // distance of the centre from all tangents of the rim, over the radius of the patch
 constexpr double kMargin = 1.2;         // beyond the points of the rim
-
-double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 }  // namespace
 
