@@ -26,7 +26,7 @@ constexpr double kMet = 1e-9;             // of the radius, which the step leave
 constexpr double kSameTurn = 1e-7;        // share of the angle between two rays; Newton's method goes on to its square
 constexpr double kFarthest = 2.0;          // radius of an edge, over that of the rim, at which the pressure is asked
 constexpr double kClose = 1e-4, kRough = 0.1;
-constexpr double kLeastCosine = 0.2;      // of Sigma's normal to the axis
+constexpr double kLeastCosine = 0.02;     // of Sigma's normal to the axis
 
 /// Where between 0 and 1 a cubic comes nearest to 0, from its values and derivatives at both, which have one sign; only where it may reach it.
 double nearest_to_zero(double left, double left_rate, double right, double right_rate) {
@@ -237,7 +237,7 @@ void PolarRuleSolver::find_corners_between(PairPressure& pressure, std::span<Cor
         return true;
       }
       if (!(search.place > search.from && search.place < search.to)) search.place = 0.5 * (search.from + search.to);
-      return false;
+      return search.to - search.from <= kSameTurn * kSameTurn;
     });
   }
 }
