@@ -189,20 +189,22 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
     std::erase_if(open, [&](std::size_t i) {
       KinkOnRay& ray = rays[i];
       const std::size_t j = next++;
-      const Vec3 &a = batch.slope_a[j], &b = batch.slope_b[j], gap = a - b;
-      const double a_up = a.dot(frame_.axis), b_up = b.dot(frame_.axis), lift = (batch.a[j] - batch.b[j]) / (b_up - a_up);
+      const Vec3 &a = batch.slope_a[j], &b = batch.slope_b[j], g = a - b;
       Vec3 slope;
       static_cast<void>(kinks_[ray.kink].value(batch.point[j], slope));
       const Vec3 along = direction(ray.way.x(), ray.way.y()), across = ray.radius * direction(-ray.way.y(), ray.way.x());
       const double s_along = slope.dot(along), s_up = slope.dot(frame_.axis), s_across = slope.dot(across);
+      const double g_along = g.dot(along), g_up = g.dot(frame_.axis), g_across = g.dot(across), determinant = s_along * g_up - s_up * g_along;
       ray.positive = s_along < 0.0;
-      if (!(b_up - a_up > kLeastCosine * gap.norm())) return true;
+      if (!(-g_up > kLeastCosine * g.norm())) return true;
+      // Newton's method for s = p_A - p_B = 0.
+      const double gap = batch.a[j] - batch.b[j], lift = -gap * s_along / determinant, move = gap * s_up / determinant;
       ray.height += lift;
+      ray.radius += move;
       if (!(std::abs(lift) <= close * frame_.thickness)) return false;
-      ray.pressure = (batch.a[j] * b_up - batch.b[j] * a_up) / (b_up - a_up);
+      ray.pressure = batch.a[j] + a.dot(lift * frame_.axis + move * along);
       ray.positive = (ray.pressure > 0.0) == (s_along > 0.0);
-      // The place moves with the ray so that s and p_A - p_B stay 0.
-      const double g_along = gap.dot(along), g_up = gap.dot(frame_.axis), g_across = gap.dot(across), determinant = s_along * g_up - s_up * g_along;
+      // The place moves with the ray so that both stay 0.
       const double out = (s_up * g_across - g_up * s_across) / determinant, rise = (g_along * s_across - s_along * g_across) / determinant;
       ray.rate = a.dot(across + out * along + rise * frame_.axis);
       return true;
