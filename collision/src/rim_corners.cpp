@@ -18,6 +18,7 @@ constexpr int kDipRounds = 6;
 constexpr double kDip = 0.1;              // of the pressures beside it
 constexpr double kNear = 0.05;            // of the radius
 constexpr double kBeside = 1.0;           // of the way to the next ray: where kinks may meet between two
+constexpr double kParallel = 1e-9;        // sine between kinks that do not meet
 constexpr double kLeastShare = 0.3;       // radius of the rim, as it leads from one ray to the next, over that of such a place
 constexpr double kAside = 1e-3;           // of the radius, to see how the pressure falls beyond an edge
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -244,35 +245,40 @@ void PolarRuleSolver::find_corners_between(PairPressure& pressure, std::span<Cor
   }
 }
 
-/// Directions of places near the rim at which two kinks meet, between points of the outline: edges that rays meet there are short.
+/// Directions of places near the rim at which two kinks meet: edges that rays meet there are short.
 void PolarRuleSolver::add_vertices(std::vector<RimPoint>& rays) const {
   const std::size_t n = outline_.size();
-  std::vector<std::size_t> near;
-  for (std::size_t i = 0; i < n; ++i) {
-    const RimPoint &p = outline_[i], &q = outline_[(i + 1) % n];
-    const Vec3 chord = direction(q.at.x() - p.at.x(), q.at.y() - p.at.y());
-    near.clear();
-    for (std::size_t k = 0; k < kinks_.size(); ++k) {
-      const Vec3 x = frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis;
-      const double left = kinks_[k].value(x), right = kinks_[k].value(x + chord);
-      if ((left > 0.0) != (right > 0.0) || std::min(std::abs(left), std::abs(right)) <= kBeside * chord.norm()) near.push_back(k);
+  const auto place = [&](const Vec2& at, double height) -> Vec3 { return frame_.origin + direction(at.x(), at.y()) + height * frame_.axis; };
+  std::vector<double> distance;  // of each kink from each point of the outline, in ways to the next
+  for (const implicit::Kink& kink : kinks_) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec2 chord = outline_[(i + 1) % n].at - outline_[i].at;
+      distance.push_back(std::abs(kink.value(place(outline_[i].at, outline_[i].height))) / direction(chord.x(), chord.y()).norm());
     }
-    for (std::size_t j = 0; j < near.size(); ++j) {
-      for (std::size_t k = 0; k < j; ++k) {
-        Vec2 at = 0.5 * (p.at + q.at);
+  }
+  for (std::size_t j = 0; j < kinks_.size(); ++j) {
+    for (std::size_t k = 0; k < j; ++k) {
+      const auto far = [&](std::size_t i) { return std::max(distance[j * n + i % n], distance[k * n + i % n]); };
+      for (std::size_t i = 0; i < n; ++i) {
+        if (!(far(i) <= kBeside) || far(i + n - 1) < far(i) || far(i + 1) <= far(i)) continue;
+        Vec2 at = outline_[i].at;
         bool met = false;
         for (int step = 0; step < kMeetingSteps && !met; ++step) {
           Vec3 one, other;
-          const Vec3 x = frame_.origin + direction(at.x(), at.y()) + p.height * frame_.axis;
-          const Vec2 s(kinks_[near[j]].value(x, one), kinks_[near[k]].value(x, other));
-          Eigen::Matrix2d rows;
-          rows << one.dot(frame_.u), one.dot(frame_.v), other.dot(frame_.u), other.dot(frame_.v);
-          const Vec2 move = -rows.inverse() * s;
+          const Vec3 x = place(at, outline_[i].height);
+          const Vec2 s(kinks_[j].value(x, one), kinks_[k].value(x, other));
+          const Vec2 a(one.dot(frame_.u), one.dot(frame_.v)), b(other.dot(frame_.u), other.dot(frame_.v));
+          const double determinant = cross(a, b);
+          if (!(std::abs(determinant) > kParallel * a.norm() * b.norm())) break;
+          const Vec2 move = Vec2(a.y() * s[1] - b.y() * s[0], b.x() * s[0] - a.x() * s[1]) / determinant;
           at += move;
           met = move.norm() <= kMet * at.norm();
         }
+        if (!met) continue;
+        const bool after = cross(outline_[i].at, at) > 0.0;
+        const RimPoint &p = outline_[after ? i : (i + n - 1) % n], &q = outline_[after ? (i + 1) % n : i];
         const double beyond = cross(p.at, at), left = cross(at, q.at), share = cross(p.at, q.at) / (beyond + left);  // of the radius of the chord
-        if (met && beyond > 0.0 && left > 0.0 && share >= kLeastShare) rays.push_back({at, p.height, Vec2::Zero()});
+        if (beyond > 0.0 && left > 0.0 && share >= kLeastShare) rays.push_back({at, outline_[i].height, Vec2::Zero()});
       }
     }
   }
