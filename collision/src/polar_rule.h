@@ -270,7 +270,6 @@ class PolarRuleSolver {
   bool follow_rays(PairPressure& pressure);
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
-  bool move_off_kinks(PairPressure& pressure);
   void follow_tangents();
   void add_vertices(std::vector<RimPoint>& rays) const;
   void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
