@@ -1,4 +1,4 @@
-/// Where kinks of a field, and the borders of third bodies, cross a patch: on its rim, on rays, and where rays begin to meet others.
+/// Where kinks of a field, and the borders of third bodies, cross a patch: which do, where on rays, and where rays begin to meet others.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -103,7 +103,7 @@ class PolarRuleSolver {
   bool solve_mild_sectors(PairPressure& pressure, const ContactSettings& settings);
   [[nodiscard]] double half_the_rays(std::size_t radial) const;
 
-  // Patches that kinks cross: split_rule.cpp, cross_kinks.cpp.
+  // Patches that kinks cross: split_rule.cpp; crossings of rays: cross_kinks.cpp.
   /// Gauss points through a squeezed region.
   static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
   struct Panel {
@@ -156,6 +156,55 @@ class PolarRuleSolver {
     Vec3 at;                       // on the rim
     std::size_t kink;              // that meets it
   };
+  struct Crossing {
+    std::size_t ray, kink;
+    double radius, height;  // radius over that of the rim
+    double left, right;     // it lies between these
+    bool good;
+  };
+  [[nodiscard]] Sheet sheet_of(const implicit::Kink& kink) const;
+  bool no_kinks_near(PairPressure& pressure);
+  void find_kinks(PairPressure& pressure);
+  bool kinks_cross(PairPressure& pressure);
+  [[nodiscard]] bool taken_by_thirds();
+  bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
+  void find_imprints(PairPressure& pressure);
+  void evaluate_thirds(std::span<const Vec3> points);
+  [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
+  [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
+  bool solve_split(PairPressure& pressure, const ContactSettings& settings);
+  void follow_rim();
+  [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
+  template <class Directions>
+  std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
+  void find_crossings(PairPressure& pressure, double error);
+  bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
+  void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
+  [[nodiscard]] std::optional<Touch> touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const;
+  bool add_missed_kinks();
+  bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
+  bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
+  void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
+  bool extend_panels(PairPressure& pressure, double error);
+  void merge(Panel& panel, const Panel& added);
+  [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
+  static double slow_decay(const Panel& panel, const PatchSums& all);
+  void doubt(Panel& panel, const PatchSums& all, double error) const;
+  [[nodiscard]] bool grows_as_root(const Panel& panel) const;
+  [[nodiscard]] double largest_to_leave(double most) const;
+  [[nodiscard]] double model_height(std::size_t ray, double share) const;
+
+  // Corners of the rim: rim_corners.cpp.
+  struct RimPoint {
+    Vec2 at = Vec2::Zero();       // in units of u and v
+    double height = 0.0;
+    Vec2 outward = Vec2::Zero();  // the pressure falls
+  };
+  struct RimCorner {
+    RimPoint point;
+    bool strip_before = false, strip_after = false;  // there, as angles grow, the rim lies beyond an edge that it meets at the corner
+    double root_within = 0.0;                         // the strip's width grows as a root from this far across the rays on [m]
+  };
   /// A kink where a ray meets it, on Sigma.
   struct KinkOnRay {
     std::size_t kink;
@@ -178,49 +227,14 @@ class PolarRuleSolver {
     double from = 0.0, to = 1.0;
     std::optional<Vec2> at = std::nullopt;
   };
-  struct Crossing {
-    std::size_t ray, kink;
-    double radius, height;  // radius over that of the rim
-    double left, right;     // it lies between these
-    bool good;
-  };
-  [[nodiscard]] Sheet sheet_of(const implicit::Kink& kink) const;
-  bool no_kinks_near(PairPressure& pressure);
-  void find_kinks(PairPressure& pressure);
-  bool kinks_cross(PairPressure& pressure);
-  [[nodiscard]] bool taken_by_thirds();
-  bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
-  void find_imprints(PairPressure& pressure);
-  void evaluate_thirds(std::span<const Vec3> points);
-  [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
-  [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
-  bool solve_split(PairPressure& pressure, const ContactSettings& settings);
-  void follow_rim();
-  [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
-  template <class Directions>
-  std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
+  static void follow_signs(std::span<const double> values, std::vector<double>& places);
   void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
   void find_corners(PairPressure& pressure, std::size_t least, std::vector<Corner>& corners);
   [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
   void meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays);
   void find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches);
-  void find_crossings(PairPressure& pressure, double error);
-  bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
-  void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
-  [[nodiscard]] std::optional<Touch> touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const;
-  static void follow_signs(std::span<const double> values, std::vector<double>& places);
-  bool add_missed_kinks();
-  bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
-  bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
-  void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
-  bool extend_panels(PairPressure& pressure, double error);
-  void merge(Panel& panel, const Panel& added);
-  [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
-  static double slow_decay(const Panel& panel, const PatchSums& all);
-  void doubt(Panel& panel, const PatchSums& all, double error) const;
-  [[nodiscard]] bool grows_as_root(const Panel& panel) const;
-  [[nodiscard]] double largest_to_leave(double most) const;
-  [[nodiscard]] double model_height(std::size_t ray, double share) const;
+  void add_vertices(std::vector<RimPoint>& rays) const;
+  void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
 
   // Rays that touch kinks: touch_kinks.cpp.
   /// A kink along a ray on Sigma, and the ray's turning.
@@ -233,16 +247,6 @@ class PolarRuleSolver {
   void find_hidden_touches(PairPressure& pressure, std::span<const Corner> corners, std::vector<double>& angles);
 
   // About the middle: middle_rule.cpp.
-  struct RimPoint {
-    Vec2 at = Vec2::Zero();       // in units of u and v
-    double height = 0.0;
-    Vec2 outward = Vec2::Zero();  // the pressure falls
-  };
-  struct RimCorner {
-    RimPoint point;
-    bool strip_before = false, strip_after = false;  // there, as angles grow, the rim lies beyond an edge that it meets at the corner
-    double root_within = 0.0;                         // the strip's width grows as a root from this far across the rays on [m]
-  };
   /// Directions of rays as a parabola through three points near the rim, with heights.
   struct Sector {
     std::array<Vec2, 3> at;
@@ -271,8 +275,6 @@ class PolarRuleSolver {
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
   void follow_tangents();
-  void add_vertices(std::vector<RimPoint>& rays) const;
-  void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
   [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners, double widest, double most_bend);
   void start_sectors(int nodes, bool strips);
   void cross_outline();

@@ -1,6 +1,7 @@
-/// Corners of a face's rim, where it leaves the edge of the face for the strip beyond it: p_A = p_B = s = 0. On faces that lean by about their overlap
-/// the gradients of the two pressures are nearly the same there and the rim turns within a tiny part of the strip, so that Newton's method for all
-/// three goes astray. The pressure along the edge itself is smooth, and its sign on two rays says that a corner lies between them.
+/// Corners of a patch's rim, where kinks meet it: p_A = p_B = s = 0. Newton's method for all three finds them where the three gradients differ. On
+/// faces that lean by about their overlap these are nearly in one plane where the rim leaves the edge of a face for the strip beyond it, and the rim
+/// turns within a tiny part of the strip. The pressure along the edge itself is smooth, though, and its sign on two rays says that a corner lies
+/// between them.
 #include <algorithm>
 #include <cmath>
 #include <limits>
