@@ -22,6 +22,7 @@ constexpr double kFar = 2.0;               // from Sigma, in the overlap: Newton
 constexpr std::size_t kFewRays = 8, kManyRays = 16;
 constexpr double kRough = 0.05, kFine = 1e-2;  // of the radius, to find the middle and the corners
 constexpr int kSteps = 8;
+constexpr double kClear = 0.1;             // of the radius, from kinks to the middle
 constexpr double kSharp = 0.1;             // of a sector's length: strips whose width grows as a root from there on do so all over it
 constexpr double kStripsBelow = 1e-5;      // errors that take so few points otherwise that it does not pay
 constexpr double kWidest = 1.7;            // sector [rad] in units of u and v
@@ -224,6 +225,25 @@ bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
   return true;
 }
 
+/// Where a kink passes close to the middle, its crossings of rays nearly along it go from there to the rim within so small an angle that rules
+/// agree without having seen it: the middle keeps away.
+bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
+  double least = kClear;
+  Vec2 away = Vec2::Zero();
+  for (const implicit::Kink& kink : kinks_) {
+    Vec3 slope;
+    const double value = kink.value(frame_.origin, slope);
+    const Vec2 rise(slope.dot(frame_.u), slope.dot(frame_.v));
+    const double distance = std::abs(value) / rise.norm();
+    if (!(distance < least)) continue;
+    least = distance;
+    away = std::copysign(kClear - distance, value) / rise.norm() * rise;
+  }
+  if (least == kClear) return true;
+  frame_.origin += direction(away.x(), away.y());
+  return lift_to_sigma(pressure);
+}
+
 /// Which kinks have points of the outline on the other side than the middle; third bodies may all cross.
 void PolarRuleSolver::cross_outline() {
   crossing_.clear();
@@ -406,6 +426,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     outline_.clear();
     if (!follow_outline(pressure, round < 2 ? few : many, round < 2 ? kRough : kFine, outline_)) return false;
     if (round < 2 && !move_to_middle(pressure)) return false;
+    if (round == 1 && !move_off_kinks(pressure)) return false;
   }
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   cross_outline();

@@ -274,6 +274,7 @@ class PolarRuleSolver {
   bool follow_rays(PairPressure& pressure);
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
+  bool move_off_kinks(PairPressure& pressure);
   void follow_tangents();
   [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners, double widest, double most_bend);
   void start_sectors(int nodes, bool strips);
