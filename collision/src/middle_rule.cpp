@@ -432,7 +432,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   cross_outline();
   find_imprints(pressure);
   cut_ = !third_.empty();
-  follow_tangents();
+  if (cut_) follow_tangents();  // corners of third bodies are begun there
   about_middle_ = by_sectors_ = true;
   rise_.setZero();
   mild_ = false;

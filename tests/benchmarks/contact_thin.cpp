@@ -123,7 +123,7 @@ void measure_leaning(int poses, std::uint64_t seed) {
     for (const double error : {1e-3, 1e-4, 1e-6}) {
       Draw draw(seed);
       int by_other_rules = 0, below_error = 0, beyond = 0;
-      double worst = 0.0, cpu_us = 0.0;
+      double worst = 0.0, cpu_us = 0.0, evaluations = 0.0;
       for (int pose = 0; pose < poses; ++pose) {
         const double d = draw.logarithmic(1e-8, 1e-4), lean = draw.uniform(0.0, 3.0) * d / 0.1;
         const auto [s, c] = math::sin_cos(draw.uniform(0.0, 2.0 * kPi));
@@ -132,6 +132,7 @@ void measure_leaning(int poses, std::uint64_t seed) {
         const std::array<collision::ContactBody, 2> bodies{upper.body(), lower.body()};
         const collision::ContactSurface::Summary found = query.ask(bodies, error, 1);
         cpu_us += query.cpu_us / poses;
+        evaluations += static_cast<double>(found.evaluations) / poses;
         by_other_rules += found.rule != collision::ContactRule::Polar ? 1 : 0;
         const collision::ContactSurface::Summary fine = query.ask(bodies, 1e-3 * error, 1);
         const double off = std::max((found.force - fine.force).norm() / fine.force.norm(), std::abs(found.area / fine.area - 1.0)) - fine.error_estimate;
@@ -139,9 +140,9 @@ void measure_leaning(int poses, std::uint64_t seed) {
         below_error += off > found.error_estimate ? 1 : 0;
         beyond += off > error ? 1 : 0;
       }
-      std::printf("{\"name\": \"collision/thin/leaning/%s/error=%g\", \"queries\": %d, \"cpu_us_mean\": %.1f, \"by_other_rules\": %d, "
+      std::printf("{\"name\": \"collision/thin/leaning/%s/error=%g\", \"queries\": %d, \"cpu_us_mean\": %.1f, \"evaluations_mean\": %.0f, \"by_other_rules\": %d, "
                   "\"bound_below_error\": %d, \"beyond_what_was_asked\": %d, \"worst_error_over_bound\": %.2g}\n",
-                  u.name, error, poses, cpu_us, by_other_rules, below_error, beyond, worst);
+                  u.name, error, poses, cpu_us, evaluations, by_other_rules, below_error, beyond, worst);
     }
   }
 }
