@@ -72,7 +72,7 @@ struct CubeMesher::Impl {
   const Mesh& mesh_on(march::RefinedMarcher& on, bool first_time, const march::LevelPlan& plan, const FieldView& field, const MarchOptions& options,
                       const Executor& executor) {
     if (first_time) on.march(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
-    return on.mesh(plan.refinements, executor, scratch);
+    return on.mesh(plan.refinements, options.may_cross, executor, scratch);
   }
   static double error_on(march::RefinedMarcher& on, const march::LevelPlan& plan, const Executor& executor) { return on.error(plan.refinements, executor); }
   static Mesh take_mesh(march::RefinedMarcher& on, const march::LevelPlan& plan) { return on.take_mesh(plan.refinements); }
@@ -97,7 +97,7 @@ const Mesh& CubeMesher::make(const FieldView& field, const MarchOptions& options
   }
   impl_->tried.clear();
   impl_->fixed.march(field, options.lattice, options.skip, executor);
-  const Mesh& mesh = impl_->fixed.mesh(options.refinements, executor, impl_->scratch);
+  const Mesh& mesh = impl_->fixed.mesh(options.refinements, options.may_cross, executor, impl_->scratch);
   count = impl_->fixed.counts();
   count.refinements = options.refinements;
   count.bytes = impl_->fixed.bytes() + impl_->scratch.bytes() - bytes_of(mesh);

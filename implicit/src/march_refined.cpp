@@ -32,7 +32,16 @@ std::uint32_t end_of(const std::array<std::uint32_t, 3>& triangle, std::size_t e
 
 void RefinedMarcher::march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor) {
   std::swap(now_, last_);
-  for (Step& step : now_) step.made = step.measured = false;
+  for (Step& step : last_) {
+    for (const StraightEdge& edge : step.straight) {  // for tiles that keep their vertices
+      step.mesh.position[edge.vertex] = edge.position;
+      step.mesh.normal[edge.vertex] = edge.normal;
+    }
+  }
+  for (Step& step : now_) {
+    step.made = step.measured = false;
+    step.straight.clear();
+  }
   last_first_.swap(first_);
   first_.clear();
   listed_ = false;
@@ -112,16 +121,18 @@ bool RefinedMarcher::is_same(const TileTriangles& tile, int step) {
   return all;
 }
 
-const Mesh& RefinedMarcher::mesh(int refinements, const Executor& executor, CutScratch& scratch) {
+const Mesh& RefinedMarcher::mesh(int refinements, bool may_cross, const Executor& executor, CutScratch& scratch) {
   if (refinements > 0) list();
   for (int step = 1; step <= refinements; ++step) {
-    if (!now_[static_cast<std::size_t>(step)].made) cut(step, executor, scratch);
+    if (!now_[static_cast<std::size_t>(step)].made) cut(step, may_cross, executor, scratch);
   }
+  counts_.straight_edges = 0;
+  for (int step = 1; step <= refinements; ++step) counts_.straight_edges += now_[static_cast<std::size_t>(step)].straight.size();
   return mesh_of(refinements);
 }
 
 /// Cuts every triangle into four at the middles of its edges, which are moved to the surface.
-void RefinedMarcher::cut(int step, const Executor& executor, CutScratch& scratch) {
+void RefinedMarcher::cut(int step, bool may_cross, const Executor& executor, CutScratch& scratch) {
   const Mesh& from = mesh_of(step - 1);
   Step& to = now_[static_cast<std::size_t>(step)];
   const Step& last = last_[static_cast<std::size_t>(step)];
@@ -202,6 +213,11 @@ void RefinedMarcher::cut(int step, const Executor& executor, CutScratch& scratch
         std::copy_n(last.mesh.position.begin() + known->first, added.count, mesh.position.begin() + first);
         std::copy_n(last.mesh.normal.begin() + known->first, added.count, mesh.normal.begin() + first);
         std::fill_n(to.same.begin() + first, added.count, std::uint8_t{1});
+        const auto below = [](const StraightEdge& edge, std::uint32_t vertex) { return edge.vertex < vertex; };
+        for (auto edge = std::lower_bound(last.straight.begin(), last.straight.end(), known->first, below);
+             edge != last.straight.end() && edge->vertex < known->first + known->count; ++edge) {
+          to.same[added.first + (edge->vertex - known->first)] = 0;  // was elsewhere in the last mesh
+        }
         continue;
       }
       normals.resize(points.size());
@@ -212,6 +228,15 @@ void RefinedMarcher::cut(int step, const Executor& executor, CutScratch& scratch
     }
   });
   to.made = true;
+  if (may_cross) return;
+  thread_local CutCrossings crossings;
+  crossings.take_back(from, executor, mesh, to.straight);
+  for (const StraightEdge& edge : to.straight) {
+    to.same[edge.vertex] = 0;
+    Vec3 slope;
+    static_cast<void>(field_.value(mesh.position[edge.vertex], slope));
+    if (slope.squaredNorm() > 0.0) mesh.normal[edge.vertex] = -slope.normalized();
+  }
 }
 
 double RefinedMarcher::error(int refinements, const Executor& executor) {
@@ -260,11 +285,14 @@ std::uint64_t RefinedMarcher::bytes() const {
   std::uint64_t sum = counts_.bytes + bytes_of(marcher_.mesh) + bytes_of(tiles_) + bytes_of(first_) + bytes_of(last_first_) +
                       bytes_of(last_tile_) + blob_changes_.bytes() + bytes_of(blob_reaches_);
   for (const auto* steps : {&now_, &last_}) {
-    for (const Step& step : *steps) sum += bytes_of(step.mesh) + bytes_of(step.added) + bytes_of(step.error) + bytes_of(step.same);
+    for (const Step& step : *steps) sum += bytes_of(step.mesh) + bytes_of(step.added) + bytes_of(step.error) + bytes_of(step.same) + bytes_of(step.straight);
   }
   return sum;
 }
 
-Mesh RefinedMarcher::take_mesh(int refinements) { return std::move(mesh_of(refinements)); }
+Mesh RefinedMarcher::take_mesh(int refinements) {
+  now_[static_cast<std::size_t>(refinements)].straight.clear();
+  return std::move(mesh_of(refinements));
+}
 
 }  // namespace supple::implicit::march

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "cut_crossings.h"
 #include "march_mesher.h"
 
 namespace supple::implicit::march {
@@ -30,12 +31,12 @@ class RefinedMarcher {
   /// The next mesh of the cells has nothing of this one.
   void forget() { marcher_.kept = false; }
 
-  /// Valid until the next call of march().
-  [[nodiscard]] const Mesh& mesh(int refinements, const Executor& executor, CutScratch& scratch);
+  /// Valid until the next call of march(). @param may_cross  itself; the same in all calls until then
+  [[nodiscard]] const Mesh& mesh(int refinements, bool may_cross, const Executor& executor, CutScratch& scratch);
   /// centroid_error of that mesh. @pre the mesh was asked for since march()
   [[nodiscard]] double error(int refinements, const Executor& executor);
 
-  /// Of the mesh of the cells.
+  /// Of the mesh of the cells, and edges of the last mesh that was asked for.
   [[nodiscard]] const MarchCounts& counts() const { return counts_; }
   /// Whether nothing of it was kept.
   [[nodiscard]] bool whole() const { return marcher_.whole(); }
@@ -63,11 +64,12 @@ class RefinedMarcher {
     std::vector<TileVertices> added;  ///< by tile
     std::vector<TileError> error;     ///< by tile
     std::vector<std::uint8_t> same;   ///< by vertex: bit for bit the one of the last call in its place
+    std::vector<StraightEdge> straight;
   };
 
   void list();
   void find_changes();
-  void cut(int step, const Executor& executor, CutScratch& scratch);
+  void cut(int step, bool may_cross, const Executor& executor, CutScratch& scratch);
   [[nodiscard]] Mesh& mesh_of(int step) { return step == 0 ? marcher_.mesh : now_[static_cast<std::size_t>(step)].mesh; }
   [[nodiscard]] bool differs(const Box& asked) const;
   /// Calls use(triangle number) for the triangles of a tile after so many cuts.

@@ -1,7 +1,8 @@
 /// @file contact_cases.h
-/// The twelve cases of contact queries in random poses.
+/// The thirteen cases of contact queries in random poses.
 #pragma once
 
+#include <optional>
 #include <string_view>
 
 #include "contact_shapes.h"
@@ -10,11 +11,13 @@ namespace supple::benchmarks {
 
 /// Calls `visit(name, make_pose)` for each case that is wanted; `make_pose(draw)` puts its two bodies in the next random pose, the same ones
 /// on every stage. Spheres of linear pressure have closed forms, in the place and size of the bodies on the default stage.
+/// @param depths  least and largest overlap over the size of the bodies, for all cases; else 1e-3 to 0.3, of those without a closed form from 1e-2 on
 template <class Wanted, class Visit>
-void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
+void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit, const std::optional<std::array<double, 2>>& depths = std::nullopt) {
   const auto turned = [](Draw& draw, const Vec3& position) { return Pose{position, draw.rotation()}; };
   const auto somewhere = [](Draw& draw) -> Vec3 { return draw.uniform(0.0, 1.0) * draw.direction(); };
-  constexpr double kRadius = 0.1, kSpacing = 0.03, kShallow = 1e-3, kDeep = 0.3, kE = 1e6;
+  constexpr double kRadius = 0.1, kSpacing = 0.03, kE = 1e6;
+  const double shallow = depths ? (*depths)[0] : 1e-3, least = depths ? shallow : 0.01, deep = depths ? (*depths)[1] : 0.3;
 
   const auto two_spheres = [&](std::string_view name, double rb, double eb) {
     if (!wanted(name)) return;
@@ -22,7 +25,7 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
     Rigid b(linear_sphere(rb), kLinearModulus * eb, kSpacing * rb / kRadius, stage);
     visit(name, [&](Draw& draw) {
       const Vec3 axis = draw.direction(), centre = somewhere(draw);
-      const double D = kRadius + rb - draw.logarithmic(kShallow, kDeep) * std::min(kRadius, rb);
+      const double D = kRadius + rb - draw.logarithmic(shallow, deep) * std::min(kRadius, rb);
       a.put(turned(draw, centre));
       b.put(turned(draw, centre + D * axis));
       return Pair{{a.body(), b.body()}, true, spheres(kRadius, kE, rb, eb, D, centre, axis)};
@@ -39,7 +42,7 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
     const double k = 100.0 * kE / kRadius;
     visit("plane", [&](Draw& draw) {
       const Vec3 up = draw.direction(), centre = somewhere(draw);
-      const double h = kRadius - draw.logarithmic(kShallow, kDeep) * kRadius;
+      const double h = kRadius - draw.logarithmic(shallow, deep) * kRadius;
       ball.put(turned(draw, centre));
       plane = stage.place(implicit::HalfSpace{centre - h * up, up, 1.0});
       collision::ContactBody ground = single_part(plane, k, origin);
@@ -55,7 +58,7 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
     visit("slab", [&](Draw& draw) {
       const Pose pose = turned(draw, somewhere(draw));
       slab.put(pose);
-      const double h = kRadius - draw.logarithmic(kShallow, kDeep) * kRadius;
+      const double h = kRadius - draw.logarithmic(shallow, deep) * kRadius;
       const Vec3 at(draw.uniform(-0.15, 0.15), draw.uniform(-0.15, 0.15), 0.05 + kRounding + h);
       const Vec3 centre = pose.position + pose.orientation * at;
       ball.put(turned(draw, centre));
@@ -67,7 +70,7 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
   // Faces on faces: a rounded box lies flat on a plane, and on the face of another one, turned and shifted.
   const Vec3 half(0.1, 0.08, 0.05);
   constexpr double kEdge = 0.02;
-  const auto overlap = [&](Draw& draw) { return draw.logarithmic(0.01, kDeep) * kEdge; };
+  const auto overlap = [&](Draw& draw) { return draw.logarithmic(least, deep) * kEdge; };
   if (wanted("face_on_plane")) {
     Rigid box(linear_shape(implicit::ShapeKind::Box, half, kEdge), kLinearModulus * kE, kSpacing, stage);
     implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
@@ -100,7 +103,7 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
   const auto pressed = [&](std::string_view name, Rigid& a, Rigid& b, double size) {
     if (!wanted(name)) return;
     visit(name, [&](Draw& draw) {
-      press(a, b, draw.logarithmic(0.01, kDeep) * size, draw);
+      press(a, b, draw.logarithmic(least, deep) * size, draw);
       return Pair{{a.body(), b.body()}, false, {}};
     });
   };
@@ -127,6 +130,10 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit) {
   {
     Rigid a(ten_blobs(1), kE, kSpacing, stage), b(ten_blobs(2), 2.0 * kE, kSpacing, stage);
     pressed("ten_blobs", a, b, 0.05);
+  }
+  {
+    Rigid a(ten_blobs(1, true), kE, kSpacing, stage), b(ten_blobs(2, true), 2.0 * kE, kSpacing, stage);
+    pressed("ten_parts", a, b, 0.05);
   }
 }
 

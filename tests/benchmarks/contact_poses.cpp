@@ -1,18 +1,23 @@
 /// @file contact_poses.cpp
-/// Contact queries in many random poses: twelve cases, worst and middle CPU time and error over the poses, one JSON
-/// object a line. A query is broad phase, candidates and contact surface of two bodies, through the general path, with
-/// no state from another pose; its time is the least in three rounds of all poses. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
+/// Contact queries in many random poses: thirteen cases, worst and middle CPU time and error over the poses, one JSON
+/// object a line. A query is broad phase, candidates and contact surface of two bodies, with
+/// no state from another pose; its time is the least in three rounds of all poses. Beside it stands that of splitting the forces to the parts of the
+/// bodies. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are measured against the finest rule for the two bodies seen otherwise, which has other nodes; what it
 /// may itself be off by is added to the bounds. Poses whose patch a kink of a field crosses are told apart.
-///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED]
+///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
+/// --marched: where there is no closed form the reference is marching, which has neither rays nor panels.
+/// --all-rays: bodies that are the same all around an axis get every ray, as others do, and not one that stands for all.
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "contact_cases.h"
+#include "supple/collision/react.h"
 #include "supple/core/hash.h"
 #include "usage.h"
 
@@ -23,6 +28,7 @@ using namespace supple::benchmarks;
 
 collision::ContactRule only_rule = collision::ContactRule::None;  // None: the cheapest that fits
 std::uint64_t seed = 2026;
+bool symmetry = true, marched = false;
 
 struct Query {
   collision::ContactCandidates candidates;
@@ -31,7 +37,7 @@ struct Query {
 
   void once(std::span<const collision::ContactBody> bodies, double error, collision::ContactRule rule, const Executor& executor) {
     find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
-    solve_contact_surface(bodies, candidates, {.error = error, .only = rule}, executor, surface);
+    solve_contact_surface(bodies, candidates, {.error = error, .only = rule, .symmetry = symmetry}, executor, surface);
   }
 
   /// The least time of `repeats` measurements. Reading the clock takes about a microsecond, so short queries are timed four in a row.
@@ -48,6 +54,24 @@ struct Query {
     }
     return surface.summary.empty() ? nullptr : &surface.summary.front();
   }
+
+  /// Time of the forces on the parts of both bodies, of the last answer [us].
+  [[nodiscard]] double time_forces(std::span<const collision::ContactBody> bodies, int repeats) const {
+    const Executor executor(1);
+    std::array<collision::PartLoads, 2> loads;
+    for (std::size_t i = 0; i < 2; ++i) {
+      loads[i].force.assign(bodies[i].pose.size(), Vec3::Zero());
+      loads[i].torque.assign(bodies[i].pose.size(), Vec3::Zero());
+    }
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < repeats; ++i) {
+      constexpr int kInARow = 4;
+      const double start = cpu_microseconds();
+      for (int n = 0; n < kInARow; ++n) react(bodies, {}, surface, {}, executor, loads);
+      least = std::min(least, (cpu_microseconds() - start) / kInARow);
+    }
+    return least;
+  }
 };
 
 template <class MakePose>
@@ -55,7 +79,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
   constexpr int kRepeats = 10, kRounds = 3;
   struct Line {
-    std::vector<double> cpu, error, ratio;  // ratio: bound over error, where the reference can tell
+    std::vector<double> cpu, forces, error, ratio;  // ratio: bound over error, where the reference can tell
     int missed = 0, march = 0, sampled = 0, unmet = 0, bound_broken = 0;
   };
   std::array<std::array<Line, kErrors.size()>, 2> classes;  // smooth, crossed by kinks
@@ -72,7 +96,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
     Answer exact = pair.exact;
     double floor = 0.0;  // what the reference itself may be off by
     if (!pair.known) {
-      const auto* s = query.ask(seen_otherwise(pair.bodies), 1e-10, 1);
+      const auto* s = marched ? query.ask(pair.bodies, 1e-10, 1, collision::ContactRule::March) : query.ask(seen_otherwise(pair.bodies), 1e-10, 1);
       if (s == nullptr) continue;  // apart: another pose
       exact = {s->force.norm(), s->area, s->centre_of_pressure};
       floor = s->error_estimate;
@@ -91,6 +115,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
       const double error = difference(*s, exact);
       timed.push_back({pose, k, crossed ? 1u : 0u, line.cpu.size()});
       line.cpu.push_back(query.cpu_us);
+      line.forces.push_back(query.time_forces(pair.bodies, kRepeats));
       line.error.push_back(error);
       line.march += s->rule == collision::ContactRule::March ? 1 : 0;
       line.sampled += s->rule == collision::ContactRule::Samples ? 1 : 0;
@@ -119,14 +144,15 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
     const std::size_t k = i / 2;
     Line& line = classes[i % 2][k];
     std::sort(line.cpu.begin(), line.cpu.end());
+    std::sort(line.forces.begin(), line.forces.end());
     std::sort(line.error.begin(), line.error.end());
     std::sort(line.ratio.begin(), line.ratio.end());
     const std::size_t n = line.cpu.size(), r = line.ratio.size();
     if (n == 0) continue;
-    std::printf("{\"name\": \"collision/poses/%s%s/error=%g\", \"poses\": %zu, \"cpu_us_median\": %.1f, \"cpu_us_max\": %.1f, "
+    std::printf("{\"name\": \"collision/poses/%s%s/error=%g\", \"poses\": %zu, \"cpu_us_median\": %.1f, \"cpu_us_max\": %.1f, \"forces_us_median\": %.1f, "
                 "\"error\": %.2g, \"error_median\": %.2g, \"error_kind\": \"%s\", \"marched\": %d, \"sampled\": %d, \"missed\": %d, "
                 "\"estimates_over\": %d, \"bounds_broken\": %d, \"bound_over_error\": %.3g, \"least_bound_over_error\": %.3g, \"hash\": \"%s\"}\n",
-                std::string(name).c_str(), i % 2 == 0 ? "" : "/kinks", kErrors[k], n, line.cpu[n / 2], line.cpu.back(),
+                std::string(name).c_str(), i % 2 == 0 ? "" : "/kinks", kErrors[k], n, line.cpu[n / 2], line.cpu.back(), line.forces[n / 2],
                 line.error.back(), line.error[n / 2], "largest of force, area, centre", line.march, line.sampled, line.missed,
                 line.unmet, line.bound_broken, r == 0 ? 0.0 : line.ratio[r / 2], r == 0 ? 0.0 : line.ratio.front(), to_hex(hasher.value()).c_str());
   }
@@ -136,13 +162,29 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED]", 4);
-  const int poses = argc > 1 ? std::atoi(argv[1]) : 1000;
-  const std::string_view only = argc > 2 ? argv[2] : "";
-  const std::string_view rule = argc > 3 ? argv[3] : "auto";
-  only_rule = rule_named(rule);
-  if (argc > 4) seed = std::strtoull(argv[4], nullptr, 10);
-  const auto wanted = [&](std::string_view name) { return only.empty() || only == "all" || only == name; };
-  for_cases({}, wanted, [poses](std::string_view name, const auto& make_pose) { measure(name, poses, make_pose); });
+  supple::benchmarks::answer_usage(argc, argv, "contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]", 9,
+                                   {{"--all-rays"}, {"--marched"}, {"--depths", 2}});
+  std::vector<std::string_view> words;
+  std::optional<std::array<double, 2>> depths;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--all-rays") {
+      symmetry = false;
+    } else if (word == "--marched") {
+      marched = true;
+    } else if (word == "--depths") {
+      depths = {std::strtod(argv[i + 1], nullptr), std::strtod(argv[i + 2], nullptr)};
+      i += 2;
+    } else {
+      words.push_back(word);
+    }
+  }
+  const auto word = [&words](std::size_t i, std::string_view otherwise) { return i < words.size() ? words[i] : otherwise; };
+  const int poses = std::atoi(word(0, "1000").data());
+  const std::string_view only = word(1, "all");
+  only_rule = rule_named(word(2, "auto"));
+  seed = std::strtoull(word(3, "2026").data(), nullptr, 10);
+  const auto wanted = [only](std::string_view name) { return only == "all" || only == name; };
+  for_cases({}, wanted, [poses](std::string_view name, const auto& make_pose) { measure(name, poses, make_pose); }, depths);
   return 0;
 }

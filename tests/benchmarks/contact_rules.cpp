@@ -3,7 +3,7 @@
 /// the peak, in tetrahedra; each refined step by step, over the same random poses at an overlap of a tenth of the smaller
 /// radius. A query is broad phase, candidates and contact surface. Errors are the largest of force, area (relative) and
 /// centre of pressure (over the root of the area), RMS over the poses, against closed forms or the finest polar rule for
-/// the bodies seen otherwise. Tables; a file name gets the plot (SVG).
+/// the bodies seen otherwise. Last come patches that are rings. Tables; a file name gets the plot (SVG).
 ///   contact_rules [FILE.svg]
 #include <cstdio>
 #include <fstream>
@@ -26,12 +26,13 @@ constexpr int kRepeats = 3;
 struct Rule {
   const char* name;
   ContactRule rule;
-  int first, last;  // refinements; of marching, which chooses its order by the error, digits asked for
+  bool by_error;    // which of them is taken follows from the error asked for
+  int first, last;  // digits of that, else refinements
   const char* colour;
 };
-constexpr std::array<Rule, 3> kRules{{{"samples", ContactRule::Samples, 0, 5, "#d95f02"},
-                                      {"polar", ContactRule::Polar, 1, 6, "#1b9e77"},
-                                      {"march", ContactRule::March, 2, 8, "#7570b3"}}};
+constexpr std::array<Rule, 3> kRules{{{"samples", ContactRule::Samples, false, 0, 5, "#d95f02"},
+                                      {"polar", ContactRule::Polar, true, 1, 10, "#1b9e77"},
+                                      {"march", ContactRule::March, true, 2, 8, "#7570b3"}}};
 
 /// A log-log panel: error from 1e-15 to 1 across, CPU time from 1 us to 1 s upwards.
 class Panel {
@@ -107,7 +108,6 @@ std::string measure(const char* name, double left, double top, const MakePose& m
   Panel panel(left, top, name);
   for (const Rule& rule : kRules) {
     std::vector<std::pair<double, double>> line;
-    const bool by_error = rule.rule == ContactRule::March;
     for (int refinements = rule.first; refinements <= rule.last; ++refinements) {
       Draw draw(7);
       double square = 0.0, worst = 0.0, points = 0.0, cpu = 0.0;
@@ -120,8 +120,9 @@ std::string measure(const char* name, double left, double top, const MakePose& m
           pair.exact = finest.answer;
         }
         collision::ContactSurface::Summary s;
-        collision::ContactSettings settings{.error = 1e-10, .max_refinement = refinements, .only = rule.rule};
-        if (by_error) settings = {.error = std::pow(10.0, -refinements), .only = rule.rule};
+        // All rays are followed, as bodies that are the same all around an axis would else have one that stands for them.
+        collision::ContactSettings settings{.error = 1e-10, .max_refinement = refinements, .only = rule.rule, .symmetry = false};
+        if (rule.by_error) settings = {.error = std::pow(10.0, -refinements), .only = rule.rule, .symmetry = false};
         const Asked asked = ask(pair.bodies, settings, &s);
         if (!asked.found) continue;
         const double error = difference(s, pair.exact);
@@ -133,13 +134,37 @@ std::string measure(const char* name, double left, double top, const MakePose& m
       }
       if (count == 0) continue;
       const double rms = std::sqrt(square / count);
-      std::printf("| %s | %s%d | %.0f | %.1e | %.1e | %.3g |\n", rule.name, by_error ? "1e-" : "", refinements, points / count, rms, worst, cpu / count);
+      std::printf("| %s | %s%d | %.0f | %.1e | %.1e | %.3g |\n", rule.name, rule.by_error ? "1e-" : "", refinements, points / count, rms, worst, cpu / count);
       std::fflush(stdout);
       line.emplace_back(rms, cpu / count);
     }
     panel.line(rule.colour, line);
   }
   return panel.svg();
+}
+
+/// Patches that are rings, which only marching solves finely: a ring in the ground, and one under a disc; errors of the force against 1e-9.
+void measure_rings() {
+  constexpr double kSupport = 0.2, kE = 1e6, kSpacing = 0.03;
+  const double thick = implicit::iso_distance(implicit::Kernel::wyvill(kSupport), 0.5);
+  Rigid ring(wyvill_shape(implicit::ShapeKind::Ring, Vec3(0.3, 0.0, 0.0), kSupport), kE, kSpacing);
+  Rigid disc(wyvill_shape(implicit::ShapeKind::Disc, Vec3(0.4, 0.0, 0.0), kSupport), kE, kSpacing);
+  ring.put({Vec3(0.0, 0.0, thick - 0.006), Quat::Identity()});
+  disc.put({Vec3(0.0, 0.0, thick - 0.006 + 0.15), Quat::Identity()});
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 10.0};
+  const Pose origin;
+  collision::ContactBody ground = single_part(plane, kE, origin);
+  ground.fixed = true;
+  std::printf("\n## patches that are rings\n\n| bodies | error asked | bound | error of the force | points | CPU us |\n|---|---|---|---|---|---|\n");
+  const auto add = [](const char* name, const std::array<collision::ContactBody, 2>& bodies) {
+    const double force = ask(bodies, {.error = 1e-9, .only = ContactRule::March}).answer.force;
+    for (const int digits : {2, 3, 5, 8}) {
+      const Asked asked = ask(bodies, {.error = std::pow(10.0, -digits), .only = ContactRule::March});
+      std::printf("| %s | 1e-%d | %.1e | %.1e | %.0f | %.3g |\n", name, digits, asked.error_bound, std::abs(asked.answer.force / force - 1.0), asked.points, asked.cpu_us);
+    }
+  };
+  add("on the ground", {ring.body(), ground});
+  add("under a disc", {ring.body(), disc.body()});
 }
 
 }  // namespace
@@ -199,6 +224,7 @@ int main(int argc, char** argv) {
     Rigid plate(wyvill_shape(implicit::ShapeKind::Rectangle, Vec3(0.15, 0.15, 0.0), 0.15), kE, kSpacing);
     pressed("ball on a plate", ball, plate, 0.7 * kDepth);
   }
+  measure_rings();
   if (argc > 1) {
     std::ofstream out(argv[1]);
     const double height = kTop + 2.0 * kHeight + 20.0;

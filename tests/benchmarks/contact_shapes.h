@@ -47,16 +47,20 @@ inline collision::ContactRule rule_named(std::string_view name) {
   return name == "samples" ? ContactRule::Samples : name == "polar" ? ContactRule::Polar : name == "march" ? ContactRule::March : ContactRule::None;
 }
 
-/// One part of a body that moves as a whole; only pose and field differ.
-inline collision::ContactBody single_part(const implicit::FieldView& field, double modulus, const Pose& pose) {
-  static const Vec3 kStill = Vec3::Zero();
+/// A body at rest. @param pose  of its parts, ten at most
+inline collision::ContactBody at_rest(const implicit::FieldView& field, double modulus, std::span<const Pose> pose) {
+  static const std::vector<Vec3> kStill(10, Vec3::Zero());
   collision::ContactBody body;
   body.field = field;
   body.material.modulus = modulus;
-  body.pose = {&pose, 1};
-  body.velocity = {&kStill, 1};
-  body.angular_velocity = {&kStill, 1};
+  body.pose = pose;
+  body.velocity = std::span(kStill).first(pose.size());
+  body.angular_velocity = body.velocity;
   return body;
+}
+/// One part of a body that moves as a whole; only pose and field differ.
+inline collision::ContactBody single_part(const implicit::FieldView& field, double modulus, const Pose& pose) {
+  return at_rest(field, modulus, {&pose, 1});
 }
 
 /// The same two bodies in the other order and with poses that are not theirs: their contact is the same, but what a query chooses by
@@ -95,25 +99,26 @@ struct Stage {
   }
 };
 
-/// A rigid body: its field and samples in the pose it was put in.
+/// A rigid body: its field and samples in the pose it was put in, which is that of all of its parts.
 class Rigid {
  public:
   Rigid(implicit::Skeleton skeleton, double modulus, double spacing, const Stage& stage = {})
-      : stage_(stage), skeleton_(stage.scaled(std::move(skeleton))), modulus_(modulus), layout_(implicit::make_sample_layout(skeleton_, stage.length * spacing)) {
-    implicit::place_skeleton(skeleton_, {&pose_, 1}, placed_);
+      : stage_(stage), skeleton_(stage.scaled(std::move(skeleton))), modulus_(modulus), layout_(implicit::make_sample_layout(skeleton_, stage.length * spacing)), poses_(skeleton_.part_count) {
+    implicit::place_skeleton(skeleton_, poses_, placed_);
     implicit::index_field(skeleton_, placed_, field_);
     implicit::SampleState kept;
-    implicit::sample_surface(skeleton_, layout_, {&pose_, 1}, field_, {}, {}, Executor(1), kept, rest_);
+    implicit::sample_surface(skeleton_, layout_, poses_, field_, {}, {}, Executor(1), kept, rest_);
   }
   /// @param pose  on the stage
   void put(const Pose& pose) {
-    pose_ = stage_.place(pose);
-    implicit::place_skeleton(skeleton_, {&pose_, 1}, placed_);
+    const Pose here = stage_.place(pose);
+    poses_.assign(poses_.size(), here);
+    implicit::place_skeleton(skeleton_, poses_, placed_);
     implicit::index_field(skeleton_, placed_, field_);
     samples_ = rest_;
     for (std::size_t i = 0; i < samples_.point.size(); ++i) {
-      samples_.point[i] = pose_.position + pose_.orientation * rest_.point[i];
-      samples_.normal[i] = pose_.orientation * rest_.normal[i];
+      samples_.point[i] = here.position + here.orientation * rest_.point[i];
+      samples_.normal[i] = here.orientation * rest_.normal[i];
     }
   }
   /// A random place of the surface and its normal, on the stage with the body at rest.
@@ -125,7 +130,7 @@ class Rigid {
     return {rest_.point[i] / stage_.length, rest_.normal[i]};
   }
   [[nodiscard]] collision::ContactBody body() const {
-    collision::ContactBody b = single_part(field_, modulus_, pose_);
+    collision::ContactBody b = at_rest(field_, modulus_, poses_);
     b.samples = &samples_;
     b.skeleton = &skeleton_;
     return b;
@@ -139,7 +144,7 @@ class Rigid {
   implicit::PlacedSkeleton placed_;
   implicit::Field field_;
   implicit::SurfaceSamples rest_, samples_;
-  Pose pose_;
+  std::vector<Pose> poses_;
 };
 
 /// Sphere of radius r with p = E (1 - d / r) inside: Gascuel's kernel, linear as far as the surface.
@@ -168,17 +173,18 @@ inline implicit::Skeleton wyvill_shape(implicit::ShapeKind shape, const Vec3& si
   return skeleton;
 }
 
-/// Ten blobs in a lump, their supports overlapping.
-inline implicit::Skeleton ten_blobs(std::uint64_t seed) {
+/// Ten blobs in a lump, their supports overlapping. @param apart  each is a part of its own
+inline implicit::Skeleton ten_blobs(std::uint64_t seed, bool apart = false) {
   Draw draw(seed);
   implicit::Skeleton skeleton;
   for (int i = 0; i < 10; ++i) {
     implicit::Primitive p;
     p.kernel = implicit::Kernel::wyvill(0.1 * draw.uniform(0.8, 1.2));
     p.offset.position = 0.05 * draw.direction();
+    if (apart) p.part = static_cast<std::uint32_t>(i);
     skeleton.primitive.push_back(p);
   }
-  skeleton.part_count = 1;
+  skeleton.part_count = apart ? 10 : 1;
   return skeleton;
 }
 

@@ -140,10 +140,11 @@ std::string hash_of(const Mesh& mesh) {
 struct Method {
   std::string_view name;
   int refinements;  ///< -1: tetrahedra, -2: a grid and OpenVDB's volumeToMesh, -3: cubes and a search for missed pieces
+  bool may_cross = false;
 };
 /// "refined" starts from a lattice of twice the cell, "refined_twice" of four times.
-constexpr std::array<Method, 6> kMethods{
-    {{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"tetrahedra", -1}, {"openvdb", -2}, {"searched", -3}}};
+constexpr std::array<Method, 8> kMethods{{{"cubes", 0}, {"refined", 1}, {"refined_twice", 2}, {"refined_may_cross", 1, true},
+                                          {"refined_twice_may_cross", 2, true}, {"tetrahedra", -1}, {"openvdb", -2}, {"searched", -3}}};
 
 /// 1 % of the blobs, those nearest to one on the surface.
 std::vector<std::uint32_t> blobs_at_the_side(const Body& body) {
@@ -297,7 +298,7 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
     } else if (method.refinements < 0) {
       mesh = polygonise(body.field, lattice, executor);
     } else {
-      made = &mesher.make(body.field, {.lattice = coarse, .refinements = method.refinements}, executor, &counts);
+      made = &mesher.make(body.field, {.lattice = coarse, .refinements = method.refinements, .may_cross = method.may_cross}, executor, &counts);
     }
     const double end = cpu_seconds();
     index = std::min(index, indexed - begin);

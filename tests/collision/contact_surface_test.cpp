@@ -147,6 +147,69 @@ TEST(ContactSurface, OfBodiesThatAreTheSameAroundALineIsThatOfAllRays) {
   }
 }
 
+TEST(ContactSurface, LeavesNothingSidewaysToAnAxisByAllRays) {
+  const Vec3 at(0.6, -0.4, 0.2);
+  for (int turn = 0; turn < 20; ++turn) {
+    const Vec3 along = (Quat(Eigen::AngleAxisd(0.7 * turn, Vec3(0.3, 0.5, -0.8).normalized())) * Vec3(0.3, -0.5, 0.7)).normalized();
+    const Blobs ball({at}, 1.0), small({at + 0.65 * along}, 0.6), other({at + 0.8 * along}, 1.0);
+    const implicit::HalfSpace plane{at + 0.4 * along, -along, 0.7};
+    for (const implicit::FieldView field : {implicit::FieldView(small.field), implicit::FieldView(other.field), implicit::FieldView(plane)}) {
+      for (const double error : {1e-2, 1e-3, 1e-6, 1e-10}) {
+        Stage stage;
+        stage.add(ball.field, ball.centre);
+        stage.add(field, {at + along}, 3.0);
+        const ContactSurface::Summary s = stage.solve({.error = error, .symmetry = false}).summary.at(0);
+        ASSERT_EQ(s.rule, ContactRule::Polar);
+        EXPECT_GE(s.points, 24u);
+        EXPECT_LE(s.force.cross(along).norm(), 1e-12 * s.force.norm()) << error;
+        EXPECT_LE((s.centre_of_pressure - at).cross(along).norm(), 1e-12 * std::sqrt(s.area)) << error;
+      }
+    }
+  }
+}
+
+/// A sphere that counts at how many points it is asked.
+struct CountedSphere {
+  LinearSphere sphere;
+  mutable std::uint64_t asked = 0;
+
+  void evaluate(std::span<const Vec3> points, std::span<double> values) const {
+    asked += points.size();
+    sphere.evaluate(points, values);
+  }
+  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+    asked += points.size();
+    sphere.evaluate(points, values, gradients);
+  }
+  void evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const {
+    asked += points.size();
+    sphere.evaluate_parts(points, parts);
+  }
+  [[nodiscard]] Interval bound(const Box& box) const { return sphere.bound(box); }
+  [[nodiscard]] double gradient_bound(const Box& box) const { return sphere.gradient_bound(box); }
+  [[nodiscard]] Box surface_box() const { return sphere.surface_box(); }
+  [[nodiscard]] double feature_size() const { return sphere.feature_size(); }
+};
+
+TEST(ContactSurface, OfBodiesApartCostsNothingButTestsOfBoxes) {
+  std::vector<CountedSphere> sphere;
+  for (int i = 0; i < 300; ++i) sphere.push_back({{Vec3(2.1 * (i % 20), 2.1 * (i / 20), 0.0), Linear{1.0, 1.0}}});
+  sphere.push_back({{Vec3(4.2, 4.2, 1.8), Linear{1.0, 1.0}}});  // on one of them
+  Stage stage;
+  for (const CountedSphere& s : sphere) stage.add(s);
+  const ContactSurface& surface = stage.solve({.error = 1e-6});
+  ASSERT_EQ(surface.summary.size(), 1u);
+  constexpr std::size_t kBelow = 42;
+  EXPECT_EQ(surface.summary[0].bodies, (BodyPair{kBelow, 300}));
+  for (std::size_t i = 0; i < sphere.size(); ++i) EXPECT_EQ(sphere[i].asked > 0, i == kBelow || i == 300) << i;
+  const std::uint64_t together = sphere[kBelow].asked;
+  Stage alone;
+  alone.add(sphere[kBelow]);
+  alone.add(sphere[300]);
+  static_cast<void>(alone.solve({.error = 1e-6}));
+  EXPECT_EQ(sphere[kBelow].asked, 2 * together);
+}
+
 TEST(ContactSurface, FollowsAllRaysWhereOneBodyIsNotRound) {
   const Blobs ball({Vec3(0.1, 0.2, 0.75)}, 1.0);
   implicit::Skeleton skeleton;

@@ -419,6 +419,25 @@ TEST(KeptMeshes, KeepRefinedVerticesWhereNothingMoved) {
   }
 }
 
+// Where triangles would cross, edges stay straight: in one frame and not in the next, beside tiles that keep theirs.
+TEST(KeptMeshes, KeepRefinedVerticesBesideEdgesThatStayStraight) {
+  Body body = random_body({.seed = 1, .parts = 400, .least_radius = 0.15, .largest_radius = 0.4, .only_points = true});
+  CubeMesher mesher;
+  Random random(5);
+  std::uint64_t least = ~std::uint64_t{0}, most = 0;
+  for (int round = 0; round < 12; ++round) {
+    const MarchOptions options{.lattice = lattice_of(0.2), .refinements = 1 + round / 6};
+    for (int k = 0; k < 4; ++k) body.parts[random.below(400)].position += random.in_box(0.1);
+    body.place();
+    MarchCounts counts;
+    EXPECT_EQ(hash_of(mesher.make(body.field, options, Executor(2), &counts)), hash_of(march_cubes(body.field, options, Executor(1)))) << round;
+    least = std::min(least, counts.straight_edges);
+    most = std::max(most, counts.straight_edges);
+  }
+  EXPECT_GT(least, 0u);
+  EXPECT_GT(most, least);
+}
+
 // One mesher for a body of Wyvill points and another of capsules in turn, and on other lattices.
 TEST(KeptMeshes, ForgetWhatIsOfAnotherBodyOrLattice) {
   const Body points = random_body({.seed = 1, .parts = 40, .only_points = true}), shapes = random_body({.seed = 2, .parts = 40});

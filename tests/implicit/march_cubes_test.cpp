@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <set>
@@ -261,29 +262,85 @@ TEST_P(MarchedBody, RefinesTheSameSurface) {
   const Body body = blobs(GetParam(), 60);
   const double cell = 0.05;
   const Mesh coarse = march_cubes(body.field, {.lattice = lattice_of(cell)}, Executor(1));
-  const Mesh fine = march_cubes(body.field, {.lattice = lattice_of(cell), .refinements = 2}, Executor(1));
+  MarchCounts counts;
+  const Mesh fine = march_cubes(body.field, {.lattice = lattice_of(cell), .refinements = 2}, Executor(1), &counts);
   const MeshReport before = expect_closed(coarse), after = expect_closed(fine);
   EXPECT_EQ(fine.triangle_count(), 16 * coarse.triangle_count());
   EXPECT_EQ(after.euler_characteristic, before.euler_characteristic);
   EXPECT_EQ(after.components, before.components);
+  EXPECT_EQ(self_intersections(fine, cell), 0u);
   for (std::size_t v = 0; v < coarse.vertex_count(); ++v) ASSERT_EQ(fine.position[v], coarse.position[v]);
   const FieldView field(body.field);
-  double sum = 0.0;
+  std::vector<double> error;  // over the cell
   for (std::size_t v = 0; v < fine.vertex_count(); ++v) {
     Vec3 gradient;
     const double f = field.value(fine.position[v], gradient);
-    sum += std::pow(f / (gradient.norm() * cell), 2);
+    error.push_back(std::abs(f) / (gradient.norm() * cell));
     ASSERT_GT(fine.normal[v].dot(-gradient.normalized()), 0.999);
   }
+  // Middles of edges that would cross are not on it.
+  std::sort(error.begin(), error.end(), std::greater<>());
+  EXPECT_LT(counts.straight_edges, fine.vertex_count() / 200);
+  double sum = 0.0;
+  for (std::size_t i = counts.straight_edges; i < error.size(); ++i) sum += error[i] * error[i];
   EXPECT_LT(std::sqrt(sum / static_cast<double>(fine.vertex_count())), 1e-4);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, MarchedBody, ::testing::Values(1, 2, 3));
 
-TEST(MarchCubes, DoesNotFoldWhereTheCellsResolveTheSurface) {
+TEST(MarchCubes, KeepsRefinedVerticesOnTheSurfaceWhereTheCellsResolveIt) {
   const Body body = body_of({{wyvill_point(1.0), Vec3(-0.55, 0, 0)}, {wyvill_point(1.0), Vec3(0.55, 0, 0)}});
-  const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.1), .refinements = 2}, Executor(1));
+  MarchCounts counts;
+  const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.1), .refinements = 2}, Executor(1), &counts);
   expect_closed(mesh);
   EXPECT_EQ(self_intersections(mesh, 0.1), 0u);
+  EXPECT_EQ(counts.straight_edges, 0u);
+}
+
+TEST(MarchCubes, DoesNotCrossItselfWhereRefinedTrianglesWould) {
+  // Blobs of a cell or two, whose surface turns within one; and noise, in double precision.
+  std::uint64_t straight = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Body body = random_body({.seed = seed, .parts = 400, .least_radius = 0.15, .largest_radius = 0.4, .only_points = true});
+    for (const int refinements : {1, 2, 3}) {
+      MarchCounts counts;
+      const Mesh mesh = march_cubes(body.field, {.lattice = lattice_of(0.2), .refinements = refinements}, Executor(2), &counts);
+      expect_closed(mesh);
+      EXPECT_EQ(self_intersections(mesh, 0.1), 0u) << seed << ' ' << refinements;
+      EXPECT_LT(counts.straight_edges, mesh.vertex_count() / 20);
+      straight += counts.straight_edges;
+    }
+  }
+  EXPECT_GT(straight, 20u);
+  const Mesh rough = march_cubes(noise(1, 0.15), {.lattice = lattice_of(0.11), .refinements = 1}, Executor(2));
+  expect_closed(rough);
+  EXPECT_EQ(self_intersections(rough, 0.11), 0u);
+}
+
+TEST(MarchCubes, PutsOnlyMiddlesOfEdgesOfCrossingTrianglesBack) {
+  // All others are on the surface: what is not lies in the middle of an edge of the mesh before.
+  const Body body = random_body({.seed = 1, .parts = 400, .least_radius = 0.15, .largest_radius = 0.4, .only_points = true});
+  const MarchOptions options{.lattice = lattice_of(0.2), .refinements = 1};
+  MarchCounts counts;
+  const Mesh mesh = march_cubes(body.field, options, Executor(1), &counts);
+  const FieldView field(body.field);
+  std::uint64_t middles = 0;
+  std::vector<bool> seen(mesh.vertex_count(), false);
+  for (std::size_t n = 3; n < mesh.triangle_count(); n += 4) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = mesh.triangle[n][k], a = mesh.triangle[n - 3 + k][k], b = mesh.triangle[n - 3 + (k + 1) % 3][(k + 1) % 3];
+      if (seen[v]) continue;
+      seen[v] = true;
+      if (mesh.position[v] == 0.5 * (mesh.position[a] + mesh.position[b])) {
+        ++middles;
+        continue;
+      }
+      Vec3 gradient;
+      const double f = field.value(mesh.position[v], gradient);
+      EXPECT_LE(std::abs(f), 1e-3 * 0.2 * gradient.norm());
+    }
+  }
+  EXPECT_EQ(middles, counts.straight_edges);
+  EXPECT_GT(middles, 0u);
 }
 
 TEST(MarchCubes, StaysClosedWhereTheSurfaceIsRougherThanTheLattice) {

@@ -43,7 +43,7 @@ inline Simulation make(int count, double dt, double error, int threads = 1) {
 struct Errors {
   double momentum = 0.0;          ///< over the largest sum of m |v|
   double angular_momentum = 0.0;  ///< over the largest sum of |x - c| m |v| + |L|
-  double energy = 0.0;            ///< of kinetic, pair and contact energy, over the initial kinetic and released energy
+  double energy = 0.0;            ///< of kinetic, pair and contact energy, over the largest kinetic energy
   double contact = 0.0;           ///< largest contact energy over the same, to show that there were collisions
 };
 

@@ -117,7 +117,7 @@ inline Result stack(double E, double ratio) {
   scene += "obstacles: [{name: floor, shape: plane, modulus: 1e9, slope: 1000}]\n";
   // From first touch the load swings to twice its weight.
   return judge(
-      scene, 8, 2.0 * load <= std::numbers::pi * E * kRadius * kRadius / 6.0, [](const Simulation&) { return false; },
+      scene, 25, 2.0 * load <= std::numbers::pi * E * kRadius * kRadius / 6.0, [](const Simulation&) { return false; },
       [](const Simulation& s) {
         for (std::size_t i = 0; i + 1 < 10; ++i) {
           // What an unstable stack squeezes out sideways has not passed through.

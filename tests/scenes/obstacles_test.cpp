@@ -225,6 +225,43 @@ TEST(Obstacles, RefuseMeshesThatAreOpenOrTooFine) {
   EXPECT_NE(message("file: absent.obj").find("absent.obj"), std::string::npos);
 }
 
+/// A file of heights over [-1.6, 1.6]^2, every 0.1 m.
+template <class Height>
+void write_heights(const fs::path& file, const Height& height) {
+  fs::create_directories(file.parent_path());
+  std::ofstream out(file);
+  out.precision(17);
+  out << "x,y,z\n";
+  for (int j = -16; j <= 16; ++j) {
+    for (int i = -16; i <= 16; ++i) out << 0.1 * i << ',' << 0.1 * j << ',' << height(0.1 * i, 0.1 * j) << '\n';
+  }
+}
+
+TEST(Obstacles, OfHeightsThatRiseEvenlyAreThePlane) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  write_heights(folder / "slope.csv", [](double x, double y) { return 0.24 * x - 0.32 * y; });
+  const std::string exact = "contact: {error: 1e-8}\n";
+  Simulation heights = make(ball_over(exact + "obstacles: [{name: slope, shape: heights, file: slope.csv, modulus: 1e6}]"), folder);
+  // F = h(x, y) - z is the distance from the plane over the cosine of its slope.
+  Simulation plane = make(ball_over(exact + "obstacles: [{name: slope, shape: plane, normal: [-0.24, 0.32, 1], modulus: " + std::to_string(1e6 * std::sqrt(1.16)) + "}]"));
+  run(heights, 7);
+  run(plane, 7);
+  const Vec3 at = plane.state().particles.position[0];
+  EXPECT_GT(heights.contacts().summary.size(), 0u);
+  EXPECT_GT((at - Vec3(0.02, 0.01, 0.25)).norm(), 0.1);  // down the slope
+  EXPECT_LT((heights.state().particles.position[0] - at).norm(), 1e-6);
+}
+
+TEST(Obstacles, OfHeightsHoldABallInTheirHollow) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  write_heights(folder / "hollow.csv", [](double x, double y) { return 0.4 * ((x - 0.1) * (x - 0.1) + (y + 0.2) * (y + 0.2)) - 0.1; });
+  Simulation simulation = make(ball_over("obstacles: [{name: hollow, shape: heights, file: hollow.csv, modulus: 1e6}]"), folder);
+  run(simulation, 61);
+  EXPECT_LT((simulation.state().particles.position[0] - Vec3(0.1, -0.2, simulation.state().particles.position[0].z())).norm(), 1e-3);
+  ASSERT_EQ(simulation.contacts().summary.size(), 1u);
+  EXPECT_NEAR(simulation.contact_forces()[0].z(), 0.2 * 9.81, 1e-3 * 0.2 * 9.81);
+}
+
 TEST(Obstacles, RefuseHeightsThatAreNoGrid) {
   const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
   fs::create_directories(folder);

@@ -94,6 +94,30 @@ TEST(Overload, CapacityStandsInTheAnswerToAQuery) {
   EXPECT_NEAR(answer["pairs"][0]["capacity_j"].get<double>(), kCapacity, 0.01 * kCapacity);
 }
 
+// Balls that begin with their middles in one another are parted by all the energy of that, no more.
+TEST(DeepStart, IsRecoveredWithTheEnergyOfTheOverlap) {
+  constexpr double kRadius = 0.1, kE = 1e4, kMass = 0.2;
+  for (const double distance : {0.03, 0.08, 0.12}) {
+    std::string text = balls(0.0, "contact: {error: 1e-4}\n");
+    const auto put = [&text](const std::string& from, double x) {
+      const std::size_t at = text.find(from);
+      text.replace(at, from.size(), std::to_string(x));
+    };
+    put(std::to_string(-0.11), -0.5 * distance);
+    put(std::to_string(0.11), 0.5 * distance);
+    const double depth = kRadius - 0.5 * std::hypot(distance, 0.01);  // of each in the plane between
+    const double energy = 2.0 * std::numbers::pi * kE * depth * depth * depth * (1.0 / 3.0 - depth / (6.0 * kRadius));
+    Simulation s = run(text, 80);
+    EXPECT_TRUE(s.contacts().summary.empty());
+    EXPECT_GT(s.state().particles.position[1].x() - s.state().particles.position[0].x(), 2.0 * kRadius);
+    double kinetic = 0.0;
+    for (const Vec3& v : s.state().particles.velocity) kinetic += 0.5 * kMass * v.squaredNorm();
+    EXPECT_NEAR(kinetic, energy, 0.01 * energy) << distance;
+    EXPECT_LT(s.audits().energy_error, 0.01);
+    EXPECT_LT(s.audits().momentum_error, 1e-13);
+  }
+}
+
 TEST(Tunnelling, HappensAtNoSpeedWithHardCores) {
   for (const double speed : {20.0, 150.0, 600.0}) {
     const int frames = 20 + static_cast<int>(100.0 / speed);

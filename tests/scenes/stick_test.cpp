@@ -1,6 +1,7 @@
 // Friction that holds: what should stay stays, what should slide slides, and the audits know of the springs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -106,6 +107,23 @@ TEST(Stick, LetsAStackOfTenInAShaftThatGrowsHeavierUpwardFallAsleep) {
     if (surface.summary[k].bodies.b >= 10) carried += s.contact_forces()[k];
   }
   EXPECT_NEAR(carried.z(), weight, 0.02 * weight);
+}
+
+TEST(Stick, LetsAHundredBallsInABinComeToRestAndSleep) {
+  Simulation s(read_scene(std::filesystem::path(SUPPLE_SOURCE_DIR) / "scenes/library/contacts/pile_rests.yaml"), {.threads = 2});
+  run(s, 73);  // three seconds
+  const State& state = s.state();
+  ASSERT_EQ(state.particles.position.size(), 100u);
+  EXPECT_EQ(std::count(state.sleep.island.begin(), state.sleep.island.end(), collision::SleepState::kAwake), 0);
+  for (std::size_t k = 0; k < 100; ++k) {
+    const Vec3& x = state.particles.position[k];
+    EXPECT_EQ(state.particles.velocity[k], Vec3::Zero());
+    // A ball pressed in by a quarter of its radius carries pi E R^2 / 16 (1 - 1/6) = 8.2 N, the weight of 17.
+    EXPECT_GT(x.z(), 0.75 * 0.05);
+    EXPECT_LT(std::max(std::abs(x.x()), std::abs(x.y())), 0.32 - 0.75 * 0.05);
+  }
+  EXPECT_LT(s.audits().energy_error, 1e-3);
+  EXPECT_LT(s.audits().momentum_error, 1e-11);
 }
 
 TEST(Stick, GoesOnFromASavedStateWithTheSameBits) {

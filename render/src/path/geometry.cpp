@@ -99,6 +99,7 @@ struct Geometry::Part {
   std::vector<float> position_end;
   std::vector<Vec3f> normal;
   std::vector<Quadrangle> quadrangle;
+  std::vector<std::uint32_t> first_quadrangle;  ///< of each vertex
   float spread = 0.0F;  ///< when its hierarchy was built
   PaintSource paint;
 };
@@ -198,6 +199,9 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
     if (part.quadrangle.empty()) continue;
     for (const auto& triangle : mesh.triangle)
       for (const std::uint32_t v : triangle) SUPPLE_EXPECTS(v < n);
+    part.first_quadrangle.assign(n, 0);
+    for (std::size_t q = part.quadrangle.size(); q-- > 0;)
+      for (const std::uint32_t v : part.quadrangle[q]) part.first_quadrangle[v] = static_cast<std::uint32_t>(q);
     part.spread = spread_of(part.quadrangle, part.position);
     part.geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
     rtcSetGeometryBuildQuality(part.geometry, RTC_BUILD_QUALITY_REFIT);
@@ -254,7 +258,9 @@ struct Geometry::Query {
   RTCIntersectContext context;
   std::array<Crossing, kLanes> first;
 
-  explicit Query(RTCIntersectContextFlags flags) {
+  const Geometry* geometry;
+
+  Query(const Geometry& of, RTCIntersectContextFlags flags) : geometry(&of) {
     rtcInitIntersectContext(&context);
     context.flags = flags;
     context.filter = look_at;
@@ -268,19 +274,52 @@ struct Geometry::Query {
       if (of->valid[k] != -1) continue;
       const Vec3f direction(RTCRayN_dir_x(of->ray, of->N, k), RTCRayN_dir_y(of->ray, of->N, k), RTCRayN_dir_z(of->ray, of->N, k));
       const Vec3f normal(RTCHitN_Ng_x(of->hit, of->N, k), RTCHitN_Ng_y(of->hit, of->N, k), RTCHitN_Ng_z(of->hit, of->N, k));
+      const Vec3f from(RTCRayN_org_x(of->ray, of->N, k), RTCRayN_org_y(of->ray, of->N, k), RTCRayN_org_z(of->ray, of->N, k));
       float& reach = RTCRayN_tfar(of->ray, of->N, k);
       Crossing& first = query.first[k];
-      const Crossing found{.distance = normal.dot(direction) > 0.0F ? reach * (1.0F + kOnePlace) : reach,
-                           .item = RTCHitN_geomID(of->hit, of->N, k), .quadrangle = RTCHitN_primID(of->hit, of->N, k),
-                           .u = RTCHitN_u(of->hit, of->N, k), .v = RTCHitN_v(of->hit, of->N, k)};
-      if (std::tie(found.distance, found.item, found.quadrangle) < std::tie(first.distance, first.item, first.quadrangle)) first = found;
+      Crossing found{.distance = reach,
+                     .item = RTCHitN_geomID(of->hit, of->N, k), .quadrangle = RTCHitN_primID(of->hit, of->N, k),
+                     .u = RTCHitN_u(of->hit, of->N, k), .v = RTCHitN_v(of->hit, of->N, k)};
+      bool back = normal.dot(direction) > 0.0F;
+      query.geometry->move_to_vertex(from, direction, RTCRayN_time(of->ray, of->N, k), found, back);
+      if (back) found.distance *= 1.0F + kOnePlace;
+      const auto order = [](const Crossing& c) { return std::tie(c.distance, c.item, c.quadrangle, c.u, c.v); };  // u, v: on its diagonal
+      if (order(found) < order(first)) first = found;
       reach = first.distance * (1.0F + 2.0F * kOnePlace);
     }
   }
 };
 
+/// A crossing at a vertex becomes that of the first quadrangle there: which of them Embree looks at depends on its hierarchy, as the ray misses
+/// the boxes of some by rounding.
+/// @param back  whether that is a back face
+void Geometry::move_to_vertex(const Vec3f& from, const Vec3f& direction, float time, Crossing& crossing, bool& back) const {
+  constexpr float kNearCorner = 0.05F;  // of a side: farther off none is within rounding
+  constexpr float kRounding = 4.0F * std::numeric_limits<float>::epsilon();
+  const bool far_u = crossing.u > 0.5F, far_v = crossing.v > 0.5F;
+  if (std::abs(crossing.u - (far_u ? 1.0F : 0.0F)) > kNearCorner || std::abs(crossing.v - (far_v ? 1.0F : 0.0F)) > kNearCorner) return;
+  const Part& part = *parts_[crossing.item];
+  const auto place = [&](std::uint32_t vertex) -> Vec3f {
+    const Vec3f p = vector(&part.position[4 * std::size_t{vertex}]);
+    return part.moving ? Vec3f(p + time * (vector(&part.position_end[4 * std::size_t{vertex}]) - p)) : p;
+  };
+  const std::uint32_t vertex = part.quadrangle[crossing.quadrangle][far_u ? (far_v ? 2 : 1) : (far_v ? 3 : 0)];
+  const Vec3f way = place(vertex) - from;
+  const float along = way.dot(direction) / direction.squaredNorm(), round = kRounding * (from.cwiseAbs().maxCoeff() + along * direction.norm());
+  if ((way - along * direction).squaredNorm() > round * round) return;
+  crossing.distance = along;
+  crossing.quadrangle = part.first_quadrangle[vertex];
+  const Quadrangle& first = part.quadrangle[crossing.quadrangle];
+  // Where two corners of a triangle's quadrangle are one, it is the last.
+  const std::size_t corner = first[0] == vertex ? 0 : first[1] == vertex ? 1 : first[3] == vertex ? 3 : 2;
+  crossing.u = corner == 1 || corner == 2 ? 1.0F : 0.0F;
+  crossing.v = corner >= 2 ? 1.0F : 0.0F;
+  const Vec3f a = place(first[corner == 2 ? 2 : 0]), b = place(first[corner == 2 ? 3 : 1]), c = place(first[corner == 2 ? 1 : 3]);
+  back = (b - a).cross(c - a).dot(direction) > 0.0F;
+}
+
 Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const {
-  Query query(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+  Query query(*this, RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   RTCRayHit ray{};
   ray.ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = near_end,
              .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
@@ -446,7 +485,7 @@ std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) 
   RTCRayHit8 bundle;
   bundle.ray = packet(rays, all_lanes(INFINITY), 1u);
   std::fill_n(bundle.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
-  Query query(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  Query query(*this, RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
   rtcIntersect8(reinterpret_cast<const int*>(&who), scene_, &query.context, &bundle);
   return query.first;
 }

@@ -5,14 +5,16 @@
     venv/bin/python tests/benchmarks/peers/contact_drake.py build/release/bin/contact_rules
 
 Two compliant spheres (R = 0.1 m, E = 1 MPa, overlap 0.1 R) and one on a rigid plane, polygon contact surfaces, at several
-resolution hints. Both programs run on one thread, one after the other; times are CPU time, the least of several. The closed
-forms: F = pi E d^2 (1 - 2 d / 3 R) on the plane, the same with d = R - D / 2 between equal spheres.
+resolution hints. All programs run on one thread, one after the other; times are CPU time, the least of several. The closed
+forms: F = pi E d^2 (1 - 2 d / 3 R) on the plane, the same with d = R - D / 2 between equal spheres. contact_poses, which stands
+beside contact_rules, then asks for errors in a thousand poses, with every ray followed and with one that stands for all.
 """
 import subprocess
 import sys
 import time
 
 from math import pi
+from pathlib import Path
 
 import numpy
 from pydrake.geometry import (
@@ -104,6 +106,11 @@ def main():
             print(f"| {other} | {share:g} | {faces} | {abs(force / exact - 1):.2e} | {1e3 * seconds:.3f} |", flush=True)
     print("\nsupple\n", flush=True)
     subprocess.run([sys.argv[1]], check=True)
+    poses = str(Path(sys.argv[1]).resolve().with_name("contact_poses"))
+    for options in (["--all-rays"], []):
+        for case in ("equal", "plane"):
+            print(f"\ncontact_poses 1000 {case} {' '.join(options)}", flush=True)
+            subprocess.run([poses, "1000", case, *options], check=True)
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ struct MarchCounts {
   double cell = 0.0;                ///< edge of a cell that was used [m]
   int refinements = 0;
   double error = 0.0;               ///< when one was asked for: the largest found [m]
+  std::uint64_t straight_edges = 0;  ///< of refined meshes: edges whose middles stay on them, as triangles would cross
   std::uint64_t blunt_cells = 0;    ///< of march_creases: cells whose crease stays cut off, as triangles would cross
 };
 
@@ -43,6 +44,9 @@ struct MarchOptions {
   /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
   /// chosen, with cells of at most half the field's feature size and, if that is stated, lattice.cell; see `make`.
   double error = 0.0;
+  /// Refined triangles are not looked at for crossings: half to two thirds of the time, for a mesh that may cross itself where the surface turns
+  /// within a cell.
+  bool may_cross = false;
   /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them; what failed to mend creases is not tried again. Changes no bit.
   bool skip = true;
 };
@@ -61,8 +65,8 @@ class CubeMesher {
   CubeMesher& operator=(CubeMesher&&) noexcept;
 
   /// The closed surface F = 0, outward oriented, with the normals of the field; valid until the next call.
-  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges: where
-  /// the surface turns by more than a right angle within a cell, as at a neck about to close, refined triangles can fold.
+  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges; where triangles would then cross, as
+  /// at a neck about to close, they stay in the middle of the edge that they cut.
   /// With options.error, a body of separate balls is found whole: half a support is a cell that no ball of its surface passes
   /// through. Triangles get shorter by sqrt(2) until the error is met, first by refinements, twice at most, then by smaller cells.
   /// Distances are |F| / |grad F|, or by Newton's method where the surface turns within a triangle.
