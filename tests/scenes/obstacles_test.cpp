@@ -241,9 +241,9 @@ TEST(Obstacles, OfHeightsThatRiseEvenlyAreThePlane) {
   const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
   write_heights(folder / "slope.csv", [](double x, double y) { return 0.24 * x - 0.32 * y; });
   const std::string exact = "contact: {error: 1e-8}\n";
-  Simulation heights = make(ball_over(exact + "obstacles: [{name: slope, shape: heights, file: slope.csv, modulus: 1e6}]"), folder);
+  Simulation heights = make(ball_over(exact + "obstacles: [{name: slope, shape: heights, file: slope.csv, modulus: 1e4}]"), folder);
   // F = h(x, y) - z is the distance from the plane over the cosine of its slope.
-  Simulation plane = make(ball_over(exact + "obstacles: [{name: slope, shape: plane, normal: [-0.24, 0.32, 1], modulus: " + std::to_string(1e6 * std::sqrt(1.16)) + "}]"));
+  Simulation plane = make(ball_over(exact + "obstacles: [{name: slope, shape: plane, normal: [-0.24, 0.32, 1], modulus: " + std::to_string(1e4 * std::sqrt(1.16)) + "}]"));
   run(heights, 7);
   run(plane, 7);
   const Vec3 at = plane.state().particles.position[0];
