@@ -235,7 +235,7 @@ int main(int argc, char** argv) {
       out << "<text x='" << 60 + 180 * k << "' y='" << height - 12.0 << "' fill='" << kRules[k].colour << "'>" << kRules[k].name
           << "</text>\n";
     }
-    out << "</svg>\n";
+    out << "<text x='" << 60 + 180 * kRules.size() << "' y='" << height - 12.0 << "'>error across (RMS over the poses), CPU time of a query upwards</text>\n</svg>\n";
     if (!out) return 4;
   }
   return 0;

@@ -93,6 +93,17 @@ TEST(Blend, TwoNodesOfAGraphGiveTheLargerAndAShareOfTheSmaller) {
   }
 }
 
+TEST(Blend, OfPointsInOnePlaceHasTheirHessianByItsFactor) {
+  const Body one = body_of({{wyvill_point(1.0), Vec3::Zero()}});
+  const Body power = two_points(0.0, {.rule = BlendRule::Ricci, .node = {}, .edge = {}, .exponent = 3.0});
+  const Body graph = two_points(0.0, {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, 0.4}}});
+  for (const Vec3& x : random_points(4, 100, 0.55)) {
+    const Mat3 expected = one.field.hessian(x);
+    EXPECT_LT((power.field.hessian(x) - std::cbrt(2.0) * expected).norm(), 1e-8 * expected.norm());
+    EXPECT_LT((graph.field.hessian(x) - 1.4 * expected).norm(), 1e-8 * expected.norm());
+  }
+}
+
 TEST(Blend, WithoutEdgesPointsDoNotBlendAtADistance) {
   // Summed, two points 1.2 apart are one piece; united, they are two balls of the radius of a lone one.
   const Body united = two_points(1.2, {.rule = BlendRule::Graph});

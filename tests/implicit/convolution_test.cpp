@@ -253,5 +253,28 @@ TEST(Convolution, PeakBoundsThePotentialClosely) {
   }
 }
 
+// Beside the middle of a long segment the field is that of a line: nothing changes along it, and around it the slope turns with the angle.
+TEST(Convolution, OfALongSegmentHasTheHessianOfALine) {
+  Primitive segment;
+  segment.shape = ShapeKind::Segment;
+  segment.size = Vec3(2.0, 0.0, 0.0);
+  segment.kernel = Kernel::wyvill(0.5);
+  segment.convolved = true;
+  const Body body = body_of({{segment, Vec3::Zero()}});
+  for (int k = 1; k < 40; ++k) {
+    const double r = 0.012 * k, angle = 0.7 * k;
+    const Vec3 out(0.0, std::cos(angle), std::sin(angle)), around(0.0, -std::sin(angle), std::cos(angle));
+    const Vec3 x = Vec3(0.3, 0.0, 0.0) + r * out;
+    Vec3 slope;
+    static_cast<void>(FieldView(body.field).value(x, slope));
+    const Mat3 hessian = body.field.hessian(x);
+    const double turn = slope.dot(out) / r, size = hessian.norm();
+    EXPECT_LT((hessian * Vec3::UnitX()).norm(), 1e-8 * size) << r;
+    EXPECT_LT((hessian * around - turn * around).norm(), 1e-8 * size) << r;
+    const double mean = (slope.dot(hessian * slope) - slope.squaredNorm() * hessian.trace()) / (2.0 * std::pow(slope.norm(), 3));
+    EXPECT_NEAR(mean, 0.5 / r, 1e-7 / r);
+  }
+}
+
 }  // namespace
 }  // namespace supple::implicit
