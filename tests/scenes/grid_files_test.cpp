@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "small_scenes.h"
@@ -62,6 +65,22 @@ TEST_F(GridFiles, AreObjectsOfTheSceneOrBoth) {
   const fs::path both = grids_of(GriddedName::Both, GridContentName::Field);
   EXPECT_GT(implicit::read_grid(both, "right").interpolate(Vec3(0.3, 0, 0)), 0.0);
   EXPECT_GT(implicit::read_grid(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
+}
+
+TEST_F(GridFiles, AreReadByTheToolsOfOpenVdb) {
+  ASSERT_EQ(std::system("command -v vdb_print >/dev/null 2>&1"), 0) << "install libopenvdb-tools";
+  scene_.output.gridding.of = GriddedName::Both;
+  scene_.output.cell = 0.05;
+  RunOptions first = options();
+  first.frames = {1};
+  EXPECT_EQ(run_scene(scene_, first).outcome, "done");
+  const fs::path report = folder_ / "report.txt";
+  ASSERT_EQ(std::system(("vdb_print -l " + (folder_ / "grids/drops.0001.vdb").string() + " >" + report.string() + " 2>&1").c_str()), 0);
+  std::ifstream file(report);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  for (const std::string word : {"Name: left", "Name: right", "Name: scene", "class: level set", "voxel size: 0.05"}) {
+    EXPECT_NE(text.find(word), std::string::npos) << word << " in\n" << text;
+  }
 }
 
 TEST_F(GridFiles, TellOfBulgesThatHoldTooLittle) {
