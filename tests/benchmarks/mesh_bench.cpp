@@ -12,6 +12,8 @@
 ///                                              cubes and the pieces that they miss
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
 ///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -275,8 +277,17 @@ std::uint64_t bytes_of(const Mesh& mesh) {
          mesh.triangle.capacity() * sizeof(mesh.triangle[0]);
 }
 
+/// Of the process so far [MB].
+double peak_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1e-6 * 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
 void measure(const std::string& name, Body& body, const Lattice& lattice, const Method& method, bool two_sided) {
   const Executor executor(1);
+  body.place();
+  const double peak_before = peak_mb();
   double index = 1e300, best = 1e300, total = 0.0;
   Mesh mesh;
   CubeMesher mesher;
@@ -306,17 +317,18 @@ void measure(const std::string& name, Body& body, const Lattice& lattice, const 
     total += end - begin;
   }
   const std::uint64_t bytes = counts.bytes;
+  const double peak = peak_mb();
   if (made != &mesh) mesh = *made;
   const double vertex_error = rms_distance(body.field, mesh.position) / lattice.cell;
   const double centroid_error = rms_distance(body.field, centroids(mesh)) / lattice.cell;
   const Back back = two_sided ? distance_back(body.field, lattice, mesh) : Back{};
   std::printf("{\"name\": \"implicit/mesh/%s\", \"threads\": 1, \"cpu_ms_min\": %.5g, \"index_cpu_ms\": %.4g, "
               "\"items\": %zu, \"items_per_s\": %.4g, \"error\": %.4g, \"error_kind\": \"rms_centroid_over_h\", "
-              "\"rms_vertex_over_h\": %.3g, \"rms_back_over_h\": %.3g, \"largest_back_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"pieces\": %llu, \"joined\": %llu, \"undecided\": %llu, \"hash\": \"%s\"}\n",
+              "\"rms_vertex_over_h\": %.3g, \"rms_back_over_h\": %.3g, \"largest_back_over_h\": %.3g, \"mesh_mb\": %.4g, \"work_mb\": %.4g, \"peak_mb\": %.4g, \"peak_of_body_mb\": %.4g, \"pieces\": %llu, \"joined\": %llu, \"undecided\": %llu, \"hash\": \"%s\"}\n",
               name.c_str(), 1e3 * best, 1e3 * index, mesh.triangle_count(),
               static_cast<double>(mesh.triangle_count()) / best, centroid_error, vertex_error,
               back.rms / lattice.cell, back.largest / lattice.cell,
-              1e-6 * static_cast<double>(bytes_of(mesh)), 1e-6 * static_cast<double>(bytes), static_cast<unsigned long long>(missed.pieces),
+              1e-6 * static_cast<double>(bytes_of(mesh)), 1e-6 * static_cast<double>(bytes), peak, peak_before, static_cast<unsigned long long>(missed.pieces),
               static_cast<unsigned long long>(missed.joined), static_cast<unsigned long long>(missed.undecided), hash_of(mesh).c_str());
   std::fflush(stdout);
 }
