@@ -3,7 +3,8 @@
 ///
 /// On the way from the flat triangles, which do not cross, to the moved ones two would have to touch first. Along a line across all sheets that meet
 /// there inside and outside alternate, so some two of them face each other: nothing touches where one direction has all normals of near triangles, at
-/// all times, on its side. Near is whose box, that of its corners and middles, holds the place. Elsewhere triangles are compared one by one.
+/// all times, on its side. Near is whose box, that of its corners and middles, holds the place. Elsewhere triangles are compared one by one, where they
+/// end: that crossings which begin there do not move on to where none begin is tested, not proved.
 #pragma once
 
 #include <array>

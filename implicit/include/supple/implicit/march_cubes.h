@@ -44,7 +44,7 @@ struct MarchOptions {
   /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
   /// chosen, with cells of at most half the field's feature size and, if that is stated, lattice.cell; see `make`.
   double error = 0.0;
-  /// Refined triangles are not looked at for crossings: half to two thirds of the time, for a mesh that may cross itself where the surface turns
+  /// Refined triangles are not looked at for crossings: half to four fifths of the time, for a mesh that may cross itself where the surface turns
   /// within a cell.
   bool may_cross = false;
   /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them; what failed to mend creases is not tried again. Changes no bit.
