@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The slower checks, before a release: a second compiler, static analysis, the thread sanitizer, headers that stand alone,
+# The slower checks, before a release: a second compiler, static analysis, all checks of its sanitizers, the thread sanitizer, headers that stand alone,
 # the installed package. Writes docs/reports/checks.md. Planted defects take hours and have scripts/mutate.sh.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -7,22 +7,24 @@ source "$here/dependencies.sh"
 source "$here/parts.sh"
 source "$here/package_check.sh"
 
-usage="usage: scripts/check_all.sh [clang] [analysis] [threads] [install]    all when none is named; logs go to build/logs"
+usage="usage: scripts/check_all.sh [clang] [analysis] [sanitizers] [threads] [install]    all when none is named; logs go to build/logs"
 for name in "$@"; do
   case $name in
-    clang | analysis | threads | install) ;;
+    clang | analysis | sanitizers | threads | install) ;;
     -h | --help) echo "$usage" && exit 0 ;;
     *) echo "$usage" >&2 && exit 2 ;;
   esac
 done
-chosen=" ${*:-clang analysis threads install} "
+chosen=" ${*:-clang analysis sanitizers threads install} "
 chose() { [[ $chosen == *" $1 "* ]]; }
 
 logs=$supple_root/build/logs
 clang_build=$supple_root/build/clang
+sanitizer_build=$supple_root/build/asan_clang
 
+# Without precompiled headers: clang reads none of GCC's, and what a file uses it must include.
 configure_clang() {
-  cmake -S "$supple_root" -B "$clang_build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=clang++ \
+  cmake -S "$supple_root" -B "$clang_build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=clang++ -DSUPPLE_PRECOMPILE_HEADERS=OFF \
     -DSUPPLE_WARNINGS_AS_ERRORS=ON -DSUPPLE_BUILD_TESTS=ON -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \
     -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3
 }
@@ -34,6 +36,11 @@ analyse() {
     sed -n 's/^ *"file": "\(.*\)",*$/\1/p' "$clang_build/compile_commands.json" | grep -E '/(src|cli|python)/' | sort -u |
     xargs -P "$supple_jobs" -n 2 clang-tidy --quiet -p "$clang_build"
 }
+
+build_sanitizers() {
+  cd "$supple_root" && cmake --preset asan -B "$sanitizer_build" -DCMAKE_CXX_COMPILER=clang++ && cmake --build "$sanitizer_build"
+}
+test_sanitizers() { ctest --test-dir "$sanitizer_build" -j "$supple_jobs" --output-on-failure --no-tests=error; }
 
 test_tsan() {
   cd "$supple_root" && TSAN_OPTIONS="suppressions=$here/tsan_suppressions.txt ignore_noninstrumented_modules=1 halt_on_error=1" \
@@ -50,6 +57,13 @@ else
   skip_part "tests (clang)" "no build"
 fi
 ! chose analysis || part "static analysis" "$logs/analysis.log" analyse || true
+if ! chose sanitizers; then
+  :
+elif part "build (clang's sanitizers)" "$logs/build_asan_clang.log" build_sanitizers; then
+  part "tests (clang's sanitizers)" "$logs/tests_asan_clang.log" test_sanitizers || true
+else
+  skip_part "tests (clang's sanitizers)" "no build"
+fi
 if ! chose threads; then
   :
 elif part "build (thread sanitizer)" "$logs/build_tsan.log" configure_and_build tsan all; then

@@ -165,7 +165,8 @@ class Builder : public YAML::EventHandler {
       if (open.node->kind == Node::Kind::List) {
         text += '[' + std::to_string(open.node->items.size()) + ']';
       } else {
-        text += (text.empty() ? "" : ".") + shown(open.key);
+        if (!text.empty()) text += '.';
+        text += shown(open.key);
       }
     }
     return text;

@@ -84,8 +84,10 @@ TEST(KeptMeshes, ToAnErrorOfAFrameShareWhatTheyMayKeep) {
   for (const char* blend : {"", ", blend: {rule: graph}"}) {
     std::string text = "schema: 1\nduration: 1 s\nframe_rate: 10\noutput: {meshing: {error: 0.0005, search: false}}\nobjects:\n";
     for (int k = 0; k < 4; ++k) {
-      text += "  - {name: pair" + std::to_string(k) + ", particles: {arrange: line, count: 2, spacing: 0.08, mass: 0.1, at: [0, " + std::to_string(k) +
-              ", 0]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.2}}]" + blend + "}\n";
+      const std::string number = std::to_string(k);
+      text.append("  - {name: pair").append(number);
+      text.append(", particles: {arrange: line, count: 2, spacing: 0.08, mass: 0.1, at: [0, ").append(number);
+      text.append(", 0]}, skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.2}}]").append(blend).append("}\n");
     }
     Simulation simulation = make(text);
     const Model& model = simulation.model();
