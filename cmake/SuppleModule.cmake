@@ -74,10 +74,12 @@ endfunction()
 # supple_test(MODULE SOURCES s... [LIBRARIES targets]): one test program per module, <module>_tests.
 function(supple_test module)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
-  add_executable(${module}_tests ${arg_SOURCES})
+  set(source_dir ${PROJECT_SOURCE_DIR}/tests/support/source_dir.cpp)
+  set_source_files_properties(${source_dir} PROPERTIES
+    COMPILE_DEFINITIONS SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
+  add_executable(${module}_tests ${arg_SOURCES} ${source_dir})
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
-  target_compile_definitions(${module}_tests PRIVATE SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   supple_precompile(${module}_tests <gtest/gtest.h> <filesystem> <fstream> <sstream>)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/tests-tmp)  # two builds may test at the same time
   gtest_discover_tests(${module}_tests

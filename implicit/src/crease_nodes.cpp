@@ -20,15 +20,16 @@ void gather(const BlendIndex& blend, std::size_t i, const FieldParts& parts, std
   }
 }
 
-/// F_k and its gradient. @param own  sums of node k  @param nodes  of all nodes
+/// F_k and its gradient; where sums are alike but for rounding, that from within the node's own side, where its sum is the larger.
+/// @param own  sums of node k  @param nodes  of all nodes
 NodeSample node_sample(const Field::Index& index, const NodeSample& own, std::span<const NodeSample> nodes) {
+  constexpr double kAlike = 1e-12;  // points of creases leave 1e-13
   NodeSample found{.node = own.node, .value = own.value - index.iso, .gradient = own.gradient};
   for (const NodeSample& other : nodes) {
     const double w = other.node == own.node ? 0.0 : index.blend.weight(own.node, other.node);
     if (w == 0.0) continue;
-    const NodeSample& less = other.value < own.value ? other : own;
-    found.value += w * less.value;
-    found.gradient += w * less.gradient;
+    found.value += w * std::min(other.value, own.value);
+    found.gradient += w * (other.value < own.value + kAlike ? other : own).gradient;
   }
   return found;
 }

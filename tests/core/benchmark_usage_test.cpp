@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "benchmarks/usage.h"
+#include "support/source_dir.h"
 
 namespace supple::benchmarks {
 namespace {
@@ -39,7 +40,7 @@ TEST(BenchmarkUsageDeathTest, IsAnsweredBeforeAnythingElse) {
 
 TEST(BenchmarkUsage, IsAskedForByEveryProgram) {
   int programs = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(SUPPLE_SOURCE_DIR) / "tests/benchmarks")) {
+  for (const auto& entry : std::filesystem::directory_iterator(supple::testing::source_dir() / "tests/benchmarks")) {
     if (entry.path().extension() != ".cpp") continue;
     std::ifstream file(entry.path());
     std::stringstream text;

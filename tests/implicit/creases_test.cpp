@@ -345,6 +345,28 @@ TEST(CreasesNeverCross, ToAnErrorEither) {
   EXPECT_EQ(found, 2);
 }
 
+// A chain whose neighbours blend and whose other particles are too far apart to: its field is the plain sum, smooth where the largest node
+// changes, and so are the normals there.
+TEST(Creases, BendNoNormalsWhereNodesBlendWholly) {
+  std::vector<std::pair<Primitive, Vec3>> chain;
+  for (int k = 0; k < 6; ++k) chain.push_back({wyvill_point(1.0), 0.45 * k * kAxis});
+  const Body sum = body_of(chain);
+  Body body = body_of(chain);
+  body.skeleton.blend.rule = BlendRule::Graph;
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    for (std::uint32_t j = i + 1; j < std::min(i + 3, 6u); ++j) body.skeleton.blend.edge.push_back({i, j, 1.0});
+  }
+  body.place();
+  const Mesh mesh = march_creases(body.field, {.lattice = lattice_of(0.1)}, Executor(2));
+  std::vector<double> value(mesh.position.size());
+  std::vector<Vec3> gradient(mesh.position.size());
+  sum.field.evaluate(mesh.position, value, gradient);
+  for (std::size_t v = 0; v < mesh.position.size(); ++v) {
+    EXPECT_NEAR(value[v], 0.0, 1e-9);
+    EXPECT_LT((mesh.normal[v] + gradient[v].normalized()).norm(), 1e-6) << v;
+  }
+}
+
 // Both ways, though only the centroids are promised: a chord's middle lies 9/8 times as far as its triangle's centroid, and at the crease the
 // circle bends by kRadius / rim times as much as the balls.
 TEST(Creases, ReachTheErrorThatIsAskedFor) {

@@ -6,6 +6,7 @@
 
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 Scene library_scene(const std::string& name) {
-  return read_scene(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"));
+  return read_scene(supple::testing::source_dir() / "scenes/library" / (name + ".yaml"));
 }
 
 std::size_t object_index(const Simulation& simulation, const std::string& name) {

@@ -7,6 +7,7 @@
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 namespace {
@@ -110,7 +111,7 @@ TEST(IntegratorKey, KeepsTheBitsOfARestartAndOfEveryNumberOfThreads) {
 }
 
 TEST(IntegratorKey, LeavesTheLibraryToVelocityVerlet) {
-  for (const auto& entry : fs::recursive_directory_iterator(fs::path(SUPPLE_SOURCE_DIR) / "scenes/library")) {
+  for (const auto& entry : fs::recursive_directory_iterator(supple::testing::source_dir() / "scenes/library")) {
     if (entry.path().extension() != ".yaml") continue;
     const Scene scene = read_scene(entry.path());
     if (scene.integrator.method != MethodName::Auto) continue;

@@ -11,6 +11,7 @@
 #include "supple/core/error.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 namespace {
@@ -25,7 +26,7 @@ std::string contents(const fs::path& path) {
 }
 
 const fs::path& folder() {
-  static const fs::path path = fs::path(SUPPLE_SOURCE_DIR) / "tests/golden/messages";
+  static const fs::path path = supple::testing::source_dir() / "tests/golden/messages";
   return path;
 }
 

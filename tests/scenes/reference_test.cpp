@@ -5,12 +5,13 @@
 #include <sstream>
 
 #include "supple/scenes/read_scene.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 namespace {
 
 TEST(SceneReference, PageInTheDocsIsTheOneTheReaderWrites) {
-  std::ifstream file(std::string(SUPPLE_SOURCE_DIR) + "/docs/scene_reference.md");
+  std::ifstream file(supple::testing::source_dir() / "docs/scene_reference.md");
   std::stringstream page;
   page << file.rdbuf();
   EXPECT_EQ(page.str(), scene_reference()) << "renew it: supple reference > docs/scene_reference.md";

@@ -9,11 +9,12 @@
 
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 
 inline Scene library_scene(const std::string& name, const std::vector<std::string>& overrides = {}) {
-  return read_scene(std::filesystem::path(SUPPLE_SOURCE_DIR) / "scenes/library" / (name + ".yaml"), overrides);
+  return read_scene(supple::testing::source_dir() / "scenes/library" / (name + ".yaml"), overrides);
 }
 
 inline Simulation make(const std::string& text, SimulationOptions options = {}) {

@@ -24,6 +24,7 @@
 #include "supple/scenes/output_limits.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 namespace {
@@ -179,7 +180,7 @@ TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
 TEST_F(Run, WritesNoColumnThatTheDocumentsDoNotDescribe) {
   Scene scene = parse_scene(std::string(small::kTwoDrops) + "duration: 0.1 s\noutput: {contacts: csv, particles: csv, samples: csv}\n", "drops.yaml", ".");
   ASSERT_EQ(run_scene(scene, options()).outcome, "done");
-  std::ifstream file(fs::path(SUPPLE_SOURCE_DIR) / "docs/results.md");
+  std::ifstream file(supple::testing::source_dir() / "docs/results.md");
   const std::string described{std::istreambuf_iterator<char>(file), {}};
   for (const char* table : {"contacts/drops.0001.csv", "contacts/drops.pairs.0001.csv", "particles/drops.0001.csv", "samples/drops.0001.csv"}) {
     std::ifstream rows(folder_ / table);

@@ -8,6 +8,7 @@
 
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/source_dir.h"
 
 namespace supple::scenes {
 namespace {
@@ -110,7 +111,7 @@ TEST(Stick, LetsAStackOfTenInAShaftThatGrowsHeavierUpwardFallAsleep) {
 }
 
 TEST(Stick, LetsAHundredBallsInABinComeToRestAndSleep) {
-  Simulation s(read_scene(std::filesystem::path(SUPPLE_SOURCE_DIR) / "scenes/library/contacts/pile_rests.yaml"), {.threads = 2});
+  Simulation s(read_scene(supple::testing::source_dir() / "scenes/library/contacts/pile_rests.yaml"), {.threads = 2});
   run(s, 73);  // three seconds
   const State& state = s.state();
   ASSERT_EQ(state.particles.position.size(), 100u);
