@@ -19,7 +19,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
   # GCC bug 105651: false -Wrestrict on std::string concatenation.
   target_compile_options(supple_flags INTERFACE -Wno-restrict)
 endif()
-if(SUPPLE_WARNINGS_AS_ERRORS)
+if(SUPPLE_WARNINGS_AS_ERRORS AND NOT SUPPLE_SANITIZE)  # what sanitizers add leads GCC to false alarms
   target_compile_options(supple_flags INTERFACE -Werror)
 endif()
 if(SUPPLE_SANITIZE)

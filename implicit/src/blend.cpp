@@ -107,9 +107,9 @@ Combined BlendIndex::combine(std::span<const NodeSample> nodes, std::span<double
         }
       }
       share[best] = 1.0;
-      for_neighbours(nodes, best, [&](std::size_t j, double w) {
-        share[nodes[j].value < nodes[best].value ? j : best] += w;
-      });
+      // Where its field is the largest the node's own value is, but for rounding: alike, the other's slope counts.
+      const double own = nodes[best].value + 64.0 * std::numeric_limits<double>::epsilon() * out.value;
+      for_neighbours(nodes, best, [&](std::size_t j, double w) { share[nodes[j].value < own ? j : best] += w; });
       return out;
     }
     case BlendRule::Ricci: {

@@ -24,7 +24,7 @@ void call(std::vector<std::string> words) {
 }
 
 TEST(BenchmarkUsageDeathTest, IsAnsweredBeforeAnythingElse) {
-  using testing::ExitedWithCode;
+  using ::testing::ExitedWithCode;
   for (const char* word : {"-h", "--help"}) {
     EXPECT_EXIT(call({word}), ExitedWithCode(0), "");
     EXPECT_EXIT(call({"plot.svg", word}), ExitedWithCode(0), "");

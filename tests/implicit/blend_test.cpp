@@ -93,6 +93,24 @@ TEST(Blend, TwoNodesOfAGraphGiveTheLargerAndAShareOfTheSmaller) {
   }
 }
 
+TEST(Blend, WhollyOfNodesHasTheSlopeOfTheirSumWhereTheyAreAlike) {
+  const Vec3 axis(0.8, 0.36, 0.48), u = axis.unitOrthogonal(), v = axis.cross(u);
+  for (const auto& [along, sideways, upwards] : {std::array{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)}, std::array{axis, u, v}}) {
+    const std::vector<std::pair<Primitive, Vec3>> points{{wyvill_point(1.0), -0.3 * along}, {wyvill_point(1.0), 0.3 * along}};
+    const Body sum = body_of(points);
+    Body graph = body_of(points);
+    graph.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, 1.0}}};
+    graph.place();
+    for (const Vec3& x : random_points(5, 300, 0.6)) {
+      const Vec3 between = x.y() * sideways + x.z() * upwards;  // as far from either, along the first axis to the last bit
+      Vec3 slope, expected;
+      (void)FieldView(graph.field).value(between, slope);
+      (void)FieldView(sum.field).value(between, expected);
+      EXPECT_LT((slope - expected).norm(), 1e-13);
+    }
+  }
+}
+
 TEST(Blend, OfPointsInOnePlaceHasTheirHessianByItsFactor) {
   const Body one = body_of({{wyvill_point(1.0), Vec3::Zero()}});
   const Body power = two_points(0.0, {.rule = BlendRule::Ricci, .node = {}, .edge = {}, .exponent = 3.0});
