@@ -24,7 +24,7 @@ void call(std::vector<std::string> words) {
 }
 
 TEST(BenchmarkUsageDeathTest, IsAnsweredBeforeAnythingElse) {
-  using ::testing::ExitedWithCode;
+  using testing::ExitedWithCode;
   for (const char* word : {"-h", "--help"}) {
     EXPECT_EXIT(call({word}), ExitedWithCode(0), "");
     EXPECT_EXIT(call({"plot.svg", word}), ExitedWithCode(0), "");
@@ -40,7 +40,7 @@ TEST(BenchmarkUsageDeathTest, IsAnsweredBeforeAnythingElse) {
 
 TEST(BenchmarkUsage, IsAskedForByEveryProgram) {
   int programs = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(supple::testing::source_dir() / "tests/benchmarks")) {
+  for (const auto& entry : std::filesystem::directory_iterator(source_dir() / "tests/benchmarks")) {
     if (entry.path().extension() != ".cpp") continue;
     std::ifstream file(entry.path());
     std::stringstream text;

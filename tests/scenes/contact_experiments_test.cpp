@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 Simulation make(const std::string& text) { return Simulation(parse_scene(text, "test.yaml", ".")); }
 
 Simulation library(const std::string& name, const std::vector<std::string>& overrides = {}) {
-  return Simulation(read_scene(supple::testing::source_dir() / "scenes/library" / (name + ".yaml"), overrides));
+  return Simulation(read_scene(source_dir() / "scenes/library" / (name + ".yaml"), overrides));
 }
 
 /// A ball of linear pressure (half its modulus at its centre) dropped by 0.2 m, in equal steps of a millisecond or less.

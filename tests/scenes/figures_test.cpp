@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 Scene library_scene(const std::string& name) {
-  return read_scene(supple::testing::source_dir() / "scenes/library" / (name + ".yaml"));
+  return read_scene(source_dir() / "scenes/library" / (name + ".yaml"));
 }
 
 std::size_t object_index(const Simulation& simulation, const std::string& name) {

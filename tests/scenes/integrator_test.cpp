@@ -111,7 +111,7 @@ TEST(IntegratorKey, KeepsTheBitsOfARestartAndOfEveryNumberOfThreads) {
 }
 
 TEST(IntegratorKey, LeavesTheLibraryToVelocityVerlet) {
-  for (const auto& entry : fs::recursive_directory_iterator(supple::testing::source_dir() / "scenes/library")) {
+  for (const auto& entry : fs::recursive_directory_iterator(source_dir() / "scenes/library")) {
     if (entry.path().extension() != ".yaml") continue;
     const Scene scene = read_scene(entry.path());
     if (scene.integrator.method != MethodName::Auto) continue;

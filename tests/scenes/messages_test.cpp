@@ -26,7 +26,7 @@ std::string contents(const fs::path& path) {
 }
 
 const fs::path& folder() {
-  static const fs::path path = supple::testing::source_dir() / "tests/golden/messages";
+  static const fs::path path = source_dir() / "tests/golden/messages";
   return path;
 }
 

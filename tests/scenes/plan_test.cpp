@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 std::vector<fs::path> library() {
   std::vector<fs::path> scenes;
-  for (const auto& entry : fs::recursive_directory_iterator(supple::testing::source_dir() / "scenes/library")) {
+  for (const auto& entry : fs::recursive_directory_iterator(source_dir() / "scenes/library")) {
     if (entry.path().extension() == ".yaml") scenes.push_back(entry.path());
   }
   std::sort(scenes.begin(), scenes.end());
@@ -64,7 +64,7 @@ TEST(StepPlan, SkipsAllOfCollisionForASingleObject) {
 }
 
 TEST(StepPlan, SimulateOnlySkipsMeshAndRender) {
-  const Scene scene = read_scene(supple::testing::source_dir() / "scenes/library/figures/ball_hits_spiral.yaml");
+  const Scene scene = read_scene(source_dir() / "scenes/library/figures/ball_hits_spiral.yaml");
   const StepPlan plan = plan_of(scene, {});
   EXPECT_FALSE(plan.on(Stage::Polygonise));
   EXPECT_FALSE(plan.on(Stage::Render));
@@ -75,7 +75,7 @@ TEST(StepPlan, SimulateOnlySkipsMeshAndRender) {
 }
 
 TEST(StepPlan, IsNotWellFormedWhenAStageReadsWhatNobodyWrote) {
-  const Scene scene = read_scene(supple::testing::source_dir() / "scenes/library/figures/ball_hits_spiral.yaml");
+  const Scene scene = read_scene(source_dir() / "scenes/library/figures/ball_hits_spiral.yaml");
   StepPlan plan = plan_of(scene, {.images = true});
   plan.stages[static_cast<std::size_t>(Stage::IndexField)].on = false;
   EXPECT_FALSE(well_formed(plan));

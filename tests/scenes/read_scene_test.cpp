@@ -259,7 +259,7 @@ TEST(SceneReader, SaysWhenAFileCannotBeRead) {
 
 TEST(SceneReader, ReadsEverySceneOfTheLibrary) {
   int count = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(supple::testing::source_dir() / "scenes/library")) {
+  for (const auto& entry : fs::recursive_directory_iterator(source_dir() / "scenes/library")) {
     if (entry.path().extension() != ".yaml") continue;
     EXPECT_NO_THROW((void)read_scene(entry.path())) << entry.path();
     ++count;

@@ -11,7 +11,7 @@ namespace supple::scenes {
 namespace {
 
 TEST(SceneReference, PageInTheDocsIsTheOneTheReaderWrites) {
-  std::ifstream file(supple::testing::source_dir() / "docs/scene_reference.md");
+  std::ifstream file(source_dir() / "docs/scene_reference.md");
   std::stringstream page;
   page << file.rdbuf();
   EXPECT_EQ(page.str(), scene_reference()) << "renew it: supple reference > docs/scene_reference.md";

@@ -14,7 +14,7 @@
 namespace supple::scenes {
 
 inline Scene library_scene(const std::string& name, const std::vector<std::string>& overrides = {}) {
-  return read_scene(supple::testing::source_dir() / "scenes/library" / (name + ".yaml"), overrides);
+  return read_scene(source_dir() / "scenes/library" / (name + ".yaml"), overrides);
 }
 
 inline Simulation make(const std::string& text, SimulationOptions options = {}) {

@@ -180,7 +180,7 @@ TEST_F(Run, RefusesToReplaceAnEarlierResultUnlessTold) {
 TEST_F(Run, WritesNoColumnThatTheDocumentsDoNotDescribe) {
   Scene scene = parse_scene(std::string(small::kTwoDrops) + "duration: 0.1 s\noutput: {contacts: csv, particles: csv, samples: csv}\n", "drops.yaml", ".");
   ASSERT_EQ(run_scene(scene, options()).outcome, "done");
-  std::ifstream file(supple::testing::source_dir() / "docs/results.md");
+  std::ifstream file(source_dir() / "docs/results.md");
   const std::string described{std::istreambuf_iterator<char>(file), {}};
   for (const char* table : {"contacts/drops.0001.csv", "contacts/drops.pairs.0001.csv", "particles/drops.0001.csv", "samples/drops.0001.csv"}) {
     std::ifstream rows(folder_ / table);

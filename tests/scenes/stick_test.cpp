@@ -111,7 +111,7 @@ TEST(Stick, LetsAStackOfTenInAShaftThatGrowsHeavierUpwardFallAsleep) {
 }
 
 TEST(Stick, LetsAHundredBallsInABinComeToRestAndSleep) {
-  Simulation s(read_scene(supple::testing::source_dir() / "scenes/library/contacts/pile_rests.yaml"), {.threads = 2});
+  Simulation s(read_scene(source_dir() / "scenes/library/contacts/pile_rests.yaml"), {.threads = 2});
   run(s, 73);  // three seconds
   const State& state = s.state();
   ASSERT_EQ(state.particles.position.size(), 100u);

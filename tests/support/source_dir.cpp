@@ -1,7 +1,7 @@
 #include "support/source_dir.h"
 
-namespace supple::testing {
+namespace supple {
 
 std::filesystem::path source_dir() { return SUPPLE_SOURCE_DIR; }
 
-}  // namespace supple::testing
+}  // namespace supple
