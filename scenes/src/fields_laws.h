@@ -32,8 +32,7 @@ void check_cohesion(Archive& archive, const InteractionDesc& d) {
                 : d.scale_force   ? "scale_force"
                 : d.maximum_ratio ? "maximum_ratio"
                                   : "maximum_distance",
-                "expected maximum_distance and maximum_force together", "one of them",
-                d.maximum_ratio || d.scale_force ? "maximum_ratio stands for maximum_distance, scale_force for maximum_force" : "");
+                "expected maximum_distance or maximum_ratio, and maximum_force or scale_force", "one of them", "");
   archive.check(!(d.maximum_distance && d.maximum_ratio), "maximum_ratio", "expected either maximum_distance or maximum_ratio",
                 "both", "");
   archive.check(!(d.maximum_force && d.scale_force), "scale_force", "expected either maximum_force or scale_force", "both", "");

@@ -97,13 +97,11 @@ std::string ReadArchive::mapping_hint(const Node& node, const std::vector<FieldI
 }
 
 void ReadArchive::check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) {
-  if (holds) return;
-  const std::string path = path_.empty() ? key : key.empty() ? path_ : path_ + '.' + key;
-  if (!key.empty() && faults_.has(path)) return;
-  faults_.add(mark_of(mapping_, key), path, std::move(expected), std::move(found), std::move(hint));
+  if (!holds) broken_.push_back({key, std::move(expected), std::move(found), std::move(hint)});
 }
 
 void ReadArchive::finish() {
+  bool misspelt = false;
   for (const Node::Entry& entry : mapping_.entries) {
     const std::string_view key = entry.key;
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
@@ -130,11 +128,19 @@ void ReadArchive::finish() {
     std::string near = std::find(known_.begin(), known_.end(), ours) != known_.end() ? std::string(ours) : "";
     if (near.empty()) near = nearest_word(key, known_);
     if (!near.empty()) {
+      misspelt = true;
       hint = "did you mean '" + near + "'? (" + hint + ')';
     } else if (const std::string home = home_of(key, scene_fields(), ""); !home.empty() && home != path_) {
       hint = "a key of this name belongs to " + home + " (" + hint + ')';
     }
     faults_.add(entry.mark, path, "unknown key", "", hint);
+  }
+  for (Broken& relation : broken_) {
+    const std::string& key = relation.key;
+    if (misspelt && key.find_first_of(".[") == std::string::npos) continue;
+    const std::string path = path_.empty() ? key : key.empty() ? path_ : path_ + '.' + key;
+    if (!key.empty() && faults_.has(path)) continue;
+    faults_.add(mark_of(mapping_, key), path, std::move(relation.expected), std::move(relation.found), std::move(relation.hint));
   }
 }
 

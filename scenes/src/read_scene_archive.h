@@ -31,9 +31,10 @@ class ReadArchive {
     field(key, value, rule, true);
   }
   [[nodiscard]] bool given(std::string_view key) const { return mapping_.find(key) != nullptr; }
-  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds or that key is faulty already.
+  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or
+  /// another key of this mapping seems misspelt, which may be the one that `key` misses.
   void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint);
-  /// Reports keys that no field took. Call after `fields`.
+  /// Reports keys that no field took, and relations that do not hold. Call after `fields`.
   void finish();
 
  private:
@@ -161,11 +162,17 @@ class ReadArchive {
     When when;
   };
 
+  /// A relation that does not hold.
+  struct Broken {
+    std::string key, expected, found, hint;
+  };
+
   FaultList& faults_;
   const Node& mapping_;
   std::string path_;
   std::vector<std::string_view> known_;
   std::vector<Idle> idle_;
+  std::vector<Broken> broken_;
 };
 
 }  // namespace supple::scenes
