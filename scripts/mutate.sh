@@ -8,15 +8,20 @@ source "$here/dependencies.sh"
 source "$here/parts.sh"
 
 if [[ ${1:-} == -h || ${1:-} == --help ]]; then
-  echo "usage: scripts/mutate.sh [--check] [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
+  echo "usage: scripts/mutate.sh [--check | -j N] [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
   echo "--check builds nothing: it says whether every defect still has its place in the sources."
+  echo "-j N plants N defects at a time, each in a copy of the tree with a build of its own."
   echo "A module all of whose defects are killed gets its report, docs/reports/mutations/MODULE.md."
   exit 0
 fi
-check=0
+check=0 jobs=1
 if [[ ${1:-} == --check ]]; then
   check=1
   shift
+elif [[ ${1:-} == -j ]]; then
+  jobs=${2:-}
+  [[ $jobs =~ ^[1-9][0-9]?$ ]] || { echo "error: -j: expected a number from 1 to 99, found '$jobs'" >&2; exit 2; }
+  shift 2
 fi
 modules=("$@")
 if ((${#modules[@]} == 0)); then
@@ -58,22 +63,31 @@ fi
 install_packages build test
 
 work=$(mktemp -d "${TMPDIR:-/tmp}/supple_mutate.XXXXXX")
-trap 'rm -rf "$work"' EXIT
-tree=$work/tree
-mkdir "$tree"
-tar -C "$supple_root" --exclude=./build --exclude=./out --exclude=./.git -cf - . | tar -C "$tree" -xf -
-# The copy lies elsewhere each time; relative paths let the cache know it again.
-export CCACHE_BASEDIR=$tree CCACHE_NOHASHDIR=1
+trap 'jobs -p | xargs -r kill 2>/dev/null; rm -rf "$work"' EXIT
 
 # plant FILE FROM TO: replaces what it has once.
 plant() { perl -0777 -pi -e 'BEGIN { ($from, $to) = splice @ARGV, 0, 2 } s/\Q$from\E/$to/' -- "$2" "$3" "$1"; }
 
-# build TARGET: to a log, quietly.
-build() { cmake --build "$work/build" --target "$1" >"$work/build.log" 2>&1; }
+# build TARGET: in `home`, to a log, quietly.
+build() { cmake --build "$home/tree/build/release" --target "$1" >"$home/build.log" 2>&1; }
 
-echo "configuring a copy of the tree"
-cmake -S "$tree" -B "$work/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPPLE_BUILD_TOOL=OFF >"$work/configure.log" 2>&1 ||
-  { tail -n 30 "$work/configure.log"; exit 1; }
+# The copies lie elsewhere each time; relative paths and the layout of the tree itself let the cache know them again.
+export CCACHE_NOHASHDIR=1
+# Defects may leave warnings, such as of a variable that nothing uses any more.
+cat >"$work/compile" <<'END'
+#!/bin/sh
+command -v ccache >/dev/null && set -- ccache "$@"
+"$@" 2>/dev/null || exec "$@" -Wno-error
+END
+chmod +x "$work/compile"
+for ((copy = 0; copy < jobs; ++copy)); do
+  home=$work/$copy
+  mkdir -p "$home/tree"
+  tar -C "$supple_root" --exclude=./build --exclude=./out --exclude=./.git -cf - . | tar -C "$home/tree" -xf -
+  echo "configuring a copy of the tree"
+  (cd "$home/tree" && cmake --preset release -DSUPPLE_BUILD_TOOL=OFF -DCMAKE_CXX_COMPILER_LAUNCHER="$work/compile" >"$home/configure.log" 2>&1) ||
+    { tail -n 30 "$home/configure.log"; exit 1; }
+done
 
 # write_report MODULE KILLED ROW...
 write_report() {
@@ -93,47 +107,70 @@ write_report() {
   echo "wrote docs/reports/mutations/$module.md"
 }
 
-failed=0
-for module in "${modules[@]}"; do
-  target=${module}_tests
-  echo "$module: building the tests without defects"
-  build "$target" || { tail -n 40 "$work/build.log"; exit 1; }
-  program=$work/build/bin/$target
-  cp "$program" "$work/sound"
-  declare -a rows=()
-  number=0 killed=0 bad=0
+# try_line PLACE LINE: plants one defect in the tree of `home`; prints the verdict, and the row of the report to $home/row.
+try_line() {
+  local place=$1 field verdict
+  split_line "$2"
+  if ((${#field[@]} != 4)); then
+    echo "  $place: expected 4 fields, found ${#field[@]}"
+    return 1
+  fi
+  local tree=$home/tree file=${field[0]} from=${field[1]} to=${field[2]} filter=${field[3]}
+  cp "$tree/$file" "$home/original" || return 1
+  if ! timeout 120 "$home/sound" --gtest_brief=1 --gtest_filter="$filter" >"$home/test.log" 2>&1; then
+    verdict="the tests fail without the defect"
+  elif ! grep -Eq '\[  PASSED  \] [1-9][0-9]* test' "$home/test.log"; then
+    verdict="the filter names no test"
+  elif ! has_once "$tree/$file" "$from" 2>"$home/error"; then
+    verdict=$(sed "s|$tree/||" "$home/error")
+  elif ! plant "$tree/$file" "$from" "$to" || ! build "$target"; then
+    verdict="does not compile"
+  elif timeout 120 "$home/tree/build/release/bin/$target" --gtest_brief=1 --gtest_filter="$filter" >"$home/test.log" 2>&1; then
+    verdict=survived
+  else
+    verdict=killed
+  fi
+  cp "$home/original" "$tree/$file"
+  printf '  %-8s %s  %s: %s -> %s\n' "$verdict" "$place" "$file" "$from" "$to"
+  echo "| $file | \`${from//|/\\|}\` | \`${to//|/\\|}\` | \`${filter//|/\\|}\` | $verdict |" >"$home/row"
+  [[ $verdict == killed ]]
+}
+
+# try_lines MODULE COPY: every `jobs`-th line of the module's list, in the tree of that copy; rows to $work/rows/NUMBER.
+try_lines() {
+  local module=$1 home=$work/$2 number=0 line
   while IFS= read -r line || [[ -n $line ]]; do
     number=$((number + 1))
     [[ -z $line || $line == \#* ]] && continue
-    place=tests/$module/mutations.txt:$number
-    split_line "$line"
-    if ((${#field[@]} != 4)); then
-      echo "  $place: expected 4 fields, found ${#field[@]}"
-      bad=$((bad + 1))
-      continue
-    fi
-    file=${field[0]} from=${field[1]} to=${field[2]} filter=${field[3]}
-    cp "$tree/$file" "$work/original" || { bad=$((bad + 1)); continue; }
-    if ! timeout 120 "$work/sound" --gtest_brief=1 --gtest_filter="$filter" >"$work/test.log" 2>&1; then
-      verdict="the tests fail without the defect"
-    elif ! grep -Eq '\[  PASSED  \] [1-9][0-9]* test' "$work/test.log"; then
-      verdict="the filter names no test"
-    elif ! has_once "$tree/$file" "$from" 2>"$work/error"; then
-      verdict=$(sed "s|$tree/||" "$work/error")
-    elif ! plant "$tree/$file" "$from" "$to" || ! build "$target"; then
-      verdict="does not compile"
-    elif timeout 120 "$program" --gtest_brief=1 --gtest_filter="$filter" >"$work/test.log" 2>&1; then
-      verdict=survived
-    else
-      verdict=killed
-    fi
-    cp "$work/original" "$tree/$file"
-    if [[ $verdict == killed ]]; then killed=$((killed + 1)); else bad=$((bad + 1)); fi
-    printf '  %-8s %s  %s: %s -> %s\n' "$verdict" "$place" "$file" "$from" "$to"
-    rows+=("| $file | \`${from//|/\\|}\` | \`${to//|/\\|}\` | \`${filter//|/\\|}\` | $verdict |")
+    ((number % jobs == $2)) || continue
+    try_line "tests/$module/mutations.txt:$number" "$line" && mv "$home/row" "$work/rows/$(printf %06d "$number")"
   done <"$supple_root/tests/$module/mutations.txt"
-  echo "$module: $killed killed, $bad not"
-  if ((bad == 0 && killed > 0)); then write_report "$module" "$killed" "${rows[@]}"; fi
+}
+
+failed=0
+for module in "${modules[@]}"; do
+  target=${module}_tests
+  rm -rf "$work/rows"
+  mkdir "$work/rows"
+  for ((copy = 0; copy < jobs; ++copy)); do
+    home=$work/$copy
+    export CCACHE_BASEDIR=$home/tree
+    echo "$module: building the tests without defects"
+    build "$target" || { tail -n 40 "$home/build.log"; exit 1; }
+    cp "$home/tree/build/release/bin/$target" "$home/sound"
+  done
+  for ((copy = 0; copy < jobs; ++copy)); do
+    CCACHE_BASEDIR=$work/$copy/tree try_lines "$module" "$copy" &
+  done
+  wait
+  rows=()
+  for row in "$work"/rows/*; do
+    [[ -f $row ]] && rows+=("$(<"$row")")
+  done
+  lines=$(grep -cEv '^(#|$)' "$supple_root/tests/$module/mutations.txt" || true)
+  bad=$((lines - ${#rows[@]}))
+  echo "$module: ${#rows[@]} killed, $bad not"
+  if ((bad == 0 && ${#rows[@]} > 0)); then write_report "$module" "${#rows[@]}" "${rows[@]}"; fi
   failed=$((failed + bad))
 done
 ((failed == 0))

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numeric>
@@ -12,6 +13,7 @@ namespace lattice {
 namespace {
 
 constexpr std::size_t kBoxesPerTask = 32;
+constexpr std::size_t kMostCubes = 8192;  // of a level that is refined at once
 constexpr double kLargestNode = 1 << 30;
 
 /// A cube of 2^level blocks, in units of its own size, with its candidates.
@@ -43,6 +45,18 @@ struct LevelPart {
   std::vector<Cube> cube;
   std::vector<std::uint32_t> candidate;
   std::vector<BlockBox> inside;
+
+  /// Cubes first..last of another one that was looked at, with their candidates, which follow each other.
+  void append(const LevelPart& other, std::size_t first, std::size_t last) {
+    if (first == last) return;
+    const std::uint32_t from = other.cube[first].first, to = other.cube[last - 1].first + other.cube[last - 1].count;
+    const auto at = static_cast<std::uint32_t>(candidate.size());
+    candidate.insert(candidate.end(), other.candidate.begin() + from, other.candidate.begin() + to);
+    for (std::size_t i = first; i < last; ++i) {
+      cube.push_back(other.cube[i]);
+      cube.back().first += at - from;
+    }
+  }
 };
 
 /// Looks at every cube of a level, in order; @return those to keep.
@@ -68,12 +82,7 @@ LevelPart look(const LevelPart& level, int size, const BlockRange& range, const 
   });
   LevelPart joined;
   for (const LevelPart& part : parts) {
-    const auto shift = static_cast<std::uint32_t>(joined.candidate.size());
-    for (Cube cube : part.cube) {
-      cube.first += shift;
-      joined.cube.push_back(cube);
-    }
-    joined.candidate.insert(joined.candidate.end(), part.candidate.begin(), part.candidate.end());
+    joined.append(part, 0, part.cube.size());
     joined.inside.insert(joined.inside.end(), part.inside.begin(), part.inside.end());
   }
   return joined;
@@ -93,6 +102,58 @@ void halve(LevelPart& level, int size, const BlockRange& range) {
   }
   level.cube = std::move(children);
 }
+
+/// Refines levels down to blocks. A level of many cubes is refined in parts, one after the other, so that what does not fit is
+/// refused without having been in memory.
+class Refinement {
+ public:
+  Refinement(const BlockRange& range, const Lattice& lattice, const Executor& executor, const RefineOptions& options, const Decide& decide)
+      : range_(range), lattice_(lattice), executor_(executor), options_(options), decide_(decide) {}
+
+  /// @param level  cubes of 2^size blocks that were not looked at yet
+  void refine(LevelPart level, int size) {
+    for (;; --size) {
+      std::uint64_t& looked = looked_[static_cast<std::size_t>(size)];
+      looked += level.cube.size();
+      if (looked > options_.limit * options_.look_factor) refuse(blocks_in(looked, size));
+      level = look(level, size, range_, lattice_, executor_, options_, decide_);
+      found_.inside.insert(found_.inside.end(), level.inside.begin(), level.inside.end());
+      const std::size_t count = level.cube.size();
+      if (size == 0) {
+        found_.append(level, 0, count);
+        if (found_.cube.size() > options_.limit) refuse(static_cast<double>(found_.cube.size()));
+        return;
+      }
+      if (count > kMostCubes) {
+        if (expected_ == 0.0) expected_ = blocks_in(count, size);
+        for (std::size_t first = 0; first < count; first += kMostCubes) {
+          LevelPart part;
+          part.append(level, first, std::min(first + kMostCubes, count));
+          halve(part, size - 1, range_);
+          refine(std::move(part), size - 1);
+        }
+        return;
+      }
+      halve(level, size - 1, range_);
+    }
+  }
+  /// Blocks that are left, in no order.
+  LevelPart& found() { return found_; }
+
+ private:
+  /// A surface in n boxes of 2^size blocks lies in about 4^size n blocks.
+  static double blocks_in(std::uint64_t boxes, int size) { return std::ldexp(static_cast<double>(boxes), 2 * size); }
+  [[noreturn]] void refuse(double least) const { refuse_blocks(std::max(least, expected_), lattice_, options_); }
+
+  const BlockRange& range_;
+  const Lattice& lattice_;
+  const Executor& executor_;
+  const RefineOptions& options_;
+  const Decide& decide_;
+  LevelPart found_;
+  std::array<std::uint64_t, 32> looked_{};  // cubes of each size
+  double expected_ = 0.0;                   // blocks, by the first level that is refined in parts
+};
 
 }  // namespace
 
@@ -174,24 +235,17 @@ BlockList refine_blocks(const BlockRange& range, const Lattice& lattice, std::ui
       }
     }
   }
-  for (;; --size) {
-    if (level.cube.size() > options.limit * options.look_factor) {
-      // A surface in n boxes of 2^size blocks lies in about 4^size n blocks.
-      refuse_blocks(static_cast<double>(level.cube.size()) * std::ldexp(1.0, 2 * size), lattice, options);
-    }
-    level = look(level, size, range, lattice, executor, options, decide);
-    list.inside.insert(list.inside.end(), level.inside.begin(), level.inside.end());
-    if (size == 0) break;
-    halve(level, size - 1, range);
-  }
-  if (level.cube.size() > options.limit) refuse_blocks(static_cast<double>(level.cube.size()), lattice, options);
-  std::sort(level.cube.begin(), level.cube.end(), [](const Cube& a, const Cube& b) { return before(a.at, b.at); });
-  list.block.reserve(level.cube.size());
-  list.offset.reserve(level.cube.size() + 1);
-  list.candidate.reserve(level.candidate.size());
-  for (const Cube& cube : level.cube) {
+  Refinement refinement(range, lattice, executor, options, decide);
+  refinement.refine(std::move(level), size);
+  LevelPart& found = refinement.found();
+  list.inside = std::move(found.inside);
+  std::sort(found.cube.begin(), found.cube.end(), [](const Cube& a, const Cube& b) { return before(a.at, b.at); });
+  list.block.reserve(found.cube.size());
+  list.offset.reserve(found.cube.size() + 1);
+  list.candidate.reserve(found.candidate.size());
+  for (const Cube& cube : found.cube) {
     list.block.push_back(cube.at);
-    const auto first = level.candidate.begin() + cube.first;
+    const auto first = found.candidate.begin() + cube.first;
     list.candidate.insert(list.candidate.end(), first, first + cube.count);
     list.offset.push_back(static_cast<std::uint32_t>(list.candidate.size()));
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 
 #include "grid_leaves.h"
@@ -12,6 +13,7 @@
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/implicit/mesh_limits.h"
+#include "triangle_crossings.h"
 
 namespace supple::implicit {
 namespace {
@@ -157,14 +159,14 @@ void project(const FieldView& field, double cell, std::span<const Vec3> from, st
   }
 }
 
+using Triangle = std::array<std::uint32_t, 3>;
+
 /// Takes back what turns triangles over, until none is.
 void keep_sides(const Mesh& mesh, std::vector<Vec3>& onto) {
-  const auto normal_of = [&](const std::vector<Vec3>& p, const std::array<std::uint32_t, 3>& t) {
-    return Vec3((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]));
-  };
+  const auto normal_of = [](const std::vector<Vec3>& p, const Triangle& t) { return Vec3((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]])); };
   for (bool turned = true; turned;) {
     turned = false;
-    for (const auto& t : mesh.triangle) {
+    for (const Triangle& t : mesh.triangle) {
       const Vec3 before = normal_of(mesh.position, t);
       if (before.dot(normal_of(onto, t)) > 0.0 || before.isZero()) continue;
       for (const std::uint32_t v : t) {
@@ -173,6 +175,34 @@ void keep_sides(const Mesh& mesh, std::vector<Vec3>& onto) {
       }
     }
   }
+}
+
+/// Of each two triangles that cross takes back the vertex that was moved farthest, until none cross but those that did before.
+void keep_apart(const Mesh& mesh, std::vector<Vec3>& onto) {
+  std::vector<std::uint32_t> all(mesh.triangle_count()), back;
+  std::iota(all.begin(), all.end(), 0u);
+  do {
+    keep_sides(mesh, onto);
+    back.clear();
+    const TriangleBoxes boxes(onto, mesh.triangle, all);
+    for (std::uint32_t i = 0; i < all.size(); ++i) {
+      const Triangle& s = mesh.triangle[i];
+      boxes.each_near(box_of(onto, s), [&](std::uint32_t k) {
+        if (k <= i || !triangles_cross(onto, s, mesh.triangle[k])) return;
+        double farthest = 0.0;
+        std::uint32_t which = 0;
+        for (const Triangle& t : {s, mesh.triangle[k]}) {
+          for (const std::uint32_t v : t) {
+            const double moved = (onto[v] - mesh.position[v]).squaredNorm();
+            if (moved > farthest || (moved == farthest && v < which)) which = v;
+            farthest = std::max(farthest, moved);
+          }
+        }
+        if (farthest > 0.0) back.push_back(which);
+      });
+    }
+    for (const std::uint32_t v : back) onto[v] = mesh.position[v];
+  } while (!back.empty());
 }
 
 }  // namespace
@@ -197,7 +227,7 @@ Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& ex
   executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {
     project(field, cell, std::span(mesh.position).subspan(begin, end - begin), std::span(onto).subspan(begin, end - begin));
   });
-  keep_sides(mesh, onto);
+  keep_apart(mesh, onto);
   mesh.position = std::move(onto);
   mesh.normal.resize(points.size());
   executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {

@@ -8,6 +8,8 @@
 #include "implicit/analytic_fields.h"
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
+#include "polygonise_blocks.h"
+#include "polygonise_lattice.h"
 
 namespace supple::implicit {
 namespace {
@@ -305,6 +307,39 @@ TEST(SurfaceBlocks, HoldEverySignChangeAndComeInOrder) {
                            static_cast<std::int32_t>(at.z())};
     EXPECT_TRUE(std::find(blocks.begin(), blocks.end(), block) != blocks.end());
   }
+}
+
+// So many that the levels above them are refined in parts: block by block, each is kept with the bodies that can be the largest in it.
+TEST(SurfaceBlocks, OfManyAreThoseThatBoundsLeaveOneByOne) {
+  const FunctionField left = sphere(Vec3(-0.3, 0.0, 0.0), 0.4), right = sphere(Vec3(0.25, 0.1, 0.0), 0.3);
+  const std::vector<FieldView> fields{left, right};
+  const std::vector<Box> surface{left.box, right.box};
+  const Lattice cells = lattice_of(0.00125);
+  PolygoniseCounts counts;
+  const lattice::BlockList list = lattice::find_label_blocks(fields, surface, cells, Executor(2), 1'000'000, counts);
+  ASSERT_GT(list.block.size(), 40'000u);  // a level above has more than 8,192
+  std::size_t at = 0;
+  const auto range = lattice::block_range(left.box.united(right.box), cells, 1);
+  for (std::int32_t z = range.lower[2]; z <= range.upper[2]; ++z) {
+    for (std::int32_t y = range.lower[1]; y <= range.upper[1]; ++y) {
+      for (std::int32_t x = range.lower[0]; x <= range.upper[0]; ++x) {
+        const Box box{lattice::node_position(cells, 8 * x, 8 * y, 8 * z), lattice::node_position(cells, 8 * x + 8, 8 * y + 8, 8 * z + 8)};
+        std::vector<std::uint32_t> can;
+        double most_lower = 0.0;
+        for (std::uint32_t k = 0; k < 2; ++k) {
+          if (surface[k].overlaps(box) && fields[k].bound(box).upper > 0.0) can.push_back(k);
+          if (!can.empty() && can.back() == k) most_lower = std::max(most_lower, fields[k].bound(box).lower);
+        }
+        std::erase_if(can, [&](std::uint32_t k) { return fields[k].bound(box).upper < most_lower; });
+        if (can.empty() || (can.size() == 1 && fields[can[0]].bound(box).lower > 0.0)) continue;
+        ASSERT_LT(at, list.block.size());
+        ASSERT_EQ(list.block[at], (lattice::BlockCoord{x, y, z}));
+        ASSERT_TRUE(std::equal(can.begin(), can.end(), list.candidate.begin() + list.offset[at], list.candidate.begin() + list.offset[at + 1]));
+        ++at;
+      }
+    }
+  }
+  EXPECT_EQ(at, list.block.size());
 }
 
 }  // namespace

@@ -512,6 +512,27 @@ TEST(SurfaceGrid, BecomesAMeshOnTheSurfaceByOpenVdb) {
   }
 }
 
+// Sheets nearer than a cell, which vertices on their way to the surface could pass through.
+TEST(SurfaceGrid, BecomesAMeshThatDoesNotCrossItself) {
+  std::size_t vertices = 0, on_surface = 0;
+  for (std::uint64_t seed = 1; seed <= 15; ++seed) {
+    const Body body = random_body({.seed = seed, .parts = 30, .half_width = 1.0});
+    for (const double cell : {0.3, 0.2}) {
+      GridOptions options = options_of(GridContent::SignedDistance);
+      options.lattice.cell = cell;
+      const Mesh mesh = mesh_of(make_surface_grid(body.field, options, Executor(1)), body.field, Executor(1));
+      EXPECT_TRUE(inspect(mesh).closed && inspect(mesh).oriented) << seed;
+      EXPECT_EQ(self_intersections(mesh, cell), 0u) << seed << ' ' << cell;
+      std::vector<double> values(mesh.vertex_count());
+      std::vector<Vec3> gradients(mesh.vertex_count());
+      body.field.evaluate(mesh.position, values, gradients);
+      vertices += values.size();
+      for (std::size_t v = 0; v < values.size(); ++v) on_surface += std::abs(values[v]) <= 1e-4 * cell * gradients[v].norm() ? 1 : 0;
+    }
+  }
+  EXPECT_GE(static_cast<double>(on_surface), 0.98 * static_cast<double>(vertices));
+}
+
 // A grid of a ball half a cell smaller than the field's: there the way is short; of one two cells smaller it is too long, and all stay.
 TEST(SurfaceGrid, GivesVerticesThatStayWhereTheSurfaceIsTooFar) {
   const Body body = body_of({{wyvill_point(1.0), kOrigin}});

@@ -1,0 +1,65 @@
+/// What is too large to be made is refused before memory is taken for it.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "implicit/analytic_fields.h"
+#include "implicit/bodies.h"
+#include "implicit/mesh_checks.h"
+#include "support/allocations.h"
+#include "supple/core/error.h"
+#include "supple/implicit/march_cubes.h"
+#include "supple/implicit/mesh_solid.h"
+#include "supple/implicit/polygonise.h"
+#include "supple/implicit/surface_grid.h"
+
+namespace supple::implicit {
+using namespace testing;
+namespace {
+
+/// Bytes that `act` holds at most until it is refused.
+std::uint64_t bytes_of_refusal(const std::function<void()>& act) {
+  const std::uint64_t before = test::most_bytes(true);
+  try {
+    act();
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.faults().size(), 1u);
+  }
+  return test::most_bytes() - before;
+}
+
+Mesh tetrahedron() {
+  Mesh mesh;
+  mesh.position = {Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
+  mesh.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  return mesh;
+}
+
+// All of them ask for a billion nodes or more, 4 GB in single precision.
+TEST(Refusals, TakeNoMemory) {
+  const Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});
+  const FunctionField ball = sphere(Vec3::Zero(), 0.5);
+  const std::vector<FieldView> bodies{ball, ball};
+  const Executor executor(1);
+  const auto grid = [](double cell) {
+    GridOptions options;
+    options.lattice = lattice_of(cell);
+    return options;
+  };
+  const std::pair<const char*, std::function<void()>> refused[] = {
+      {"cubes", [&] { (void)march_cubes(body.field, {.lattice = lattice_of(0.0018)}, executor); }},
+      {"cubes, node numbers", [&] { (void)march_cubes(body.field, {.lattice = lattice_of(1e-12)}, executor); }},
+      {"cubes to an error", [&] { (void)march_cubes(body.field, {.lattice = lattice_of(0.0), .error = 1e-12}, executor); }},
+      {"tetrahedra", [&] { (void)polygonise(ball, lattice_of(1e-6), executor); }},
+      {"tetrahedra of two", [&] { (void)polygonise_partition(bodies, lattice_of(1e-6), executor); }},
+      {"grid", [&] { (void)make_surface_grid(ball, grid(1e-6), executor); }},
+      {"solid", [&] { (void)MeshSolid(tetrahedron(), {.voxel = 1e-4}); }},
+  };
+  // At most as many blocks as are allowed are listed, and the largest list is that of a grid: 48 bytes for each of 390,625
+  // blocks with its candidate and a box between them, thrice where a list moves to twice the room.
+  for (const auto& [name, act] : refused) EXPECT_LT(bytes_of_refusal(act), 3 * 48 * 390'625 + 4'000'000) << name;
+}
+
+}  // namespace
+}  // namespace supple::implicit
