@@ -8,21 +8,26 @@ source "$here/dependencies.sh"
 source "$here/parts.sh"
 
 if [[ ${1:-} == -h || ${1:-} == --help ]]; then
-  echo "usage: scripts/mutate.sh [--check | -j N] [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
+  echo "usage: scripts/mutate.sh [--check] [--new] [-j N] [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
   echo "--check builds nothing: it says whether every defect still has its place in the sources."
+  echo "--new plants those that the module's report does not list, docs/reports/mutations/MODULE.md."
   echo "-j N plants N defects at a time, each in a copy of the tree with a build of its own."
-  echo "A module all of whose defects are killed gets its report, docs/reports/mutations/MODULE.md."
   exit 0
 fi
-check=0 jobs=1
-if [[ ${1:-} == --check ]]; then
-  check=1
+check=0 new=0 jobs=1
+while [[ ${1:-} == -* ]]; do
+  case $1 in
+    --check) check=1 ;;
+    --new) new=1 ;;
+    -j)
+      jobs=${2:-}
+      [[ $jobs =~ ^[1-9][0-9]?$ ]] || { echo "error: -j: expected a number from 1 to 99, found '$jobs'" >&2; exit 2; }
+      shift
+      ;;
+    *) echo "error: unknown option $1" >&2; exit 2 ;;
+  esac
   shift
-elif [[ ${1:-} == -j ]]; then
-  jobs=${2:-}
-  [[ $jobs =~ ^[1-9][0-9]?$ ]] || { echo "error: -j: expected a number from 1 to 99, found '$jobs'" >&2; exit 2; }
-  shift 2
-fi
+done
 modules=("$@")
 if ((${#modules[@]} == 0)); then
   for list in "$supple_root"/tests/*/mutations.txt; do
@@ -89,22 +94,38 @@ for ((copy = 0; copy < jobs; ++copy)); do
     { tail -n 30 "$home/configure.log"; exit 1; }
 done
 
-# write_report MODULE KILLED ROW...
+report_of() { echo "$supple_root/docs/reports/mutations/$1.md"; }
+
+# row_start: of the row of the report of the line in `field`.
+row_start() { echo "| ${field[0]} | \`${field[1]//|/\\|}\` | \`${field[2]//|/\\|}\` | \`${field[3]//|/\\|}\` |"; }
+
+# write_report MODULE: for each line of its list the row of this run, or that of the last report.
 write_report() {
-  local module=$1 killed=$2
-  shift 2
-  mkdir -p "$supple_root/docs/reports/mutations"
+  local module=$1 line start row field count=0 report
+  report=$(report_of "$module")
+  local -a rows=()
+  while IFS= read -r line || [[ -n $line ]]; do
+    [[ -z $line || $line == \#* ]] && continue
+    count=$((count + 1))
+    split_line "$line"
+    start=$(row_start)
+    grep -qxF -- "$start" "$work/bad" && continue
+    row=$(cat "$work"/rows/* "$report" 2>/dev/null | grep -F -m 1 -- "$start" || true)
+    [[ -z $row ]] || rows+=("$row")
+  done <"$supple_root/tests/$module/mutations.txt"
+  mkdir -p "$(dirname "$report")"
   {
     echo "# Planted defects: $module"
     echo
     echo "Written by \`scripts/mutate.sh $module\`: each defect is planted alone, and the tests named beside it must fail."
-    echo "$killed defects, $killed killed."
+    echo "$count defects, ${#rows[@]} killed, at the commit beside them or where that has uncommitted changes (+)."
     echo
-    echo "| file | source | planted instead | tests | result |"
+    echo "| file | source | planted instead | tests | killed at |"
     echo "|---|---|---|---|---|"
-    printf '%s\n' "$@"
-  } >"$supple_root/docs/reports/mutations/$module.md"
-  echo "wrote docs/reports/mutations/$module.md"
+    printf '%s\n' "${rows[@]}"
+  } >"$work/report"
+  mv "$work/report" "$report"
+  echo "wrote ${report#"$supple_root"/}"
 }
 
 # try_line PLACE LINE: plants one defect in the tree of `home`; prints the verdict, and the row of the report to $home/row.
@@ -132,26 +153,37 @@ try_line() {
   fi
   cp "$home/original" "$tree/$file"
   printf '  %-8s %s  %s: %s -> %s\n' "$verdict" "$place" "$file" "$from" "$to"
-  echo "| $file | \`${from//|/\\|}\` | \`${to//|/\\|}\` | \`${filter//|/\\|}\` | $verdict |" >"$home/row"
+  echo "$(row_start) $commit |" >"$home/row"
   [[ $verdict == killed ]]
 }
 
 # try_lines MODULE COPY: every `jobs`-th line of the module's list, in the tree of that copy; rows to $work/rows/NUMBER.
 try_lines() {
-  local module=$1 home=$work/$2 number=0 line
+  local module=$1 home=$work/$2 number=0 line field
   while IFS= read -r line || [[ -n $line ]]; do
     number=$((number + 1))
     [[ -z $line || $line == \#* ]] && continue
     ((number % jobs == $2)) || continue
-    try_line "tests/$module/mutations.txt:$number" "$line" && mv "$home/row" "$work/rows/$(printf %06d "$number")"
+    if ((new)); then
+      split_line "$line"
+      grep -qF -- "$(row_start)" "$(report_of "$module")" 2>/dev/null && continue
+    fi
+    if try_line "tests/$module/mutations.txt:$number" "$line"; then
+      mv "$home/row" "$work/rows/$(printf %06d "$number")"
+    else
+      split_line "$line"
+      row_start >>"$work/bad"
+    fi
   done <"$supple_root/tests/$module/mutations.txt"
 }
 
+commit=$(git -C "$supple_root" describe --always --exclude='*' --dirty=+ 2>/dev/null || echo -)
 failed=0
 for module in "${modules[@]}"; do
   target=${module}_tests
-  rm -rf "$work/rows"
+  rm -rf "$work/rows" "$work/bad"
   mkdir "$work/rows"
+  touch "$work/bad"
   for ((copy = 0; copy < jobs; ++copy)); do
     home=$work/$copy
     export CCACHE_BASEDIR=$home/tree
@@ -159,18 +191,15 @@ for module in "${modules[@]}"; do
     build "$target" || { tail -n 40 "$home/build.log"; exit 1; }
     cp "$home/tree/build/release/bin/$target" "$home/sound"
   done
+  workers=()
   for ((copy = 0; copy < jobs; ++copy)); do
     CCACHE_BASEDIR=$work/$copy/tree try_lines "$module" "$copy" &
+    workers+=($!)
   done
-  wait
-  rows=()
-  for row in "$work"/rows/*; do
-    [[ -f $row ]] && rows+=("$(<"$row")")
-  done
-  lines=$(grep -cEv '^(#|$)' "$supple_root/tests/$module/mutations.txt" || true)
-  bad=$((lines - ${#rows[@]}))
-  echo "$module: ${#rows[@]} killed, $bad not"
-  if ((bad == 0 && ${#rows[@]} > 0)); then write_report "$module" "${#rows[@]}" "${rows[@]}"; fi
+  for worker in "${workers[@]}"; do wait "$worker"; done
+  bad=$(wc -l <"$work/bad")
+  echo "$module: $(find "$work/rows" -type f | wc -l) killed, $bad not"
   failed=$((failed + bad))
+  write_report "$module"
 done
 ((failed == 0))

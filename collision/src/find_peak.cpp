@@ -52,14 +52,14 @@ void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> 
   out.beside.clear();
   batch_.resize(seeds.size());
   std::copy(seeds.begin(), seeds.end(), batch_.point.begin());
-  pressure.evaluate_values(batch_);
+  pressure.evaluate(batch_);
   score_.resize(seeds.size());
   // A sample has zero pressure in its own body, so that the sum is what the other body says of it. The round-off of
   // that zero must not turn a sample on both surfaces into an outside one.
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
     score_[i] = a + b;
-    (std::min(a, b) > -1e-9 && score_[i] > 0.0 ? out.inside : out.beside).push_back(seeds[i]);
+    (std::min(a, b) > -1e-9 && score_[i] > 0.0 ? out.inside : out.beside).push_back(start_at(i));
   }
   order_.resize(seeds.size());
   std::iota(order_.begin(), order_.end(), 0u);
@@ -71,7 +71,7 @@ void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> 
     const Vec3& x = seeds[order_[k]];
     bool top = true;
     for (std::size_t j = 0; j < k && top; ++j) top = (seeds[order_[j]] - x).squaredNorm() > near;
-    if (top) out.hill.push_back(x);
+    if (top) out.hill.push_back(start_at(order_[k]));
   }
 }
 
@@ -92,11 +92,11 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
       }
     }
   }
-  pressure.evaluate_values(batch_);
+  pressure.evaluate(batch_);
   score_.resize(batch_.size());
   for (std::size_t n = 0; n < batch_.size(); ++n) {
     score_[n] = std::min(batch_.a[n], batch_.b[n]);
-    if (score_[n] >= 0.0) out.inside.push_back(batch_.point[n]);
+    if (score_[n] >= 0.0) out.inside.push_back(start_at(n));
   }
   order_.clear();
   for (int k = 0; k < kNodes; ++k) {
@@ -117,7 +117,7 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   std::sort(order_.begin(), order_.end(), [this](std::uint32_t i, std::uint32_t j) {
     return score_[i] != score_[j] ? score_[i] > score_[j] : i < j;
   });
-  for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(batch_.point[order_[n]]);
+  for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(start_at(order_[n]));
 }
 
 /// Newton's method along the gradient of p_A - p_B.

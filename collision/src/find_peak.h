@@ -41,11 +41,17 @@ struct CommonAxis {
   Vec3 direction = Vec3::UnitZ();  ///< unit, out of A and into B
 };
 
+/// A place, and the slope of p_B - p_A there: out of A, as the axes of patches are that the place may belong to. Zero: not known.
+struct StartPoint {
+  Vec3 at;
+  Vec3 across = Vec3::Zero();  ///< [Pa / m]
+};
+
 /// Starting points of one pair, and points that lie inside both bodies.
 struct StartPoints {
-  std::vector<Vec3> hill;    ///< one for each hill of the seeds, most promising first
-  std::vector<Vec3> inside;  ///< points of {p_A >= 0, p_B >= 0}: every component should hold one
-  std::vector<Vec3> beside;  ///< seeds that lie outside one body, near its surface: components between samples lie near one
+  std::vector<StartPoint> hill;    ///< one for each hill of the seeds, most promising first
+  std::vector<StartPoint> inside;  ///< points of {p_A >= 0, p_B >= 0}: every component should hold one
+  std::vector<StartPoint> beside;  ///< seeds that lie outside one body, near its surface: components between samples lie near one
 };
 
 class PeakFinder {
@@ -65,6 +71,8 @@ class PeakFinder {
 
  private:
   Vec3 foot_on_sigma(PairPressure& pressure, Vec3 x, double reach);
+  /// Point n of `batch_`, once that is evaluated.
+  [[nodiscard]] StartPoint start_at(std::size_t n) const { return {batch_.point[n], batch_.slope_b[n] - batch_.slope_a[n]}; }
 
   PressureBatch batch_;
   std::vector<std::uint32_t> order_;

@@ -13,6 +13,8 @@ namespace {
 constexpr double kLeastAlong = 0.1;  // cosine of a way out of the apex to the axis
 constexpr double kLeastSight = 0.1;  // cosine of a body's normal to the ray, at the rim
 constexpr double kWidest = 1.3;      // across over along at the rim: energies by wider columns are off by more than asked
+constexpr double kEndsWithin = 1e-3;  // of the peak: ends beside the rim are that near to the other body's surface
+constexpr double kLong = 1.5;         // over the depth below the peak, to first order
 constexpr int kEndSteps = 40;
 constexpr int kMostOnColumn = 6;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
@@ -130,6 +132,19 @@ bool PolarRuleSolver::lead_out(int side) const {
   return true;
 }
 
+/// Whether columns that are long end within the other body. A body that reaches around it may press on from the near side of it to the far
+/// one: columns then lead through it to where that ends elsewhere.
+bool PolarRuleSolver::end_within(PairPressure& pressure, int side) {
+  line_point_.clear();
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    if (end_[side][i] > kLong * frame_.depth[side]) line_point_.push_back(node_.point[i] + end_[side][i] * column(i).way);
+  }
+  other_value_.resize(line_point_.size());
+  pressure.evaluate(1 - side, line_point_, other_value_);
+  const double least = -kEndsWithin * frame_.peak;
+  return std::all_of(other_value_.begin(), other_value_.end(), [least](double p) { return p >= least; });
+}
+
 /// @param nodes  of Gauss along a column, or as many as would be as exact
 bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
   const bool from_ends = region == Region::Sums;
@@ -144,6 +159,11 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, d
   // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
   const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
   if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
+  if (!pressure.field(side).convex() && !apex_[side] && !end_within(pressure, side)) {
+    points.unsure[side] = true;
+    thickness_ += frame_.depth[side];
+    return true;
+  }
   thickness_ += end_[side][summit_];
   if (from_ends) {
     add_energy_from_ends(pressure, nodes, side, points);

@@ -33,8 +33,9 @@ PolarCover::Reach PolarCover::reach(const Vec2& at) const {
   return {far, height_there};
 }
 
-bool PolarCover::contains(const Vec3& x, double slack) const {
-  const Vec3 d = x - frame.origin;
+bool PolarCover::contains(const StartPoint& place, double slack) const {
+  if (place.across.dot(frame.axis) < 0.0) return false;
+  const Vec3 d = place.at - frame.origin;
   const auto [far, height_there] = reach(Vec2(d.dot(frame.u) / frame.u.squaredNorm(), d.dot(frame.v) / frame.v.squaredNorm()));
   if (far > 1.0 + slack) return false;
   const double up = d.dot(frame.axis), linear = rise.dot(d - up * frame.axis), curved = height_there * far * far - linear * far;

@@ -23,8 +23,9 @@ struct PolarCover {
     double far = 0.0, rise = 0.0;
   };
   [[nodiscard]] Reach reach(const Vec2& at) const;
-  /// Whether x lies over the patch, near Sigma. @param slack  share of the radius that a point may lie outside
-  [[nodiscard]] bool contains(const Vec3& x, double slack) const;
+  /// Whether a place lies over the patch, near Sigma, and on the same side of A: on the other side of a body that is pinched there is
+  /// another patch. @param slack  share of the radius that a point may lie outside
+  [[nodiscard]] bool contains(const StartPoint& place, double slack) const;
 };
 
 }  // namespace supple::collision

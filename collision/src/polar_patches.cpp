@@ -14,13 +14,13 @@ constexpr std::size_t kMostPatches = 16;
 }  // namespace
 
 void PolarPatches::start_from(const Vec3& seed, PairPressure& pressure) {
-  starts_.hill.assign(1, seed);
+  starts_.hill.assign(1, {.at = seed});
   starts_.inside.clear();
   starts_.beside.clear();
   batch_.resize(1);
   batch_.point[0] = seed;
   pressure.evaluate_values(batch_);
-  if (std::min(batch_.a[0], batch_.b[0]) > 0.0) starts_.inside.push_back(seed);
+  if (std::min(batch_.a[0], batch_.b[0]) > 0.0) starts_.inside.push_back({.at = seed});
 }
 
 bool PolarPatches::solve(const PolarJob& job, PairResult& out) {
@@ -35,11 +35,11 @@ bool PolarPatches::solve(const PolarJob& job, PairResult& out) {
 /// @param follow  all rims   @param unseen  whether there is a place of a patch that its rim leaves out
 bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out) {
   forget();
-  for (const Vec3& hill : starts_.hill) {
+  for (const StartPoint& hill : starts_.hill) {
     if (add_patch(job, hill, follow, out) == Patch::Unfit) return false;
   }
   // Two patches may lie so near to each other that their seeds have one hill.
-  for (std::size_t more = 0; const std::optional<Vec3> x = outside(job.pressure, job.extent); ++more) {
+  for (std::size_t more = 0; const std::optional<StartPoint> x = outside(job.pressure, job.extent); ++more) {
     const Patch found = more < kMostPatches ? add_patch(job, *x, follow, out) : Patch::Unfit;
     if (found == Patch::Lost) break;
     unseen = found == Patch::Known && !empty();
@@ -47,38 +47,38 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
   }
   crossing_.clear();
   if (!job.pressure.convex()) find_crossings(job.pressure, job.spacing);
-  for (const Vec3& x : crossing_) {
+  for (const StartPoint& x : crossing_) {
     if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
-  return !overlap();
+  return !overlap(job.pressure);
 }
 
 bool PolarPatches::any_touches(PairPressure& pressure, double extent, bool convex) {
   return std::any_of(starts_.hill.begin(), starts_.hill.end(),
-                     [&](const Vec3& hill) { return finder_.climb(pressure, hill, extent, convex, false).has_value(); });
+                     [&](const StartPoint& hill) { return finder_.climb(pressure, hill.at, extent, convex, false).has_value(); });
 }
 
-bool PolarPatches::covered(const Vec3& x, double slack) const {
+bool PolarPatches::covered(const StartPoint& place, double slack) const {
   const std::span<const PolarCover> all = covers();
-  return std::any_of(all.begin(), all.end(), [&](const PolarCover& cover) { return cover.contains(x, slack); });
+  return std::any_of(all.begin(), all.end(), [&](const PolarCover& cover) { return cover.contains(place, slack); });
 }
 
-PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const Vec3& hill, bool follow, PairResult& out) {
+PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoint& hill, bool follow, PairResult& out) {
   if (covered(hill, 0.0)) return Patch::Known;
   std::optional<PeakFrame> frame;
-  if (job.axis && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *job.axis, hill, job.extent);
+  if (job.axis && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *job.axis, hill.at, job.extent);
   const bool on_axis = frame.has_value();
-  if (!on_axis) frame = finder_.climb(job.pressure, hill, job.extent, job.faces, job.faces);
-  if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
+  if (!on_axis) frame = finder_.climb(job.pressure, hill.at, job.extent, job.faces, job.faces);
+  if (!frame || covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
   const auto fits = [&] {
     return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };
   if (!fits()) {
     if (polar_.rounding() > kLostInRounding) return Patch::Lost;
     if (!frame->flat) return Patch::Unfit;
-    frame = finder_.climb(job.pressure, hill, job.extent, job.faces, false);
-    if (!frame || covered(frame->origin, 0.0)) return Patch::Known;
+    frame = finder_.climb(job.pressure, hill.at, job.extent, job.faces, false);
+    if (!frame || covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
     if (!fits()) return Patch::Unfit;
   }
   out.add(polar_.sums(), polar_.origin());
@@ -94,12 +94,16 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const Vec3& hil
   return Patch::Added;
 }
 
-bool PolarPatches::overlap() const {
+bool PolarPatches::overlap(PairPressure& pressure) {
   for (const PolarCover& one : covers()) {
     for (const PolarCover& other : covers()) {
       if (&one == &other) continue;
       for (const Vec3& x : one.rim) {
-        if (other.contains(x, 0.0)) return true;
+        if (!other.contains({.at = x}, 0.0)) continue;
+        batch_.resize(1);
+        batch_.point[0] = x;
+        pressure.evaluate(batch_);
+        if (other.contains({x, batch_.slope_b[0] - batch_.slope_a[0]}, 0.0)) return true;
       }
     }
   }
@@ -107,10 +111,10 @@ bool PolarPatches::overlap() const {
 }
 
 /// A place of Sigma where both bodies press that belongs to no patch, from the points inside both.
-std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent) {
+std::optional<StartPoint> PolarPatches::outside(PairPressure& pressure, double extent) {
   batch_.point.clear();
-  for (const Vec3& x : starts_.inside) {
-    if (!covered(x, kBesideRim)) batch_.point.push_back(x);
+  for (const StartPoint& place : starts_.inside) {
+    if (!covered(place, kBesideRim)) batch_.point.push_back(place.at);
   }
   if (batch_.point.empty()) return std::nullopt;
   // The rest may only seem to lie outside, by a slanted axis: what counts is their foot on Sigma.
@@ -134,8 +138,9 @@ std::optional<Vec3> PolarPatches::outside(PairPressure& pressure, double extent)
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const double noise = pressure.noise_on_sigma(batch_.point[i], batch_.slope_a[i].norm(), batch_.slope_b[i].norm());
     if (std::min(batch_.a[i], batch_.b[i]) <= std::max(1e-3 * peak, noise)) continue;
-    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return batch_.point[i];  // it found no place on Sigma
-    if (!covered(batch_.point[i], kBesideRim)) return batch_.point[i];
+    const StartPoint place{batch_.point[i], batch_.slope_b[i] - batch_.slope_a[i]};
+    if (std::abs(batch_.a[i] - batch_.b[i]) > 1e-6 * pressure.largest_modulus()) return place;  // it found no place on Sigma
+    if (!covered(place, kBesideRim)) return place;
   }
   return std::nullopt;
 }
@@ -148,12 +153,12 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
   crossing_.clear();
   batch_.point.clear();
   from_.clear();
-  const auto keep = [&](const Vec3& x, const Vec3& from) {
-    if (covered(x, kBesideRim)) return;
-    batch_.point.push_back(x);
+  const auto keep = [&](const StartPoint& place, const Vec3& from) {
+    if (covered(place, kBesideRim)) return;
+    batch_.point.push_back(place.at);
     from_.push_back(from);
   };
-  for (const Vec3& x : starts_.beside) keep(x, x);
+  for (const StartPoint& place : starts_.beside) keep(place, place.at);
   for (int step = 0; step < kSteps && !batch_.point.empty(); ++step) {
     batch_.resize(batch_.point.size());
     pressure.evaluate(batch_);
@@ -164,11 +169,12 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
     for (std::size_t i = 0; i < point_.size(); ++i) {
       const double steep_a = batch_.slope_a[i].norm(), steep_b = batch_.slope_b[i].norm();
       if (!(steep_a > 0.0) || !(steep_b > 0.0)) continue;
+      const Vec3 across = batch_.slope_b[i] - batch_.slope_a[i];
       // Newton's method to p_A = p_B = 0, the shortest step: normals and distances of both surfaces, to first order.
       const Vec3 normal_a = batch_.slope_a[i] / steep_a, normal_b = batch_.slope_b[i] / steep_b;
       const double off_a = batch_.a[i] / steep_a, off_b = batch_.b[i] / steep_b, c = normal_a.dot(normal_b), square = 1.0 - c * c;
       if (step + 1 == kSteps) {
-        if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back(point_[i]);
+        if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back({point_[i], across});
         continue;
       }
       if (!(square > 0.0)) continue;
@@ -176,7 +182,7 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
       const double length = move.norm(), longest = kLongest * spacing;
       if (length > longest) move *= longest / length;
       const Vec3 next = point_[i] + move;
-      if ((next - before_[i]).norm() <= kFarthest * spacing) keep(next, before_[i]);
+      if ((next - before_[i]).norm() <= kFarthest * spacing) keep({next, across}, before_[i]);
     }
   }
 }

@@ -47,16 +47,17 @@ class PolarPatches {
   enum class Patch : std::uint8_t { Added, Known, Lost, Unfit };
 
   bool solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out);
-  Patch add_patch(const PolarJob& job, const Vec3& hill, bool follow, PairResult& out);
-  [[nodiscard]] bool overlap() const;
-  std::optional<Vec3> outside(PairPressure& pressure, double extent);
+  Patch add_patch(const PolarJob& job, const StartPoint& hill, bool follow, PairResult& out);
+  [[nodiscard]] bool overlap(PairPressure& pressure);
+  std::optional<StartPoint> outside(PairPressure& pressure, double extent);
   void find_crossings(PairPressure& pressure, double spacing);
-  [[nodiscard]] bool covered(const Vec3& x, double slack) const;
+  [[nodiscard]] bool covered(const StartPoint& place, double slack) const;
 
   PeakFinder finder_;
   PolarRuleSolver polar_;
   StartPoints starts_;
-  std::vector<Vec3> crossing_, from_, point_, before_;
+  std::vector<StartPoint> crossing_;
+  std::vector<Vec3> from_, point_, before_;
   std::vector<PolarCover> covers_;
   std::size_t cover_count_ = 0;
   PressureBatch batch_;

@@ -335,9 +335,8 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     points.back_to(before);
     return true;
   };
-  // Samples of flat faces are near enough to a coarse error, and change more evenly as the faces lean.
-  const bool peaked = !frame.flat && (!faces || settings.error < kSplitBelow);
-  if (!frame.flat && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, peaked, points)) return true;
+  const bool peaked = !frame.flat;
+  if (peaked && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, true, points)) return true;
   if (faces && anew() && solve_about_middle(pressure, frame, settings, regions, points)) return true;
   if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, follow, points)) return true;
   if (uneven_ && anew() && solve_about_peak(pressure, frame, settings, regions, round, false, false, points)) return true;

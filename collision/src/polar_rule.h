@@ -84,6 +84,7 @@ class PolarRuleSolver {
   void add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points);
   void add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
+  bool end_within(PairPressure& pressure, int side);
   void evaluate_on_lines(PairPressure& pressure, int side);
   bool start_columns(int side);
   bool start_out_of(const Apex& apex, double sign);
@@ -324,7 +325,7 @@ class PolarRuleSolver {
   std::vector<std::size_t> open_;   // which they are
   std::vector<double> height_, weight_, area_, pressure_, end_[2], reached_;
   std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
-  std::vector<double> line_value_;
+  std::vector<double> line_value_, other_value_;
   double residual_ = 0.0;
   double rim_error_ = 0.0;  // relative, of the area
   // Of rays: the square of the last step of Newton's method to the rim [m^2], and what the last two say is left of the way, over the radius.

@@ -125,7 +125,8 @@ class Refinement {
         return;
       }
       if (count > kMostCubes) {
-        if (expected_ == 0.0) expected_ = blocks_in(count, size);
+        // By all halves, as a band about the surface fills more of them the smaller they are.
+        if (expected_ == 0.0) expected_ = blocks_in(8 * std::uint64_t{count}, size - 1);
         for (std::size_t first = 0; first < count; first += kMostCubes) {
           LevelPart part;
           part.append(level, first, std::min(first + kMostCubes, count));

@@ -392,6 +392,40 @@ TEST(ContactSurface, FindsBothPatchesOfAPlateWithTwoBumps) {
   }
 }
 
+// Pinched between two blobs of one body, so deeply that each patch lies within two thicknesses of the other one, and that body's pressure goes
+// on from one to the other, so that columns lead through the ball. Marching knows neither patches nor columns.
+TEST(ContactSurface, FindsBothPatchesOfABallThatIsPinched) {
+  int both = 0;
+  for (const double apart : {0.585, 0.6, 0.605, 0.61}) {
+    for (const double side : {0.0, 0.03, 0.06}) {
+      for (const double out : {0.0, 0.04}) {
+        const Blobs ball({Vec3(side, out, 0.01)}, 0.34), blobs({Vec3(-apart, 0, 0), Vec3(apart, 0.02, 0)}, 1.0);
+        const auto ball_samples = sphere_samples(ball.centre[0], 0.34 * 0.454202019, 120);
+        auto samples = sphere_samples(blobs.centre[0], 0.454202019, 400);
+        const auto more = sphere_samples(blobs.centre[1], 0.454202019, 400);
+        samples.point.insert(samples.point.end(), more.point.begin(), more.point.end());
+        samples.area.insert(samples.area.end(), more.area.begin(), more.area.end());
+        samples.valid.insert(samples.valid.end(), more.valid.begin(), more.valid.end());
+        Stage stage;
+        stage.add(ball.field, ball.centre).samples = &ball_samples;
+        stage.add(blobs.field, blobs.centre).samples = &samples;
+        const auto solve = [&](ContactRule only) {
+          const ContactSurface& s = stage.solve({.error = 1e-4, .only = only});
+          return s.summary.empty() ? ContactSurface::Summary{} : s.summary.front();
+        };
+        const ContactSurface::Summary found = solve(ContactRule::None), marched = solve(ContactRule::March);
+        const double bound = found.error_estimate + marched.error_estimate;
+        EXPECT_LE(bound, 2e-4);
+        EXPECT_NEAR(found.area / marched.area, 1.0, bound) << apart << ' ' << side << ' ' << out;
+        EXPECT_LE((found.force - marched.force).norm(), bound * marched.load) << apart << ' ' << side << ' ' << out;
+        EXPECT_NEAR(found.energy / marched.energy, 1.0, 4e-4) << apart << ' ' << side << ' ' << out;
+        if (found.rule == ContactRule::Polar && found.patches == 2) ++both;
+      }
+    }
+  }
+  EXPECT_GE(both, 12);
+}
+
 /// Integral of [p]+ over the plane z = 0 by the midpoint rule.
 double plane_integral(const implicit::FieldView& field, double half) {
   const int n = 800;

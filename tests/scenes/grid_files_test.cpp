@@ -84,7 +84,7 @@ TEST_F(GridFiles, AreReadByTheToolsOfOpenVdb) {
 }
 
 TEST_F(GridFiles, TellOfBulgesThatHoldTooLittle) {
-  // Without a mesh, too; once for both grids.
+  // Without a mesh, too.
   const std::string ball = ", mass: 1}\n    contact: {modulus: 1e4}\n    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]\n";
   const auto told_by = [&](const std::string& width) {
     scene_ = parse_scene("schema: 1\nduration: 1e-3\nobjects:\n  - name: low\n    particles: {at: [0, 0, 0]" + ball +

@@ -262,6 +262,7 @@ TEST(ObjectMeshing, BulgesHoldTheVolumeOfEachBodyOrAWarningTells) {
                                           "contact: {error: 1e-6" + contact + "}\noutput: {mesh: ply, cell: 4 mm}\n",
                                       "test.yaml", "."));
     const std::vector<Mesh> meshes = simulation.meshes();
+    (void)simulation.division();  // of the same state: counted once
     std::vector<std::string> told = simulation.warnings();
     std::erase_if(told, [](const std::string& warning) { return !warning.starts_with("contact.bulge_volume: "); });
     EXPECT_EQ(query_mesh(simulation, {}).find("\"held\"") == std::string::npos, told.empty());

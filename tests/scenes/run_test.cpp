@@ -572,8 +572,8 @@ output: )";
        "ball.yaml:9:27: output.cell: expected at most 1000000000 lattice nodes around the body, found about 1.38e+09 with cells of 0.0018 m; "
        "use cells of at least 0.00211 m"},
       {"{grid: vdb, cell: 0.1 mm}",
-       "ball.yaml:9:27: output.cell: expected a surface in at most 200000000 voxels, found about 6.78e+09 with cells of 0.0001 m; use cells of "
-       "at least 0.000611 m"},
+       "ball.yaml:9:27: output.cell: expected a surface in at most 200000000 voxels, found about 6.39e+09 with cells of 0.0001 m; use cells of "
+       "at least 0.000593 m"},
       {"{samples: csv, sampling: {spacing: 10 mm}}",
        "ball.yaml:9:44: output.sampling.spacing: expected at most 1000000000 lattice nodes around the body, found about 1.74e+09 with cells of "
        "0.00167 m; use cells of at least 0.00211 m, which are a sixth of the spacing"},
@@ -612,7 +612,7 @@ output: {samples: csv, sampling: {spacing: 1}}
   const RunResult refused = run_scene(foil, o);
   EXPECT_EQ(refused.outcome, "limit");
   EXPECT_EQ(refused.reason,
-            "foil.yaml:9:19: output.samples: expected a surface in at most 1000000 blocks of 8^3 cells, found about 1.57e+08 with cells of 0.0005 m, "
+            "foil.yaml:9:19: output.samples: expected a surface in at most 1000000 blocks of 8^3 cells, found about 3.26e+08 with cells of 0.0005 m, "
             "half the size of the smallest features of 'foil'; make these larger, or what they are parts of smaller");
 }
 
@@ -631,14 +631,14 @@ TEST_F(Run, RefusesThinSurfacesAndOwnCellsByTheirKeys) {
             "ball.yaml:8:10: objects.ball.iso: expected at most 1000000000 lattice nodes around the body, found about 8.41e+13 with cells of "
             "4.56e-05 m, 8 across a surface 0.000365148 m thick; use cells of at least 0.0021 m in output.cell, or make the surface thicker");
   EXPECT_EQ(reason_of(disc, "{grid: vdb}"),
-            "ball.yaml:7:15: objects.ball.skeleton: expected a surface in at most 200000000 voxels, found about 3.91e+13 with cells of "
-            "0.000114 m, 8 across a surface 0.000908404 m thick; use cells of at least 0.0527 m in output.cell, or make the surface thicker");
+            "ball.yaml:7:15: objects.ball.skeleton: expected a surface in at most 200000000 voxels, found about 7.97e+13 with cells of "
+            "0.000114 m, 8 across a surface 0.000908404 m thick; use cells of at least 0.0753 m in output.cell, or make the surface thicker");
   EXPECT_EQ(reason_of(disc, "{grid: vdb, cell: 0.1 mm}"),
-            "ball.yaml:8:27: output.cell: expected a surface in at most 200000000 voxels, found about 5.04e+13 with cells of 0.0001 m; use "
-            "cells of at least 0.0527 m");
+            "ball.yaml:8:27: output.cell: expected a surface in at most 200000000 voxels, found about 1.03e+14 with cells of 0.0001 m; use "
+            "cells of at least 0.0753 m");
   EXPECT_EQ(reason_of(point + "    meshing: {cell: 1e-5}\n", "{grid: vdb}"),
-            "ball.yaml:8:21: objects.ball.meshing.cell: expected a surface in at most 200000000 voxels, found about 6.29e+11 with cells of "
-            "1e-05 m; use cells of at least 0.000589 m");
+            "ball.yaml:8:21: objects.ball.meshing.cell: expected a surface in at most 200000000 voxels, found about 6.24e+11 with cells of "
+            "1e-05 m; use cells of at least 0.000586 m");
 }
 
 /// What is told of the outputs of a scene at its start; empty: nothing.
