@@ -16,6 +16,8 @@ using testing::LinearSphere;
 using testing::sphere_samples;
 using testing::Stage;
 
+constexpr double kIsoRadius = 0.454202019;  // of a Wyvill kernel of support 1 at the value 1/2 [m]
+
 std::vector<Vec3> moved(std::vector<Vec3> points, const Quat& q, const Vec3& shift, double scale) {
   for (Vec3& x : points) x = scale * (q * x) + shift;
   return points;
@@ -370,16 +372,22 @@ TEST(ContactEnergy, HasForceAndTorqueAsItsGradient) {
   }
 }
 
+/// Of two blobs of support 1, `count` each.
+implicit::SurfaceSamples samples_of_two(const Blobs& blobs, int count) {
+  implicit::SurfaceSamples samples = sphere_samples(blobs.centre[0], kIsoRadius, count);
+  const implicit::SurfaceSamples more = sphere_samples(blobs.centre[1], kIsoRadius, count);
+  samples.point.insert(samples.point.end(), more.point.begin(), more.point.end());
+  samples.area.insert(samples.area.end(), more.area.begin(), more.area.end());
+  samples.valid.insert(samples.valid.end(), more.valid.begin(), more.valid.end());
+  return samples;
+}
+
 TEST(ContactSurface, FindsBothPatchesOfAPlateWithTwoBumps) {
   // Each bump is a Wyvill sphere of its own on a rigid plane, h = .40 and .35: closed forms of the two add up.
   const Blobs bumps({Vec3(-1.5, 0, 0.40), Vec3(1.5, 0.2, 0.35)}, 1.0);
   const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1e9};
   for (const bool sampled : {false, true}) {
-    auto samples = sphere_samples(bumps.centre[0], 0.454202019, 150);
-    const auto more = sphere_samples(bumps.centre[1], 0.454202019, 150);
-    samples.point.insert(samples.point.end(), more.point.begin(), more.point.end());
-    samples.area.insert(samples.area.end(), more.area.begin(), more.area.end());
-    samples.valid.insert(samples.valid.end(), more.valid.begin(), more.valid.end());
+    const auto samples = samples_of_two(bumps, 150);
     Stage stage;
     ContactBody& body = stage.add(bumps.field, bumps.centre);
     if (sampled) body.samples = &samples;
@@ -400,12 +408,8 @@ TEST(ContactSurface, FindsBothPatchesOfABallThatIsPinched) {
     for (const double side : {0.0, 0.03, 0.06}) {
       for (const double out : {0.0, 0.04}) {
         const Blobs ball({Vec3(side, out, 0.01)}, 0.34), blobs({Vec3(-apart, 0, 0), Vec3(apart, 0.02, 0)}, 1.0);
-        const auto ball_samples = sphere_samples(ball.centre[0], 0.34 * 0.454202019, 120);
-        auto samples = sphere_samples(blobs.centre[0], 0.454202019, 400);
-        const auto more = sphere_samples(blobs.centre[1], 0.454202019, 400);
-        samples.point.insert(samples.point.end(), more.point.begin(), more.point.end());
-        samples.area.insert(samples.area.end(), more.area.begin(), more.area.end());
-        samples.valid.insert(samples.valid.end(), more.valid.begin(), more.valid.end());
+        const auto ball_samples = sphere_samples(ball.centre[0], 0.34 * kIsoRadius, 120);
+        const auto samples = samples_of_two(blobs, 400);
         Stage stage;
         stage.add(ball.field, ball.centre).samples = &ball_samples;
         stage.add(blobs.field, blobs.centre).samples = &samples;
