@@ -263,7 +263,7 @@ void MarchRuleSolver::weigh(int order) {
   for (const Leaf& leaf : leaves_) sums_.add(leaf.sums);
   estimate_ = 1.0;
   if (!(sums_.load > 0.0)) return;
-  const double across = std::sqrt(sums_.area), force = std::max(sums_.force.norm(), 1e-3 * sums_.load);
+  const double across = std::sqrt(sums_.area), force = force_scale(sums_.force, sums_.load);
   const Vec3 centre = sums_.centre();
   std::array<double, 3> sum{};
   for (Leaf& leaf : leaves_) {

@@ -137,7 +137,8 @@ bool PairSolver::polar(const Job& job, PairResult& out) {
     return rings(coarse, job.overlap, job.convex, out);
   }
   if (patches_.empty() || meets(out, job.settings().error)) return true;
-  // Rims and rounding may add a little to what panels are held to: finer ones cost far less than another rule.
+  // Rims and rounding may add a little to what panels are held to, and several patches are off by more than each of them: finer ones cost far
+  // less than another rule.
   out.clear();
   PolarJob finer = job.polar;
   finer.settings.error *= kFiner;

@@ -48,11 +48,13 @@ struct PatchSums {
   [[nodiscard]] Vec3 centre() const { return load > 0.0 ? Vec3(first / load) : Vec3::Zero().eval(); }
 };
 
-/// Largest relative difference of force, area and centre of pressure (over the root of the area). A force that nearly
-/// cancels over the patch is measured against a thousandth of the load at least.
+/// What errors of the force are measured against: where it nearly cancels over the patches, a thousandth of the load.
+inline double force_scale(const Vec3& force, double load) { return std::max(force.norm(), 1e-3 * load); }
+
+/// Largest relative difference of force, area and centre of pressure (over the root of the area).
 inline double relative_difference(const PatchSums& fine, const PatchSums& coarse) {
   if (!(fine.load > 0.0) || !(fine.area > 0.0)) return 1.0;
-  const double force = (fine.force - coarse.force).norm() / std::max(fine.force.norm(), 1e-3 * fine.load);
+  const double force = (fine.force - coarse.force).norm() / force_scale(fine.force, fine.load);
   const double area = std::abs(fine.area - coarse.area) / fine.area;
   const double centre = (fine.centre() - coarse.centre()).norm() / std::sqrt(fine.area);
   return std::max({force, area, centre});

@@ -35,6 +35,7 @@ bool PolarPatches::solve(const PolarJob& job, PairResult& out) {
 /// @param follow  all rims   @param unseen  whether there is a place of a patch that its rim leaves out
 bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out) {
   forget();
+  share_.clear();
   for (const StartPoint& hill : starts_.hill) {
     if (add_patch(job, hill, follow, out) == Patch::Unfit) return false;
   }
@@ -51,6 +52,7 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
     if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
+  if (share_.size() > 1) out.summary.error_estimate = estimate_of_all(out);
   return !overlap(job.pressure);
 }
 
@@ -82,6 +84,8 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoin
     if (!fits()) return Patch::Unfit;
   }
   out.add(polar_.sums(), polar_.origin());
+  const PatchSums& sums = polar_.sums();
+  share_.push_back({sums.force, sums.first + sums.load * polar_.origin(), sums.load, sums.area, polar_.estimate()});
   out.summary.error_estimate = std::max(out.summary.error_estimate, polar_.estimate());
   out.rounding = std::max(out.rounding, polar_.rounding());
   out.summary.kinks += polar_.kinks();
@@ -92,6 +96,20 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoin
   if (covers_.size() == cover_count_) covers_.emplace_back();
   polar_.cover(covers_[cover_count_++]);
   return Patch::Added;
+}
+
+/// Forces of patches may cancel, and each is a lever to the centre of pressure: both are then off by more than any of the patches is.
+double PolarPatches::estimate_of_all(const PairResult& all) const {
+  if (!(all.load > 0.0)) return 1.0;
+  const Vec3 centre = all.first / all.load;
+  double force = 0.0, area = 0.0, first = 0.0;
+  for (const Share& patch : share_) {
+    if (!(patch.load > 0.0)) continue;  // a third body has all of it
+    force += patch.estimate * patch.force.norm();
+    area += patch.estimate * patch.area;
+    first += patch.estimate * patch.load * (std::sqrt(patch.area) + (patch.first / patch.load - centre).norm());
+  }
+  return std::min(1.0, std::max({force / force_scale(all.summary.force, all.load), area / all.summary.area, first / (all.load * std::sqrt(all.summary.area))}));
 }
 
 bool PolarPatches::overlap(PairPressure& pressure) {

@@ -57,7 +57,7 @@ void weigh(PatchSums& sums, const Vec3& x, const Vec3& normal, double weight, do
 
 /// Of force, area and first moment, over those of `all`.
 double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSums& all) {
-  const double force = (a.force - b.force).norm() / std::max(all.force.norm(), 1e-3 * all.load);
+  const double force = (a.force - b.force).norm() / force_scale(all.force, all.load);
   const double area = std::abs(a.area - b.area) / all.area;
   const Vec3 first = (a.first - b.first) - (a.load - b.load) * all.centre();
   return std::max({force, area, first.norm() / (all.load * std::sqrt(all.area))});

@@ -1,5 +1,5 @@
 /// @file contact_cases.h
-/// The thirteen cases of contact queries in random poses.
+/// The fifteen cases of contact queries in random poses.
 #pragma once
 
 #include <optional>
@@ -134,6 +134,46 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit, con
   {
     Rigid a(ten_blobs(1, true), kE, kSpacing, stage), b(ten_blobs(2, true), 2.0 * kE, kSpacing, stage);
     pressed("ten_parts", a, b, 0.05);
+  }
+  // Bodies that reach around the other one: a ball between two blobs, with a patch on each if neither is missed by the random step aside, and a
+  // ball in a ring that is too narrow, with a crescent or a whole belt. The ball is pressed in by the depth on each side when it is in the middle.
+  const double of_support = implicit::iso_distance(implicit::Kernel::wyvill(1.0), 0.5);
+  if (wanted("pinched")) {
+    std::optional<Rigid> ball, jaws;
+    visit("pinched", [&](Draw& draw) {
+      constexpr double kSupport = 0.2;
+      const std::array<double, 2> support{kSupport * draw.uniform(0.6, 1.0), kSupport * draw.uniform(0.6, 1.0)};
+      const double small = kSupport * draw.logarithmic(0.2, 1.0), depth = of_support * small * draw.logarithmic(least, deep);
+      implicit::Skeleton two;
+      for (const int i : {0, 1}) {
+        implicit::Primitive& p = two.primitive.emplace_back();
+        p.kernel = implicit::Kernel::wyvill(support[static_cast<std::size_t>(i)]);
+        p.offset.position = Vec3((i == 0 ? -1.0 : 1.0) * (of_support * (support[static_cast<std::size_t>(i)] + small) - depth), 0.0, 0.0);
+      }
+      two.part_count = 1;
+      jaws.emplace(std::move(two), 2.0 * kE, kSpacing, stage);
+      ball.emplace(wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), small), kE, 0.5 * small, stage);
+      const Pose pose = turned(draw, somewhere(draw));
+      jaws->put(pose);
+      const Vec3 aside = draw.uniform(0.0, 1.0) * (2.0 * depth * draw.direction());
+      ball->put(turned(draw, pose.position + pose.orientation * aside));
+      return Pair{{ball->body(), jaws->body()}, false, {}};
+    });
+  }
+  if (wanted("ring")) {
+    std::optional<Rigid> ball;
+    constexpr double kTube = 0.15, kMiddle = 0.2;
+    Rigid ring(wyvill_shape(implicit::ShapeKind::Ring, Vec3(kMiddle, 0.0, 0.0), kTube), 2.0 * kE, kSpacing, stage);
+    visit("ring", [&](Draw& draw) {
+      const double depth = of_support * kTube * draw.logarithmic(least, deep), hole = kMiddle - of_support * kTube;
+      const double support = (hole + depth) / of_support;
+      ball.emplace(wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), support), kE, kSpacing, stage);
+      const Pose pose = turned(draw, somewhere(draw));
+      ring.put(pose);
+      const Vec3 aside = draw.uniform(0.0, 1.0) * (2.0 * depth * draw.direction());
+      ball->put(turned(draw, pose.position + pose.orientation * aside));
+      return Pair{{ball->body(), ring.body()}, false, {}};
+    });
   }
 }
 

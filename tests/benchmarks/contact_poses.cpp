@@ -1,5 +1,5 @@
 /// @file contact_poses.cpp
-/// Contact queries in many random poses: thirteen cases, worst and middle CPU time and error over the poses, one JSON
+/// Contact queries in many random poses: fifteen cases, worst and middle CPU time and error over the poses, one JSON
 /// object a line. A query is broad phase, candidates and contact surface of two bodies, with
 /// no state from another pose; its time is the least in three rounds of all poses. Beside it stands that of splitting the forces to the parts of the
 /// bodies. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The

@@ -274,8 +274,9 @@ inline double cpu_microseconds() {
   return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
 }
 
+/// As ContactSettings::error measures it.
 inline double difference(const collision::ContactSurface::Summary& s, const Answer& exact) {
-  return std::max({std::abs(s.force.norm() / exact.force - 1.0), std::abs(s.area / exact.area - 1.0),
+  return std::max({std::abs(s.force.norm() - exact.force) / std::max(exact.force, 1e-3 * s.load), std::abs(s.area / exact.area - 1.0),
                    (s.centre_of_pressure - exact.centre).norm() / std::sqrt(exact.area)});
 }
 

@@ -430,6 +430,30 @@ TEST(ContactSurface, FindsBothPatchesOfABallThatIsPinched) {
   EXPECT_GE(both, 12);
 }
 
+// What a patch may be off by moves the centre of pressure by its distance from there, and is more of a force when that of another patch cancels it.
+TEST(ContactSurface, HasBoundsOfSeveralPatchesTogether) {
+  const Blobs bumps({Vec3(-12, 0, 0.40), Vec3(12, 0, 0.42)}, 1.0), blobs({Vec3(-0.75, 0, 0), Vec3(0.75, 0, 0)}, 1.0), ball({Vec3(0.001, 0, 0)}, 0.68);
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1e9};
+  const auto samples = samples_of_two(bumps, 150), two = samples_of_two(blobs, 400), one = sphere_samples(ball.centre[0], 0.68 * kIsoRadius, 300);
+  Stage flat, pinch;
+  flat.add(bumps.field, bumps.centre).samples = &samples;
+  flat.add(plane).fixed = true;
+  pinch.add(ball.field, ball.centre).samples = &one;
+  pinch.add(blobs.field, blobs.centre).samples = &two;
+  for (Stage* stage : {&flat, &pinch}) {
+    const ContactSurface::Summary finest = stage->solve({.error = 1e-10}).summary.at(0);
+    for (double error = 1e-2; error > 1e-7; error *= 0.7) {
+      const ContactSurface::Summary s = stage->solve({.error = error, .only = ContactRule::Polar}).summary.at(0);
+      ASSERT_EQ(s.patches, 2u);
+      const double scale = std::max(finest.force.norm(), 1e-3 * finest.load);
+      const double off = std::max({(s.force - finest.force).norm() / scale, std::abs(s.area / finest.area - 1.0),
+                                   (s.centre_of_pressure - finest.centre_of_pressure).norm() / std::sqrt(finest.area)});
+      EXPECT_LE(s.error_estimate, 1.01 * error);
+      EXPECT_LE(off, s.error_estimate + finest.error_estimate) << error;
+    }
+  }
+}
+
 /// Integral of [p]+ over the plane z = 0 by the midpoint rule.
 double plane_integral(const implicit::FieldView& field, double half) {
   const int n = 800;

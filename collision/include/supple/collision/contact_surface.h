@@ -31,7 +31,9 @@ enum class RuleReason : std::uint8_t {
 };
 
 struct ContactSettings {
-  double error = 1e-4;   ///< relative error of force, area and centre of pressure asked for, in [1e-10, 0.1]
+  /// Error asked for, in [1e-10, 0.1]: of the force over the force, or over a thousandth of the load where it cancels to less; of the area over the
+  /// area; of the centre of pressure over the root of the area.
+  double error = 1e-4;
   bool energy = true;    ///< false: energy, displaced volumes and squeezed regions only where the parts of a body need them
   int max_refinement = 6;  ///< refinements before the estimate is accepted as it is
   /// None: polar where it fits; else samples for coarse errors, marching for finer ones; and where a bound is not as good as asked, of
@@ -73,7 +75,7 @@ struct ContactSurface {
     double displaced_a = 0.0;              ///< volume of V_A [m^3]: what A loses to B
     double displaced_b = 0.0;              ///< volume of V_B [m^3]
     double residual = 0.0;                 ///< largest |p_A - p_B| / max(P_A, P_B) at the points [1]
-    double error_estimate = 0.0;           ///< relative, of force, area and centre of pressure (the largest)
+    double error_estimate = 0.0;           ///< the largest of those of force, area and centre of pressure, as in ContactSettings::error
     std::uint32_t patches = 0;             ///< connected components found
     std::uint32_t kinks = 0;               ///< kinks of the fields (implicit/kinks.h) and third bodies that polar patches were parted at
     std::uint64_t points = 0;              ///< quadrature points on Sigma
