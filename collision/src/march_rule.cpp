@@ -246,9 +246,10 @@ void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactB
 /// What the finer rule of a leaf may be off by, of what it differs from the coarser one by. Where sums converge like a power of the order,
 /// as Gauss's do on smooth pieces, that falls with the difference.
 double MarchRuleSolver::share_of(const Leaf& leaf, int order) {
-  constexpr double kFall = 30.0, kLost = 10.0;
+  constexpr double kFall = 30.0, kKinked = 4.0, kLost = 10.0;
   if (leaf.trust == Trust::Lost) return kLost;
-  if (leaf.trust == Trust::Kinked || !leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kSafety;
+  if (leaf.trust == Trust::Kinked) return kKinked;
+  if (!leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kSafety;
   const double off = std::max(leaf.off.force.norm() / leaf.sums.load, std::abs(leaf.off.area) / leaf.sums.area);
   double root = std::sqrt(off);  // of degree order - 1 at least
   for (int degree = 2; degree < order - 1; degree *= 2) root = std::sqrt(root);

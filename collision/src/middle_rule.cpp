@@ -418,7 +418,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   static const std::vector<Vec2> few = circle(kFewRays), many = circle(kManyRays);
   kinks_.clear();
   // All of both bodies: which of them a box holds depends on how it lies.
-  pressure.kinks({Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)}, kinks_);
+  all_kinks_ = pressure.kinks({Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)}, kinks_);
   if (kinks_.empty()) return false;
   frame_.u *= std::sqrt(2.0 * frame_.peak);
   frame_.v *= std::sqrt(2.0 * frame_.peak);

@@ -15,7 +15,7 @@ constexpr int kRootSteps = 40;
 constexpr int kMostLevels = 32;
 constexpr double kFewPoints = 24.0;  // fewer say nothing about their error
 constexpr double kRim = 0.75;       // half width of the rim in cells: wider blurs it, narrower leaves the cells' places visible
-constexpr double kSafety = 2.5;
+constexpr double kSafety = 2.7;
 constexpr double kCellError = 4.0;   // what the places of the cells may do, in the largest share of a cell over the area
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

@@ -71,7 +71,10 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
 constexpr double kRound = 6e5;  // times its square
 constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
-constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
+constexpr double kUnknown = 1.5, kUnknownCoarse = 3.0, kRadialUnknown = 4.0;  // where kinks are not all known
+constexpr double kRegularOnFaces = 2.0;  // times the root of the difference, of the panel itself
+constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kinks from some angle on
+constexpr double kOnFaces = 0.05, kOnFacesUneven = 0.1, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 /// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
@@ -370,10 +373,24 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) co
     panel.by_radius *= share;
     return;
   }
-  const double on_faces = grows_as_root(panel) ? kOnFacesAsRoot : fine || panel.leaves ? kOnFacesDoubted : panel.halved ? kOnFacesHalved : kOnFaces;
+  if (!all_kinks_) {
+    // Some may cross any panel, where rules say no more than what they differ by.
+    panel.by_angle = std::max((fine ? kUnknown : kUnknownCoarse) * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kRadialUnknown;
+    return;
+  }
+  // Over the panel itself: what differs so much is not the last digit of a rule that converges.
+  const double off = panel.fine.area > 0.0 ? panel.by_angle * all.area / panel.fine.area : 0.0;
+  const double on_faces = std::max(grows_as_root(panel)         ? kOnFacesAsRoot
+                                   : fine || panel.leaves ? kOnFacesDoubted
+                                   : panel.halved         ? kOnFacesHalved
+                                                          : kOnFaces,
+                                   std::min(kRegularOnFaces * std::sqrt(off), kHalf));
   if (!panel.even()) {
     const auto changes = static_cast<double>(panel.change_end - panel.change);
-    panel.by_angle *= panel.lost ? kLost : about_middle_ ? on_faces : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    const double decay = about_middle_ ? std::min(kDecayOnFaces * slow_decay(panel, all), kHalf * panel.by_angle) : 0.0;
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesUneven) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    panel.by_angle = std::max(panel.by_angle, decay);
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {

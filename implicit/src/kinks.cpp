@@ -61,6 +61,13 @@ std::array<double, 2> levels_of(const Kernel& kernel) noexcept {
 /// Derivatives below this order go over a level without a jump: (1 - rho^2)^3 ends with two of them, the others with one.
 int order_of(const Kernel& kernel) noexcept { return kernel.kind == KernelKind::Wyvill ? 3 : 2; }
 
+/// Whether the line x = y = 0 of a primitive surely passes a box by.
+bool clear_of_axis(const Mat3& to_local, const Box& box, const Vec3& origin) noexcept {
+  if (!box.lower.allFinite() || !box.upper.allFinite()) return false;
+  const Vec3 centre = to_local * (box.centre() - origin), half = 0.5 * (to_local.cwiseAbs() * box.extent());
+  return centre.head<2>().squaredNorm() > half.head<2>().squaredNorm();
+}
+
 }  // namespace
 
 bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
@@ -132,10 +139,30 @@ bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out) {
       cap(begin.point, begin.first, 1.0);
       cap(end.point, end.first, shape.view.taper);
       levels = complete = false;
+    } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Superquadric) {
+      // Powers |x|^(2 / e) have as many derivatives there as e leaves them.
+      const auto [vertical, around] = shape.view.pair;
+      for (int k = 0; k < 3; ++k) {
+        if ((k < 2 ? around : vertical) != 1.0) plane(Vec3::Unit(k), 0.0);
+      }
+      levels = complete = false;
     } else if (shape.foot == PackedFoot::Scalar && shape.view.kind == ShapeKind::Directed) {
       for (int k = 0; k < 3; ++k) plane(Vec3::Unit(k), 0.0);
       levels = false;
       complete = complete && index.size() == 1;
+    } else if (shape.foot == PackedFoot::Scalar && (shape.view.kind == ShapeKind::Ring || shape.view.kind == ShapeKind::Arc)) {
+      if (shape.view.kind == ShapeKind::Arc) {
+        // Where the nearest point is an end, and beyond the axis where it goes from one end to the other.
+        const auto [cosine, sine] = shape.view.pair;
+        plane(Vec3(-sine, cosine, 0.0), 0.0);
+        plane(Vec3(-sine, -cosine, 0.0), 0.0);
+        plane(Vec3::UnitY(), 0.0);
+      }
+      levels = false;
+      // Levels of the kernel are tori; at the axis the nearest point jumps.
+      const std::array<double, 2> level = levels_of(shape.kernel);
+      const bool inside = std::any_of(level.begin(), level.end(), [&](double at) { return at > 0.0 && at < farthest; });
+      complete = complete && index.size() == 1 && !inside && clear_of_axis(A, box, kink.origin);
     } else if (shape.foot == PackedFoot::Scalar &&
                (shape.view.kind == ShapeKind::Triangle || shape.view.kind == ShapeKind::Polygon)) {
       const std::span<const Vec3> corner = shape.view.control;

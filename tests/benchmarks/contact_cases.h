@@ -1,5 +1,5 @@
 /// @file contact_cases.h
-/// The fifteen cases of contact queries in random poses.
+/// The sixteen cases of contact queries in random poses.
 #pragma once
 
 #include <optional>
@@ -134,6 +134,17 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit, con
   {
     Rigid a(ten_blobs(1, true), kE, kSpacing, stage), b(ten_blobs(2, true), 2.0 * kE, kSpacing, stage);
     pressed("ten_parts", a, b, 0.05);
+  }
+  if (wanted("shapes")) {
+    std::optional<Rigid> a, b;
+    visit("shapes", [&](Draw& draw) {
+      // Bodies that go through one another elsewhere are drawn again.
+      do {
+        a.emplace(any_shape(draw), kE, kSpacing, stage);
+        b.emplace(any_shape(draw), 2.0 * kE, kSpacing, stage);
+      } while (!press(*a, *b, draw.logarithmic(least, deep) * 0.07, draw));
+      return Pair{{a->body(), b->body()}, false, {}};
+    });
   }
   // Bodies that reach around the other one: a ball between two blobs, with a patch on each if neither is missed by the random step aside, and a
   // ball in a ring that is too narrow, with a crescent or a whole belt. The ball is pressed in by the depth on each side when it is in the middle.

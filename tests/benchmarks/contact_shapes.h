@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <ctime>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <string_view>
@@ -89,6 +90,7 @@ struct Stage {
     if (length == 1.0) return skeleton;
     for (implicit::Primitive& p : skeleton.primitive) {
       p.size *= length;
+      for (Vec3& x : p.control) x *= length;
       p.offset.position *= length;
       p.kernel.radius *= length;
       p.kernel.thickness *= length;
@@ -128,6 +130,15 @@ class Rigid {
       i = static_cast<std::size_t>(draw.uniform(0.0, 1.0) * static_cast<double>(rest_.point.size()));
     } while (rest_.valid[i] == 0);
     return {rest_.point[i] / stage_.length, rest_.normal[i]};
+  }
+  [[nodiscard]] implicit::FieldView field() const { return field_; }
+  /// Largest value of another body's field at the samples.
+  [[nodiscard]] double deepest_in(const implicit::FieldView& other) const {
+    std::vector<double> value(samples_.point.size());
+    other.evaluate(samples_.point, value);
+    double deepest = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < value.size(); ++i) deepest = samples_.valid[i] != 0 ? std::max(deepest, value[i]) : deepest;
+    return deepest;
   }
   [[nodiscard]] collision::ContactBody body() const {
     collision::ContactBody b = at_rest(field_, modulus_, poses_);
@@ -185,6 +196,42 @@ inline implicit::Skeleton ten_blobs(std::uint64_t seed, bool apart = false) {
     skeleton.primitive.push_back(p);
   }
   skeleton.part_count = apart ? 10 : 1;
+  return skeleton;
+}
+
+/// One primitive of any shape, kernel, taper and stretch, about 0.1 to 0.6 across.
+inline implicit::Skeleton any_shape(Draw& draw) {
+  using implicit::Kernel;
+  using implicit::ShapeKind;
+  const auto one_of = [&draw](std::size_t count) { return static_cast<std::size_t>(draw.uniform(0.0, static_cast<double>(count))); };
+  const auto sizes = [&draw](double lower, double upper) { return Vec3(draw.uniform(lower, upper), draw.uniform(lower, upper), draw.uniform(lower, upper)); };
+  implicit::Primitive p;
+  p.shape = static_cast<ShapeKind>(one_of(static_cast<std::size_t>(ShapeKind::Directed) + 1));
+  const double support = draw.uniform(0.08, 0.2);
+  const std::array<Kernel, 5> kernels{Kernel::wyvill(support), Kernel::soft_object(support), Kernel::murakami(support), Kernel::nishimura(support),
+                                      Kernel::blanc_schlick(support, draw.uniform(0.3, 3.0))};
+  p.kernel = draw.uniform(0.0, 1.0) < 0.5 ? kernels[0] : kernels[one_of(kernels.size())];
+  p.size = sizes(0.03, 0.2);
+  if (p.shape == ShapeKind::Ellipsoid || p.shape == ShapeKind::Superquadric || p.shape == ShapeKind::Directed) p.size = sizes(0.1, 0.25);
+  if (p.shape == ShapeKind::Arc) p.size.y() = draw.uniform(0.5, 3.0);
+  if (p.shape == ShapeKind::Directed) p.control = {sizes(0.1, 0.25)};
+  if (p.shape == ShapeKind::Superquadric) p.exponent = {draw.uniform(0.4, 1.0), draw.uniform(0.4, 1.0)};
+  if (p.shape == ShapeKind::Segment || p.shape == ShapeKind::Curve) p.taper = draw.uniform(0.6, 1.4);
+  if (p.shape == ShapeKind::Triangle) p.control = {sizes(-0.2, 0.2), sizes(-0.2, 0.2), sizes(-0.2, 0.2)};
+  if (p.shape == ShapeKind::Curve) {
+    for (std::size_t i = 0, count = 2 + one_of(3); i < count; ++i) p.control.push_back(sizes(-0.2, 0.2));
+  }
+  if (p.shape == ShapeKind::Polygon) {
+    const double across = draw.uniform(0.08, 0.2);
+    for (int i = 0; i < 5; ++i) {
+      const auto [sine, cosine] = math::sin_cos(2.0 * kPi * i / 5.0);
+      p.control.emplace_back(across * cosine, across * sine, 0.0);
+    }
+  }
+  if (draw.uniform(0.0, 1.0) < 0.3) p.stretch = sizes(0.7, 1.4);
+  implicit::Skeleton skeleton;
+  skeleton.primitive.push_back(p);
+  skeleton.part_count = 1;
   return skeleton;
 }
 
@@ -298,7 +345,8 @@ struct Pair {
 };
 
 /// Places B such that a surface point of it is pressed into one of A by `depth`, normal against normal.
-inline void press(Rigid& a, Rigid& b, double depth, Draw& draw) {
+/// @return whether no other sample of either lies much deeper in the other one
+inline bool press(Rigid& a, Rigid& b, double depth, Draw& draw) {
   const Pose pose{draw.uniform(0.0, 1.0) * draw.direction(), draw.rotation()};
   a.put(pose);
   const auto [rest, outward] = a.surface_point(draw);
@@ -307,6 +355,8 @@ inline void press(Rigid& a, Rigid& b, double depth, Draw& draw) {
   const Quat spin(Eigen::AngleAxisd(draw.uniform(-kPi, kPi), n));
   const Quat turn = (spin * Quat::FromTwoVectors(m, -n)).normalized();
   b.put({x - depth * n - turn * y, turn});
+  constexpr double kDeeper = 1.5;
+  return a.deepest_in(b.field()) <= kDeeper * b.field().value(x) && b.deepest_in(a.field()) <= kDeeper * a.field().value(x - depth * n);
 }
 
 }  // namespace supple::benchmarks

@@ -62,6 +62,66 @@ double interpolation_error(double a, double b, const F& f) {
   return worst;
 }
 
+/// Errors of polynomials of a field along at(t), |t| <= reach: one on all of it, and the worst of those between two kinks each.
+struct LineErrors {
+  double whole = 0.0, pieces = 0.0;
+};
+template <class Line>
+LineErrors errors_along(const Body& body, const std::vector<Kink>& kinks, const Line& at, double reach) {
+  const auto f = [&](double t) { return implicit::FieldView(body.field).value(at(t)); };
+  std::vector<double> cut{-reach, reach};
+  for (const Kink& kink : kinks) {
+    constexpr int kSteps = 2000;
+    for (int i = 0; i < kSteps; ++i) {
+      double low = -reach + 2.0 * reach * i / kSteps, high = low + 2.0 * reach / kSteps;
+      const bool side = kink.value(at(low)) > 0.0;
+      if ((kink.value(at(high)) > 0.0) == side) continue;
+      for (int k = 0; k < 50; ++k) ((kink.value(at(0.5 * (low + high))) > 0.0) == side ? low : high) = 0.5 * (low + high);
+      cut.push_back(low);
+    }
+  }
+  std::sort(cut.begin(), cut.end());
+  LineErrors errors{interpolation_error(-reach, reach, f), 0.0};
+  for (std::size_t i = 0; i + 1 < cut.size(); ++i) {
+    // 21 points leave 1e-8 where the nearest pole is as far away as the piece is long; tiny pieces only round.
+    if (cut[i + 1] - cut[i] >= 1e-9) errors.pieces = std::max(errors.pieces, interpolation_error(cut[i], cut[i + 1], f));
+  }
+  return errors;
+}
+
+TEST(Kinks, OfArcsAndRingsAreAllKnownAwayFromTheirAxes) {
+  Primitive arc = make(ShapeKind::Arc, Vec3(0.5, 1.2, 0), Kernel::wyvill(1.2));
+  arc.stretch = Vec3(1.2, 0.9, 1.0);
+  const auto [sine, cosine] = math::sin_cos(1.2);
+  const Pose pose{Vec3(0.3, -0.2, 0.1), Quat(0.5, 0.1, 0.7, -0.3).normalized()};
+  const Quat turn = pose.orientation * arc.offset.orientation;
+  const Vec3 end = pose.position + turn * Vec3(1.2 * 0.5 * cosine, 0.9 * 0.5 * sine, 0.0);
+  const Vec3 behind = pose.position - turn * Vec3(0.22, 0.0, 0.0);  // nearly as far from both ends
+  const Vec3 half = Vec3::Constant(0.08);
+  for (const bool ring : {false, true}) {
+    arc.shape = ring ? ShapeKind::Ring : ShapeKind::Arc;
+    const Body body({arc}, pose);
+    std::vector<Kink> kinks;
+    EXPECT_FALSE(kinks_of(body.field, body.field.surface_box(), kinks));
+    for (const Vec3& middle : {end, behind}) {
+      kinks.clear();
+      EXPECT_TRUE(kinks_of(body.field, {middle - half, middle + half}, kinks));
+      double whole = 0.0;
+      for (int line = 0; line < 30; ++line) {
+        const auto [s, c] = math::sin_cos(1.7 * line);
+        const Vec3 along(0.6 * c, 0.6 * s, 0.8);
+        const LineErrors errors = errors_along(body, kinks, [&](double t) { return Vec3(middle + 0.001 * line * along.unitOrthogonal() + t * along); }, 0.08);
+        whole = std::max(whole, errors.whole);
+        EXPECT_LT(errors.pieces, 1e-7) << line;
+      }
+      EXPECT_TRUE(ring || whole > 2e-6) << whole;
+    }
+    // Beside another primitive, the torus at which its kernel ends is not among them.
+    const Body two({arc, make(ShapeKind::Point, Vec3::Zero(), Kernel::wyvill(0.6), Vec3(0.5, 0.1, 0))}, pose);
+    EXPECT_FALSE(kinks_of(two.field, {end - half, end + half}, kinks));
+  }
+}
+
 TEST(Kinks, PartEveryLineIntoPiecesOnWhichTheFieldIsSmooth) {
   Primitive triangle = make(ShapeKind::Triangle, Vec3::Zero(), Kernel::wyvill(1.0));
   triangle.control = {Vec3(-0.5, -0.3, 0), Vec3(0.6, -0.2, 0), Vec3(0.0, 0.5, 0)};
@@ -99,26 +159,9 @@ TEST(Kinks, PartEveryLineIntoPiecesOnWhichTheFieldIsSmooth) {
       const Vec3 n(std::sqrt(1.0 - z * z) * c, std::sqrt(1.0 - z * z) * s, z);
       const Vec3 along = n.unitOrthogonal();
       const auto at = [&](double t) -> Vec3 { return Vec3(0.3, -0.2, 0.1) + 0.55 * n + t * along; };
-      const auto f = [&](double t) { return implicit::FieldView(body.field).value(at(t)); };
-      constexpr double kReach = 0.5;
-      std::vector<double> cut{-kReach, kReach};
-      for (const Kink& kink : kinks) {
-        constexpr int kSteps = 2000;
-        for (int i = 0; i < kSteps; ++i) {
-          double low = -kReach + 2.0 * kReach * i / kSteps, high = low + 2.0 * kReach / kSteps;
-          const bool side = kink.value(at(low)) > 0.0;
-          if ((kink.value(at(high)) > 0.0) == side) continue;
-          for (int k = 0; k < 50; ++k) ((kink.value(at(0.5 * (low + high))) > 0.0) == side ? low : high) = 0.5 * (low + high);
-          cut.push_back(low);
-        }
-      }
-      std::sort(cut.begin(), cut.end());
-      whole = std::max(whole, interpolation_error(-kReach, kReach, f));
-      for (std::size_t i = 0; i + 1 < cut.size(); ++i) {
-        // 21 points leave 1e-8 where the nearest pole is as far away as the piece is long; tiny pieces only round.
-        if (cut[i + 1] - cut[i] < 1e-9) continue;
-        EXPECT_LT(interpolation_error(cut[i], cut[i + 1], f), 1e-7) << b << " line " << line;
-      }
+      const LineErrors errors = errors_along(body, kinks, at, 0.5);
+      whole = std::max(whole, errors.whole);
+      EXPECT_LT(errors.pieces, 1e-7) << b << " line " << line;
     }
     EXPECT_GT(whole, 1e-5) << b;  // otherwise the pieces prove nothing
   }
@@ -611,6 +654,27 @@ TEST(SplitRule, GivesRaysThatAreNotCheckedAsManyPoints) {
       const benchmarks::Pair pair = make_pose(draw);
       const ContactSurface::Summary exact = contact_of(benchmarks::seen_otherwise(pair.bodies), 1e-10), s = contact_of(pair.bodies, 1e-6);
       EXPECT_LE(benchmarks::difference(s, {exact.force.norm(), exact.area, exact.centre_of_pressure}), s.error_estimate + exact.error_estimate) << from;
+    });
+  }
+}
+
+TEST(SplitRule, KeepsItsBoundsBetweenAnyTwoShapes) {
+  // A triangle on a polygon, whose kinks are oblique to the faces, and a ring on a stretched ball with a kink that is not told as one of all.
+  struct Case {
+    std::uint64_t seed;
+    int pose;
+  };
+  for (const auto& [seed, pose] : {Case{1, 53}, Case{2, 282}, Case{5, 55}}) {
+    benchmarks::for_cases({}, [](std::string_view name) { return name == "shapes"; }, [&, at = pose, from = seed](std::string_view, const auto& make_pose) {
+      benchmarks::Draw draw(from);
+      for (int i = 0; i < at; ++i) (void)make_pose(draw);
+      const benchmarks::Pair pair = make_pose(draw);
+      const ContactSurface::Summary exact = contact_of(pair.bodies, 1e-8);
+      for (const double error : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+        const ContactSurface::Summary s = contact_of(pair.bodies, error);
+        EXPECT_LE(benchmarks::difference(s, {exact.force.norm(), exact.area, exact.centre_of_pressure}), s.error_estimate + exact.error_estimate)
+            << from << ' ' << error;
+      }
     });
   }
 }

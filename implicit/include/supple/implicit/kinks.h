@@ -34,8 +34,9 @@ struct Kink {
 };
 
 /// Appends the kinks of the primitives whose supports may meet the box; some of them may not meet the box, or the body.
-/// @return whether these are all: not so for curves, arcs, rings, superquadrics and convolved primitives, for tapered segments beside
-///         others or of kernels of several formulas, and not for fields that combine their parts by another rule than the sum
+/// @return whether these are all: not so for curves, superquadrics and convolved primitives, for arcs, rings and tapered segments beside
+///         others or of kernels of several formulas, for arcs and rings whose axis may meet the box, and not for fields that combine their
+///         parts by another rule than the sum
 bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out);
 
 }  // namespace supple::implicit
