@@ -129,6 +129,7 @@ void ReadArchive::finish() {
     if (near.empty()) near = nearest_word(key, known_);
     if (!near.empty()) {
       misspelt = true;
+      if (mapping_.find(near) == nullptr) faults_.withdraw(path_of(near));  // that it is missing
       hint = "did you mean '" + near + "'? (" + hint + ')';
     } else if (const std::string home = home_of(key, scene_fields(), ""); !home.empty() && home != path_) {
       hint = "a key of this name belongs to " + home + " (" + hint + ')';

@@ -59,6 +59,10 @@ void FaultList::add(Mark mark, std::string key, std::string expected, std::strin
   faults_.push_back({mark, Fault{"", std::move(key), std::move(expected), std::move(found), std::move(hint)}});
 }
 
+void FaultList::withdraw(std::string_view key) {
+  count_ -= std::erase_if(faults_, [key](const Placed& placed) { return placed.fault.key == key; });
+}
+
 bool FaultList::has(std::string_view key) const {
   return std::any_of(faults_.begin(), faults_.end(), [&](const Placed& placed) {
     const std::string_view other = placed.fault.key;

@@ -46,6 +46,8 @@ class FaultList {
   /// @param texts  outlives the list
   explicit FaultList(const SourceTexts& texts) : texts_(texts) {}
   void add(Mark mark, std::string key, std::string expected, std::string found, std::string hint);
+  /// Forgets what is listed at this very key.
+  void withdraw(std::string_view key);
   [[nodiscard]] std::size_t count() const { return count_; }
   /// A fault at this key, above it or below it is listed.
   [[nodiscard]] bool has(std::string_view key) const;

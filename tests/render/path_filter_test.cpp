@@ -94,6 +94,28 @@ TEST(PathTracer, FilterKeepsNothingOfEarlierPictures) {
     for (int x = 0; x < 64; ++x) ASSERT_EQ(film.radiance.at(x, y), same.radiance.at(x, y)) << x << " " << y;
 }
 
+TEST(PathTracer, FilterLeavesQuietPixelsBesideNoisyOnes) {
+  // Direct light in a checkerboard whose means over neighbours are alike everywhere: only the noise, in the columns from `kNoisy` on, says what is to be
+  // smoothed. Eight pixels go through the filter together, some of which are quiet.
+  constexpr int kSize = 32, kNoisy = 15, kSpread = 5;  // columns by which noise spreads, one with each level
+  Film film;
+  film.resize(kSize, kSize);
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      film.cover.store(x, y, 1.0F);
+      film.albedo.store(x, y, Vec3f::Ones());
+      film.normal.store(x, y, Vec3f::UnitZ());
+      film.position.store(x, y, Vec3f(static_cast<float>(x), static_cast<float>(y), 0.0F));
+      film.direct.radiance.store(x, y, Vec3f::Constant((x + y) % 2 == 0 ? 1.0F : 0.5F));
+      film.direct.variance.store(x, y, x >= kNoisy ? 0.25F : 0.0F);
+    }
+  path::Denoiser{}.run(Vec3f(16, 16, 1000), 1e-3F, Executor(1), film);
+  for (int y = 8; y < 24; ++y) {
+    for (int x = 4; x < kNoisy - kSpread; ++x) EXPECT_NEAR(film.radiance.at(x, y).x(), (x + y) % 2 == 0 ? 1.0F : 0.5F, 1e-6F) << x << ' ' << y;
+    for (int x = kNoisy + 2; x < 24; ++x) EXPECT_NEAR(film.radiance.at(x, y).x(), 0.75F, 0.15F) << x << ' ' << y;
+  }
+}
+
 TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {
   // Where a ball stands on a floor, in even light, its outline passes over the darkest part of the floor.
   const Mesh ball = sphere(Vec3(0, 0, 0.3), 0.3, 48), floor = plate(4.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
