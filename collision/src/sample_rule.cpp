@@ -16,6 +16,8 @@ constexpr int kMostLevels = 32;
 constexpr double kFewPoints = 24.0;  // fewer say nothing about their error
 constexpr double kRim = 0.75;       // half width of the rim in cells: wider blurs it, narrower leaves the cells' places visible
 constexpr double kSafety = 2.7;
+constexpr double kOfLast = 0.35;     // of the bound of the spacing before: the next may agree with it by chance
+constexpr double kEnough = 0.9;      // of the error asked: what that asks no finer spacing for
 constexpr double kCellError = 4.0;   // what the places of the cells may do, in the largest share of a cell over the area
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -423,7 +425,10 @@ bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody
       if (last) break;
       continue;
     }
-    if (refined >= 0) estimate_ = kSafety * relative_difference(sums_, coarse) + kCellError * largest_cell_ / sums_.area;
+    if (refined >= 0) {
+      const double least = refined > 0 ? std::min(kOfLast * estimate_, kEnough * settings.error) : 0.0;
+      estimate_ = std::max(kSafety * relative_difference(sums_, coarse) + kCellError * largest_cell_ / sums_.area, least);
+    }
     ++refined;
     if (last || estimate_ <= settings.error || refined >= settings.max_refinement) break;
     coarse = sums_;
