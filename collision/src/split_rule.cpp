@@ -71,7 +71,7 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
 constexpr double kRound = 6e5;  // times its square
 constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
-constexpr double kUnknown = 1.5, kUnknownCoarse = 3.0, kRadialUnknown = 4.0;  // where kinks are not all known
+constexpr double kUnknown = 4.0;  // of either difference, where kinks are not all known
 constexpr double kRegularOnFaces = 2.0;  // times the root of the difference, of the panel itself
 constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kinks from some angle on
 constexpr double kOnFaces = 0.05, kOnFacesUneven = 0.1, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
@@ -374,9 +374,9 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) co
     return;
   }
   if (!all_kinks_) {
-    // Some may cross any panel, where rules say no more than what they differ by.
-    panel.by_angle = std::max((fine ? kUnknown : kUnknownCoarse) * panel.by_angle, slow_decay(panel, all));
-    panel.by_radius *= kRadialUnknown;
+    // Some may cross any panel, where rules converge slowly.
+    panel.by_angle = std::max(kUnknown * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kUnknown;
     return;
   }
   // Over the panel itself: what differs so much is not the last digit of a rule that converges.
