@@ -9,6 +9,11 @@
 
 namespace supple::benchmarks {
 
+/// Whether a command names a case, or all: these do not include three of which many poses are marched, up to seconds each.
+inline bool names(std::string_view command, std::string_view name) {
+  return command == name || (command == "all" && name != "shapes" && name != "pinched" && name != "ring");
+}
+
 /// Calls `visit(name, make_pose)` for each case that is wanted; `make_pose(draw)` puts its two bodies in the next random pose, the same ones
 /// on every stage. Spheres of linear pressure have closed forms, in the place and size of the bodies on the default stage.
 /// @param depths  least and largest overlap over the size of the bodies, for all cases; else 1e-3 to 0.3, of those without a closed form from 1e-2 on

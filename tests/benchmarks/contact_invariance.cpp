@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
   const std::string_view only = argc > 2 ? argv[2] : "all", rule = argc > 3 ? argv[3] : "auto";
   const std::uint64_t seed = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 2026;
   constexpr double kRoundOff = 1e-9;
-  for_cases({}, [only](std::string_view name) { return only == "all" || only == name; }, [&](std::string_view name, const auto&) {
+  for_cases({}, [only](std::string_view name) { return names(only, name); }, [&](std::string_view name, const auto&) {
     const Answers rest = look({}, name, poses, kErrors, rule_named(rule), seed);
     for (const View& view : other_views()) {
       const Answers answers = look(view, name, poses, kErrors, rule_named(rule), seed);
