@@ -370,6 +370,7 @@ bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& 
   parted_ = 0;
   polygon_.clear();
   kinks_.clear();
+  all_kinks_ = true;  // where none are looked for
   bool smooth = error < kSplitBelow && third_.empty() && no_kinks_near(pressure);
   std::size_t first = first_of(smooth);
   double difference = 0.0;
