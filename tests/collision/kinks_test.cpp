@@ -679,6 +679,32 @@ TEST(SplitRule, KeepsItsBoundsBetweenAnyTwoShapes) {
   }
 }
 
+TEST(SplitRule, ForgetsWhatWasKnownOfThePairBefore) {
+  // Of boxes all kinks are known; those of balls beside a third one are not looked for at this error.
+  Primitive brick = make(ShapeKind::Box, Vec3(0.3, 0.3, 0.1), Kernel::wyvill(0.3));
+  brick.offset = {};
+  const Body below({brick}, {Vec3(0, 0, 20), Quat::Identity()}), above({brick}, {Vec3(0.05, 0, 20.45), Quat::Identity()});
+  const Primitive point = make(ShapeKind::Point, Vec3::Zero(), Kernel::gascuel(1.0, 1.5, 0.5));
+  const std::array balls{Body({point}, {Vec3(0, 0, 0.8), Quat::Identity()}), Body({point}, {Vec3(0, 0, -0.8), Quat::Identity()}),
+                         Body({point}, {Vec3(0.85, 0, 0), Quat::Identity()})};
+  const auto answer = [&](bool first) {
+    Stage stage;
+    if (first) {
+      stage.add(below.field, {Vec3(0, 0, 20)});
+      stage.add(above.field, {Vec3(0.05, 0, 20.45)});
+    }
+    for (const Body& ball : balls) stage.add(ball.field, {Vec3::Zero()});
+    const ContactSurface& s = stage.solve({.error = 1e-2});
+    EXPECT_EQ(s.summary.size(), first ? 4u : 3u);
+    return s.summary.at(first ? 1 : 0);
+  };
+  const ContactSurface::Summary alone = answer(false), after = answer(true);
+  ASSERT_EQ(alone.rule, ContactRule::Polar);
+  EXPECT_EQ(alone.force, after.force);
+  EXPECT_EQ(alone.error_estimate, after.error_estimate);
+  EXPECT_EQ(alone.points, after.points);
+}
+
 TEST(SmoothPatches, HaveBoundsNearTheirErrors) {
   // A linear ball of radius 1 on a rigid plane, F = pi E d^2 (1 - 2 d / 3) with E d / (1 + E / k) in place of E d for a plane of slope k.
   constexpr double k = 1e9;
