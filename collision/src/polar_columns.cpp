@@ -1,6 +1,7 @@
 #include "polar_rule.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -145,6 +146,60 @@ bool PolarRuleSolver::end_within(PairPressure& pressure, int side) {
   return std::all_of(other_value_.begin(), other_value_.end(), [least](double p) { return p >= least; });
 }
 
+/// Whether a convex body comes out of the other one beyond this patch: then it has another patch there, where what it loses ends, too. Sought from columns
+/// at whose end the pressure of the other body falls. @param ended  the columns are there; else lines along the axis
+bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended) {
+  constexpr std::size_t kFew = 8;
+  constexpr int kSteps = 4;
+  const std::size_t n = node_.size(), stride = (n + kFew - 1) / kFew;
+  const Vec3 axis = (side == 0 ? 1.0 : -1.0) * frame_.axis;
+  const auto way = [&](std::size_t i) { return ended ? column(i).way : axis; };
+  open_.clear();
+  for (std::size_t i = 0; i < n; i += stride) open_.push_back(i);
+  open_.push_back(n);
+  some_.resize(open_.size());
+  for (std::size_t k = 0; k < open_.size(); ++k) {
+    const std::size_t i = open_[k];
+    some_.point[k] = (i < n ? node_.point[i] : peak_) + (ended ? end_[side][i] : frame_.depth[side]) * way(i);
+  }
+  for (int step = 0; step < kSteps && !ended; ++step) {
+    pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
+    for (std::size_t k = 0; k < open_.size(); ++k) {
+      const double fall = -some_.slope_a[k].dot(axis);
+      some_.point[k] += (fall > 0.0 ? std::clamp(some_.a[k] / fall, -frame_.depth[side], frame_.depth[side]) : frame_.depth[side]) * axis;
+    }
+  }
+  pressure.evaluate(1 - side, some_.point, some_.b, some_.slope_b);
+  for (std::size_t k = 0; k < open_.size(); ++k) {
+    if (some_.slope_b[k].dot(way(open_[k])) < 0.0 && comes_out(pressure, side, some_.point[k])) return true;
+  }
+  return false;
+}
+
+/// Whether the surface of a body leaves the other one near a place of it: by the place where their normals are the same, which is farthest out.
+bool PolarRuleSolver::comes_out(PairPressure& pressure, int side, Vec3 at) {
+  constexpr int kSteps = 40;
+  constexpr double kOnSurface = 1e-3, kAlike = 1e-3;  // of the feature size; between normals
+  const double size = pressure.feature_size(), out = -kEndsWithin * frame_.peak;
+  std::array<double, 1> own, other;
+  std::array<Vec3, 1> slope, other_slope;
+  for (int step = 0; step < kSteps; ++step) {
+    pressure.evaluate(side, {&at, 1}, own, slope);
+    pressure.evaluate(1 - side, {&at, 1}, other, other_slope);
+    const double steep = slope[0].norm(), other_steep = other_slope[0].norm();
+    if (!(steep > 0.0)) return false;
+    const Vec3 normal = -slope[0] / steep;
+    const double off = own[0] / steep;
+    const bool on_surface = std::abs(off) <= kOnSurface * size;
+    if (on_surface && other[0] < out) return true;
+    if (!(other_steep > 0.0)) return false;
+    const Vec3 aim = -other_slope[0] / other_steep, across = aim - aim.dot(normal) * normal;
+    if (on_surface && across.norm() < kAlike) return false;
+    at += std::clamp(off, -size, size) * normal + size * across;
+  }
+  return true;
+}
+
 /// @param nodes  of Gauss along a column, or as many as would be as exact
 bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
   const bool from_ends = region == Region::Sums;
@@ -164,6 +219,7 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, d
     thickness_ += frame_.depth[side];
     return true;
   }
+  if (may_go_through_ && pressure.field(side).convex() && goes_through(pressure, side, true)) return false;
   thickness_ += end_[side][summit_];
   if (from_ends) {
     add_energy_from_ends(pressure, nodes, side, points);

@@ -325,6 +325,11 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
   imprints_.clear();
   uneven_ = false;
   peak_ = frame.origin;
+  may_go_through_ = false;
+  for (const int side : {0, 1}) {
+    const std::optional<implicit::CorePoint> core = pressure.field(side).core_point(frame.origin);
+    may_go_through_ = may_go_through_ || ((!core || !core->round) && third.empty());
+  }
   for (const int side : {0, 1}) {
     const bool wanted = !third.empty() && regions[static_cast<std::size_t>(side)] != Region::None;
     apex_[side] = wanted ? find_apex(pressure, side, third, frame.origin, (side == 0 ? 1.0 : -1.0) * frame.axis) : std::nullopt;
@@ -452,6 +457,7 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const Regions& 
   for (const int side : {0, 1}) {
     const Region region = regions[static_cast<std::size_t>(side)];
     if (region == Region::None) {
+      if (may_go_through_ && pressure.field(side).convex() && goes_through(pressure, side, false)) return false;
       thickness_ += 0.5 * frame_.thickness;
     } else if (!add_columns(pressure, column, side, error, region, points)) {
       return false;

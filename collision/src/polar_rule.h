@@ -85,6 +85,8 @@ class PolarRuleSolver {
   void add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points);
   bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
   bool end_within(PairPressure& pressure, int side);
+  bool goes_through(PairPressure& pressure, int side, bool ended);
+  bool comes_out(PairPressure& pressure, int side, Vec3 at);
   void evaluate_on_lines(PairPressure& pressure, int side);
   bool start_columns(int side);
   bool start_out_of(const Apex& apex, double sign);
@@ -336,6 +338,7 @@ class PolarRuleSolver {
   PatchSums fine_, coarse_;
   double estimate_ = 1.0;
   double thickness_ = 0.0;
+  bool may_go_through_ = false;  // one body through the other: not balls and half-spaces, whose surfaces meet in one circle, and not where third bodies press
 
   std::span<const ContactBody* const> third_;
   bool cut_ = false;                   // nodes where a third body presses harder do not count

@@ -1,5 +1,5 @@
 /// @file contact_cases.h
-/// The sixteen cases of contact queries in random poses.
+/// The seventeen cases of contact queries in random poses.
 #pragma once
 
 #include <optional>
@@ -9,9 +9,9 @@
 
 namespace supple::benchmarks {
 
-/// Whether a command names a case, or all: these do not include three of which many poses are marched, up to seconds each.
+/// Whether a command names a case, or all: these do not include four of which many poses are marched, up to seconds each.
 inline bool names(std::string_view command, std::string_view name) {
-  return command == name || (command == "all" && name != "shapes" && name != "pinched" && name != "ring");
+  return command == name || (command == "all" && name != "shapes" && name != "pinched" && name != "ring" && name != "pierced");
 }
 
 /// Calls `visit(name, make_pose)` for each case that is wanted; `make_pose(draw)` puts its two bodies in the next random pose, the same ones
@@ -149,6 +149,24 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit, con
         b.emplace(any_shape(draw), 2.0 * kE, kSpacing, stage);
       } while (!press(*a, *b, draw.logarithmic(least, deep) * 0.07, draw));
       return Pair{{a->body(), b->body()}, false, {}};
+    });
+  }
+  // Convex bodies, one of them thin, pressed in by up to thrice its thickness: the other one may come out on its far side.
+  if (wanted("pierced")) {
+    std::optional<Rigid> thin, other;
+    visit("pierced", [&](Draw& draw) {
+      const auto convex_shape = [&](std::optional<Rigid>& body, double support, double modulus) {
+        do {
+          implicit::Skeleton skeleton = any_shape(draw);
+          skeleton.primitive.front().kernel = implicit::Kernel::wyvill(support);
+          body.emplace(std::move(skeleton), modulus, kSpacing, stage);
+        } while (!body->field().convex());
+      };
+      const double support = draw.uniform(0.04, 0.1);
+      convex_shape(thin, support, kE);
+      convex_shape(other, draw.uniform(0.08, 0.2), draw.logarithmic(0.2, 5.0) * kE);
+      press(*thin, *other, draw.logarithmic(0.2, 3.0) * support, draw);
+      return Pair{{thin->body(), other->body()}, false, {}};
     });
   }
   // Bodies that reach around the other one: a ball between two blobs, with a patch on each if neither is missed by the random step aside, and a

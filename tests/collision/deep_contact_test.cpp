@@ -9,6 +9,7 @@
 
 #include "benchmarks/contact_shapes.h"
 #include "bodies.h"
+#include "supple/implicit/solids.h"
 
 namespace supple::collision {
 namespace {
@@ -225,6 +226,63 @@ TEST(DeepContact, OfARingAroundAStiffBallHasItsEnergy) {
     EXPECT_NEAR(s.energy, exact, 2e-3 * exact) << out;  // error, cells
     EXPECT_LE(s.largest_overlap, 0.14) << out;          // the ball is .137 m wide
   }
+}
+
+// A ball of linear pressure through a slab so stiff that its faces hardly yield: a patch on each, whose forces oppose each other.
+TEST(DeepContact, OfABallThroughASlabHasThePatchesOfBothFaces) {
+  constexpr double kRadius = 0.1, kHalf = 0.01, kSoft = 1e5, kStiff = 1e12;  // [m], [Pa/m]
+  benchmarks::Rigid ball(benchmarks::linear_sphere(kRadius), kRadius * kSoft * benchmarks::kLinearModulus, 0.03);
+  const implicit::SolidBox slab({}, Vec3(kHalf, 0.5, 0.5), 0.0, 1.0);
+  const Pose still, turned{Vec3::Zero(), Quat(0.9, 0.3, -0.2, 0.1).normalized()};
+  ContactBody wall = benchmarks::single_part(slab, kStiff, still);
+  wall.fixed = true;
+  // By a plane at the depth d a ball loses pi k d^2 (3 R - 2 d) / 3 in force and, as far as to its centre, the integral of that in energy.
+  const auto force = [](double d) { return d > 0.0 ? benchmarks::kPi * kSoft * d * d * (3.0 * kRadius - 2.0 * d) / 3.0 : 0.0; };
+  const auto energy = [](double d) { return d > 0.0 ? benchmarks::kPi * kSoft * d * d * d * (kRadius / 3.0 - d / 6.0) : 0.0; };
+  for (const double x : {0.0899, 0.0895, 0.08, 0.05, 0.015}) {
+    ball.put({Vec3(x, 0.003, -0.002), turned.orientation});
+    const double near = kRadius - (x - kHalf), far = kRadius - (x + kHalf), exact = force(near) - force(far), load = force(near) + force(far);
+    for (const double error : {1e-2, 1e-5}) {
+      for (const bool with_energy : {true, false}) {
+        const ContactSurface::Summary s = query_all(std::array{ball.body(), wall}, {.error = error, .energy = with_energy}).at(0);
+        // What the slab yields: the depth of the ball over the ratio of the stiffnesses.
+        const double yields = 10.0 * kSoft / kStiff * load, bound = s.error_estimate * std::max(exact, 1e-3 * load) + yields;
+        EXPECT_NEAR(std::abs(s.force.x()), exact, bound) << x << ' ' << error << ' ' << with_energy;
+        EXPECT_LE(s.error_estimate, error) << x << ' ' << error << ' ' << with_energy;
+        if (!with_energy) continue;
+        EXPECT_NEAR(s.energy, energy(near) - energy(far), 2.0 * std::max(error, 1e-4) * energy(near)) << x << ' ' << error;
+      }
+    }
+  }
+}
+
+// Rods, discs and boxes through plates, at angles: against marching, which sees all of Sigma.
+TEST(DeepContact, OfConvexBodiesThroughPlatesIsThatOfMarching) {
+  using implicit::ShapeKind;
+  benchmarks::Draw draw(7);
+  int through = 0;
+  for (int i = 0; i < 25; ++i) {
+    const std::array<ShapeKind, 5> shapes{ShapeKind::Segment, ShapeKind::Point, ShapeKind::Ellipsoid, ShapeKind::Disc, ShapeKind::Box};
+    const ShapeKind shape = shapes[static_cast<std::size_t>(i) % shapes.size()];
+    const Vec3 size = shape == ShapeKind::Ellipsoid ? Vec3(0.2, 0.15, 0.3) : Vec3(0.15, 0.08, 0.05);
+    benchmarks::Rigid body(benchmarks::wyvill_shape(shape, size, 0.15), kModulus * draw.logarithmic(0.1, 10.0), 0.03);
+    benchmarks::Rigid plate(benchmarks::wyvill_shape(i % 2 == 0 ? ShapeKind::Rectangle : ShapeKind::Disc, Vec3(0.5, 0.5, 0.0), 0.06), kModulus, 0.03);
+    plate.put({});
+    body.put({Vec3(0.1, -0.05, draw.uniform(0.0, 0.25)), draw.rotation()});
+    const auto query = [&](ContactRule only) {
+      const auto all = query_all(std::array{body.body(), plate.body()}, {.error = 1e-3, .only = only});
+      return all.empty() ? ContactSurface::Summary{} : all.front();
+    };
+    const ContactSurface::Summary found = query(ContactRule::None), marched = query(ContactRule::March);
+    ASSERT_EQ(found.load > 0.0, marched.load > 0.0) << i;
+    if (!(marched.load > 0.0)) continue;
+    const double bound = found.error_estimate + marched.error_estimate, scale = std::max(marched.force.norm(), 1e-3 * marched.load);
+    EXPECT_LE((found.force - marched.force).norm(), bound * scale) << i;
+    EXPECT_NEAR(found.area / marched.area, 1.0, bound) << i;
+    EXPECT_NEAR(found.energy / marched.energy, 1.0, 1e-2) << i;
+    if (found.rule == ContactRule::March) ++through;
+  }
+  EXPECT_GE(through, 8);
 }
 
 /// Bodies that are not convex, in one another beyond their middles.
