@@ -40,23 +40,32 @@ double MarchRuleSolver::area_of(const Piece& piece) const {
   return 0.5 * (q - p).cross(plane(piece.triangle, piece.corner[2].at) - p).norm();
 }
 
-/// Pressures at some feet, at their heights so far, and the tangents of the image as if they were on Sigma.
+/// Tangents of the image at a foot, as if it were on Sigma.
+void MarchRuleSolver::find_tangents(Feet& feet, std::size_t i) const {
+  const auto& c = mesh_.triangle[feet.triangle[i]].corner;
+  const Vec3 n = along(feet.triangle[i], feet.at[i]), slope = feet.batch.slope_a[i] - feet.batch.slope_b[i];
+  const double rate = slope.dot(n);
+  const auto flat = [&](std::uint32_t to) {
+    return Vec3(mesh_.vertex[to] - mesh_.vertex[c[0]] + feet.height[i] * (mesh_.normal[to] - mesh_.normal[c[0]]));
+  };
+  const Vec3 s = flat(c[1]), t = flat(c[2]);
+  feet.climb[i] = Vec2(-slope.dot(s), -slope.dot(t)) / rate;
+  feet.along_s[i] = s + feet.climb[i].x() * n;
+  feet.along_t[i] = t + feet.climb[i].y() * n;
+}
+
+/// Whether the image lies the same way round there as its triangle, and does not stand on end.
+bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) const {
+  const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], way = along(feet.triangle[i], feet.at[i]);
+  return normal.dot(way) > kLeastCosine * normal.norm() * way.norm() && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0;
+}
+
+/// Pressures at some feet, at their heights so far, and the tangents of the image there.
 void MarchRuleSolver::measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet,
                               std::span<const std::size_t> which) {
   for (const std::size_t i : which) feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * along(feet.triangle[i], feet.at[i]);
   pressure.evaluate(feet.batch, which, some_);
-  for (const std::size_t i : which) {
-    const auto& c = mesh_.triangle[feet.triangle[i]].corner;
-    const Vec3 n = along(feet.triangle[i], feet.at[i]), slope = feet.batch.slope_a[i] - feet.batch.slope_b[i];
-    const double rate = slope.dot(n);
-    const auto flat = [&](std::uint32_t to) {
-      return Vec3(mesh_.vertex[to] - mesh_.vertex[c[0]] + feet.height[i] * (mesh_.normal[to] - mesh_.normal[c[0]]));
-    };
-    const Vec3 s = flat(c[1]), t = flat(c[2]);
-    feet.climb[i] = Vec2(-slope.dot(s), -slope.dot(t)) / rate;
-    feet.along_s[i] = s + feet.climb[i].x() * n;
-    feet.along_t[i] = t + feet.climb[i].y() * n;
-  }
+  for (const std::size_t i : which) find_tangents(feet, i);
   if (third.empty()) return;
   place_.resize(which.size());
   value_.resize(which.size());
@@ -84,6 +93,7 @@ void MarchRuleSolver::Feet::make_room() {
   climb.resize(n);
   third.assign(n, 0.0);
   third_slope.assign(n, Vec3::Zero());
+  met.assign(n, 0);
   good.assign(n, 0);
 }
 
@@ -119,9 +129,8 @@ void MarchRuleSolver::place(PairPressure& pressure, std::span<const ContactBody*
         continue;
       }
       lift(feet, i, move);
-      const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], way = along(feet.triangle[i], feet.at[i]);
-      const bool upright = normal.dot(way) > kLeastCosine * normal.norm() * way.norm();
-      feet.good[i] = upright && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0 ? 1 : 0;
+      feet.met[i] = 1;
+      feet.good[i] = upright(feet, i) ? 1 : 0;
     }
     open_.resize(left);
   }

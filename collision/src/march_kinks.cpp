@@ -22,13 +22,13 @@ std::array<double, 6> MarchRuleSolver::weights(const Piece& piece, const Vec2& a
 }
 
 /// Kinks that may cross the leaves [first, end).
-void MarchRuleSolver::find_crossings(std::size_t first, std::size_t end, double error) {
+void MarchRuleSolver::find_crossings(const PairPressure& pressure, std::size_t first, std::size_t end, double error) {
   crossings_.clear();
   for (std::size_t l = first; l < end; ++l) {
     Leaf& leaf = leaves_[l];
     leaf.first_crossing = crossings_.size();
     leaf.crossings = 0;
-    leaf.trust = all_kinks_ ? Trust::Smooth : Trust::Kinked;
+    leaf.trust = Trust::Smooth;
     leaf.mild = true;
     if (leaf.shape.part == Part::None) continue;
     std::array<Vec3, 6> foot;
@@ -40,6 +40,11 @@ void MarchRuleSolver::find_crossings(std::size_t first, std::size_t end, double 
     const Vec3 centre = (foot[3] + foot[4] + foot[5]) / 3.0;
     double reach = 0.0;
     for (const Vec3& x : foot) reach = std::max(reach, kReach * (x - centre).norm());
+    if (!all_kinks_) {
+      known_.clear();
+      const Vec3 around = Vec3::Constant(reach);
+      if (!pressure.kinks({centre - around, centre + around}, known_)) leaf.trust = Trust::Kinked;
+    }
     for (std::size_t k = 0; k < kinks_.size(); ++k) {
       const implicit::Kink& kink = kinks_[k];
       if (std::abs(kink.value(centre)) > kink.change(centre, reach)) continue;
@@ -137,7 +142,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
     const Leaf& leaf = leaves_[l];
     if (leaf.crossings == 0 || (leaf.shape.part != Part::Corner && leaf.shape.part != Part::AllButCorner)) continue;
     const auto& c = leaf.piece.corner;
-    const auto [i, j, k] = leaf.shape.order;
+    const std::size_t i = leaf.shape.order[0], j = leaf.shape.order[1], k = leaf.shape.order[2];
     const auto rim_at = [&](double across) {
       const Vec2 from = c[i].at + across * (c[k].at - c[i].at), way = (1.0 - across) * (c[j].at - c[i].at);
       const auto look = [&](double u) { return quadratic(leaf.piece, from + u * way, [](const Foot& f) { return f.pressure; }); };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace supple::collision {
 namespace {
@@ -78,40 +79,128 @@ MarchRuleSolver::Shape MarchRuleSolver::shape_of(const Piece& piece) const {
                                       inner - edge[i][other],      edge[to][other] - inner, edge[other][to] - edge[other][i]};
     return std::all_of(steps.begin(), steps.end(), [&](double step) { return sign * step < -margin; });
   };
-  if (!steady(j, k)) std::swap(j, k);
+  // Or it bends one way along all of them: then it changes its sign once where it has two signs at their ends. Where it has one, as beyond the rim on the
+  // edge across, it keeps it if it bends away from zero, or else if it goes away from it where they begin.
+  const auto bends = [&](std::size_t to, std::size_t other) {
+    const std::array<double, 3> bend{edge[to][i] - 2.0 * edge[i][to] + c[i].pressure, c[to].pressure - 2.0 * edge[to][i] + edge[i][to],
+                                     edge[to][other] - 2.0 * inner + edge[i][other]};
+    if (std::all_of(bend.begin(), bend.end(), [&](double change) { return sign * change > margin; })) return true;
+    if (!std::all_of(bend.begin(), bend.end(), [&](double change) { return sign * change < -margin; })) return false;
+    const double ends = c[i].pressure / (c[i].pressure - c[other].pressure);
+    const double begin = edge[i][to] - c[i].pressure, middle = inner - edge[i][other], end = edge[other][to] - edge[other][i];
+    const double last = (1.0 - ends) * middle + ends * end, here = (1.0 - ends) * ((1.0 - ends) * begin + ends * middle) + ends * last;
+    return sign * here < -margin && sign * last < -margin && sign * end < -margin;
+  };
+  const auto rays_certain = [&](std::size_t to, std::size_t other) { return steady(to, other) || bends(to, other); };
+  if (!rays_certain(j, k)) std::swap(j, k);
   shape.order = {i, j, k};
   // Controls along the edge across, from the lone corner: once they have changed sign, they stay so.
   const bool once = !(sign * edge[i][k] < 0.0 && sign * edge[k][i] > 0.0);
-  shape.certain = good && once && steady(j, k) && sign * edge[j][k] < -margin && sign * edge[k][j] < -margin;
+  shape.certain = good && once && rays_certain(j, k) && sign * edge[j][k] < -margin && sign * edge[k][j] < -margin;
   return shape;
 }
 
-/// The triangles of the mesh as pieces.
+/// The triangles of the mesh as pieces. Vertices and middles of edges have the same image seen from every triangle, and are placed once.
 void MarchRuleSolver::begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces) {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   const std::array<Vec2, 6> at{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1), Vec2(0.5, 0.5), Vec2(0, 0.5), Vec2(0.5, 0)};
-  pieces.clear();
+  const auto edge_of = [](const SigmaMesh::Triangle& triangle, std::size_t across) {
+    const auto [low, high] = std::minmax(triangle.corner[(across + 1) % 3], triangle.corner[(across + 2) % 3]);
+    return static_cast<std::uint64_t>(low) << 32 | high;
+  };
+  edges_.clear();
+  for (const SigmaMesh::Triangle& triangle : mesh_.triangle) {
+    for (std::size_t k = 0; k < 3; ++k) edges_.push_back(edge_of(triangle, k));
+  }
+  std::sort(edges_.begin(), edges_.end());
+  edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
+  const std::size_t vertices = mesh_.vertex.size();
+  const auto place_of = [&](std::uint32_t t, std::size_t k) {
+    const SigmaMesh::Triangle& triangle = mesh_.triangle[t];
+    if (k < 3) return static_cast<std::size_t>(triangle.corner[k]);
+    return vertices + static_cast<std::size_t>(std::lower_bound(edges_.begin(), edges_.end(), edge_of(triangle, k - 3)) - edges_.begin());
+  };
   feet_.clear();
+  feet_.triangle.assign(vertices + edges_.size(), kNone);
+  feet_.at.resize(feet_.triangle.size());
+  feet_.height.assign(feet_.triangle.size(), 0.0);
+  spots_.clear();
   for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
-    Piece piece;
-    piece.triangle = t;
-    pieces.push_back(piece);
-    for (const Vec2& x : at) feet_.add(t, x, 0.0);
+    for (std::size_t k = 0; k < 6; ++k) {
+      const std::size_t i = place_of(t, k);
+      spots_.push_back(i);
+      if (feet_.triangle[i] != kNone) continue;
+      feet_.triangle[i] = t;
+      feet_.at[i] = at[k];
+    }
   }
   place(pressure, third, feet_);
-  for (std::size_t p = 0; p < pieces.size(); ++p) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      pieces[p].corner[k] = foot(feet_, 6 * p + k);
-      pieces[p].middle[k] = foot(feet_, 6 * p + 3 + k);
+  pieces.assign(mesh_.triangle.size(), {});
+  for (std::uint32_t t = 0; t < pieces.size(); ++t) {
+    pieces[t].triangle = t;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const std::size_t i = spots_[6 * t + k];
+      feet_.triangle[i] = t;
+      feet_.at[i] = at[k];
+      find_tangents(feet_, i);
+      feet_.good[i] = feet_.met[i] != 0 && upright(feet_, i) ? 1 : 0;
+      (k < 3 ? pieces[t].corner[k] : pieces[t].middle[k - 3]) = foot(feet_, i);
     }
   }
 }
 
-/// Four pieces of each.
-void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from,
+/// Where on the edge across from a corner the pressure turns and has another sign than at both ends, from the next corner (0) to the last (1), if it
+/// does: by the quartic polynomial with the values and slopes at the ends, and the value at the middle.
+std::optional<double> MarchRuleSolver::turn(const Piece& piece, std::size_t across) {
+  const Foot &from = piece.corner[(across + 1) % 3], &to = piece.corner[(across + 2) % 3], &middle = piece.middle[across];
+  if (!from.good || !to.good || !middle.good || (from.pressure > 0.0) != (to.pressure > 0.0)) return {};
+  const double sign = from.pressure > 0.0 ? -1.0 : 1.0;
+  const Vec2 way = to.at - from.at;
+  const double p = from.pressure, q = to.pressure, rise = from.slope.dot(way) / 3.0, fall = to.slope.dot(way) / 3.0;
+  const double rest = 16.0 * (middle.pressure - (p + q + 3.0 * (p + rise + q - fall)) / 8.0);
+  constexpr int kLooks = 16;
+  std::array<double, kLooks + 1> look;
+  for (int i = 0; i <= kLooks; ++i) {
+    const double t = static_cast<double>(i) / kLooks, u = 1.0 - t;
+    look[static_cast<std::size_t>(i)] = sign * (u * u * u * p + 3.0 * u * u * t * (p + rise) + 3.0 * u * t * t * (q - fall) + t * t * t * q + rest * u * u * t * t);
+  }
+  const auto best = std::max_element(look.begin() + 1, look.end() - 1);
+  const double before = *(best - 1), here = *best, after = *(best + 1), bend = before - 2.0 * here + after;
+  if (!(bend < 0.0)) return {};
+  const double step = std::clamp(0.5 * (before - after) / bend, -0.5, 0.5);
+  if (!(here + 0.25 * (after - before) * step > 0.0)) return {};
+  return (static_cast<double>(best - look.begin()) + step) / kLooks;
+}
+
+/// Ends of edges of pieces become corners of smaller ones: four of each, or where `at_turns` and the pressure turns on edges, so that both rims of a narrow
+/// band cross it, as many as have a corner on its ridge and one rim each.
+void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns,
                             std::vector<Piece>& to) {
+  turns_.assign(from.size(), {});
+  feet_.clear();
+  for (std::size_t p = 0; at_turns && p < from.size(); ++p) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::optional<double> t = turn(from[p], k);
+      if (!t) continue;
+      const Vec2 at = (1.0 - *t) * from[p].corner[(k + 1) % 3].at + *t * from[p].corner[(k + 2) % 3].at;
+      turns_[p][k].emplace();
+      feet_.add(from[p].triangle, at, height_at(from[p], at));
+    }
+  }
+  place(pressure, third, feet_);
+  std::size_t place_of_turn = 0;
+  for (std::size_t p = 0; p < from.size(); ++p) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!turns_[p][k]) continue;
+      const Foot found = foot(feet_, place_of_turn++);
+      if (found.good && (found.pressure > 0.0) != (from[p].corner[(k + 1) % 3].pressure > 0.0)) turns_[p][k] = found;
+      else turns_[p][k].reset();
+    }
+  }
   feet_.clear();
   const std::size_t first = to.size();
-  for (const Piece& p : from) {
+  for (std::size_t n = 0; n < from.size(); ++n) {
+    const Piece& p = from[n];
     const auto add = [&](const Foot& a, const Foot& b, const Foot& c) {
       Piece piece;
       piece.triangle = p.triangle;
@@ -122,8 +211,34 @@ void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody*
       }
       to.push_back(piece);
     };
-    for (std::size_t k = 0; k < 3; ++k) add(p.corner[k], p.middle[(k + 2) % 3], p.middle[(k + 1) % 3]);
-    add(p.middle[0], p.middle[1], p.middle[2]);
+    const auto& turned = turns_[n];
+    const auto turns = std::count_if(turned.begin(), turned.end(), [](const auto& t) { return t.has_value(); });
+    if (turns == 0 || turns == 3) {
+      std::array<Foot, 3> middle = p.middle;
+      for (std::size_t k = 0; k < 3 && turns == 3; ++k) middle[k] = *turned[k];
+      for (std::size_t k = 0; k < 3; ++k) add(p.corner[k], middle[(k + 2) % 3], middle[(k + 1) % 3]);
+      add(middle[0], middle[1], middle[2]);
+      continue;
+    }
+    std::size_t i = 0;  // whose edges are both alike
+    while (turned[i].has_value() != (turns == 1)) ++i;
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    const Foot &a = p.corner[i], &b = p.corner[j], &c = p.corner[k];
+    if (turns == 1) {
+      add(a, b, *turned[i]);
+      add(a, *turned[i], c);
+      continue;
+    }
+    const Foot &to_b = *turned[k], &to_c = *turned[j];
+    add(a, to_b, to_c);
+    const auto length = [&](const Foot& s, const Foot& t) { return (plane(p.triangle, t.at) - plane(p.triangle, s.at)).norm(); };
+    if (length(to_b, c) < length(to_c, b)) {
+      add(to_b, b, c);
+      add(to_b, c, to_c);
+    } else {
+      add(to_b, b, to_c);
+      add(to_c, b, c);
+    }
   }
   place(pressure, third, feet_);
   for (std::size_t i = first; i < to.size(); ++i) {
@@ -195,7 +310,7 @@ void MarchRuleSolver::settle(PairPressure& pressure, std::span<const ContactBody
     }
     doubtful_.resize(left);
     pieces.clear();
-    split(pressure, third, doubtful_, pieces);
+    split(pressure, third, doubtful_, true, pieces);
   }
 }
 

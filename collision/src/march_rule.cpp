@@ -125,7 +125,7 @@ void MarchRuleSolver::send_rays(std::size_t first, std::size_t end, int order) {
     const Leaf& leaf = leaves_[l];
     if (leaf.shape.part == Part::None) continue;
     const auto& c = leaf.piece.corner;
-    const auto [i, j, k] = leaf.shape.order;
+    const std::size_t i = leaf.shape.order[0], j = leaf.shape.order[1], k = leaf.shape.order[2];
     const auto send = [&](int nodes, std::size_t part, Rim rim, double across, double weight) {
       Ray ray;
       ray.leaf = l;
@@ -208,7 +208,7 @@ void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactB
   const int order = order_for(error);
   for (; first < leaves_.size(); first += kBatch) {
     const std::size_t end = std::min(leaves_.size(), first + kBatch);
-    find_crossings(first, end, error);
+    find_crossings(pressure, first, end, error);
     find_breaks(pressure, third, first, end);
     send_rays(first, end, order);
     find_zeros(pressure, third, rays_);
@@ -308,7 +308,7 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
     for (std::size_t k = keeps; k < order_.size(); ++k) leaves_[order_[k]].error = -1.0;
     std::erase_if(leaves_, [](const Leaf& leaf) { return leaf.error < 0.0; });
     pieces_.clear();
-    split(pressure, third, halves_, pieces_);
+    split(pressure, third, halves_, false, pieces_);
     const std::size_t first = leaves_.size();
     settle(pressure, third, limits.error, pieces_);
     integrate(pressure, third, reference, limits.error, first);

@@ -96,7 +96,7 @@ class MarchRuleSolver {
     std::vector<Vec3> third_slope;
     std::vector<Vec3> along_s, along_t;  // of the image [m]
     std::vector<Vec2> climb;
-    std::vector<std::uint8_t> good;
+    std::vector<std::uint8_t> met, good;  // Sigma was, and the image is smooth there
     void clear();
     void make_room();
     void add(std::uint32_t in, const Vec2& where, double guess);
@@ -145,6 +145,8 @@ class MarchRuleSolver {
     [[nodiscard]] double ends() const noexcept { return rim == Rim::Falls ? at : exit; }
   };
 
+  void find_tangents(Feet& feet, std::size_t i) const;
+  [[nodiscard]] bool upright(const Feet& feet, std::size_t i) const;
   void measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet, std::span<const std::size_t> which);
   void place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet);
   [[nodiscard]] double to_sigma(const Feet& feet, std::size_t i) const;
@@ -167,13 +169,14 @@ class MarchRuleSolver {
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
   void make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis);
   void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
-  void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, std::vector<Piece>& to);
+  static std::optional<double> turn(const Piece& piece, std::size_t across);
+  void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);
   void settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces);
   void guess(Ray& ray) const;
   static double height_at(const Piece& piece, const Vec2& at);
   static std::array<double, 6> weights(const Piece& piece, const Vec2& at);
   void cross_kinks(Leaf& leaf) const;
-  void find_crossings(std::size_t first, std::size_t end, double error);
+  void find_crossings(const PairPressure& pressure, std::size_t first, std::size_t end, double error);
   void add_cuts(const Ray& along, double low, double high, std::vector<Ray>& cuts) const;
   void find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
   void find_breaks(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
@@ -202,10 +205,13 @@ class MarchRuleSolver {
   std::vector<double> value_, third_, share_;
   std::vector<Vec3> slope_, place_;
   std::vector<std::size_t> open_;
+  std::vector<std::uint64_t> edges_;  // of the mesh: both vertices
+  std::vector<std::size_t> spots_;    // of its triangles: six feet each
   std::vector<Piece> pieces_, halves_, doubtful_;
+  std::vector<std::array<std::optional<Foot>, 3>> turns_;  // on the edges across from the corners of pieces that are split
   std::vector<Leaf> leaves_;
-  std::vector<implicit::Kink> kinks_;
-  bool all_kinks_ = true;
+  std::vector<implicit::Kink> kinks_, known_;  // of the overlap, of a leaf
+  bool all_kinks_ = true;  // of the overlap; else those of leaves may be
   std::vector<Crossing> crossings_;
   std::vector<Corner> corners_;
   std::vector<double> breaks_;

@@ -46,8 +46,8 @@ std::optional<double> PolarRuleSolver::touching_angle(PairPressure& pressure, co
   double angle = near.angle, radius = near.radius, height = near.height;
   PressureBatch& batch = crossing_batch_;
   for (int step = 0; step < kTouchSteps; ++step) {
-    const auto [sin, cos] = math::sin_cos(angle);
-    const auto place = [&](double r, double h) -> Vec3 { return frame_.origin + r * direction(cos, sin) + h * frame_.axis; };
+    const math::SinCos at = math::sin_cos(angle);
+    const auto place = [&](double r, double h) -> Vec3 { return frame_.origin + r * direction(at.cos, at.sin) + h * frame_.axis; };
     batch.resize(1);
     batch.point[0] = place(radius, height);
     pressure.evaluate(batch);

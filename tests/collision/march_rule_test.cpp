@@ -108,6 +108,28 @@ TEST(AnnularPatch, OfARingOnAPlaneMeetsTheErrorAsked) {
   }
 }
 
+// Belts and crescents many times as narrow as a triangle of the mesh is wide, whose rims meet where the plane leaves the ring.
+TEST(AnnularPatch, IsCutAlongItsRidgeWhereItIsNarrow) {
+  benchmarks::Draw draw(5);
+  const double surface = 0.3 * std::sqrt(1.0 - std::cbrt(kIso));
+  for (int i = 0; i < 40; ++i) {
+    const double depth = surface * draw.logarithmic(1e-3, 0.1), lean = depth * draw.uniform(0.0, 3.0);
+    const Pose frame{Vec3::Zero(), Quat(Eigen::AngleAxisd(lean, Vec3(draw.uniform(-1.0, 1.0), draw.uniform(-1.0, 1.0), 0.0).normalized()))};
+    RingOnPlane scene(0.3, surface - depth, {});
+    scene.plane.normal = frame.orientation * Vec3::UnitZ();
+    const auto march = [&](double error) { return scene.stage.solve({.error = error, .only = ContactRule::March}).summary.at(0); };
+    const ContactSurface::Summary finest = march(1e-7);
+    for (const double error : {1e-2, 1e-4}) {
+      const ContactSurface::Summary s = march(error);
+      EXPECT_LE(s.error_estimate, error) << i;
+      EXPECT_LE((s.force - finest.force).norm(), (s.error_estimate + finest.error_estimate) * finest.force.norm()) << i << ' ' << error;
+      EXPECT_NEAR(s.area / finest.area, 1.0, s.error_estimate + finest.error_estimate) << i << ' ' << error;
+      // Pieces as narrow as the patch would take up to 46,000 and 87,000 points.
+      EXPECT_LE(s.points, error >= 1e-2 ? 20'000u : 35'000u) << i;
+    }
+  }
+}
+
 TEST(AnnularPatch, OfARingOnADiscMeetsTheErrorAsked) {
   // Of equal kernels Sigma is the parabola around the ring: z = (D^2 - s^2) / 2 D, d = (D^2 + s^2) / 2 D.
   constexpr double kSupport = 0.3, kDistance = 0.24;
