@@ -188,13 +188,19 @@ bool PairSolver::solve_in_order(const Job& job, Rule& rule, ContactRule name, co
   return true;
 }
 
-bool PairSolver::samples(const Job& job, PairResult& out) {
+/// @param few  no more than pays where marching would meet the error, too
+bool PairSolver::samples(const Job& job, bool few, PairResult& out) {
   // The spacing of the kept samples, or what they would have.
   constexpr double kAcrossFeature = 3.0;
+  // Rays where this rule alone is asked for, and where it stands in for another; evaluations in which marching is done at a coarse error.
+  constexpr std::size_t kMostRays = 1u << 17, kRays = 1u << 15, kAsMarching = 300'000, kAny = std::numeric_limits<std::size_t>::max();
+  const ContactSettings& settings = job.settings();
   PairPressure& pressure = job.polar.pressure;
   const double first = job.polar.spacing > 0.0 ? job.polar.spacing : pressure.feature_size() / kAcrossFeature;
+  const SampleRuleSolver::Limits limits{settings.error, settings.max_refinement, settings.only == ContactRule::Samples ? kMostRays : kRays,
+                                        few ? kAsMarching : kAny};
   return solve_in_order(job, samples_, ContactRule::Samples, [&](const Regions& regions, const Vec3& reference) {
-    return samples_.solve(pressure, third_bodies_, job.overlap, first, job.settings(), regions, reference, out.points);
+    return samples_.solve(pressure, third_bodies_, job.overlap, first, limits, regions, reference, out.points);
   }, out);
 }
 
@@ -211,19 +217,21 @@ bool PairSolver::march(const Job& job, PairResult& out) {
 /// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.
 /// @param have  `out` holds a result already   @return whether it holds one
 bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
-  // Few samples meet a coarse error with fewer points than marching begins with; finer ones they meet late or never.
+  // Few samples meet a coarse error with fewer evaluations than marching begins with; finer ones they meet late or never.
   constexpr double kCoarse = 1e-2, kFinestSampled = 1e-3;
   const ContactSettings& settings = job.settings();
   const auto set_aside = [&] {
     std::swap(kept_, out);
     out.summary.bodies = kept_.summary.bodies;
   };
-  const std::array<ContactRule, 2> marched_first{ContactRule::March, ContactRule::Samples}, sampled_first{ContactRule::Samples, ContactRule::March};
-  for (const ContactRule rule : settings.error >= kCoarse ? sampled_first : marched_first) {
-    if (settings.only != ContactRule::None && settings.only != rule) continue;
-    if (have && (meets(out, settings.error) || (rule == ContactRule::Samples && out.summary.error_estimate <= kFinestSampled))) continue;
+  enum class Try { FewSamples, March, Samples };
+  for (const Try rule : {Try::FewSamples, Try::March, Try::Samples}) {
+    const bool marched = rule == Try::March, few = rule == Try::FewSamples;
+    if (few ? settings.only != ContactRule::None || settings.error < kCoarse
+            : settings.only != ContactRule::None && settings.only != (marched ? ContactRule::March : ContactRule::Samples)) continue;
+    if (have && (meets(out, settings.error) || (!marched && out.summary.error_estimate <= kFinestSampled))) continue;
     if (have) set_aside();
-    const bool fits = rule == ContactRule::March ? march(job, out) : samples(job, out);
+    const bool fits = marched ? march(job, out) : samples(job, few, out);
     if (have && (!fits || kept_.summary.error_estimate <= out.summary.error_estimate)) set_aside();
     have = have || fits;
   }

@@ -52,7 +52,7 @@ class PairSolver {
   bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
   bool polar(const Job& job, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
-  bool samples(const Job& job, PairResult& out);
+  bool samples(const Job& job, bool few, PairResult& out);
   bool march(const Job& job, PairResult& out);
   bool stand_in(const Job& job, bool have, PairResult& out);
   void choose(const Job& job, PairResult& out);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "quadrature.h"
 #include "squeezed_region.h"
@@ -400,7 +401,7 @@ void SampleRuleSolver::add_columns_across(PairPressure& pressure, int side, Patc
 }
 
 bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing,
-                             const ContactSettings& settings, const Regions& regions, const Vec3& reference, PatchPoints& points) {
+                             const Limits& limits, const Regions& regions, const Vec3& reference, PatchPoints& points) {
   body_ = {&pressure.body(0), &pressure.body(1)};
   estimate_ = 1.0;
   thickness_ = 0.0;
@@ -408,7 +409,8 @@ bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody
   if (body_[0]->skeleton == nullptr && body_[1]->skeleton == nullptr) return false;
   if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return false;
   const double scale = 1e-13 * pressure.largest_modulus();
-  const std::size_t most = settings.only == ContactRule::Samples ? kMostRays : kFewRays;
+  const std::size_t evaluated_before = pressure.evaluations();
+  std::size_t evaluated = 0;
   PatchSums coarse;
   int refined = -1;
   Box patch = shrink(overlap);
@@ -420,17 +422,27 @@ bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody
     for (const int side : {0, 1}) seen += send(pressure, side, box, spacing_);
     find_crossings(pressure, scale);
     place_points(pressure, third, reference, points);
-    const bool last = 4 * seen > most || level + 1 == kMostLevels;
+    const bool last = 4 * seen > limits.rays || level + 1 == kMostLevels;
+    const std::size_t before = std::exchange(evaluated, pressure.evaluations() - evaluated_before);
+    // What the error falls to, and evaluations grow to, when the spacing is halved.
+    constexpr double kFall = 0.25, kGrow = 4.0;
+    const auto within = [&] {
+      double more = kGrow * static_cast<double>(evaluated - before), sum = static_cast<double>(evaluated) + more;
+      for (double error = kFall * estimate_; refined > 0 && error > limits.error; error *= kFall) sum += more *= kGrow;
+      return sum <= static_cast<double>(limits.evaluations);
+    };
     if (static_cast<double>(points.point.size()) < kFewPoints) {
       if (last) break;
+      if (!within()) return false;
       continue;
     }
     if (refined >= 0) {
-      const double least = refined > 0 ? std::min(kOfLast * estimate_, kEnough * settings.error) : 0.0;
+      const double least = refined > 0 ? std::min(kOfLast * estimate_, kEnough * limits.error) : 0.0;
       estimate_ = std::max(kSafety * relative_difference(sums_, coarse) + kCellError * largest_cell_ / sums_.area, least);
     }
     ++refined;
-    if (last || estimate_ <= settings.error || refined >= settings.max_refinement) break;
+    if (last || estimate_ <= limits.error || refined >= limits.refinements) break;
+    if (!within()) return false;
     coarse = sums_;
     Box held;
     for (const Vec3& x : points.point) held.include(x);

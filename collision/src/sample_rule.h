@@ -17,22 +17,24 @@ namespace supple::collision {
 
 class SampleRuleSolver {
  public:
-  /// Halves the spacing of the seeds until two consecutive layouts agree to `settings.error`, at most
-  /// `settings.max_refinement` times and never beyond so many rays.
+  struct Limits {
+    double error;             ///< relative, asked for
+    int refinements;          ///< times that the spacing of the seeds is halved, at most
+    std::size_t rays;         ///< of both bodies, looked at in one layout
+    std::size_t evaluations;  ///< of pressures, in all layouts, about: with more of them there is nothing, unless the error is met
+  };
+  /// Halves the spacing of the seeds until two consecutive layouts agree to the error asked for, within these limits.
   /// @param third  bodies whose larger pressure takes space away from the pair
   /// @param spacing  of the seeds to begin with [m], > 0
   /// @param regions  what is wanted of the squeezed regions
   /// @param reference  origin of the moments in `sums`
-  /// @return whether Sigma was met; false too where neither body has a skeleton
+  /// @return whether Sigma was met, within the limits; false too where neither body has a skeleton
   bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing,
-             const ContactSettings& settings, const Regions& regions, const Vec3& reference, PatchPoints& points);
+             const Limits& limits, const Regions& regions, const Vec3& reference, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< about the point of largest pressure [m]
-
-  /// Of both bodies, looked at in one layout: where this rule alone is asked for, and where it stands in for another.
-  static constexpr std::size_t kMostRays = 1u << 17, kFewRays = 1u << 15;
 
  private:
   /// The rays of one body in world axes, and their stretch inside the overlap's box.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "benchmarks/contact_shapes.h"
 #include "bodies.h"
 
 namespace supple::collision {
@@ -115,6 +116,7 @@ TEST(SampleRule, OnAHalfSpaceSendsTheRaysOfTheOtherBodyAlone) {
   ball.add_to(stage, kLinearModulus);
   stage.add(plane).fixed = true;
   const ContactSurface::Summary s = stage.solve({.error = 2e-3, .only = ContactRule::Samples}).summary.at(0);
+  for (double e : {1e-1,5e-2,2e-2,1e-2}) for (auto r:{ContactRule::None,ContactRule::Samples,ContactRule::March}) {auto q=stage.solve({.error=e,.only=r}).summary.at(0); std::printf("%g rule %d est %g ev %zu pts %zu\n",e,(int)q.rule,q.error_estimate,(size_t)q.evaluations,(size_t)q.points);}
   EXPECT_EQ(s.rule, ContactRule::Samples);
   EXPECT_NEAR(s.force.z(), 0.019780398, s.error_estimate * 0.019780398);
   const ContactSurface::Summary polar = stage.solve({.error = 1e-8, .only = ContactRule::Polar}).summary.at(0);
@@ -192,8 +194,8 @@ TEST(ContactRules, AgreeOnForcesOfPartsAndKeepMomenta) {
   EXPECT_GT((loads[2][1].force[0] - loads[0][1].force[0]).norm(), 1e-8 * size);
 }
 
-TEST(ContactRules, TakeSamplesWhereNoPolarPatchFits) {
-  // A ring of blobs on a plane: the patch is an annulus.
+TEST(ContactRules, TakeWhicheverCostsLessWhereNoPolarPatchFits) {
+  // A ring of blobs on a plane, and one around a ball: the patch is an annulus, narrow there and wide here.
   std::vector<implicit::Primitive> blobs;
   std::vector<Pose> parts;
   for (std::uint32_t k = 0; k < 16; ++k) {
@@ -202,16 +204,34 @@ TEST(ContactRules, TakeSamplesWhereNoPolarPatchFits) {
     blobs.back().kernel = implicit::Kernel::wyvill(0.7);
     parts.push_back({Vec3(c, s, 0.3), kTurn});
   }
-  const Shaped ring(blobs, parts);
+  const Shaped beads(blobs, parts);
   const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1e9};
-  Stage stage;
-  ring.add_to(stage, 1.0);
-  stage.add(plane).fixed = true;
-  const ContactSurface::Summary s = stage.solve({.error = 5e-2}).summary.at(0);
-  EXPECT_EQ(s.rule, ContactRule::Samples);
-  EXPECT_EQ(s.reason, RuleReason::NoGraph);
-  EXPECT_LE(s.error_estimate, 5e-2);
+  benchmarks::Rigid ring(benchmarks::wyvill_shape(implicit::ShapeKind::Ring, Vec3(0.2, 0.0, 0.0), 0.15), 2.0, 0.03);
+  benchmarks::Rigid ball(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), 0.33), 1.0, 0.03);
+  ring.put({});
+  ball.put({Vec3(0.01, 0.0, 0.005), kTurn});
+  Stage narrow, wide;
+  beads.add_to(narrow, 1.0);
+  narrow.add(plane).fixed = true;
+  wide.bodies() = {ball.body(), ring.body()};
+  int sampled = 0, marched = 0;
+  for (Stage* stage : {&narrow, &wide}) {
+    const ContactSurface::Summary finest = stage->solve({.error = 1e-4, .only = ContactRule::March}).summary.at(0);
+    for (const double error : {1e-1, 5e-2, 2e-2, 1e-2}) {
+      const auto solve = [&](ContactRule only) { return stage->solve({.error = error, .only = only}).summary.at(0); };
+      const ContactSurface::Summary s = solve(ContactRule::None);
+      ++(s.rule == ContactRule::Samples ? sampled : marched);
+      EXPECT_EQ(s.reason, RuleReason::NoGraph);
+      EXPECT_LE(s.error_estimate, error);
+      EXPECT_LE((s.force - finest.force).norm(), (s.error_estimate + finest.error_estimate) * std::max(finest.force.norm(), 1e-3 * finest.load));
+      // What the other one is tried for does not double the cost.
+      EXPECT_LE(s.evaluations, 2 * std::min(solve(ContactRule::Samples).evaluations, solve(ContactRule::March).evaluations)) << error;
+    }
+  }
+  EXPECT_GE(sampled, 1);
+  EXPECT_GE(marched, 4);
   // By the midpoint rule over the plane.
+  const ContactSurface::Summary s = narrow.solve({.error = 1e-2}).summary.at(0);
   constexpr int kCells = 800;
   const double half = 2.0, h = 2.0 * half / kCells;
   std::vector<Vec3> row(kCells);
@@ -219,14 +239,14 @@ TEST(ContactRules, TakeSamplesWhereNoPolarPatchFits) {
   double force = 0.0;
   for (int j = 0; j < kCells; ++j) {
     for (int i = 0; i < kCells; ++i) row[static_cast<std::size_t>(i)] = Vec3(-half + (i + 0.5) * h, -half + (j + 0.5) * h, 0.0);
-    ring.field.evaluate(row, p);
+    beads.field.evaluate(row, p);
     for (const double value : p) force += std::max(value, 0.0) * h * h;
   }
   EXPECT_NEAR(s.force.z(), force, 1e-2 * force);
-  stage.bodies()[0].skeleton = nullptr;
-  const ContactSurface::Summary marched = stage.solve({.error = 1e-2}).summary.at(0);
-  EXPECT_EQ(marched.rule, ContactRule::March);
-  EXPECT_EQ(marched.reason, RuleReason::NoSkeleton);
+  narrow.bodies()[0].skeleton = nullptr;
+  const ContactSurface::Summary unsampled = narrow.solve({.error = 1e-2}).summary.at(0);
+  EXPECT_EQ(unsampled.rule, ContactRule::March);
+  EXPECT_EQ(unsampled.reason, RuleReason::NoSkeleton);
 }
 
 TEST(ContactRules, GiveNoForceWhereTheOnlyOneAskedForDoesNotFit) {
