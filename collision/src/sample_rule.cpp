@@ -19,6 +19,7 @@ constexpr double kRim = 0.75;       // half width of the rim in cells: wider blu
 constexpr double kSafety = 2.7;
 constexpr double kOfLast = 0.35;     // of the bound of the spacing before: the next may agree with it by chance
 constexpr double kEnough = 0.9;      // of the error asked: what that asks no finer spacing for
+constexpr double kEdgeOn = 0.01;     // of a cell of the surface: so near to where they begin rays see Sigma from beside it, if at all
 constexpr double kCellError = 4.0;   // what the places of the cells may do, in the largest share of a cell over the area
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -222,13 +223,14 @@ void SampleRuleSolver::place_points(PairPressure& pressure, std::span<const Cont
   weight_.clear();
   moved_.resize(0);
   largest_cell_ = 0.0;
+  edge_on_ = false;
   for (std::size_t i = 0; i < at_.size(); ++i) {
     if (!(share_[i] > 0.0)) continue;
     const Crossing& c = crossings_[i];
     const Vec3 across = at_.slope_b[i] - at_.slope_a[i];
     const Vec3 normal = across.normalized();
     const double cosine = std::max(std::abs(normal.dot(rays_[c.side].direction[c.ray])), kLeastCosine);
-    const double cell = rays_[c.side].swept(c.ray, c.t) / cosine;
+    const double swept = rays_[c.side].swept(c.ray, c.t), cell = swept / cosine;
     const double p = 0.5 * (at_.a[i] + at_.b[i]);
     Vec3 slope = at_.slope_a[i];
     double room = p;
@@ -251,6 +253,7 @@ void SampleRuleSolver::place_points(PairPressure& pressure, std::span<const Cont
       continue;
     }
     largest_cell_ = std::max(largest_cell_, share_[i] * cell);
+    edge_on_ = edge_on_ || swept < kEdgeOn * spacing_ * spacing_;
     moved_.point.push_back(x);
     weight_.push_back(share_[i] * cell * inside);
   }
@@ -438,7 +441,7 @@ bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody
     }
     if (refined >= 0) {
       const double least = refined > 0 ? std::min(kOfLast * estimate_, kEnough * limits.error) : 0.0;
-      estimate_ = std::max(kSafety * relative_difference(sums_, coarse) + kCellError * largest_cell_ / sums_.area, least);
+      estimate_ = edge_on_ ? 1.0 : std::max(kSafety * relative_difference(sums_, coarse) + kCellError * largest_cell_ / sums_.area, least);
     }
     ++refined;
     if (last || estimate_ <= limits.error || refined >= limits.refinements) break;

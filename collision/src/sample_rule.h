@@ -88,6 +88,7 @@ class SampleRuleSolver {
   PatchSums sums_;
   double spacing_ = 0.0;
   double largest_cell_ = 0.0;  // on Sigma, by share [m^2]
+  bool edge_on_ = false;  // Sigma passes where rays begin
   double estimate_ = 1.0;
   double thickness_ = 0.0;
 };

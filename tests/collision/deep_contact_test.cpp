@@ -256,6 +256,28 @@ TEST(DeepContact, OfABallThroughASlabHasThePatchesOfBothFaces) {
   }
 }
 
+// Where the middle of the ball lies near a face, rays out of it all but lie in the patch there, and in it they do not meet it: samples are then no
+// choice, however coarse the error.
+TEST(DeepContact, OfABallWhoseMiddleLiesInAFaceIsNotLeftToSamples) {
+  benchmarks::Rigid ball(benchmarks::linear_sphere(0.1), 2e4, 0.03);
+  const implicit::SolidBox slab({}, Vec3(0.01, 0.5, 0.5), 0.0, 1.0);
+  const Pose still;
+  const ContactBody wall = benchmarks::single_part(slab, 1e12, still);
+  for (const double x : {0.0085, 0.0099, 0.01, 0.0102, 0.012, 0.014}) {
+    ball.put({Vec3(x, 0.003, -0.002), Quat::Identity()});
+    const auto solve = [&](double error, ContactRule only) { return query_all(std::array{ball.body(), wall}, {.error = error, .only = only}).at(0); };
+    const ContactSurface::Summary finest = solve(1e-4, ContactRule::March);
+    const auto off = [&](const ContactSurface::Summary& s) { return (s.force - finest.force).norm() / std::max(finest.force.norm(), 1e-3 * finest.load); };
+    for (const double error : {1e-1, 3e-2, 1e-2}) {
+      const ContactSurface::Summary s = solve(error, ContactRule::None);
+      EXPECT_LE(s.error_estimate, error) << x;
+      EXPECT_LE(off(s), s.error_estimate + finest.error_estimate) << x << ' ' << error;
+    }
+    const ContactSurface::Summary sampled = solve(1e-2, ContactRule::Samples);
+    EXPECT_TRUE(sampled.error_estimate >= 1.0 || off(sampled) <= sampled.error_estimate + finest.error_estimate) << x << ' ' << off(sampled) << ' ' << sampled.error_estimate;
+  }
+}
+
 // Rods, discs and boxes through plates, at angles: against marching, which sees all of Sigma.
 TEST(DeepContact, OfConvexBodiesThroughPlatesIsThatOfMarching) {
   using implicit::ShapeKind;
