@@ -21,14 +21,15 @@ struct Group {
   std::string_view name;
   std::string_view program;
   std::string_view measures;
+  bool names = false;  ///< what follows the group in a name is for the program
 };
 
 constexpr std::array<Group, 14> kGroups{{
-    {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)"},
+    {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
     {"core/integrators", "integrator_bench", "time against error of every integrator; a file name after it: plot (SVG)"},
     {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
-    {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)"},
-    {"implicit/mesh", "mesh_bench", "surface meshes beside their error (w1/64 to w4/512)"},
+    {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)", true},
+    {"implicit/mesh", "mesh_bench", "surface meshes beside their error (w1/64 to w4/512)", true},
     {"collision", "contact_bench", "one contact query: time, points and error; a file name after it: that of collision/rules, too"},
     {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; after it: poses, case"},
     {"collision/invariance", "contact_invariance", "what changes in swapped, turned and scaled queries; after it: poses, case"},
@@ -37,7 +38,7 @@ constexpr std::array<Group, 14> kGroups{{
     {"collision/stability", "contact_stress", "contact tried hard; after it: --seed N, file name of a map (SVG)"},
     {"collision/pile", "contact_pile", "steps of settled balls and of 100,000; after it: numbers of balls"},
     {"collision/conservation", "contact_conservation", "momenta and energy of free balls; after it: steps"},
-    {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a stated noise)"},
+    {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a stated noise)", true},
 }};
 
 fs::path program_path(const Group& group) { return fs::read_symlink("/proc/self/exe").parent_path() / group.program; }
@@ -60,14 +61,16 @@ void run_benchmark(const std::string& group, std::span<const std::string> argume
   const Group* found = nullptr;
   for (const Group& known : kGroups) {
     const bool leads = group == known.name || group.starts_with(std::string(known.name) + '/');
-    if (leads && (found == nullptr || known.name.size() > found->name.size())) found = &known;
+    if (leads && (known.names || group == known.name) && (found == nullptr || known.name.size() > found->name.size())) found = &known;
   }
   if (found == nullptr) {
+    std::string known;
+    for (const Group& one : kGroups) known.append(known.empty() ? "" : ", ").append(one.name);
     throw Error(ErrorKind::Usage, Fault{.place = "bench",
                                         .key = {},
                                         .expected = "expected a group of benchmarks",
                                         .found = "'" + group + "'",
-                                        .hint = "supple bench --list names them"});
+                                        .hint = "known: " + known + "; supple bench --list tells what they measure"});
   }
   const fs::path program = program_path(*found);
   std::vector<std::string> words{program.string()};

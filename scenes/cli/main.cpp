@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <new>
 #include <optional>
 #include <string>
@@ -294,16 +295,19 @@ void run_flags(CLI::App* verb, Arguments& a) {
   verb->add_flag("--quiet", a.quiet, "print faults only");
 }
 
+/// NaN where the text is no finite number.
+double number_in(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool good = error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+  return good ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
 void drawing_flags(CLI::App* verb, Arguments& a) {
   verb->add_option("--at-once", a.at_once, "frames in work at the same time (default: one a thread, as memory allows; changes no bit)")
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")
-      ->check([](const std::string& text) {
-        double value = 0.0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool good = error == std::errc() && end == text.data() + text.size() && value > 0.0 && std::isfinite(value);
-        return good ? std::string() : "expected a number > 0, found " + text;
-      });
+      ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0, found " + text; });
 }
 
 int parse_and_call(int argc, char** argv) {
@@ -371,7 +375,10 @@ int parse_and_call(int argc, char** argv) {
   query_verb->add_option("--points", a.points, "field: CSV of points");
   query_verb->add_option("--cells", a.cells, "mesh: cells along the longest side")->check(CLI::Range(4, 4096));
   query_verb->add_option("--out", a.out, "mesh: .ply or .obj file, or folder, to write");
-  query_verb->add_option("--error", a.error, "contact: relative error asked for")->check(CLI::Range(1e-10, 0.1));
+  query_verb->add_option("--error", a.error, "contact: relative error asked for, 1e-10 to 0.1")->check([](const std::string& text) {
+    const double error = number_in(text);  // CLI::Range prints its bounds with six digits
+    return error >= 1e-10 && error <= 0.1 ? std::string() : "expected a number from 1e-10 to 0.1, found " + text;
+  });
   query_verb->add_option("--threads", a.threads, "threads")->check(CLI::Range(0, 1024));
   query_verb->add_flag("--samples", a.samples, "contact: every point of the contact surface too");
   query_verb->add_flag("--json", a.json, "JSON (always; accepted for scripts)");

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "contact_shapes.h"
 
@@ -209,6 +210,17 @@ void for_cases(const Stage& stage, const Wanted& wanted, const Visit& visit, con
       return Pair{{ball->body(), ring.body()}, false, {}};
     });
   }
+}
+
+/// What a command may name: `all`, or a case.
+inline std::vector<std::string_view> case_names() {
+  std::vector<std::string_view> names{"all"};
+  const auto listed = [&names](std::string_view name) {
+    names.push_back(name);
+    return false;
+  };
+  for_cases({}, listed, [](std::string_view, const auto&) {});
+  return names;
 }
 
 }  // namespace supple::benchmarks

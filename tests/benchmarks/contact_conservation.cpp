@@ -2,18 +2,20 @@
 // the step and with the error asked of the contact quadrature. Prints the tables of docs/reports/contact_conservation.md.
 // Words: steps (default 100000), and a number of balls for that row alone.
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
+#include <string_view>
 #include <vector>
 
 #include "scenes/contact_gas.h"
 #include "usage.h"
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "contact_conservation [STEPS] [BALLS]", 2);
   using namespace supple::scenes;
-  const int steps = argc > 1 ? std::atoi(argv[1]) : 100000;
-  const std::vector<int> counts = argc > 2 ? std::vector<int>{std::atoi(argv[2])} : std::vector<int>{2, 10, 100};
+  using namespace supple::benchmarks;
+  constexpr std::string_view kUsage = "contact_conservation [STEPS] [BALLS]";
+  answer_usage(argc, argv, kUsage, 2);
+  const int steps = argc > 1 ? whole_number(kUsage, argv[1]) : 100000;
+  const std::vector<int> counts = argc > 2 ? std::vector<int>{whole_number(kUsage, argv[2])} : std::vector<int>{2, 10, 100};
   constexpr double kStep = 2.5e-4;
   std::printf("| balls | steps | momentum | angular momentum | energy | largest contact energy | CPU s |\n|---|---|---|---|---|---|---|\n");
   for (const int count : counts) {

@@ -4,7 +4,6 @@
 /// one JSON object a line. Nothing should but for round-off, 1e-9.
 ///   contact_invariance [POSES] [CASE|all] [auto|samples|polar|march] [SEED]
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,10 +15,13 @@ int main(int argc, char** argv) {
   using namespace supple;
   using namespace supple::benchmarks;
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
-  answer_usage(argc, argv, "contact_invariance [POSES] [CASE|all] [auto|samples|polar|march] [SEED]", 4);
-  const int poses = argc > 1 ? std::atoi(argv[1]) : 1000;
+  constexpr std::string_view kUsage = "contact_invariance [POSES] [CASE|all] [auto|samples|polar|march] [SEED]";
+  answer_usage(argc, argv, kUsage, 4);
+  const int poses = argc > 1 ? whole_number(kUsage, argv[1]) : 1000;
   const std::string_view only = argc > 2 ? argv[2] : "all", rule = argc > 3 ? argv[3] : "auto";
-  const std::uint64_t seed = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 2026;
+  expect_word(kUsage, only, case_names());
+  expect_word(kUsage, rule, kRuleNames);
+  const std::uint64_t seed = argc > 4 ? whole_number<std::uint64_t>(kUsage, argv[4], 0) : 2026;
   constexpr double kRoundOff = 1e-9;
   for_cases({}, [only](std::string_view name) { return names(only, name); }, [&](std::string_view name, const auto&) {
     const Answers rest = look({}, name, poses, kErrors, rule_named(rule), seed);

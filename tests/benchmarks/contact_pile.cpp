@@ -1,6 +1,7 @@
 /// @file contact_pile.cpp
 /// Many balls in a bin, one JSON object a line: CPU time of a step once they have settled, and of the same after they have
-/// fallen asleep; its mean over the quarter of a second in which most of them meet. From 10,000 on the balls begin where they nearly rest, and ten steps are measured. The time of day of the
+/// fallen asleep; its mean over the quarter of a second in which most of them meet. From 10,000 on the balls begin where they nearly rest, in whole
+/// layers, and ten steps are measured. The time of day of the
 /// fastest step says what threads bring where the machine has nothing else to do: `contact_pile 100 --threads 2`.
 #include <sys/resource.h>
 
@@ -8,9 +9,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "supple/core/cpu_time.h"
@@ -30,23 +31,30 @@ constexpr double kDiameter = 0.1;
 std::string pile(int count, bool sleeps) {
   const bool many = count >= kMany;
   const int side = std::max(2, static_cast<int>(std::ceil(std::cbrt(count) - 1e-9)));
-  const int layers = (count + side * side - 1) / (side * side);
+  const int layer = side * side, layers = (count + layer - 1) / layer;
   const double spacing = many ? 0.985 * kDiameter : 1.1 * kDiameter;  // many: pressed a little on all sides
   const double wall = 0.5 * side * spacing + (many ? 0.0 : 0.1 * kDiameter);
   const auto text = [](double x) { return std::to_string(x); };
-  const std::string columns = "columns: " + std::to_string(side) + ", rows: " + std::to_string(side);
+  const auto grid = [&](const char* name, int columns, int rows, int high, double z) {
+    const auto whole = [](int n) { return std::to_string(n); };
+    return "  - name: " + std::string(name) + "\n    particles: {arrange: grid, columns: " + whole(columns) + ", rows: " + whole(rows) +
+           ", layers: " + whole(high) + ", spacing: " + text(spacing) + ", disorder: " + text(many ? 5e-4 : 4e-3) + ", at: [0, 0, " + text(z) +
+           "], mass: 0.05}\n    separate: true\n"
+           "    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.075, thickness: 0.05, slope: 10}}]\n"
+           "    contact: {modulus: 4e4, friction: 0.3, dissipation: 0.5}\n    medium: {linear: 2, angular: 2}\n";
+  };
+  // What is short of a whole layer lies on the others: whole rows, and a part of one above them.
+  const int whole = many ? layers : count / layer, rows = many ? 0 : count % layer / side, rest = many ? 0 : count % side;
+  std::string balls = whole > 0 ? grid("balls", side, side, whole, 0.5 * whole * spacing) : "";
+  if (rows > 0) balls += grid("rows", side, rows, 1, (whole + 0.5) * spacing);
+  if (rest > 0) balls += grid("rest", rest, 1, 1, (whole + (rows > 0 ? 1.5 : 0.5)) * spacing);
   const auto plane = [&](const char* name, double x, double y) {
     return "  - {name: " + std::string(name) + ", shape: plane, at: [" + text(x) + ", " + text(y) + ", 0], normal: [" +
            text(-x) + ", " + text(-y) + ", 0]}\n";
   };
   return "schema: 1\nduration: 20 s\nframe_rate: 24\ntime_step: {substeps: 64}\ngravity: [0, 0, -9.81]\ncontact: {error: 0.01}\n" +
          std::string(sleeps ? "sleep: {speed: 0.02, time: 0.1}\n" : "") +
-         "objects:\n  - name: balls\n    particles: {arrange: grid, " + columns + ", layers: " + std::to_string(layers) + ", spacing: " +
-         text(spacing) + ", disorder: " + text(many ? 5e-4 : 4e-3) + ", at: [0, 0, " + text(0.5 * layers * spacing) +
-         "], mass: 0.05}\n    separate: true\n"
-         "    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.075, thickness: 0.05, slope: 10}}]\n"
-         "    contact: {modulus: 4e4, friction: 0.3, dissipation: 0.5}\n    medium: {linear: 2, angular: 2}\n"
-         "ground: {height: 0}\nobstacles:\n" +
+         "objects:\n" + balls + "ground: {height: 0}\nobstacles:\n" +
          plane("left", -wall, 0) + plane("right", wall, 0) + plane("front", 0, -wall) + plane("back", 0, wall);
 }
 
@@ -99,14 +107,16 @@ void measure(int count, bool sleeps, int threads) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "contact_pile [BALLS ...] [--threads N]", std::numeric_limits<std::size_t>::max(), {{"--threads", 1}});
+  using supple::benchmarks::whole_number;
+  constexpr std::string_view kUsage = "contact_pile [BALLS ...] [--threads N]    from 10,000 balls on: as many as fill the last layer";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--threads", 1}});
   std::vector<int> counts;
   int threads = 1;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--threads" && i + 1 < argc) {
-      threads = std::max(1, std::atoi(argv[++i]));
+      threads = whole_number(kUsage, argv[++i]);
     } else {
-      counts.push_back(std::max(1, std::atoi(argv[i])));
+      counts.push_back(whole_number(kUsage, argv[i]));
     }
   }
   if (counts.empty()) counts = {10, 100, 1000, 100000};

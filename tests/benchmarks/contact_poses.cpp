@@ -9,7 +9,6 @@
 /// --marched: where there is no closed form the reference is marching, which has neither rays nor panels.
 /// --all-rays: bodies that are the same all around an axis get every ray, as others do, and not one that stands for all.
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <string>
@@ -163,8 +162,8 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]", 9,
-                                   {{"--all-rays"}, {"--marched"}, {"--depths", 2}});
+  constexpr std::string_view kUsage = "contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]";
+  answer_usage(argc, argv, kUsage, 9, {{"--all-rays"}, {"--marched"}, {"--depths", 2}});
   std::vector<std::string_view> words;
   std::optional<std::array<double, 2>> depths;
   for (int i = 1; i < argc; ++i) {
@@ -174,17 +173,19 @@ int main(int argc, char** argv) {
     } else if (word == "--marched") {
       marched = true;
     } else if (word == "--depths") {
-      depths = {std::strtod(argv[i + 1], nullptr), std::strtod(argv[i + 2], nullptr)};
+      depths = {positive_number(kUsage, argv[i + 1]), positive_number(kUsage, argv[i + 2])};
       i += 2;
     } else {
       words.push_back(word);
     }
   }
   const auto word = [&words](std::size_t i, std::string_view otherwise) { return i < words.size() ? words[i] : otherwise; };
-  const int poses = std::atoi(word(0, "1000").data());
-  const std::string_view only = word(1, "all");
-  only_rule = rule_named(word(2, "auto"));
-  seed = std::strtoull(word(3, "2026").data(), nullptr, 10);
+  const int poses = whole_number(kUsage, word(0, "1000"));
+  const std::string_view only = word(1, "all"), rule = word(2, "auto");
+  expect_word(kUsage, only, case_names());
+  expect_word(kUsage, rule, kRuleNames);
+  only_rule = rule_named(rule);
+  seed = whole_number<std::uint64_t>(kUsage, word(3, "2026"), 0);
   const auto wanted = [only](std::string_view name) { return names(only, name); };
   for_cases({}, wanted, [poses](std::string_view name, const auto& make_pose) { measure(name, poses, make_pose); }, depths);
   return 0;

@@ -4,11 +4,11 @@
 // untold, stopped, or did not hold what it can hold.
 #include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scenes/contact_stress.h"
@@ -83,12 +83,13 @@ void draw(const std::vector<Block>& blocks, const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "contact_stress [--seed N] [FILE.svg]", 3, {{"--seed", 1}});
+  constexpr std::string_view kUsage = "contact_stress [--seed N] [FILE.svg]";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, 3, {{"--seed", 1}});
   std::string map;
   unsigned seed = std::random_device{}();
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--seed" && i + 1 < argc) {
-      seed = static_cast<unsigned>(std::strtoul(argv[++i], nullptr, 10));
+      seed = supple::benchmarks::whole_number(kUsage, argv[++i], 0U);
     } else {
       map = argv[i];
     }

@@ -5,10 +5,10 @@
 ///   contact_thin [POSES] [SEED]
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "thin_cases.h"
 #include "usage.h"
@@ -150,10 +150,11 @@ void measure_leaning(int poses, std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  answer_usage(argc, argv, "contact_thin [POSES] [SEED]", 2);
+  constexpr std::string_view kUsage = "contact_thin [POSES] [SEED]";
+  answer_usage(argc, argv, kUsage, 2);
+  const int poses = argc > 1 ? whole_number(kUsage, argv[1]) : 300;
+  const std::uint64_t seed = argc > 2 ? whole_number<std::uint64_t>(kUsage, argv[2], 0) : 2026;
   measure_on_plane();
-  const int poses = argc > 1 ? std::atoi(argv[1]) : 300;
-  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 2026;
   measure_pairs(poses, seed);
   measure_leaning(3 * poses, seed);
   return 0;

@@ -3,6 +3,7 @@
 /// memory. Times are the least of several repeats, CPU time of the process; lines of two threads give wall time.
 #include <sys/resource.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -537,18 +538,23 @@ void bench_spiral(int count, bool rubs) {
 /// @param argv  melt [FILE [STEPS]], melt_single [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, surface, lists,
 ///              spiral; all when absent
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "core_bench [melt|melt_single|ellipsoids [FILE [STEPS]]]\n"
-                                   "       core_bench threads|surface|lists|spiral", 3);
+  constexpr std::string_view kUsage = "core_bench [melt|melt_single|ellipsoids [FILE [STEPS]]]\n"
+                                      "       core_bench threads|surface|lists|spiral";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, 3);
   const std::string_view what = argc > 1 ? argv[1] : "";
+  if (argc > 1) {
+    supple::benchmarks::expect_word(kUsage, what, std::array<std::string_view, 7>{"melt", "melt_single", "ellipsoids", "threads", "surface", "lists", "spiral"});
+  }
+  const auto steps = [&](int otherwise) { return argc > 3 ? supple::benchmarks::whole_number(kUsage, argv[3]) : otherwise; };
   const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };
   for (const Precision precision : {Precision::Double, Precision::SingleForces}) {
     const bool single = precision == Precision::SingleForces;
     if (what.empty() || what == (single ? "melt_single" : "melt")) {
-      bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), precision, argc > 3 ? std::atoi(argv[3]) : 100, 3);
+      bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), precision, steps(100), 3);
     }
   }
   if (wanted("ellipsoids")) {
-    bench_ellipsoids(argc > 2 ? Ellipsoids(argv[2]) : Ellipsoids(20), argc > 3 ? std::atoi(argv[3]) : 50, 3);
+    bench_ellipsoids(argc > 2 ? Ellipsoids(argv[2]) : Ellipsoids(20), steps(50), 3);
   }
   if (wanted("surface")) {
     for (const Precision precision : {Precision::Double, Precision::SingleForces}) {

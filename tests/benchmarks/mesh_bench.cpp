@@ -560,14 +560,21 @@ bool starts_alike(std::string_view a, std::string_view b) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "mesh_bench [PREFIX [--both]]          of the names to run, e.g. w3/128; --both: errors both ways\n"
-                                   "       mesh_bench --bounded BODY CELLS\n"
-                                   "       mesh_bench --grid BODY CELLS FILE\n"
-                                   "       mesh_bench --errors BODY CELLS FILE", 4, {{"--both"}, {"--bounded", 2}, {"--grid", 3}, {"--errors", 3}});
+  using supple::benchmarks::whole_number;
+  constexpr std::array<std::string_view, 6> kBodies{"w1", "w2", "w3", "w4", "capsules", "united"};
+  constexpr std::string_view kUsage =
+      "mesh_bench [PREFIX [--both]]          of the names to run, e.g. w3/128; --both: errors both ways\n"
+      "       mesh_bench --bounded BODY CELLS\n"
+      "       mesh_bench --grid BODY CELLS FILE\n"
+      "       mesh_bench --errors BODY CELLS FILE";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, 4, {{"--both"}, {"--bounded", 2}, {"--grid", 3}, {"--errors", 3}});
+  // After an option: a body and its cells.
+  if (argc > 3) supple::benchmarks::expect_word(kUsage, argv[2], kBodies);
+  const int own_cells = argc > 3 ? whole_number(kUsage, argv[3], 2) : 0;
   if (argc == 4 && std::string_view(argv[1]) == "--bounded") {
 #ifdef SUPPLE_HAS_CGAL
     const Body body = make_body(argv[2]);
-    return report_bounded(argv[2], body, frame_of(body), std::stoi(argv[3]));
+    return report_bounded(argv[2], body, frame_of(body), own_cells);
 #else
     std::fputs("built without the component supple_cgal\n", stderr);
     return 2;
@@ -575,29 +582,35 @@ int main(int argc, char** argv) {
   }
   if (argc == 5 && std::string_view(argv[1]) == "--errors") {
     Body body = make_body(argv[2]);
-    return report_errors(body, frame_of(body).lattice(std::stoi(argv[3])), argv[4]);
+    return report_errors(body, frame_of(body).lattice(own_cells), argv[4]);
   }
   if (argc == 5 && std::string_view(argv[1]) == "--grid") {
     Body body = make_body(argv[2]);
-    const int cells = std::stoi(argv[3]);
-    return write_grid(body, frame_of(body).lattice(cells), cells, argv[4]);
+    return write_grid(body, frame_of(body).lattice(own_cells), own_cells, argv[4]);
   }
   const std::string_view filter = argc > 1 ? argv[1] : "";
   const bool two_sided = argc > 2 && std::string_view(argv[2]) == "--both";
-  for (const std::string body_name : {"w1", "w2", "w3", "w4", "capsules", "united"}) {
+  bool any = false;
+  const auto wanted = [&](const std::string& name) {
+    const bool named = name.starts_with(filter);
+    any = any || named;
+    return named;
+  };
+  for (const std::string_view known : kBodies) {
+    const std::string body_name(known);
     if (!starts_alike(filter, body_name)) continue;
     Body body = make_body(body_name);
     const Frame frame = frame_of(body);
     for (const int cells : {64, 128, 256, 512}) {
       for (const Method& method : kMethods) {
         const std::string name = body_name + '/' + std::to_string(cells) + '/' + std::string(method.name);
-        if (name.compare(0, filter.size(), filter) != 0 || (method.refinements == -3 && name != filter)) continue;
+        if (!wanted(name) || (method.refinements == -3 && name != filter)) continue;
         measure(name, body, frame.lattice(cells), method, two_sided);
       }
       const Lattice lattice = frame.lattice(cells);
       for (const bool within : {false, true}) {
         const std::string name = body_name + '/' + std::to_string(cells) + (within ? "/within" : "/moved");
-        if (body_name == "w1" || name.compare(0, filter.size(), filter) != 0 || (within && name != filter)) continue;
+        if (body_name == "w1" || !wanted(name) || (within && name != filter)) continue;
         MarchOptions options{.lattice = lattice};
         if (within) options = {.lattice = {.origin = lattice.origin, .cell = 0.0}, .error = (body_name == "united" ? 0.5 : 0.1) * lattice.cell};
         if (body.skeleton.blend.rule == BlendRule::Graph) {
@@ -607,14 +620,15 @@ int main(int argc, char** argv) {
         }
       }
       const std::string field = body_name + '/' + std::to_string(cells) + "/field";
-      if (body_name != "w1" && field.compare(0, filter.size(), filter) == 0) {
+      if (body_name != "w1" && wanted(field)) {
         measure_field(field, body, frame.lattice(cells), cells);
       }
       const std::string grid = body_name + '/' + std::to_string(cells) + "/grid";
-      if (body_name != "w1" && grid.compare(0, filter.size(), filter) == 0) {
+      if (body_name != "w1" && wanted(grid)) {
         measure_grid(grid, body, frame.lattice(cells));
       }
     }
   }
+  if (!any) supple::benchmarks::refuse(kUsage, "a prefix of a name, as w3/128", filter);
   return 0;
 }

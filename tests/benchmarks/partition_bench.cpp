@@ -9,6 +9,7 @@
 ///                                            share is that of the time, blocks_share that of the blocks visited
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -296,17 +297,23 @@ void moved(int count, double cell, double error) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "partition_bench [rims] [SETS] [CELL]\n"
-                                   "       partition_bench delaunay [SETS] [SIZE]\n"
-                                   "       partition_bench moved [BALLS] [CELL] [ERROR]", 4);
+  using supple::benchmarks::expect_word;
+  using supple::benchmarks::positive_number;
+  using supple::benchmarks::whole_number;
+  constexpr std::string_view kUsage = "partition_bench [rims] [SETS] [CELL]\n"
+                                      "       partition_bench delaunay [SETS] [SIZE]\n"
+                                      "       partition_bench moved [BALLS] [CELL] [ERROR]";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, 4);
   const std::string_view what = argc > 1 ? argv[1] : "rims";
-  const int sets = argc > 2 ? std::atoi(argv[2]) : 50;
+  expect_word(kUsage, what, std::array<std::string_view, 3>{"rims", "delaunay", "moved"});
+  const int sets = argc > 2 ? whole_number(kUsage, argv[2]) : 50;
+  const auto length = [&](int i, double otherwise) { return argc > i ? positive_number(kUsage, argv[i]) : otherwise; };
   if (what == "delaunay") {
-    delaunay(sets, argc > 3 ? std::atof(argv[3]) : 0.1);
+    delaunay(sets, length(3, 0.1));
   } else if (what == "moved") {
-    moved(argc > 2 ? sets : 100, argc > 3 ? std::atof(argv[3]) : 0.005, argc > 4 ? std::atof(argv[4]) : 0.0);
+    moved(argc > 2 ? sets : 100, length(3, 0.005), length(4, 0.0));
   } else {
-    rims(sets, argc > 3 ? std::atof(argv[3]) : 0.05);
+    rims(sets, length(3, 0.05));
   }
   return 0;
 }

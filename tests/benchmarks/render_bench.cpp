@@ -16,6 +16,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -196,7 +197,8 @@ int write_studio(const fs::path& folder) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const char* usage = "render_bench [gl] | rate [AT_ONCE] [NOISE] | path [NOISE] [OUT.png] | studio FOLDER";
+  using supple::benchmarks::positive_number;
+  constexpr std::string_view usage = "render_bench [gl] | rate [AT_ONCE] [NOISE] | path [NOISE] [OUT.png] | studio FOLDER";
   supple::benchmarks::answer_usage(argc, argv, usage, 3);
   const std::string what = argc > 1 ? argv[1] : "gl";
   try {
@@ -205,17 +207,16 @@ int main(int argc, char** argv) {
       RenderSettings settings;
       if (argc > 3) {
         settings.kind = RendererKind::Path;
-        settings.noise = std::atof(argv[3]);
+        settings.noise = positive_number(usage, argv[3]);
         settings.threads = 1;
       }
-      return bench_rate(argc > 2 ? std::max(1, std::atoi(argv[2])) : 2, settings);
+      return bench_rate(argc > 2 ? supple::benchmarks::whole_number(usage, argv[2]) : 2, settings);
     }
-    if (what == "path") return bench_path(argc > 2 ? std::atof(argv[2]) : 0.05, argc > 3 ? argv[3] : "");
+    if (what == "path") return bench_path(argc > 2 ? positive_number(usage, argv[2]) : 0.05, argc > 3 ? argv[3] : "");
     if (what == "studio" && argc > 2) return write_studio(argv[2]);
   } catch (const supple::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return static_cast<int>(error.kind());
   }
-  std::fprintf(stderr, "usage: %s\n", usage);
-  return 2;
+  supple::benchmarks::refuse(usage, "one of gl, rate, path, or studio with its folder", what);
 }

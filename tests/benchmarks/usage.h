@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <initializer_list>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace supple::benchmarks {
@@ -17,32 +20,67 @@ struct BenchmarkOption {
   std::size_t values = 0;  ///< arguments that must follow it
 };
 
+inline void print_usage(std::FILE* to, std::string_view usage) {
+  std::fprintf(to, "usage: %.*s\n", static_cast<int>(usage.size()), usage.data());
+}
+
+/// Ends the program with 2, as an argument is not what it takes.
+[[noreturn]] inline void refuse(std::string_view usage, std::string_view expected, std::string_view found) {
+  std::fprintf(stderr, "error: expected %.*s, found '%.*s'\n", static_cast<int>(expected.size()), expected.data(), static_cast<int>(found.size()),
+               found.data());
+  print_usage(stderr, usage);
+  std::exit(2);
+}
+
+/// The number that an argument is, all of it; another one ends the program with 2.
+template <class T = int>
+T whole_number(std::string_view usage, std::string_view text, T least = 1) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least) {
+    refuse(usage, "a whole number >= " + std::to_string(least), text);
+  }
+  return value;
+}
+
+/// As above, of any number > 0.
+inline double positive_number(std::string_view usage, std::string_view text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool good = error == std::errc() && end == text.data() + text.size() && value > 0.0 && std::isfinite(value);
+  if (!good) refuse(usage, "a number > 0", text);
+  return value;
+}
+
+/// Ends the program with 2 where a word is none that it knows.
+template <class Words>
+void expect_word(std::string_view usage, std::string_view word, const Words& known) {
+  if (std::find(std::begin(known), std::end(known), word) != std::end(known)) return;
+  std::string expected = "one of";
+  for (const std::string_view other : known) expected.append(expected.size() > 6 ? ", " : " ").append(other);
+  refuse(usage, expected, word);
+}
+
 /// Ends the program where it is asked for its usage (-h, --help), with 0, or given an option that it does not know, one without
 /// its values, or more arguments than it takes, with 2. Negative numbers are no options.
 /// @param usage  a line for each way to call it   @param most  arguments that it takes, options and their values included
 /// @param options  that it knows
 inline void answer_usage(int argc, char** argv, std::string_view usage, std::size_t most, std::initializer_list<BenchmarkOption> options = {}) {
   const std::span<char*> arguments(argv + 1, static_cast<std::size_t>(std::max(argc - 1, 0)));
-  const auto print = [usage](std::FILE* to) { std::fprintf(to, "usage: %.*s\n", static_cast<int>(usage.size()), usage.data()); };
   for (const std::string_view argument : arguments) {
     if (argument != "-h" && argument != "--help") continue;
-    print(stdout);
+    print_usage(stdout, usage);
     std::exit(0);
   }
-  const auto refuse = [&](const char* expected, std::string_view found) {
-    std::fprintf(stderr, "error: expected %s, found '%.*s'\n", expected, static_cast<int>(found.size()), found.data());
-    print(stderr);
-    std::exit(2);
-  };
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string_view argument = arguments[i];
     const bool option = argument.size() > 1 && argument[0] == '-' && argument[1] != '.' && std::isdigit(static_cast<unsigned char>(argument[1])) == 0;
     if (!option) continue;
     const auto known = std::find_if(options.begin(), options.end(), [&](const BenchmarkOption& o) { return o.name == argument; });
-    if (known == options.end()) refuse("an option of these", argument);
-    if (i + known->values >= arguments.size()) refuse("a value after every option", argument);
+    if (known == options.end()) refuse(usage, "an option of these", argument);
+    if (i + known->values >= arguments.size()) refuse(usage, "a value after every option", argument);
   }
-  if (arguments.size() > most) refuse("no more arguments", arguments[most]);
+  if (arguments.size() > most) refuse(usage, "no more arguments", arguments[most]);
 }
 
 }  // namespace supple::benchmarks

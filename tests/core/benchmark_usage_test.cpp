@@ -1,11 +1,13 @@
 // What benchmark programs answer before they measure anything, and that all of them do.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "benchmarks/usage.h"
@@ -38,6 +40,24 @@ TEST(BenchmarkUsageDeathTest, IsAnsweredBeforeAnythingElse) {
   }
 }
 
+TEST(BenchmarkUsageDeathTest, RefusesWhatIsNoNumberOrNoKnownWord) {
+  using testing::ExitedWithCode;
+  for (const char* word : {"ten", "", "0", "-5", "10x", "1.5", "1e3", "99999999999"}) {
+    EXPECT_EXIT(std::exit(whole_number("program [N]", word)), ExitedWithCode(2),
+                "expected a whole number >= 1, found '" + std::string(word) + "'\nusage: program \\[N\\]");
+  }
+  EXPECT_EXIT(std::exit(static_cast<int>(whole_number("", "abc", 0U))), ExitedWithCode(2), "expected a whole number >= 0, found 'abc'");
+  EXPECT_EQ(whole_number("", "10"), 10);
+  EXPECT_EQ(whole_number("", "0", 0U), 0U);
+  for (const char* word : {"x", "0", "-.5", "nan", "inf", "1 m"}) {
+    EXPECT_EXIT(positive_number("program [SIZE]", word), ExitedWithCode(2), "expected a number > 0, found '" + std::string(word) + '\'');
+  }
+  EXPECT_EQ(positive_number("", "2.5e-3"), 2.5e-3);
+  constexpr std::array<std::string_view, 2> kWords{"equal", "radii"};
+  EXPECT_EXIT(expect_word("program [CASE]", "spheres", kWords), ExitedWithCode(2), "expected one of equal, radii, found 'spheres'\nusage: program");
+  expect_word("", "radii", kWords);
+}
+
 TEST(BenchmarkUsage, IsAskedForByEveryProgram) {
   int programs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(source_dir() / "tests/benchmarks")) {
@@ -48,6 +68,9 @@ TEST(BenchmarkUsage, IsAskedForByEveryProgram) {
     if (text.str().find("int main(") == std::string::npos) continue;
     ++programs;
     EXPECT_NE(text.str().find("answer_usage(argc, argv"), std::string::npos) << entry.path();
+    for (const char* lenient : {"atoi(", "atof(", "strto", "stoi("}) {  // they take what is no number
+      EXPECT_EQ(text.str().find(lenient), std::string::npos) << entry.path();
+    }
   }
   EXPECT_GE(programs, 13);
 }

@@ -54,9 +54,14 @@ expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
 expect 2 '1 to 3' run good.yaml --out frames --frames 9 --progress none
 expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
 expect 2 '' query nonsense good.yaml
+for error in 1e-12 0 0.5 nan; do
+  expect 2 "expected a number from 1e-10 to 0.1, found $error" query contact good.yaml --error "$error"
+done
+expect 0 '' query contact good.yaml --error 1e-10
 expect 0 '' bench --list
 expect 2 '--list' bench cores
 expect 2 "found '--lst'" bench --lst
+expect 2 'collision/poses, collision/invariance' bench collision/posess
 # Programs of benchmarks get what follows their names, options too, in its order.
 mkdir bin
 ln "$supple" bin/supple 2> err.txt || cp "$supple" bin/supple
