@@ -35,7 +35,7 @@ void fields(Archive& archive, MeshingDesc& d) {
   archive("size", d.size, only(above(0.0, kLength).or_auto()), "largest radius of a ball through a triangle's corners around a point of the surface; auto: two cells");
   archive("distance", d.distance, only(above(0.0, kLength).or_auto()), "from a triangle's circumcentre to that point; auto: a tenth of the size");
   archive("search", d.search, Rule{}.or_auto(), "looks for cavities and islands between the nodes of the lattice and adds them, but not to bodies that touch others and bulge; never by way of a grid. true: all others, though it takes longer than the mesh itself where supports span few cells, bodies touch in many places or cells stay open; a warning counts what was found and where some may be missed still (where both ends of an arc, all of a ring or parts of a curve beside other shapes are as near as each other, blends by gradients, where three bodies meet). auto: those whose search takes by counts at most twice as long as the mesh, or next to nothing, and leaves no cells open along blends by gradients or tight bends of curves beside other shapes; 'search' in the report counts the others");
-  archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files");
+  archive("motion", d.motion, {}, "columns velocity_x, velocity_y, velocity_z [m/s] and owner (number of the particle) in mesh files as ply and usd; obj has none");
   archive.check(!d.error || d.method == Auto || d.method == Cubes, "error", "expected method auto or cubes with an error",
                 std::string(name_of(d.method)), "leave out 'method'");
   archive.check(!d.search.value_or(false) || d.method == Auto || d.method == Cubes, "search", "expected method auto or cubes with a search",
@@ -75,7 +75,7 @@ void fields(Archive& archive, OutputDesc& d) {
   archive("meshing", d.meshing, {}, "how surfaces become meshes");
   archive("gridding", d.gridding, {}, "how fields become grids");
   archive("sampling", d.sampling, {}, "how far apart samples are");
-  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids of objects without 'meshing.cell'; auto: 8 cells across the smallest thickness of these, 64 along each");
+  archive("cell", d.cell, above(0.0, kLength).or_auto(), "lattice cell of meshes and grids of objects without 'meshing.cell'; auto: 8 cells across the smallest thickness of these, and for each at least 64 along the box of balls around the supports of its particles, of which its surface may fill a third");
   archive.check(!d.film || !d.images || std::count(d.images->formats.begin(), d.images->formats.end(), ImageName::Png) > 0, "film",
                 "expected images as png for a film", "none", "add png to output.images.formats");
   archive.check(!d.film || d.images, "film", "expected images for a film", "none", "add 'images: true' under output");

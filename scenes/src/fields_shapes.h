@@ -22,7 +22,7 @@ void fields(Archive& archive, KernelDesc& d) {
   using enum KernelName;
   archive("type", d.type, {}, "wyvill: (1 - d^2/R^2)^3; gascuel: linear down to the thickness, then cubic; murakami: (1 - d^2/R^2)^2; "
                               "blinn: Gaussian; all others by their papers, all 0 beyond R");
-  archive("radius", d.radius, above(0.0, kLength), "support R; required, except where the shape gives the support itself (then its smallest semi-axis or radius)");
+  archive("radius", d.radius, above(0.0, kLength), "support R; required, except where the shape gives the support itself (its smallest semi-axis or radius; another one then scales gascuel's thickness and slope, and changes no surface of other kernels)");
   archive.required("thickness", d.thickness, above(0.0, kLength).only("type", d.type, {Gascuel}), "e: distance of the surface");
   archive.required("slope", d.slope, above(0.0, kSlope).only("type", d.type, {Gascuel}),
                    "steepness at the surface; slope (radius - thickness) <= 3 iso");

@@ -12,8 +12,8 @@ namespace supple::scenes {
 /// Force, torque and energy by law, particle by particle; contact included as law "contact".
 [[nodiscard]] std::string query_forces(Simulation& simulation);
 
-/// For each pair: force, moment about the origin, area, centre of pressure, energy, points, cpu_us, and the bound of the error, with the one
-/// asked for and whether it is met.
+/// For each pair: force, moment about the origin, area, centre of pressure, energy, points, and the bound of the error, with the one asked
+/// for and whether it is met; cpu_us of all pairs together.
 [[nodiscard]] std::string query_contact(Simulation& simulation, bool samples);
 
 /// Value, gradient and owner at each point of a CSV file, of each object. @throws Error{Io}, Error{Scene}

@@ -415,7 +415,7 @@ struct OutputDesc {
   MeshingDesc meshing;
   GriddingDesc gridding;
   SamplingDesc sampling;
-  std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along each object
+  std::optional<double> cell;         ///< lattice cell [m]; absent: 8 cells across the smallest surface thickness, and 64 along the balls around each object's supports
 };
 
 struct ScenePlaces;
