@@ -31,7 +31,8 @@ Quat from_z_to(const Vec3& direction) {
   return Quat(1.0 + a.z(), -a.y(), a.x(), 0.0).normalized();
 }
 
-core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std::string& key) {
+/// Without particles where the file that has them cannot be read.
+core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std::string& key, ModelFaults& faults) {
   core::Arrangement out;
   switch (d.arrange) {
     case ArrangeKind::Single: out = core::arrange_single(); break;
@@ -43,7 +44,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
       break;
     case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
     case ArrangeKind::File:
-      out.position = read_for(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); });
+      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); }).value_or(std::vector<Vec3>());
       out.orientation.assign(out.position.size(), Quat::Identity());
       break;
   }
@@ -171,12 +172,12 @@ double largest_radius(const implicit::Primitive& p) {
 /// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
-  const core::Arrangement arrangement = arrange(scene, d.particles, key + ".particles");
+  const core::Arrangement arrangement = arrange(scene, d.particles, key + ".particles", faults);
   const auto n = static_cast<std::uint32_t>(arrangement.size());
   object.first = static_cast<std::uint32_t>(model.particles.size());
   object.last = object.first + n;
   if (n == 0) {
-    faults.add(key + ".particles.file", "expected at least one particle", "none", "");
+    faults.add_once(key + ".particles.file", "expected at least one particle", "none", "");
     return;
   }
   std::vector<double> volume;
@@ -212,7 +213,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     } else if (axes.isZero()) {
       axes.setConstant(0.5 * nearest[i]);
     }
-    if (!(axes.maxCoeff() > 0.0)) {
+    if (!(axes.maxCoeff() > 0.0) && !faults.has(key + ".iso")) {  // without a surface there is no solid
       faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
                       n > 1 && !d.separate ? "two particles lie at one place, so give it"
                       : d.skeleton.empty() ? "a single particle without a surface needs it"
@@ -356,6 +357,7 @@ Model build_model(const Scene& scene) {
     ObjectModel object;
     object.name = d.name;
     add_particles(scene, d, key, object, model, faults);
+    if (object.first == object.last) continue;
     if (d.contact) {
       object.material = {d.contact->modulus, d.contact->friction, d.contact->dissipation};
       object.collides = !object.skeleton.primitive.empty();
@@ -368,7 +370,7 @@ Model build_model(const Scene& scene) {
     add_pins_and_loads(d, key, object, model, faults);
     model.objects.push_back(std::move(object));
   }
-  if (model.particles.size() == 0) faults.add("objects", "expected at least one object with particles", "none", "");
+  if (model.particles.size() == 0 && faults.none()) faults.add("objects", "expected at least one object with particles", "none", "");
   faults.raise();  // what follows relies on particles
 
   model.rest = model.initial;

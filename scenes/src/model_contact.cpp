@@ -94,7 +94,10 @@ double stick_frequency(const ObjectModel& object, const core::ParticleSet& parti
 
 /// Heights at the points of a regular grid, in any order.
 implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults) {
-  std::vector<Vec3> points = read_for(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); });
+  const implicit::HeightField none{Vec3::Zero(), 1.0, 2, 2, std::vector<double>(4, 0.0), 1.0};
+  auto read = faults.read(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); });
+  if (!read) return none;
+  std::vector<Vec3>& points = *read;
   std::sort(points.begin(), points.end(), [](const Vec3& a, const Vec3& b) {
     return a.y() != b.y() ? a.y() < b.y() : a.x() < b.x();
   });
@@ -114,20 +117,22 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
   if (!regular) {
     faults.add(key + ".file", "expected points of a regular grid in x and y, at least 2 by 2, equally far apart both ways",
                std::to_string(points.size()) + " points that are not one", "");
-    return {Vec3::Zero(), 1.0, 2, 2, std::vector<double>(4, 0.0), 1.0};
+    return none;
   }
   return {Vec3(points[0].x(), points[0].y(), 0.0) + d.at, spacing, columns, rows, heights, d.slope};
 }
 
 /// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
 void add_mesh(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults, FixedBody& body) try {
-  Mesh mesh = read_for(key + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
+  auto read = faults.read(key + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
+  if (!read) return;
+  Mesh& mesh = *read;
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
   for (Vec3& x : mesh.position) x = d.at + turn * x;
   body.solid = implicit::MeshSolid(mesh, {.voxel = d.voxel.value_or(0.0), .slope = d.slope});
 } catch (const Error& error) {
+  if (error.kind() != ErrorKind::Scene) throw;
   const Fault& fault = error.faults().front();
-  if (error.kind() != ErrorKind::Scene || !fault.place.empty()) throw;
   faults.add(key + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
 }
 

@@ -18,18 +18,31 @@ bool is_identifier(std::string_view text) {
 
 /// Words of other tools and of the physics for keys that we name differently.
 std::string_view our_word(std::string_view key) {
-  constexpr std::array<std::array<std::string_view, 2>, 10> kWords{{{"stiffness", "modulus"},
-                                                                    {"fov", "field_of_view_deg"},
-                                                                    {"field_of_view", "field_of_view_deg"},
-                                                                    {"position", "at"},
-                                                                    {"offset", "at"},
-                                                                    {"fps", "frame_rate"},
-                                                                    {"damping", "medium"},
-                                                                    {"forces", "loads"},
-                                                                    {"restitution", "dissipation"},
-                                                                    {"k", "strength"}}};
+  constexpr std::array<std::array<std::string_view, 2>, 9> kWords{{{"stiffness", "modulus"},
+                                                                   {"fov", "field_of_view_deg"},
+                                                                   {"field_of_view", "field_of_view_deg"},
+                                                                   {"position", "at"},
+                                                                   {"offset", "at"},
+                                                                   {"fps", "frame_rate"},
+                                                                   {"damping", "medium"},
+                                                                   {"forces", "loads"},
+                                                                   {"k", "strength"}}};
   for (const auto& [theirs, ours] : kWords) {
     if (theirs == key) return ours;
+  }
+  return "";
+}
+
+/// The same for the words of a choice.
+std::string_view our_choice(std::string_view word) {
+  constexpr std::array<std::array<std::string_view, 2>, 6> kWords{{{"literal", "contribution"},
+                                                                   {"hard", "barrier"},
+                                                                   {"heightfield", "heights"},
+                                                                   {"height_field", "heights"},
+                                                                   {"halfspace", "plane"},
+                                                                   {"half_space", "plane"}}};
+  for (const auto& [theirs, ours] : kWords) {
+    if (theirs == word) return ours;
   }
   return "";
 }
@@ -261,7 +274,8 @@ std::optional<std::size_t> ReadArchive::read_choice(const Node& node, const std:
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (names[i] == node.text) return i;
     }
-    const std::string near = nearest_word(node.text, names);
+    const std::string_view ours = our_choice(node.text);
+    const std::string near = std::find(names.begin(), names.end(), ours) != names.end() ? std::string(ours) : nearest_word(node.text, names);
     if (!near.empty()) hint = "did you mean '" + near + "'?";
   }
   fault(node, path, "expected " + expectation(type, names, {}), hint);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fields_rules.h"
+#include "model_contact.h"
 #include "read_scene_faults.h"
 #include "search_choice.h"
 
@@ -109,6 +110,57 @@ void add_wide_samples(const Model& model, double spacing, std::vector<std::strin
   }
 }
 
+/// Whether any two bodies that may touch have friction.
+bool any_friction(const Model& model) {
+  const std::size_t n = model.objects.size();
+  const auto collides = [&](std::size_t i) { return i >= n || model.objects[i].collides; };
+  const auto material = [&](std::size_t i) { return i >= n ? model.fixed[i - n].material : model.objects[i].material; };
+  const auto allowed = [&](std::uint32_t a, std::uint32_t b) { return !model.rules.allowed || model.rules.allowed(a, b); };
+  const auto& overrides = model.rules.overrides;
+  if (std::any_of(overrides.begin(), overrides.end(), [](const auto& o) { return o.material.friction > 0.0; })) return true;
+  for (std::uint32_t a = 0; a < n; ++a) {
+    if (!collides(a) || material(a).friction == 0.0) continue;
+    if (own_contacts(model.objects[a]) > 0) return true;
+    for (std::uint32_t b = a + 1; b < n + model.fixed.size(); ++b) {
+      const collision::BodyPair pair{a, b};
+      if (!collides(b) || material(b).friction == 0.0 || !allowed(a, b)) continue;
+      if (std::none_of(overrides.begin(), overrides.end(), [&](const auto& o) { return o.pair == pair; })) return true;
+    }
+  }
+  return false;
+}
+
+/// Keys that are given, but change nothing.
+void add_idle(const Scene& scene, const Model& model, std::vector<std::string>& warnings) {
+  const ContactDesc& d = scene.contact;
+  const auto idle = [&](bool given, const std::string& key, const char* why) {
+    if (given) warnings.push_back(key + ": it has no effect, as " + why);
+  };
+  if ((d.stick || d.friction_speed != ContactDesc{}.friction_speed) && !any_friction(model)) {
+    constexpr const char* kSmooth = "no two bodies that may touch have friction";
+    idle(d.stick.has_value(), "contact.stick", kSmooth);
+    idle(d.friction_speed != ContactDesc{}.friction_speed, "contact.friction_speed", kSmooth);
+  }
+  const bool flat = d.bulge == 0.0 && !d.bulge_volume;
+  idle(flat && d.bulge_width, "contact.bulge_width", "'bulge' is 0");
+  idle(flat && d.bulge_literal, "contact.bulge_literal", "'bulge' is 0");
+  for (std::size_t k = 0; k < scene.pairs.size(); ++k) {
+    const PairDesc& pair = scene.pairs[k];
+    idle(!pair.collide && !pair.friction && !pair.dissipation && !pair.restitution, "pairs[" + std::to_string(k) + ']',
+         "it says nothing of its two objects");
+  }
+  const auto& meshes = scene.output.mesh;
+  if (scene.output.meshing.motion && !meshes.empty() && std::all_of(meshes.begin(), meshes.end(), [](MeshName m) { return m == MeshName::Obj; })) {
+    warnings.push_back("output.meshing.motion: OBJ files have no columns, those of ply and usd do");
+  }
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    const ObjectModel& object = model.objects[i];
+    const auto& contact = scene.objects[i].contact;
+    idle(contact && contact->self.value_or(false) && object.collides && !object.passes_itself && own_contacts(object) == 0,
+         "objects." + object.name + ".contact.self", "it has no parts that could touch each other: they blend, or are bonded");
+  }
+}
+
 }  // namespace
 
 bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair) {
@@ -136,6 +188,7 @@ std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& 
   add_passing(context.model, warnings);
   add_without_surface(context, particles, frame, warnings);
   add_missed(context.model, warnings);
+  add_idle(scene, context.model, warnings);
   if (scene.contact.sample_spacing) add_wide_samples(context.model, *scene.contact.sample_spacing, warnings);
   return warnings;
 }

@@ -18,7 +18,8 @@ namespace supple::scenes {
 [[nodiscard]] std::string passing_text(const ObjectModel& object);
 
 /// What is odd about the start: bodies deep in one another, parts of an object that pass through each other, objects without a
-/// surface, cells and samples of contact that miss objects, and a spacing of samples where there are none.
+/// surface, cells and samples of contact that miss objects, and keys
+/// without an effect.
 /// @param frame  of the contacts at the start
 [[nodiscard]] std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles,
                                                       Frame& frame);

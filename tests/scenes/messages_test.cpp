@@ -88,6 +88,40 @@ objects:
   }
 }
 
+TEST(Messages, NameAllFilesThatAreAbsent) {
+  const std::string text = R"(
+schema: 1
+duration: 1 s
+objects:
+  - {name: ball, particles: {arrange: file, file: absent.csv, mass: 1}, skeleton: [{shape: point, kernel: {radius: 0.1}}]}
+  - {name: cube, particles: {arrange: file, file: nowhere.csv, mass: 1}, skeleton: [{shape: point, kernel: {radius: 0.1}}]}
+)";
+  const std::string solids = R"(
+schema: 1
+duration: 1 s
+objects:
+  - {name: ball, particles: {mass: 1}, skeleton: [{shape: point, kernel: {radius: 0.1}}], contact: {}}
+  - {name: cube, particles: {mass: 1}, skeleton: [{shape: point, kernel: {radius: 0.1}}]}
+obstacles:
+  - {name: hill, shape: heights, file: absent.csv}
+  - {name: roof, shape: mesh, file: absent.obj}
+)";
+  const auto expect = [](const std::string& scene, ErrorKind kind, const std::vector<std::string>& keys) {
+    try {
+      (void)build_model(parse_scene(scene, "scene.yaml", ""));
+      FAIL() << "files that are absent were read";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), kind);
+      std::vector<std::string> found;
+      for (const Fault& fault : error.faults()) found.push_back(fault.key);
+      EXPECT_EQ(found, keys);
+    }
+  };
+  expect(text, ErrorKind::Io, {"objects.ball.particles.file", "objects.cube.particles.file"});
+  expect(solids, ErrorKind::Io, {"obstacles.hill.file", "obstacles.roof.file"});
+  expect(solids + "pairs: [{objects: [ball, cube], friction: 0.1}]\n", ErrorKind::Scene, {"obstacles.hill.file", "obstacles.roof.file", "pairs[0]"});
+}
+
 TEST(Messages, AreAtLeastForty) { EXPECT_GE(names().size(), 40u); }
 
 }  // namespace

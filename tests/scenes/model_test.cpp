@@ -212,6 +212,45 @@ TEST(Warnings, TellOfSamplesThatAreTooFarApartOrOfNoUse) {
   EXPECT_NE(idle[0].find("contact.sample_spacing: it has no effect"), std::string::npos) << idle[0];
 }
 
+TEST(Warnings, TellOfKeysThatChangeNothing) {
+  const auto warnings_of = [](const std::string& text, const std::string& contact = "", const std::string& particles = "inertia_radius: 0.1") {
+    return Simulation(parse_scene("schema: 1\nduration: 1 s\n" + text + "objects:\n  - {name: a, particles: {at: [0, 0, 1], " + particles +
+                                  "}, skeleton: [{shape: point, kernel: {radius: 0.2}}], contact: {" + contact + "}}\n"
+                                  "  - {name: b, particles: {at: [0, 0, 2]}, skeleton: [{shape: point, kernel: {radius: 0.2}}], contact: {friction: 1}}\n",
+                                  "test.yaml", ".")).warnings();
+  };
+  const auto expect = [](const std::vector<std::string>& found, const std::vector<std::string>& expected) { EXPECT_EQ(found, expected); };
+  const std::string stick = "contact: {stick: {stiffness: 100}, friction_speed: 0.1}\n", rough = "ground: {friction: 0.5}\n";
+  const std::string smooth = ": it has no effect, as no two bodies that may touch have friction";
+  const std::vector<std::string> both{"contact.stick" + smooth, "contact.friction_speed" + smooth};
+  expect(warnings_of(stick), both);
+  expect(warnings_of(stick + rough + "pairs: [{objects: [b, ground], collide: false}]\n"), both);
+  expect(warnings_of(stick + rough + "pairs: [{objects: [b, ground], friction: 0}]\n"), both);
+  expect(warnings_of(stick + rough), {});
+  expect(warnings_of(stick + "pairs: [{objects: [a, b], friction: 0.1}]\n"), {});
+  expect(warnings_of(stick, "friction: 0.1"), {});
+  expect(warnings_of("contact: {friction_speed: 0.1}\n"), {both[1]});
+
+  expect(warnings_of("contact: {bulge: 0, bulge_width: 0.2, bulge_literal: true}\n"),
+         {"contact.bulge_width: it has no effect, as 'bulge' is 0", "contact.bulge_literal: it has no effect, as 'bulge' is 0"});
+  expect(warnings_of("contact: {bulge: 0.1, bulge_width: 0.2}\n"), {});
+  expect(warnings_of("contact: {bulge_volume: true, bulge_width: 0.2}\n"), {});
+
+  expect(warnings_of(rough + "pairs: [{objects: [a, ground], collide: true}, {objects: [b, a]}]\n"),
+         {"pairs[1]: it has no effect, as it says nothing of its two objects"});
+
+  const std::string line = "arrange: line, count: 3, spacing: 0.1";
+  const std::vector<std::string> whole{"objects.a.contact.self: it has no effect, as it has no parts that could touch each other: they blend, or are bonded"};
+  expect(warnings_of("", "self: true"), whole);
+  expect(warnings_of("", "self: true", line), whole);
+  expect(warnings_of("", "self: false", line), {});
+  expect(warnings_of("", "", line), {});
+
+  const std::string motion = "output: {meshing: {motion: true}, mesh: ";
+  expect(warnings_of(motion + "obj}\n"), {"output.meshing.motion: OBJ files have no columns, those of ply and usd do"});
+  expect(warnings_of(motion + "[obj, ply]}\n"), {});
+}
+
 TEST(Warnings, TellOfContactsThatAreNotSolvedAsWellAsAsked) {
   // The patch of a ring on the ground: samples end at a bound of 8e-2, marching goes as far as is asked.
   const auto warnings_of = [](const std::string& rule) {
