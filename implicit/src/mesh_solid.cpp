@@ -10,6 +10,7 @@
 #include <limits>
 #include <numeric>
 #include <string>
+#include <utility>
 
 #include "single_part.h"
 #include "supple/core/error.h"
@@ -18,7 +19,10 @@ namespace supple::implicit {
 namespace {
 
 constexpr double kBand = 6.0;    // cells outside the mesh in which distances are kept
+constexpr double kMargin = kBand + 2.0;
 constexpr double kCellsAlong = 64.0;
+constexpr double kMostHollow = 0.05;  // share of the mesh's area: edges of 90 degrees of a cube eight cells wide have less
+constexpr double kMostTried = 8e6;    // cells of a lattice that nobody asked for
 
 /// The mesh's triangles for OpenVDB, in index space.
 struct Triangles {
@@ -91,6 +95,67 @@ Mesh flat_faces(const Mesh& mesh) {
   return flat;
 }
 
+/// Signed distances to a mesh [m] on a lattice around it, cut off beyond the band outside.
+struct Distances {
+  Vec3 corner = Vec3::Zero();
+  std::array<std::size_t, 3> size{};
+  std::vector<float> at;  // x fastest
+  double deepest = 0.0;
+};
+
+Distances distances_to(const Mesh& mesh, const Box& box, double voxel) {
+  Distances made;
+  made.corner = box.lower - Vec3::Constant(kMargin * voxel);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    made.size[axis] = static_cast<std::size_t>(std::ceil(box.extent()[static_cast<Eigen::Index>(axis)] / voxel) + 2.0 * kMargin + 1.0);
+  }
+  openvdb::initialize();
+  const auto transform = openvdb::math::Transform::createLinearTransform(1.0);  // distances in cells
+  openvdb::FloatGrid::Ptr grid;
+  tbb::task_arena alone(1);  // whatever the number of threads, the same bits
+  alone.execute([&] {
+    grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(Triangles{mesh, made.corner, voxel}, *transform,
+                                                           static_cast<float>(kBand), std::numeric_limits<float>::max());
+  });
+  made.at.reserve(made.size[0] * made.size[1] * made.size[2]);
+  const auto nodes_of = grid->getConstAccessor();
+  for (std::size_t k = 0; k < made.size[2]; ++k) {
+    for (std::size_t j = 0; j < made.size[1]; ++j) {
+      for (std::size_t i = 0; i < made.size[0]; ++i) {
+        const float cells = nodes_of.getValue({static_cast<int>(i), static_cast<int>(j), static_cast<int>(k)});
+        const double distance = static_cast<double>(std::min(cells, static_cast<float>(kBand))) * voxel;
+        made.at.push_back(static_cast<float>(distance));
+        made.deepest = std::max(made.deepest, -distance);
+      }
+    }
+  }
+  return made;
+}
+
+/// Share of a mesh's area with no inside within a cell of it, by points spread evenly over its faces. @param faces  that do not share corners
+double hollow_share(const FieldView& solid, const Mesh& faces, double voxel) {
+  double area = 0.0, hollow = 0.0;
+  for (std::size_t face = 0; face < faces.triangle.size(); ++face) {
+    const Vec3* corner = &faces.position[3 * face];
+    const Vec3 u = corner[1] - corner[0], v = corner[2] - corner[0], normal = faces.normal[3 * face];
+    const double whole = 0.5 * u.cross(v).norm();
+    const double count = std::ceil(whole / (voxel * voxel));
+    area += whole;
+    for (double k = 0.0; k < count; ++k) {
+      double s = std::fmod(1.0 / 3.0 + k * 0.7548776662466927, 1.0), t = std::fmod(1.0 / 3.0 + k * 0.5698402909980532, 1.0);
+      if (s + t > 1.0) {
+        s = 1.0 - s;
+        t = 1.0 - t;
+      }
+      const Vec3 at = corner[0] + s * u + t * v;
+      // On either side, as faces need not point outwards: half a cell in for plates, which may be no thicker than one, a cell in for edges.
+      const auto inside = [&](double cells) { return solid.value(at + cells * voxel * normal) > 0.0; };
+      if (!inside(-0.5) && !inside(-1.0) && !inside(0.5) && !inside(1.0)) hollow += whole / count;
+    }
+  }
+  return area > 0.0 ? hollow / area : 1.0;
+}
+
 }  // namespace
 
 MeshSolid::MeshSolid(const Mesh& given, const MeshSolidOptions& options) : mesh_(flat_faces(given)), slope_(options.slope) {
@@ -106,8 +171,7 @@ MeshSolid::MeshSolid(const Mesh& given, const MeshSolidOptions& options) : mesh_
   const Vec3 extent = box.extent();
   voxel_ = options.voxel > 0.0 ? options.voxel : extent.maxCoeff() / kCellsAlong;
   if (!(voxel_ > 0.0)) refuse("mesh", "expected a mesh with an extent", "all vertices at one place", "");
-  const double margin = kBand + 2.0;
-  const auto nodes = [&](double h) { return ((extent / h).array().ceil() + 2.0 * margin + 1.0).prod(); };
+  const auto nodes = [&](double h) { return ((extent / h).array().ceil() + 2.0 * kMargin + 1.0).prod(); };
   const auto most = static_cast<double>(options.max_voxels);
   if (nodes(voxel_) > most) {
     double fits = voxel_;
@@ -115,30 +179,27 @@ MeshSolid::MeshSolid(const Mesh& given, const MeshSolidOptions& options) : mesh_
     refuse("voxel", "expected at most " + std::to_string(options.max_voxels) + " cells around the mesh",
            shown(nodes(voxel_)) + " with a voxel of " + shown(voxel_) + " m", "a voxel of " + shown(fits) + " m would fit");
   }
-  corner_ = box.lower - Vec3::Constant(margin * voxel_);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    size_[axis] = static_cast<std::size_t>(std::ceil(extent[static_cast<Eigen::Index>(axis)] / voxel_) + 2.0 * margin + 1.0);
+  const auto hollow_with = [&](double h) {
+    Distances made = distances_to(mesh, box, voxel_ = h);
+    corner_ = made.corner;
+    size_ = made.size;
+    distance_ = std::move(made.at);
+    deepest_ = made.deepest;
+    return hollow_share(*this, mesh_, h);
+  };
+  const double first = voxel_, hollow = hollow_with(first);
+  bool solid = hollow <= kMostHollow;
+  while (!solid) {
+    // As a message shows it: what it names was tried.
+    const double finer = std::stod(shown(0.5 * std::min(voxel_, extent.maxCoeff())));
+    if (nodes(finer) > std::min(most, kMostTried)) break;
+    solid = hollow_with(finer) <= kMostHollow;
   }
-
-  openvdb::initialize();
-  const auto transform = openvdb::math::Transform::createLinearTransform(1.0);  // distances in cells
-  openvdb::FloatGrid::Ptr grid;
-  tbb::task_arena alone(1);  // whatever the number of threads, the same bits
-  alone.execute([&] {
-    grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(Triangles{mesh, corner_, voxel_}, *transform,
-                                                           static_cast<float>(kBand), std::numeric_limits<float>::max());
-  });
-  distance_.resize(size_[0] * size_[1] * size_[2]);
-  const auto nodes_of = grid->getConstAccessor();
-  for (std::size_t k = 0; k < size_[2]; ++k) {
-    for (std::size_t j = 0; j < size_[1]; ++j) {
-      for (std::size_t i = 0; i < size_[0]; ++i) {
-        const float cells = nodes_of.getValue({static_cast<int>(i), static_cast<int>(j), static_cast<int>(k)});
-        const double distance = static_cast<double>(std::min(cells, static_cast<float>(kBand))) * voxel_;
-        distance_[index(i, j, k)] = static_cast<float>(distance);
-        deepest_ = std::max(deepest_, -distance);
-      }
-    }
+  if (!solid || (options.voxel > 0.0 && voxel_ != first)) {
+    refuse("voxel", "expected cells small enough for an inside behind the whole mesh",
+           "none behind " + shown(100.0 * hollow) + " % of its area with a voxel of " + shown(first) + " m",
+           solid ? "a voxel of " + shown(voxel_) + " m would do"
+                 : "parts of it are too thin for a voxel of " + shown(voxel_) + " m, the finest tried: make them thicker, or try finer ones");
   }
   box_ = box.inflated(2.0 * voxel_);  // the spline mixes nodes of two cells around
 }

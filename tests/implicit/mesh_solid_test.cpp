@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "supple/core/error.h"
 
@@ -113,6 +115,38 @@ TEST(MeshSolid, RefusesWhatHasNoInsideOrTooManyCells) {
   expect_refused(open, {}, "mesh", "expected a closed surface");
   expect_refused(Mesh{}, {}, "mesh", "no triangle");
   expect_refused(sphere(1.0, 2), {.voxel = 1e-3}, "voxel", "expected at most 64000000 cells");
+}
+
+/// A plate of 1 x 0.8 m, turned out of the lattice; with its faces the wrong way round if `inside_out`.
+Mesh plate(double thickness, bool inside_out = false) {
+  Mesh mesh;
+  const Quat turn(Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized()));
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto side = [&](int axis) { return (corner >> axis & 1) == 1 ? 0.5 : -0.5; };
+    mesh.position.push_back(turn * Vec3(side(0), 0.8 * side(1), thickness * side(2)));
+  }
+  mesh.triangle = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  if (inside_out) {
+    for (auto& t : mesh.triangle) std::swap(t[1], t[2]);
+  }
+  return mesh;
+}
+
+TEST(MeshSolid, RefusesPartsThinnerThanACellAndNamesAVoxelThatDoes) {
+  // On its lattice a plate of two thirds of a cell has nowhere an inside: the spline lifts the middle by a third of a cell or more.
+  const std::string text = "expected cells small enough for an inside behind the whole mesh, found none behind 100 % of its area with a voxel of ";
+  expect_refused(plate(0.01), {.voxel = 0.016}, "voxel", text + "0.016 m; a voxel of 0.008 m would do");
+  expect_refused(plate(0.01), {.voxel = 3.0}, "voxel", text + "3 m; a voxel of 0.00");
+  expect_refused(plate(1e-4), {}, "voxel", "make them thicker, or try finer ones");
+  for (const bool inside_out : {false, true}) EXPECT_EQ(MeshSolid(plate(0.01, inside_out), {.voxel = 0.006}).voxel(), 0.006);
+}
+
+TEST(MeshSolid, ChoosesFinerCellsForThinParts) {
+  const MeshSolid thick(plate(0.1), {}), thin(plate(0.02), {});
+  EXPECT_LT(thin.voxel(), thick.voxel());
+  // Spline and plate differ by less than half a cell in the middle, so it is inside all over.
+  const Quat turn(Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized()));
+  for (int i = -20; i <= 20; ++i) EXPECT_GT(value(thin, turn * Vec3(0.02 * i, 0.013 * i, 0.0)), 0.0) << i;
 }
 
 }  // namespace

@@ -114,10 +114,10 @@ ground: {}
   EXPECT_LT(simulation.audits().energy_error, 2e-2);
 }
 
-/// A cuboid of half sizes (2, 2, 0.5) with its upper face at z = 0, as squares; `open` leaves one side out.
-void write_slab(const fs::path& file, bool open) {
+/// A slab of 4 x 4 m with its upper face at z = 0, as squares; `open` leaves one side out.
+void write_slab(const fs::path& file, bool open, double thickness = 1.0) {
   std::ofstream out(file);
-  for (const double z : {-1.0, 0.0}) {
+  for (const double z : {-thickness, 0.0}) {
     for (const double y : {-2.0, 2.0}) {
       for (const double x : {-2.0, 2.0}) out << "v " << x << ' ' << y << ' ' << z << '\n';
     }
@@ -223,6 +223,29 @@ TEST(Obstacles, RefuseMeshesThatAreOpenOrTooFine) {
             std::string::npos)
       << message("file: slab.obj, voxel: 1 mm");
   EXPECT_NE(message("file: absent.obj").find("absent.obj"), std::string::npos);
+}
+
+TEST(Obstacles, RefuseMeshesThinnerThanTheirVoxelsAndCarryABallOtherwise) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  write_slab(folder / "sheet.obj", false, 0.04);
+  const auto sheet = [&](const std::string& keys) {
+    return make(ball_over("obstacles: [{name: floor, shape: mesh, file: sheet.obj, modulus: 1e6" + keys + "}]"), folder);
+  };
+  try {
+    (void)sheet(", voxel: 0.1");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "test.yaml:6:78: obstacles.floor.voxel: expected cells small enough for an inside behind the whole mesh, found none behind "
+                               "100 % of its area with a voxel of 0.1 m; a voxel of 0.025 m would do");
+  }
+  // Below the ball the sheet is as stiff as the ground down to its middle, far deeper than the ball sinks in; the default voxel,
+  // 4 / 64 m, would miss it.
+  const double on_ground = rest_height(make(ball_over("ground: {height: 0, modulus: 1e6}")));
+  EXPECT_NEAR(rest_height(sheet(", voxel: 0.01")), on_ground, 1e-6);
+  // The voxel chosen is 1/64 m, so the middle lies 1.28 cells below the face. A node t cells below the middle is 2 t cells nearer to the
+  // surface than the depth below that face says, which raises the face by at most 2 t (0.72 - t)^3 / 6 of a cell.
+  EXPECT_NEAR(rest_height(sheet("")), on_ground, 0.01 / 64.0);
 }
 
 /// A file of heights over [-1.6, 1.6]^2, every 0.1 m.

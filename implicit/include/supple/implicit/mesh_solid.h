@@ -12,7 +12,7 @@
 namespace supple::implicit {
 
 struct MeshSolidOptions {
-  double voxel = 0.0;                     ///< edge of a cell [m]; 0: a 64th of the mesh's longest side
+  double voxel = 0.0;                     ///< edge of a cell [m]; 0: a 64th of the mesh's longest side, or finer where the mesh is thinner
   double slope = 1.0;                     ///< |grad F| beside faces [1/m], > 0
   std::uint64_t max_voxels = 64'000'000;  ///< of the lattice around the mesh; refused beyond
 };
@@ -22,7 +22,7 @@ struct MeshSolidOptions {
 /// radius R by voxel^2 / 3 R in distance. Beyond a few cells outside the mesh F stays what it is there.
 class MeshSolid {
  public:
-  /// Vertices at one place count as one. @throws Error{Scene}, keys `mesh` for one that is not closed and `voxel` for one that would need too many cells
+  /// Vertices at one place count as one. @throws Error{Scene}, keys `mesh` for one that is not closed, `voxel` for too many cells or none in thin parts
   MeshSolid(const Mesh& mesh, const MeshSolidOptions& options);
 
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
