@@ -81,15 +81,31 @@ void add_without_surface(const StageContext& context, const core::ParticleState&
   }
 }
 
+/// Whether each body of an object is one ball: no part of it comes off the rest.
+bool has_only_balls(const ObjectModel& object) {
+  std::vector<std::uint8_t> taken(object.last - object.first, 0);  // by the first particle of a body
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    if (primitive.shape != implicit::ShapeKind::Point) return false;
+    const std::uint32_t body = object.separate ? primitive.part : object.component.empty() ? 0 : object.component[primitive.part];
+    if (std::exchange(taken[body], 1) != 0) return false;
+  }
+  return true;
+}
+
 void add_missed(const Model& model, std::vector<std::string>& warnings) {
   const MeshingDesc& d = model.meshing;
-  if (!search_is_off(d) && (d.method == MeshingName::Auto || d.method == MeshingName::Cubes)) return;
+  const bool cubes = d.method == MeshingName::Auto || d.method == MeshingName::Cubes;
   for (const ObjectModel& object : model.objects) {
-    const double thickness = 2.0 * object.iso_radius;
+    if (object.mesh_error) continue;  // chooses smaller cells
+    if (cubes && !search_is_off(d) && has_only_balls(object)) continue;  // a search finds closed pieces, no lost connections
+    double thickness = std::numeric_limits<double>::infinity();
+    for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+      thickness = std::min(thickness, 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive)));
+    }
     if (!(object.cell > thickness && thickness > 0.0)) continue;
     const std::string key = object.own_cell ? "objects." + object.name + ".meshing.cell" : "output.cell";
-    warnings.push_back(key + ": cells of " + number_text(object.cell) + " m may miss '" + object.name + "', which is " +
-                       number_text(thickness) + " m thick; 'output.meshing.search' would look for it");
+    warnings.push_back(key + ": cells of " + number_text(object.cell) + " m may miss '" + object.name + "', or leave it in pieces, as it is " +
+                       short_text(thickness) + " m thick; smaller cells resolve it, or 'output.meshing.error'" + (cubes ? "" : " with method auto"));
   }
 }
 

@@ -185,6 +185,20 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   const auto coarse = warnings_of("output: {cell: 5, meshing: {search: false}}\n" + small);
   ASSERT_EQ(coarse.size(), 1u);
   EXPECT_NE(coarse[0].find("cells of 5 m may miss 'a'"), std::string::npos) << coarse[0];
+  // A search finds a whole ball, but does not join what comes apart. Thickness: 2 (1 - 2^(-1/3))^(1/2) 0.009 m.
+  const auto rod = [&](const std::string& output) {
+    return warnings_of("output: {" + output + "}\nobjects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: "
+                       "[{shape: segment, half_length: 0.4, kernel: {radius: 9 mm}}]}\n");
+  };
+  const std::string lost = "output.cell: cells of 0.015 m may miss 'a', or leave it in pieces, as it is 0.00817564 m thick; "
+                           "smaller cells resolve it, or 'output.meshing.error'";
+  EXPECT_EQ(rod("cell: 15 mm"), std::vector<std::string>{lost});
+  EXPECT_EQ(rod("cell: 15 mm, meshing: {search: true}"), std::vector<std::string>{lost});
+  EXPECT_EQ(rod("cell: 15 mm, meshing: {method: openvdb}"), std::vector<std::string>{lost + " with method auto"});
+  EXPECT_TRUE(rod("cell: 15 mm, meshing: {error: 0.5 mm}").empty());
+  EXPECT_TRUE(rod("cell: 8 mm").empty());
+  EXPECT_TRUE(warnings_of("output: {cell: 15 mm}\nobjects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: "
+                          "[{shape: box, half_sizes: [0.1, 0.1, 0.1], kernel: {radius: 9 mm}}]}\n").empty());
   const auto thin = warnings_of(
       "objects:\n  - {name: a, particles: {at: [0, 0, 1], inertia_radius: 0.1}, skeleton: [{shape: triangle, convolve: true, "
       "points: [[0.2, 0, 0], [-0.1, 0.17, 0], [-0.1, -0.17, 0]], kernel: {type: cauchy, radius: 0.35}}]}\n");
