@@ -2,6 +2,8 @@
 
 #include <openvdb/tools/ChangeBackground.h>
 
+#include <limits>
+
 #include "supple/core/error.h"
 
 namespace supple::implicit::gridding {
@@ -15,28 +17,124 @@ namespace {
 
 Coord first_voxel(const BlockCoord& block) { return {kCells * block[0], kCells * block[1], kCells * block[2]}; }
 
+template <class T>
+using PerVoxel = std::array<T, kLeafVoxels>;
+
+/// From a node to a neighbour on the other side of the surface.
+struct CrossedEdge {
+  openvdb::Index node;
+  Vec3 way;
+};
+
+/// Of some nodes of a leaf: their edges that cross the surface, to nodes of the leaf and beyond it.
+std::vector<CrossedEdge> crossed_edges(const FieldView& field, const Lattice& lattice, const Coord& origin, const PerVoxel<double>& values,
+                                       std::span<const openvdb::Index> nodes) {
+  std::vector<CrossedEdge> crossed;
+  std::vector<CrossedEdge> open;
+  std::vector<Vec3> beyond;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int step : {-1, 1}) {
+      const Vec3 way = step * lattice.cell * Vec3::Unit(axis);
+      const int face = step < 0 ? 0 : kCells - 1;
+      Box next;  // the nodes beyond the face: nothing is evaluated where their side is known
+      std::vector<openvdb::Index> at_face;
+      for (const openvdb::Index n : nodes) {
+        Coord local = Leaf::offsetToLocalCoord(n);
+        if (local[axis] == face) {
+          at_face.push_back(n);
+          local[axis] += step;
+          const Coord at = origin + local;
+          next.include(node_position(lattice, at.x(), at.y(), at.z()));
+          continue;
+        }
+        local[axis] += step;
+        if ((values[Leaf::coordToOffset(local)] > 0.0) != (values[n] > 0.0)) crossed.push_back({n, way});
+      }
+      if (at_face.empty()) continue;
+      const Interval bound = field.bound(next);
+      const bool inside = bound.lower > 0.0;
+      for (const openvdb::Index n : at_face) {
+        if (inside || bound.upper <= 0.0) {
+          if (inside != (values[n] > 0.0)) crossed.push_back({n, way});
+          continue;
+        }
+        Coord at = origin + Leaf::offsetToLocalCoord(n);
+        at[axis] += step;
+        open.push_back({n, way});
+        beyond.push_back(node_position(lattice, at.x(), at.y(), at.z()));
+      }
+    }
+  }
+  std::vector<double> value(beyond.size());
+  field.evaluate(beyond, value);
+  for (std::size_t k = 0; k < beyond.size(); ++k) {
+    if ((value[k] > 0.0) != (values[open[k].node] > 0.0)) crossed.push_back(open[k]);
+  }
+  return crossed;
+}
+
+/// Distances to the surface [m] along the edges that cross it, the least of each node's; infinite where none does.
+void measure_along(const FieldView& field, double cell, const PerVoxel<Vec3>& points, const PerVoxel<double>& values,
+                   std::span<const CrossedEdge> edges, PerVoxel<double>& distance) {
+  constexpr int kHalvings = 20;
+  distance.fill(std::numeric_limits<double>::infinity());
+  std::vector<double> near(edges.size(), 0.0), value(edges.size());  // share of the edge on the node's side
+  std::vector<Vec3> at(edges.size());
+  double width = 1.0;
+  for (int k = 0; k < kHalvings; ++k) {
+    width *= 0.5;
+    for (std::size_t e = 0; e < edges.size(); ++e) at[e] = points[edges[e].node] + (near[e] + width) * edges[e].way;
+    field.evaluate(at, value);
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+      if ((value[e] > 0.0) == (values[edges[e].node] > 0.0)) near[e] += width;
+    }
+  }
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    double& least = distance[edges[e].node];
+    least = std::min(least, (near[e] + 0.5 * width) * cell);
+  }
+}
+
+bool may_cross(const FieldView& field, const Box& box) {
+  const Interval value = field.bound(box);
+  return value.lower <= 0.0 && value.upper > 0.0;
+}
+
 }  // namespace
 
-SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, const BlockCoord& block) {
-  std::array<Vec3, kLeafVoxels> points;
-  std::array<double, kLeafVoxels> values{};
-  std::array<Vec3, kLeafVoxels> gradients;
+bool is_thin(const FieldView& field, const GridOptions& options) { return field.feature_size() < 3.0 * options.lattice.cell; }
+
+SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, bool thin, const BlockCoord& block) {
+  PerVoxel<Vec3> points;
+  PerVoxel<double> values{}, along;
+  PerVoxel<Vec3> gradients;
   const Coord origin = first_voxel(block);
   for (openvdb::Index n = 0; n < kLeafVoxels; ++n) {
     const Coord at = origin + Leaf::offsetToLocalCoord(n);
     points[n] = node_position(options.lattice, at.x(), at.y(), at.z());
   }
   field.evaluate(points, values, gradients);
+  const double cell = options.lattice.cell, width = band_of(options);
+  std::vector<openvdb::Index> far;  // by first order
+  for (openvdb::Index n = 0; thin && n < kLeafVoxels; ++n) {
+    if (!(std::abs(values[n]) <= cell * gradients[n].norm())) far.push_back(n);
+  }
+  std::vector<CrossedEdge> crossed;
+  if (!far.empty() && may_cross(field, box_of(block, options.lattice).inflated(cell))) {
+    crossed = crossed_edges(field, options.lattice, origin, values, far);
+    if (!crossed.empty()) measure_along(field, cell, points, values, crossed, along);
+  }
   SampledLeaf result;
   result.leaf = std::make_unique<Leaf>(origin);
-  const double width = options.half_width * options.lattice.cell;
   for (openvdb::Index n = 0; n < kLeafVoxels; ++n) {
     const double f = values[n], slope = gradients[n].norm();
-    if (!(std::abs(f) <= width * slope)) {
+    const bool crosses = !crossed.empty() && std::isfinite(along[n]);
+    if (!crosses && !(std::abs(f) <= width * slope)) {
       result.leaf->setValueOff(n, f > 0.0 ? 1.0F : -1.0F);  // its side, until the background is known
       continue;
     }
-    const double distance = slope > 0.0 ? -f / slope : 0.0;
+    // Where grad F vanishes, on skeletons and at the rims of supports, it tells no distance: what is thin is about such nodes.
+    const double distance = crosses ? std::copysign(along[n], -f) : slope > 0.0 ? -f / slope : 0.0;
     const auto value = static_cast<float>(options.content == GridContent::Field ? f : distance);
     result.leaf->setValueOn(n, value);
     result.largest = std::max(result.largest, std::abs(value));
@@ -50,12 +148,13 @@ SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, cons
   return result;
 }
 
-Verdict look(const FieldView& field, double width, const Box& box) {
+Verdict look(const FieldView& field, const GridOptions& options, bool thin, const Box& box) {
   const Interval value = field.bound(box);
-  const double band = width * field.gradient_bound(box);
-  if (value.lower > band) return Verdict::Inside;
-  if (value.upper < -band) return Verdict::Outside;
-  return Verdict::Keep;
+  const double band = band_of(options) * field.gradient_bound(box);
+  if (value.lower <= band && value.upper >= -band) return Verdict::Keep;
+  // Where F is constant, beyond supports, a node next to it may be on the other side.
+  if (thin && may_cross(field, box.inflated(options.lattice.cell))) return Verdict::Keep;
+  return value.lower > band ? Verdict::Inside : Verdict::Outside;
 }
 
 BlockRange range_of(const FieldView& field, const GridOptions& options) {
@@ -114,9 +213,9 @@ BlockList band_leaves(const BlockRange& range, const GridOptions& options, std::
 }
 
 BlockList band_leaves(const FieldView& field, const GridOptions& options, const Executor& executor) {
-  const double width = band_of(options);
+  const bool thin = is_thin(field, options);
   return band_leaves(range_of(field, options), options, 0, executor,
-                     [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) { return look(field, width, box); });
+                     [&](const Box& box, std::span<const std::uint32_t>, std::vector<std::uint32_t>&) { return look(field, options, thin, box); });
 }
 
 void LargestValues::reset(std::span<const std::pair<BlockCoord, float>> by_leaf) {
@@ -180,7 +279,8 @@ MadeGrid make_whole(const BlockList& list, const GridOptions& options, const Exe
 MadeGrid make_whole(const FieldView& field, const GridOptions& options, const Executor& executor) {
   SUPPLE_EXPECTS(options.half_width >= 1.0 && std::isfinite(options.half_width));
   const BlockList list = band_leaves(field, options, executor);
-  return make_whole(list, options, executor, [&](std::size_t i) { return sample_leaf(field, options, list.block[i]); });
+  const bool thin = is_thin(field, options);
+  return make_whole(list, options, executor, [&](std::size_t i) { return sample_leaf(field, options, thin, list.block[i]); });
 }
 
 bool same(const GridOptions& a, const GridOptions& b) {

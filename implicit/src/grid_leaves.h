@@ -44,8 +44,12 @@ static_assert(Leaf::DIM == lattice::kCells, "a leaf holds the nodes that a block
 /// The blocks of a grid: those of the surface's box and of the band around it.
 [[nodiscard]] BlockRange range_of(const FieldView& field, const GridOptions& options);
 
-/// Whether the nodes of a box may be in the band.
-[[nodiscard]] Verdict look(const FieldView& field, double width, const Box& box);
+/// Whether parts may be so thin that a node inside has neighbours beyond all supports, where no gradient tells a distance. Its leaves are then
+/// told by the nodes next to them, too.
+[[nodiscard]] bool is_thin(const FieldView& field, const GridOptions& options);
+
+/// Whether the nodes of a box may be in the band, or, of thin parts, a cell from the surface.
+[[nodiscard]] Verdict look(const FieldView& field, const GridOptions& options, bool thin, const Box& box);
 
 /// The box of a leaf's nodes.
 [[nodiscard]] Box box_of(const BlockCoord& block, const Lattice& lattice);
@@ -64,7 +68,7 @@ struct SampledLeaf {
   bool inside = false;          ///< of a leaf without band: all voxels inside
   float largest = 0.0F;         ///< largest |value| of an active voxel
 };
-[[nodiscard]] SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, const BlockCoord& block);
+[[nodiscard]] SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, bool thin, const BlockCoord& block);
 
 /// What stands for voxels beyond the band: its width, or the largest |F| in it, with the sign of the side.
 [[nodiscard]] float inside_value(const GridOptions& options, float largest);

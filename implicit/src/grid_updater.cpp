@@ -29,6 +29,7 @@ bool holds(const BlockRange& range, const BlockCoord& block) {
 struct GridUpdater::Impl {
   SurfaceGrid result;
   bool usable = false;
+  bool thin = false;
   GridOptions options;
   BlockRange range;
   FieldChanges changes;
@@ -87,16 +88,15 @@ struct GridUpdater::Impl {
   }
 
   void update(const FieldView& field, const Executor& executor, GridCounts& counts) {
-    const double width = band_of(options);
     sampled.clear();
     sampled.resize(touched.size());
     std::vector<Verdict> verdict(touched.size());
     executor.for_blocks(touched.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const BlockCoord& b = touched[i];
-        verdict[i] = holds(range, b) ? look(field, width, box_of(b, options.lattice)) : Verdict::Outside;
+        verdict[i] = holds(range, b) ? look(field, options, thin, box_of(b, options.lattice)) : Verdict::Outside;
         if (verdict[i] == Verdict::Keep) {
-          sampled[i] = sample_leaf(field, options, b);
+          sampled[i] = sample_leaf(field, options, thin, b);
         } else {
           sampled[i].inside = verdict[i] == Verdict::Inside;
         }
@@ -126,7 +126,9 @@ const SurfaceGrid& GridUpdater::make(const Field& field, const GridOptions& opti
                                      GridCounts* counts) {
   Impl& self = *impl_;
   GridCounts count;
-  const bool comparable = std::exchange(self.usable, false) && same(options, self.options);
+  const bool thin = is_thin(field, options);
+  const bool comparable = std::exchange(self.usable, false) && same(options, self.options) && thin == self.thin;
+  self.thin = thin;
   self.changes.update(field.index());
   const BlockRange last = std::exchange(self.range, range_of(field, options));
   if (comparable && self.list_touched(last)) {

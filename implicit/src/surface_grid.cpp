@@ -161,6 +161,29 @@ void project(const FieldView& field, double cell, std::span<const Vec3> from, st
 
 using Triangle = std::array<std::uint32_t, 3>;
 
+/// Takes back what presses closed pieces flat: all vertices of one about a node of a thin part may go to the same side of it.
+void keep_volumes(const Mesh& mesh, std::vector<Vec3>& onto) {
+  constexpr double kLeast = 0.1;  // of the volume before
+  std::vector<std::uint32_t> next(onto.size());
+  std::iota(next.begin(), next.end(), 0u);
+  const auto piece_of = [&](std::uint32_t v) {
+    while (next[v] != v) v = next[v] = next[next[v]];
+    return v;
+  };
+  for (const Triangle& t : mesh.triangle) next[piece_of(t[1])] = next[piece_of(t[2])] = piece_of(t[0]);
+  std::vector<double> before(onto.size(), 0.0), after(onto.size(), 0.0);  // six times that of a piece, by one of its vertices
+  for (const Triangle& t : mesh.triangle) {
+    const std::uint32_t piece = piece_of(t[0]);
+    const auto volume = [&](const std::vector<Vec3>& p) { return (p[t[0]] - p[piece]).dot((p[t[1]] - p[piece]).cross(p[t[2]] - p[piece])); };
+    before[piece] += volume(mesh.position);
+    after[piece] += volume(onto);
+  }
+  for (std::uint32_t v = 0; v < onto.size(); ++v) {
+    const std::uint32_t piece = piece_of(v);
+    if (before[piece] > 0.0 && after[piece] < kLeast * before[piece]) onto[v] = mesh.position[v];
+  }
+}
+
 /// Takes back what turns triangles over, until none is.
 void keep_sides(const Mesh& mesh, std::vector<Vec3>& onto) {
   const auto normal_of = [](const std::vector<Vec3>& p, const Triangle& t) { return Vec3((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]])); };
@@ -227,6 +250,7 @@ Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& ex
   executor.for_blocks(points.size(), kPointsPerTask, [&](std::size_t begin, std::size_t end) {
     project(field, cell, std::span(mesh.position).subspan(begin, end - begin), std::span(onto).subspan(begin, end - begin));
   });
+  keep_volumes(mesh, onto);
   keep_apart(mesh, onto);
   mesh.position = std::move(onto);
   mesh.normal.resize(points.size());

@@ -33,11 +33,11 @@ struct LeafList : BlockList {
 };
 
 /// Of depths, each of slope 1: those in whose band a box may be.
-Verdict look_at_depths(std::span<const UnitedBody> bodies, double width, const Box& box, std::span<const std::uint32_t> candidates,
-                       std::vector<std::uint32_t>& left) {
+Verdict look_at_depths(std::span<const UnitedBody> bodies, const GridOptions& options, bool thin, const Box& box,
+                       std::span<const std::uint32_t> candidates, std::vector<std::uint32_t>& left) {
   const std::size_t none = left.size();
   for (const std::uint32_t b : candidates) {
-    const Verdict verdict = look(bodies[b].view, width, box);
+    const Verdict verdict = look(bodies[b].view, options, thin, box);
     if (verdict == Verdict::Inside) return verdict;
     if (verdict == Verdict::Keep) left.push_back(b);
   }
@@ -67,12 +67,13 @@ Verdict look_at_fields(std::span<const UnitedBody> bodies, double width, const B
   return most < -width * slope ? Verdict::Outside : Verdict::Keep;
 }
 
-LeafList look_at(std::span<const UnitedBody> bodies, const BlockRange& range, const GridOptions& options, const Executor& executor) {
+LeafList look_at(std::span<const UnitedBody> bodies, const BlockRange& range, const GridOptions& options, bool thin, const Executor& executor) {
   const bool depths = options.content == GridContent::SignedDistance;
-  const double width = band_of(options);
+  const double beside = thin ? options.lattice.cell : 0.0, width = band_of(options);
   LeafList found{band_leaves(range, options, static_cast<std::uint32_t>(bodies.size()), executor,
                              [&](const Box& box, std::span<const std::uint32_t> candidates, std::vector<std::uint32_t>& left) {
-                               return depths ? look_at_depths(bodies, width, box, candidates, left) : look_at_fields(bodies, width, box, candidates, left);
+                               return depths ? look_at_depths(bodies, options, thin, box, candidates, left)
+                                             : look_at_fields(bodies, width, box.inflated(beside), candidates, left);
                              }),
                  {}};
   std::sort(found.inside.begin(), found.inside.end(), before_box);
@@ -80,7 +81,7 @@ LeafList look_at(std::span<const UnitedBody> bodies, const BlockRange& range, co
   if (depths) return found;
   executor.for_blocks(found.block.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Box leaf = box_of(found.block[i], options.lattice);
+      const Box leaf = box_of(found.block[i], options.lattice).inflated(beside);
       for (std::size_t k = found.offset[i]; k < found.offset[i + 1]; ++k) {
         const Interval value = bodies[found.candidate[k]].view.bound(leaf);
         if (value.lower == value.upper) found.constant[k] = value.lower;
@@ -95,6 +96,7 @@ LeafList look_at(std::span<const UnitedBody> bodies, const BlockRange& range, co
 struct UnionUpdater::Impl {
   SurfaceGrid result;
   bool usable = false;
+  bool thin = false;
   GridOptions options;
   float inside = 0.0F;
   LeafList list;                       ///< of the last call; candidates are places among its bodies
@@ -103,11 +105,11 @@ struct UnionUpdater::Impl {
   LargestValues largest;               ///< with GridContent::Field
 
   /// A leaf by the bodies that may be in its band, or the largest there; the others are farther out than it reaches, or less.
-  static SampledLeaf sample(std::span<const UnitedBody> bodies, const LeafList& list, const GridOptions& options, std::size_t i) {
+  static SampledLeaf sample(std::span<const UnitedBody> bodies, const LeafList& list, const GridOptions& options, bool thin, std::size_t i) {
     std::vector<FieldView> near;
     for (std::uint32_t k = list.offset[i]; k < list.offset[i + 1]; ++k) near.push_back(bodies[list.candidate[k]].view);
-    if (near.size() == 1) return sample_leaf(near.front(), options, list.block[i]);
-    return sample_leaf(UnitedField(std::move(near)), options, list.block[i]);
+    if (near.size() == 1) return sample_leaf(near.front(), options, thin, list.block[i]);
+    return sample_leaf(UnitedField(std::move(near)), options, thin, list.block[i]);
   }
 
   /// Sees what moved within bodies that are not what they were. @param known  the last call is there to compare with
@@ -135,7 +137,7 @@ struct UnionUpdater::Impl {
     const auto unchanged = [&](std::size_t i, std::size_t old) {
       const std::size_t count = next.offset[i + 1] - next.offset[i];
       if (count != list.offset[old + 1] - list.offset[old]) return false;
-      const Box leaf = box_of(next.block[i], options.lattice);
+      const Box leaf = box_of(next.block[i], options.lattice).inflated(thin ? options.lattice.cell : 0.0);
       for (std::size_t k = 0; k < count; ++k) {
         const std::size_t now = next.offset[i] + k, last = list.offset[old] + k;
         if (next.constant[now] && list.constant[last] && *next.constant[now] == *list.constant[last]) continue;
@@ -157,7 +159,7 @@ struct UnionUpdater::Impl {
               const Executor& executor) {
     std::vector<SampledLeaf> leaves(changed.size());
     executor.for_blocks(changed.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) leaves[i] = sample(bodies, next, options, changed[i]);
+      for (std::size_t i = begin; i < end; ++i) leaves[i] = sample(bodies, next, options, thin, changed[i]);
     });
     openvdb::FloatTree& tree = result.impl_->grid->tree();
     if (options.content == GridContent::Field) {
@@ -188,9 +190,12 @@ const SurfaceGrid& UnionUpdater::make(std::span<const UnitedBody> bodies, const 
   Impl& self = *impl_;
   std::vector<FieldView> views;
   for (const UnitedBody& body : bodies) views.push_back(body.view);
-  const bool comparable = std::exchange(self.usable, false) && same(options, self.options);
+  const UnitedField united(std::move(views));
+  const bool thin = is_thin(united, options);
+  const bool comparable = std::exchange(self.usable, false) && same(options, self.options) && thin == self.thin;
+  self.thin = thin;
   self.find_changes(bodies, comparable);
-  LeafList next = look_at(bodies, range_of(UnitedField(std::move(views)), options), options, executor);
+  LeafList next = look_at(bodies, range_of(united, options), options, thin, executor);
   GridCounts count{.leaves_looked_at = next.block.size(), .leaves_sampled = next.block.size(), .whole = true};
   std::vector<std::size_t> changed;
   std::vector<BlockCoord> gone;
@@ -199,7 +204,7 @@ const SurfaceGrid& UnionUpdater::make(std::span<const UnitedBody> bodies, const 
     count.whole = 2 * (changed.size() + gone.size()) >= std::max<std::size_t>(next.block.size(), 64);
   }
   if (count.whole) {
-    MadeGrid made = make_whole(next, options, executor, [&](std::size_t i) { return Impl::sample(bodies, next, options, i); });
+    MadeGrid made = make_whole(next, options, executor, [&](std::size_t i) { return Impl::sample(bodies, next, options, thin, i); });
     self.result.impl_ = std::make_unique<SurfaceGrid::Impl>(std::move(made.grid));
     self.inside = made.inside;
     self.largest.reset(made.largest);

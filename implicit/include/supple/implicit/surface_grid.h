@@ -157,7 +157,7 @@ class UnionUpdater {
 
 /// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles cut in two, its vertices projected
 /// onto the surface of the field along its gradients, with its normals. Vertices stay that Newton's steps do not bring there within half a
-/// cell, or whose triangles would turn over or cross others.
+/// cell, or whose triangles would turn over or cross others, and all of a closed piece that would be pressed flat.
 /// @param field  that the grid was made from
 [[nodiscard]] Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor);
 
