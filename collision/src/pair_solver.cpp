@@ -119,8 +119,10 @@ void PairSolver::begin_anew(const Job& job, PairResult& out) {
 /// Polar patches from where `find_patches` begins. @return false where the rule does not fit
 bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out) {
   if (!patches_.solve(job, out)) return false;
-  if (!convex || !patches_.empty()) return true;
-  // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed.
+  // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed. Obstacles without samples of their own
+  // may be thin, and have a field only near them.
+  const auto shown_by_seeds = [&](int side) { return job.pressure.body(side).skeleton != nullptr || job.pressure.field(side).convex(); };
+  if (!patches_.empty() || (!convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
   patches_.start_from(overlap, job.pressure);
   return patches_.solve(job, out);
 }

@@ -48,8 +48,11 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
   }
   crossing_.clear();
   if (!job.pressure.convex()) find_crossings(job.pressure, job.spacing);
-  for (const StartPoint& x : crossing_) {
-    if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
+  for (std::size_t i = 0; i < crossing_.size(); ++i) {
+    if (covered(crossing_[i], kBesideRim)) continue;
+    const Patch found = add_patch(job, crossing_[i], follow, out);
+    // Where surfaces cross there is a patch, whether a way leads to its peak or not.
+    if (found == Patch::Unfit || (found == Patch::Known && met_[i] != 0 && !covered(crossing_[i], kBesideRim))) return false;
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
   if (share_.size() > 1) out.summary.error_estimate = estimate_of_all(out);
@@ -167,8 +170,10 @@ std::optional<StartPoint> PolarPatches::outside(PairPressure& pressure, double e
 /// beside a larger one, whose hill then is the only one.
 void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
   constexpr int kSteps = 6;
-  constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05;  // of the spacing
+  constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05, kMet = 1e-6;  // of the spacing
+  constexpr double kUpright = 0.01;  // square of the sine between both surfaces
   crossing_.clear();
+  met_.clear();
   batch_.point.clear();
   from_.clear();
   const auto keep = [&](const StartPoint& place, const Vec3& from) {
@@ -192,7 +197,10 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
       const Vec3 normal_a = batch_.slope_a[i] / steep_a, normal_b = batch_.slope_b[i] / steep_b;
       const double off_a = batch_.a[i] / steep_a, off_b = batch_.b[i] / steep_b, c = normal_a.dot(normal_b), square = 1.0 - c * c;
       if (step + 1 == kSteps) {
-        if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back({point_[i], across});
+        const double off = std::max(std::abs(off_a), std::abs(off_b));
+        if (off > kNear * spacing) continue;
+        crossing_.push_back({point_[i], across});
+        met_.push_back(off <= kMet * spacing && square > kUpright ? 1 : 0);
         continue;
       }
       if (!(square > 0.0)) continue;

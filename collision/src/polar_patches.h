@@ -63,6 +63,7 @@ class PolarPatches {
   PolarRuleSolver polar_;
   StartPoints starts_;
   std::vector<StartPoint> crossing_;
+  std::vector<std::uint8_t> met_;  // of these: the surfaces do cross there
   std::vector<Vec3> from_, point_, before_;
   std::vector<PolarCover> covers_;
   std::size_t cover_count_ = 0;

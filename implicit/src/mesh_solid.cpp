@@ -21,7 +21,8 @@ namespace {
 constexpr double kBand = 6.0;    // cells outside the mesh in which distances are kept
 constexpr double kMargin = kBand + 2.0;
 constexpr double kCellsAlong = 64.0;
-constexpr double kMostHollow = 0.05;  // share of the mesh's area: edges of 90 degrees of a cube eight cells wide have less
+constexpr double kMostHollow = 0.15;  // share of the mesh's area: edges of 90 degrees of a cube eight cells wide have less
+constexpr double kThin = 1.8, kThick = 3.7;  // cells that plates have at least: which are there, and whose faces do not feel what lies beyond the middle
 constexpr double kMostTried = 8e6;    // cells of a lattice that nobody asked for
 
 /// The mesh's triangles for OpenVDB, in index space.
@@ -132,8 +133,10 @@ Distances distances_to(const Mesh& mesh, const Box& box, double voxel) {
   return made;
 }
 
-/// Share of a mesh's area with no inside within a cell of it, by points spread evenly over its faces. @param faces  that do not share corners
-double hollow_share(const FieldView& solid, const Mesh& faces, double voxel) {
+/// Share of a mesh's area behind which there are fewer cells up to the other side, by points spread evenly over its faces: two thirds of that deep, the
+/// surface must be a fifth of it away. @param faces  that do not share corners   @param slope  of the field [1/m]
+double hollow_share(const FieldView& solid, const Mesh& faces, double voxel, double slope, double cells) {
+  const double deep = 2.0 / 3.0 * cells * voxel, least = 0.2 * cells * voxel * slope;
   double area = 0.0, hollow = 0.0;
   for (std::size_t face = 0; face < faces.triangle.size(); ++face) {
     const Vec3* corner = &faces.position[3 * face];
@@ -148,9 +151,8 @@ double hollow_share(const FieldView& solid, const Mesh& faces, double voxel) {
         t = 1.0 - t;
       }
       const Vec3 at = corner[0] + s * u + t * v;
-      // On either side, as faces need not point outwards: half a cell in for plates, which may be no thicker than one, a cell in for edges.
-      const auto inside = [&](double cells) { return solid.value(at + cells * voxel * normal) > 0.0; };
-      if (!inside(-0.5) && !inside(-1.0) && !inside(0.5) && !inside(1.0)) hollow += whole / count;
+      // On either side, as faces need not point outwards.
+      if (solid.value(at - deep * normal) < least && solid.value(at + deep * normal) < least) hollow += whole / count;
     }
   }
   return area > 0.0 ? hollow / area : 1.0;
@@ -179,22 +181,26 @@ MeshSolid::MeshSolid(const Mesh& given, const MeshSolidOptions& options) : mesh_
     refuse("voxel", "expected at most " + std::to_string(options.max_voxels) + " cells around the mesh",
            shown(nodes(voxel_)) + " with a voxel of " + shown(voxel_) + " m", "a voxel of " + shown(fits) + " m would fit");
   }
-  const auto hollow_with = [&](double h) {
+  const auto sample = [&](double h) {
     Distances made = distances_to(mesh, box, voxel_ = h);
     corner_ = made.corner;
     size_ = made.size;
     distance_ = std::move(made.at);
     deepest_ = made.deepest;
-    return hollow_share(*this, mesh_, h);
   };
-  const double first = voxel_, hollow = hollow_with(first);
-  bool solid = hollow <= kMostHollow;
-  while (!solid) {
+  const auto hollow_share_of = [&](double cells) { return hollow_share(*this, mesh_, voxel_, slope_, cells); };
+  const double first = voxel_;
+  sample(first);
+  const double hollow = hollow_share_of(kThin);
+  // As fine as thin parts ask for, or as there is room for.
+  const double enough = options.voxel > 0.0 ? kThin : kThick;
+  while (hollow_share_of(enough) > kMostHollow) {
     // As a message shows it: what it names was tried.
     const double finer = std::stod(shown(0.5 * std::min(voxel_, extent.maxCoeff())));
     if (nodes(finer) > std::min(most, kMostTried)) break;
-    solid = hollow_with(finer) <= kMostHollow;
+    sample(finer);
   }
+  const bool solid = hollow_share_of(kThin) <= kMostHollow;
   if (!solid || (options.voxel > 0.0 && voxel_ != first)) {
     refuse("voxel", "expected cells small enough for an inside behind the whole mesh",
            "none behind " + shown(100.0 * hollow) + " % of its area with a voxel of " + shown(first) + " m",

@@ -133,12 +133,12 @@ Mesh plate(double thickness, bool inside_out = false) {
 }
 
 TEST(MeshSolid, RefusesPartsThinnerThanACellAndNamesAVoxelThatDoes) {
-  // On its lattice a plate of two thirds of a cell has nowhere an inside: the spline lifts the middle by a third of a cell or more.
+  // A plate of two thirds of a cell has nowhere an inside, one of one and a quarter not as much of it as there should be, one of two and a half has.
   const std::string text = "expected cells small enough for an inside behind the whole mesh, found none behind 100 % of its area with a voxel of ";
-  expect_refused(plate(0.01), {.voxel = 0.016}, "voxel", text + "0.016 m; a voxel of 0.008 m would do");
-  expect_refused(plate(0.01), {.voxel = 3.0}, "voxel", text + "3 m; a voxel of 0.00");
+  expect_refused(plate(0.02), {.voxel = 0.032}, "voxel", text + "0.032 m; a voxel of 0.008 m would do");
+  expect_refused(plate(0.02), {.voxel = 3.0}, "voxel", text + "3 m; a voxel of 0.00");
   expect_refused(plate(1e-4), {}, "voxel", "make them thicker, or try finer ones");
-  for (const bool inside_out : {false, true}) EXPECT_EQ(MeshSolid(plate(0.01, inside_out), {.voxel = 0.006}).voxel(), 0.006);
+  for (const bool inside_out : {false, true}) EXPECT_EQ(MeshSolid(plate(0.02, inside_out), {.voxel = 0.009}).voxel(), 0.009);
 }
 
 TEST(MeshSolid, ChoosesFinerCellsForThinParts) {

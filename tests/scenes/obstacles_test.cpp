@@ -1,6 +1,7 @@
 // Solids that stand still, and objects whose particles are bodies of their own.
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -237,15 +238,43 @@ TEST(Obstacles, RefuseMeshesThinnerThanTheirVoxelsAndCarryABallOtherwise) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(), "test.yaml:6:78: obstacles.floor.voxel: expected cells small enough for an inside behind the whole mesh, found none behind "
-                               "100 % of its area with a voxel of 0.1 m; a voxel of 0.025 m would do");
+                               "100 % of its area with a voxel of 0.1 m; a voxel of 0.0125 m would do");
   }
   // Below the ball the sheet is as stiff as the ground down to its middle, far deeper than the ball sinks in; the default voxel,
   // 4 / 64 m, would miss it.
   const double on_ground = rest_height(make(ball_over("ground: {height: 0, modulus: 1e6}")));
   EXPECT_NEAR(rest_height(sheet(", voxel: 0.01")), on_ground, 1e-6);
-  // The voxel chosen is 1/64 m, so the middle lies 1.28 cells below the face. A node t cells below the middle is 2 t cells nearer to the
-  // surface than the depth below that face says, which raises the face by at most 2 t (0.72 - t)^3 / 6 of a cell.
-  EXPECT_NEAR(rest_height(sheet("")), on_ground, 0.01 / 64.0);
+  // The voxel chosen is 1/128 m, so the middle lies 2.56 cells below the face, beyond those that the spline mixes there.
+  EXPECT_NEAR(rest_height(sheet("")), on_ground, 1e-6);
+}
+
+// A ball whose tip is on the far side of a thin sheet, or beyond it, of which few of its samples or none lie in the sheet.
+TEST(Obstacles, OfThinMeshesAreMetHoweverDeep) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  write_slab(folder / "thin.obj", false, 0.04);
+  constexpr double kRadius = 0.1, kThickness = 0.04, kStiffness = 1e5;
+  // As of a plane under each face: pi k d^2 (3 R - 2 d) / 3 at the depth d.
+  const auto force = [](double d) { return d > 0.0 ? std::numbers::pi * kStiffness * d * d * (3.0 * kRadius - 2.0 * d) / 3.0 : 0.0; };
+  for (const double depth : {0.002, 0.04, 0.07}) {
+    char ball[512];
+    std::snprintf(ball, sizeof ball, R"(
+schema: 1
+duration: 0.1 s
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0.05, 0.03, %g], mass: 1}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]
+    contact: {modulus: 1e4}
+obstacles: [{name: sheet, shape: mesh, file: thin.obj, modulus: 1e9, voxel: 0.01}]
+contact: {error: 1e-3}
+)", kRadius - depth);
+    Simulation simulation = make(ball, folder);
+    ASSERT_EQ(simulation.contacts().summary.size(), 1u) << depth;
+    const auto& s = simulation.contacts().summary[0];
+    // Four cells thick: the faces do not feel the middle of the sheet.
+    EXPECT_NEAR(s.force.norm(), force(depth) - force(depth - kThickness), 0.05 * force(depth)) << depth;
+  }
 }
 
 /// A file of heights over [-1.6, 1.6]^2, every 0.1 m.
