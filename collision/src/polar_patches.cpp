@@ -43,7 +43,7 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
   for (std::size_t more = 0; const std::optional<StartPoint> x = outside(job.pressure, job.extent); ++more) {
     const Patch found = more < kMostPatches ? add_patch(job, *x, follow, out) : Patch::Unfit;
     if (found == Patch::Lost) break;
-    unseen = found == Patch::Known && !empty();
+    unseen = (found == Patch::Known || found == Patch::NoPeak) && !empty();
     if (found != Patch::Added) return false;
   }
   crossing_.clear();
@@ -52,7 +52,7 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
     if (covered(crossing_[i], kBesideRim)) continue;
     const Patch found = add_patch(job, crossing_[i], follow, out);
     // Where surfaces cross there is a patch, whether a way leads to its peak or not.
-    if (found == Patch::Unfit || (found == Patch::Known && met_[i] != 0 && !covered(crossing_[i], kBesideRim))) return false;
+    if (found == Patch::Unfit || (found == Patch::NoPeak && met_[i] != 0)) return false;
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
   if (share_.size() > 1) out.summary.error_estimate = estimate_of_all(out);
@@ -75,7 +75,8 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoin
   if (job.axis && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *job.axis, hill.at, job.extent);
   const bool on_axis = frame.has_value();
   if (!on_axis) frame = finder_.climb(job.pressure, hill.at, job.extent, job.faces, job.faces);
-  if (!frame || covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
+  if (!frame) return Patch::NoPeak;
+  if (covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
   const auto fits = [&] {
     return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };

@@ -44,7 +44,7 @@ class PolarPatches {
   [[nodiscard]] bool any_touches(PairPressure& pressure, double extent, bool convex);
 
  private:
-  enum class Patch : std::uint8_t { Added, Known, Lost, Unfit };
+  enum class Patch : std::uint8_t { Added, Known, NoPeak, Lost, Unfit };
 
   /// What one patch adds, and how far it is off.
   struct Share {
