@@ -43,16 +43,13 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
   for (std::size_t more = 0; const std::optional<StartPoint> x = outside(job.pressure, job.extent); ++more) {
     const Patch found = more < kMostPatches ? add_patch(job, *x, follow, out) : Patch::Unfit;
     if (found == Patch::Lost) break;
-    unseen = (found == Patch::Known || found == Patch::NoPeak) && !empty();
+    unseen = found == Patch::Known && !empty();
     if (found != Patch::Added) return false;
   }
   crossing_.clear();
   if (!job.pressure.convex()) find_crossings(job.pressure, job.spacing);
-  for (std::size_t i = 0; i < crossing_.size(); ++i) {
-    if (covered(crossing_[i], kBesideRim)) continue;
-    const Patch found = add_patch(job, crossing_[i], follow, out);
-    // Where surfaces cross there is a patch, whether a way leads to its peak or not.
-    if (found == Patch::Unfit || (found == Patch::NoPeak && met_[i] != 0)) return false;
+  for (const StartPoint& x : crossing_) {
+    if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
   if (share_.size() > 1) out.summary.error_estimate = estimate_of_all(out);
@@ -75,8 +72,7 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoin
   if (job.axis && job.third.empty()) frame = finder_.find_on_axis(job.pressure, *job.axis, hill.at, job.extent);
   const bool on_axis = frame.has_value();
   if (!on_axis) frame = finder_.climb(job.pressure, hill.at, job.extent, job.faces, job.faces);
-  if (!frame) return Patch::NoPeak;
-  if (covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
+  if (!frame || covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
   const auto fits = [&] {
     return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
   };
@@ -171,10 +167,8 @@ std::optional<StartPoint> PolarPatches::outside(PairPressure& pressure, double e
 /// beside a larger one, whose hill then is the only one.
 void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
   constexpr int kSteps = 6;
-  constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05, kMet = 1e-6;  // of the spacing
-  constexpr double kUpright = 0.01;  // square of the sine between both surfaces
+  constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05;  // of the spacing
   crossing_.clear();
-  met_.clear();
   batch_.point.clear();
   from_.clear();
   const auto keep = [&](const StartPoint& place, const Vec3& from) {
@@ -198,10 +192,7 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
       const Vec3 normal_a = batch_.slope_a[i] / steep_a, normal_b = batch_.slope_b[i] / steep_b;
       const double off_a = batch_.a[i] / steep_a, off_b = batch_.b[i] / steep_b, c = normal_a.dot(normal_b), square = 1.0 - c * c;
       if (step + 1 == kSteps) {
-        const double off = std::max(std::abs(off_a), std::abs(off_b));
-        if (off > kNear * spacing) continue;
-        crossing_.push_back({point_[i], across});
-        met_.push_back(off <= kMet * spacing && square > kUpright ? 1 : 0);
+        if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back({point_[i], across});
         continue;
       }
       if (!(square > 0.0)) continue;

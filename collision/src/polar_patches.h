@@ -44,7 +44,7 @@ class PolarPatches {
   [[nodiscard]] bool any_touches(PairPressure& pressure, double extent, bool convex);
 
  private:
-  enum class Patch : std::uint8_t { Added, Known, NoPeak, Lost, Unfit };
+  enum class Patch : std::uint8_t { Added, Known, Lost, Unfit };
 
   /// What one patch adds, and how far it is off.
   struct Share {
@@ -63,7 +63,6 @@ class PolarPatches {
   PolarRuleSolver polar_;
   StartPoints starts_;
   std::vector<StartPoint> crossing_;
-  std::vector<std::uint8_t> met_;  // of these: the surfaces do cross there
   std::vector<Vec3> from_, point_, before_;
   std::vector<PolarCover> covers_;
   std::size_t cover_count_ = 0;
