@@ -13,6 +13,9 @@ namespace supple::collision {
 /// Whether the first of two bodies comes first: by what they are, then by how each sees the way to the other.
 [[nodiscard]] bool leads(const ContactBody& one, const ContactBody& other);
 
+/// Whether two bodies press alike everywhere, as what they are and where they lie is the same, bit by bit.
+[[nodiscard]] bool coincide(const ContactBody& one, const ContactBody& other);
+
 /// That of the first part of the body that leads, or of the other where only that one has a skeleton, which lies as its pose says; world axes where
 /// neither has.
 [[nodiscard]] Pose common_pose(const ContactBody& leading, const ContactBody& other);

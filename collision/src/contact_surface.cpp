@@ -21,7 +21,7 @@ struct Extent {
 
 /// What a surface needs of one pair. @param parted  whether A, B have several parts, whose forces need the regions
 Extent extent_of(const PairResult& result, const std::array<bool, 2>& parted) {
-  if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0) return {};
+  if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0 && !(result.summary.energy > 0.0)) return {};
   Extent extent{1, result.points.point.size(), 0};
   for (std::size_t i = 0; i < result.points.volume_side.size() && (parted[0] || parted[1]); ++i) {
     extent.volumes += parted[result.points.volume_side[i]] ? 1 : 0;

@@ -17,7 +17,6 @@ constexpr int kCrossingSteps = 8;
 constexpr int kBorderSteps = 16;         // of Illinois' method to the border of an imprint
 constexpr double kBorder = 0.01;         // of the way from its middle
 constexpr double kAtOrigin = 1e-9;       // radius of a crossing, over that of the rim: the kink goes through the origin
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 }  // namespace
 

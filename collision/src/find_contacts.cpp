@@ -115,10 +115,11 @@ void add_inside(std::span<const Vec3> points, const std::uint8_t* valid, const B
   const std::size_t count = std::min(points.size(), kTogether);
   const Vec3 lower = box.lower, upper = box.upper;
   // Which lie inside cannot be foreseen: no branch until it is known whether there are any.
+  const auto is = [](bool yes) { return std::int64_t{yes}; };
   std::array<std::int64_t, kTogether> in;
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3& x = points[i];
-    in[i] = (x[0] >= lower[0]) & (x[1] >= lower[1]) & (x[2] >= lower[2]) & (x[0] <= upper[0]) & (x[1] <= upper[1]) & (x[2] <= upper[2]);
+    in[i] = is(x[0] >= lower[0]) & is(x[1] >= lower[1]) & is(x[2] >= lower[2]) & is(x[0] <= upper[0]) & is(x[1] <= upper[1]) & is(x[2] <= upper[2]);
   }
   std::uint64_t bits = 0;
   for (std::size_t i = 0; i < count; ++i) bits |= static_cast<std::uint64_t>(in[i] & valid[i]) << i;
@@ -150,7 +151,7 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
   for (std::size_t i = 0; i < count; ++i) {
     const double reach2 = std::max(spacing * spacing, samples.area[inside[i]]);
     seed[kept] = point[i];
-    kept += static_cast<std::size_t>((value[i] > 0.0) | (value[i] * value[i] < reach2 * slope[i].squaredNorm()));
+    kept += std::size_t{value[i] > 0.0} | std::size_t{value[i] * value[i] < reach2 * slope[i].squaredNorm()};
   }
   seeds.resize(kept);
 }

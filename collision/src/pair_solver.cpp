@@ -269,12 +269,17 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   out.summary.reason = reason;
 }
 
+/// Of squeezed regions that are filled as they are. Forces and moments are the sums on Sigma: how regions share them out among the parts of a body need
+/// not be better.
+double PairSolver::region_error(const ContactSettings& settings) {
+  constexpr double kFinest = 1e-4, kToShare = 1e-2;
+  return std::max(settings.error, settings.energy ? kFinest : kToShare);
+}
+
 /// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
 void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
-  // Forces and moments are the sums on Sigma: how regions share them out among the parts of a body need not be better.
-  constexpr double kFinest = 1e-4, kToShare = 1e-2, kPoor = 1e-3;
-  const ContactSettings& settings = job.settings();
-  const double error = std::max(settings.error, settings.energy ? kFinest : kToShare);
+  constexpr double kPoor = 1e-3;
+  const double error = region_error(job.settings());
   PatchPoints& points = out.points;
   const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
   for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || points.unsure[side]);
@@ -285,6 +290,43 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
     if (!points.unsure[side]) continue;
     points.drop_region(side);
     region_.fill({job.polar.pressure, side, third_bodies_, error}, job.overlap, points.normal[peak], points);
+  }
+}
+
+/// Whether a body may lie in another with all of it: that presses harder where a primitive of the first sits, or on the first of its samples.
+bool PairSolver::may_lie_within(const Job& job, int side) {
+  const ContactBody& inner = side == 0 ? job.a : job.b;
+  const auto presses_less = [&](const Vec3& place) {
+    std::array<double, 2> at{};
+    for (const int s : {0, 1}) job.polar.pressure.evaluate(s, {&place, 1}, {&at[static_cast<std::size_t>(s)], 1});
+    const double own = at[static_cast<std::size_t>(side)], other = at[static_cast<std::size_t>(1 - side)];
+    return own > 0.0 && own < other;
+  };
+  if (inner.skeleton == nullptr) return presses_less(inner.field.surface_box().centre());
+  const auto& primitives = inner.skeleton->primitive;
+  if (std::any_of(primitives.begin(), primitives.end(), [&](const implicit::Primitive& p) { return presses_less(inner.pose[p.part].to_world(p.offset.position)); })) {
+    return true;
+  }
+  if (inner.samples == nullptr) return false;
+  const auto valid = std::find(inner.samples->valid.begin(), inner.samples->valid.end(), 1);
+  if (valid == inner.samples->valid.end()) return false;
+  const Vec3& on_surface = inner.samples->point[static_cast<std::size_t>(valid - inner.samples->valid.begin())];
+  return (side == 0 ? job.b : job.a).field.value(on_surface) > 0.0;
+}
+
+/// One body in the other without Sigma, if it is so: the energy that it took to get there. What presses no more than rounding is no Sigma.
+/// @param equal  both press alike everywhere
+void PairSolver::fill_within(const Job& job, bool equal, PairResult& out) {
+  PairPressure& pressure = job.polar.pressure;
+  if (out.summary.largest_pressure > std::numeric_limits<double>::epsilon() * pressure.largest_modulus()) return;
+  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return;
+  const int leading = leads(job.a, job.b) ? 0 : 1;
+  for (const int side : {leading, 1 - leading}) {
+    if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || may_lie_within(job, side))) continue;
+    begin_anew(job, out);
+    region_.fill({pressure, side, third_bodies_, region_error(job.settings()), equal}, job.overlap, Vec3::UnitZ(), out.points);
+    out.summary.reason = RuleReason::Within;
+    return;
   }
 }
 
@@ -326,9 +368,13 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
   job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
-  find_patches(job, seeds);
-  choose(job, out);
-  fill_unsure_regions(job, out);
+  const bool equal = coincide(a, b);
+  if (!equal) {
+    find_patches(job, seeds);
+    choose(job, out);
+    fill_unsure_regions(job, out);
+  }
+  fill_within(job, equal, out);
 
   ContactSurface::Summary& summary = out.summary;
   summary.load = out.load;

@@ -58,7 +58,10 @@ class PairSolver {
   void choose(const Job& job, PairResult& out);
   void take_all_thirds(const Job& job);
   void begin_anew(const Job& job, PairResult& out);
+  static double region_error(const ContactSettings& settings);
   void fill_unsure_regions(const Job& job, PairResult& out);
+  static bool may_lie_within(const Job& job, int side);
+  void fill_within(const Job& job, bool equal, PairResult& out);
   template <class Rule, class Solve>
   bool solve_in_order(const Job& job, Rule& rule, ContactRule name, const Solve& solve, PairResult& out);
 

@@ -48,7 +48,7 @@ void SqueezedRegion::find_margins(const Lost& lost, std::span<const Vec3> at) {
       for (std::size_t i = 0; i < n; ++i) spared[i] = std::min(spared[i], rest[i] - body->material.modulus * third_[i]);
     }
   }
-  for (std::size_t i = 0; i < n; ++i) rest[i] -= own[i];
+  for (std::size_t i = 0; i < n && !lost.equal; ++i) rest[i] -= own[i];
 }
 
 /// Where margins change their sign along the columns, by halving and a straight line through the last two values. Each by itself: pieces of the region

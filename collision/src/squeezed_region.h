@@ -28,6 +28,7 @@ class SqueezedRegion {
     int side;                                  ///< whose space it is
     std::span<const ContactBody* const> third;  ///< bodies that take space from the pair, too
     double error;                              ///< relative, of its volume and of the integral of the pressure
+    bool equal = false;                        ///< the pressures are the same everywhere: all that the body has
   };
   /// Appends points of the region, and its sums.
   /// @param overlap  finite, holds the region   @param across  normal of Sigma where it matters most: columns run along the axis nearest to it

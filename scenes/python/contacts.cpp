@@ -86,6 +86,8 @@ void bind_pair(py::module_& module) {
       .def_property_readonly(
           "dissipated_power", [](const Pair& p) { return p.of().dissipated_power; }, "By damping and friction [W].")
       .def_property_readonly(
+          "dissipated_work", [](const Pair& p) { return p.of().dissipated_work; }, "By damping and friction since the start [J].")
+      .def_property_readonly(
           "point", [](const Pair& p) { return rows(p, p.report->points.point); },
           "[m], shape (points, 3), a view of the report.")
       .def_property_readonly(
@@ -186,7 +188,7 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
           "dissipated_power", [](const Contacts& c) { return c.report->dissipated_power; }, "Of all pairs [W].")
       .def_property_readonly(
           "dissipated_work", [](const Contacts& c) { return c.report->dissipated_work; },
-          "By all damping and friction since the start [J].")
+          "By damping and friction of all pairs since the start [J].")
       .def("__len__", [](const Contacts& c) { return c.report->pairs.size(); })
       .def("__iter__", [](const py::object& self) { return py::iter(self.attr("pairs")); })
       .def("__getitem__", [](const Contacts& c, py::ssize_t k) {

@@ -1,12 +1,14 @@
 #include "supple/scenes/contact_report.h"
 
+#include "contact_work.h"
+
 namespace supple::scenes {
 
 ContactReport report_contacts(Simulation& simulation) {
   ContactReport report{.pairs = {},
                        .points = simulation.contacts(),
                        .loads = simulation.contact_loads(),
-                       .dissipated_work = simulation.state().ledger.dissipated};
+                       .dissipated_work = all_pair_work(simulation.state().record)};
   std::size_t point = 0;
   for (std::uint32_t k = 0; k < report.points.summary.size(); ++k) {
     const collision::ContactSurface::Summary& s = report.points.summary[k];
@@ -23,6 +25,7 @@ ContactReport report_contacts(Simulation& simulation) {
                             .largest_overlap = s.largest_overlap,
                             .energy = s.energy,
                             .dissipated_power = simulation.contact_powers()[k],
+                            .dissipated_work = pair_work(simulation.state().record, s.bodies),
                             .error_estimate = s.error_estimate,
                             .rule = s.rule,
                             .first = first,

@@ -102,9 +102,9 @@ std::vector<std::uint64_t> versions_of(const StageContext& context, const Divisi
 }
 
 DivisionMeshers::OnLattice& mesher_of(const DivisionGroup& group, DivisionMeshers& dividing) {
-  const auto [cell, error] = cell_and_error(group);
-  auto on = std::find_if(dividing.mesher.begin(), dividing.mesher.end(), [&](const auto& m) { return m.cell == cell && m.error == error; });
-  if (on == dividing.mesher.end()) on = dividing.mesher.insert(on, DivisionMeshers::OnLattice{.cell = cell, .error = error});
+  const auto wanted = cell_and_error(group);
+  auto on = std::find_if(dividing.mesher.begin(), dividing.mesher.end(), [&](const auto& m) { return std::pair(m.cell, m.error) == wanted; });
+  if (on == dividing.mesher.end()) on = dividing.mesher.insert(on, DivisionMeshers::OnLattice{.cell = wanted.first, .error = wanted.second});
   on->used = true;
   return *on;
 }
@@ -491,7 +491,12 @@ Error with_keys_of(const Model& model, const Error& failure, const ObjectModel* 
       fault.key = own ? "objects." + error->name + ".meshing.error" : "output.meshing.error";
     }
     if (fault.key == "mesh.distance") fault.key = "output.meshing.distance";
-    if (fault.key == "mesh.cell") fault.key = cell != nullptr && cell->own_cell ? "objects." + cell->name + ".meshing.cell" : "output.cell";
+    if (fault.key == "mesh.cell" && cell != nullptr) {  // of one body
+      const std::string own = "objects." + cell->name + ".meshing.cell";
+      fault.found += " on '" + cell->name + '\'';
+      fault.key = cell->own_cell ? own : "output.cell";
+      if (!cell->own_cell) fault.hint += ", of it alone by " + own;
+    }
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
     if (fault.key == "mesh.angle") fault.key = "output.meshing.angle_deg";
   }

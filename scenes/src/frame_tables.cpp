@@ -78,7 +78,7 @@ io::PointSet contact_pairs(Simulation& simulation) {
   add("largest_overlap_m", [](const Pair& p) { return p.largest_overlap; });
   add("energy_j", [](const Pair& p) { return p.energy; });
   add("dissipated_power_w", [](const Pair& p) { return p.dissipated_power; });
-  add("dissipated_work_j", [&](const Pair&) { return report.dissipated_work; });
+  add("dissipated_work_j", [](const Pair& p) { return p.dissipated_work; });
   add("error_estimate", [](const Pair& p) { return p.error_estimate; });
   add("points", [](const Pair& p) { return p.last - p.first; });
   return points;

@@ -17,6 +17,20 @@ std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
   return kAlike | context.bodies[body].object;
 }
 
+/// Keeps when an overload began, and how hard it is at worst.
+void note(const StageContext& context, const collision::BodyPair& bodies, RunRecord::Overload found, RunRecord& record) {
+  found.a = body_name(context.model, context.bodies, bodies.a);
+  found.b = body_name(context.model, context.bodies, bodies.b);
+  const auto known = std::find_if(record.overloads.begin(), record.overloads.end(),
+                                  [&](const RunRecord::Overload& o) { return o.a == found.a && o.b == found.b; });
+  if (known == record.overloads.end()) {
+    record.overloads.push_back(std::move(found));
+  } else if (found.energy * known->capacity > known->energy * found.capacity) {
+    known->energy = found.energy;
+    known->capacity = found.capacity;
+  }
+}
+
 }  // namespace
 
 double mass_of(const StageContext& context, std::uint32_t body) {
@@ -104,20 +118,15 @@ void OverloadWatch::look(const StageContext& context, const Frame& frame, double
     if (!(energy > kWorthMeasuring * worst)) continue;
     worst = energy;
     const double capacity = collision::contact_capacity(a, b, approach.normal, kCells);
-    if (!(energy > 0.5 * capacity)) continue;
-    RunRecord::Overload found{.a = body_name(context.model, context.bodies, s.bodies.a),
-                              .b = body_name(context.model, context.bodies, s.bodies.b),
-                              .time = time,
-                              .energy = energy,
-                              .capacity = capacity};
-    const auto known = std::find_if(record.overloads.begin(), record.overloads.end(),
-                                    [&](const RunRecord::Overload& o) { return o.a == found.a && o.b == found.b; });
-    if (known == record.overloads.end()) {
-      record.overloads.push_back(std::move(found));
-    } else if (energy * known->capacity > known->energy * capacity) {
-      known->energy = energy;
-      known->capacity = capacity;
-    }
+    if (energy > 0.5 * capacity) note(context, s.bodies, {.a = {}, .b = {}, .time = time, .energy = energy, .capacity = capacity}, record);
+  }
+}
+
+void OverloadWatch::look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record) {
+  for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
+    if (s.reason != collision::RuleReason::Within) continue;
+    // What lies wholly within holds all that it can: the energy is the capacity.
+    note(context, s.bodies, {.a = {}, .b = {}, .time = time, .energy = s.energy, .capacity = s.energy}, record);
   }
 }
 

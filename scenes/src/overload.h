@@ -15,6 +15,8 @@ namespace supple::scenes {
 class OverloadWatch {
  public:
   void look(const StageContext& context, const Frame& frame, double time, RunRecord& record);
+  /// The same of bodies that lie in others with all of them: their pairs have no force, but an energy. @param frame  with energies
+  static void look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record);
   /// Bodies have other indices from now on.
   void forget();
 

@@ -40,6 +40,7 @@ std::string reason_text(collision::RuleReason reason) {
     case collision::RuleReason::NoGraph: return "a patch that is no graph over a disc";
     case collision::RuleReason::ThirdBody: return "a third body presses on the patch";
     case collision::RuleReason::Unmet: return "its bound is smaller than that of polar rings, which is larger than asked";
+    case collision::RuleReason::Within: return "one lies in the other, which presses as hard all over or harder: energy, but no surface and no force";
     case collision::RuleReason::NoSkeleton: return "no polar patch, and no skeleton to send rays from";
   }
   return "";
@@ -51,6 +52,12 @@ ordered_json loads_json(const core::Loads& loads) {
     particles.push_back({{"force", vector(loads.force[i])}, {"torque", vector(loads.torque[i])}});
   }
   return particles;
+}
+
+/// What lies wholly within holds all that it can.
+double capacity_of(Simulation& simulation, const collision::ContactSurface::Summary& s) {
+  if (s.reason == collision::RuleReason::Within) return s.energy;
+  return s.force.norm() > 0.0 ? contact_capacity(simulation, s.bodies.a, s.bodies.b) : 0.0;
 }
 
 std::string text(const ordered_json& json) { return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"; }
@@ -97,7 +104,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"area_m2", s.area},
                          {"centre_of_pressure_m", vector(s.centre_of_pressure)},
                          {"energy_j", s.energy},
-                         {"capacity_j", s.force.norm() > 0.0 ? contact_capacity(simulation, s.bodies.a, s.bodies.b) : 0.0},
+                         {"capacity_j", capacity_of(simulation, s)},
                          {"largest_pressure_pa", s.largest_pressure},
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},
@@ -164,7 +171,6 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   const std::vector<Mesh>& meshes = simulation.meshes();
   const double cpu_ms = 1e3 * (process_cpu_seconds() - begin);
   ordered_json json;
-  json["cell_m"] = simulation.cell();
   json["cpu_ms"] = cpu_ms;
   ordered_json objects = ordered_json::array();
   const std::size_t surfaces = static_cast<std::size_t>(std::count_if(
@@ -172,7 +178,12 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     if (meshes[i].position.empty()) continue;
     const MeshReport report = inspect(meshes[i]);
-    objects.push_back({{"name", model.objects[i].name},
+    // Where an error is asked for and no cell stated, the error chooses cells.
+    const ObjectModel& o = model.objects[i];
+    const bool on_cells = !o.mesh_error || o.cell_is_stated;
+    objects.push_back({{"name", o.name},
+                       {"cell_m", on_cells ? ordered_json(o.cell) : ordered_json()},
+                       {"error_m", o.mesh_error ? ordered_json(*o.mesh_error) : ordered_json()},
                        {"vertices", meshes[i].vertex_count()},
                        {"triangles", meshes[i].triangle_count()},
                        {"closed", report.closed},

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "contact_work.h"
 #include "fields_rules.h"
 #include "search_files.h"
 #include "supple/core/hash.h"
@@ -76,6 +77,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
                       {"largest_overlap", audits.largest_overlap},
                       {"largest_overlap_share", audits.largest_overlap_share},
                       {"dissipated_j", state.ledger.dissipated},
+                      {"dissipated_by_contacts_j", all_pair_work(state.record)},
                       {"broken_j", state.links.released},
                       {"yielded_j", state.links.flowed},
                       {"external_work_j", state.ledger.external_work},

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "audits.h"
+#include "contact_work.h"
 #include "held_volumes.h"
 #include "model_faults.h"
 #include "pieces.h"
@@ -113,6 +114,7 @@ void Simulation::Impl::step() {
     throw_diverged(divergence, step, at);
   }
   check_fixed_step();
+  if (!awake.empty()) book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
   commit_friction();
   wake_touched();
   watch_pressing();

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "contact_work.h"
 #include "held_volumes.h"
 #include "pieces.h"
 #include "rest.h"
@@ -73,6 +74,7 @@ void Simulation::Impl::part_bodies() {
   if (scene.sleep) state.sleep.reset(bodies.size());
   form_awake();
   if (bodies.size() == before.size()) return;
+  rename_pair_work(model, before, bodies, state.record);
   state.ledger.dissipated += collision::stick_energy(model.reaction.stick, state.sticks);  // bodies have other numbers now
   state.sticks = {};
   state.kick.valid = false;

@@ -122,6 +122,7 @@ Energies Simulation::Impl::energies() {
 void Simulation::Impl::book_audits() {
   const double energy = energies().total();  // and the contacts
   scenes::book_audits(model, bodies, energy, pulled.surface, state);
+  OverloadWatch::look_within(context(), pulled, time(), state.record);
 }
 
 }  // namespace supple::scenes

@@ -9,7 +9,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 9;
+constexpr std::uint64_t kVersion = 10;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -43,6 +43,13 @@ void save_record(StateWriter& out, const RunRecord& r) {
     out.write(std::string_view(o.b));
     for (const double value : {o.time, o.energy, o.capacity}) out.write(value);
   }
+  out.write(std::uint64_t{r.pair_work.size()});
+  for (const auto& pair : r.pair_work) {
+    out.write(std::uint64_t{pair.bodies.a});
+    out.write(std::uint64_t{pair.bodies.b});
+    out.write(pair.work);
+    out.write(pair.power);
+  }
 }
 
 void load_record(StateReader& in, RunRecord& r) {
@@ -75,6 +82,18 @@ void load_record(StateReader& in, RunRecord& r) {
     in.read(o.b);
     for (double* value : {&o.time, &o.energy, &o.capacity}) in.read(*value);
     r.overloads.push_back(std::move(o));
+  }
+  in.read(n);
+  r.pair_work.clear();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    std::uint64_t a = 0, b = 0;
+    RunRecord::PairWork pair;
+    in.read(a);
+    in.read(b);
+    in.read(pair.work);
+    in.read(pair.power);
+    pair.bodies = {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)};
+    r.pair_work.push_back(pair);
   }
 }
 

@@ -307,6 +307,86 @@ TEST(DeepContact, OfConvexBodiesThroughPlatesIsThatOfMarching) {
   EXPECT_GE(through, 8);
 }
 
+/// pi E R^3 / 3: the integral of a linear ball's pressure E (1 - r/R).
+double all_of(double modulus, double radius) { return benchmarks::kPi * 0.5 * modulus * radius * radius * radius / 3.0; }
+
+void expect_within(const ContactSurface::Summary& s, double energy, double volume) {
+  constexpr double kRegion = 1e-4;  // to which regions are filled at most
+  EXPECT_EQ(s.reason, RuleReason::Within);
+  EXPECT_EQ(s.rule, ContactRule::None);
+  EXPECT_EQ(s.force, Vec3::Zero());
+  EXPECT_EQ(s.error_estimate, 0.0);
+  EXPECT_NEAR(s.energy, energy, kRegion * energy);
+  EXPECT_NEAR(s.displaced_a + s.displaced_b, volume, kRegion * volume);
+}
+
+// There is no Sigma then, but the energy that it took: the contact energy has no jump where Sigma vanishes.
+TEST(DeepContact, OfABodyWhollyWithinAnotherIsTheEnergyOfAllOfIt) {
+  constexpr double kRadius = 0.1, kSoft = 2e4;
+  const double energy = all_of(kSoft, kRadius), volume = 4.0 / 3.0 * benchmarks::kPi * kRadius * kRadius * kRadius;
+  benchmarks::Rigid ball(benchmarks::linear_sphere(kRadius), kSoft, 0.03), large(benchmarks::linear_sphere(3.0 * kRadius), 10.0 * kSoft, 0.03);
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+  const Pose still;
+  const ContactBody ground = benchmarks::single_part(plane, 1e9, still);
+  for (const double depth : {1.01, 1.5, 8.0}) {
+    ball.put({Vec3(0.02, -0.3, -depth * kRadius), Quat::Identity()});
+    expect_within(query({ball.body(), ground}, 1e-6), energy, volume);
+    expect_within(query({ground, ball.body()}, 1e-3), energy, volume);
+    EXPECT_TRUE(query_all(std::array{ball.body(), ground}, {.error = 1e-4, .energy = false}).empty());
+    ContactBody bare = ball.body();
+    bare.samples = nullptr;
+    expect_within(query({bare, ground}, 1e-4), energy, volume);
+  }
+  // By its samples where no primitive sits in the middle of it; and without a skeleton.
+  benchmarks::Rigid ring(benchmarks::wyvill_shape(implicit::ShapeKind::Ring, Vec3(0.3, 0.0, 0.0), 0.1), kSoft, 0.03);
+  ring.put({Vec3(0.0, 0.0, -0.5), Quat(0.8, 0.0, 0.6, 0.0)});
+  const ContactSurface::Summary sunk = query({ring.body(), ground}, 1e-3);
+  const double across = std::sqrt(1.0 - std::cbrt(0.5)) * 0.1;  // radius of the tube: Pappus' theorem
+  EXPECT_EQ(sunk.reason, RuleReason::Within);
+  EXPECT_NEAR(sunk.displaced_a, 2.0 * benchmarks::kPi * 0.3 * benchmarks::kPi * across * across, 1e-3 * sunk.displaced_a);
+  const implicit::SolidBox pebble({Vec3(0.01, 0.02, 0.0), Quat::Identity()}, Vec3(0.02, 0.01, 0.01), 0.0, 1.0);
+  ball.put({});
+  const ContactSurface::Summary stone = query({ball.body(), benchmarks::single_part(pebble, 1e3, still)}, 1e-4);
+  EXPECT_EQ(stone.reason, RuleReason::Within);
+  EXPECT_NEAR(stone.displaced_b, 8.0 * 0.02 * 0.01 * 0.01, 1e-4 * stone.displaced_b);
+  large.put({});
+  for (const double x : {0.0, 0.05, 0.15}) {
+    ball.put({Vec3(x, 0.0, 0.01), Quat::Identity()});
+    expect_within(query({large.body(), ball.body()}, 1e-4), energy, volume);
+  }
+  // Past its middle most of the energy is there; the rest falls to nothing with what is left of Sigma.
+  double before = 0.0;
+  for (const double depth : {0.9, 0.97, 0.999}) {
+    ball.put({Vec3(0.0, 0.0, -depth * kRadius), Quat::Identity()});
+    const ContactSurface::Summary s = query({ball.body(), ground}, 1e-6);
+    EXPECT_GT(s.load, 0.0);
+    EXPECT_GT(s.energy, before);
+    // What is missing is the work on the rest of the way, of less force than now: the area where the ball cuts the plane times the largest pressure there.
+    const double cap = benchmarks::kPi * (kRadius * kRadius - depth * depth * kRadius * kRadius), pressure = 0.5 * kSoft * (1.0 - depth);
+    EXPECT_NEAR(s.energy, energy, cap * pressure * kRadius * (1.0 - depth) + 1e-4 * energy) << depth;
+    before = s.energy;
+  }
+}
+
+TEST(DeepContact, OfEqualBodiesInOnePlaceIsTheEnergyOfOne) {
+  constexpr double kRadius = 0.1, kSoft = 2e4;
+  benchmarks::Rigid ball(benchmarks::linear_sphere(kRadius), kSoft, 0.03), same(benchmarks::linear_sphere(kRadius), kSoft, 0.03);
+  const Pose place{Vec3(0.3, -2.0, 0.1), Quat(0.5, 0.5, -0.5, 0.5)};
+  ball.put(place);
+  same.put(place);
+  expect_within(query({ball.body(), same.body()}, 1e-4), all_of(kSoft, kRadius), 4.0 / 3.0 * benchmarks::kPi * kRadius * kRadius * kRadius);
+  // A bit off, and there is a plane of equal pressures between them.
+  same.put({place.position + Vec3(1e-9, 0.0, 0.0), place.orientation});
+  const ContactSurface::Summary apart = query({ball.body(), same.body()}, 1e-4);
+  EXPECT_NE(apart.reason, RuleReason::Within);
+  EXPECT_NEAR(apart.area, benchmarks::kPi * kRadius * kRadius, 1e-3 * apart.area);
+  EXPECT_NEAR(apart.energy, all_of(kSoft, kRadius), 1e-3 * apart.energy);
+  // Nor are those of another stiffness, which press harder all over.
+  benchmarks::Rigid harder(benchmarks::linear_sphere(kRadius), 3.0 * kSoft, 0.03);
+  harder.put(place);
+  expect_within(query({ball.body(), harder.body()}, 1e-4), all_of(kSoft, kRadius), 4.0 / 3.0 * benchmarks::kPi * kRadius * kRadius * kRadius);
+}
+
 /// Bodies that are not convex, in one another beyond their middles.
 struct DeepPair {
   const char* name;

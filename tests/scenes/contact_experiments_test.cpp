@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <tuple>
 
+#include "contact_work.h"
 #include "model_contact.h"
 #include "supple/scenes/contact_report.h"
 #include "supple/scenes/query.h"
@@ -150,6 +152,79 @@ objects:
   EXPECT_EQ(report.dissipated_work, 0.0);
   simulation.step();
   EXPECT_GT(report_contacts(simulation).dissipated_work, 0.0);
+}
+
+/// A ball that bounces without weight and loses some of its speed, beside one that only a medium brakes. @return work of the pair, lost by the ball [J]
+std::array<double, 2> bounced(int substeps, bool restart = false) {
+  Simulation simulation = make(dropped(R"(  - name: slow
+    particles: {arrange: single, at: [5, 0, 3], velocity: [1, 0, 0], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    medium: {linear: 2}
+pairs: [{objects: [ball, floor], dissipation: 0.5}]
+)",
+                                       substeps, "2e4", "0", "-2"));
+  double work = 0.0;
+  while (simulation.state().particles.velocity[0].z() < 0.0 || simulation.state().particles.position[0].z() < 0.101) {
+    if (restart && simulation.state().particles.position[0].z() < 0.09) {
+      const fs::path file = fs::path(::testing::TempDir()) / "pair_work.state";
+      save_state(file, simulation.state(), 1);
+      simulation.restore(load_state(file, 1));
+      restart = false;
+    }
+    simulation.step();
+    const ContactReport report = report_contacts(simulation);
+    for (const ContactReport::Pair& pair : report.pairs) EXPECT_EQ(pair.dissipated_work, report.dissipated_work);
+    EXPECT_GE(report.dissipated_work, work);  // kept when they are apart
+    work = report.dissipated_work;
+    if (simulation.time() > 0.5) break;
+  }
+  EXPECT_GT(simulation.state().ledger.dissipated, 1.1 * work);  // the medium's too
+  return {work, 0.5 * 0.2 * (4.0 - simulation.state().particles.velocity[0].squaredNorm())};
+}
+
+TEST(Contacts, SayWhatEachPairTook) {
+  std::vector<double> off;
+  for (const int substeps : {2, 4, 8}) {
+    const auto [work, lost] = bounced(substeps);
+    EXPECT_GT(lost, 0.1);
+    off.push_back(std::abs(work / lost - 1.0));
+  }
+  // The sum over the steps is of second order in them.
+  EXPECT_LT(off[0], 1e-2);
+  EXPECT_LT(off[1], 0.5 * off[0]);
+  EXPECT_LT(off[2], 0.5 * off[1]);
+  EXPECT_EQ(bounced(2, true), bounced(2));
+}
+
+TEST(Contacts, KeepTheirWorkByNameWhenBodiesAreNumberedAnew) {
+  const Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+ground: {height: 0}
+objects:
+  - name: a
+    particles: {arrange: single, at: [0, 0, 5]}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]
+  - name: b
+    particles: {arrange: single, at: [0, 0, 6]}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]
+)");
+  const std::vector<Body>& both = simulation.bodies();
+  ASSERT_EQ(both.size(), 2u);
+  const std::vector<Body> other{both[1]}, turned{both[1], both[0]};
+  RunRecord record;
+  record.pair_work = {{{0, 1}, 1.0, 0.1}, {{0, 2}, 2.0, 0.2}, {{1, 2}, 4.0, 0.4}};  // 2: the ground
+  RunRecord only_b = record;
+  rename_pair_work(simulation.model(), both, other, only_b);
+  ASSERT_EQ(only_b.pair_work.size(), 1u);
+  EXPECT_EQ(pair_work(only_b, {0, 1}), 4.0);
+  EXPECT_EQ(only_b.pair_work[0].power, 0.4);
+  rename_pair_work(simulation.model(), both, turned, record);
+  EXPECT_EQ(pair_work(record, {0, 1}), 1.0);
+  EXPECT_EQ(pair_work(record, {0, 2}), 4.0);
+  EXPECT_EQ(pair_work(record, {1, 2}), 2.0);
+  EXPECT_EQ(pair_work(record, {1, 3}), 0.0);
+  EXPECT_EQ(all_pair_work(record), 7.0);
 }
 
 TEST(Bounce, RestsAtTheDepthThatCarriesTheWeight) {

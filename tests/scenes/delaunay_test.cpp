@@ -78,6 +78,32 @@ TEST(DelaunayScene, NamesTheKeyWhenTheBoundsTakeTooMuch) {
   }
 }
 
+TEST(DelaunayScene, NamesTheObjectThatCellsDoNotResolve) {
+  Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 1 s
+objects:
+  - name: ball
+    particles: {arrange: single, at: [1, 0, 0], mass: 1}
+    skeleton: [{shape: point, kernel: {radius: 0.3}}]
+  - name: sheet
+    particles: {arrange: single, mass: 1}
+    skeleton: [{shape: disc, radius: 0.3, turn_axis: [0, 1, 1], turn_deg: 33, kernel: {type: gascuel, radius: 0.004, thickness: 0.002, slope: 8}}]
+output: {mesh: ply, cell: 0.015, meshing: {method: delaunay}}
+)",
+                                    "test.yaml", "."),
+                        {.delaunay = cgal::delaunay_mesh});
+  try {
+    (void)simulation.meshes();
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    const Fault& fault = error.faults().front();
+    EXPECT_EQ(fault.key, "output.cell");
+    EXPECT_EQ(fault.found, "a part that no triangles reach from the vertices of cells of 0.015 m on 'sheet'");
+    EXPECT_EQ(fault.hint, "ask for smaller cells, of it alone by objects.sheet.meshing.cell");
+  }
+}
+
 constexpr const char* kTwoBalls = R"(
 schema: 1
 duration: 0.2 s

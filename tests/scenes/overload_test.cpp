@@ -78,6 +78,40 @@ objects:
   EXPECT_TRUE(crushed.state().particles.position[0].allFinite());
 }
 
+TEST(Overload, OfWhatBeginsWhollyWithinIsReportedAtOnce) {
+  const auto begin_at = [](double height) {
+    return Simulation(parse_scene(R"(
+schema: 1
+duration: 1 s
+frame_rate: 100
+gravity: [0, 0, -9.81]
+ground: {height: 0, modulus: 1e9}
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0, 0, )" + std::to_string(height) + R"(], mass: 0.2}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 2e4}
+)",
+                                  "test.yaml", "."));
+  };
+  EXPECT_TRUE(begin_at(0.05).state().record.overloads.empty());
+  Simulation simulation = begin_at(-0.15);
+  ASSERT_EQ(simulation.state().record.overloads.size(), 1u);
+  const RunRecord::Overload found = simulation.state().record.overloads[0];
+  EXPECT_EQ(found.a, "ball");
+  EXPECT_EQ(found.b, "ground");
+  EXPECT_EQ(found.time, 0.0);
+  EXPECT_NEAR(found.energy, kCapacity, 1e-4 * kCapacity);  // to which regions are filled
+  EXPECT_EQ(found.capacity, found.energy);
+  while (simulation.frame() < 20) simulation.step_frame();
+  ASSERT_EQ(simulation.state().record.overloads.size(), 1u);
+  EXPECT_EQ(simulation.state().record.overloads[0].time, 0.0);
+  EXPECT_LE(simulation.audits().energy_error, 1e-4);
+  const nlohmann::json json = nlohmann::json::parse(query_contact(simulation, false));
+  EXPECT_EQ(json["pairs"][0]["capacity_j"], json["pairs"][0]["energy_j"]);
+  EXPECT_EQ(json["pairs"][0]["error_met"], true);
+}
+
 TEST(Overload, IsKeptWithTheState) {
   const Simulation simulation = run(balls(15.0), 8);
   const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "overload.state";

@@ -824,5 +824,17 @@ TEST(Query, AnswersForcesContactFieldAndMeshAsJson) {
   EXPECT_THROW((void)query_mesh(simulation, {.cells = 24, .out = "mesh.stl"}), Error);
 }
 
+TEST(Query, OfAMeshNamesTheCellsOrTheErrorThatItWasMadeBy) {
+  const auto made_by = [](const std::vector<std::string>& overrides) {
+    Simulation simulation(parse_scene(kTiny, "drops.yaml", ".", overrides));
+    const json object = json::parse(query_mesh(simulation, {})).at("objects")[0];
+    return std::pair(object.at("cell_m"), object.at("error_m"));
+  };
+  EXPECT_EQ(made_by({"output.cell=0.03"}), std::pair(json(0.03), json()));
+  EXPECT_EQ(made_by({"output.meshing.error=0.005"}), std::pair(json(), json(0.005)));
+  EXPECT_EQ(made_by({"output.cell=0.03", "output.meshing.error=0.005"}), std::pair(json(0.03), json(0.005)));
+  EXPECT_EQ(made_by({"output.cell=0.03", "objects.left.meshing.cell=0.02"}), std::pair(json(0.02), json()));
+}
+
 }  // namespace
 }  // namespace supple::scenes

@@ -28,6 +28,7 @@ enum class RuleReason : std::uint8_t {
   ThirdBody,   ///< not polar: a third body presses on a patch of bodies with several parts, or cuts it badly
   NoSkeleton,  ///< neither polar nor samples: neither body has a skeleton
   Unmet,       ///< not polar: it fits, but another rule has the smaller bound
+  Within,      ///< no rule: one body lies in the other, which presses harder all over, or as hard: an energy without Sigma and force
 };
 
 struct ContactSettings {
@@ -81,8 +82,8 @@ struct ContactSurface {
     std::uint64_t points = 0;              ///< quadrature points on Sigma
     std::uint64_t evaluations = 0;         ///< field evaluations spent
   };
-  /// One per candidate pair that touches, sorted by bodies. A body wholly within one that presses harder all over has no Sigma with it: no force, no entry,
-  /// and no energy, though it took some to get there (the pair is overloaded by then).
+  /// One per candidate pair that touches, sorted by bodies. A body wholly within one that presses harder all over has no Sigma with it and no force, but the
+  /// energy that it took to get there (`RuleReason::Within`); without `ContactSettings::energy` bodies of one part have no entry then.
   std::vector<Summary> summary;
 
   void clear();

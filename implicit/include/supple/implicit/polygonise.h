@@ -48,7 +48,8 @@ inline constexpr std::uint64_t kMostBlocks = 250'000;
                                                                            std::uint64_t limit = kMostBlocks,
                                                                            PolygoniseCounts* counts = nullptr);
 
-/// Stage 9 for one body: the closed surface F = 0, outward oriented, with analytic normals.
+/// Stage 9 for one body: the closed surface F = 0, outward oriented, with analytic normals. Where a node lies on the surface, the vertices of its edges lie in
+/// one place with it, and triangles between them have no area.
 [[nodiscard]] Mesh polygonise(const FieldView& field, const Lattice& lattice, const Executor& executor,
                               PolygoniseCounts* counts = nullptr);
 

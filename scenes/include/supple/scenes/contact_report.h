@@ -24,6 +24,7 @@ struct ContactReport {
     double largest_overlap = 0.0;          ///< of the undeformed bodies [m]
     double energy = 0.0;                   ///< of compression [J]
     double dissipated_power = 0.0;         ///< by damping and friction [W]
+    double dissipated_work = 0.0;          ///< by the same since the start, its integral over the steps [J]
     double error_estimate = 0.0;           ///< relative, of force, area and centre of pressure
     collision::ContactRule rule = collision::ContactRule::None;
     std::size_t first = 0, last = 0;       ///< its points are [first, last) of `points`
@@ -33,7 +34,7 @@ struct ContactReport {
   core::Loads loads;                       ///< of contact on every particle, damping and friction included
   double energy = 0.0;                     ///< of all pairs [J]
   double dissipated_power = 0.0;           ///< of all pairs [W]
-  double dissipated_work = 0.0;            ///< by all damping and friction since the start [J]
+  double dissipated_work = 0.0;            ///< of all pairs that ever touched [J]
 };
 [[nodiscard]] ContactReport report_contacts(Simulation& simulation);
 

@@ -45,6 +45,13 @@ struct RunRecord {
     double capacity = 0.0;             ///< largest contact energy of the pair [J]
   };
   std::vector<Overload> overloads;
+  /// What damping and friction of a pair took since the start: the integral of its power over the steps, springs of friction included.
+  struct PairWork {
+    collision::BodyPair bodies;
+    double work = 0.0;                 ///< [J]
+    double power = 0.0;                ///< at the end of the last step [W]
+  };
+  std::vector<PairWork> pair_work;     ///< of all pairs that took any, sorted by bodies
   std::uint64_t core_impulses = 0;     ///< pairs that hard cores turned back
   bool valid = false;
 };
