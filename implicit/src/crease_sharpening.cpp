@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -116,11 +117,23 @@ class Sharpener {
     for (std::size_t k = 0; k < loop.size(); ++k) {
       if (!faces_out(loop[k], loop[(k + 1) % loop.size()], point->position)) return;
     }
+    const auto near_point = [&](std::uint32_t v) { return meet(mesh_.position[v], point->position); };
+    if (std::any_of(loop.begin(), loop.end(), near_point) || !is_first_at(point->position)) return;
     const std::uint32_t fresh = add_vertex(*point);
     std::vector<Triangle> around;
     for (std::size_t k = 0; k < loop.size(); ++k) around.push_back({loop[k], loop[(k + 1) % loop.size()], fresh});
     steps_.replace(numbers, around);
     safe_.resize(steps_.triangles().size(), inside);
+  }
+
+  /// Whether two vertices would lie in one place, as where a crease runs along a plane of the lattice.
+  [[nodiscard]] bool meet(const Vec3& x, const Vec3& y) const { return (x - y).lpNorm<Eigen::Infinity>() < kLeast * lattice_.cell; }
+
+  /// Whether no other cell has a point here yet: one in a face belongs to both of its cells.
+  bool is_first_at(const Vec3& x) {
+    // Lattice planes lie within the places, not between them.
+    const Vec3 at = ((x - lattice_.origin) / (kLeast * lattice_.cell)).array() + 0.5;
+    return taken_.insert({static_cast<std::int64_t>(std::floor(at.x())), static_cast<std::int64_t>(std::floor(at.y())), static_cast<std::int64_t>(std::floor(at.z()))}).second;
   }
 
   /// As the last call found it, where that cannot be different: all that a search looks at lies this near.
@@ -229,7 +242,7 @@ class Sharpener {
       const std::uint32_t right = sides[i + 1].triangle;
       const std::array nodes{owner_[low], owner_[high]};
       const std::optional<CreasePoint>& x = crease_point({mesh_.position[low], mesh_.position[high], nodes});
-      if (x && can_cut(steps_[left], low, high, x->position) && can_cut(steps_[right], low, high, x->position)) {
+      if (x && !meet(x->position, mesh_.position[low]) && !meet(x->position, mesh_.position[high]) && can_cut(steps_[left], low, high, x->position) && can_cut(steps_[right], low, high, x->position)) {
         cuts.push_back({low, high, add_vertex(*x)});
         joined.push_back({left, right});
       }
@@ -356,6 +369,7 @@ class Sharpener {
   }
 
   static constexpr double kBeyond = 1.0, kFarthest = 2.0;  // [cells]
+  static constexpr double kLeast = 0x1p-17;                // between two vertices, as on edges of the lattice [cells]
   FieldView whole_;
   std::span<const FieldView> fields_;  ///< of the nodes
   const Lattice& lattice_;
@@ -366,6 +380,7 @@ class Sharpener {
   CrossingMemory& crossings_;
   Mesh& mesh_;
   TriangleSteps steps_;
+  std::set<CellPlace> taken_;  ///< where points are
   std::vector<bool> safe_;  ///< see take_back_crossings; of points and turned edges only
 };
 

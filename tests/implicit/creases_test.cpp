@@ -82,6 +82,41 @@ TEST(Creases, LieOnTheCircleWhereTwoBallsMeet) {
   }
 }
 
+// Cells on both sides of such a plane see the same points of the crease, and vertices of the lattice lie on it.
+TEST(Creases, AlongAPlaneOfTheLatticeHaveNoVerticesInOnePlace) {
+  struct Row {
+    int count;
+    double support, apart;  // half of the distance
+  };
+  for (const auto& [count, support, apart] : {Row{2, 1.0, kApart}, Row{4, 1.0, kApart}, Row{4, 0.4, 0.1}}) {
+    const double radius = kRadius * support;
+    std::vector<std::pair<Primitive, Vec3>> balls;
+    for (int i = 0; i < count; ++i) balls.emplace_back(wyvill_point(support), Vec3(2.0 * apart * i - apart * (count - 1), 3.0, 0.0));
+    Body body = body_of(balls);
+    body.skeleton.blend = {.rule = BlendRule::Graph};
+    body.place();
+    for (const double cell : {0.05, 0.03125, 0.015}) {
+      const Mesh mesh = march_creases(body.field, {.lattice = {.origin = Vec3::Zero(), .cell = cell}}, Executor(2));
+      const MeshReport report = inspect(mesh);
+      EXPECT_TRUE(report.closed && report.oriented) << cell;
+      EXPECT_EQ(report.euler_characteristic, 2) << cell;
+      EXPECT_EQ(self_intersections(mesh, cell), 0u) << cell;
+      double least = cell * cell;
+      for (const auto& t : mesh.triangle) {
+        const Vec3& p = mesh.position[t[0]];
+        least = std::min(least, 0.5 * (mesh.position[t[1]] - p).cross(mesh.position[t[2]] - p).norm());
+      }
+      EXPECT_GT(least, 0x1p-20 * 1e-2 * cell * cell) << cell;  // two edges of 2^-17 of a cell and of a hundredth of it may meet
+      // Caps of a ball at both ends and slices between, less at most the sagitta of a cell's diagonal all over.
+      const double cap = radius + apart, slice = 2.0 * apart;
+      const double exact = 2.0 * std::numbers::pi * cap * cap * (3.0 * radius - cap) / 3.0 +
+                           (count - 2) * std::numbers::pi * slice * (radius * radius - slice * slice / 12.0);
+      EXPECT_LT(report.volume, exact);
+      EXPECT_GT(report.volume, exact - report.area * 3.0 * cell * cell / (8.0 * radius));
+    }
+  }
+}
+
 /// Distance to the surface of two balls of a radius, `apart` from their middle along an axis, united.
 double distance_to_two_balls(const Vec3& p, const Vec3& axis, double radius, double apart) {
   const double along = p.dot(axis), rim = std::sqrt(radius * radius - apart * apart);
