@@ -17,11 +17,13 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "pack_lanes-inl.h"
 #include "packed_laws-inl.h"
 #include "packed_rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace supple::core::packed::HWY_NAMESPACE {
+using supple::HWY_NAMESPACE::pack_lanes;
 
 using F = hn::CappedTag<float, kFloatRoom>;
 using U = hn::RebindToUnsigned<F>;
@@ -310,7 +312,7 @@ HWY_INLINE void search_tile(const CellGrid& grid, std::uint32_t cell, ListBlock&
       const auto dz = hn::Sub(hn::LoadU(f, near_z + k), z);
       const auto d2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
       const auto near = hn::RebindMask(u, hn::Lt(d2, range2));
-      hn::StoreU(hn::Compress(hn::LoadU(u, near_index + k), near), u, to);
+      hn::StoreU(pack_lanes(hn::LoadU(u, near_index + k), near), u, to);
       to += hn::CountTrue(u, near);
     }
     // Whole batches: whatever stands after them is overwritten.

@@ -11,9 +11,12 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "pack_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace supple::implicit::blobs::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+using supple::HWY_NAMESPACE::pack_lanes;
 namespace {
 
 using D = hn::CappedTag<float, kLanes>;
@@ -58,10 +61,10 @@ HWY_INLINE V cube(V t) { return hn::Mul(t, hn::Mul(t, t)); }
 /// Writes those marked behind the first `count` of a list. @return how many they are now
 HWY_INLINE std::size_t append(V s, V x, V y, V z, hn::Mask<D> keep, BlobList& list, std::size_t count) {
   const D d;
-  hn::StoreU(hn::Compress(s, keep), d, list.scale.data() + count);
-  hn::StoreU(hn::Compress(x, keep), d, list.x.data() + count);
-  hn::StoreU(hn::Compress(y, keep), d, list.y.data() + count);
-  hn::StoreU(hn::Compress(z, keep), d, list.z.data() + count);
+  hn::StoreU(pack_lanes(s, keep), d, list.scale.data() + count);
+  hn::StoreU(pack_lanes(x, keep), d, list.x.data() + count);
+  hn::StoreU(pack_lanes(y, keep), d, list.y.data() + count);
+  hn::StoreU(pack_lanes(z, keep), d, list.z.data() + count);
   return count + hn::CountTrue(d, keep);
 }
 
@@ -168,14 +171,14 @@ void GatherColumn(const BlobArrays& all, std::span<const BlobRun> runs, std::spa
         const V z = hn::Mul(s, half);
         auto keep = hn::Lt(distances(s, x, y, z, half, half, half, half).near2, hn::Set(d, kReach2));
         if (run.end - i < kWidth) keep = hn::And(keep, hn::FirstN(d, run.end - i));
-        hn::StoreU(hn::Compress(s, keep), d, column.scale.data() + count);
-        hn::StoreU(hn::Compress(x, keep), d, column.x.data() + count);
-        hn::StoreU(hn::Compress(y, keep), d, column.y.data() + count);
+        hn::StoreU(pack_lanes(s, keep), d, column.scale.data() + count);
+        hn::StoreU(pack_lanes(x, keep), d, column.x.data() + count);
+        hn::StoreU(pack_lanes(y, keep), d, column.y.data() + count);
         // Doubles as pairs of words, which compress by the same mask.
         hn::VFromD<decltype(du)> low, high;
         hn::LoadInterleaved2(du, reinterpret_cast<const std::uint32_t*>(all.z + i), low, high);
         const auto words = hn::RebindMask(du, keep);
-        hn::StoreInterleaved2(hn::Compress(low, words), hn::Compress(high, words), du, reinterpret_cast<std::uint32_t*>(column.z.data() + count));
+        hn::StoreInterleaved2(pack_lanes(low, words), pack_lanes(high, words), du, reinterpret_cast<std::uint32_t*>(column.z.data() + count));
         count += hn::CountTrue(d, keep);
       }
     }
@@ -278,8 +281,8 @@ void SelectTiles(const BlobList& from, const std::array<float, 3>& centre, unsig
       hn::Store(hn::Add(hn::Load(d, high), cube(hn::Max(hn::Sub(one, near2), zero))), d, high);
       hn::Store(hn::Add(hn::Load(d, low), cube(hn::Max(hn::Sub(one, far2), zero))), d, low);
       const auto rest = hn::AndNot(close, keep);
-      hn::StoreU(hn::Compress(place, hn::RebindMask(du, close)), du, w->near);
-      hn::StoreU(hn::Compress(place, hn::RebindMask(du, rest)), du, w->far);
+      hn::StoreU(pack_lanes(place, hn::RebindMask(du, close)), du, w->near);
+      hn::StoreU(pack_lanes(place, hn::RebindMask(du, rest)), du, w->far);
       w->near += hn::CountTrue(d, close);
       w->far += hn::CountTrue(d, rest);
     }

@@ -11,9 +11,12 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "pack_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace supple::implicit::blobs::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+using supple::HWY_NAMESPACE::pack_lanes;
 namespace {
 
 using D = hn::CappedTag<float, kLanes>;
@@ -60,10 +63,10 @@ HWY_INLINE void cut(const BlobList& from, const float (&centre)[3], const float 
       near2 = hn::MulAdd(gap, gap, near2);
     }
     const auto keep = hn::Lt(near2, hn::Set(d, kReach2));
-    hn::StoreU(hn::Compress(s, keep), d, list.scale.data() + count);
-    hn::StoreU(hn::Compress(at[0], keep), d, list.x.data() + count);
-    hn::StoreU(hn::Compress(at[1], keep), d, list.y.data() + count);
-    hn::StoreU(hn::Compress(at[2], keep), d, list.z.data() + count);
+    hn::StoreU(pack_lanes(s, keep), d, list.scale.data() + count);
+    hn::StoreU(pack_lanes(at[0], keep), d, list.x.data() + count);
+    hn::StoreU(pack_lanes(at[1], keep), d, list.y.data() + count);
+    hn::StoreU(pack_lanes(at[2], keep), d, list.z.data() + count);
     count += hn::CountTrue(d, keep);
   }
   list.count = count;

@@ -12,9 +12,12 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "pack_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace supple::implicit::blobs::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+using supple::HWY_NAMESPACE::pack_lanes;
 namespace {
 
 using D = hn::CappedTag<float, kLanes>;
@@ -26,7 +29,7 @@ HWY_INLINE V dot(V ax, V ay, V az, V bx, V by, V bz) { return hn::MulAdd(az, bz,
 
 /// Writes those marked behind the first `count`, which is not beyond where they were read.
 HWY_INLINE void store(V v, hn::Mask<D> keep, std::vector<float>& to, std::size_t count) {
-  hn::StoreU(hn::Compress(v, keep), D(), to.data() + count);
+  hn::StoreU(pack_lanes(v, keep), D(), to.data() + count);
 }
 
 /// f is convex in q, so F >= F(m) + g.d - 3 rho^2 sum s^2 t^2. The largest second derivative of a blob is s^2 t (24 -

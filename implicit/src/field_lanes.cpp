@@ -12,9 +12,12 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "pack_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace supple::implicit::lanes::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+using supple::HWY_NAMESPACE::pack_lanes;
 
 static_assert(sizeof(Vec3) == 3 * sizeof(double));
 
@@ -464,7 +467,7 @@ HWY_INLINE std::size_t filter_packs(const LeafPack* pack, std::size_t pack_count
       std::uint8_t bits[8];
       hn::StoreMaskBits(d, hn::Le(q, hn::Load(d, p->reach2 + lane)), bits);
       // Compressed in a register and stored whole: scalar loads follow at once, and masked stores do not forward.
-      hn::StoreU(hn::Compress(hn::Load(di, p->id + lane), hn::LoadMaskBits(di, bits)), di, ids + count);
+      hn::StoreU(pack_lanes(hn::Load(di, p->id + lane), hn::LoadMaskBits(di, bits)), di, ids + count);
       count += static_cast<std::size_t>(std::popcount(bits[0]));
     }
   }
