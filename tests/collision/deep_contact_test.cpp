@@ -384,7 +384,18 @@ TEST(DeepContact, OfEqualBodiesInOnePlaceIsTheEnergyOfOne) {
   // Nor are those of another stiffness, which press harder all over.
   benchmarks::Rigid harder(benchmarks::linear_sphere(kRadius), 3.0 * kSoft, 0.03);
   harder.put(place);
-  expect_within(query({ball.body(), harder.body()}, 1e-4), all_of(kSoft, kRadius), 4.0 / 3.0 * benchmarks::kPi * kRadius * kRadius * kRadius);
+  const double energy = all_of(kSoft, kRadius), volume = 4.0 / 3.0 * benchmarks::kPi * kRadius * kRadius * kRadius;
+  expect_within(query({ball.body(), harder.body()}, 1e-4), energy, volume);
+  ContactBody held = ball.body();
+  held.fixed = true;
+  expect_within(query({held, harder.body()}, 1e-4), energy, volume);
+  // All of their surfaces presses alike then, but for rounding: that is no Sigma.
+  implicit::Skeleton steep = benchmarks::linear_sphere(kRadius);
+  steep.primitive[0].kernel = implicit::Kernel::gascuel(kRadius, 1.5 * kRadius, 1.0 / kRadius);
+  benchmarks::Rigid soft(steep, 0.5 * kSoft, 0.03), hard(steep, kSoft, 0.03);
+  soft.put({});
+  hard.put({});
+  expect_within(query({soft.body(), hard.body()}, 1e-4), energy, volume);
 }
 
 /// Bodies that are not convex, in one another beyond their middles.

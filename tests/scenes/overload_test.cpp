@@ -112,6 +112,21 @@ objects:
   EXPECT_EQ(json["pairs"][0]["error_met"], true);
 }
 
+// Their surfaces press alike all over but for rounding, which is neither a force nor a change of energy.
+TEST(Overload, OfConcentricBallsHoldsTheEnergyOfTheSofter) {
+  const auto ball = [](const std::string& name, const std::string& modulus) {
+    return "  - name: " + name + "\n    particles: {arrange: single, mass: 0.1}\n" +
+           "    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 10}}]\n" +
+           "    contact: {modulus: " + modulus + "}\n";
+  };
+  Simulation simulation(parse_scene("schema: 1\nduration: 1 s\nobjects:\n" + ball("soft", "1e4") + ball("hard", "2e4"), "test.yaml", "."));
+  ASSERT_EQ(simulation.contacts().summary.size(), 1u);
+  EXPECT_EQ(simulation.contacts().summary[0].reason, collision::RuleReason::Within);
+  EXPECT_NEAR(simulation.contacts().summary[0].energy, kCapacity, 1e-4 * kCapacity);
+  while (simulation.frame() < 4) simulation.step_frame();
+  EXPECT_EQ(simulation.audits().energy_error, 0.0);
+}
+
 TEST(Overload, IsKeptWithTheState) {
   const Simulation simulation = run(balls(15.0), 8);
   const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "overload.state";
