@@ -293,19 +293,20 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   }
 }
 
-/// Whether a body may lie in another with all of it: that presses harder where a primitive of the first sits, or on the first of its samples.
+/// Whether a body may lie in another with all of it. It would press less there everywhere: where its first primitive that has pressure sits, or on its
+/// first sample.
 bool PairSolver::may_lie_within(const Job& job, int side) {
   const ContactBody& inner = side == 0 ? job.a : job.b;
-  const auto presses_less = [&](const Vec3& place) {
+  const auto presses_less = [&](const Vec3& place) -> std::optional<bool> {  // none: it has no pressure there
     std::array<double, 2> at{};
-    for (const int s : {0, 1}) job.polar.pressure.evaluate(s, {&place, 1}, {&at[static_cast<std::size_t>(s)], 1});
-    const double own = at[static_cast<std::size_t>(side)], other = at[static_cast<std::size_t>(1 - side)];
-    return own > 0.0 && own < other;
+    job.polar.pressure.evaluate(side, {&place, 1}, {at.data(), 1});
+    if (!(at[0] > 0.0)) return std::nullopt;
+    job.polar.pressure.evaluate(1 - side, {&place, 1}, {&at[1], 1});
+    return at[0] < at[1];
   };
-  if (inner.skeleton == nullptr) return presses_less(inner.field.surface_box().centre());
-  const auto& primitives = inner.skeleton->primitive;
-  if (std::any_of(primitives.begin(), primitives.end(), [&](const implicit::Primitive& p) { return presses_less(inner.pose[p.part].to_world(p.offset.position)); })) {
-    return true;
+  if (inner.skeleton == nullptr) return presses_less(inner.field.surface_box().centre()).value_or(false);
+  for (const implicit::Primitive& p : inner.skeleton->primitive) {
+    if (const std::optional<bool> less = presses_less(inner.pose[p.part].to_world(p.offset.position))) return *less;
   }
   if (inner.samples == nullptr) return false;
   const auto valid = std::find(inner.samples->valid.begin(), inner.samples->valid.end(), 1);
