@@ -152,6 +152,22 @@ Combined BlendIndex::combine(std::span<const NodeSample> nodes, std::span<double
   return out;
 }
 
+Interval BlendIndex::opening_range(const NodeBound& a, const NodeBound& b) const {
+  const double length_a = a.gradient.norm(), length_b = b.gradient.norm();
+  if ((length_a == 0.0 && a.turn == 0.0) || (length_b == 0.0 && b.turn == 0.0)) return {1.0, 1.0};  // no angle: they unite
+  if (!(a.turn < length_a && b.turn < length_b)) return {opening_, 1.0};
+  // A vector within r of g lies within asin(r / |g|) of its direction; both may turn towards or away from each other.
+  const double sin_a = a.turn / length_a, sin_b = b.turn / length_b, cos_a = std::sqrt(1.0 - sin_a * sin_a), cos_b = std::sqrt(1.0 - sin_b * sin_b);
+  const double cosine = a.gradient.dot(b.gradient) / (length_a * length_b), sine = a.gradient.cross(b.gradient).norm() / (length_a * length_b);
+  const double turned_cosine = cos_a * cos_b - sin_a * sin_b, turned_sine = sin_a * cos_b + cos_a * sin_b;
+  constexpr double kRounding = 1e-14;
+  const double most = cosine >= turned_cosine ? 1.0 : cosine * turned_cosine + sine * turned_sine + kRounding;
+  const double least = cosine <= -turned_cosine ? -1.0 : cosine * turned_cosine - sine * turned_sine - kRounding;
+  const double smallest = least <= 0.0 && most >= 0.0 ? 0.0 : std::min(std::abs(least), std::abs(most));
+  const double largest = std::min(std::max(std::abs(least), std::abs(most)), 1.0);
+  return {opening_of(opening_, smallest).t, opening_of(opening_, largest).t};
+}
+
 Interval BlendIndex::bound(std::span<const NodeBound> nodes) const {
   Interval out;
   const std::size_t n = nodes.size();
@@ -183,6 +199,17 @@ Interval BlendIndex::bound(std::span<const NodeBound> nodes) const {
     out.upper = mean(out.upper, [](const NodeBound& k) { return k.value.upper; });
   } else if (rule_ == BlendRule::Gradient) {
     // The arc rises with both values and falls with t, which is at least the opening.
+    const bool turns_known = std::any_of(nodes.begin(), nodes.end(), [](const NodeBound& k) { return std::isfinite(k.turn); });
+    if (turns_known) {
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t j = i + 1; j < n; ++j) {
+          const Interval t = opening_range(nodes[i], nodes[j]);
+          out.lower = std::max(out.lower, arc_blend(nodes[i].value.lower, nodes[j].value.lower, t.upper).value);
+          out.upper = std::max(out.upper, arc_blend(nodes[i].value.upper, nodes[j].value.upper, t.lower).value);
+        }
+      }
+      return out;
+    }
     double first = 0.0, second = 0.0;
     for (const NodeBound& k : nodes) {
       const double u = k.value.upper;

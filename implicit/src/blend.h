@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "supple/implicit/blend.h"
@@ -44,7 +45,10 @@ class BlendIndex {
   struct NodeBound {
     std::uint32_t node = 0;
     Interval value{};
-    double slope = 0.0;  ///< of |grad f_k|
+    double slope = 0.0;             ///< of |grad f_k|
+    // Gradient: within `turn` of `gradient` lies grad f_k; infinite: not known.
+    Vec3 gradient = Vec3::Zero();
+    double turn = std::numeric_limits<double>::infinity();
   };
   [[nodiscard]] Interval bound(std::span<const NodeBound> nodes) const;
   /// Of |grad F|; infinite for Gradient where two nodes are met, for the angle turns without a limit where gradients vanish.
@@ -64,6 +68,9 @@ class BlendIndex {
   /// Calls use(j, weight) for the positions j in `nodes` of the neighbours of nodes[k].
   template <class Nodes, class Use>
   void for_neighbours(const Nodes& nodes, std::size_t k, const Use& use) const;
+
+  /// Gradient: of t where the gradients of two nodes may turn as their bounds say.
+  [[nodiscard]] Interval opening_range(const NodeBound& a, const NodeBound& b) const;
 
   BlendRule rule_ = BlendRule::Sum;
   double exponent_ = 4.0;

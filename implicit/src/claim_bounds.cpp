@@ -128,10 +128,10 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
       if (!bounds.curved.known) continue;  // the same everywhere
       bounds.term.clear();  // of the whole box
       const auto& [lower, upper] = bounds.curved.curvature;
-      const double first = slope_[i][c].cwiseAbs().dot(half + rounding_of(box)) + bounds.curved.round_off, second = 0.5 * reach * reach;
+      const double first = slope_[i][c].cwiseAbs().dot(half + rounding_of(box)) + bounds.round_off, second = 0.5 * reach * reach;
       bounds.value = {value_[i][c] - first + second * lower, value_[i][c] + first + second * upper};
       entry_[i].value = scaled(bounds.value, entry_[i].weight);
-      bounds.hull[0] = {slope_[i][c], std::max(-lower, upper) * reach + bounds.curved.round_off / largest};
+      bounds.hull[0] = {slope_[i][c], std::max(-lower, upper) * reach + bounds.round_off / largest};
     }
     verdict[c] = judge();
     verdict[c].flat = is_flat();

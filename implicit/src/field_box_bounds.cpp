@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kCancels = 1e4;  // of convolutions, which sum over edges: their round-off against that of others
 
 /// Taylor's expansion of a sum of potentials about the centre of a box.
 struct Expansion {
@@ -24,10 +25,16 @@ struct Expansion {
   Interval plain{0.0, 0.0};       ///< of all, from distances alone
   bool sloped = true;             ///< nothing is left for the rest
   double scale = 0.0;             ///< of round-off [1]
+  double slope_scale = 0.0;       ///< and of that of the gradient [1/m]
   double terms = 0.0;
 
   /// How far the gradient turns between the centre and a corner, at most.
   [[nodiscard]] double turn(double reach) const { return std::max(-curvature.lower, curvature.upper) * reach; }
+  /// The same of the gradient as it is evaluated: 0 where it vanishes everywhere, as within solids.
+  [[nodiscard]] double evaluated_turn(double reach) const {
+    const double most = turn(reach);
+    return most == 0.0 && gradient == Vec3::Zero() ? 0.0 : most + (64.0 + 2.0 * terms) * kEps * slope_scale;
+  }
   [[nodiscard]] double round_off() const { return (64.0 + 2.0 * terms) * kEps * scale; }
   [[nodiscard]] Interval range(const Vec3& half) const {
     const double first = gradient.cwiseAbs().dot(half), reach2 = half.squaredNorm();
@@ -123,6 +130,7 @@ void add_slope(const Field::Index& index, const Box& box, GradientBounds::Term& 
 /// Of second derivatives on the box.
 CurvatureRange curvature_of(const Field::Index& index, const Box& box, const GradientBounds::Term& term) {
   const PackedShape& shape = index.shape[term.id];
+  if (shape.foot == PackedFoot::Slab && term.far2 == 0.0) return {0.0, 0.0};  // within the solid
   const double reach = 0.5 * box.extent().norm(), metric2 = metric2_of(term.to_local);
   const Vec3 y = local_middle(index.primitive[term.id], term.to_local, box);
   CurvatureRange curvature;
@@ -142,7 +150,7 @@ CurvatureRange curvature_of(const Field::Index& index, const Box& box, const Gra
 
 /// Of round-off, of a primitive's value on the box.
 double scale_of(const PackedShape& shape, double reach) {
-  return shape.peak + shape.lipschitz * reach + (shape.foot == PackedFoot::Convolved ? 1e4 * shape.peak : 0.0);  // sums over edges cancel
+  return shape.peak + shape.lipschitz * reach + (shape.foot == PackedFoot::Convolved ? kCancels * shape.peak : 0.0);
 }
 
 /// With all that is known of a primitive. @return that, less where it cannot be expanded
@@ -174,6 +182,7 @@ void expand_nodes(const Field::Index& index, const Box& box, std::vector<Expansi
     if (!start_term(index, id, box, term)) continue;
     add_slope(index, box, term);
     place->scale += scale_of(index.shape[id], 0.5 * box.extent().norm());
+    place->slope_scale += index.shape[id].lipschitz * (index.shape[id].foot == PackedFoot::Convolved ? kCancels : 1.0);
     place->terms += 1.0;
     add_expanded(index, box, term, *place);
   }
@@ -249,6 +258,10 @@ GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, con
   bool sloped = true;
   for (const Expansion& k : nodes) {
     bounds.push_back({.node = k.node, .value = intersection(k.plain, k.range(half))});
+    if (k.sloped && !half.isZero()) {
+      bounds.back().gradient = k.gradient;
+      bounds.back().turn = k.evaluated_turn(half.norm());
+    }
     scale += k.scale;
     slopes += k.gradient.norm();
     sloped = sloped && k.sloped;
@@ -261,6 +274,7 @@ GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, con
   if (!sloped || half.isZero()) return out;
   find_hull(index.blend, nodes, bounds, terms, half.norm(), half.maxCoeff(), out.hull);
   for (GradientBounds::Ball& ball : out.hull) ball.turn += round_off * slopes;
+  out.round_off = round_off * scale;
   out.least_slope = least_of_hull(out.hull);
   return out;
 }
@@ -365,7 +379,8 @@ void add_curvature(const Field& field, const Box& box, GradientBounds& bounds) {
   if (!sum.sloped) return;
   bounds.hull.push_back({sum.gradient, sum.turn(half.norm()) + bounds.slack});
   bounds.least_slope = least_of_hull(bounds.hull);
-  bounds.curved = {true, sum.curvature, sum.round_off()};
+  bounds.curved = {true, sum.curvature};
+  bounds.round_off = sum.round_off();
 }
 
 Interval slope_along(const GradientBounds& bounds, const Vec3& direction) {

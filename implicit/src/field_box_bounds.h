@@ -23,7 +23,6 @@ struct GradientBounds : Field::BoxBounds {
   struct Curved {
     bool known = false;
     CurvatureRange curvature{};  ///< on the box [1/m^2]
-    double round_off = 0.0;      ///< of values [1]
   };
   Curved curved;
   /// One primitive's part of a sum. Its gradient is `factor` times a vector A^T v and lies within `turn` of `gradient`; v is up to `spread` away
@@ -46,6 +45,7 @@ struct GradientBounds : Field::BoxBounds {
   std::size_t convex = 0;  ///< primitives that may add to a sum on the box, if the squared distances to all of them are convex
   std::vector<Term> term{};  ///< of a sum; empty: not known, or none
   double scale = 0.0;        ///< of round-off of the sum [1]
+  double round_off = 0.0;    ///< of values, where the hull is known [1]
   double slack = 0.0;        ///< and of slopes [1/m]
   bool stepwise = false;     ///< add_slopes and add_curvature know more
 };

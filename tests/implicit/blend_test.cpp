@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "blend.h"
 #include "bodies.h"
 #include "supple/core/error.h"
 #include "supple/core/executor.h"
@@ -147,6 +148,35 @@ TEST(Blend, RicciRunsFromTheSumToTheUnion) {
   }
   const double f = evaluate(Kernel::wyvill(1.0), 0.16).value;
   EXPECT_NEAR(FieldView(two.field).value(Vec3::Zero()), std::sqrt(2.0) * f - 0.5, 1e-15);
+}
+
+// Gradients anywhere in balls, values known exactly: what is left is how far the angle turns.
+TEST(Blend, BoundsOfArcsHoldForAllGradientsInTheirBalls) {
+  BlendIndex blend;
+  blend.assign({.rule = BlendRule::Gradient, .opening = 0.3}, 2);
+  Random random(8);
+  double narrowest = 1.0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    BlendIndex::NodeBound nodes[2];
+    const double reach = std::pow(10.0, random.uniform(-4.0, 0.2)), value = random.uniform(0.2, 1.0);
+    for (std::uint32_t k = 0; k < 2; ++k) {
+      const double f = value * random.uniform(0.8, 1.0);
+      nodes[k] = {.node = k, .value = {f, f}, .gradient = random.in_box(1.0), .turn = reach * random.uniform(0.1, 1.0)};
+    }
+    const Interval bound = blend.bound(nodes);
+    narrowest = std::min(narrowest, bound.upper - bound.lower);
+    for (int i = 0; i < 40; ++i) {
+      NodeSample samples[2];
+      double share[2];
+      for (std::uint32_t k = 0; k < 2; ++k) {
+        samples[k] = {.node = k, .value = nodes[k].value.lower, .gradient = nodes[k].gradient + nodes[k].turn * random.direction()};
+      }
+      const double f = blend.combine(samples, share).value;
+      ASSERT_GE(f, bound.lower - 1e-15) << trial;
+      ASSERT_LE(f, bound.upper + 1e-15) << trial;
+    }
+  }
+  EXPECT_LT(narrowest, 1e-3);
 }
 
 TEST(Blend, GradientsThatFaceEachOtherUniteAndThoseThatCrossBlend) {

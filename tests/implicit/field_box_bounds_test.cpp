@@ -122,6 +122,22 @@ TEST_P(BoundsOnBoxes, HoldSlopesAlongDirections) {
   EXPECT_GT(known, 1000);
 }
 
+// Blends by gradients: the angle between two gradients is bounded too, so that values are to first order.
+TEST(BoxBounds, OfBlendsByGradientsShrinkWithTheBox) {
+  const Body body = body_of_case({.name = "gradient", .rule = BlendRule::Gradient});
+  Random random(7);
+  int wide = 0, boxes = 0;
+  for (int trial = 0; trial < 4000; ++trial) {
+    const Vec3 centre = random.in_box(1.0);
+    if (FieldView(body.field).value(centre) <= -body.skeleton.iso) continue;
+    ++boxes;
+    const Interval value = body.field.tight_bound(Box{centre, centre}.inflated(1e-6));
+    wide += value.upper - value.lower > 1e-4;
+  }
+  EXPECT_GT(boxes, 2000);
+  EXPECT_LT(wide, boxes / 200);  // where the gradient of a node vanishes the angle has no limit
+}
+
 // All balls whose supports reach a box lie to one side, beyond its corners: F rises towards them however their supports end in the box.
 TEST(BoxBounds, KnowThatSumsRiseTowardsAllTheirPrimitives) {
   for (const Kernel& kernel : {Kernel::wyvill(1.0), kGascuel, Kernel::murakami(1.0), Kernel::nishimura(1.0), Kernel::soft_object(1.0)}) {

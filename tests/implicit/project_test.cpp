@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "bodies.h"
 #include "supple/core/error.h"
@@ -312,6 +314,104 @@ TEST(Intersect, MeetsTheSurfaceOfEveryBlendAndNothingElse) {
     EXPECT_GT(passes, 10);
   }
 }
+
+/// The largest value on a ray: samples, and a ternary search about the best.
+std::pair<double, double> peak_on_ray(const Field& field, const Vec3& origin, const Vec3& direction, double t_max) {
+  constexpr int kSamples = 20000;
+  const auto value = [&](double t) { return FieldView(field).value(origin + t * direction); };
+  int best = 0;
+  double most = value(0.0);
+  for (int i = 1; i <= kSamples; ++i) {
+    const double f = value(t_max * i / kSamples);
+    if (f > most) {
+      most = f;
+      best = i;
+    }
+  }
+  double low = t_max * std::max(best - 1, 0) / kSamples, high = t_max * std::min(best + 1, kSamples) / kSamples;
+  while (high - low > 1e-14) {
+    const double a = low + (high - low) / 3.0, b = high - (high - low) / 3.0;
+    if (value(a) < value(b)) {
+      low = a;
+    } else {
+      high = b;
+    }
+  }
+  return {0.5 * (low + high), std::max(most, value(0.5 * (low + high)))};
+}
+
+struct Rule {
+  const char* name;
+  BlendRule rule;
+  bool convolved;
+  double gap;    ///< of F, at which a ray passes: bounds are of second order, of blends by gradients of first
+  double touch;  ///< of F, that counts as meeting
+};
+std::ostream& operator<<(std::ostream& out, const Rule& r) { return out << r.name; }
+
+class IntersectedRule : public ::testing::TestWithParam<Rule> {};
+
+Body body_of_rule(const Rule& r, std::uint64_t seed) {
+  Body body = random_body({.seed = seed, .parts = 6, .half_width = 0.6, .every_shape = !r.convolved});
+  if (r.convolved) {
+    Random random(seed);
+    for (Primitive& p : body.skeleton.primitive) {
+      constexpr ShapeKind kShapes[] = {ShapeKind::Point, ShapeKind::Segment, ShapeKind::Triangle, ShapeKind::Ring, ShapeKind::Arc};
+      p.shape = kShapes[random.below(5)];
+      p.kernel = Kernel::cauchy(0.8, random.uniform(1.5, 3.0));
+      p.convolved = p.shape != ShapeKind::Point;
+      p.size = {random.uniform(0.2, 0.5), random.uniform(0.5, 3.0), 0.0};
+      p.control.clear();
+      if (p.shape == ShapeKind::Triangle) p.control = {random.in_box(0.4), random.in_box(0.4), random.in_box(0.4)};
+    }
+  }
+  body.skeleton.blend.rule = r.rule;
+  if (r.rule == BlendRule::Graph) body.skeleton.blend.edge = {{0, 1, 1.0}, {1, 2, 0.5}, {3, 4, 1.0}};
+  body.place();
+  return body;
+}
+
+// The iso value is set so that a ray dives under the surface by 1e-13 of F, for some ten-millionths of its length, or passes above it.
+TEST_P(IntersectedRule, IsMetByRaysThatHardlyTouch) {
+  constexpr double kMost = 5.0;
+  int rays = 0;
+  for (const std::uint64_t seed : {171u, 172u, 173u}) {
+    Body body = body_of_rule(GetParam(), seed);
+    Random random(seed + 100);
+    for (int trial = 0; trial < 12; ++trial) {
+      const Vec3 origin = 2.2 * random.direction();
+      const Vec3 direction = (random.in_box(0.9) - origin).normalized();
+      const double iso = body.skeleton.iso;
+      const auto [at, most] = peak_on_ray(body.field, origin, direction, kMost);
+      if (!(most > -0.9 * iso) || at < 1e-3) continue;
+      ++rays;
+      body.skeleton.iso = iso + most - 1e-13;
+      body.place();
+      const std::optional<double> dives = intersect(body.field, origin, direction, kMost);
+      EXPECT_TRUE(dives.has_value()) << seed << ' ' << trial;
+      if (dives) {
+        EXPECT_LT(std::abs(FieldView(body.field).value(origin + *dives * direction)), GetParam().touch) << seed << ' ' << trial;
+      }
+      body.skeleton.iso = iso + most + GetParam().gap;
+      body.place();
+      EXPECT_FALSE(intersect(body.field, origin, direction, kMost).has_value()) << seed << ' ' << trial;
+      body.skeleton.iso = iso;
+      body.place();
+    }
+  }
+  EXPECT_GT(rays, 25);
+}
+
+// Where the second derivatives of some shape have no bound a ray meets what is nearer than 1e-8 features, here 1 m / 0.6 at most, at slopes of
+// up to 16 / m.
+constexpr double kFirstOrder = 1e-7;
+
+INSTANTIATE_TEST_SUITE_P(Rules, IntersectedRule,
+                         ::testing::Values(Rule{"convolution", BlendRule::Sum, true, 1e-7, kFirstOrder},
+                                           Rule{"convolution_ricci", BlendRule::Ricci, true, 1e-7, kFirstOrder},
+                                           Rule{"graph", BlendRule::Graph, false, 1e-7, kFirstOrder}, Rule{"ricci", BlendRule::Ricci, false, 1e-7, kFirstOrder},
+                                           Rule{"gradient", BlendRule::Gradient, false, 1e-4, 5e-5}),
+                         ::testing::PrintToStringParamName());
 
 TEST(Intersect, MeetsABoxThatRaysCutAtAnEdge) {
   // Its slope is the same everywhere outside: steps longer than F / slope would leap over the edge.
