@@ -219,7 +219,8 @@ Simulation bind_simulation(py::module_& module) {
               return names;
             });
           },
-          "Names of what has a surface of its own: objects, or the pieces that they broke into (\"plate.1\", ...).")
+          "Names of what has a surface of its own: objects, or the pieces that they broke into (\"plate.1\", ...); then the groups of a "
+          "blending graph that touch each other (\"hand.group2\", ...).")
       .def_property_readonly(
           "fixed_bodies",
           [](const Handle& h) {

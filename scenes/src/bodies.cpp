@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <span>
@@ -32,6 +33,13 @@ implicit::Blend take_blend(const implicit::Blend& all, std::span<const std::uint
     if (a != kElsewhere && b != kElsewhere) blend.edge.push_back({a, b, e.weight});
   }
   return blend;
+}
+
+bool blend_with_each_other(const implicit::Blend& blend, std::uint32_t a, std::uint32_t b) {
+  const auto [low, high] = std::minmax(blend.node[a], blend.node[b]);
+  const auto at = std::lower_bound(blend.edge.begin(), blend.edge.end(), std::pair(low, high),
+                                   [](const implicit::BlendEdge& e, const auto& pair) { return std::pair(e.a, e.b) < pair; });
+  return low == high || (at != blend.edge.end() && at->a == low && at->b == high);
 }
 
 /// Numbers of things by the particle that carries them, so that a piece is cut out in the time that its own size takes.
@@ -84,6 +92,12 @@ void take_part(const ObjectModel& object, const Carried& primitives, const Carri
     body.samples.reach.push_back(all.reach[s]);
     body.samples.spread.push_back(all.spread[s]);
   }
+}
+
+void add_particle(const core::ParticleSet& set, std::uint32_t i, Body& body) {
+  body.particle.push_back(i);
+  body.yield.push_back({core::free_translation(set.pinned[i], Vec3::Constant(1.0 / set.mass[i])).maxCoeff(),
+                        core::free_rotation(set.pinned[i], Vec3::Constant(1.0 / set.inertia[i].minCoeff())).maxCoeff()});
 }
 
 }  // namespace
@@ -156,9 +170,14 @@ void fade_blends(const Model& model, const core::LinkState& links, std::span<con
 
 Meeting meeting_of(const ObjectModel& object, const BodyOrigin& a, const BodyOrigin& b) {
   if (object.separate) return Meeting::Always;
-  if (a.component == b.component) return Meeting::OnceApart;
+  if (a.is_group() != b.is_group()) return Meeting::Never;
+  if (a.is_group()) {
+    if (a.component != b.component || blend_with_each_other(object.skeleton.blend, a.group, b.group)) return Meeting::Never;
+  } else if (a.component == b.component) {
+    return Meeting::OnceApart;
+  }
   const auto listed = [&](const std::vector<collision::BodyPair>& pairs) {
-    const auto [low, high] = std::minmax(a.component, b.component);
+    const auto [low, high] = std::minmax({a.number(), b.number()});
     return std::binary_search(pairs.begin(), pairs.end(), collision::BodyPair{low, high});
   };
   if (listed(object.bonded)) return a.piece == b.piece ? Meeting::Never : Meeting::OnceApart;
@@ -171,7 +190,7 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
     if (object.separate) std::iota(piece.begin() + object.first, piece.begin() + object.last, object.first);
   }
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> body_of;  // by piece and component, of one object
-  std::vector<Body> bodies;
+  std::vector<Body> bodies, groups;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const ObjectModel& object = model.objects[o];
     const std::size_t begin = bodies.size();
@@ -182,14 +201,10 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
       if (fresh) {
         bodies.push_back({.object = o, .origin = origin, .name = object.name, .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
       }
-      Body& body = bodies[place->second];
-      body.particle.push_back(i);
-      const core::ParticleSet& set = model.particles;
-      body.yield.push_back({core::free_translation(set.pinned[i], Vec3::Constant(1.0 / set.mass[i])).maxCoeff(),
-                            core::free_rotation(set.pinned[i], Vec3::Constant(1.0 / set.inertia[i].minCoeff())).maxCoeff()});
+      add_particle(model.particles, i, bodies[place->second]);
     }
     const std::size_t count = bodies.size() - begin;
-    const std::size_t particles = object.last - object.first;
+    const std::uint32_t particles = object.last - object.first;
     const auto& primitive = object.skeleton.primitive;
     const Carried primitives(particles, primitive.size(), [&](std::size_t k) { return primitive[k].part; });
     const Carried seeds(particles, object.samples.size(), [&](std::size_t s) { return object.samples.part[s]; });
@@ -198,8 +213,26 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
       if (count > 1) body.name += '.' + std::to_string(k + 1);
       take_part(object, primitives, seeds, body);
     }
+    for (const std::uint32_t first : object.group) {
+      const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+      Body group{.object = o,
+                 .origin = {piece[object.first + first], object.component.empty() ? 0 : object.component[first], first},
+                 .name = object.name + ".group" + std::to_string(node[first] + 1),
+                 .particle = {}, .yield = {}, .skeleton = {}, .samples = {}};
+      for (std::uint32_t i = first; i < particles; ++i) {
+        if (node[i] == node[first]) add_particle(model.particles, object.first + i, group);
+      }
+      take_part(object, primitives, seeds, group);
+      if (!group.skeleton.primitive.empty()) groups.push_back(std::move(group));
+    }
   }
+  std::move(groups.begin(), groups.end(), std::back_inserter(bodies));
   return bodies;
+}
+
+std::size_t surface_count(const std::vector<Body>& bodies) {
+  const auto whole = std::partition_point(bodies.begin(), bodies.end(), [](const Body& body) { return !body.origin.is_group(); });
+  return static_cast<std::size_t>(whole - bodies.begin());
 }
 
 collision::ContactRules make_body_rules(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
@@ -229,7 +262,10 @@ collision::ContactRules make_body_rules(const Model& model, const std::vector<Bo
             [](const auto& x, const auto& y) { return x.pair < y.pair; });
   rules.allowed = [&allowed = model.rules.allowed, &objects = model.objects, object, leader, origin, apart](std::uint32_t a,
                                                                                                        std::uint32_t b) {
-    if (object[a] != object[b]) return !allowed || allowed(object[a], object[b]);
+    if (object[a] != object[b]) {
+      const auto is_group = [&](std::uint32_t body) { return body < origin.size() && origin[body].is_group(); };
+      return !is_group(a) && !is_group(b) && (!allowed || allowed(object[a], object[b]));
+    }
     const Meeting meeting = meeting_of(objects[object[a]], origin[a], origin[b]);
     if (meeting != Meeting::OnceApart) return meeting == Meeting::Always;
     return std::binary_search(apart.begin(), apart.end(),

@@ -31,17 +31,19 @@ void find_strangers(const Model& model, const std::vector<Body>& bodies, Divisio
 Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
                      std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface, const Executor& executor) {
   Division out;
+  const std::size_t surfaces = surface_count(bodies);
   for (const auto& s : surface.summary) {
+    if (s.bodies.a >= surfaces) continue;  // groups divide no surface: where they meet, their component has a crease
     for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
-      if (body < bodies.size()) out.body.push_back(body);
+      if (body < surfaces) out.body.push_back(body);
     }
-    if (s.bodies.b < bodies.size()) out.pair.push_back(s.bodies);
+    if (s.bodies.b < surfaces) out.pair.push_back(s.bodies);
   }
   out.placed.assign(placed.begin(), placed.end());
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < surfaces; ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     if (out.placed[i].pose.empty()) out.placed[i].field = fields[i];
-    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+    for (std::uint32_t j = i + 1; j < surfaces && bodies[j].object == bodies[i].object; ++j) {
       if (bodies[j].skeleton.primitive.empty()) continue;
       if (!fields[i].surface_box().overlaps(fields[j].surface_box())) continue;
       out.body.insert(out.body.end(), {i, j});

@@ -31,6 +31,7 @@ std::uint64_t count_never(const StageContext& context, const ObjectModel& object
   const std::vector<Body>& bodies = context.bodies;
   std::uint64_t never = 0;
   for (const collision::BodyPair& pair : pairs) {
+    if (object.are_groups(pair)) continue;
     const std::uint32_t i = body_led_by(bodies, object.first + pair.a), j = body_led_by(bodies, object.first + pair.b);
     if (collides(context, bodies[i]) && collides(context, bodies[j]) && !context.rules.allowed(i, j)) ++never;
   }
@@ -38,7 +39,7 @@ std::uint64_t count_never(const StageContext& context, const ObjectModel& object
 }
 
 /// Pairs that may ever touch. The particles of a `separate` object are alike to the rules, and so are components that do not break
-/// but for the pairs listed, so the first stands for all.
+/// but for the pairs listed, so the first stands for all. Groups are looked at one by one.
 std::uint64_t count_present_pairs(const StageContext& context) {
   struct Kind {
     std::uint32_t first = 0;
@@ -50,7 +51,7 @@ std::uint64_t count_present_pairs(const StageContext& context) {
   const auto count = static_cast<std::uint32_t>(bodies.size() + context.model.fixed.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     if (i < bodies.size()) {
-      if (!collides(context, bodies[i])) continue;
+      if (!collides(context, bodies[i]) || bodies[i].origin.is_group()) continue;
       const ObjectModel& object = context.model.objects[bodies[i].object];
       if (object.separate || (!object.component.empty() && !object.breaks)) {
         std::size_t& kind = kind_of[bodies[i].object];
@@ -73,6 +74,11 @@ std::uint64_t count_present_pairs(const StageContext& context) {
     for (std::size_t b = a + 1; b < kinds.size(); ++b) {
       const bool moves = kinds[a].first < bodies.size() || kinds[b].first < bodies.size();
       if (moves && context.rules.allowed(kinds[a].first, kinds[b].first)) pairs += kinds[a].count * kinds[b].count;
+    }
+  }
+  for (auto i = static_cast<std::uint32_t>(surface_count(bodies)); i < bodies.size(); ++i) {
+    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
+      if (collides(context, bodies[i]) && context.rules.allowed(i, j)) ++pairs;
     }
   }
   return pairs;
@@ -319,7 +325,7 @@ StageTimer::~StageTimer() {
 }
 
 std::uint32_t body_led_by(const std::vector<Body>& bodies, std::uint32_t particle) {
-  const auto before = [](const Body& body, std::uint32_t p) { return body.particle.front() < p; };
+  const auto before = [](const Body& body, std::uint32_t p) { return !body.origin.is_group() && body.particle.front() < p; };
   return static_cast<std::uint32_t>(std::lower_bound(bodies.begin(), bodies.end(), particle, before) - bodies.begin());
 }
 

@@ -389,15 +389,15 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const Division
   const core::ParticleState& particles = state.particles;
   const std::vector<Body>& bodies = context.bodies;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::Polygonise)];
-  std::vector<Mesh> surfaces(bodies.size());
+  std::vector<Mesh> surfaces(surface_count(bodies));
   frame.missed = {};
   mesh_divided(context, division, profile, frame, surfaces);
   std::vector<std::size_t> pieces(model.objects.size());
-  for (const Body& body : bodies) ++pieces[body.object];
+  for (std::size_t i = 0; i < surfaces.size(); ++i) ++pieces[bodies[i].object];
   KeptBudget budget(context.most_kept);
   for (const implicit::CubeMesher& mesher : frame.mesher) budget.add(mesher);
   for (const implicit::CreaseMesher& mesher : frame.creases) budget.add(mesher);
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {
       profile.present += 1;
@@ -405,12 +405,12 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const Division
       surfaces[i] = mesh_alone(context, i, pieces[bodies[i].object], budget, profile, frame);
     }
   }
-  for (std::uint32_t i = 0; i < bodies.size() && model.meshing.motion; ++i) {
+  for (std::uint32_t i = 0; i < surfaces.size() && model.meshing.motion; ++i) {
     if (surfaces[i].position.empty()) continue;
     core::gather_motion(model.particles, particles, bodies[i].particle, frame.velocity[i], frame.spin[i]);
     add_surface_motion(context, state, i, frame, surfaces[i]);
   }
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
     if (surfaces[i].position.empty()) continue;
     add_look_columns(model, bodies[i], particles, laws, frame.field[i], frame.pose[i], context.executor, surfaces[i]);
     if (model.objects[bodies[i].object].look.colour_by == ColourByName::Pressure) {
@@ -418,7 +418,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const Division
     }
   }
   std::vector<Mesh> meshes(model.objects.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
     Mesh& mesh = meshes[bodies[i].object];
     if (mesh.position.empty()) {
       mesh = std::move(surfaces[i]);
@@ -454,7 +454,7 @@ void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Bo
   }
   std::vector<Pose> pose;
   implicit::PlacedSkeleton placed;
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < surface_count(bodies); ++i) {
     const ObjectModel& object = model.objects[bodies[i].object];
     if (bodies[i].skeleton.primitive.empty()) continue;
     if (std::binary_search(division.body.begin(), division.body.end(), i) || (shown && !shown(fields[i].surface_box()))) continue;
@@ -462,7 +462,7 @@ void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Bo
     implicit::place_skeleton(bodies[i].skeleton, pose, placed);
     try {
       if (object.mesh_error && takes_cubes(d, object, bodies[i].skeleton, placed.support)) {
-        expect_error_alone(d, object, fields[i], bodies.size(), executor);
+        expect_error_alone(d, object, fields[i], surface_count(bodies), executor);
       } else if (!object.mesh_error) {
         expect_size_alone(d, object, bodies[i].skeleton, placed.support, fields[i], executor);
       }

@@ -271,13 +271,15 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
   return rule;
 }
 
-/// Components of the blending graph of an object that touches itself become bodies of their own.
+/// Components of the blending graph of an object that touches itself become bodies of their own, and so do groups that others join.
 void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   if (!d.contact->self.value_or(true)) return;
   BlendComponents components = blend_components(object.skeleton.blend, object.last - object.first);
   const bool several = std::any_of(components.first.begin(), components.first.end(), [](std::uint32_t first) { return first != 0; });
-  object.passes_itself = !components.direct || (several && d.volume);
+  const bool grouped = !components.group.empty();
+  object.passes_itself = (d.volume && (several || grouped)) || (d.breaking && grouped);
   if (several && !d.volume) object.component = std::move(components.first);
+  if (!d.volume && !d.breaking) object.group = std::move(components.group);
 }
 
 /// All particles move in one plane z = const.

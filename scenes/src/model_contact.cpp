@@ -295,13 +295,25 @@ bool only_convex(const ObjectModel& object) {
   return true;
 }
 
-/// Components of an object with a bond between them.
-void find_bonded_components(Model& model) {
+/// Components and groups of an object with a bond between them.
+void find_bonded(Model& model) {
+  const auto add = [](std::uint32_t x, std::uint32_t y, ObjectModel& object) {
+    const auto [a, b] = std::minmax(x, y);
+    if (a != b) object.bonded.push_back({a, b});
+  };
   for (const auto& [p, q] : core::bonded_pairs(model.interactions)) {
     ObjectModel& object = model.objects[model.particles.object[p]];
-    if (object.component.empty() || model.particles.object[q] != model.particles.object[p]) continue;
-    const auto [a, b] = std::minmax(object.component[p - object.first], object.component[q - object.first]);
-    if (a != b) object.bonded.push_back({a, b});
+    if (model.particles.object[q] != model.particles.object[p]) continue;
+    const std::uint32_t i = p - object.first, j = q - object.first;
+    if (!object.component.empty()) add(object.component[i], object.component[j], object);
+    if (object.group.empty() || (!object.component.empty() && object.component[i] != object.component[j])) continue;
+    const auto group_of = [&object](std::uint32_t particle) {
+      const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+      const auto first = std::find_if(object.group.begin(), object.group.end(), [&](std::uint32_t g) { return node[g] == node[particle]; });
+      return first != object.group.end() ? *first : BodyOrigin::kWhole;
+    };
+    const std::uint32_t a = group_of(i), b = group_of(j);
+    if (a != BodyOrigin::kWhole && b != BodyOrigin::kWhole) add(a, b, object);
   }
   for (ObjectModel& object : model.objects) {
     std::sort(object.bonded.begin(), object.bonded.end());
@@ -340,6 +352,7 @@ double solid_half_size(const implicit::Primitive& primitive) {
 std::size_t own_contacts(const ObjectModel& object) {
   if (object.breaks) return 2;
   if (object.separate) return object.last > object.first + 1 ? 2 : 0;
+  if (!object.group.empty()) return object.group.size();
   if (object.component.empty()) return 0;
   std::vector<std::uint8_t> solid(object.component.size(), 0);  // components that have a surface
   for (const implicit::Primitive& primitive : object.skeleton.primitive) solid[object.component[primitive.part]] = 1;
@@ -391,7 +404,7 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
   for (const auto& pair : model.rules.overrides) {
     model.largest_dissipation = std::max(model.largest_dissipation, pair.material.dissipation);
   }
-  find_bonded_components(model);
+  find_bonded(model);
   const auto count = static_cast<std::uint32_t>(model.objects.size());
   std::vector<std::uint8_t> convex;
   for (const ObjectModel& object : model.objects) convex.push_back(only_convex(object) ? 1 : 0);

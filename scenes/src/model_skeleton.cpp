@@ -296,11 +296,17 @@ BlendComponents blend_components(const implicit::Blend& blend, std::uint32_t par
     least = std::min(least, i);
     out.first[i] = least;
   }
-  std::vector<std::size_t> size(nodes, 0);
+  std::vector<std::uint32_t> size(nodes, 0), joined(nodes, 1);  // nodes of components, and those that a node blends with, itself one of them
   for (std::uint32_t k = 0; k < nodes; ++k) ++size[root_of(k)];
-  std::size_t pairs = 0;
-  for (const std::size_t n : size) pairs += n * (n - std::min<std::size_t>(n, 1)) / 2;
-  out.direct = blend.edge.size() == pairs;
+  for (const implicit::BlendEdge& e : blend.edge) {
+    ++joined[e.a];
+    ++joined[e.b];
+  }
+  std::vector<std::uint8_t> seen(nodes, 0);
+  for (std::uint32_t i = 0; i < parts; ++i) {
+    const std::uint32_t k = blend.node[i];
+    if (seen[k]++ == 0 && joined[k] < size[root_of(k)]) out.group.push_back(i);
+  }
   return out;
 }
 

@@ -26,7 +26,7 @@ namespace supple::scenes {
 /// What a blending graph joins.
 struct BlendComponents {
   std::vector<std::uint32_t> first;  ///< of each part: the first part that it blends with, directly or by way of others
-  bool direct = true;                ///< no two nodes are joined only by way of others
+  std::vector<std::uint32_t> group{};  ///< first parts of the nodes that others join with some node, but that do not blend with it; sorted
 };
 /// @param parts  of the blend's body
 [[nodiscard]] BlendComponents blend_components(const implicit::Blend& blend, std::uint32_t parts);

@@ -236,7 +236,7 @@ void ScenePictures::limit_meshes(Simulation& simulation) const {
 
 void ScenePictures::warn_inside(Simulation& simulation, std::size_t camera) {
   const std::vector<Body>& bodies = simulation.bodies();
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
+  for (std::size_t i = 0; i < surface_count(bodies); ++i) {
     if (bodies[i].skeleton.primitive.empty() || !(implicit::FieldView(simulation.fields()[i]).value(view_.camera.from) > 0.0)) continue;
     const std::string& name = cameras_of(scene_)[camera].name;
     const std::string text = "camera" + (name.empty() ? "" : " '" + name + "'") + " stands inside of '" +
@@ -333,7 +333,7 @@ void ScenePictures::add_fields(Simulation& simulation) {
   const std::vector<implicit::Field>& fields = simulation.fields();
   const Division& division = simulation.division();
   std::vector<Pieces> pieces(scene_.objects.size());
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < surface_count(bodies); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     std::vector<Piece>& of_object = pieces[bodies[i].object].piece;
     const auto at = std::lower_bound(division.body.begin(), division.body.end(), i);

@@ -20,6 +20,7 @@ bool age_broken_links(const Model& model, double dt, State& state) {
 
 ApartPairs inherited_apart(const Model& model, const std::vector<Body>& before, const ApartPairs& apart, const std::vector<Body>& bodies) {
   const auto origin = [&before](const Body& body) {
+    if (body.origin.is_group()) return body.particle.front();  // what has groups does not break
     for (const Body& old : before) {
       if (std::binary_search(old.particle.begin(), old.particle.end(), body.particle.front())) return old.particle.front();
     }
@@ -54,9 +55,10 @@ bool note_overlapping(const std::vector<Body>& bodies, const Frame& frame, Model
   bool any = false;
   const auto note = [&](const collision::BodyPair& pair) {
     if (pair.b >= bodies.size() || bodies[pair.a].object != bodies[pair.b].object) return;
-    const auto [a, b] = std::minmax(bodies[pair.a].origin.component, bodies[pair.b].origin.component);
+    const BodyOrigin &first = bodies[pair.a].origin, &second = bodies[pair.b].origin;
+    const auto [a, b] = std::minmax({first.number(), second.number()});
     ObjectModel& object = model.objects[bodies[pair.a].object];
-    if (a == b || object.component.empty()) return;
+    if (a == b || first.is_group() != second.is_group() || (object.component.empty() && !first.is_group())) return;
     object.overlapping.push_back({a, b});
     any = true;
   };
@@ -74,6 +76,12 @@ bool note_overlapping(const std::vector<Body>& bodies, const Frame& frame, Model
 
 namespace {
 
+std::uint32_t group_led_by(const std::vector<Body>& bodies, std::uint32_t particle) {
+  const auto whole = bodies.begin() + static_cast<std::ptrdiff_t>(surface_count(bodies));
+  const auto before = [](const Body& body, std::uint32_t p) { return body.particle.front() < p; };
+  return static_cast<std::uint32_t>(std::lower_bound(whole, bodies.end(), particle, before) - bodies.begin());
+}
+
 /// Bodies of one object that meet once they have been apart, but for those that have been.
 std::vector<collision::BodyPair> pairs_to_part(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
   std::vector<collision::BodyPair> pairs;
@@ -86,8 +94,11 @@ std::vector<collision::BodyPair> pairs_to_part(const Model& model, const std::ve
   const auto body_of = [&](std::uint32_t particle) { return body_led_by(bodies, particle); };
   for (const ObjectModel& object : model.objects) {
     if (!object.collides || object.separate) continue;
-    if (!object.breaks) {  // bodies are its components, and few of their pairs overlapped
-      for (const collision::BodyPair& pair : object.overlapping) add(body_of(object.first + pair.a), body_of(object.first + pair.b));
+    if (!object.breaks) {  // bodies are its components and their groups, and few of their pairs overlapped
+      for (const collision::BodyPair& pair : object.overlapping) {
+        const auto find = [&](std::uint32_t particle) { return object.are_groups(pair) ? group_led_by(bodies, particle) : body_of(particle); };
+        add(find(object.first + pair.a), find(object.first + pair.b));
+      }
       continue;
     }
     const std::uint32_t end = body_of(object.last);

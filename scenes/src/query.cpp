@@ -139,7 +139,7 @@ std::string query_field(Simulation& simulation, const fs::path& points) {
   json["time_s"] = simulation.time();
   json["convention"] = "value > 0 inside; the outward normal is -gradient / |gradient|";
   ordered_json objects = ordered_json::array();
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
+  for (std::size_t i = 0; i < surface_count(bodies); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     std::vector<double> values(at.size());
     std::vector<Vec3> gradients(at.size());
@@ -227,12 +227,12 @@ std::string search_text(const Simulation& simulation, std::size_t object) {
   if (d.method != MeshingName::Auto && d.method != MeshingName::Cubes) return "not searched: only marching cubes are";
   const ObjectModel& model = simulation.model().objects[object];
   const core::ParticleState& particles = simulation.state().particles;
-  const auto bodies = static_cast<std::size_t>(
-      std::count_if(simulation.bodies().begin(), simulation.bodies().end(), [&](const Body& b) { return b.object == object; }));
+  const std::span<const Body> surfaces = std::span(simulation.bodies()).first(surface_count(simulation.bodies()));
+  const auto bodies = static_cast<std::size_t>(std::count_if(surfaces.begin(), surfaces.end(), [&](const Body& b) { return b.object == object; }));
   implicit::SearchEstimate sum;
   std::optional<Unsearched> why;
   bool by_grid = false;
-  for (const Body& body : simulation.bodies()) {
+  for (const Body& body : surfaces) {
     if (body.object != object) continue;
     std::vector<Pose> poses;
     for (const std::uint32_t p : body.particle) poses.push_back({particles.position[p], particles.orientation[p]});
@@ -271,16 +271,23 @@ std::string searches_text(const Simulation& simulation) {
 /// Which parts of an object touch each other, in a sentence; empty: it is one body.
 std::string self_contact_text(const ObjectModel& object) {
   std::string text;
+  const auto add_exceptions = [&](bool of_groups) {
+    const auto except = [&](const std::vector<collision::BodyPair>& pairs, const char* which) {
+      const auto count = std::count_if(pairs.begin(), pairs.end(), [&](const collision::BodyPair& pair) { return object.are_groups(pair) == of_groups; });
+      if (count > 0) text += "; not " + std::to_string(count) + (count == 1 ? " pair " : " pairs ") + which;
+    };
+    except(object.bonded, "with a bond");
+    except(object.overlapping, "that overlap at the start, until they have been apart");
+  };
   if (!object.component.empty()) {
     std::size_t parts = 0;
     for (std::uint32_t i = 0; i < object.component.size(); ++i) parts += object.component[i] == i ? 1 : 0;
     text = std::to_string(parts) + " parts that do not blend are bodies that touch each other";
-    const auto except = [&](const std::vector<collision::BodyPair>& pairs, const char* which) {
-      if (pairs.empty()) return;
-      text += "; not " + std::to_string(pairs.size()) + (pairs.size() == 1 ? " pair " : " pairs ") + which;
-    };
-    except(object.bonded, "with a bond");
-    except(object.overlapping, "that overlap at the start, until they have been apart");
+    add_exceptions(false);
+  }
+  if (!object.group.empty()) {
+    text += (text.empty() ? "" : "; ") + std::to_string(object.group.size()) + " groups touch those that they do not blend with, by their own fields";
+    add_exceptions(true);
   }
   if (object.passes_itself) text += (text.empty() ? "" : "; ") + passing_text(object);
   return text;

@@ -38,6 +38,7 @@ std::vector<collision::BodyMotion> motions_of(const std::vector<Body>& bodies, c
   std::vector<std::uint32_t> body_of(set.size(), kNobody);
   std::vector<double> mass(bodies.size(), 0.0);
   for (const std::uint32_t i : awake) {
+    if (bodies[i].origin.is_group()) continue;  // rests with the body that it is part of
     for (const std::uint32_t p : bodies[i].particle) body_of[p] = i;
     mass[i] = mass_of(bodies[i], set);
   }
@@ -50,10 +51,17 @@ std::vector<collision::BodyMotion> motions_of(const std::vector<Body>& bodies, c
 
 std::vector<collision::BodyPair> tied_bodies(const std::vector<Body>& bodies, const core::Interactions& laws) {
   std::vector<collision::BodyPair> tied;
+  const std::size_t surfaces = surface_count(bodies);
+  for (std::size_t i = surfaces; i < bodies.size(); ++i) {
+    const auto whole = std::find_if(bodies.begin(), bodies.begin() + static_cast<std::ptrdiff_t>(surfaces), [&](const Body& body) {
+      return body.object == bodies[i].object && body.origin.component == bodies[i].origin.component;
+    });
+    tied.push_back({static_cast<std::uint32_t>(whole - bodies.begin()), static_cast<std::uint32_t>(i)});
+  }
   for (const auto& [a, b] : core::acting_objects(laws)) {
     std::uint32_t first = 0;
-    while (first < bodies.size() && bodies[first].object != a && bodies[first].object != b) ++first;
-    for (std::uint32_t i = first + 1; i < bodies.size(); ++i) {
+    while (first < surfaces && bodies[first].object != a && bodies[first].object != b) ++first;
+    for (std::uint32_t i = first + 1; i < surfaces; ++i) {
       if (bodies[i].object == a || bodies[i].object == b) tied.push_back({first, i});
     }
   }

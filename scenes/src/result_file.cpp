@@ -95,7 +95,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
       const ObjectModel& o = model.objects[i];
       const auto& record = state.record.objects[i];
       const auto pieces = std::count_if(simulation->bodies().begin(), simulation->bodies().end(),
-                                        [i](const Body& body) { return body.object == i; });
+                                        [i](const Body& body) { return body.object == i && !body.origin.is_group(); });
       objects[o.name] = {{"particles", o.last - o.first},
                          {"pieces", pieces},
                          {"diameter", o.rest_diameter},

@@ -99,8 +99,8 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
   std::deque<collision::DeformedField> bulging;
   std::deque<implicit::DepthField> depth;
   std::vector<implicit::UnitedBody> united;
-  updater_.resize(bodies.size());
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  updater_.resize(surface_count(bodies));
+  for (std::uint32_t i = 0; i < surface_count(bodies); ++i) {
     if (bodies[i].skeleton.primitive.empty()) continue;
     options.name = bodies[i].name;
     const ObjectModel& object = model.objects[bodies[i].object];
@@ -149,7 +149,7 @@ void expect_grid_sizes(Simulation& simulation, const Executor& executor) try {
   if (gridding.of == GriddedName::Scene) return;
   const std::vector<implicit::Field>& fields = simulation.fields();
   const Division& division = simulation.division();
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < surface_count(bodies); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
     const ObjectModel& object = simulation.model().objects[bodies[i].object];
     try {

@@ -50,7 +50,7 @@ void SceneSamples::follow(Simulation& simulation, const Executor& executor) {
   bodies_.clear();
   std::sort(before.begin(), before.end(), [](const OfBody& a, const OfBody& b) { return a.particle < b.particle; });
   std::vector<Pose> pose;
-  for (std::size_t i = 0; i < simulation.bodies().size(); ++i) {
+  for (std::size_t i = 0; i < surface_count(simulation.bodies()); ++i) {
     const Body& body = simulation.bodies()[i];
     if (body.skeleton.primitive.empty()) continue;
     OfBody& samples = bodies_.emplace_back(OfBody{.object = body.object, .particle = body.particle, .set = {}});
@@ -68,7 +68,7 @@ void SceneSamples::follow(Simulation& simulation, const Executor& executor) {
 }
 
 void SceneSamples::expect_sizes(Simulation& simulation, const Executor& executor) const {
-  for (std::size_t i = 0; i < simulation.bodies().size(); ++i) {
+  for (std::size_t i = 0; i < surface_count(simulation.bodies()); ++i) {
     const Body& body = simulation.bodies()[i];
     if (body.skeleton.primitive.empty()) continue;
     const implicit::Field& field = simulation.fields()[i];

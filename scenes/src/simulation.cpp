@@ -99,7 +99,7 @@ void Simulation::Impl::step() {
         core::advance(integrator.settings, particles, awake_laws, forces, time(), dt(), state.particles,
                       state.kick, state.ledger, executor, workspace, integrator_workspace);
     book_work(report);
-    for (const std::uint32_t i : awake) p.visited += bodies[i].particle.size();
+    for (const std::uint32_t i : awake) p.visited += bodies[i].origin.is_group() ? 0 : bodies[i].particle.size();
     p.present += particles.size();
   }
   ++state.steps;
@@ -289,7 +289,7 @@ void Simulation::set_cells(int cells) {
   SUPPLE_EXPECTS(cells > 0);
   impl_->pull_fields();
   Box all;
-  for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
+  for (std::size_t i = 0; i < surface_count(impl_->bodies); ++i) {
     if (!impl_->bodies[i].skeleton.primitive.empty()) all = all.united(impl_->pulled.field[i].surface_box());
   }
   if (!all.empty()) {

@@ -24,9 +24,9 @@ void Simulation::Impl::form_bodies() {
   renew_pulled();
 }
 
-/// Components of one object that overlap at the start would be driven apart: they meet once they have been apart.
+/// Components and groups of one object that overlap at the start would be driven apart: they meet once they have been apart.
 void Simulation::Impl::leave_overlapping() {
-  if (std::all_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.component.empty(); })) return;
+  if (std::all_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.component.empty() && o.group.empty(); })) return;
   pull_contacts();
   if (!note_overlapping(bodies, pulled, model)) return;
   divide_anew();
@@ -158,7 +158,9 @@ void Simulation::Impl::wake_touched() {
   const core::Loads loads = state.kick.sample.internal;
   const std::vector<std::uint32_t> rose = wake(touched);
   if (integrator.settings.method != core::Integrator::Symplectic) return;
-  for (const std::uint32_t i : rose) give_half_kick(bodies[i], particles, loads, dt(), state);
+  for (const std::uint32_t i : rose) {
+    if (!bodies[i].origin.is_group()) give_half_kick(bodies[i], particles, loads, dt(), state);
+  }
 }
 
 /// After a step: islands that have been quiet for long enough stop, and what they had is booked as held and dissipated.

@@ -18,7 +18,7 @@ void Simulation::Impl::place_cameras() {
   Box seen;
   if (std::any_of(cameras.begin(), cameras.end(), is_open)) {
     pull_fields();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
+    for (std::size_t i = 0; i < surface_count(bodies); ++i) {
       const LookDesc& look = scene.objects[bodies[i].object].look;
       if (!bodies[i].skeleton.primitive.empty() && (look.surface || look.wireframe)) seen = seen.united(pulled.field[i].surface_box());
     }

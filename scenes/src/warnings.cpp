@@ -65,7 +65,7 @@ void add_passing(const Model& model, std::vector<std::string>& warnings) {
 /// Convolved primitives add up to less than their kernel, perhaps nowhere to the iso value.
 void add_without_surface(const StageContext& context, const core::ParticleState& particles, Frame& frame,
                          std::vector<std::string>& warnings) {
-  for (std::size_t i = 0; i < context.bodies.size(); ++i) {
+  for (std::size_t i = 0; i < surface_count(context.bodies); ++i) {
     const implicit::Skeleton& skeleton = context.bodies[i].skeleton;
     const auto convolved = [](const implicit::Primitive& p) { return p.convolved; };
     if (std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), convolved)) continue;
@@ -195,7 +195,7 @@ bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const coll
 
 std::string passing_text(const ObjectModel& object) {
   return object.holds_volume ? "it holds its volume, so it stays one body and passes through itself where it does not blend"
-                             : "what its blending graph joins only by way of others does not blend, but passes through itself";
+                             : "it may break, so what its blending graph joins only by way of others does not blend, but passes through itself";
 }
 
 std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles, Frame& frame) {
@@ -227,7 +227,10 @@ bool misses_error(const collision::ContactSurface::Summary& contact, double aske
 
 void UnmetContacts::look(const StageContext& context, const collision::ContactSurface& surface, double time) {
   const double asked = context.model.contact.error;
-  const auto kind = [&](std::uint32_t body) -> const std::string& { return object_name(context.model, context.bodies, body); };
+  const auto kind = [&](std::uint32_t body) -> const std::string& {
+    const bool is_group = body < context.bodies.size() && context.bodies[body].origin.is_group();
+    return (is_group ? body_name : object_name)(context.model, context.bodies, body);
+  };
   for (const auto& s : surface.summary) {
     if (!misses_error(s, asked) || s.force.norm() == 0.0) continue;  // without force: the rule asked for does not fit
     Worst& worst = worst_[{kind(s.bodies.a), kind(s.bodies.b)}];

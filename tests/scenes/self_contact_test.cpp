@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 
 #include "run_scenes.h"
 #include "supple/core/mesh.h"
+#include "supple/scenes/contact_report.h"
 #include "supple/scenes/query.h"
 
 namespace supple::scenes {
@@ -238,17 +241,199 @@ TEST(SelfContact, IsExplained) {
       << explain(overlapping);
 }
 
-// Where a graph joins stretches by way of others, they are one body; that is said, unless it is meant.
+/// Three parts in a row of which the middle one blends with both others, which do not blend with each other.
+std::string joined(const std::string& skeleton, const std::string& keys, const std::string& contact) {
+  return "  - name: chain\n    particles: {arrange: line, count: 3, spacing: 0.25, inertia_radius: 0.1, mass: 0.1}\n    skeleton: [" + skeleton +
+         "]\n    blend: {rule: graph, neighbours: 1}\n    contact: " + contact + "\n    " + keys + '\n';
+}
+const std::string kPressed = "loads: [{particle: 0, force: [0.6, 0.05, 0], torque: [0, 0, 2e-4]}, {particle: 2, force: [-0.6, 0, 0.05]}]";
+const std::string kRubs = "{modulus: 2e4, friction: 0.3, dissipation: 0.1}";
+
+TEST(GroupContact, IsThatOfTwoObjects) {
+  for (const char* skeleton : {kBall, kTwin}) {
+    Simulation groups = make(kHead + joined(skeleton, kPressed, kRubs)), objects = two_bodies(skeleton, false);
+    ASSERT_EQ(groups.bodies().size(), 3u);
+    EXPECT_EQ(groups.bodies()[0].name, "chain");
+    EXPECT_EQ(groups.bodies()[1].name, "chain.group1");
+    EXPECT_EQ(groups.bodies()[2].name, "chain.group3");
+    EXPECT_TRUE(groups.warnings().empty());
+    int touched = 0;
+    while (groups.frame() < 13) {
+      groups.step();
+      objects.step();
+      for (const auto& [own, other] : {std::pair(0, 0), std::pair(2, 1)}) {
+        ASSERT_EQ(groups.state().particles.position[own], objects.state().particles.position[other]) << groups.time();
+        ASSERT_EQ(groups.state().particles.angular_momentum[own], objects.state().particles.angular_momentum[other]) << groups.time();
+      }
+      const auto &own = groups.contacts().summary, &other = objects.contacts().summary;
+      ASSERT_EQ(own.size(), other.size()) << groups.time();
+      if (own.empty()) continue;
+      ++touched;
+      EXPECT_EQ(own[0].bodies, (collision::BodyPair{1, 2}));
+      EXPECT_EQ(report_contacts(groups).pairs[0].a, "chain.group1");
+      EXPECT_EQ(own[0].energy, other[0].energy);
+      EXPECT_EQ(own[0].force, other[0].force);
+    }
+    EXPECT_GT(touched, 10);
+    EXPECT_EQ(groups.state().particles.velocity[1], Vec3::Zero());  // the middle one touches neither
+    EXPECT_EQ(groups.audits().energy_error, objects.audits().energy_error);
+  }
+}
+
+TEST(GroupContact, HasTheSameBitsForAnyThreadsAndWithoutSkipsAndFromASavedState) {
+  const auto chain = [](SimulationOptions options) { return make(kHead + joined(kTwin, kPressed, kRubs), options); };
+  const auto hash = [&](SimulationOptions options) {
+    Simulation simulation = chain(options);
+    run(simulation, 13);
+    return simulation.state_hash();
+  };
+  const std::uint64_t one = hash({.threads = 1});
+  EXPECT_EQ(hash({.threads = 3}), one);
+  EXPECT_EQ(hash({.threads = 1, .skip = false}), one);
+  Simulation first = chain({}), second = chain({});
+  while (first.contacts().summary.empty()) first.step_frame();
+  first.step();
+  second.restore(first.state());
+  run(second, 13);
+  EXPECT_EQ(second.state_hash(), one);
+}
+
+// The surface of the whole has a crease where its groups meet, as without contact.
+TEST(GroupContact, DividesNoSurface) {
+  Simulation touching = make(kHead + joined(kTwin, kPressed, kRubs)), passing = make(kHead + joined(kTwin, kPressed, "{self: false}"));
+  while (touching.contacts().summary.empty()) touching.step_frame();
+  passing.adopt(touching.state());
+  ASSERT_EQ(touching.meshes().size(), 1u);
+  EXPECT_EQ(touching.meshes()[0].position, passing.meshes()[0].position);
+  EXPECT_TRUE(touching.division().body.empty());
+}
+
+// Groups that touch nothing change nothing, nor does their sleep: something that hits what they are part of wakes all of it, once.
+TEST(GroupContact, ThatDoesNotHappenChangesNoBit) {
+  const auto scene = [](const std::string& contact) {
+    return "schema: 1\nduration: 4 s\nframe_rate: 20\nsleep: {speed: 0.01, time: 0.2}\nobjects:\n" +
+           joined(kBall, "interactions: [{law: bond_frame, stretch: 20, rotation: 0.5}, {law: friction, linear: 0.5}]", contact) +
+           "  - name: visitor\n    particles: {at: [0.25, 0, 1], velocity: [0, 0, -1.3], mass: 0.1, inertia_radius: 0.1}\n    skeleton: [" + kBall +
+           "]\n    contact: {modulus: 2e4}\n";
+  };
+  Simulation groups = make(scene("{modulus: 2e4}")), whole = make(scene("{modulus: 2e4, self: false}"));
+  ASSERT_EQ(groups.bodies().size(), 4u);
+  ASSERT_EQ(whole.bodies().size(), 2u);
+  bool slept = false, woke = false;
+  while (groups.frame() < 40) {
+    groups.step();
+    whole.step();
+    const bool asleep = groups.state().sleep.asleep(0);
+    ASSERT_EQ(asleep, whole.state().sleep.asleep(0)) << groups.time();
+    EXPECT_EQ(groups.state().sleep.asleep(2), asleep) << groups.time();
+    EXPECT_EQ(groups.state().sleep.asleep(3), asleep) << groups.time();
+    slept = slept || asleep;
+    woke = woke || (slept && !asleep);
+    ASSERT_EQ(groups.state().particles.position, whole.state().particles.position) << groups.time();
+    ASSERT_EQ(groups.state().particles.velocity, whole.state().particles.velocity) << groups.time();
+  }
+  EXPECT_TRUE(slept);
+  EXPECT_TRUE(woke);
+}
+
+TEST(GroupContact, OfThoseThatOverlapAtTheStartBeginsOnceTheyHaveBeenApart) {
+  const auto close = [](const std::string& loads) {
+    std::string text = "schema: 1\nduration: 2 s\nframe_rate: 20\nobjects:\n" + joined(kBall, loads, "{modulus: 2e4}");
+    return make(text.replace(text.find("0.25"), 4, "0.1"));
+  };
+  Simulation simulation = close("loads: [{particle: 0, force: [-1, 0, 0], until: 0.2}, {particle: 2, force: [1, 0, 0], until: 0.2}, "
+                                "{particle: 0, force: [2, 0, 0], from: 0.2, until: 0.5}, {particle: 2, force: [-2, 0, 0], from: 0.2, until: 0.5}]");
+  ASSERT_EQ(simulation.warnings().size(), 1u);
+  EXPECT_NE(simulation.warnings()[0].find("touch once they have been apart: 1 pair, the first with particles 0 and 2"), std::string::npos)
+      << simulation.warnings()[0];
+  EXPECT_EQ(simulation.energies().contact, 0.0);
+  double nearest = 1.0;
+  while (simulation.frame() < 30) {
+    simulation.step();
+    const auto& x = simulation.state().particles.position;
+    if (!simulation.state().apart.empty()) nearest = std::min(nearest, x[2].x() - x[0].x());
+  }
+  EXPECT_EQ(simulation.state().apart, (ApartPairs{{0, 2}}));
+  EXPECT_GT(nearest, 0.05);  // 0.27 is where they touch; they did not pass
+  const auto& x = simulation.state().particles.position;
+  EXPECT_GT(x[2].x() - x[0].x(), 0.2);
+}
+
+// Of five parts in a row six pairs do not blend, of which bonds tie three.
+TEST(GroupContact, IsNotBetweenBondedGroups) {
+  const auto present = [](const std::string& keys) {
+    Simulation simulation = make("schema: 1\nduration: 1\nframe_rate: 20\nobjects:\n  - name: row\n    particles: {arrange: line, count: 5, spacing: 0.3, mass: 0.1}\n"
+                                 "    skeleton: [" + std::string(kBall) + "]\n    blend: {rule: graph, neighbours: 1}\n    contact: {}\n    " + keys + "\nground: {height: -0.13}\n");
+    simulation.step();
+    const StageProfile found = simulation.profile()[static_cast<std::size_t>(Stage::FindContacts)];
+    return static_cast<double>(found.present) / static_cast<double>(found.calls);
+  };
+  EXPECT_EQ(present("loads: []"), 6 + 1);
+  EXPECT_EQ(present("interactions: [{law: bond_frame, stretch: 5, rotation: 0.1, neighbours: 2}]"), 3 + 1);
+}
+
+// Two rows of three, each a component with two groups.
+TEST(GroupContact, IsWithinComponents) {
+  const std::filesystem::path folder = ::testing::TempDir();
+  std::ofstream(folder / "two_rows.csv") << "-0.25, 0, 0\n0, 0, 0\n0.25, 0, 0\n-0.25, 1, 0\n0, 1, 0\n0.25, 1, 0\n";
+  Simulation rows(parse_scene("schema: 1\nduration: 1\nframe_rate: 20\nobjects:\n  - name: rows\n    particles: {arrange: file, file: two_rows.csv, mass: 0.1, inertia_radius: 0.1}\n"
+                              "    skeleton: [" + std::string(kBall) + "]\n    blend: {rule: graph, within: 0.3}\n    contact: {modulus: 2e4}\n"
+                              "    loads: [{particle: 3, force: [0.6, 0, 0]}, {particle: 5, force: [-0.6, 0, 0]}]\n", "test.yaml", folder), {});
+  std::vector<std::string> names;
+  for (const Body& body : rows.bodies()) names.push_back(body.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"rows.1", "rows.2", "rows.group1", "rows.group3", "rows.group4", "rows.group6"}));
+  EXPECT_EQ(surface_count(rows.bodies()), 2u);
+  EXPECT_NE(explain(rows).find("2 parts that do not blend are bodies that touch each other; 4 groups touch those that they do not blend with, by their own fields\n"),
+            std::string::npos)
+      << explain(rows);
+  while (rows.frame() < 13 && rows.contacts().summary.empty()) rows.step();
+  ASSERT_EQ(rows.contacts().summary.size(), 1u);
+  EXPECT_EQ(rows.contacts().summary[0].bodies, (collision::BodyPair{4, 5}));
+  EXPECT_EQ(rows.meshes().size(), 1u);
+}
+
+// One group presses on two that blend with each other, where all three overlap: the energy is that of the pair that presses harder.
+TEST(GroupContact, KeepsItsEnergyWhereThreeOverlap) {
+  const std::filesystem::path folder = ::testing::TempDir();
+  std::ofstream(folder / "hook.csv") << "0.375, 0.4, 0\n-0.6, 0.4, 0\n-0.6, 0, 0\n0.25, 0, 0\n0.5, 0, 0\n";
+  Simulation hook(parse_scene("schema: 1\nduration: 2\nframe_rate: 50\ntime_step: {substeps: 64}\nobjects:\n  - name: hook\n"
+                              "    particles: {arrange: file, file: hook.csv, mass: 0.1, inertia_radius: 0.1}\n    skeleton: [" + std::string(kBall) +
+                              "]\n    blend: {rule: graph, neighbours: 1}\n    contact: {modulus: 2e4}\n    loads: [{particle: 0, force: [0, -5, 0], until: 0.05}]\n",
+                              "test.yaml", folder), {});
+  ASSERT_EQ(hook.bodies().size(), 6u);
+  int together = 0;
+  double fastest = 0.0;
+  while (hook.frame() < 40) {
+    hook.step();
+    fastest = std::min(fastest, hook.state().particles.velocity[0].y());
+    std::vector<collision::BodyPair> pairs;
+    for (const auto& s : hook.contacts().summary) pairs.push_back(s.bodies);
+    if (pairs.empty()) continue;
+    EXPECT_EQ(pairs, (std::vector<collision::BodyPair>{{1, 4}, {1, 5}})) << hook.time();
+    ++together;
+  }
+  EXPECT_GT(together, 20);
+  EXPECT_LT(fastest, -1.0);
+  EXPECT_LT(hook.audits().energy_error, 1e-4);
+  EXPECT_LT(hook.audits().momentum_error, 1e-12);
+  const auto& v = hook.state().particles.velocity;
+  EXPECT_NEAR(v[3].x(), -v[4].x(), 1e-9);  // to both sides alike
+  EXPECT_GT(v[0].y() - fastest, 1.0);
+}
+
+// What could break, or holds its volume, stays one body; that is said, unless it is meant.
 TEST(SelfContact, SaysWhatPassesThroughItself) {
   const auto chain = [](const std::string& blend, const std::string& contact) {
     return make("schema: 1\nduration: 1\nobjects:\n  - name: chain\n    particles: {arrange: line, count: 4, spacing: 0.2, mass: 0.1}\n    skeleton: [" +
                 std::string(kBall) + "]\n    blend: {rule: graph, " + blend + "}\n    contact: " + contact + '\n');
   };
-  const std::string text = "what its blending graph joins only by way of others does not blend, but passes through itself";
-  Simulation part = chain("neighbours: 1", "{}");
+  const std::string breaks = "\n    interactions: [{law: bond_frame, stretch: 5, rotation: 0.1}]\n    breaking: {stretch: 2}";
+  const std::string text = "it may break, so what its blending graph joins only by way of others does not blend, but passes through itself";
+  Simulation part = chain("neighbours: 1", "{}" + breaks);
   ASSERT_EQ(part.warnings().size(), 1u);
   EXPECT_NE(part.warnings()[0].find("objects.chain.contact: " + text), std::string::npos) << part.warnings()[0];
   EXPECT_NE(explain(part).find("but passes through itself"), std::string::npos) << explain(part);
+  EXPECT_TRUE(chain("neighbours: 1", "{self: false}" + breaks).warnings().empty());
   Simulation held = chain("neighbours: 3", "{}\n    volume: {rate: 1}");
   EXPECT_TRUE(held.warnings().empty());
   Simulation parts = chain("within: 0.1", "{}\n    volume: {rate: 1}");
@@ -256,7 +441,7 @@ TEST(SelfContact, SaysWhatPassesThroughItself) {
   ASSERT_EQ(parts.warnings().size(), 1u);
   EXPECT_NE(parts.warnings()[0].find("objects.chain.contact: it holds its volume"), std::string::npos) << parts.warnings()[0];
   EXPECT_TRUE(chain("neighbours: 3", "{}").warnings().empty());  // all blend
-  EXPECT_TRUE(chain("neighbours: 1", "{self: false}").warnings().empty());
+  EXPECT_EQ(chain("neighbours: 1", "{self: false}").bodies().size(), 1u);
 }
 
 }  // namespace
