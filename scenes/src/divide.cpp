@@ -31,9 +31,8 @@ void find_strangers(const Model& model, const std::vector<Body>& bodies, Divisio
 Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
                      std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface, const Executor& executor) {
   Division out;
-  const std::size_t surfaces = surface_count(bodies);
+  const std::size_t surfaces = surface_count(bodies);  // groups divide none: where they meet, their component has a crease
   for (const auto& s : surface.summary) {
-    if (s.bodies.a >= surfaces) continue;  // groups divide no surface: where they meet, their component has a crease
     for (const std::uint32_t body : {s.bodies.a, s.bodies.b}) {
       if (body < surfaces) out.body.push_back(body);
     }

@@ -317,7 +317,7 @@ TEST(Intersect, MeetsTheSurfaceOfEveryBlendAndNothingElse) {
 
 /// The largest value on a ray: samples, and a ternary search about the best.
 std::pair<double, double> peak_on_ray(const Field& field, const Vec3& origin, const Vec3& direction, double t_max) {
-  constexpr int kSamples = 20000;
+  constexpr int kSamples = 6000;
   const auto value = [&](double t) { return FieldView(field).value(origin + t * direction); };
   int best = 0;
   double most = value(0.0);
