@@ -213,17 +213,17 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) 
       if (count > 1) body.name += '.' + std::to_string(k + 1);
       take_part(object, primitives, seeds, body);
     }
+    const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+    const std::size_t nodes = object.group.empty() ? 0 : particles;  // at most
+    const Carried members(nodes, nodes, [&](std::size_t i) { return node[i]; });
     for (const std::uint32_t first : object.group) {
-      const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
       Body group{.object = o,
                  .origin = {piece[object.first + first], object.component.empty() ? 0 : object.component[first], first},
                  .name = object.name + ".group" + std::to_string(node[first] + 1),
                  .particle = {}, .yield = {}, .skeleton = {}, .samples = {}};
-      for (std::uint32_t i = first; i < particles; ++i) {
-        if (node[i] == node[first]) add_particle(model.particles, object.first + i, group);
-      }
+      for (const std::size_t i : members.of({&node[first], 1})) add_particle(model.particles, object.first + static_cast<std::uint32_t>(i), group);
       take_part(object, primitives, seeds, group);
-      if (!group.skeleton.primitive.empty()) groups.push_back(std::move(group));
+      groups.push_back(std::move(group));
     }
   }
   std::move(groups.begin(), groups.end(), std::back_inserter(bodies));

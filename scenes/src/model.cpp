@@ -276,6 +276,12 @@ void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   if (!d.contact->self.value_or(true)) return;
   BlendComponents components = blend_components(object.skeleton.blend, object.last - object.first);
   const bool several = std::any_of(components.first.begin(), components.first.end(), [](std::uint32_t first) { return first != 0; });
+  const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+  std::vector<std::uint8_t> solid(node.size(), 0);  // nodes that have primitives; there are no more than particles
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    if (!node.empty()) solid[node[primitive.part]] = 1;
+  }
+  std::erase_if(components.group, [&](std::uint32_t first) { return solid[node[first]] == 0; });
   const bool grouped = !components.group.empty();
   object.passes_itself = (d.volume && (several || grouped)) || (d.breaking && grouped);
   if (several && !d.volume) object.component = std::move(components.first);

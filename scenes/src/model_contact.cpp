@@ -301,18 +301,21 @@ void find_bonded(Model& model) {
     const auto [a, b] = std::minmax(x, y);
     if (a != b) object.bonded.push_back({a, b});
   };
+  std::vector<std::uint32_t> group_of(model.particles.size(), BodyOrigin::kWhole);  // of each particle
+  for (const ObjectModel& object : model.objects) {
+    if (object.group.empty()) continue;
+    const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+    std::vector<std::uint32_t> led_by(node.size(), BodyOrigin::kWhole);  // nodes are no more than particles
+    for (const std::uint32_t first : object.group) led_by[node[first]] = first;
+    for (std::uint32_t i = 0; i < node.size(); ++i) group_of[object.first + i] = led_by[node[i]];
+  }
   for (const auto& [p, q] : core::bonded_pairs(model.interactions)) {
     ObjectModel& object = model.objects[model.particles.object[p]];
     if (model.particles.object[q] != model.particles.object[p]) continue;
     const std::uint32_t i = p - object.first, j = q - object.first;
     if (!object.component.empty()) add(object.component[i], object.component[j], object);
-    if (object.group.empty() || (!object.component.empty() && object.component[i] != object.component[j])) continue;
-    const auto group_of = [&object](std::uint32_t particle) {
-      const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
-      const auto first = std::find_if(object.group.begin(), object.group.end(), [&](std::uint32_t g) { return node[g] == node[particle]; });
-      return first != object.group.end() ? *first : BodyOrigin::kWhole;
-    };
-    const std::uint32_t a = group_of(i), b = group_of(j);
+    if (!object.component.empty() && object.component[i] != object.component[j]) continue;
+    const std::uint32_t a = group_of[p], b = group_of[q];
     if (a != BodyOrigin::kWhole && b != BodyOrigin::kWhole) add(a, b, object);
   }
   for (ObjectModel& object : model.objects) {
@@ -352,7 +355,12 @@ double solid_half_size(const implicit::Primitive& primitive) {
 std::size_t own_contacts(const ObjectModel& object) {
   if (object.breaks) return 2;
   if (object.separate) return object.last > object.first + 1 ? 2 : 0;
-  if (!object.group.empty()) return object.group.size();
+  const auto origin = [&object](std::uint32_t first) { return BodyOrigin{0, object.component.empty() ? 0 : object.component[first], first}; };
+  for (auto a = object.group.begin(); a != object.group.end(); ++a) {
+    if (std::any_of(a + 1, object.group.end(), [&](std::uint32_t b) { return meeting_of(object, origin(*a), origin(b)) != Meeting::Never; })) {
+      return object.group.size();
+    }
+  }
   if (object.component.empty()) return 0;
   std::vector<std::uint8_t> solid(object.component.size(), 0);  // components that have a surface
   for (const implicit::Primitive& primitive : object.skeleton.primitive) solid[object.component[primitive.part]] = 1;

@@ -372,6 +372,13 @@ TEST(GroupContact, IsNotBetweenBondedGroups) {
   EXPECT_EQ(present("interactions: [{law: bond_frame, stretch: 5, rotation: 0.1, neighbours: 2}]"), 3 + 1);
 }
 
+TEST(GroupContact, IsNotLookedForWhereBondsTieAllGroups) {
+  Simulation tied = make(kHead + joined(kBall, "interactions: [{law: bond_frame, stretch: 5, rotation: 0.1, neighbours: 2}]", "{}"));
+  EXPECT_NE(explain(tied).find("off  find_contacts"), std::string::npos) << explain(tied);
+  Simulation free = make(kHead + joined(kBall, "interactions: [{law: bond_frame, stretch: 5, rotation: 0.1}]", "{}"));
+  EXPECT_NE(explain(free).find("on   find_contacts"), std::string::npos) << explain(free);
+}
+
 // Two rows of three, each a component with two groups.
 TEST(GroupContact, IsWithinComponents) {
   const std::filesystem::path folder = ::testing::TempDir();
