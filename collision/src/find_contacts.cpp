@@ -9,6 +9,7 @@
 
 #include "body_order.h"
 #include "boxes.h"
+#include "cores.h"
 
 namespace supple::collision {
 namespace {
@@ -156,43 +157,6 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
   seeds.resize(kept);
 }
 
-/// Between two convex bodies.
-struct Between {
-  Vec3 middle = Vec3::Zero();  ///< of the overlap, or of the gap
-  bool apart = false;          ///< certainly no overlap
-};
-
-/// On the line between the nearest points of two cores, which are found by going from one to the other. None when the
-/// cores meet.
-std::optional<Between> between_cores(const ContactBody& one, const ContactBody& other) {
-  constexpr int kSteps = 32;
-  constexpr double kEnough = 1e-3;  // of the distance: the overlap is sought from here, not measured
-  const bool leading = leads(one, other);
-  const ContactBody &a = leading ? one : other, &b = leading ? other : one;
-  const Vec3 start = first_place(a);
-  std::optional<implicit::CorePoint> on_a = a.field.core_point(start);
-  if (!on_a) return std::nullopt;
-  std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
-  if (!on_b) return std::nullopt;
-  constexpr double kRounding = 1e-12;
-  bool settled = false;  // the nearest points but for rounding, so that planes across the line part the cores
-  for (int i = 0; i < kSteps; ++i) {
-    const Vec3 before = on_a->point;
-    on_a = a.field.core_point(on_b->point);
-    const double moved = (on_a->point - before).norm(), between = (on_a->point - on_b->point).norm();
-    settled = moved <= kRounding * (between + before.lpNorm<Eigen::Infinity>());
-    if (moved <= kEnough * between) break;
-    on_b = b.field.core_point(on_a->point);
-  }
-  const Vec3 across = on_b->point - on_a->point;
-  const double distance = across.norm();
-  if (!(distance > kEnough * (on_a->radius + on_b->radius))) return std::nullopt;
-  const double middle = 0.5 * (std::min(on_a->radius, distance) + std::max(distance - on_b->radius, 0.0));
-  constexpr double kMargin = 1e-9;  // covers the rounding, however long the cores are
-  return Between{on_a->point + (middle / distance) * across,
-                 settled && distance > (1.0 + kMargin) * (on_a->radius + on_b->radius)};
-}
-
 }  // namespace
 
 std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor) {
@@ -338,7 +302,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
       Slot& slot = job.slots[k];
       slot.overlap = job.box[job.pairs[k].a].intersection(job.box[job.pairs[k].b]);
       slot.seed.clear();
-      const std::optional<Between> between = between_cores(a, b);
+      const std::optional<Between> between = between_cores(a, b, slot.overlap);
       slot.convex = between.has_value();
       slot.spacing = 0.0;
       if (slot.convex) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "flat_cells.h"
 #include "quadrature.h"
 #include "squeezed_region.h"
 
@@ -19,6 +20,7 @@ constexpr int kMostHalvings = 4;       // of the cells of a mesh at which someth
 constexpr double kBeside = 2.0;        // from where it presses, in triangles: others need not be smooth
 constexpr double kBesideEnd = 0.7;     // the same at the end of both supports; not beyond the cells that are there in every view
 constexpr double kSmallest = 1.0 / 512.0;  // cell, over the features, for small patches
+constexpr double kNoLess = 0.9;        // of Sigma: long cells see as much of it as cubes do
 constexpr double kSafety = 2.0;        // of the difference between two rules
 constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
@@ -263,6 +265,7 @@ void MarchRuleSolver::weigh(int order) {
   sums_ = {};
   for (const Leaf& leaf : leaves_) sums_.add(leaf.sums);
   estimate_ = 1.0;
+  unmet_ = std::numeric_limits<double>::infinity();
   if (!(sums_.load > 0.0)) return;
   const double across = std::sqrt(sums_.area), force = force_scale(sums_.force, sums_.load);
   const Vec3 centre = sums_.centre();
@@ -271,13 +274,15 @@ void MarchRuleSolver::weigh(int order) {
     const double lever = leaf.sums.load > 0.0 ? (leaf.sums.centre() - centre).norm() : across, share = share_of(leaf, order);
     const double square = twice_parameters(leaf.piece), size = leaf.mild ? square : std::sqrt(square);
     const double unseen = leaf.trust == Trust::Lost ? kUnseen * size : 0.0;
-    const double doubt = leaf.doubt + unseen * leaf.sums.area, doubt_load = leaf.doubt_load + unseen * leaf.sums.load;
+    const double left_out = unseen + (!rough_.empty() && rough_[leaf.piece.triangle] != 0 ? 1.0 : 0.0);  // Sigma may turn between its corners
+    const double doubt = leaf.doubt + left_out * leaf.sums.area, doubt_load = leaf.doubt_load + left_out * leaf.sums.load;
     const std::array<double, 3> off{(share * std::abs(leaf.off.area) + doubt) / sums_.area, (share * leaf.off.force.norm() + doubt_load) / force,
                                     (share * (leaf.off.first - leaf.off.load * centre).norm() + doubt_load * lever) / (sums_.load * across)};
     for (std::size_t k = 0; k < 3; ++k) sum[k] += off[k];
     leaf.error = *std::max_element(off.begin(), off.end());
   }
-  estimate_ = std::min(1.0, *std::max_element(sum.begin(), sum.end()));
+  unmet_ = *std::max_element(sum.begin(), sum.end());
+  estimate_ = std::min(1.0, unmet_);
 }
 
 /// Splits the leaves that err most until the rest is as good as asked. @return whether Sigma was met
@@ -405,10 +410,10 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
   add_to_region(pressure, side, begin, value_, points);
 }
 
-/// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press.
-void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
-                                const std::optional<CommonAxis>& axis) {
-  const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, axis, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
+/// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press. @return whether there were not too many cells
+bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
+                               const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat) {
+  const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, axis, flat, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
   // Halves of the features until something is seen to press, as how long the box of an overlap is depends on how it lies.
   const double size = pressure.feature_size();
   cell_ = size;
@@ -437,9 +442,20 @@ void MarchRuleSolver::make_mesh(PairPressure& pressure, std::span<const ContactB
   };
   const auto fits = [&](const Piece& p) { return at_end(p) ? !presses_within(p, kBesideEnd) : smooth(p) || !presses_within(p, kBeside); };
   for (int halvings = 0; halvings < kMostHalvings && !coarse; ++halvings) {
-    if (std::all_of(pieces_.begin(), pieces_.end(), fits)) return;
+    if (std::all_of(pieces_.begin(), pieces_.end(), fits)) break;
     halve();
   }
+  rough_.assign(flat || coarse ? pieces_.size() : 0, 0);
+  for (std::size_t i = 0; i < rough_.size(); ++i) rough_[i] = fits(pieces_[i]) ? 0 : 1;
+  return !coarse;
+}
+
+bool MarchRuleSolver::may_meet(const PairPressure& pressure, const Box& overlap) {
+  const double size = pressure.feature_size();
+  for (double cell = size; cell > kSmallest * size; cell *= 0.5) {
+    if (!mesher_.may_meet(pressure, overlap, cell)) return false;
+  }
+  return true;
 }
 
 bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
@@ -450,12 +466,25 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
   points.clear();
   if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite() || !(overlap.extent().maxCoeff() > 0.0)) return false;
   const double coordinates = std::max(overlap.lower.cwiseAbs().maxCoeff(), overlap.upper.cwiseAbs().maxCoeff());
-  on_sigma_ = kOnSigma;
-  make_mesh(pressure, third, overlap, axis);
-  on_sigma_ = std::max(std::clamp(1e-2 * limits.error, kOnSigmaAtBest, kOnSigma), 64.0 * kEpsilon * coordinates / cell_);
   kinks_.clear();
   all_kinks_ = pressure.kinks(overlap, kinks_);
-  if (!refine(pressure, third, limits, reference)) return false;
+  bool fine = false;
+  const auto solve_on = [&](const std::optional<FlatCells>& cells) {
+    on_sigma_ = kOnSigma;
+    fine = lay_mesh(pressure, third, overlap, axis, cells);
+    on_sigma_ = std::max(std::clamp(1e-2 * limits.error, kOnSigmaAtBest, kOnSigma), 64.0 * kEpsilon * coordinates / cell_);
+    return refine(pressure, third, limits, reference);
+  };
+  bool met = solve_on({});
+  if (!met || (!fine && estimate_ > limits.error)) {
+    const double unmet = unmet_, area = met ? sums_.area : 0.0;
+    const std::optional<FlatCells> flat = flat_cells(pressure, overlap);
+    if (flat) {
+      const bool better = solve_on(flat) && (!met || (unmet_ < unmet && sums_.area >= kNoLess * area));
+      met = better || solve_on({});
+    }
+  }
+  if (!met) return false;
 
   std::size_t peak = 0;
   kept_.clear();

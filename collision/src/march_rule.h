@@ -31,6 +31,9 @@ class MarchRuleSolver {
   bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const Limits& limits,
              const Regions& regions, const std::optional<CommonAxis>& axis, const Vec3& reference, PatchPoints& points);
 
+  /// False: bounds of the fields leave no room for Sigma.
+  bool may_meet(const PairPressure& pressure, const Box& overlap);
+
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }
   [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< about the point of largest pressure [m]
@@ -167,7 +170,8 @@ class MarchRuleSolver {
   [[nodiscard]] Shape shape_of(const Piece& piece) const;
   [[nodiscard]] bool smooth(const Piece& piece) const;
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
-  void make_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis);
+  bool lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis,
+                const std::optional<FlatCells>& flat);
   void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
   static std::optional<double> turn(const Piece& piece, std::size_t across);
   void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);
@@ -206,6 +210,7 @@ class MarchRuleSolver {
   std::vector<Vec3> slope_, place_;
   std::vector<std::size_t> open_;
   std::vector<std::uint64_t> edges_;  // of the mesh: both vertices
+  std::vector<std::uint8_t> rough_;   // triangles of long cells, or of too many, that are not smooth: between their corners Sigma may turn
   std::vector<std::size_t> spots_;    // of its triangles: six feet each
   std::vector<Piece> pieces_, halves_, doubtful_;
   std::vector<std::array<std::optional<Foot>, 3>> turns_;  // on the edges across from the corners of pieces that are split
@@ -223,7 +228,7 @@ class MarchRuleSolver {
   std::optional<Apex> apex_;  // that they come out of
   std::vector<std::uint32_t> order_;
   PatchSums sums_;
-  double estimate_ = 1.0;
+  double estimate_ = 1.0, unmet_ = 1.0;  // the same, and by how much it is missed where that is more than all
   double thickness_ = 0.0;
 };
 

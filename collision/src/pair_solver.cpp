@@ -9,6 +9,7 @@
 
 #include "body_order.h"
 #include "boxes.h"
+#include "cores.h"
 #include "symmetry.h"
 
 namespace supple::collision {
@@ -123,7 +124,13 @@ bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, Pai
   // may be thin, and have a field only near them.
   const auto shown_by_seeds = [&](int side) { return job.pressure.body(side).skeleton != nullptr || job.pressure.field(side).convex(); };
   if (!patches_.empty() || (!convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
+  std::optional<Between> between;
+  if (convex) between = between_cores(job.pressure.body(0), job.pressure.body(1), overlap, kManySteps);
+  if (between && between->apart) return true;
   patches_.start_from(overlap, job.pressure);
+  if (!patches_.solve(job, out)) return false;
+  if (!patches_.empty() || !between || !between->overlap) return true;
+  patches_.start_from(between->middle, job.pressure);
   return patches_.solve(job, out);
 }
 
@@ -244,6 +251,11 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   const ContactRule only = job.settings().only;
   const bool any = only == ContactRule::None;
   bool fits = (any || only == ContactRule::Polar) && polar(job, out);
+  // Bodies that overlap where rings find no Sigma lie in each other, or one is so thin that Sigma is far from where rings begin.
+  const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && job.overlap.lower.allFinite() && job.overlap.upper.allFinite() &&
+                             (patches_.knows_overlap(job.polar.pressure) || may_lie_within(job, 0) || may_lie_within(job, 1)) &&
+                             march_.may_meet(job.polar.pressure, job.overlap);
+  fits = fits && !may_be_missed;
   RuleReason reason = !any ? RuleReason::Asked : fits ? RuleReason::Fits : RuleReason::NoGraph;
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
@@ -263,6 +275,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
     if (any && !polar_fits && out.summary.rule == ContactRule::March && job.a.skeleton == nullptr && job.b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
     if (!fits) {
       begin_anew(job, out);
+      if (may_be_missed) out.summary.error_estimate = 1.0;
       if (only == ContactRule::Samples && patches_.any_touches(job.polar.pressure, job.polar.extent, job.convex)) out.summary.error_estimate = 1.0;
     }
   }
@@ -324,7 +337,9 @@ void PairSolver::fill_within(const Job& job, bool equal, PairResult& out) {
   const int leading = leads(job.a, job.b) ? 0 : 1;
   for (const int side : {leading, 1 - leading}) {
     if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || may_lie_within(job, side))) continue;
+    const double unsure = job.settings().only == ContactRule::None ? out.summary.error_estimate : 0.0;
     begin_anew(job, out);
+    out.summary.error_estimate = unsure;
     region_.fill({pressure, side, third_bodies_, region_error(job.settings()), equal}, job.overlap, Vec3::UnitZ(), out.points);
     out.summary.reason = RuleReason::Within;
     return;

@@ -61,6 +61,19 @@ bool PolarPatches::any_touches(PairPressure& pressure, double extent, bool conve
                      [&](const StartPoint& hill) { return finder_.climb(pressure, hill.at, extent, convex, false).has_value(); });
 }
 
+bool PolarPatches::knows_overlap(PairPressure& pressure) {
+  constexpr double kOutside = -1e-9, kInside = 1e-6;  // pressures over moduli; on a body's own samples its own is nothing but rounding
+  batch_.point.clear();
+  for (const StartPoint& place : starts_.inside) batch_.point.push_back(place.at);
+  batch_.resize(batch_.point.size());
+  pressure.evaluate_values(batch_);
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
+    if (std::min(a, b) > kOutside && std::max(a, b) > kInside) return true;
+  }
+  return false;
+}
+
 bool PolarPatches::covered(const StartPoint& place, double slack) const {
   const std::span<const PolarCover> all = covers();
   return std::any_of(all.begin(), all.end(), [&](const PolarCover& cover) { return cover.contains(place, slack); });

@@ -42,6 +42,8 @@ class PolarPatches {
   void forget() { cover_count_ = 0; }
   /// Whether Newton's method finds a place where the bodies press from any of the hills.
   [[nodiscard]] bool any_touches(PairPressure& pressure, double extent, bool convex);
+  /// Whether one of the places to start from lies farther inside both bodies than rounding tells.
+  [[nodiscard]] bool knows_overlap(PairPressure& pressure);
 
  private:
   enum class Patch : std::uint8_t { Added, Known, Lost, Unfit };

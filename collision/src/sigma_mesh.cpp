@@ -228,22 +228,42 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   }
 }
 
-bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, SigmaMesh& out) {
+/// Sigma goes through no node but by chance: no planes of symmetry of bodies do, and no cylinders of round radii.
+void SigmaMesher::lay_lattice(const PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis,
+                              const std::optional<FlatCells>& flat) {
   mirrored_ = axis.has_value();
-  // Sigma goes through no node but by chance: no planes of symmetry of bodies do, and no cylinders of round radii.
+  Vec3 origin = Vec3::Zero(), shift(0.2763932, 0.3819660, 0.4142136);
   if (mirrored_) {
     cell_ = 0.9472136 * cell;
     const Vec3 &z = axis->direction, x = z.unitOrthogonal();
     axes_ << x, z.cross(x), z;
-    const double near = std::round((overlap.centre() - axis->point).dot(z) / cell_);  // whole cells from there
-    origin_ = axis->point + cell_ * (near + 0.4142136) * z;
+    origin = axis->point;
+    shift.head<2>().setZero();
   } else {
-    const Pose pose = common_pose(pressure.body(0), pressure.body(1));
     cell_ = cell;
+    const Pose pose = common_pose(pressure.body(0), pressure.body(1));
     axes_ = pose.orientation.toRotationMatrix();
-    const Vec3 near = (axes_.transpose() * (overlap.centre() - pose.position) / cell).array().round();  // whole cells from there
-    origin_ = pose.position + axes_ * (cell * (near + Vec3(0.2763932, 0.3819660, 0.4142136)));
+    origin = pose.position;
+    if (flat) {
+      const Vec3 &z = flat->across, x = pressure.tangent(overlap.centre(), z).value_or(z.unitOrthogonal());
+      axes_ << x, z.cross(x), z;
+    }
   }
+  const Vec3 to_centre = axes_.transpose() * (overlap.centre() - origin);
+  if (flat) axes_.leftCols<2>() *= flat->stretch;
+  Vec3 near = Vec3::Zero();  // whole cells
+  for (Eigen::Index k = mirrored_ ? 2 : 0; k < 3; ++k) near[k] = std::round(to_centre[k] / (cell_ * axes_.col(k).norm()));
+  origin_ = origin + axes_ * (cell_ * (near + shift));
+}
+
+bool SigmaMesher::may_meet(const PairPressure& pressure, const Box& overlap, double cell) {
+  lay_lattice(pressure, overlap, cell, std::nullopt, std::nullopt);
+  return !find_cells(pressure, overlap) || !cells_.empty();
+}
+
+bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis,
+                       const std::optional<FlatCells>& flat, SigmaMesh& out) {
+  lay_lattice(pressure, overlap, cell, axis, flat);
   if (!find_cells(pressure, overlap)) return false;
   find_nodes(pressure);
   cut_cells(out);

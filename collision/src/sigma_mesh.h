@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "find_peak.h"
+#include "flat_cells.h"
 #include "pair_pressure.h"
 
 namespace supple::collision {
@@ -26,16 +27,21 @@ struct SigmaMesh {
 
 class SigmaMesher {
  public:
-  /// @param overlap  finite; holds all of Sigma where p > 0   @param cell  side of the lattice's cells [m], about
+  /// @param overlap  finite; holds all of Sigma where p > 0   @param cell  side of the lattice's cells [m], about, the shortest one
   /// @param axis  of symmetry, if there is one: two planes through it, at right angles, mirror the triangles; else the lattice is that of the
-  ///              bodies' common pose
+  ///              bodies' common pose, or of `flat`   @param flat  cells that are not cubes
   /// @return false where there would be more cells than kMostCells
-  bool mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, SigmaMesh& out);
+  bool mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat,
+            SigmaMesh& out);
+  /// Whether bounds in cells leave room for Sigma where both bodies press.
+  bool may_meet(const PairPressure& pressure, const Box& overlap, double cell);
 
   static constexpr std::size_t kMostCells = 1u << 16;
 
  private:
   using Key = std::uint64_t;
+  void lay_lattice(const PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis,
+                   const std::optional<FlatCells>& flat);
   bool find_cells(const PairPressure& pressure, const Box& overlap);
   void find_nodes(PairPressure& pressure);
   void cut_cells(SigmaMesh& out);
@@ -52,7 +58,7 @@ class SigmaMesher {
     double at = 0.0, low = 0.0, high = 1.0;
   };
   Vec3 origin_ = Vec3::Zero();
-  Mat3 axes_ = Mat3::Identity();  // of the lattice, columns
+  Mat3 axes_ = Mat3::Identity();  // of the lattice, columns, which are longer than 1 where cells are longer than `cell_`
   bool mirrored_ = false;
   double cell_ = 0.0;
   std::vector<Key> cells_, near_, nodes_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -305,6 +306,120 @@ TEST(DeepContact, OfConvexBodiesThroughPlatesIsThatOfMarching) {
     if (found.rule == ContactRule::March) ++through;
   }
   EXPECT_GE(through, 8);
+}
+
+/// Whether points of a box tell that A presses harder at one and B at another, both of them on both bodies: where these are convex Sigma lies between.
+bool press_in_turn(const std::array<ContactBody, 2>& bodies, benchmarks::Draw& draw) {
+  constexpr std::size_t kPoints = 20'000;
+  const Box overlap = bodies[0].field.surface_box().intersection(bodies[1].field.surface_box());
+  std::vector<Vec3> x(kPoints);
+  for (Vec3& p : x) p = overlap.lower + overlap.extent().cwiseProduct(Vec3(draw.uniform(0.0, 1.0), draw.uniform(0.0, 1.0), draw.uniform(0.0, 1.0)));
+  std::array<std::vector<double>, 2> value{std::vector<double>(kPoints), std::vector<double>(kPoints)};
+  for (const std::size_t side : {0u, 1u}) bodies[side].field.evaluate(x, value[side]);
+  bool one = false, other = false;
+  for (std::size_t i = 0; i < kPoints; ++i) {
+    const double a = bodies[0].material.modulus * value[0][i], b = bodies[1].material.modulus * value[1][i];
+    one = one || (b > 0.0 && a > b);
+    other = other || (a > 0.0 && b > a);
+  }
+  return one && other;
+}
+
+/// A convex body, thin or not: of a skeleton with samples, or a box without.
+struct Convex {
+  std::optional<benchmarks::Rigid> rigid;
+  std::optional<implicit::SolidBox> box;
+  Pose pose;
+  double modulus = 0.0;
+
+  Convex(benchmarks::Draw& draw, double thickness) : pose{0.05 * draw.direction(), draw.rotation()}, modulus(kModulus * draw.logarithmic(1e-3, 1e3)) {
+    using implicit::ShapeKind;
+    const auto kind = static_cast<std::size_t>(draw.uniform(0.0, 6.0));
+    if (kind == 5) {
+      box.emplace(pose, Vec3(0.5 * thickness, 0.3, 0.3), 0.0, 1.0);
+      modulus *= 10.0;
+      return;
+    }
+    const std::array<ShapeKind, 5> shapes{ShapeKind::Rectangle, ShapeKind::Disc, ShapeKind::Segment, ShapeKind::Point, ShapeKind::Box};
+    rigid.emplace(benchmarks::wyvill_shape(shapes[kind], shapes[kind] == ShapeKind::Box ? Vec3(0.2, 0.2, 0.1 * thickness) : Vec3(0.2, 0.2, 0.0), thickness), modulus,
+                  std::max(0.02, 0.3 * thickness));
+    rigid->put(pose);
+  }
+  [[nodiscard]] ContactBody body() const { return rigid ? rigid->body() : benchmarks::single_part(*box, modulus, pose); }
+};
+
+TEST(DeepContact, OfConvexBodiesIsNeverMissedHoweverThinOneIs) {
+  benchmarks::Draw draw(11);
+  int pressed = 0;
+  for (int i = 0; i < 40; ++i) {
+    const Convex thin(draw, draw.logarithmic(0.004, 0.1)), other(draw, draw.uniform(0.1, 0.25));
+    const std::array<ContactBody, 2> bodies{thin.body(), other.body()};
+    if (!press_in_turn(bodies, draw)) continue;
+    ++pressed;
+    const auto found = query_all(bodies, {.error = 0.1, .energy = false});
+    ASSERT_EQ(found.size(), 1u) << i;
+    EXPECT_GT(found[0].load, 0.0) << i;
+  }
+  EXPECT_GE(pressed, 24);
+}
+
+// Within the ball the plate presses less everywhere but near the ball's surface: Sigma is a narrow ring there.
+TEST(DeepContact, OfASoftPlateInABallIsNotTakenForOneWhollyWithin) {
+  constexpr double kRadius = 0.1, kSlope = 1e5;
+  benchmarks::Rigid ball(benchmarks::linear_sphere(kRadius), kRadius * kSlope * benchmarks::kLinearModulus, 0.03);
+  const implicit::SolidBox plate({}, Vec3(0.001, 0.5, 0.5), 0.0, 1.0);
+  const Pose still;
+  for (const auto& [softer, x] : {std::pair(1.0, 0.02), std::pair(0.5, 0.01), std::pair(0.1, 0.02), std::pair(0.1, 0.03)}) {
+    const ContactBody wall = benchmarks::single_part(plate, softer * kSlope, still);
+    ball.put({Vec3(x, 0.0, 0.0), Quat::Identity()});
+    const auto found = query_all(std::array{ball.body(), wall}, {.error = 1e-2});
+    ASSERT_EQ(found.size(), 1u) << softer << ' ' << x;
+    EXPECT_GT(found[0].load, 0.0) << softer << ' ' << x;
+  }
+}
+
+// Seen otherwise cells lie otherwise. Where there are too many, or too long ones, what lies between their corners is unknown.
+TEST(DeepContact, OfThinBodiesKeepsItsBounds) {
+  benchmarks::Draw draw(11);
+  int bounded = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Convex thin(draw, draw.logarithmic(0.002, 0.1)), other(draw, draw.uniform(0.1, 0.25));
+    const std::array<ContactBody, 2> bodies{thin.body(), other.body()};
+    if (!press_in_turn(bodies, draw)) continue;
+    const ContactSettings settings{.error = 1e-2, .energy = false, .only = ContactRule::March};
+    const auto one = query_all(bodies, settings), same = query_all(benchmarks::seen_otherwise(bodies), settings);
+    if (one.empty() || same.empty() || one[0].error_estimate >= 1.0 || same[0].error_estimate >= 1.0) continue;
+    ++bounded;
+    const double bound = one[0].error_estimate + same[0].error_estimate;
+    EXPECT_LE((one[0].force + same[0].force).norm(), bound * std::max(same[0].force.norm(), 1e-3 * same[0].load)) << i;
+    EXPECT_NEAR(one[0].area / same[0].area, 1.0, bound) << i;
+  }
+  EXPECT_GE(bounded, 3);
+}
+
+// Planes of cells that are as long as the ball's features and as short as the slab's: cubes would be too many.
+TEST(DeepContact, OfABallThroughAThinSlabIsAsExactAsAsked) {
+  constexpr double kRadius = 0.1, kSoft = 1e5, kStiff = 1e12;  // [m], [Pa/m]
+  benchmarks::Rigid ball(benchmarks::linear_sphere(kRadius), kRadius * kSoft * benchmarks::kLinearModulus, 0.03);
+  // Of a plane so far from the middle; on both sides of it alike.
+  const auto force = [](double z) { return benchmarks::kPi * kSoft * (kRadius - z) * (kRadius - z) * (kRadius + 2.0 * z) / 3.0; };
+  for (const double half : {2e-3, 2e-4}) {
+    const Pose lies{Vec3(0.02, -0.01, 0.03), Quat(0.9, 0.3, -0.2, 0.1).normalized()};
+    const implicit::SolidBox slab(lies, Vec3(half, 0.5, 0.5), 0.0, 1.0);
+    ContactBody wall = benchmarks::single_part(slab, kStiff, lies);
+    wall.fixed = true;
+    for (const double x : {0.08, 0.02}) {
+      ball.put({lies.position + lies.orientation * Vec3(x, 0.003, -0.002), Quat::Identity()});
+      const double near = force(x - half), far = force(x + half), exact = near - far, load = near + far;
+      for (const double error : {1e-2, 1e-4}) {
+        const ContactSurface::Summary s = query_all(std::array{ball.body(), wall}, {.error = error, .energy = false}).at(0);
+        // What the slab yields, in each face: the depth of the ball over the ratio of the stiffnesses.
+        const double yields = 10.0 * kSoft / kStiff * load, bound = s.error_estimate * std::max(exact, 1e-3 * load) + yields;
+        EXPECT_NEAR(std::abs(s.force.dot(lies.orientation * Vec3::UnitX())), exact, bound) << half << ' ' << x << ' ' << error;
+        EXPECT_LE(s.error_estimate, error) << half << ' ' << x << ' ' << error;
+      }
+    }
+  }
 }
 
 /// pi E R^3 / 3: the integral of a linear ball's pressure E (1 - r/R).

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "bodies.h"
+#include "supple/implicit/solids.h"
 
 namespace supple::collision {
 namespace {
@@ -248,6 +249,35 @@ TEST(ConvexBodies, AreLeftOutWhenCertainlyApartAndKeptAtTheLeastOverlap) {
     EXPECT_EQ(stage.candidates.pair.size(), gap < 0.0 ? 1u : 0u) << gap;
     EXPECT_EQ(stage.surface.summary.size(), gap < 0.0 ? 1u : 0u) << gap;
   }
+}
+
+// Their cores are all of them, so that nothing but rounding is left between those that meet.
+TEST(ConvexBodies, WithoutRoundedEdgesAreKeptWhereTheyOverlap) {
+  std::mt19937_64 engine(5);
+  const auto direction = [&engine] { return Vec3(uniform(engine, -1, 1), uniform(engine, -1, 1), uniform(engine, -1, 1)); };
+  const auto pose = [&] { return Pose{0.05 * direction(), Quat(uniform(engine, -1, 1), uniform(engine, -1, 1), uniform(engine, -1, 1), uniform(engine, -1, 1)).normalized()}; };
+  int overlapping = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Pose at_thin = pose(), at_thick = pose();
+    const Vec3 thin(uniform(engine, 0.005, 0.02), 0.3, 0.3), thick(0.1, 0.3, 0.3);
+    const implicit::SolidBox one(at_thin, thin, 0.0, 1.0), other(at_thick, thick, 0.0, 1.0);
+    Vec3 x;
+    bool overlap = false;
+    for (int k = 0; k < 200 && !overlap; ++k) {
+      x = at_thin.position + at_thin.orientation * thin.cwiseProduct(direction());
+      overlap = implicit::FieldView(one).value(x) > 0.0 && implicit::FieldView(other).value(x) > 0.0;
+    }
+    if (!overlap) continue;
+    ++overlapping;
+    Stage stage;
+    stage.add(one, {at_thin.position});
+    stage.add(other, {at_thick.position});
+    const auto bodies = stage.bodies();
+    ContactCandidates candidates;
+    find_contacts(bodies, broad_phase(bodies, {}, Executor(1)), Executor(1), candidates);
+    EXPECT_EQ(candidates.pair.size(), 1u) << trial;
+  }
+  EXPECT_GT(overlapping, 250);
 }
 
 }  // namespace

@@ -1,0 +1,25 @@
+/// @file cores.h
+/// Two convex bodies as their cores tell how they lie.
+#pragma once
+
+#include <optional>
+
+#include "supple/collision/bodies.h"
+
+namespace supple::collision {
+
+struct Between {
+  Vec3 middle = Vec3::Zero();  ///< of the overlap, or of the gap [m]
+  bool apart = false;          ///< certainly no overlap
+  bool overlap = false;        ///< certainly one
+};
+
+/// Steps that tell most pairs apart, and all that are tried where nothing else helps: faces that are nearly parallel need many.
+inline constexpr int kFewSteps = 32, kManySteps = 512;
+
+/// On the line between the nearest points of two cores, which are found by going from one to the other.
+/// @param overlap  of their boxes   @param steps  at most; kFewSteps also end where a thousandth of the distance is all that is left
+/// @return none where the cores meet, or a body has none
+[[nodiscard]] std::optional<Between> between_cores(const ContactBody& one, const ContactBody& other, const Box& overlap, int steps = kFewSteps);
+
+}  // namespace supple::collision
