@@ -2,7 +2,9 @@
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "supple/scenes/model.h"
@@ -82,6 +84,7 @@ void take_part(const ObjectModel& object, const Carried& primitives, const Carri
     implicit::Primitive copy = object.skeleton.primitive[k];
     copy.part = place(particle, copy.part);
     body.skeleton.primitive.push_back(copy);
+    if (object.holds_volume) body.primitive.push_back(static_cast<std::uint32_t>(k));
   }
   const implicit::SampleLayout& all = object.samples;
   for (const std::size_t s : seeds.of(particle)) {
@@ -91,6 +94,7 @@ void take_part(const ObjectModel& object, const Carried& primitives, const Carri
     body.samples.direction.push_back(all.direction[s]);
     body.samples.reach.push_back(all.reach[s]);
     body.samples.spread.push_back(all.spread[s]);
+    if (object.holds_volume) body.seed.push_back(static_cast<std::uint32_t>(s));
   }
 }
 
@@ -98,6 +102,107 @@ void add_particle(const core::ParticleSet& set, std::uint32_t i, Body& body) {
   body.particle.push_back(i);
   body.yield.push_back({core::free_translation(set.pinned[i], Vec3::Constant(1.0 / set.mass[i])).maxCoeff(),
                         core::free_rotation(set.pinned[i], Vec3::Constant(1.0 / set.inertia[i].minCoeff())).maxCoeff()});
+}
+
+/// Pairs of groups of an object that may break.
+class GroupTies {
+ public:
+  /// @param led_by  the first particle of the group of each node, or kElsewhere   @param parted  links as bodies see them
+  GroupTies(const Model& model, const ObjectModel& object, std::span<const std::uint32_t> led_by, const core::LinkState& parted)
+      : object_(object), led_by_(led_by) {
+    for (const implicit::BlendEdge& e : object.skeleton.blend.edge) add(led_by[e.a], led_by[e.b], once_);
+    for (const collision::BodyPair& pair : object.bonded) {
+      if (object.are_groups(pair)) add(pair.a, pair.b, once_);
+    }
+    keep_unique(once_);
+    for (std::size_t k = 0; k < model.links.size(); ++k) {
+      const std::uint32_t p = model.links.first[k], q = model.links.second[k];
+      if (p >= object.first && p < object.last && parted.broken[k] == 0) bonds_.push_back({p, q});
+    }
+    std::sort(bonds_.begin(), bonds_.end());
+  }
+  /// Those within a body that blend, or have a bond between them, as it is now.
+  [[nodiscard]] std::vector<collision::BodyPair> within(const Body& body) const {
+    std::vector<collision::BodyPair> pairs;
+    const implicit::Blend& blend = body.skeleton.blend;
+    std::vector<std::uint32_t> led_by(body.particle.size(), kElsewhere);  // of the body's own nodes
+    for (std::size_t i = 0; i < blend.node.size(); ++i) led_by[blend.node[i]] = group_of(body.particle[i]);
+    for (const implicit::BlendEdge& e : blend.edge) {
+      if (e.weight > 0.0) add(led_by[e.a], led_by[e.b], pairs);
+    }
+    for (const std::uint32_t p : body.particle) {
+      for (auto bond = std::lower_bound(bonds_.begin(), bonds_.end(), collision::BodyPair{p, 0}); bond != bonds_.end() && bond->a == p; ++bond) {
+        add(group_of(p), group_of(bond->b), pairs);
+      }
+    }
+    keep_unique(pairs);
+    return pairs;
+  }
+  /// Those that were so before anything broke.
+  [[nodiscard]] const std::vector<collision::BodyPair>& once() const { return once_; }
+
+ private:
+  static void add(std::uint32_t x, std::uint32_t y, std::vector<collision::BodyPair>& pairs) {
+    const auto [a, b] = std::minmax({x, y});
+    if (a != b && b != kElsewhere) pairs.push_back({a, b});
+  }
+  static void keep_unique(std::vector<collision::BodyPair>& pairs) {
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  }
+  [[nodiscard]] std::uint32_t group_of(std::uint32_t particle) const { return led_by_[object_.skeleton.blend.node[particle - object_.first]]; }
+
+  const ObjectModel& object_;
+  std::span<const std::uint32_t> led_by_;
+  std::vector<collision::BodyPair> once_, bonds_;  // of groups; of particles
+};
+
+/// The groups of one object: where it may break, those of a piece that others of it may touch.
+void add_groups(const Model& model, const ObjectModel& object, const core::LinkState& parted, const Carried& primitives, const Carried& seeds, std::span<const Body> whole, std::vector<Body>& groups) {
+  const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+  std::vector<std::uint32_t> led_by(node.size(), kElsewhere);  // nodes are no more than particles
+  for (const std::uint32_t first : object.group) led_by[node[first]] = first;
+  std::optional<GroupTies> ties;
+  if (object.breaks) ties.emplace(model, object, led_by, parted);
+  std::vector<Body> own;
+  for (const Body& body : whole) {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> members;  // particles of each group
+    for (const std::uint32_t p : body.particle) {
+      const std::uint32_t first = led_by[node[p - object.first]];
+      if (first != kElsewhere) members[first].push_back(p);
+    }
+    std::map<std::uint32_t, std::size_t> tied;  // others that a group may not touch
+    std::map<std::uint32_t, std::vector<std::uint32_t>> cut;
+    if (ties) {
+      const std::vector<collision::BodyPair> now = ties->within(body);
+      for (const collision::BodyPair& pair : now) {
+        ++tied[pair.a];
+        ++tied[pair.b];
+      }
+      for (const collision::BodyPair& pair : ties->once()) {
+        if (!members.contains(pair.a) || !members.contains(pair.b) || std::binary_search(now.begin(), now.end(), pair)) continue;
+        cut[pair.a].push_back(pair.b);
+        cut[pair.b].push_back(pair.a);
+      }
+    }
+    for (auto& [first, particle] : members) {
+      if (ties && tied[first] + 1 >= members.size()) continue;
+      std::sort(cut[first].begin(), cut[first].end());
+      Body& group = own.emplace_back(Body{.object = body.object,
+                                          .origin = {body.origin.piece, body.origin.component, first, std::move(cut[first])},
+                                          .name = object.name + ".group" + std::to_string(node[first] + 1),
+                                          .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
+      for (const std::uint32_t p : particle) add_particle(model.particles, p, group);
+      take_part(object, primitives, seeds, group);
+    }
+  }
+  std::sort(own.begin(), own.end(), [](const Body& a, const Body& b) { return a.particle.front() < b.particle.front(); });
+  std::map<std::string, int> named;
+  for (Body& group : own) {
+    const int number = ++named[group.name];
+    if (number > 1) group.name += '.' + std::to_string(number);  // what broke has several of the same group
+  }
+  std::move(own.begin(), own.end(), std::back_inserter(groups));
 }
 
 }  // namespace
@@ -172,7 +277,9 @@ Meeting meeting_of(const ObjectModel& object, const BodyOrigin& a, const BodyOri
   if (object.separate) return Meeting::Always;
   if (a.is_group() != b.is_group()) return Meeting::Never;
   if (a.is_group()) {
-    if (a.component != b.component || blend_with_each_other(object.skeleton.blend, a.group, b.group)) return Meeting::Never;
+    if (a.piece != b.piece || a.component != b.component) return Meeting::Never;
+    if (std::binary_search(a.cut.begin(), a.cut.end(), b.group)) return Meeting::OnceApart;
+    if (blend_with_each_other(object.skeleton.blend, a.group, b.group)) return Meeting::Never;
   } else if (a.component == b.component) {
     return Meeting::OnceApart;
   }
@@ -184,47 +291,42 @@ Meeting meeting_of(const ObjectModel& object, const BodyOrigin& a, const BodyOri
   return listed(object.overlapping) ? Meeting::OnceApart : Meeting::Always;
 }
 
-std::vector<Body> make_bodies(const Model& model, const core::LinkState& links) {
-  std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, links);
+std::uint32_t leader_of(const Model& model, const Body& body) {
+  const bool shared = body.origin.is_group() && model.objects[body.object].breaks;
+  return body.particle.front() + (shared ? static_cast<std::uint32_t>(model.particles.size()) : 0);
+}
+
+std::vector<Body> make_bodies(const Model& model, const core::LinkState& links, std::span<const double> broken_for) {
+  const core::LinkState parted = parted_links(model, links, broken_for);
+  std::vector<std::uint32_t> piece = core::find_pieces(model.particles, model.links, parted);
   for (const ObjectModel& object : model.objects) {
     if (object.separate) std::iota(piece.begin() + object.first, piece.begin() + object.last, object.first);
   }
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> body_of;  // by piece and component, of one object
-  std::vector<Body> bodies, groups;
+  std::vector<Body> bodies, groups, own;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const ObjectModel& object = model.objects[o];
-    const std::size_t begin = bodies.size();
+    own.clear();
     body_of.clear();
     for (std::uint32_t i = object.first; i < object.last; ++i) {
       const BodyOrigin origin{piece[i], object.component.empty() ? 0 : object.component[i - object.first]};
-      const auto [place, fresh] = body_of.try_emplace({origin.piece, origin.component}, bodies.size());
+      const auto [place, fresh] = body_of.try_emplace({origin.piece, origin.component}, own.size());
       if (fresh) {
-        bodies.push_back({.object = o, .origin = origin, .name = object.name, .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
+        own.push_back({.object = o, .origin = origin, .name = object.name, .particle = {}, .yield = {}, .skeleton = {}, .samples = {}});
       }
-      add_particle(model.particles, i, bodies[place->second]);
+      add_particle(model.particles, i, own[place->second]);
     }
-    const std::size_t count = bodies.size() - begin;
     const std::uint32_t particles = object.last - object.first;
     const auto& primitive = object.skeleton.primitive;
     const Carried primitives(particles, primitive.size(), [&](std::size_t k) { return primitive[k].part; });
     const Carried seeds(particles, object.samples.size(), [&](std::size_t s) { return object.samples.part[s]; });
-    for (std::size_t k = 0; k < count; ++k) {
-      Body& body = bodies[begin + k];
-      if (count > 1) body.name += '.' + std::to_string(k + 1);
-      take_part(object, primitives, seeds, body);
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      if (own.size() > 1) own[k].name += '.' + std::to_string(k + 1);
+      take_part(object, primitives, seeds, own[k]);
     }
-    const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
-    const std::size_t nodes = object.group.empty() ? 0 : particles;  // at most
-    const Carried members(nodes, nodes, [&](std::size_t i) { return node[i]; });
-    for (const std::uint32_t first : object.group) {
-      Body group{.object = o,
-                 .origin = {piece[object.first + first], object.component.empty() ? 0 : object.component[first], first},
-                 .name = object.name + ".group" + std::to_string(node[first] + 1),
-                 .particle = {}, .yield = {}, .skeleton = {}, .samples = {}};
-      for (const std::size_t i : members.of({&node[first], 1})) add_particle(model.particles, object.first + static_cast<std::uint32_t>(i), group);
-      take_part(object, primitives, seeds, group);
-      groups.push_back(std::move(group));
-    }
+    fade_blends(model, links, broken_for, own);
+    if (!object.group.empty()) add_groups(model, object, parted, primitives, seeds, own, groups);
+    std::move(own.begin(), own.end(), std::back_inserter(bodies));
   }
   std::move(groups.begin(), groups.end(), std::back_inserter(bodies));
   return bodies;
@@ -241,7 +343,7 @@ collision::ContactRules make_body_rules(const Model& model, const std::vector<Bo
   std::vector<BodyOrigin> origin;
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     object[k] = bodies[k].object;
-    leader[k] = bodies[k].particle.front();
+    leader[k] = leader_of(model, bodies[k]);
     origin.push_back(bodies[k].origin);
   }
   for (std::size_t k = bodies.size(); k < count; ++k) {

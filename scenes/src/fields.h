@@ -116,8 +116,6 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive.check(!d.volume || !d.skeleton.empty(), "volume", "expected a skeleton, whose volume it is", "none", "");
   archive.check(!d.volume || (!d.breaking && !d.separate), "volume", "expected an object that stays one body",
                 d.breaking ? "'breaking'" : "'separate'", "");
-  archive.check(!d.volume || !d.contact || !d.contact->self.value_or(false), "contact.self",
-                "expected false in an object that holds its volume, which stays one body", "true", "");
   for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
     archive.check(!d.skeleton[k].volume || (d.volume && d.volume->of == VolumeOfName::Primitive), "skeleton[" + std::to_string(k) + "].volume",
                   "expected the object's volume to be held by primitive", d.volume ? std::string(name_of(d.volume->of)) : "not held",

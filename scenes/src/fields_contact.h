@@ -16,7 +16,7 @@ void fields(Archive& archive, MaterialDesc& d) {
   archive("modulus", d.modulus, above(0.0, kPressure), "P0: pressure is P0 (f - iso)");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient; a pair has sqrt(mu_A mu_B)");
   archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "Hunt & Crossley d; 1/d is the largest speed of a bounce");
-  archive("self", d.self, {}, "whether parts of the object that its blending graph does not join touch each other: those that it joins by no way as bodies of their own, groups that others join (the fingers of a hand) by their own fields, without what these add, unless the object can break; not those that a bond ties, and those that overlap at the start only once they have been apart; absent: unless it holds its volume");
+  archive("self", d.self, {}, "whether parts of the object that its blending graph does not join touch each other: those that it joins by no way as bodies of their own, groups that others join (the fingers of a hand) by their own fields, without what these add (all that do not blend do so in an object that holds its volume); not those that a bond ties; those that overlap at the start, or that a bond or its blend has left, only once they have been apart; absent: true");
 }
 
 template <class Archive>

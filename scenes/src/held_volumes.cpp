@@ -39,6 +39,7 @@ void scale_kernels(const Model& model, const std::vector<implicit::VolumeState>&
   for (Body& body : bodies) {
     const ObjectModel& object = model.objects[body.object];
     if (!object.holds_volume) continue;
+    const auto at = [](const std::vector<std::uint32_t>& of_object, std::size_t k) { return of_object.empty() ? k : of_object[k]; };
     const auto scale_of = [&](std::size_t primitive) {
       switch (object.volume_of) {
         case VolumeOfName::Object: return volumes[object.first_volume].scale;
@@ -48,10 +49,13 @@ void scale_kernels(const Model& model, const std::vector<implicit::VolumeState>&
       return volumes[object.first_volume + primitive].scale;
     };
     for (std::size_t k = 0; k < body.skeleton.primitive.size(); ++k) {
-      body.skeleton.primitive[k] = implicit::scaled(object.skeleton.primitive[k], scale_of(k));
+      const std::size_t primitive = at(body.primitive, k);
+      implicit::Primitive scaled = implicit::scaled(object.skeleton.primitive[primitive], scale_of(primitive));
+      scaled.part = body.skeleton.primitive[k].part;
+      body.skeleton.primitive[k] = scaled;
     }
     for (std::size_t k = 0; k < body.samples.size(); ++k) {
-      body.samples.reach[k] = scale_of(body.samples.primitive[k]) * object.samples.reach[k];
+      body.samples.reach[k] = scale_of(at(body.primitive, body.samples.primitive[k])) * object.samples.reach[at(body.seed, k)];
     }
   }
 }
@@ -60,7 +64,7 @@ void measure_targets(const StageContext& context, const core::ParticleState& par
                      Model& model) {
   for (std::size_t i = 0; i < context.bodies.size(); ++i) {
     ObjectModel& object = model.objects[context.bodies[i].object];
-    if (!object.holds_volume) continue;
+    if (!object.holds_volume || context.bodies[i].origin.is_group()) continue;
     if (std::all_of(object.target.begin(), object.target.end(), [](double v) { return v > 0.0; })) continue;
     const std::vector<double> volumes = volumes_of(context, particles, i, state, frame);
     for (std::size_t k = 0; k < volumes.size(); ++k) {
@@ -74,7 +78,7 @@ bool control_volumes(const StageContext& context, const core::ParticleState& par
   bool any = false;
   for (std::size_t i = 0; i < context.bodies.size(); ++i) {
     const ObjectModel& object = context.model.objects[context.bodies[i].object];
-    if (!object.holds_volume || rests(context, i)) continue;
+    if (!object.holds_volume || context.bodies[i].origin.is_group() || rests(context, i)) continue;
     const std::vector<double> found = volumes_of(context, particles, i, volumes, frame);
     for (std::size_t k = 0; k < found.size(); ++k) {
       implicit::VolumeControl control = object.volume;

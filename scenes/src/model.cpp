@@ -271,7 +271,8 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
   return rule;
 }
 
-/// Components of the blending graph of an object that touches itself become bodies of their own, and so do groups that others join.
+/// Components of the blending graph of an object that touches itself become bodies of their own, and so do groups that others join. An object that holds its
+/// volume stays one body: all that do not blend are groups of it.
 void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   if (!d.contact->self.value_or(true)) return;
   BlendComponents components = blend_components(object.skeleton.blend, object.last - object.first);
@@ -281,11 +282,16 @@ void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   for (const implicit::Primitive& primitive : object.skeleton.primitive) {
     if (!node.empty()) solid[node[primitive.part]] = 1;
   }
+  if (d.volume ? several : object.fade > 0.0 && object.skeleton.blend.rule == implicit::BlendRule::Graph) {  // any two groups may not blend, then or later
+    std::vector<std::uint8_t> seen(node.size(), 0);
+    components.group.clear();
+    for (std::uint32_t i = 0; i < node.size(); ++i) {
+      if (seen[node[i]]++ == 0) components.group.push_back(i);
+    }
+  }
   std::erase_if(components.group, [&](std::uint32_t first) { return solid[node[first]] == 0; });
-  const bool grouped = !components.group.empty();
-  object.passes_itself = (d.volume && (several || grouped)) || (d.breaking && grouped);
   if (several && !d.volume) object.component = std::move(components.first);
-  if (!d.volume && !d.breaking) object.group = std::move(components.group);
+  object.group = std::move(components.group);
 }
 
 /// All particles move in one plane z = const.

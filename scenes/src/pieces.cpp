@@ -19,12 +19,12 @@ bool age_broken_links(const Model& model, double dt, State& state) {
 }
 
 ApartPairs inherited_apart(const Model& model, const std::vector<Body>& before, const ApartPairs& apart, const std::vector<Body>& bodies) {
-  const auto origin = [&before](const Body& body) {
-    if (body.origin.is_group()) return body.particle.front();  // what has groups does not break
+  const auto origin = [&](const Body& body) {
     for (const Body& old : before) {
-      if (std::binary_search(old.particle.begin(), old.particle.end(), body.particle.front())) return old.particle.front();
+      if (old.origin.is_group() != body.origin.is_group()) continue;
+      if (std::binary_search(old.particle.begin(), old.particle.end(), body.particle.front())) return leader_of(model, old);
     }
-    return body.particle.front();
+    return leader_of(model, body);
   };
   ApartPairs pairs;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -32,10 +32,11 @@ ApartPairs inherited_apart(const Model& model, const std::vector<Body>& before, 
     for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
       const auto [a, b] = std::minmax({origin(bodies[i]), origin(bodies[j])});
       if (std::binary_search(apart.begin(), apart.end(), collision::BodyPair{a, b})) {
-        pairs.push_back({bodies[i].particle.front(), bodies[j].particle.front()});
+        pairs.push_back({leader_of(model, bodies[i]), leader_of(model, bodies[j])});
       }
     }
   }
+  std::sort(pairs.begin(), pairs.end());
   return pairs;
 }
 
@@ -43,7 +44,9 @@ std::vector<implicit::SampleState> inherited_samples(const std::vector<Body>& be
                                                      const std::vector<Body>& bodies) {
   std::vector<implicit::SampleState> out;
   for (const Body& body : bodies) {
-    const auto same = std::find_if(before.begin(), before.end(), [&body](const Body& old) { return old.particle == body.particle; });
+    const auto same = std::find_if(before.begin(), before.end(), [&body](const Body& old) {
+      return old.origin.is_group() == body.origin.is_group() && old.particle == body.particle;
+    });
     out.push_back(same != before.end() ? samples[static_cast<std::size_t>(same - before.begin())] : fresh_samples(body));
   }
   return out;
@@ -76,10 +79,18 @@ bool note_overlapping(const std::vector<Body>& bodies, const Frame& frame, Model
 
 namespace {
 
-std::uint32_t group_led_by(const std::vector<Body>& bodies, std::uint32_t particle) {
-  const auto whole = bodies.begin() + static_cast<std::ptrdiff_t>(surface_count(bodies));
+/// Groups of an object by their numbers: of what may break there may be several with the same, or none.
+using GroupNumbers = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+GroupNumbers groups_of(const ObjectModel& object, const std::vector<Body>& bodies) {
+  GroupNumbers all;
+  const auto first = bodies.begin() + static_cast<std::ptrdiff_t>(surface_count(bodies));
   const auto before = [](const Body& body, std::uint32_t p) { return body.particle.front() < p; };
-  return static_cast<std::uint32_t>(std::lower_bound(whole, bodies.end(), particle, before) - bodies.begin());
+  for (auto body = std::lower_bound(first, bodies.end(), object.first, before); body != bodies.end() && body->particle.front() < object.last; ++body) {
+    all.emplace_back(body->origin.group, static_cast<std::uint32_t>(body - bodies.begin()));
+  }
+  std::sort(all.begin(), all.end());
+  return all;
 }
 
 /// Bodies of one object that meet once they have been apart, but for those that have been.
@@ -88,19 +99,31 @@ std::vector<collision::BodyPair> pairs_to_part(const Model& model, const std::ve
   const auto add = [&](std::uint32_t i, std::uint32_t j) {
     if (meeting_of(model.objects[bodies[i].object], bodies[i].origin, bodies[j].origin) != Meeting::OnceApart) return;
     if (bodies[i].skeleton.primitive.empty() || bodies[j].skeleton.primitive.empty()) return;
-    if (std::binary_search(apart.begin(), apart.end(), collision::BodyPair{bodies[i].particle.front(), bodies[j].particle.front()})) return;
-    pairs.push_back({i, j});
+    const auto [a, b] = std::minmax({leader_of(model, bodies[i]), leader_of(model, bodies[j])});
+    if (!std::binary_search(apart.begin(), apart.end(), collision::BodyPair{a, b})) pairs.push_back({std::min(i, j), std::max(i, j)});
   };
   const auto body_of = [&](std::uint32_t particle) { return body_led_by(bodies, particle); };
   for (const ObjectModel& object : model.objects) {
     if (!object.collides || object.separate) continue;
-    if (!object.breaks) {  // bodies are its components and their groups, and few of their pairs overlapped
-      for (const collision::BodyPair& pair : object.overlapping) {
-        const auto find = [&](std::uint32_t particle) { return object.are_groups(pair) ? group_led_by(bodies, particle) : body_of(particle); };
-        add(find(object.first + pair.a), find(object.first + pair.b));
+    const GroupNumbers groups = object.group.empty() ? GroupNumbers{} : groups_of(object, bodies);
+    const auto add_groups = [&](std::uint32_t i, std::uint32_t number) {
+      for (auto other = std::lower_bound(groups.begin(), groups.end(), std::pair(number, 0u)); other != groups.end() && other->first == number; ++other) {
+        if (i < other->second) add(i, other->second);
       }
-      continue;
+    };
+    for (const auto& [number, body] : groups) {
+      for (const std::uint32_t other : bodies[body].origin.cut) add_groups(body, other);
     }
+    for (const collision::BodyPair& pair : object.overlapping) {  // few
+      if (!object.are_groups(pair)) {
+        if (!object.breaks) add(body_of(object.first + pair.a), body_of(object.first + pair.b));
+        continue;
+      }
+      for (auto one = std::lower_bound(groups.begin(), groups.end(), std::pair(pair.a, 0u)); one != groups.end() && one->first == pair.a; ++one) {
+        add_groups(one->second, pair.b);
+      }
+    }
+    if (!object.breaks) continue;  // its bodies are components
     const std::uint32_t end = body_of(object.last);
     for (std::uint32_t i = body_of(object.first); i < end; ++i) {
       for (std::uint32_t j = i + 1; j < end; ++j) add(i, j);
@@ -122,7 +145,7 @@ bool note_apart(const StageContext& context, const core::ParticleState& particle
   };
   for (const collision::BodyPair& pair : pairs_to_part(context.model, bodies, apart)) {
     if (surface_box(pair.a).overlaps(surface_box(pair.b))) continue;
-    fresh.push_back({bodies[pair.a].particle.front(), bodies[pair.b].particle.front()});
+    fresh.push_back({leader_of(context.model, bodies[pair.a]), leader_of(context.model, bodies[pair.b])});
   }
   if (fresh.empty()) return false;
   apart.insert(apart.end(), fresh.begin(), fresh.end());

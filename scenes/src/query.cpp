@@ -289,7 +289,6 @@ std::string self_contact_text(const ObjectModel& object) {
     text += (text.empty() ? "" : "; ") + std::to_string(object.group.size()) + " groups touch those that they do not blend with, by their own fields";
     add_exceptions(true);
   }
-  if (object.passes_itself) text += (text.empty() ? "" : "; ") + passing_text(object);
   return text;
 }
 

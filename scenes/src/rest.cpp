@@ -54,7 +54,7 @@ std::vector<collision::BodyPair> tied_bodies(const std::vector<Body>& bodies, co
   const std::size_t surfaces = surface_count(bodies);
   for (std::size_t i = surfaces; i < bodies.size(); ++i) {
     const auto whole = std::find_if(bodies.begin(), bodies.begin() + static_cast<std::ptrdiff_t>(surfaces), [&](const Body& body) {
-      return body.object == bodies[i].object && body.origin.component == bodies[i].origin.component;
+      return body.object == bodies[i].object && body.origin.piece == bodies[i].origin.piece && body.origin.component == bodies[i].origin.component;
     });
     tied.push_back({static_cast<std::uint32_t>(whole - bodies.begin()), static_cast<std::uint32_t>(i)});
   }

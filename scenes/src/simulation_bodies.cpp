@@ -15,8 +15,7 @@ namespace supple::scenes {
 
 /// Bodies, rules and frames for the present pieces.
 void Simulation::Impl::form_bodies() {
-  bodies = make_bodies(model, parted_links(model, state.links, state.broken_for));
-  fade_blends(model, state.links, state.broken_for, bodies);
+  bodies = make_bodies(model, state.links, state.broken_for);
   scale_kernels(model, state.volumes, bodies);
   watch.forget();
   rules = make_body_rules(model, bodies, state.apart);
@@ -73,7 +72,12 @@ void Simulation::Impl::part_bodies() {
   form_bodies();
   if (scene.sleep) state.sleep.reset(bodies.size());
   form_awake();
-  if (bodies.size() == before.size()) return;
+  const auto same_parts = [](const Body& a, const Body& b) { return a.origin.group == b.origin.group && a.particle == b.particle; };
+  if (std::equal(bodies.begin(), bodies.end(), before.begin(), before.end(), same_parts)) {
+    const auto same_cuts = [](const Body& a, const Body& b) { return a.origin.cut == b.origin.cut; };
+    if (!std::equal(bodies.begin(), bodies.end(), before.begin(), same_cuts)) divide_anew();
+    return;
+  }
   rename_pair_work(model, before, bodies, state.record);
   state.ledger.dissipated += collision::stick_energy(model.reaction.stick, state.sticks);  // bodies have other numbers now
   state.sticks = {};

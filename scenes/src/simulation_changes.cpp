@@ -84,7 +84,7 @@ void Simulation::Impl::adopt(State other) {
   other.ledger = {};
   other.record = {};
   // Distances of samples go on from where they are, if there are as many.
-  const std::vector<Body> parted = make_bodies(model, parted_links(model, other.links, other.broken_for));
+  const std::vector<Body> parted = make_bodies(model, other.links, other.broken_for);
   other.samples.resize(parted.size());
   for (std::size_t i = 0; i < parted.size(); ++i) {
     if (other.samples[i].distance.size() != parted[i].samples.size()) other.samples[i] = fresh_samples(parted[i]);

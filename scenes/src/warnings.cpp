@@ -58,7 +58,6 @@ void add_passing(const Model& model, std::vector<std::string>& warnings) {
                          (pairs == 1 ? " pair" : " pairs") + ", the first with particles " + std::to_string(one.a) + " and " +
                          std::to_string(one.b));
     }
-    if (object.passes_itself) warnings.push_back(key + passing_text(object) + "; 'self: false' says that it may");
   }
 }
 
@@ -172,7 +171,7 @@ void add_idle(const Scene& scene, const Model& model, std::vector<std::string>& 
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
     const ObjectModel& object = model.objects[i];
     const auto& contact = scene.objects[i].contact;
-    idle(contact && contact->self.value_or(false) && object.collides && !object.passes_itself && own_contacts(object) == 0,
+    idle(contact && contact->self.value_or(false) && object.collides && own_contacts(object) == 0,
          "objects." + object.name + ".contact.self", "it has no parts that could touch each other: they blend, or are bonded");
   }
 }
@@ -191,11 +190,6 @@ bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const coll
     });
   };
   return seen(pair.a) && seen(pair.b) && (lies_in(pair.a, pair.b) || lies_in(pair.b, pair.a));
-}
-
-std::string passing_text(const ObjectModel& object) {
-  return object.holds_volume ? "it holds its volume, so it stays one body and passes through itself where it does not blend"
-                             : "it may break, so what its blending graph joins only by way of others does not blend, but passes through itself";
 }
 
 std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles, Frame& frame) {

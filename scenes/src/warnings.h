@@ -14,9 +14,6 @@ namespace supple::scenes {
 /// @param frame  of the contacts at the start
 [[nodiscard]] bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair);
 
-/// Of an object that passes through itself: what does, and why.
-[[nodiscard]] std::string passing_text(const ObjectModel& object);
-
 /// What is odd about the start: bodies deep in one another, parts of an object that pass through each other, objects without a
 /// surface, cells and samples of contact that miss objects, and keys
 /// without an effect.

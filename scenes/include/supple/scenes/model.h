@@ -44,15 +44,13 @@ struct ObjectModel {
   /// Of each particle, the first one that its blending graph joins it with, directly or by way of others, counted from the
   /// object's first; such components are bodies of their own. Empty: it is not divided by them.
   std::vector<std::uint32_t> component{};
-  /// Nodes of the graph that do not blend with all others of their component, by their first particles, counted likewise and sorted: they touch
-  /// those by their own fields, without what the others add to these.
+  /// Nodes of the graph that do not blend with all others of their body, or may not once bonds have broken, by their first particles, counted
+  /// likewise and sorted: they touch those by their own fields, without what the others add to these.
   std::vector<std::uint32_t> group{};
   std::vector<collision::BodyPair> bonded{};       ///< components or groups with a bond between them, sorted: they never touch while it holds
   std::vector<collision::BodyPair> overlapping{};  ///< others that overlap at the start, sorted: they touch once they have been apart
   /// Whether a pair of these is one of groups: groups touch within their component, components each other.
   [[nodiscard]] bool are_groups(const collision::BodyPair& pair) const { return component.empty() || component[pair.a] == component[pair.b]; }
-  /// Some of it passes through what it does not blend with: a held volume keeps it one body, or its graph joins them by way of others and bonds may break.
-  bool passes_itself = false;
   double fade = 0.0;                      ///< how long a broken bond's blend fades [s]
   bool holds_volume = false;              ///< kernels are scaled by State::volumes
   VolumeOfName volume_of = VolumeOfName::Object;
@@ -134,20 +132,23 @@ struct BodyOrigin {
   std::uint32_t piece = 0;      ///< the smallest particle of what links join it with
   std::uint32_t component = 0;  ///< of ObjectModel::component; 0 where that is empty
   static constexpr std::uint32_t kWhole = 0xffffffff;
-  std::uint32_t group = kWhole;  ///< of ObjectModel::group, of a body that is one group of a component
+  std::uint32_t group = kWhole;  ///< of ObjectModel::group, of a body that is one group of another one
+  std::vector<std::uint32_t> cut{};  ///< groups of the same body that it blended with, or was bonded to, until bonds broke; sorted
   [[nodiscard]] bool is_group() const noexcept { return group != kWhole; }
   /// In ObjectModel::bonded and overlapping.
   [[nodiscard]] std::uint32_t number() const noexcept { return is_group() ? group : component; }
+  bool operator==(const BodyOrigin&) const = default;
 };
 
 /// What has a surface of its own: a whole object, a component of its blending graph, or a piece of one that broke. Behind all of these are the
-/// groups of components, whose particles are theirs, too: they only touch groups that they do not blend with. Contact bodies are these, by index.
+/// groups of these, whose particles are theirs, too: they only touch groups of the same one that they do not blend with. Contact bodies are these, by index.
 struct Body {
   std::uint32_t object = 0;
   BodyOrigin origin;
   std::string name;                        ///< of the object; of several bodies "name.1", "name.2" ...
   std::vector<std::uint32_t> particle;     ///< its parts are these, ascending
   std::vector<collision::PartYield> yield; ///< of its parts
+  std::vector<std::uint32_t> primitive{}, seed{};  ///< which ones of its object `skeleton` and `samples` have; empty: all of them
   implicit::Skeleton skeleton;
   implicit::SampleLayout samples;
 };
@@ -155,13 +156,16 @@ struct Body {
 /// When two bodies of one object touch.
 enum class Meeting : std::uint8_t {
   Always,
-  OnceApart,  ///< pieces, as a fresh crack must first open, and components that overlap at the start
-  Never,      ///< components and groups with a bond between them, groups that blend, a group and a body
+  OnceApart,  ///< pieces, and groups that bonds or blends have left, as a fresh crack must first open; components and groups that overlap at the start
+  Never,      ///< components and groups with a bond between them, groups that blend, those of different bodies, a group and a body
 };
 [[nodiscard]] Meeting meeting_of(const ObjectModel& object, const BodyOrigin& a, const BodyOrigin& b);
 
-/// Bodies of one object that meet OnceApart and have been apart from each other, named by their smallest particles, sorted.
-/// Part of State.
+/// What names a body among those of its object: its smallest particle; of groups of what may break, whose bodies may have the same, this and the number of all
+/// particles.
+[[nodiscard]] std::uint32_t leader_of(const Model& model, const Body& body);
+
+/// Bodies of one object that meet OnceApart and have been apart from each other, by their leaders, sorted. Part of State.
 using ApartPairs = std::vector<collision::BodyPair>;
 
 /// Name of a contact body: of a body, or of a fixed one.
@@ -175,8 +179,9 @@ using ApartPairs = std::vector<collision::BodyPair>;
 /// weight, one without the best of the paths over one common neighbour, or 1 where there never was such a path.
 void fade_blends(const Model& model, const core::LinkState& links, std::span<const double> broken_for, std::vector<Body>& bodies);
 
-/// The bodies at a state, in the order of objects and of smallest particles; then the groups, likewise.
-[[nodiscard]] std::vector<Body> make_bodies(const Model& model, const core::LinkState& links);
+/// The bodies at a state, in the order of objects and of smallest particles; then the groups, likewise. Their blends are faded.
+/// @param broken_for  time since each link broke [s], shape of the links
+[[nodiscard]] std::vector<Body> make_bodies(const Model& model, const core::LinkState& links, std::span<const double> broken_for);
 /// How many of them are no groups: these have surfaces.
 [[nodiscard]] std::size_t surface_count(const std::vector<Body>& bodies);
 /// Model::rules for these bodies, which the fixed ones follow.
