@@ -451,9 +451,12 @@ bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBo
 }
 
 bool MarchRuleSolver::may_meet(const PairPressure& pressure, const Box& overlap) {
+  constexpr double kLeast = 0.1;
   const double size = pressure.feature_size();
+  const auto most = [&](int side) { return pressure.modulus(side) * pressure.field(side).bound(overlap).upper; };
+  const double least = kLeast * std::min(most(0), most(1));
   for (double cell = size; cell > kSmallest * size; cell *= 0.5) {
-    if (!mesher_.may_meet(pressure, overlap, cell)) return false;
+    if (!mesher_.may_meet(pressure, overlap, cell, least)) return false;
   }
   return true;
 }

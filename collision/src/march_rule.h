@@ -31,7 +31,8 @@ class MarchRuleSolver {
   bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const Limits& limits,
              const Regions& regions, const std::optional<CommonAxis>& axis, const Vec3& reference, PatchPoints& points);
 
-  /// False: bounds of the fields leave no room for Sigma.
+  /// False: bounds of the fields leave no room for Sigma, but for what presses less than a tenth of what the softer body may there: surfaces in one place
+  /// have no other one.
   bool may_meet(const PairPressure& pressure, const Box& overlap);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }

@@ -17,6 +17,7 @@ namespace {
 constexpr double kLeastCosine = 0.2;       // of Sigma's normal to the axis
 constexpr int kWalkSteps = 40;
 constexpr double kFirst = 1e-3;            // kinks nearer to the middle are not gone to
+constexpr double kBeyond = 4.0;            // kinks farther than that, in radii, tell no more than none; which are known depends on how the overlap's box lies
 constexpr double kNear = 0.3;              // pressure at the rim, of that in the middle
 constexpr double kFar = 2.0;               // from Sigma, in the overlap: Newton's method is not believed
 constexpr std::size_t kFewRays = 8, kManyRays = 16;
@@ -100,7 +101,7 @@ bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec
     double step = falls > 0.0 ? walk.pressure / falls : kInfinity;
     if (!walk.fresh && walk.bend < 0.0) step = (std::sqrt(square) - falls) / -walk.bend;
     // Beyond a kink the pressure may begin to fall: a short step tells how.
-    if (walk.fresh && (walk.passed > 0.0 || kink == kInfinity)) step = std::min(step, first / walk.along.norm());
+    if (walk.fresh && (walk.passed > 0.0 || !(kink < kBeyond))) step = std::min(step, first / walk.along.norm());
     walk.at = walk.in + step;
     if (walk.at > kink) walk.at = walk.passed = kink;
   };

@@ -92,10 +92,10 @@ class PairPressure {
     evaluations_ += points.size();
   }
 
-  /// Whether the box may hold a place where both bodies press, and equally hard, by their bounds.
-  [[nodiscard]] bool may_meet(const Box& box) const {
+  /// Whether the box may hold a place where both bodies press, and equally hard, by their bounds. @param least  by more than that [Pa]
+  [[nodiscard]] bool may_meet(const Box& box, double least = 0.0) const {
     const Interval a = field_[0].bound(box), b = field_[1].bound(box);
-    return a.upper > 0.0 && b.upper > 0.0 && modulus_[0] * a.lower <= modulus_[1] * b.upper && modulus_[1] * b.lower <= modulus_[0] * a.upper;
+    return modulus_[0] * a.upper > least && modulus_[1] * b.upper > least && modulus_[0] * a.lower <= modulus_[1] * b.upper && modulus_[1] * b.lower <= modulus_[0] * a.upper;
   }
 
   /// Appends where derivatives of either pressure jump, as far as the fields tell. @return whether these are all
