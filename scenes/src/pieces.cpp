@@ -26,11 +26,13 @@ ApartPairs inherited_apart(const Model& model, const std::vector<Body>& before, 
     }
     return leader_of(model, body);
   };
+  std::vector<std::uint32_t> from;
+  for (const Body& body : bodies) from.push_back(origin(body));
   ApartPairs pairs;
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
+  for (std::size_t i = 0; i < bodies.size() && !apart.empty(); ++i) {
     if (model.objects[bodies[i].object].separate) continue;
     for (std::size_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-      const auto [a, b] = std::minmax({origin(bodies[i]), origin(bodies[j])});
+      const auto [a, b] = std::minmax({from[i], from[j]});
       if (std::binary_search(apart.begin(), apart.end(), collision::BodyPair{a, b})) {
         pairs.push_back({leader_of(model, bodies[i]), leader_of(model, bodies[j])});
       }
