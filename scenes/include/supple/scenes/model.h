@@ -137,7 +137,6 @@ struct BodyOrigin {
   [[nodiscard]] bool is_group() const noexcept { return group != kWhole; }
   /// In ObjectModel::bonded and overlapping.
   [[nodiscard]] std::uint32_t number() const noexcept { return is_group() ? group : component; }
-  bool operator==(const BodyOrigin&) const = default;
 };
 
 /// What has a surface of its own: a whole object, a component of its blending graph, or a piece of one that broke. Behind all of these are the
