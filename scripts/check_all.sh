@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The slower checks, before a release: a second compiler, static analysis, all checks of its sanitizers, the thread sanitizer, headers that stand alone,
-# the installed package. Writes docs/reports/checks.md. Planted defects take hours and have scripts/mutate.sh.
+# the installed package. Writes docs/checks.md. Planted defects take hours and have scripts/mutate.sh.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -84,7 +84,7 @@ fi
 
 failed=0
 print_summary || failed=1
-report=$supple_root/docs/reports/checks.md
+report=$supple_root/docs/checks.md
 mkdir -p "$(dirname "$report")"
 # What was not run this time keeps its last line.
 declare -A rows=()
@@ -111,5 +111,5 @@ done
   echo "|---|---|---|---|"
   for name in "${order[@]}"; do echo "${rows[$name]}"; done
 } >"$report"
-echo "wrote docs/reports/checks.md"
+echo "wrote docs/checks.md"
 exit $failed

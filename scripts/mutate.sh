@@ -10,7 +10,7 @@ source "$here/parts.sh"
 if [[ ${1:-} == -h || ${1:-} == --help ]]; then
   echo "usage: scripts/mutate.sh [--check] [--new] [-j N] [MODULE ...]    e.g. scripts/mutate.sh core implicit; all modules when none is named"
   echo "--check builds nothing: it says whether every defect still has its place in the sources."
-  echo "--new plants those that the module's report does not list, docs/reports/mutations/MODULE.md."
+  echo "--new plants those that the last report of the module does not list, build/mutations/MODULE.md."
   echo "-j N plants N defects at a time, each in a copy of the tree with a build of its own."
   exit 0
 fi
@@ -94,7 +94,7 @@ for ((copy = 0; copy < jobs; ++copy)); do
     { tail -n 30 "$home/configure.log"; exit 1; }
 done
 
-report_of() { echo "$supple_root/docs/reports/mutations/$1.md"; }
+report_of() { echo "$supple_root/build/mutations/$1.md"; }
 
 # row_start: of the row of the report of the line in `field`.
 row_start() { echo "| ${field[0]} | \`${field[1]//|/\\|}\` | \`${field[2]//|/\\|}\` | \`${field[3]//|/\\|}\` |"; }

@@ -16,7 +16,7 @@ constexpr int kMildOrder = 3;           // of the derivative that jumps
 constexpr std::size_t kFinestRings = 5;  // that is worth its points: sectors reach the rest with fewer
 constexpr double kEnough = 0.9;         // leaves room for Newton's method
 /// What a rule is off by, over what the one before it is: about the fourth power of the ratio of their points along a ray or
-/// around (fitted in the middle of patches of bodies of ten blobs; docs/reports/contact_speed.md, "Mild kinks").
+/// around (fitted in the middle of patches of bodies of ten blobs).
 constexpr std::array<double, kFinestRings + 1> kFall{1.0, 0.1, 0.14, 0.13, 0.28, 0.19};
 /// Over what that, and the rule two before, say; over what half the rays are off by.
 constexpr double kSafety = 12.0, kHalves = 0.5;

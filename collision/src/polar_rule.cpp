@@ -37,7 +37,7 @@ double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums&
   const double later = r == 1 ? 60.0 : r == 2 ? 25.0 : 10.0;
   const double difference = std::max(relative_difference(fine, coarse), spread / later), root = std::sqrt(difference);
   // Shares fitted to the errors of patches between ellipsoids, capsules, discs, boxes and blobs; in other poses the least bound was twice
-  // the error (docs/reports/contact_speed.md, "Bounds on smooth patches").
+  // the error.
   switch (r) {
     case 1: return difference * (0.05 + 20.0 * difference + (25.0 + 3600.0 * moved) * moved);
     case 2: return difference * (0.1 + 10.0 * root + 20.0 * moved);

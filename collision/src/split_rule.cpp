@@ -67,7 +67,7 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 /// same order it converges faster than the coarser one, and the more so the less they differ, as in QUADPACK (Piessens et al. 1983,
 /// sec. 2.2.4.1); less so of panels that were halved because they did not. Where rays meet other kinks from some angle on, a derivative jumps
 /// there, and two rules say little; less so on faces, where the pressure is nearly the same on both sides. The shares come from the errors of
-/// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs (docs/reports/contact_speed.md, "Bounds across kinks").
+/// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs.
 constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
 constexpr double kRound = 6e5;  // times its square
 constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;

@@ -1,5 +1,5 @@
 // Contact tried hard: stiffness x mass ratio x speed at steps asked of 1/24 s, stacks that grow heavier upward, balls
-// squeezed to half their diameter, a thousand shots. Prints the table of docs/reports/contact_stability.md; a file name
+// squeezed to half their diameter, a thousand shots. Prints the table of docs/stability.md; a file name
 // writes the map as SVG. `--seed N` repeats the shots of a run. Exit 1 when a run gained energy, let something pass
 // untold, stopped, or did not hold what it can hold.
 #include <array>

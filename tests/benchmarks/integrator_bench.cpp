@@ -1,6 +1,6 @@
 // Time against error of every integrator on three systems: a stiff spiral, a tumbling cluster of soft bonds, a shell that
 // rings. Error: RMS of positions at the end against the adaptive method at tolerance 1e-12, over the size of the system.
-// Prints the table of docs/reports/integrators.md; with a file name, also draws it as SVG.
+// Prints time against error of the integrators; with a file name, also draws it as SVG.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -21,12 +21,12 @@ def output_of(example, page):
     return printed.getvalue()
 
 
-class Readme(unittest.TestCase):
+class EmbeddingPage(unittest.TestCase):
     @unittest.skipUnless(TOOL, "the command line tool is not built")
     def test_has_an_example_that_gives_what_the_tool_gives(self):
-        example = re.search(r"```python\n(.*?)```", (SOURCE / "README.md").read_text(), re.DOTALL).group(1)
+        example = re.search(r"```python\n(.*?)```", (SOURCE / "docs/embedding.md").read_text(), re.DOTALL).group(1)
         self.assertLessEqual(len(example.splitlines()), 12)
-        printed = output_of(example, "README.md")
+        printed = output_of(example, "docs/embedding.md")
         result = run_tool("contacts/two_balls", "--set", "objects.left.particles.mass=0.3")
         self.assertEqual(printed.split()[-1], result["state_hash"])
 
