@@ -10,7 +10,7 @@
 namespace supple::render {
 namespace {
 
-void append(const Mesh& mesh, const Vec3& origin, DrawList& list) {
+void append(const Mesh& mesh, const PictureSpace& space, DrawList& list) {
   SUPPLE_EXPECTS(mesh.normal.size() == mesh.position.size());
   const auto base = static_cast<std::uint32_t>(list.vertices.size() / 6);
   SUPPLE_EXPECTS(std::size_t{base} + mesh.vertex_count() <= std::size_t{0xffffffff});
@@ -18,7 +18,7 @@ void append(const Mesh& mesh, const Vec3& origin, DrawList& list) {
   float* out = list.vertices.data() + 6 * std::size_t{base};
   bool finite = true;
   for (std::size_t i = 0; i < mesh.vertex_count(); ++i, out += 6) {
-    const Vec3 p = mesh.position[i] - origin;
+    const Vec3 p = space.place(mesh.position[i]);
     list.bounds.include(p);
     finite = finite && p.allFinite();
     for (int k = 0; k < 3; ++k) {
@@ -42,17 +42,15 @@ void append(const Mesh& mesh, const Vec3& origin, DrawList& list) {
 /// What decides the colour at the vertices of an item.
 void append_paint(const Item& item, std::vector<float>& out) {
   const Mesh& mesh = *item.mesh;
-  const bool values = item.paint.kind == PaintKind::Values;
-  std::array<const std::vector<double>*, 3> from = {column(mesh, values ? item.paint.column : "rest_x"), nullptr, nullptr};
-  if (!values) from = {from[0], column(mesh, "rest_y"), column(mesh, "rest_z")};
-  const bool rest = from[0] != nullptr && from[1] != nullptr && from[2] != nullptr;
-  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
-    Vec3 at = Vec3::Zero();
-    if (values)
-      at.x() = from[0] == nullptr ? item.paint.lower : (*from[0])[i];
-    else
-      at = rest ? Vec3((*from[0])[i], (*from[1])[i], (*from[2])[i]) : mesh.position[i];
-    for (int k = 0; k < 3; ++k) out.push_back(static_cast<float>(at[k]));
+  const std::size_t first = out.size();
+  out.resize(first + 3 * mesh.vertex_count(), 0.0F);
+  if (item.paint.kind == PaintKind::Values) {
+    const std::vector<double>* values = column(mesh, item.paint.column);
+    for (std::size_t i = 0; i < mesh.vertex_count(); ++i)
+      out[first + 3 * i] = static_cast<float>(values == nullptr ? item.paint.lower : (*values)[i]);
+  } else if (has_pattern(item.paint)) {
+    const std::vector<Eigen::Vector3f> places = places_in_pattern(item);
+    for (std::size_t i = 0; i < places.size(); ++i) std::copy_n(places[i].data(), 3, &out[first + 3 * i]);
   }
 }
 
@@ -67,6 +65,22 @@ const std::vector<double>* column(const Mesh& mesh, std::string_view name) {
   return nullptr;
 }
 
+bool has_pattern(const Paint& paint) {
+  return paint.kind == PaintKind::Checker || paint.kind == PaintKind::Stripes || paint.kind == PaintKind::Picture;
+}
+
+std::vector<Eigen::Vector3f> places_in_pattern(const Item& item) {
+  const Mesh& mesh = *item.mesh;
+  const std::array rest = {column(mesh, "rest_x"), column(mesh, "rest_y"), column(mesh, "rest_z")};
+  const bool has_rest = rest[0] != nullptr && rest[1] != nullptr && rest[2] != nullptr;
+  const auto place = [&](std::size_t v) -> Vec3 { return has_rest ? Vec3((*rest[0])[v], (*rest[1])[v], (*rest[2])[v]) : mesh.position[v]; };
+  std::vector<Eigen::Vector3f> out(mesh.vertex_count());
+  if (out.empty()) return out;
+  const Vec3 origin = same_in_pattern(item.paint, place(0));
+  for (std::size_t v = 0; v < out.size(); ++v) out[v] = Vec3((place(v) - origin) / item.paint.size).cast<float>();
+  return out;
+}
+
 bool is_painted(const Item& item) {
   return item.paint.kind != PaintKind::Plain || item.wireframe || !item.surface;
 }
@@ -79,7 +93,7 @@ RectangleEdges rectangle_edges(const AreaLight& light) {
   return {.u = light.half_sizes.x() * across, .v = light.half_sizes.y() * facing.cross(across)};
 }
 
-void pack(std::span<const Item> items, const Vec3& origin, DrawList& list) {
+void pack(std::span<const Item> items, const PictureSpace& space, DrawList& list) {
   list.vertices.clear();
   list.indices.clear();
   list.ranges.clear();
@@ -91,7 +105,7 @@ void pack(std::span<const Item> items, const Vec3& origin, DrawList& list) {
     const Mesh& mesh = *items[i].mesh;
     if (mesh.triangle.empty()) continue;
     const std::size_t first = list.indices.size();
-    append(mesh, origin, list);
+    append(mesh, space, list);
     if (painted) append_paint(items[i], list.paint);
     list.ranges.push_back({.first = first, .count = list.indices.size() - first, .item = i});
   }
@@ -123,13 +137,12 @@ CameraMatrices camera_matrices(const Camera& camera, double aspect, const Box& b
 
   double farthest = 12.0 * out.distance;
   if (!bounds.empty()) farthest = std::max(farthest, 1.01 * ((bounds.centre() - eye).norm() + bounds.extent().norm()));
-  const double nearest = 0.01 * out.distance;
+  const double nearest = 1e-5 * out.distance;
   const double half_height = std::tan(0.5 * camera.field_of_view);
   Eigen::Matrix4d projection = Eigen::Matrix4d::Zero();
   projection(0, 0) = 1.0 / (half_height * aspect);
   projection(1, 1) = 1.0 / half_height;
-  projection(2, 2) = -(farthest + nearest) / (farthest - nearest);
-  projection(2, 3) = -2.0 * farthest * nearest / (farthest - nearest);
+  projection(2, 3) = nearest;
   projection(3, 2) = -1.0;
 
   out.view = view.cast<float>();
@@ -172,14 +185,14 @@ MapFit fit_map(const Box& bounds, const Vec3& direction, int size) {
           .extent = extent.cast<float>()};
 }
 
-AreaMap fit_area_map(const AreaLight& light, const Vec3& origin, std::span<const float> vertices, int size) {
+AreaMap fit_area_map(const AreaLight& light, std::span<const float> vertices, int size) {
   constexpr float kWidest = 4.0F;
   const RectangleEdges edges = rectangle_edges(light);
   Eigen::Matrix3f axes;
   // Seen along the last axis with the first to the right, the second is up: front faces keep their turn.
   axes << edges.u.normalized().cast<float>().transpose(), -edges.v.normalized().cast<float>().transpose(),
       light.facing.normalized().cast<float>().transpose();
-  const Eigen::Vector3f middle = (light.at - origin).cast<float>();
+  const Eigen::Vector3f middle = light.at.cast<float>();
   const float nearest = 0.02F * static_cast<float>(light.half_sizes.minCoeff());
   Eigen::Vector2f least = Eigen::Vector2f::Constant(INFINITY), most = -least;
   float first = INFINITY, last = 0.0F;

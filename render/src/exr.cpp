@@ -50,6 +50,7 @@ std::vector<half> halves(const std::vector<float>& values) {
   return out;
 }
 
+constexpr std::array kVelocity = {"velocity.X", "velocity.Y", "velocity.Z"};
 constexpr const char* kFingerprint = "fingerprint";
 
 }  // namespace
@@ -61,7 +62,7 @@ void write_exr(const std::filesystem::path& path, const LinearImage& picture, co
   SUPPLE_EXPECTS(picture.rgba.size() == 4 * count && layers.depth.size() == count && layers.normal.size() == 3 * count);
   SUPPLE_EXPECTS(layers.velocity.size() == 3 * count && layers.object.size() == count);
 
-  const std::vector<half> colour = halves(picture.rgba), normal = halves(layers.normal), velocity = halves(layers.velocity);
+  const std::vector<half> colour = halves(picture.rgba), normal = halves(layers.normal);
 
   Imf::Header header(layers.width, layers.height);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -85,7 +86,8 @@ void write_exr(const std::filesystem::path& path, const LinearImage& picture, co
   };
   add_vector({"R", "G", "B", "A"}, colour);
   add_vector({"N.X", "N.Y", "N.Z"}, normal);
-  add_vector({"velocity.X", "velocity.Y", "velocity.Z"}, velocity);
+  // Halves end at 6e-8 and 65504 m/s.
+  for (std::size_t k = 0; k < kVelocity.size(); ++k) add(kVelocity[k], Imf::FLOAT, &layers.velocity[k], 3 * sizeof(float));
   add("Z", Imf::FLOAT, layers.depth.data(), sizeof(float));
   add("id", Imf::UINT, layers.object.data(), sizeof(std::uint32_t));
 

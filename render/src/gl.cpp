@@ -71,7 +71,7 @@ Gl::Gl(const GlContext& context) {
                                        .key = {},
                                        .expected = std::string("the driver has no function ") + name,
                                        .found = {},
-                                       .hint = "OpenGL 3.3 or later is needed"});
+                                       .hint = "OpenGL 4.5 or later is needed"});
     return function;
   };
 #define SUPPLE_GL_LOAD(type, name) name = reinterpret_cast<PFNGL##type##PROC>(load("gl" #name));

@@ -19,7 +19,7 @@ namespace supple::render {
   X(BINDFRAMEBUFFER, BindFramebuffer) X(BINDSAMPLER, BindSampler) X(BINDTEXTURE, BindTexture)                 \
   X(BINDVERTEXARRAY, BindVertexArray) X(BUFFERDATA, BufferData)               \
   X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus) X(CLEAR, Clear)         \
-  X(CLEARCOLOR, ClearColor) X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram)                   \
+  X(CLEARCOLOR, ClearColor) X(CLEARDEPTH, ClearDepth) X(CLIPCONTROL, ClipControl) X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram)                   \
   X(CREATESHADER, CreateShader) X(CULLFACE, CullFace) X(DELETEBUFFERS, DeleteBuffers)                         \
   X(DELETESHADER, DeleteShader) X(DELETETEXTURES, DeleteTextures) X(DEPTHFUNC, DepthFunc)                     \
   X(DEPTHMASK, DepthMask) X(DISABLE, Disable) X(DRAWARRAYS, DrawArrays) X(DRAWBUFFER, DrawBuffer)             \

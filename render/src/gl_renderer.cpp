@@ -62,13 +62,29 @@ void GlRenderer::draw_ground_occlusion(const MapFit& fit, float ground_height) {
   draw_cover();
 }
 
+/// Depths of geometry are largest at the near plane; those of maps and of draw_picture are least where they are nearest.
+void GlRenderer::begin_geometry(const Target& target) const {
+  begin(target, true);
+  gl_.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  gl_.DepthFunc(GL_GEQUAL);
+  gl_.ClearDepth(0.0);
+  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+}
+
+void GlRenderer::end_geometry() const {
+  gl_.ClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+  gl_.DepthFunc(GL_LEQUAL);
+  gl_.ClearDepth(1.0);
+  gl_.Enable(GL_CULL_FACE);
+  gl_.Disable(GL_SAMPLE_MASK);
+}
+
 void GlRenderer::draw_geometry(const CameraMatrices& camera, std::span<const Item> items) const {
   if (painted_) {
     draw_painted_geometry(camera, items);
     return;
   }
-  begin(geometry_, true);
-  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+  begin_geometry(geometry_);
   programs_->geometry.use();
   programs_->geometry.set("to_clip", camera.view_projection);
   gl_.BindVertexArray(item_array_);
@@ -77,8 +93,7 @@ void GlRenderer::draw_geometry(const CameraMatrices& camera, std::span<const Ite
     programs_->geometry.set("id", static_cast<int>(range.item + 1));
     draw_range(range);
   }
-  gl_.Enable(GL_CULL_FACE);
-  gl_.Disable(GL_SAMPLE_MASK);
+  end_geometry();
 }
 
 void GlRenderer::set_geometry(const Program& program, const CameraMatrices& camera, const View& view) const {
@@ -152,7 +167,7 @@ void GlRenderer::set_ground(const Program& program, const View& view) const {
   program.set("ground_second", linear_colour(paint.colour));
   program.set("ground_paint_size", static_cast<float>(paint.size));
   program.set("ground_axis", Eigen::Vector2f(paint.axis.normalized().head<2>().cast<float>()));
-  program.set("ground_origin", Eigen::Vector2f(-view.camera.look_at.head<2>().cast<float>()));
+  program.set("ground_origin", Eigen::Vector2f(pattern_origin_.head<2>().cast<float>()));
   if (paint.kind != PaintKind::Picture) return;
   program.set("ground_picture", kGroundPicture);
   program.set("ground_aspect", static_cast<float>(paint.picture->width) / static_cast<float>(paint.picture->height));
@@ -164,7 +179,7 @@ void GlRenderer::set_area_lights(const Program& program, const Shot& shot, const
   std::array<std::array<Eigen::Vector3f, kAreaLights>, 6> area;
   for (std::size_t i = 0; i < count; ++i) {
     const RectangleEdges edges = rectangle_edges(view.area_lights[i]);
-    area[0][i] = (view.area_lights[i].at - view.camera.look_at).cast<float>();
+    area[0][i] = view.area_lights[i].at.cast<float>();
     area[1][i] = edges.u.cast<float>();
     area[2][i] = edges.v.cast<float>();
     area[3][i] = static_cast<float>(view.area_lights[i].radiance) * linear_colour(view.area_lights[i].colour);
@@ -272,7 +287,7 @@ std::vector<AreaMap> GlRenderer::draw_area_maps(const View& view) {
   gl_.Clear(GL_DEPTH_BUFFER_BIT);
   programs_->depth.use();
   for (std::size_t i = 0; i < std::min(view.area_lights.size(), kAreaLights); ++i) {
-    maps.push_back(fit_area_map(view.area_lights[i], view.camera.look_at, list_.vertices, kAreaMapSize));
+    maps.push_back(fit_area_map(view.area_lights[i], list_.vertices, kAreaMapSize));
     if (maps.back().extent.z() == 0.0F) continue;
     gl_.Viewport(static_cast<int>(i & 1) * kAreaMapSize, static_cast<int>(i >> 1) * kAreaMapSize, kAreaMapSize, kAreaMapSize);
     programs_->depth.set("to_clip", maps.back().to_clip);
@@ -281,11 +296,12 @@ std::vector<AreaMap> GlRenderer::draw_area_maps(const View& view) {
   return maps;
 }
 
-GlRenderer::Shot GlRenderer::draw(const View& view, std::span<const Item> items) {
-  const Vec3& origin = view.camera.look_at;
+GlRenderer::Shot GlRenderer::draw(const LocalView& local, std::span<const Item> items) {
+  const View& view = local.view;
+  pattern_origin_ = local.pattern_origin;
   {
     const CpuClock clock(times_.upload);
-    pack(items, origin, list_);
+    pack(items, local.space, list_);
   }
   painted_ = !list_.paint.empty();
   if (painted_) make_painting();
@@ -318,7 +334,7 @@ GlRenderer::Shot GlRenderer::draw(const View& view, std::span<const Item> items)
   }
   if (!view.area_lights.empty()) shot.area = draw_area_maps(view);
   if (has_region && view.ground) {
-    const double ground = view.ground->height - origin.z();
+    const double ground = view.ground->height;
     const double above = region.upper.z() - ground;
     if (above > 0.0) {
       const double margin = std::min(1.5 * above, 0.5 * kRegion * shot.camera.distance);
@@ -340,7 +356,8 @@ GlRenderer::Shot GlRenderer::draw(const View& view, std::span<const Item> items)
 Image GlRenderer::render(const View& view, std::span<const Item> items, LinearImage* linear) {
   SUPPLE_EXPECTS(view.light.direction.norm() > 0.0);
   const CurrentContext current(*context_);
-  const Shot shot = draw(view, items);
+  const LocalView local = localised(view, items);
+  const Shot shot = draw(local, items);
   Image image;
   {
     const CpuClock clock(times_.read_back);
@@ -351,7 +368,7 @@ Image GlRenderer::render(const View& view, std::span<const Item> items, LinearIm
     const CpuClock clock(times_.draw);
     gl_.ActiveTexture(GL_TEXTURE0 + kUploads);
     if (!linear_) linear_ = make_target(gl_, settings_.width, settings_.height, {.colour = GL_RGBA32F, .depth = true});
-    draw_picture(*linear_, light_programs(lighting(view, true)), shot, view);
+    draw_picture(*linear_, light_programs(lighting(view, true)), shot, local.view);
     gl_.Finish();
   }
   const CpuClock clock(times_.read_back);

@@ -54,7 +54,7 @@ class GlRenderer final : public Renderer {
     std::optional<MapFit> shadow;
     std::optional<MapFit> heights;
     std::vector<AreaMap> area;  // of each area light
-    float radius = 0.0F;        // of ambient occlusion [m]
+    float radius = 0.0F;        // of ambient occlusion
   };
 
   void make_targets();
@@ -72,8 +72,10 @@ class GlRenderer final : public Renderer {
   void draw_all_items() const;
   void draw_cover() const;
   void begin(const Target& target, bool depth) const;
+  void begin_geometry(const Target& target) const;
+  void end_geometry() const;
 
-  [[nodiscard]] Shot draw(const View& view, std::span<const Item> items);
+  [[nodiscard]] Shot draw(const LocalView& local, std::span<const Item> items);
   [[nodiscard]] std::vector<AreaMap> draw_area_maps(const View& view);
   void draw_shadow_map(const MapFit& fit) const;
   void draw_ground_occlusion(const MapFit& fit, float ground_height);
@@ -123,6 +125,7 @@ class GlRenderer final : public Renderer {
   GLuint heights_ = 0;
   GLuint compare_sampler_ = 0;
   DrawList list_;
+  Vec3 pattern_origin_ = Vec3::Zero();  // of the ground
   std::vector<float> material_values_;
   std::vector<float> height_values_;
   std::vector<std::uint8_t> rgba_;

@@ -95,7 +95,6 @@ void GlRenderer::set_paint(const Program& program, const Item& item) const {
   program.set("paint", static_cast<int>(paint.kind));
   program.set("first", linear_colour(item.colour));
   program.set("second", linear_colour(paint.colour));
-  program.set("paint_size", static_cast<float>(paint.size));
   program.set("paint_axis", Eigen::Vector3f(paint.axis.normalized().cast<float>()));
   program.set("value_range", Eigen::Vector2f(static_cast<float>(paint.lower), static_cast<float>(paint.upper)));
   program.set("map_row", (static_cast<float>(paint.map) + 0.5F) / static_cast<float>(kColourMapNames.size()));
@@ -130,7 +129,7 @@ void GlRenderer::draw_wires(const DrawRange& range, const Item& item) const {
   if (item.surface) {
     gl_.Enable(GL_CULL_FACE);
     gl_.Enable(GL_POLYGON_OFFSET_LINE);
-    gl_.PolygonOffset(-1.0F, -2.0F);
+    gl_.PolygonOffset(1.0F, 2.0F);
   }
   draw_range(range);
   gl_.Disable(GL_POLYGON_OFFSET_LINE);
@@ -139,8 +138,7 @@ void GlRenderer::draw_wires(const DrawRange& range, const Item& item) const {
 }
 
 void GlRenderer::draw_painted_geometry(const CameraMatrices& camera, std::span<const Item> items) const {
-  begin(painting_->target, true);
-  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+  begin_geometry(painting_->target);
   const Program& program = painting_->geometry;
   program.use();
   program.set("to_clip", camera.view_projection);
@@ -157,8 +155,7 @@ void GlRenderer::draw_painted_geometry(const CameraMatrices& camera, std::span<c
     }
     if (item.wireframe) draw_wires(range, item);
   }
-  gl_.Enable(GL_CULL_FACE);
-  gl_.Disable(GL_SAMPLE_MASK);
+  end_geometry();
 }
 
 }  // namespace supple::render

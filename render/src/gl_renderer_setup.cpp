@@ -65,7 +65,7 @@ void GlRenderer::prime() {
   view.camera = {.from = Vec3(0, -4, 0), .look_at = Vec3::Zero()};
   view.ground = Ground{.height = -0.5};
   priming_ = true;
-  static_cast<void>(draw(view, items));
+  static_cast<void>(draw(localised(view, items), items));
   priming_ = false;
 }
 

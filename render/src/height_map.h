@@ -13,7 +13,7 @@ namespace supple::render {
 inline constexpr float kNoHeight = -1e30F;
 
 /// Minus the lowest and the highest height over the middle of each texel, at least 0; shape [size][size][2], rows along v.
-/// @param fit  seen straight down; what lies outside of its box is left out  @param ground  height of the ground, as the vertices [m]
+/// @param fit  seen straight down; what lies outside of its box is left out  @param ground  height of the ground, as the vertices
 void fill_heights(const DrawList& list, const MapFit& fit, float ground, int size, std::vector<float>& out);
 
 }  // namespace supple::render

@@ -95,11 +95,13 @@ class GlLayerRenderer final : public LayerRenderer {
   Layers render(const View& view, std::span<const Item> items) override {
     SUPPLE_EXPECTS(items.size() < kMostItems);
     const CurrentContext current(*context_);
-    pack(items, view.camera.look_at, list_);
-    const CameraMatrices camera = camera_matrices(view.camera, static_cast<double>(width_) / height_, list_.bounds);
+    const LocalView local = localised(view, items);
+    pack(items, local.space, list_);
+    const CameraMatrices camera = camera_matrices(local.view.camera, static_cast<double>(width_) / height_, list_.bounds);
     draw(camera, items);
     Layers layers = read_back();
-    if (view.ground) add_ground(view, camera, static_cast<std::uint32_t>(items.size() + 1), layers);
+    if (view.ground) add_ground(local.view, camera, static_cast<std::uint32_t>(items.size() + 1), layers);
+    for (float& depth : layers.depth) depth = static_cast<float>(depth / local.space.per_metre);
     return layers;
   }
 
@@ -120,7 +122,9 @@ class GlLayerRenderer final : public LayerRenderer {
     gl_.Disable(GL_BLEND);
     gl_.Disable(GL_DITHER);
     gl_.Enable(GL_DEPTH_TEST);
-    gl_.DepthFunc(GL_LEQUAL);
+    gl_.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);  // depths are largest at the near plane
+    gl_.DepthFunc(GL_GEQUAL);
+    gl_.ClearDepth(0.0);
     gl_.CullFace(GL_BACK);
     gl_.ClearColor(0.0F, 0.0F, 0.0F, 0.0F);
     gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);

@@ -16,16 +16,15 @@ const mat2 kGoldenTurn = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888)
 const char* const kGeometry = R"(
 uniform vec2 half_extent;
 uniform vec2 picture_size;
-uniform vec2 depth_range;     // near and far plane [m]
+uniform vec2 depth_range;     // near plane, and what lies beyond all items
 uniform mat4 view;
-uniform float eye_height;     // above the ground; below 0: no ground to be seen [m]
-const float kNowhere = 1e4;   // depth of nothing, in depths of the far plane
+uniform float eye_height;     // above the ground; below 0: no ground to be seen
+const float kNowhere = 1e4;   // depth of nothing, over depth_range.y
 
 vec3 eye_ray(vec2 pixel) { return vec3((pixel / picture_size * 2.0 - 1.0) * half_extent, -1.0); }
 
 float eye_depth(float stored) {
-  return stored < 1.0 ? depth_range.x * depth_range.y / (depth_range.y - stored * (depth_range.y - depth_range.x))
-                      : kNowhere * depth_range.y;
+  return stored > 0.0 ? depth_range.x / stored : kNowhere * depth_range.y;
 }
 
 float ground_depth(vec3 ray) {

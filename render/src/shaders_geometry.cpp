@@ -21,7 +21,6 @@ const char* const kPaint = R"(
 uniform int paint;           // PaintKind
 uniform vec3 first;          // linear
 uniform vec3 second;
-uniform float paint_size;    // [m]
 uniform vec3 paint_axis;
 uniform sampler2D picture;
 uniform float picture_aspect;
@@ -29,26 +28,25 @@ uniform sampler2D maps;      // a row for each colour map
 uniform float map_row;
 uniform vec2 value_range;
 
-vec3 albedo(vec3 at, vec3 n) {
-  vec3 scaled = at / paint_size;
-  vec3 along = dFdx(scaled);
-  vec3 up = dFdy(scaled);
-  vec3 slope = normalize(cross(along, up) + vec3(0.0, 0.0, 1e-12));
+vec3 albedo(vec3 at, vec3 n) {   // at: in cubes, slices or widths of the pattern
+  vec3 along = dFdx(at);
+  vec3 up = dFdy(at);
+  vec3 slope = normalize(cross(along, up) + vec3(0.0, 0.0, 1e-18));
   vec3 weight = slope * slope;
   weight *= weight;
   weight /= weight.x + weight.y + weight.z;
   if (paint == 1) {
     vec3 width = abs(along) + abs(up);
-    return mix(second, first, 0.5 + 0.5 * wave(scaled.x, width.x) * wave(scaled.y, width.y) * wave(scaled.z, width.z));
+    return mix(second, first, 0.5 + 0.5 * wave(at.x, width.x) * wave(at.y, width.y) * wave(at.z, width.z));
   }
   if (paint == 2) {
-    float t = dot(scaled, paint_axis);
+    float t = dot(at, paint_axis);
     return mix(second, first, 0.5 + 0.5 * wave(t, abs(dot(along, paint_axis)) + abs(dot(up, paint_axis))));
   }
   if (paint == 3) {
     vec2 proportion = vec2(1.0, picture_aspect);
-    return weight.x * texture(picture, scaled.yz * proportion).rgb + weight.y * texture(picture, scaled.xz * proportion).rgb +
-           weight.z * texture(picture, scaled.xy * proportion).rgb;
+    return weight.x * texture(picture, at.yz * proportion).rgb + weight.y * texture(picture, at.xz * proportion).rgb +
+           weight.z * texture(picture, at.xy * proportion).rgb;
   }
   if (paint == 4) {
     float t = clamp((at.x - value_range.x) / (value_range.y - value_range.x), 0.0, 1.0);

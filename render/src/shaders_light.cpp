@@ -118,7 +118,7 @@ vec4 stored(vec4 light) { return encoded(light.rgb); }
 const char* const kAreaUniforms = R"(
 uniform int area_lights;
 uniform vec3 area_centre[4];
-uniform vec3 area_u[4];        // half the edge along either side [m]
+uniform vec3 area_u[4];        // half the edge along either side
 uniform vec3 area_v[4];
 uniform vec3 area_radiance[4];
 )";
@@ -255,7 +255,7 @@ vec3 area_light(vec3 p, vec3 n, vec3 v, vec3 albedo, vec3 normal_reflectance, fl
 const char* const kGroundPaint = R"(
 uniform int ground_paint;           // PaintKind
 uniform vec3 ground_second;
-uniform float ground_paint_size;    // [m]
+uniform float ground_paint_size;
 uniform vec2 ground_axis;
 uniform sampler2D ground_picture;
 uniform float ground_aspect;
@@ -316,7 +316,7 @@ vec4 ground_light(vec3 p, vec3 behind, float visible) {
 const char* const kItemLight = R"(
 uniform sampler2D materials;      // albedo and roughness of each item; in the next row, metallic, painted, reflectance
 uniform sampler2D occlusion;
-uniform float occlusion_radius;   // [m]
+uniform float occlusion_radius;
 uniform int contact_taps;         // 0: no other item to touch
 
 float item_visibility(float depth) {
@@ -430,10 +430,10 @@ std::string classify(const Lighting& lighting) {
   return header(lighting.samples) + choices(lighting) + kGeometry + kPixel + kLight + kShown + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float nearest = 1.0;
-  for (int s = 0; s < SAMPLES; ++s) nearest = min(nearest, DEPTH(pixel, s).r);
+  float nearest = 0.0;
+  for (int s = 0; s < SAMPLES; ++s) nearest = max(nearest, DEPTH(pixel, s).r);
   bool is_floor = ground_depth(eye_ray(gl_FragCoord.xy)) < depth_range.y;
-  gl_FragDepth = nearest < 1.0 ? 0.9 : (is_floor ? 0.1 : 0.5);
+  gl_FragDepth = nearest > 0.0 ? 0.9 : (is_floor ? 0.1 : 0.5);
   colour = stored(background(background_colour()));
 })";
 }
@@ -469,7 +469,7 @@ void main() {
     uvec2 item = GEOMETRY(pixel, s).rg;
     float stored_depth = DEPTH(pixel, s).r;
     float item_depth = eye_depth(stored_depth);
-    bool is_item = stored_depth < 1.0 && item_depth <= floor_depth;
+    bool is_item = stored_depth > 0.0 && item_depth <= floor_depth;
     id[s] = is_item ? item.y : 0u;
     normal[s] = is_item ? unpack_normal(item.x) : vec3(0.0, 0.0, 1.0);
     depth[s] = is_item ? item_depth : floor_depth;

@@ -10,7 +10,7 @@ namespace supple::render::shaders {
 std::string ground_occlusion() {
   return std::string(kVersion) + R"(
 uniform sampler2D heights;
-uniform float map_size;      // edge of the map [m]
+uniform float map_size;      // edge of the map
 uniform float target_size;   // edge of this target [texel]
 out vec4 visibility;
 const int kAzimuths = 20;
@@ -62,7 +62,7 @@ void main() {
 // Scalable ambient obscurance (McGuire, Mara, Luebke 2012), without its mip chain: the disc is a few dozen pixels.
 std::string screen_occlusion(int samples) {
   return header(samples) + kDisc + kGeometry + R"(
-uniform float radius;        // [m]
+uniform float radius;
 out vec4 data;
 const int kTaps = 14;
 void main() {
@@ -78,7 +78,7 @@ void main() {
   float turn = 6.2831853 * float((cell.x * 4 + cell.y * 5 + (cell.y & 1) * 2) & 15) / 16.0;
   vec2 turned = vec2(cos(turn), sin(turn));
   float pixels = clamp(radius / (depth * half_extent.y) * 0.5 * picture_size.y, 3.0, 0.15 * picture_size.y);
-  int taps = stored_depth < 1.0 ? kTaps : 0;
+  int taps = stored_depth > 0.0 ? kTaps : 0;
   float r2 = radius * radius;
   float sum = 0.0;
   for (int i = 0; i < taps; ++i) {
@@ -99,7 +99,7 @@ std::string occlusion_blur() {
   return std::string(kVersion) + R"(
 uniform sampler2D occlusion;
 uniform float radius;
-uniform float nowhere;   // depths beyond are of no item [m]
+uniform float nowhere;   // depths beyond are of no item
 out vec4 data;
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);

@@ -16,7 +16,7 @@ struct Map {
   explicit Map(const Mesh& mesh, const Box& box, double ground) : fit(fit_map(box, Vec3(0, 0, -1), kSize)) {
     const Item item{.mesh = &mesh};
     DrawList list;
-    pack(std::span(&item, 1), Vec3::Zero(), list);
+    pack(std::span(&item, 1), {}, list);
     fill_heights(list, fit, static_cast<float>(ground), kSize, values);
   }
   [[nodiscard]] float lowest(int column, int row) const { return -values[2 * static_cast<std::size_t>(row * kSize + column)]; }

@@ -103,7 +103,7 @@ TEST(PathTracer, FilterLeavesQuietPixelsBesideNoisyOnes) {
   for (int y = 0; y < kSize; ++y)
     for (int x = 0; x < kSize; ++x) {
       film.cover.store(x, y, 1.0F);
-      film.albedo.store(x, y, Vec3f::Ones());
+      film.reflectance.store(x, y, Vec3f::Ones());
       film.normal.store(x, y, Vec3f::UnitZ());
       film.position.store(x, y, Vec3f(static_cast<float>(x), static_cast<float>(y), 0.0F));
       film.direct.radiance.store(x, y, Vec3f::Constant((x + y) % 2 == 0 ? 1.0F : 0.5F));
@@ -114,6 +114,35 @@ TEST(PathTracer, FilterLeavesQuietPixelsBesideNoisyOnes) {
     for (int x = 4; x < kNoisy - kSpread; ++x) EXPECT_NEAR(film.radiance.at(x, y).x(), (x + y) % 2 == 0 ? 1.0F : 0.5F, 1e-6F) << x << ' ' << y;
     for (int x = kNoisy + 2; x < 24; ++x) EXPECT_NEAR(film.radiance.at(x, y).x(), 0.75F, 0.15F) << x << ' ' << y;
   }
+}
+
+TEST(PathTracer, FilterKeepsTheBrightRimOfGlossyBodies) {
+  // A red ball that mirrors a white sky: its reflectance grows to 1 towards the outline, within few pixels.
+  const Mesh ball = sphere(Vec3::Zero(), 0.5, 96);
+  const Item item{.mesh = &ball, .colour = Vec3(0.8, 0.1, 0.15), .roughness = 0.15};
+  Studio studio;
+  studio.settings.width = studio.settings.height = 64;
+  studio.settings.noise = 0.1;
+  studio.settings.most_samples = 64;
+  studio.view.camera.field_of_view = 0.22;
+  studio.lights.above = studio.lights.below = Vec3f::Ones();
+  Film film = studio.trace(std::span(&item, 1));
+  path::Denoiser{}.run(Vec3f(0, -5, 0), static_cast<float>(2.0 * std::tan(0.11) / 64.0), Executor(1), film);
+  studio.settings.noise = 0.0;
+  studio.settings.most_samples = 1024;
+  const Film reference = studio.trace(std::span(&item, 1));
+  double error2 = 0.0, light2 = 0.0, count = 0.0;
+  for (const path::DetailedPixel& d : film.detailed) {
+    if (d.detail != path::Detail::Surfaces || reference.cover.at(d.x, d.y) < 0.05F) continue;
+    const double green = reference.radiance.at(d.x, d.y).y();  // of which the ball itself sends little
+    error2 += std::pow(film.radiance.at(d.x, d.y).y() - green, 2);
+    light2 += green * green;
+    count += 1.0;
+  }
+  EXPECT_GT(count, 100.0);
+  // Noise may be a tenth, and reflectances leave out what roughness does to them, as much again. That of neighbours farther in, which
+  // reflect less, would be off by more than half.
+  EXPECT_LT(std::sqrt(error2 / light2), 0.2);
 }
 
 TEST(PathTracer, FilterKeepsTheDarkOfGapsAlongOutlines) {

@@ -47,12 +47,29 @@ TEST(PathTracer, MeetsTheFieldInsteadOfACoarseMesh) {
     }
 }
 
+TEST(PathTracer, ShadesGapsOfAnySize) {
+  for (const double size : {1e-9, 1e-6, 1e-3, 1.0, 1e3}) {
+    // A lid over a floor, at a thousandth of their size.
+    const double gap = 1e-3 * size;
+    const Mesh floor = plate(size, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY()), lid = plate(size, Vec3(0, 0, gap), Vec3::UnitY(), Vec3::UnitX());
+    const std::array items = {matt(floor, 0.5), matt(lid, 0.5)};
+    path::Geometry geometry;
+    const Vec3f from(0.1F * static_cast<float>(size), 0.0F, 0.5F * static_cast<float>(gap));
+    for (const std::size_t count : {1u, 2u}) {
+      geometry.set(std::span(items).first(count), {}, 0.0, 0.0F);
+      path::Hit hit;
+      ASSERT_TRUE(geometry.meet(from, -Vec3f::UnitZ(), 0.0F, 0.0F, false, hit));
+      EXPECT_EQ(geometry.blocked(hit.leave, Vec3f::UnitZ(), INFINITY, 0.0F), count == 2) << size;
+    }
+  }
+}
+
 TEST(PathTracer, FollowsBundlesAsItFollowsRays) {
   const std::array meshes = {sphere(Vec3(-0.3, 0, 0), 0.4, 12), sphere(Vec3(0.3, 0.2, 0), 0.4, 12)};
   std::array items = {matt(meshes[0], 0.5), matt(meshes[1], 0.5)};
   items[0].opacity = 0.5;
   path::Geometry geometry;
-  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(items, {}, 0.0, 0.0F);
   std::size_t hits_found = 0, shadows = 0;
   for (const bool together : {false, true})
     for (int row = 0; row < 40; ++row) {
@@ -89,7 +106,7 @@ TEST(PathTracer, MissesNothingInBundlesAlongTheFacesOfTheBoxOfAllItems) {
   const Mesh mesh = plate(1.0, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
   const Item item = matt(mesh, 0.5);
   path::Geometry geometry;
-  geometry.set(std::span(&item, 1), Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(std::span(&item, 1), {}, 0.0, 0.0F);
   int hits_found = 0;
   for (int place = 0; place < 49; ++place)
     for (const bool together : {false, true}) {
@@ -110,7 +127,7 @@ TEST(PathTracer, MissesNothingInBundlesThatComeFromAfarOrBeginInside) {
   const Mesh ball = sphere(Vec3(3, 0, 0), 1.0, 16), other = sphere(Vec3(-3, 1, 0), 0.5, 16);
   const std::array items = {matt(ball, 0.5), matt(other, 0.5)};
   path::Geometry geometry;
-  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(items, {}, 0.0, 0.0F);
   int hits_found = 0;
   for (const float away : {0.0F, 2.0F, 30.0F, 3000.0F})
     for (int k = 0; k < 400; ++k) {
@@ -156,7 +173,7 @@ TEST(PathTracer, MeetsEachTriangleWhetherOrNotItJoinsTheNextOne) {
   Item item = matt(mesh, 0.5);
   item.two_sided = true;
   path::Geometry geometry;
-  geometry.set(std::span(&item, 1), Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(std::span(&item, 1), {}, 0.0, 0.0F);
   for (const auto& t : mesh.triangle) {
     const bool back = (mesh.position[t[1]] - mesh.position[t[0]]).cross(mesh.position[t[2]] - mesh.position[t[0]]).z() < 0.0;
     for (const Vec3& weight : {Vec3(0.2, 0.3, 0.5), Vec3(0.05, 0.05, 0.9), Vec3(0.9, 0.05, 0.05), Vec3(0.45, 0.5, 0.05)}) {
@@ -193,7 +210,7 @@ TEST(PathTracer, MeetsFrontsBeforeBacksAtOnePlace) {
   for (const bool first : {false, true}) {
     const std::array items = {matt(first ? ball : turned, 0.5), matt(first ? turned : ball, 0.5)};
     path::Geometry geometry;
-    geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+    geometry.set(items, {}, 0.0, 0.0F);
     for (int k = 0; k < 500; ++k) {
       const Vec3f from = Vec3f(std::sin(1.7F * static_cast<float>(k)), std::cos(2.3F * static_cast<float>(k)), 0.9F).normalized();
       for (const path::Hit& hit : both_ways(geometry, 4.0F * from, -from)) {
@@ -218,10 +235,10 @@ TEST(PathTracer, MeetsTheSameWhateverItsHierarchy) {
   std::array<Mesh, 3> meshes;
   for (int frame = 0; frame < kFrames; ++frame) {
     meshes = moved(frame);
-    refitted.set(items_of(meshes), Vec3::Zero(), 0.0, 0.0F);
+    refitted.set(items_of(meshes), {}, 0.0, 0.0F);
     EXPECT_EQ(refitted.counts().refitted, frame == 0 ? 0 : 3);
   }
-  fresh.set(items_of(meshes), Vec3::Zero(), 0.0, 0.0F);
+  fresh.set(items_of(meshes), {}, 0.0, 0.0F);
   EXPECT_EQ(fresh.counts().built, 3);
   const Mesh& mesh = meshes[0];
   for (const auto& t : mesh.triangle)
@@ -244,7 +261,7 @@ TEST(PathTracer, BuildsAnewWhatHasLeftItsHierarchy) {
   Mesh ball = sphere(Vec3::Zero(), 1.0, 24);
   const Item item = matt(ball, 0.5);
   path::Geometry geometry;
-  const auto set = [&] { geometry.set(std::span(&item, 1), Vec3::Zero(), 0.0, 0.0F); };
+  const auto set = [&] { geometry.set(std::span(&item, 1), {}, 0.0, 0.0F); };
   set();
   EXPECT_EQ(geometry.counts().built, 1);
   const Mat3 turn = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix();
@@ -260,12 +277,12 @@ TEST(PathTracer, KeepsItemsAndMovesVertices) {
   Mesh a = sphere(Vec3::Zero(), 0.5, 8), b = sphere(Vec3::UnitX(), 0.3, 8);
   const std::array items = {matt(a, 0.5), matt(b, 0.5)};
   path::Geometry geometry;
-  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(items, {}, 0.0, 0.0F);
   EXPECT_EQ(geometry.counts().built, 2);
-  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(items, {}, 0.0, 0.0F);
   EXPECT_EQ(geometry.counts().kept, 2);
   for (Vec3& p : b.position) p += Vec3(0.5, 0, 0);
-  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(items, {}, 0.0, 0.0F);
   EXPECT_EQ(geometry.counts().kept, 1);
   EXPECT_EQ(geometry.counts().refitted, 1);
   // The moved one is met where it is now.
@@ -273,7 +290,7 @@ TEST(PathTracer, KeepsItemsAndMovesVertices) {
   EXPECT_TRUE(geometry.meet(Vec3f(1.5F, -2, 0), Vec3f::UnitY(), 0.0F, 0.0F, false, hit));
   EXPECT_FALSE(geometry.meet(Vec3f(0.95F, -2, 0), Vec3f::UnitY(), 0.0F, 0.0F, false, hit));
   b = sphere(Vec3::UnitX(), 0.3, 9);
-  geometry.set(items, Vec3::Zero(), 0.0, 0.0F);
+  geometry.set(items, {}, 0.0, 0.0F);
   EXPECT_EQ(geometry.counts().built, 1);
 }
 

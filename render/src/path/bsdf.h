@@ -23,6 +23,13 @@ struct BsdfOf {
     return normal_reflectance + weight * (Vector::Constant(grazing_reflectance) - normal_reflectance);
   }
 
+  /// About what it sends that way of even light from all around. @param cosine  of the direction it goes to
+  [[nodiscard]] Vector reflectance(Number cosine) const {
+    const Number c = larger(cosine, 0.0F);
+    const Vector of_base = diffuse.cwiseProduct(Vector::Ones() - normal_reflectance) * (1.0F - grazing_reflectance * fall(c));
+    return select(has_lobe(), Vector(of_base + fresnel(c)), Vector(diffuse));
+  }
+
   /// Chance of taking the lobe instead of the base.
   [[nodiscard]] Number lobe_share(const Vector& out) const {
     const Number lobe = luminance(fresnel(out.z()));
@@ -62,16 +69,16 @@ struct BsdfOf {
   }
 
  private:
+  [[nodiscard]] static Number fall(Number cosine) {
+    const Number s = 1.0F - 0.5F * cosine;
+    return s * s * s * s * s;
+  }
   [[nodiscard]] static auto above(const Vector& out, const Vector& in) { return both(out.z() > 0.0F, in.z() > 0.0F); }
   /// Reciprocal, and dark where the lobe reflects (Ashikhmin & Shirley 2000, eq. 5, for any grazing reflectance g: the
   /// factor is 1 / (1 - 5/28 g), 28/23 for theirs).
   [[nodiscard]] Vector base(Number cos_out, Number cos_in) const {
     const Vector flat = diffuse.cwiseProduct(Vector::Ones() - normal_reflectance) * (1.0F / kPi);
     if (!any(has_lobe())) return flat;
-    const auto fall = [](Number c) {
-      const Number s = 1.0F - 0.5F * c;
-      return Number(s * s * s * s * s);
-    };
     const Number g = grazing_reflectance;
     const Number both = (1.0F - g * fall(cos_out)) * (1.0F - g * fall(cos_in)) / (1.0F - g * (5.0F / 28.0F));
     return flat * both;

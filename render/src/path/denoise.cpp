@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kLevels = 5;
 static_assert((1 << (kLevels - 1)) <= Plane::kMargin);
-constexpr float kAlbedoFloor = 0.02F;
+constexpr float kReflectanceFloor = 0.02F;
 constexpr float kNearScale = 2.5F;   // 1 / distance over which indirect light may change, times that of what it comes from
 // Standard errors that count as the same. Edges of shadows are sharp, indirect light is known to be smooth by what is near,
 // except in mirrors.
@@ -151,7 +151,7 @@ void Denoiser::shown_blocks(int y, const Body& body) const {
 
 template <class Vector>
 auto Denoiser::steepness(const Vector& position) const {
-  return 1.0F / (2.0F * footprint_ * Vector(position - Vector(eye_)).norm() + 1e-12F);
+  return 1.0F / (2.0F * footprint_ * Vector(position - Vector(eye_)).norm() + 1e-12F);  // at the eye itself
 }
 
 void Denoiser::resize() {
@@ -175,10 +175,10 @@ void Denoiser::fill() {
       }
       const LaneMask shown = film.cover.load(at) > 0.0F;
       f_.shown.store(at, select(shown, all_lanes(1.0F), 0.0F));
-      const Vec3Lanes albedo = film.albedo.load(at).cwiseMax(kAlbedoFloor);
-      const Lanes scale = 1.0F / luminance(albedo);
+      const Vec3Lanes reflectance = film.reflectance.load(at).cwiseMax(kReflectanceFloor);
+      const Lanes scale = 1.0F / luminance(reflectance);
       for (std::size_t k = 0; k < 2; ++k) {
-        const Vec3Lanes falls = parts[k]->radiance.load(at).cwiseQuotient(albedo);
+        const Vec3Lanes falls = parts[k]->radiance.load(at).cwiseQuotient(reflectance);
         Light& light = signals_[k].light;
         light.colour.store(at, falls);
         light.variance.store(at, parts[k]->variance.load(at) * scale * scale);
@@ -206,7 +206,7 @@ void Denoiser::sort_paths() {
     if (!detailed.walks) continue;
     for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
       if (sample.facet.cover <= 0.0F) continue;
-      const Vec3f falls = sample.indirect.cwiseQuotient(sample.facet.albedo.cwiseMax(kAlbedoFloor));
+      const Vec3f falls = sample.indirect.cwiseQuotient(sample.facet.reflectance.cwiseMax(kReflectanceFloor));
       const float steep = steepness(sample.facet.position);
       if (!parts[0].take(sample, falls, steep)) parts[1].take(sample, falls, steep);
     }
@@ -296,7 +296,7 @@ void Denoiser::finish(Film& film) const {
   rows([&](int y) {
     shown_blocks(y, [&](std::ptrdiff_t at) {
       const Vec3Lanes falls = signals_[0].light.colour.load(at) + signals_[1].light.colour.load(at);
-      film.radiance.store(at, falls.cwiseProduct(film.albedo.load(at).cwiseMax(kAlbedoFloor)));
+      film.radiance.store(at, falls.cwiseProduct(film.reflectance.load(at).cwiseMax(kReflectanceFloor)));
     });
   });
   executor_->for_blocks(film.detailed.size(), 16, [&](std::size_t begin, std::size_t end) {
@@ -308,7 +308,7 @@ void Denoiser::finish(Film& film) const {
       float cover = 0.0F;
       for (const Sample& sample : std::span(film.detailed_samples).subspan(detailed.samples, detailed.rays)) {
         if (sample.facet.cover <= 0.0F) continue;
-        sum += sample.facet.cover * neighbours.light_of(sample.facet).cwiseProduct(sample.facet.albedo.cwiseMax(kAlbedoFloor));
+        sum += sample.facet.cover * neighbours.light_of(sample.facet).cwiseProduct(sample.facet.reflectance.cwiseMax(kReflectanceFloor));
         cover += sample.facet.cover;
       }
       if (cover > 0.0F) film.radiance.store(detailed.x, detailed.y, Vec3f(film.direct.radiance.at(detailed.x, detailed.y) + sum / cover));

@@ -1,6 +1,6 @@
 /// @file denoise.h
 /// A filter that follows features: the edge-avoiding a-trous transform (Dammertz et al. 2010) of the light that falls on
-/// each pixel (radiance over albedo), stopped by normals, tangent planes and differences above the estimated noise
+/// each pixel (radiance over reflectance), stopped by normals, tangent planes and differences above the estimated noise
 /// (Schied et al. 2017). Direct and indirect light go apart; the second is stopped by distance, too, where other surfaces are
 /// near, as it can change no faster than these allow (Ward & Heckbert 1992). A pixel where surfaces meet has the indirect light of each
 /// of its facets from neighbours on the same surface.
@@ -23,7 +23,7 @@ struct SurfacePart {
   float count = 0.0F;           ///< of paths
 
   /// A sample with a path: only if it faces the same way and lies in the same plane, to some pixels. @return whether it does
-  /// @param steepness  1 / (two pixels) where it lies [1/m]
+  /// @param steepness  1 / (two pixels) where it lies
   bool take(const Sample& sample, const Vec3f& falls, float steepness);
 };
 

@@ -15,8 +15,6 @@
 namespace supple::render::path {
 namespace {
 
-constexpr float kNear = 1e-5F;
-
 void check(RTCDevice device) {
   const RTCError code = rtcGetDeviceError(device);
   if (code == RTC_ERROR_NONE) return;
@@ -118,13 +116,13 @@ Geometry::~Geometry() {
   rtcReleaseDevice(device_);
 }
 
-void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutter, float wire) {
+void Geometry::set(std::span<const Item> items, const PictureSpace& space, double shutter, float wire) {
   counts_ = {};
   wire_ = wire;
-  const bool same_place = origin == origin_;
+  const bool same_place = space == space_;
   bool changed = scene_is_new_;
   scene_is_new_ = false;
-  origin_ = origin;
+  space_ = space;
   for (std::size_t i = items.size(); i < parts_.size(); ++i) {
     if (parts_[i]->geometry == nullptr) continue;
     changed = true;
@@ -148,8 +146,8 @@ void Geometry::set(std::span<const Item> items, const Vec3& origin, double shutt
     const bool moving = shutter > 0.0 && vx != nullptr && vy != nullptr && vz != nullptr;
     std::vector<float> begin(4 * n), end(moving ? 4 * n : 0);
     for (std::size_t v = 0; v < n; ++v) {
-      const Vec3 half = moving ? Vec3(0.5 * shutter * Vec3((*vx)[v], (*vy)[v], (*vz)[v])) : Vec3(Vec3::Zero());
-      const Vec3 p = mesh.position[v] - origin;
+      const Vec3 half = moving ? Vec3(0.5 * shutter * space.per_metre * Vec3((*vx)[v], (*vy)[v], (*vz)[v])) : Vec3(Vec3::Zero());
+      const Vec3 p = space.place(mesh.position[v]);
       for (int k = 0; k < 3; ++k) {
         begin[4 * v + static_cast<std::size_t>(k)] = static_cast<float>(p[k] - half[k]);
         if (moving) end[4 * v + static_cast<std::size_t>(k)] = static_cast<float>(p[k] + half[k]);
@@ -330,7 +328,7 @@ Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, 
 }
 
 bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
-  return first_visible(crossed(from, direction, time, kNear), from, direction, time, choice, exact, hit);
+  return first_visible(crossed(from, direction, time, 0.0F), from, direction, time, choice, exact, hit);
 }
 
 /// Of what a ray crosses from this crossing on.
@@ -366,7 +364,7 @@ bool Geometry::first_visible(Crossing crossing, const Vec3f& from, const Vec3f& 
     const bool back = hit.face_normal.dot(direction) > 0.0F;
     const bool visible = on_wire || (item.surface && (!back || item.two_sided) && choice < item.opacity);
     if (!visible) {
-      crossing = crossed(from, direction, time, hit.distance * (1.0F + 2e-6F) + kNear);
+      crossing = crossed(from, direction, time, hit.distance * (1.0F + 2e-6F) + std::numeric_limits<float>::min());
       continue;
     }
     hit.normal = (weight[0] * part.normal[corner[0]] + weight[1] * part.normal[corner[1]] + weight[2] * part.normal[corner[2]]).normalized();
@@ -380,8 +378,11 @@ bool Geometry::first_visible(Crossing crossing, const Vec3f& from, const Vec3f& 
       const Vec3f n = back ? Vec3f(-part.normal[corner[k]]) : part.normal[corner[k]];
       hit.leave += weight[k] * (hit.point - std::min(0.0F, (hit.point - p[static_cast<std::size_t>(k)]).dot(n)) * n);
     }
-    hit.bsdf = part.paint.bsdf(item, corner.data(), weight, p, hit.point + origin_.cast<float>(), hit.normal, on_wire);
+    hit.bsdf = part.paint.bsdf(item, corner.data(), weight, hit.normal, on_wire);
     if (exact && item.field && !on_wire && !part.moving) refine(item, direction, hit);
+    float largest = 0.0F;
+    for (const Vec3f& at : p) largest = std::max(largest, at.cwiseAbs().maxCoeff());
+    hit.leave += clearance(largest) * hit.face_normal;
     // A smooth normal may look away where the triangle does not.
     if (hit.normal.dot(direction) > -0.02F) hit.normal = (hit.normal - (hit.normal.dot(direction) + 0.02F) * direction).normalized();
     return true;
@@ -393,7 +394,7 @@ bool Geometry::first_visible(Crossing crossing, const Vec3f& from, const Vec3f& 
 /// may curve away from the ray.
 void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const {
   const Vec3 along = direction.cast<double>();
-  const Vec3 start = hit.point.cast<double>() + origin_;
+  const Vec3 start = space_.world(hit.point.cast<double>());
   double t = 0.0;
   Vec3 gradient = Vec3::Zero();
   bool found = false;
@@ -414,8 +415,8 @@ void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const 
   if (normal.dot(hit.face_normal) < 0.3F) return;
   hit.normal = normal;
   if (!found) return;
-  const Vec3f p = (start + t * along - origin_).cast<float>();
-  hit.distance += static_cast<float>(t);
+  const Vec3f p = space_.place(start + t * along).cast<float>();
+  hit.distance += static_cast<float>(space_.per_metre * t);
   // Outside of triangle and surface both, so that neither shadows the other.
   const float outward = (p - hit.point).dot(hit.face_normal);
   if (outward > 0.0F) hit.leave = p;
@@ -425,7 +426,7 @@ void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const 
 bool Geometry::blocked(const Vec3f& from, const Vec3f& direction, float distance, float time) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  RTCRay ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = kNear,
+  RTCRay ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = 0.0F,
                 .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
                 .tfar = distance, .mask = 2u, .id = 0, .flags = 0};
   rtcOccluded1(scene_, &context, &ray);
@@ -445,7 +446,7 @@ RTCRay8 packet(const RayBundle& rays, Lanes distance, unsigned mask) {
   put(rays.direction.y(), to.dir_y);
   put(rays.direction.z(), to.dir_z);
   put(rays.time, to.time);
-  put(all_lanes(kNear), to.tnear);
+  put(Lanes{}, to.tnear);
   put(distance, to.tfar);
   std::fill_n(to.mask, kLanes, mask);
   std::fill_n(to.id, kLanes, 0u);
@@ -479,7 +480,7 @@ std::array<Geometry::Crossing, kLanes> Geometry::crossed(const RayBundle& rays) 
   if (!any(who)) return out;
   if (!rays.together) {
     for (std::size_t k = 0; k < kLanes; ++k)
-      if (who[k] != 0) out[k] = crossed(rays.from.lane(k), rays.direction.lane(k), rays.time[k], kNear);
+      if (who[k] != 0) out[k] = crossed(rays.from.lane(k), rays.direction.lane(k), rays.time[k], 0.0F);
     return out;
   }
   RTCRayHit8 bundle;

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "../picture_space.h"
 #include "bsdf.h"
 #include "supple/render/view.h"
 
@@ -17,10 +18,10 @@ namespace supple::render::path {
 /// Where a ray met an item. It begins empty, as eight are made for every bundle.
 struct Hit {
   float distance;
-  Vec3f point;        ///< of the triangle, relative to the origin [m]
+  Vec3f point;        ///< of the triangle, in the picture's space
   Vec3f face_normal;  ///< unit, of the triangle, towards the ray
   Vec3f normal;       ///< unit, smooth, of the field where the item has one
-  Vec3f leave;        ///< where paths go on: outside of the smooth surface (Hanika 2021)
+  Vec3f leave;        ///< where paths go on: outside of the smooth surface (Hanika 2021) and clear of the triangle's rounding
   Bsdf bsdf;
   std::uint32_t item;
 };
@@ -33,6 +34,14 @@ struct RayBundle {
   bool together = false;  ///< they start near each other and go the same way
 };
 
+/// How far from a face rays leave it, so that its own rounding does not stop them: a point of it is as far off as a few roundings of the
+/// largest coordinate of its corners (Waechter & Binder 2019). No length is built in, so scenes may have any size.
+template <class Number>
+[[nodiscard]] Number clearance(Number largest_coordinate) {
+  constexpr float kRoundings = 0x1p-16F;  // 256 of them
+  return kRoundings * largest_coordinate;
+}
+
 class Geometry {
  public:
   Geometry();
@@ -44,7 +53,7 @@ class Geometry {
   /// anew where its triangles are others or have left each other; no picture depends on that.
   /// @param shutter  how long the picture is exposed [s]: vertices move by the columns velocity_x, velocity_y, velocity_z
   /// @param wire     radius of the edges of wireframes over their distance
-  void set(std::span<const Item> items, const Vec3& origin, double shutter, float wire);
+  void set(std::span<const Item> items, const PictureSpace& space, double shutter, float wire);
 
   /// @param time    in [0, 1] of the exposure
   /// @param choice  uniform, decides about opacity
@@ -79,8 +88,8 @@ class Geometry {
   RTCScene scene_ = nullptr;
   std::vector<std::unique_ptr<Part>> parts_;  ///< of each item
   std::vector<Item> items_;
-  Vec3 origin_ = Vec3::Zero();
-  Vec3f lower_ = Vec3f::Zero(), upper_ = Vec3f::Zero();  ///< of the box of all items, relative to the origin [m]
+  PictureSpace space_;
+  Vec3f lower_ = Vec3f::Zero(), upper_ = Vec3f::Zero();  ///< of the box of all items
   Vec3f centre_ = Vec3f::Zero();  ///< of the ball of all items
   float radius_ = 0.0F;
   float wire_ = 0.0F;

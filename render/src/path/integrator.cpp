@@ -42,6 +42,7 @@ struct Sums {
   using Vector = typename LaneTypes<Number>::Vector;
   LightSum<Number> direct, indirect;
   Vector albedo = Vector::Zero();
+  Vector reflectance = Vector::Zero();
   Vector normal = Vector::Zero();
   Vector position = Vector::Zero();
   Number cover{};
@@ -53,6 +54,7 @@ struct Sums {
     const FacetOf<Number>& facet = s.facet;
     direct.add(s.direct * facet.cover, taken);
     albedo += facet.albedo * facet.cover;
+    reflectance += facet.reflectance * facet.cover;
     normal += facet.normal * facet.cover;
     position += facet.position * facet.cover;
     cover += facet.cover;
@@ -74,7 +76,7 @@ LightSum<float> total(const LightSum<Lanes>& sum) {
 
 Sums<float> total(const Sums<Lanes>& sum) {
   return {.direct = total(sum.direct), .indirect = total(sum.indirect), .albedo = path::total(sum.albedo),
-          .normal = path::total(sum.normal), .position = path::total(sum.position), .cover = path::total(sum.cover),
+          .reflectance = path::total(sum.reflectance), .normal = path::total(sum.normal), .position = path::total(sum.position), .cover = path::total(sum.cover),
           .walked_cover = path::total(sum.walked_cover), .nearness = path::total(sum.nearness), .mirror = path::total(sum.mirror)};
 }
 
@@ -215,6 +217,7 @@ void Exposure::keep_surface(int x, int y, const Sums<Number>& sum, float count, 
   film_.direct.radiance.store(x, y, direct);
   film_.direct.variance.store(x, y, variance * scale * scale);
   film_.albedo.store(x, y, Vector(sum.albedo * share));
+  film_.reflectance.store(x, y, Vector(sum.reflectance * share));
   film_.normal.store(x, y, Vector(sum.normal * share));
   film_.position.store(x, y, Vector(sum.position * share));
 }
@@ -334,7 +337,7 @@ void Film::resize(int across, int down) {
     light->radiance.resize(across, down);
     light->variance.resize(across, down);
   }
-  for (VectorPlane* plane : {&radiance, &albedo, &normal, &position}) plane->resize(across, down);
+  for (VectorPlane* plane : {&radiance, &albedo, &reflectance, &normal, &position}) plane->resize(across, down);
   for (Plane* plane : {&cover, &nearness, &mirror, &samples}) plane->resize(across, down);
 }
 

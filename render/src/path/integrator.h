@@ -45,9 +45,10 @@ struct Film {
   VectorPlane radiance;  ///< the sum of both
   Plane cover;           ///< in [0, 1]: not background
   VectorPlane albedo;
+  VectorPlane reflectance;
   VectorPlane normal;
-  VectorPlane position;  ///< relative to the origin [m]
-  Plane nearness;        ///< mean of 1 / distance of what indirect light comes from [1/m], 0 for the sky, times cover
+  VectorPlane position;  ///< in the picture's space
+  Plane nearness;        ///< mean of 1 / distance of what indirect light comes from, 0 for the sky, times cover
   Plane mirror;          ///< 1 where reflections are sharp, 0 on matt surfaces
   Plane samples;         ///< camera rays
   std::vector<DetailedPixel> detailed;  ///< in the order of pixels

@@ -38,7 +38,7 @@ bool even(float x) { return (static_cast<long>(std::floor(x)) & 1) == 0; }
 
 Pattern::Pattern(const Paint& paint, const Vec3& colour)
     : kind_(paint.kind), first_(linear_colour(colour)), second_(linear_colour(paint.colour)),
-      axis_(paint.axis.normalized().cast<float>()), scale_(static_cast<float>(1.0 / paint.size)) {
+      axis_(paint.axis.normalized().cast<float>()) {
   if (kind_ != PaintKind::Picture) return;
   const Image& image = *paint.picture;
   width_ = image.width;
@@ -50,8 +50,7 @@ Pattern::Pattern(const Paint& paint, const Vec3& colour)
     }
 }
 
-Vec3f Pattern::colour(const Vec3f& p, const Vec3f& n) const {
-  const Vec3f at = scale_ * p;
+Vec3f Pattern::colour(const Vec3f& at, const Vec3f& n) const {
   if (kind_ == PaintKind::Checker) return (even(at.x()) == even(at.y())) == even(at.z()) ? first_ : second_;
   if (kind_ == PaintKind::Stripes) return even(at.dot(axis_)) ? first_ : second_;
   if (kind_ != PaintKind::Picture) return first_;
@@ -63,17 +62,13 @@ Vec3f Pattern::colour(const Vec3f& p, const Vec3f& n) const {
          share.z() * texel(texels_, width_, height_, at.x(), at.y() * aspect);
 }
 
-Vec3f Pattern::colour(const Eigen::Vector2f& p) const {
-  return colour(Vec3f(p.x(), p.y(), 0.0F), Vec3f::UnitZ());
+Vec3f Pattern::colour(const Eigen::Vector2f& at) const {
+  return colour(Vec3f(at.x(), at.y(), 0.0F), Vec3f::UnitZ());
 }
 
 PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)), plain_(material(item, first_)), pattern_(item.paint, item.colour) {
   const Mesh& mesh = *item.mesh;
-  const std::array<const std::vector<double>*, 3> rest = {column(mesh, "rest_x"), column(mesh, "rest_y"), column(mesh, "rest_z")};
-  const bool patterned = item.paint.kind == PaintKind::Checker || item.paint.kind == PaintKind::Stripes || item.paint.kind == PaintKind::Picture;
-  if (patterned && rest[0] != nullptr && rest[1] != nullptr && rest[2] != nullptr)
-    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
-      rest_.push_back(Vec3((*rest[0])[v], (*rest[1])[v], (*rest[2])[v]).cast<float>());
+  if (has_pattern(item.paint)) place_ = places_in_pattern(item);
   if (item.paint.kind == PaintKind::Values) {
     const std::vector<double>* values = column(mesh, item.paint.column);
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
@@ -81,25 +76,20 @@ PaintSource::PaintSource(const Item& item) : first_(linear_colour(item.colour)),
   }
 }
 
-Vec3f PaintSource::colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,
-                          const Vec3f& world, const Vec3f& normal) const {
+Vec3f PaintSource::colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const Vec3f& normal) const {
   const Paint& paint = item.paint;
   if (paint.kind == PaintKind::Normals) return linear_colour(0.5 * normal.cast<double>() + Vec3::Constant(0.5));
   if (paint.kind == PaintKind::Values) {
     const float value = weight[0] * values_[corner[0]] + weight[1] * values_[corner[1]] + weight[2] * values_[corner[2]];
     return linear_colour(colour_of(paint.map, (value - paint.lower) / (paint.upper - paint.lower)));
   }
-  const bool own = !rest_.empty();
-  const Vec3f at = own ? Vec3f(weight[0] * rest_[corner[0]] + weight[1] * rest_[corner[1]] + weight[2] * rest_[corner[2]]) : world;
-  const Vec3f slope = own ? (rest_[corner[1]] - rest_[corner[0]]).cross(rest_[corner[2]] - rest_[corner[0]]).normalized()
-                          : (places[1] - places[0]).cross(places[2] - places[0]).normalized();
-  return pattern_.colour(at, slope);
+  const Vec3f &a = place_[corner[0]], &b = place_[corner[1]], &c = place_[corner[2]];
+  return pattern_.colour(weight[0] * a + weight[1] * b + weight[2] * c, (b - a).cross(c - a).stableNormalized());
 }
 
-Bsdf PaintSource::bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const std::array<Vec3f, 3>& places,
-                       const Vec3f& world, const Vec3f& normal, bool on_wire) const {
+Bsdf PaintSource::bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const Vec3f& normal, bool on_wire) const {
   if (on_wire) return material(item, first_ * (item.surface ? 0.08F : 1.0F));
-  return item.paint.kind == PaintKind::Plain ? plain_ : material(item, colour(item, corner, weight, places, world, normal));
+  return item.paint.kind == PaintKind::Plain ? plain_ : material(item, colour(item, corner, weight, normal));
 }
 
 }  // namespace supple::render::path

@@ -15,8 +15,8 @@ class Pattern {
  public:
   Pattern() = default;
   Pattern(const Paint& paint, const Vec3& colour);
-  /// Albedo at p [m] where the surface has the normal n (Picture: which axes it is projected along).
-  [[nodiscard]] Vec3f colour(const Vec3f& p, const Vec3f& n) const;
+  /// Albedo at a place, in cubes, slices or widths, where the surface has the normal n (Picture: which axes it is projected along).
+  [[nodiscard]] Vec3f colour(const Vec3f& at, const Vec3f& n) const;
   /// Albedo of a level plane: squares in place of cubes.
   [[nodiscard]] Vec3f colour(const Eigen::Vector2f& p) const;
 
@@ -25,7 +25,6 @@ class Pattern {
   Vec3f first_ = Vec3f::Zero();
   Vec3f second_ = Vec3f::Zero();
   Vec3f axis_ = Vec3f::UnitX();
-  float scale_ = 1.0F;           ///< 1 / size
   std::vector<Vec3f> texels_;    ///< of the picture, from its lowest row up
   int width_ = 0;
   int height_ = 0;
@@ -36,18 +35,15 @@ class PaintSource {
   PaintSource() = default;
   explicit PaintSource(const Item& item);
 
-  /// @param corner, weight, places  the triangle's vertices, barycentric coordinates, positions
-  /// @param world   the point [m]
-  [[nodiscard]] Bsdf bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight,
-                          const std::array<Vec3f, 3>& places, const Vec3f& world, const Vec3f& normal, bool on_wire) const;
+  /// @param corner, weight  the triangle's vertices, barycentric coordinates
+  [[nodiscard]] Bsdf bsdf(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const Vec3f& normal, bool on_wire) const;
 
  private:
-  [[nodiscard]] Vec3f colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight,
-                             const std::array<Vec3f, 3>& places, const Vec3f& world, const Vec3f& normal) const;
+  [[nodiscard]] Vec3f colour(const Item& item, const std::uint32_t* corner, const Vec3f& weight, const Vec3f& normal) const;
   Vec3f first_ = Vec3f::Zero();  ///< linear
   Bsdf plain_;                   ///< where the colour is everywhere the same
   Pattern pattern_;
-  std::vector<Vec3f> rest_;      ///< object coordinates of the vertices; empty: world
+  std::vector<Vec3f> place_;     ///< of the vertices, in the pattern
   std::vector<float> values_;    ///< of the vertices
 };
 

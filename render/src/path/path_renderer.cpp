@@ -24,7 +24,7 @@ class PathRenderer final : public Renderer {
  public:
   explicit PathRenderer(const RenderSettings& settings) : settings_(settings), executor_(settings.threads) {}
   using Renderer::render;
-  Image render(const View& view, std::span<const Item> items, LinearImage* linear) override;
+  Image render(const View& world, std::span<const Item> items, LinearImage* linear) override;
   [[nodiscard]] std::string description() const override { return "path tracer, Embree " + std::string(RTC_VERSION_STRING); }
   [[nodiscard]] RenderTimes times() const override { return times_; }
 
@@ -47,30 +47,32 @@ path::Lights lights_of(const View& view, double softness) {
                 .cosine = static_cast<float>(std::cos(softness))};
   for (const AreaLight& light : view.area_lights) {
     const RectangleEdges edges = rectangle_edges(light);
-    lights.rectangles.push_back({.centre = (light.at - view.camera.look_at).cast<float>(), .u = edges.u.cast<float>(),
+    lights.rectangles.push_back({.centre = light.at.cast<float>(), .u = edges.u.cast<float>(),
                                  .v = edges.v.cast<float>(), .front = light.facing.normalized().cast<float>(),
                                  .radiance = static_cast<float>(light.radiance) * linear_colour(light.colour)});
   }
   return lights;
 }
 
-Image PathRenderer::render(const View& view, std::span<const Item> items, LinearImage* linear) {
-  SUPPLE_EXPECTS(view.light.direction.norm() > 0.0);
-  const Vec3& origin = view.camera.look_at;
+Image PathRenderer::render(const View& world, std::span<const Item> items, LinearImage* linear) {
+  SUPPLE_EXPECTS(world.light.direction.norm() > 0.0);
+  const LocalView local = localised(world, items);
+  const View& view = local.view;
   const CameraMatrices camera = camera_matrices(view.camera, static_cast<double>(settings_.width) / settings_.height, {});
   const float footprint = 2.0F * camera.half_extent.y() / static_cast<float>(settings_.height);
   {
     const CpuClock clock(times_.upload);
-    geometry_.set(items, origin, settings_.shutter, 0.6F * footprint);
+    geometry_.set(items, local.space, settings_.shutter, 0.6F * footprint);
   }
   std::optional<path::GroundPlane> ground;
   path::Pattern pattern;
   if (view.ground) {
-    ground = {.height = static_cast<float>(view.ground->height - origin.z()), .albedo = linear_colour(view.ground->colour), .fades = true};
+    ground = {.height = static_cast<float>(view.ground->height), .albedo = linear_colour(view.ground->colour), .fades = true};
     if (view.ground->paint.kind != PaintKind::Plain) {
       pattern = path::Pattern(view.ground->paint, view.ground->colour);
       ground->pattern = &pattern;
-      ground->origin = origin.head<2>().cast<float>();
+      ground->pattern_origin = local.pattern_origin.head<2>().cast<float>();
+      ground->pattern_size = static_cast<float>(view.ground->paint.size);
     }
   }
   path::TraceSettings trace;
@@ -80,7 +82,7 @@ Image PathRenderer::render(const View& view, std::span<const Item> items, Linear
   trace.noise = settings_.noise;
   trace.exact = settings_.exact;
   trace.aperture = view.camera.aperture;
-  trace.focus = view.camera.focus > 0.0 ? view.camera.focus : camera.distance;
+  trace.focus = view.camera.focus;
   {
     const CpuClock clock(times_.draw);
     path::trace(geometry_, lights_of(view, settings_.shadow_softness), ground, camera, trace, executor_, film_);

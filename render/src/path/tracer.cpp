@@ -59,18 +59,19 @@ Tracer::Meeting Tracer::meet(const RayBundle& rays, Lanes choice, Places& places
 
   if (any(met.ground)) {
     const Vec3Lanes p = rays.from + met.distance * rays.direction;
-    places = {.point = p, .normal = Vec3Lanes(Vec3f::UnitZ()), .leave = Vec3Lanes(p.x(), p.y(), all_lanes(ground_->height + gap_)),
+    const Lanes clear = clearance(larger(larger(magnitude(p.x()), magnitude(p.y())), std::abs(ground_->height)));
+    places = {.point = p, .normal = Vec3Lanes(Vec3f::UnitZ()), .leave = Vec3Lanes(p.x(), p.y(), ground_->height + clear),
               .bsdf = {.diffuse = Vec3Lanes(ground_->albedo), .normal_reflectance = Vec3Lanes::Zero(), .grazing_reflectance = Lanes{},
                        .alpha = all_lanes(1.0F)}};
     for (std::size_t k = 0; ground_->pattern != nullptr && k < kLanes; ++k)
-      if (met.ground[k] != 0) places.bsdf.diffuse.set_lane(k, ground_->pattern->colour(p.lane(k).head<2>() + ground_->origin));
+      if (met.ground[k] != 0) places.bsdf.diffuse.set_lane(k, ground_->pattern->colour((p.lane(k).head<2>() - ground_->pattern_origin) / ground_->pattern_size));
   }
   for (std::size_t k = 0; k < kLanes; ++k) {
     if (met.surface[k] == 0) continue;
     const Hit& hit = hits[k];
     places.point.set_lane(k, hit.point);
     places.normal.set_lane(k, hit.normal);
-    places.leave.set_lane(k, hit.leave + gap_ * hit.face_normal);
+    places.leave.set_lane(k, hit.leave);
     places.bsdf.diffuse.set_lane(k, hit.bsdf.diffuse);
     places.bsdf.normal_reflectance.set_lane(k, hit.bsdf.normal_reflectance);
     places.bsdf.grazing_reflectance[k] = hit.bsdf.grazing_reflectance;
@@ -183,7 +184,7 @@ Vec3Lanes Tracer::indirect(Places& places, const RayBundle& camera_rays, Random&
     if (any(sunny)) add(sunny, sun_radiance_ * power_share(density, all_lanes(sun_density_)));
     if (any(met.lamp)) add(met.lamp, met.radiance * power_share(density, met.density));
     rays.who = met.surface;
-    if (bounce == 1) nearness = select(met.surface, 1.0F / larger(met.distance, gap_), 0.0F);
+    if (bounce == 1) nearness = select(met.surface, 1.0F / larger(met.distance, least_distance_), 0.0F);
 
     const Axes there(places.normal);
     const Vec3Lanes back = there.to_local(-rays.direction);
@@ -206,11 +207,12 @@ Samples Tracer::sample(const Picks& picks) const {
   const Lanes cover = select(met.ground, of_ground, select(shown, all_lanes(1.0F), 0.0F));
   const BsdfOf<Lanes>& bsdf = places.bsdf;
   const auto on_surfaces = [&](const Vec3Lanes& v) { return select(met.surface, v, Vec3Lanes::Zero()); };
-  out.facet = {.cover = cover, .albedo = on_surfaces(bsdf.diffuse + bsdf.normal_reflectance), .normal = on_surfaces(places.normal),
-               .position = on_surfaces(places.point)};
   out.mirror = select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F);
   const Axes axes(places.normal);
   const Vec3Lanes away = axes.to_local(-rays.direction);
+  out.facet = {.cover = cover, .albedo = on_surfaces(bsdf.diffuse + bsdf.normal_reflectance),
+               .reflectance = on_surfaces(bsdf.reflectance(away.z())), .normal = on_surfaces(places.normal),
+               .position = on_surfaces(places.point)};
   const LaneMask lit = both(met.surface, both(cover > 0.0F, away.z() > 0.0F));
   out.direct = select(met.lamp, met.radiance, direct(places, axes, away, lit, rays.time, true, random));
 

@@ -12,11 +12,12 @@
 namespace supple::render::path {
 
 struct GroundPlane {
-  float height = 0.0F;         ///< relative to the origin [m]
+  float height = 0.0F;         ///< in the picture's space, as all that follows
   Vec3f albedo = Vec3f::Zero();
   bool fades = false;          ///< into the background with distance, for the camera
-  const Pattern* pattern = nullptr;  ///< in place of the albedo, by world x and y; null: none
-  Eigen::Vector2f origin = Eigen::Vector2f::Zero();  ///< of positions, in the world [m]
+  const Pattern* pattern = nullptr;  ///< in place of the albedo, by x and y; null: none
+  Eigen::Vector2f pattern_origin = Eigen::Vector2f::Zero();
+  float pattern_size = 1.0F;   ///< of a square, a slice or a width
 };
 
 struct TraceSettings {
@@ -27,8 +28,8 @@ struct TraceSettings {
   double noise = 0.05;         ///< standard error of a pixel's luminance over (luminance + 0.1), RMS of a tile; 0: most_samples
   int bounces = 6;             ///< surfaces along a path after the first
   bool exact = true;           ///< hits lie on the surface of the field, where an item has one
-  double aperture = 0.0;       ///< radius of the lens [m]
-  double focus = 1.0;          ///< distance of the plane that is sharp, along the line of sight [m]
+  double aperture = 0.0;       ///< radius of the lens
+  double focus = 1.0;          ///< distance of the plane that is sharp, along the line of sight
   float largest_indirect = 10.0F;  ///< luminance that a bounce can add; keeps single bright paths out of a picture
 };
 
@@ -37,9 +38,10 @@ template <class Number>
 struct FacetOf {
   using Vector = typename LaneTypes<Number>::Vector;
   Number cover{};
-  Vector albedo = Vector::Zero();
+  Vector albedo = Vector::Zero();       ///< seen head on
+  Vector reflectance = Vector::Zero();  ///< towards the eye
   Vector normal = Vector::Zero();
-  Vector position = Vector::Zero();  ///< relative to the origin [m]
+  Vector position = Vector::Zero();
 };
 using Facet = FacetOf<float>;
 
@@ -61,7 +63,8 @@ using Samples = SampleOf<Lanes>;
   const FacetOf<Lanes>& facet = samples.facet;
   return {.direct = samples.direct.lane(k), .indirect = samples.indirect.lane(k), .weight = samples.weight[k],
           .nearness = samples.nearness[k], .mirror = samples.mirror[k],
-          .facet = {.cover = facet.cover[k], .albedo = facet.albedo.lane(k), .normal = facet.normal.lane(k), .position = facet.position.lane(k)}};
+          .facet = {.cover = facet.cover[k], .albedo = facet.albedo.lane(k), .reflectance = facet.reflectance.lane(k),
+                    .normal = facet.normal.lane(k), .position = facet.position.lane(k)}};
 }
 
 /// Samples of neighbouring pixels, or of one. Of each pixel they are sample `number` of `count` that it takes together from two
@@ -83,7 +86,7 @@ class Tracer {
       : geometry_(geometry), lights_(lights), ground_(ground), camera_(camera), settings_(settings),
         to_world_(camera.view.block<3, 3>(0, 0).transpose()), sun_axes_(Vec3Lanes(lights.sun.to_light)),
         sun_radiance_(lights.sun.radiance()), sun_density_(1.0F / lights.sun.solid_angle()),
-        gap_(2e-5F * static_cast<float>(camera.distance)) {}
+        least_distance_(2e-5F * static_cast<float>(camera.distance)) {}
 
   /// Lanes without a pick bring zeros.
   [[nodiscard]] Samples sample(const Picks& picks) const;
@@ -128,7 +131,7 @@ class Tracer {
   Axes sun_axes_;
   Vec3Lanes sun_radiance_;  // infinite for a point, as is the density of its directions; neither is asked for then
   float sun_density_;
-  float gap_;  // between a surface and the paths that leave it [m]
+  float least_distance_;  // of what counts as near
 };
 
 }  // namespace supple::render::path

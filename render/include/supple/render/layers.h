@@ -35,8 +35,8 @@ class LayerRenderer {
 /// Of settings, width, height and context count. @throws as make_renderer
 [[nodiscard]] std::unique_ptr<LayerRenderer> make_layer_renderer(const RenderSettings& settings);
 
-/// OpenEXR, ZIP-compressed scan lines: R, G, B, A (half, scene-linear: LinearImage), N.X, N.Y, N.Z and velocity.X, .Y, .Z
-/// (half), Z (float), id (uint). The header has `objects`, the names of the numbers, `exposure`, by which
+/// OpenEXR, ZIP-compressed scan lines: R, G, B, A (half, scene-linear: LinearImage), N.X, N.Y, N.Z (half),
+/// velocity.X, .Y, .Z, Z (float), id (uint). The header has `objects`, the names of the numbers, `exposure`, by which
 /// pictures multiply the light before their tone curve, and `fingerprint` unless empty.
 /// @pre picture and layers of one size  @throws Error{Io}
 void write_exr(const std::filesystem::path& path, const LinearImage& picture, const Layers& layers,
