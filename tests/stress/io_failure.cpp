@@ -1,7 +1,7 @@
 // Input and output that fail on purpose. LD_PRELOAD=io_failure.so, and in the environment:
 //   SUPPLE_FAIL_IO_UNDER   only files below this folder count (absolute path)
 //   SUPPLE_FAIL_IO_KIND    enospc: from call AT on nothing more can be written; eio: call AT fails; eintr: call AT is interrupted (reads and
-//                          writes alone); short: call AT reads or writes half; none
+//                          writes alone); short: call AT reads or writes half; crash: call AT ends the program; none
 //   SUPPLE_FAIL_IO_AT      number of that call, from 1
 //   SUPPLE_FAIL_IO_COUNT   file that gets the number of calls when the program ends
 // Programs that this one starts are left alone.
@@ -22,7 +22,7 @@
 
 namespace {
 
-enum class Kind { None, NoSpace, Fault, Interrupted, Short };
+enum class Kind { None, NoSpace, Fault, Interrupted, Short, Crash };
 enum class Call { Open, Read, Write, Other };
 
 constexpr int kMostFiles = 4096;
@@ -45,6 +45,7 @@ Kind kind_named(const char* name) {
   if (std::strcmp(name, "eio") == 0) return Kind::Fault;
   if (std::strcmp(name, "eintr") == 0) return Kind::Interrupted;
   if (std::strcmp(name, "short") == 0) return Kind::Short;
+  if (std::strcmp(name, "crash") == 0) return Kind::Crash;
   return Kind::None;
 }
 
@@ -83,6 +84,9 @@ int verdict(Call call, bool takes_space, bool& half) {
     case Kind::Fault: return number == settings.at ? EIO : 0;
     case Kind::Interrupted: return number == settings.at && (call == Call::Read || call == Call::Write) ? EINTR : 0;
     case Kind::Short: half = number == settings.at && (call == Call::Read || call == Call::Write); return 0;
+    case Kind::Crash:
+      if (number == settings.at) std::abort();
+      break;
     case Kind::None: break;
   }
   return 0;

@@ -32,7 +32,7 @@ def judge(run, out, ended, where, same):
     return [f"{where}: {text}" for text in faults]
 
 
-def failing_io(context, asked):
+def failing_io(context, asked, kinds=KINDS):
     outcome = Outcome()
     base = context.folder("io")
     run = SmallRun(context, *TINY, base / "reference")
@@ -42,14 +42,14 @@ def failing_io(context, asked):
     if ended.code != 0:
         raise RuntimeError(f"the run that counts calls ended with {ended.code}: {ended.err}")
     total = int(count.read_text())
-    turns = [(kind, number) for number in spread(total, max(1, asked // len(KINDS))) for kind in KINDS]
+    turns = [(kind, number) for number in spread(total, max(1, asked // len(kinds))) for kind in kinds]
     for kind, number in turns:
         shutil.rmtree(out, ignore_errors=True)
         env = {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_KIND": kind, "SUPPLE_FAIL_IO_AT": str(number)}
         ended = run_process(run.command(out), env)
         outcome.faults += judge(run, out, ended, f"{kind} at call {number}", kind in ("short", "eintr"))
         outcome.reached += 1
-    outcome.note = f"a run makes {total} calls; {len(KINDS)} kinds of failure"
+    outcome.note = f"a run makes {total} calls; {len(kinds)} kinds of failure"
     return outcome
 
 

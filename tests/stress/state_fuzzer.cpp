@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <set>
@@ -52,7 +53,11 @@ class StateFuzzer {
     Trial trial = judged("fuzz.state", [&] {
       try {
         const scenes::State state = scenes::load_state(path, saved->fingerprint);
-        if (state.hash() != saved->hash || state.frame != saved->frame) fault = "a state that is not what was saved was read without a word";
+        // The end of another state may be all of it.
+        const bool known = std::any_of(saved_.begin(), saved_.end(), [&bytes = bytes, &state](const Saved& s) {
+          return s.bytes == bytes && s.hash == state.hash() && s.frame == state.frame;
+        });
+        if (!known) fault = "a state that is not what was saved was read without a word";
       } catch (const Error& error) {
         if (error.kind() != ErrorKind::Corrupt) fault = std::string("not refused as corrupt: ") + error.what();
         throw;

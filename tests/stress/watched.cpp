@@ -171,13 +171,15 @@ Tally watch(std::uint64_t first, std::uint64_t count, const Limits& limits, cons
 }
 
 Meter::Meter() {
-  std::ofstream("/proc/self/clear_refs") << "5";  // the peak begins here
+  std::ofstream file("/proc/self/clear_refs");
+  file << "5";  // the peak begins here
+  peaks_ = static_cast<bool>(file.flush());
   begin_bytes_ = status_bytes("VmRSS:");
   begin_s_ = processor_now();
 }
 
 double Meter::processor_s() const { return processor_now() - begin_s_; }
 
-double Meter::most_bytes() const { return status_bytes("VmHWM:") - begin_bytes_; }
+double Meter::most_bytes() const { return peaks_ ? status_bytes("VmHWM:") - begin_bytes_ : 0.0; }
 
 }  // namespace supple::stress

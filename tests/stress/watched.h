@@ -42,11 +42,12 @@ class Meter {
  public:
   Meter();
   [[nodiscard]] double processor_s() const;
-  /// The most that was resident at once beyond what was at the start [byte].
+  /// The most that was resident at once beyond what was at the start [byte]; 0 where the system does not let peaks begin anew.
   [[nodiscard]] double most_bytes() const;
 
  private:
   double begin_s_ = 0.0, begin_bytes_ = 0.0;
+  bool peaks_ = false;
 };
 
 /// How many times longer things may take in this build: sanitizers slow it down.
