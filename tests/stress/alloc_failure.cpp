@@ -1,142 +1,146 @@
-// Memory that runs out on purpose. LD_PRELOAD=alloc_failure.so, and in the environment:
-//   SUPPLE_FAIL_ALLOC    number of the call of operator new that fails, from 1, once; later ones succeed
-//   SUPPLE_COUNT_ALLOC   file that gets the number of calls when the program ends
-// Calls within main count that the program's own code makes, itself or by way of the C++ library: what graphics drivers and other shared
-// libraries do without memory is theirs, and what is allocated before main can be caught by nobody. Programs that this one starts are left alone.
-#include <dlfcn.h>
-#include <execinfo.h>
+/// A library to be preloaded that makes allocations of a program fail, for tests of what it does then:
+///
+///     SUPPLE_FAIL_AT=1234 LD_PRELOAD=liballoc_failure.so supple run scene.yaml --out folder
+///
+/// Variables of the environment:
+///   SUPPLE_FAIL_AT     the allocation that fails, counted from 1; 0 or absent: none
+///   SUPPLE_FAIL_MANY   how many fail from there on (default 1; 0: all)
+///   SUPPLE_FAIL_KIND   `new` (default): operator new, by whichever library it is called; `malloc`: malloc, calloc, realloc and
+///                      posix_memalign where the program itself calls them
+///   SUPPLE_FAIL_COUNT  a file that gets the number of allocations seen when the program ends
 #include <fcntl.h>
 #include <link.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
-#include <array>
 #include <atomic>
-#include <cstddef>
+#include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <new>
 
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+}
+
 namespace {
 
-std::atomic<long> calls{0};
-std::atomic<bool> counting{false};
-long failing = 0;
-const char* count_file = nullptr;
-
-struct Range {
-  std::size_t begin = 0, end = 0;
-  [[nodiscard]] bool holds(const void* address) const {
-    const auto at = reinterpret_cast<std::size_t>(address);
-    return at >= begin && at < end;
-  }
+struct Settings {
+  long at = 0;
+  long many = 1;
+  bool of_malloc = false;
+  const char* count_file = nullptr;
+  std::uintptr_t text_begin = 0, text_end = 0;  // of the program itself
 };
 
-Range program, cxx_library, here;
+Settings settings;
+std::atomic<bool> ready{false};
+std::atomic<long> seen{0};
 
-int find_range(dl_phdr_info* info, std::size_t, void*) {
-  Range range;
+long number(const char* name, long otherwise) {
+  const char* text = std::getenv(name);
+  return text != nullptr ? std::strtol(text, nullptr, 10) : otherwise;
+}
+
+/// The program is the first object of the list.
+int keep_text(dl_phdr_info* info, std::size_t, void*) {
   for (int k = 0; k < info->dlpi_phnum; ++k) {
-    const ElfW(Phdr)& part = info->dlpi_phdr[k];
-    if (part.p_type != PT_LOAD) continue;
-    const std::size_t begin = info->dlpi_addr + part.p_vaddr;
-    if (range.end == 0) range.begin = begin;
-    range.end = begin + part.p_memsz;
+    const auto& part = info->dlpi_phdr[k];
+    if (part.p_type != PT_LOAD || (part.p_flags & PF_X) == 0) continue;
+    settings.text_begin = info->dlpi_addr + part.p_vaddr;
+    settings.text_end = settings.text_begin + part.p_memsz;
   }
-  if (info->dlpi_name[0] == '\0' && program.end == 0) program = range;
-  if (std::strstr(info->dlpi_name, "libstdc++") != nullptr) cxx_library = range;
-  if (std::strstr(info->dlpi_name, "alloc_failure") != nullptr) here = range;
-  return 0;
-}
-
-/// Whether the program's code asks, itself or by way of the C++ library.
-bool asked_by_program() {
-  std::array<void*, 16> frame{};
-  const int count = backtrace(frame.data(), static_cast<int>(frame.size()));
-  for (int k = 0; k < count; ++k) {
-    if (program.holds(frame[static_cast<std::size_t>(k)])) return true;
-    if (!cxx_library.holds(frame[static_cast<std::size_t>(k)]) && !here.holds(frame[static_cast<std::size_t>(k)])) return false;
-  }
-  return false;
-}
-
-thread_local bool looking = false;  // the first backtrace allocates
-
-bool counts() {
-  if (!counting || looking) return false;
-  looking = true;
-  const bool ours = asked_by_program();
-  looking = false;
-  return ours;
+  return 1;
 }
 
 __attribute__((constructor)) void begin() {
-  const char* number = std::getenv("SUPPLE_FAIL_ALLOC");
-  failing = number != nullptr ? std::strtol(number, nullptr, 10) : 0;
-  count_file = std::getenv("SUPPLE_COUNT_ALLOC");
-  dl_iterate_phdr(find_range, nullptr);
-  unsetenv("LD_PRELOAD");
-}
-
-using Main = int (*)(int, char**, char**);
-Main real_main = nullptr;
-
-int counted_main(int argc, char** argv, char** environment) {
-  calls = 0;
-  counting = true;
-  const int code = real_main(argc, argv, environment);
-  counting = false;
-  return code;
+  settings.at = number("SUPPLE_FAIL_AT", 0);
+  settings.many = number("SUPPLE_FAIL_MANY", 1);
+  const char* kind = std::getenv("SUPPLE_FAIL_KIND");
+  settings.of_malloc = kind != nullptr && std::strcmp(kind, "malloc") == 0;
+  settings.count_file = std::getenv("SUPPLE_FAIL_COUNT");
+  dl_iterate_phdr(keep_text, nullptr);
+  ready.store(true);
 }
 
 __attribute__((destructor)) void end() {
-  if (count_file == nullptr) return;
-  std::array<char, 32> text{};
-  const int length = std::snprintf(text.data(), text.size(), "%ld\n", calls.load());
-  const long file = syscall(SYS_openat, AT_FDCWD, count_file, O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  if (settings.count_file == nullptr) return;
+  const int file = ::open(settings.count_file, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) return;
-  (void)!syscall(SYS_write, file, text.data(), static_cast<std::size_t>(length));
-  syscall(SYS_close, file);
+  char text[32];
+  const int length = std::snprintf(text, sizeof text, "%ld\n", seen.load());
+  static_cast<void>(!::write(file, text, static_cast<std::size_t>(length)));
+  ::close(file);
 }
 
-void* take(std::size_t size, std::size_t alignment) noexcept {
-  if (counts() && calls.fetch_add(1) + 1 == failing) return nullptr;
-  if (size == 0) size = 1;
-  return alignment <= alignof(std::max_align_t) ? std::malloc(size) : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+bool fails() {
+  if (!ready.load(std::memory_order_relaxed)) return false;
+  const long n = seen.fetch_add(1) + 1;
+  return settings.at > 0 && n >= settings.at && (settings.many == 0 || n < settings.at + settings.many);
 }
 
-void* take_or_throw(std::size_t size, std::size_t alignment) {
-  if (void* memory = take(size, alignment)) return memory;
-  throw std::bad_alloc();
+bool malloc_fails(const void* caller) {
+  const auto at = reinterpret_cast<std::uintptr_t>(caller);
+  return settings.of_malloc && at >= settings.text_begin && at < settings.text_end && fails();
+}
+
+void* allocate(std::size_t size, std::size_t alignment) {
+  if (!settings.of_malloc && fails()) return nullptr;
+  return alignment == 0 ? __libc_malloc(size == 0 ? 1 : size) : __libc_memalign(alignment, size);
+}
+
+/// As the standard asks: the new-handler is called until it makes room, or throws.
+void* allocate_or_throw(std::size_t size, std::size_t alignment) {
+  for (;;) {
+    if (void* memory = allocate(size, alignment)) return memory;
+    const std::new_handler handler = std::get_new_handler();
+    if (handler == nullptr) throw std::bad_alloc();
+    handler();
+  }
 }
 
 }  // namespace
 
-extern "C" int __libc_start_main(Main main, int argc, char** argv, void (*init)(), void (*fini)(), void (*unload)(), void* stack) {
-  using Start = int (*)(Main, int, char**, void (*)(), void (*)(), void (*)(), void*);
-  real_main = main;
-  return reinterpret_cast<Start>(dlsym(RTLD_NEXT, "__libc_start_main"))(counted_main, argc, argv, init, fini, unload, stack);
-}
-
-using std::align_val_t;
-using std::nothrow_t;
-using std::size_t;
-void* operator new(size_t size) { return take_or_throw(size, 1); }
-void* operator new[](size_t size) { return take_or_throw(size, 1); }
-void* operator new(size_t size, align_val_t alignment) { return take_or_throw(size, size_t(alignment)); }
-void* operator new[](size_t size, align_val_t alignment) { return take_or_throw(size, size_t(alignment)); }
-void* operator new(size_t size, const nothrow_t&) noexcept { return take(size, 1); }
-void* operator new[](size_t size, const nothrow_t&) noexcept { return take(size, 1); }
-void* operator new(size_t size, align_val_t alignment, const nothrow_t&) noexcept { return take(size, size_t(alignment)); }
-void* operator new[](size_t size, align_val_t alignment, const nothrow_t&) noexcept { return take(size, size_t(alignment)); }
+void* operator new(std::size_t size) { return allocate_or_throw(size, 0); }
+void* operator new[](std::size_t size) { return allocate_or_throw(size, 0); }
+void* operator new(std::size_t size, std::align_val_t alignment) { return allocate_or_throw(size, static_cast<std::size_t>(alignment)); }
+void* operator new[](std::size_t size, std::align_val_t alignment) { return allocate_or_throw(size, static_cast<std::size_t>(alignment)); }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size, 0); }
+void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return allocate(size, 0); }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, align_val_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, size_t, align_val_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, size_t, align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, const nothrow_t&) noexcept { std::free(memory); }
-void operator delete[](void* memory, const nothrow_t&) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+extern "C" {
+
+void* malloc(std::size_t size) {
+  if (!malloc_fails(__builtin_return_address(0))) return __libc_malloc(size);
+  errno = ENOMEM;
+  return nullptr;
+}
+void* calloc(std::size_t count, std::size_t size) {
+  if (!malloc_fails(__builtin_return_address(0))) return __libc_calloc(count, size);
+  errno = ENOMEM;
+  return nullptr;
+}
+void* realloc(void* memory, std::size_t size) {
+  if (size == 0 || !malloc_fails(__builtin_return_address(0))) return __libc_realloc(memory, size);
+  errno = ENOMEM;
+  return nullptr;
+}
+int posix_memalign(void** memory, std::size_t alignment, std::size_t size) {
+  if (malloc_fails(__builtin_return_address(0))) return ENOMEM;
+  *memory = __libc_memalign(alignment, size);
+  return *memory != nullptr ? 0 : ENOMEM;
+}
+
+}  // extern "C"

@@ -1,4 +1,4 @@
-// Input and output that fail on purpose. LD_PRELOAD=io_failure.so, and in the environment:
+// Input and output that fail on purpose. LD_PRELOAD=libio_failure.so, and in the environment:
 //   SUPPLE_FAIL_IO_UNDER   only files below this folder count (absolute path)
 //   SUPPLE_FAIL_IO_KIND    enospc: from call AT on nothing more can be written; eio: call AT fails; eintr: call AT is interrupted (reads and
 //                          writes alone); short: call AT reads or writes half; crash: call AT ends the program; none

@@ -5,14 +5,17 @@ from support import Outcome, SmallRun, broken_files, fault_of_exit, orphans, run
 
 TINY = ("contacts/two_balls", ["duration=0.05", "output.images.size=[32,24]", "output.images.samples=1", "output.film=false", "output.mesh=[ply,usd]",
                                "output.particles=vtk", "output.contacts=csv", "output.cell=0.05"])
+# Without pictures: what a graphics driver does without memory is its own.
+NO_PICTURES = (TINY[0], [word for word in TINY[1] if not word.startswith("output.images")] + ["output.images=false"])
 KINDS = ("eio", "enospc", "short", "eintr")
 
 
-def spread(total, asked):
-    """Numbers from 1 to total: all, or so many of them, each first of its stretch."""
-    if asked >= total:
-        return list(range(1, total + 1))
-    return sorted({1 + k * total // asked for k in range(asked)})
+def spread(total, asked, first=1):
+    """Numbers from first to total: all, or so many of them, each first of its stretch."""
+    count = total - first + 1
+    if asked >= count:
+        return list(range(first, total + 1))
+    return sorted({first + k * count // asked for k in range(asked)})
 
 
 def judge(run, out, ended, where, same):
@@ -36,7 +39,7 @@ def failing_io(context, asked, kinds=KINDS):
     outcome = Outcome()
     base = context.folder("io")
     run = SmallRun(context, *TINY, base / "reference")
-    library = str(context.bin / "io_failure.so")
+    library = str(context.build / "lib/libio_failure.so")
     out, count = base / "out", base / "calls"
     ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_COUNT": str(count)})
     if ended.code != 0:
@@ -53,21 +56,30 @@ def failing_io(context, asked, kinds=KINDS):
     return outcome
 
 
+def before_main(context, library):
+    """How many allocations libraries make before main, where nobody can catch what they throw."""
+    for number in range(1, 200):
+        if run_process([context.tool, "--version"], {"LD_PRELOAD": library, "SUPPLE_FAIL_AT": str(number)}).code >= 0:
+            return number - 1
+    raise RuntimeError("every allocation that fails ends the program")
+
+
 def failing_memory(context, asked):
     outcome = Outcome()
     base = context.folder("memory")
-    run = SmallRun(context, *TINY, base / "reference")
-    library = str(context.bin / "alloc_failure.so")
+    run = SmallRun(context, *NO_PICTURES, base / "reference")
+    library = str(context.build / "lib/liballoc_failure.so")
     out, count = base / "out", base / "calls"
-    ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_COUNT_ALLOC": str(count)})
+    ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_COUNT": str(count)})
     if ended.code != 0 or not count.exists():
         raise RuntimeError(f"the run that counts allocations ended with {ended.code}: {ended.err}")
     total = int(count.read_text())
-    for number in spread(total, asked):
+    early = before_main(context, library)
+    for number in spread(total, asked, early + 1):
         shutil.rmtree(out, ignore_errors=True)
-        ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_ALLOC": str(number)})
+        ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_AT": str(number)})
         outcome.faults += judge(run, out, ended, f"allocation {number}", False)
         outcome.reached += 1
     outcome.faults += [f"still running: {text}" for text in orphans(out)]
-    outcome.note = f"a run makes {total} allocations"
+    outcome.note = f"a run makes {total} allocations, the first {early} before main"
     return outcome
