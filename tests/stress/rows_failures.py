@@ -22,12 +22,10 @@ def judge(run, out, ended, where, same):
     """A failed run: its exit, what it leaves, and that it can be resumed. `same`: nothing may have come of it."""
     fault = fault_of_exit(ended, {0} if same else {0, 4, 6})
     faults = [fault] if fault else []
-    if out.exists():
-        faults += broken_files(out, run.files)
-        if ended.code == 0:
-            faults += run.difference(out)
-        else:
-            faults += [f"a temporary file is left: {name}" for name in temporaries(out)]
+    if ended.code == 0:
+        faults += run.difference(out)
+    elif out.exists():
+        faults += broken_files(out, run.files) + [f"a temporary file is left: {name}" for name in temporaries(out)]
     if ended.code != 0:
         resumed = run_process(run.command(out, "--resume"))
         fault = fault_of_exit(resumed, {0})

@@ -1,6 +1,8 @@
 """Rows that tests and benchmarks cover: they are called, and counted by what they say."""
+import json
 import pathlib
 import re
+import subprocess
 import time
 
 from support import Outcome, run_process
@@ -76,7 +78,6 @@ def resident(process):
 
 def soak(context, asked):
     """A ball that rolls on the ground for so many steps: resident memory from the tenth part of the way to the end."""
-    import subprocess
     outcome = Outcome()
     folder = context.folder("soak")
     steps = 1
@@ -100,4 +101,19 @@ def soak(context, asked):
     elif not early or late > 1.01 * early:
         outcome.faults.append(f"{early} kB after a tenth, {late} kB at the end")
     outcome.note = f"{early} kB after a tenth, {late} kB at the end"
+    return outcome
+
+
+def contacts(context, asked):
+    """stress_contacts: momenta, pressures and deformed surfaces of random contacts, and none where bodies are apart."""
+    outcome = Outcome()
+    ended = run_process([context.bin / "stress_contacts", asked, context.seed], timeout=LONG_S)
+    try:
+        told = json.loads(ended.out)
+    except ValueError:
+        outcome.faults.append(f"stress_contacts ended with {ended.code}: {ended.err[:300]}")
+        return outcome
+    outcome.reached, outcome.faults = told["touching"], told["faults"]
+    outcome.note = (f"and {told['apart']} pairs apart; largest relative errors: forces {told['forces']:.0e}, moments {told['moments']:.0e}, "
+                    f"pressures {told['pressures']:.0e}, surfaces {told['surfaces']:.0e}")
     return outcome

@@ -58,6 +58,7 @@ ROWS = [
     Row("invariance", "contacts turned, moved, scaled, exchanged", 1, "tests", tests(("collision_tests", "*Invariance*:ContactSurface.TurnsMovesAndScalesWithTheBodies:ContactSurface.GivesTheOpposite*")), True),
     Row("conservation", "momentum, angular momentum, action and reaction", 1, "tests", tests(("scenes_tests", "FreeBalls.*:FreeCollision.*:SetParticles.KeepsTheAudits"), ("collision_tests", "React.KeepsMomentum*:FreeCollision.*:ContactRules.*KeepMomenta")), True),
     Row("surfaces", "both deformed surfaces meet on the contact, no force apart from it", 1, "tests", tests(("collision_tests", "DeformedField.*:*NeverGivesOnePointToTwoBodies*:ContactSurface.HasBothPressuresEqualAtEveryPoint:ContactSurface.IsEmpty*"), ("scenes_tests", "FreeCollision.BothDeformed*:Simulation.GivesNoForce*:Meshes.OfTouchingObjects*")), True),
+    Row("contacts", "random contacts of 13 kinds of pairs: momenta, pressures and deformed surfaces to 1e-10, none where bodies are apart", 2_000, "contacts", rows_programs.contacts),
     Row("gradients", "laws, kernels, shapes and fields against finite differences", 1, "tests", tests(("core_tests", "*AreTheGradient*:*MatchCentralDifferences*"), ("implicit_tests", "*CentralDifferences*"), ("collision_tests", "*Gradient*")), True),
     Row("stability", "step x stiffness x compression x mass ratio, and contact at any stiffness and speed", 1_000, "runs", rows_programs.stability, True),
     Row("soak", "memory of a long run: grows by less than 1 %", 1_000_000, "steps", rows_programs.soak, True),
