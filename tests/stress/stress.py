@@ -92,12 +92,16 @@ def tell(row, asked, outcome, seconds):
         print(f"    and {len(outcome.faults) - MOST_FAULTS_TOLD} more")
 
 
+def asked_in_words(row):
+    return f"{row.asked:,} {row.unit}" if row.asked > 1 else f"all {row.unit}"
+
+
 def report_line(row, context, outcome, seconds):
     command = f"`scripts/stress.sh {row.name} --seed {context.seed}" + ("" if row.fixed or context.share == 1.0 else f" --share {context.share:g}") + "`"
-    asked = f"{row.asked} {row.unit}" if row.asked > 1 else f"all {row.unit}"
+    asked = asked_in_words(row)
     today = datetime.date.today().isoformat()
     note = f" ({outcome.note})" if outcome.note else ""
-    return f"| {row.name} | {row.what} | {asked} | {outcome.reached}{note} | {len(outcome.faults)} | {seconds:.0f} | {today}, {commit()} | {command} |"
+    return f"| {row.name} | {row.what} | {asked} | {outcome.reached:,}{note} | {len(outcome.faults)} | {seconds:.0f} | {today}, {commit()} | {command} |"
 
 
 HEAD = """# Reliability
@@ -118,9 +122,8 @@ def write_report(lines):
     if REPORT.exists():
         known = {match.group(1): match.group(0) for match in re.finditer(r"^\| ([a-z-]+) \|.*$", REPORT.read_text(), re.MULTILINE) if match.group(1) != "row"}
     known.update(lines)
-    never = lambda row: f"| {row.name} | {row.what} | {row.asked} {row.unit} | 0, not run | | | | `scripts/stress.sh {row.name}` |"
+    never = lambda row: f"| {row.name} | {row.what} | {asked_in_words(row)} | 0, not run | | | | `scripts/stress.sh {row.name}` |"
     REPORT.write_text(HEAD + "".join(known.get(row.name, never(row)) + "\n" for row in ROWS))
-    print(f"wrote {REPORT.relative_to(SOURCES)}")
 
 
 def main():
@@ -151,8 +154,8 @@ def main():
             tell(row, asked, outcome, seconds)
             lines[row.name] = report_line(row, context, outcome, seconds)
             failed = failed or bool(outcome.faults)
-        if arguments.report:
-            write_report(lines)
+            if arguments.report:
+                write_report(lines)  # at once: what follows may take an hour
     if failed:
         print(f"what shows the faults is in {scratch}")
     else:

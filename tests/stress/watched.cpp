@@ -161,6 +161,7 @@ Tally watch(std::uint64_t first, std::uint64_t count, const Limits& limits, cons
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) break;
     tally.faults.push_back({board.at, cause_of(status, limits)});
+    std::fprintf(stderr, "trial %llu: %s\n", static_cast<unsigned long long>(board.at.load()), tally.faults.back().what.c_str());
     ++board.tried;
     first = board.at + 1;
   }
