@@ -180,7 +180,8 @@ def states(context, asked):
         where = f"{run.name}, {verb}, altered state {outcome.reached} ({path.name})"
         fault = fault_of_exit(ended, {0, 7})
         if not fault and ended.code == 0:
-            fault = "exit 0 though the state is not what was saved"
+            # What is damaged may be simulated again; then the folder is that of an undisturbed run.
+            fault = "; ".join(run.difference(out)) if verb == "resume" else "exit 0 though the state is not what was saved"
         elif not fault and path.name not in ended.err:
             fault = f"the message does not name the file: {ended.err[:200]}"
         # Tables of the export are new; whatever the run had left is as it was.

@@ -43,7 +43,7 @@ ROWS = [
     Row("hostile", "scenes that mean harm, and golden messages: refused in 1 s and 256 MB", 250, "scenes", rows_inputs.hostile),
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
-    Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7", 1_000, "commands", rows_runs.states),
+    Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7, or simulated again to the same bits", 1_000, "commands", rows_runs.states),
     Row("frames", "lists of frames as `--frames` takes them", 100_000, "lists", functools.partial(rows_inputs.by_libraries, "frames")),
     Row("grids", "OpenVDB files altered or cut off: exported again, whole", 200, "files", rows_runs.grids),
     Row("memory", "an allocation that fails, the n-th: exit 6 with a message, nothing half-written, resumed to the same bits", 1_000, "runs", rows_failures.failing_memory),

@@ -121,7 +121,8 @@ def contents(folder):
     folder = pathlib.Path(folder)
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
-        if not path.is_file() or path.name == ".lock" or path.name.endswith(".tmp") or REPORTS.match(name):
+        temporary = any(part.endswith(".tmp") for part in path.relative_to(folder).parts)
+        if not path.is_file() or path.name == ".lock" or temporary or REPORTS.match(name):
             continue
         data = path.read_bytes()
         found[name] = str(len(data)) if name.endswith(".vdb") else hashlib.sha256(data).hexdigest()
