@@ -1,0 +1,83 @@
+"""Input, output and memory that fail at the n-th call (io_failure.cpp, alloc_failure.cpp)."""
+import shutil
+
+from support import Outcome, SmallRun, broken_files, fault_of_exit, orphans, run_process, temporaries
+
+TINY = ("contacts/two_balls", ["duration=0.05", "output.images.size=[32,24]", "output.images.samples=1", "output.film=false", "output.mesh=[ply,usd]",
+                               "output.particles=vtk", "output.contacts=csv", "output.cell=0.05"])
+# Without pictures: what a graphics driver does without memory is its own.
+NO_PICTURES = (TINY[0], [word for word in TINY[1] if not word.startswith("output.images")] + ["output.images=false"])
+KINDS = ("eio", "enospc", "short", "eintr")
+
+
+def spread(total, asked, first=1):
+    """Numbers from first to total: all, or so many of them, each first of its stretch."""
+    count = total - first + 1
+    if asked >= count:
+        return list(range(first, total + 1))
+    return sorted({first + k * count // asked for k in range(asked)})
+
+
+def judge(run, out, ended, where, same):
+    """A failed run: its exit, what it leaves, and that it can be resumed. `same`: nothing may have come of it."""
+    fault = fault_of_exit(ended, {0} if same else {0, 4, 6})
+    faults = [fault] if fault else []
+    if ended.code == 0:
+        faults += run.difference(out)
+    elif out.exists():
+        faults += broken_files(out, run.files) + [f"a temporary file is left: {name}" for name in temporaries(out)]
+    if ended.code != 0:
+        resumed = run_process(run.command(out, "--resume"))
+        fault = fault_of_exit(resumed, {0})
+        faults += [f"resumed: {text}" for text in ([fault] if fault else run.difference(out))]
+    return [f"{where}: {text}" for text in faults]
+
+
+def failing_io(context, asked, kinds=KINDS):
+    outcome = Outcome()
+    base = context.folder("io")
+    run = SmallRun(context, *TINY, base / "reference")
+    library = str(context.build / "lib/libio_failure.so")
+    out, count = base / "out", base / "calls"
+    ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_COUNT": str(count)})
+    if ended.code != 0:
+        raise RuntimeError(f"the run that counts calls ended with {ended.code}: {ended.err}")
+    total = int(count.read_text())
+    turns = [(kind, number) for number in spread(total, max(1, asked // len(kinds))) for kind in kinds]
+    for kind, number in turns:
+        shutil.rmtree(out, ignore_errors=True)
+        env = {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_KIND": kind, "SUPPLE_FAIL_IO_AT": str(number)}
+        ended = run_process(run.command(out), env)
+        outcome.faults += judge(run, out, ended, f"{kind} at call {number}", kind in ("short", "eintr"))
+        outcome.reached += 1
+    outcome.note = f"a run makes {total} calls; {len(kinds)} kinds of failure"
+    return outcome
+
+
+def before_main(context, library):
+    """How many allocations libraries make before main, where nobody can catch what they throw."""
+    for number in range(1, 200):
+        if run_process([context.tool, "--version"], {"LD_PRELOAD": library, "SUPPLE_FAIL_AT": str(number)}).code >= 0:
+            return number - 1
+    raise RuntimeError("every allocation that fails ends the program")
+
+
+def failing_memory(context, asked):
+    outcome = Outcome()
+    base = context.folder("memory")
+    run = SmallRun(context, *NO_PICTURES, base / "reference")
+    library = str(context.build / "lib/liballoc_failure.so")
+    out, count = base / "out", base / "calls"
+    ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_COUNT": str(count)})
+    if ended.code != 0 or not count.exists():
+        raise RuntimeError(f"the run that counts allocations ended with {ended.code}: {ended.err}")
+    total = int(count.read_text())
+    early = before_main(context, library)
+    for number in spread(total, asked, early + 1):
+        shutil.rmtree(out, ignore_errors=True)
+        ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_AT": str(number)})
+        outcome.faults += judge(run, out, ended, f"allocation {number}", False)
+        outcome.reached += 1
+    outcome.faults += [f"still running: {text}" for text in orphans(out)]
+    outcome.note = f"a run makes {total} allocations, the first {early} before main"
+    return outcome

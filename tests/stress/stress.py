@@ -1,0 +1,167 @@
+"""Rows of docs/reliability.md: what must never happen, tried. Called by scripts/stress.sh, which builds what they need."""
+import argparse
+import dataclasses
+import datetime
+import functools
+import math
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import time
+import traceback
+
+import rows_failures
+import rows_inputs
+import rows_programs
+import rows_runs
+from support import MOST_FAULTS_TOLD, Context, Outcome
+
+SOURCES = pathlib.Path(__file__).resolve().parents[2]
+REPORT = SOURCES / "docs/reliability.md"
+
+
+@dataclasses.dataclass
+class Row:
+    name: str
+    what: str
+    asked: int        # at full share, in things that `unit` names
+    unit: str
+    run: object
+    fixed: bool = False  # no share changes it
+
+
+def tests(*parts):
+    return functools.partial(rows_programs.several, parts)
+
+
+ROWS = [
+    Row("scenes", "library scenes and golden messages, mutated; read and checked, those that pass run for two frames", 10_000, "scenes", functools.partial(rows_inputs.by_libraries, "scenes")),
+    Row("tool", "mutated scenes by the command line: check, then run under a time limit", 500, "scenes", rows_inputs.mutated_by_tool),
+    Row("hostile", "scenes that mean harm, and golden messages: refused in 1 s and 256 MB", 250, "scenes", rows_inputs.hostile),
+    Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
+    Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
+    Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7, or simulated again to the same bits", 1_000, "commands", rows_runs.states),
+    Row("frames", "lists of frames as `--frames` takes them", 100_000, "lists", functools.partial(rows_inputs.by_libraries, "frames")),
+    Row("grids", "OpenVDB files altered or cut off: exported again, whole", 200, "files", rows_runs.grids),
+    Row("memory", "an allocation that fails, the n-th: exit 6 with a message, nothing half-written, resumed to the same bits", 1_000, "runs", rows_failures.failing_memory),
+    Row("io", "EIO, ENOSPC, EINTR or a short count at the n-th call: exit 4 or the same result, resumed to the same bits", 2_000, "runs", rows_failures.failing_io),
+    Row("kill", "SIGKILL at random moments, then `--resume`: same bits, no temporary file, no process left", 200, "kills", rows_runs.kill),
+    Row("signals", "SIGINT, SIGTERM: exit 130, 143, resumed to the same bits", 100, "signals", rows_runs.signals),
+    Row("races", "two runs in one folder: one does it, the other says why not", 50, "races", rows_runs.races),
+    Row("resume", "resumed from every frame, and once more, in fresh processes", 60, "frames", rows_runs.resume),
+    Row("threads", "8 scenes by 1, 2, 3, 4, 8, 16 threads: same bits, same files", 48, "runs", rows_runs.threads),
+    Row("messages", "golden messages, word for word", 150, "tests", tests(("scenes_tests", "Golden/Message.*:Messages.*")), True),
+    Row("determinism", "threads, skips, outputs, restarts, order of objects", 1, "tests", tests(("scenes_tests", "*Determinism*"), ("collision_tests", "*AnyNumberOfThreads*:*AnyThreads*")), True),
+    Row("invariance", "contacts turned, moved, scaled, exchanged", 1, "tests", tests(("collision_tests", "*Invariance*:ContactSurface.TurnsMovesAndScalesWithTheBodies:ContactSurface.GivesTheOpposite*")), True),
+    Row("conservation", "momentum, angular momentum, action and reaction", 1, "tests", tests(("scenes_tests", "FreeBalls.*:FreeCollision.*:SetParticles.KeepsTheAudits"), ("collision_tests", "React.KeepsMomentum*:FreeCollision.*:ContactRules.*KeepMomenta")), True),
+    Row("surfaces", "both deformed surfaces meet on the contact, no force apart from it", 1, "tests", tests(("collision_tests", "DeformedField.*:*NeverGivesOnePointToTwoBodies*:ContactSurface.HasBothPressuresEqualAtEveryPoint:ContactSurface.IsEmpty*"), ("scenes_tests", "FreeCollision.BothDeformed*:Simulation.GivesNoForce*:Meshes.OfTouchingObjects*")), True),
+    Row("contacts", "random contacts of 13 kinds of pairs: momenta, pressures and deformed surfaces to 1e-10, none where bodies are apart", 2_000, "contacts", rows_programs.contacts),
+    Row("gradients", "laws, kernels, shapes and fields against finite differences", 1, "tests", tests(("core_tests", "*AreTheGradient*:*MatchCentralDifferences*"), ("implicit_tests", "*CentralDifferences*"), ("collision_tests", "*Gradient*")), True),
+    Row("stability", "step x stiffness x compression x mass ratio, and contact at any stiffness and speed", 1_000, "runs", rows_programs.stability, True),
+    Row("soak", "memory of a long run: grows by less than 1 %", 1_000_000, "steps", rows_programs.soak, True),
+]
+
+
+def commit():
+    words = ["git", "-C", str(SOURCES), "rev-parse", "--short", "HEAD"]
+    return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
+
+
+def run_row(row, context):
+    asked = row.asked if row.fixed else max(1, math.ceil(row.asked * context.share))
+    begin = time.monotonic()
+    try:
+        outcome = row.run(context, asked)
+        if outcome.reached == 0 and not outcome.faults:
+            outcome.faults.append("nothing was tried")
+    except Exception as error:  # a row that cannot be run has failed, and the others go on
+        traceback.print_exc()
+        outcome = Outcome(faults=[f"the row ended early: {error}"])
+    return asked, outcome, time.monotonic() - begin
+
+
+def tell(row, asked, outcome, seconds):
+    result = "passed" if not outcome.faults else f"{len(outcome.faults)} FAULTS"
+    print(f"{row.name:<14} {outcome.reached} of {asked} {row.unit}, {result}, {seconds:.0f} s{', ' + outcome.note if outcome.note else ''}", flush=True)
+    for fault in outcome.faults[:MOST_FAULTS_TOLD]:
+        print("    " + fault)
+    if len(outcome.faults) > MOST_FAULTS_TOLD:
+        print(f"    and {len(outcome.faults) - MOST_FAULTS_TOLD} more")
+
+
+def asked_in_words(row):
+    return f"{row.asked:,} {row.unit}" if row.asked > 1 else f"all {row.unit}"
+
+
+def report_line(row, context, outcome, seconds):
+    command = f"`scripts/stress.sh {row.name} --seed {context.seed}" + ("" if row.fixed or context.share == 1.0 else f" --share {context.share:g}") + "`"
+    asked = asked_in_words(row)
+    today = datetime.date.today().isoformat()
+    note = f" ({outcome.note})" if outcome.note else ""
+    return f"| {row.name} | {row.what} | {asked} | {outcome.reached:,}{note} | {len(outcome.faults)} | {seconds:.0f} | {today}, {commit()} | {command} |"
+
+
+HEAD = """# Reliability
+
+A run is killed, the disk fills, a scene is hostile: nothing is lost, nothing half-written is left under a final name, and the user is told
+what happened and what to do. `scripts/stress.sh` tries this, a row of the table at a time, and `--report` writes the lines of the rows that
+it ran; the others keep their last line. "Asked" is what a full run tries, "reached" what the last run tried. `scripts/stress.sh --self-test`
+plants faults and expects to find them.
+
+| row | what is tried | asked | reached | failures | time [s] | when, commit | command |
+|---|---|---|---|---|---|---|---|
+"""
+
+
+def write_report(lines):
+    """Rows that were not run this time keep their last line."""
+    known = {}
+    if REPORT.exists():
+        known = {match.group(1): match.group(0) for match in re.finditer(r"^\| ([a-z-]+) \|.*$", REPORT.read_text(), re.MULTILINE) if match.group(1) != "row"}
+    known.update(lines)
+    never = lambda row: f"| {row.name} | {row.what} | {asked_in_words(row)} | 0, not run | | | | `scripts/stress.sh {row.name}` |"
+    REPORT.write_text(HEAD + "".join(known.get(row.name, never(row)) + "\n" for row in ROWS))
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="scripts/stress.sh", description="Tries what must never happen, row by row: " + ", ".join(row.name for row in ROWS) + ".")
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="all when none is named")
+    parser.add_argument("--seed", type=int, default=1, help="of what is random (default 1)")
+    parser.add_argument("--share", type=float, default=1.0, help="of the full counts, e.g. 0.1")
+    parser.add_argument("--report", action="store_true", help="write the lines of these rows into docs/reliability.md")
+    parser.add_argument("--build", default=str(SOURCES / "build/release"), help="build folder (default build/release)")
+    parser.add_argument("--self-test", action="store_true", help="plant faults and expect every row that is tried to find them")
+    arguments = parser.parse_args()
+    unknown = set(arguments.rows) - {row.name for row in ROWS}
+    if unknown:
+        parser.error(f"no row is named {', '.join(sorted(unknown))}; rows: {', '.join(row.name for row in ROWS)}")
+    if not 0.0 < arguments.share <= 1.0:
+        parser.error("--share: expected a number above 0, at most 1")
+    scratch = pathlib.Path(arguments.build) / "stress" / str(os.getpid())
+    context = Context(SOURCES, arguments.build, scratch, arguments.seed, arguments.share)
+    if arguments.self_test:
+        import self_test
+        failed = self_test.run(context)
+    else:
+        lines, failed = {}, False
+        for row in ROWS:
+            if arguments.rows and row.name not in arguments.rows:
+                continue
+            asked, outcome, seconds = run_row(row, context)
+            tell(row, asked, outcome, seconds)
+            lines[row.name] = report_line(row, context, outcome, seconds)
+            failed = failed or bool(outcome.faults)
+            if arguments.report:
+                write_report(lines)  # at once: what follows may take an hour
+    if failed:
+        print(f"what shows the faults is in {scratch}")
+    else:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
