@@ -1,8 +1,10 @@
 #include "supple/core/arrange.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "neighbour_grid.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/math.h"
@@ -177,6 +179,12 @@ Bonds bonds_along(std::uint32_t begin, std::uint32_t end, int steps) {
   return bonds;
 }
 
+std::uint64_t count_bonds_along(std::uint64_t particles, int steps) {
+  SUPPLE_EXPECTS(steps >= 1);
+  const std::uint64_t reach = std::min<std::uint64_t>(static_cast<std::uint64_t>(steps), particles > 0 ? particles - 1 : 0);
+  return reach * particles - reach * (reach + 1) / 2;
+}
+
 Bonds bonds_within(std::span<const Vec3> position, std::uint32_t begin, std::uint32_t end, double distance) {
   SUPPLE_EXPECTS(begin <= end && end <= position.size() && distance > 0.0);
   Bonds bonds;
@@ -185,6 +193,16 @@ Bonds bonds_within(std::span<const Vec3> position, std::uint32_t begin, std::uin
     bonds.second.push_back(begin + pair.second);
   }
   return bonds;
+}
+
+BondCount count_bonds_within(std::span<const Vec3> position, double distance) {
+  constexpr std::uint64_t kMostCounted = 10'000'000;  // one by one, in a fraction of a second
+  constexpr std::size_t kSample = 512;
+  NeighbourGrid grid;
+  const std::size_t stride = std::max<std::size_t>(1, position.size() / kSample);
+  const std::uint64_t estimate = stride * grid.count(position, distance, stride);
+  if (stride == 1 || estimate > kMostCounted) return {.number = estimate, .estimated = stride > 1};
+  return {.number = grid.count(position, distance, 1), .estimated = false};
 }
 
 }  // namespace supple::core

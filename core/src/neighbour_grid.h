@@ -16,6 +16,8 @@ class NeighbourGrid {
   /// Replaces `pairs` by all pairs nearer than `range`, sorted; returns the number of distances computed.
   std::uint64_t find(std::span<const Vec3> positions, double range, const Executor& executor,
                      std::vector<IndexPair>& pairs);
+  /// How many pairs `find` would find whose first point is one of every `stride`, from 0 on, without keeping any.
+  std::uint64_t count(std::span<const Vec3> positions, double range, std::size_t stride);
 
  private:
   /// Cell coordinates as doubles: a point may lie farther out than an integer reaches.

@@ -169,6 +169,21 @@ std::uint64_t NeighbourGrid::find(std::span<const Vec3> positions, double range,
   return visited;
 }
 
+std::uint64_t NeighbourGrid::count(std::span<const Vec3> positions, double range, std::size_t stride) {
+  SUPPLE_EXPECTS(range > 0.0 && stride > 0);
+  if (positions.size() < 2) return 0;
+  SUPPLE_EXPECTS(positions.size() < (std::size_t{1} << 30));
+  sort_into_buckets(positions, range);
+  std::vector<IndexPair> pairs;  // of one point
+  std::uint64_t found = 0;
+  for (std::size_t i = 0; i < positions.size(); i += stride) {
+    pairs.clear();
+    search(positions, range, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(i + 1), pairs);
+    found += pairs.size();
+  }
+  return found;
+}
+
 std::vector<IndexPair> find_neighbours(std::span<const Vec3> positions, double range) {
   NeighbourGrid grid;
   std::vector<IndexPair> pairs;

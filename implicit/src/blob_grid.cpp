@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "field_index.h"
+#include "march_sampling.h"
 #include "supple/core/error.h"
 
 namespace supple::implicit::blobs {
@@ -57,6 +58,11 @@ void BlobGrid::build(std::span<const PackedPrimitive> primitives, const Lattice&
   shift_ = 3;
   if (n > 0) {
     const std::array<double, 3> lower = centre_of(least), upper = centre_of(most);
+    double far = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) far = std::max({far, reach_ - lower[k], reach_ + upper[k]});
+    forgotten_ = true;  // where it throws, positions are kept that were not sorted
+    march::expect_near_nodes(far, lattice);
+    forgotten_ = false;
     while (static_cast<double>(2 * bin()) < reach_) ++shift_;
     for (;; ++shift_) {
       for (std::size_t k = 0; k < 3; ++k) {

@@ -37,29 +37,35 @@ float value_at(const BlockTable& table, const Block& block, int x, int y, int z)
   return owner->values[kTileNodes * owner->rank(tile) + static_cast<std::size_t>((x & 3) | (y & 3) << 2 | (z & 3) << 4)];
 }
 
-void expect_nodes(const Cells& lower, const Cells& upper, const Lattice& lattice) {
+namespace {
+
+[[noreturn]] void refuse(const std::string& expected, const std::string& found, double factor, const Lattice& lattice) {
+  throw Error(ErrorKind::Limit, {.place = "",
+                                 .key = "lattice.cell",
+                                 .expected = expected,
+                                 .found = found + " with cells of " + lattice::three_digits(lattice.cell) + " m",
+                                 .hint = "use cells of at least " + lattice::three_digits(1.05 * factor * lattice.cell) + " m"});
+}
+
+}  // namespace
+
+void expect_near_nodes(double far, const Lattice& lattice) {
   constexpr double kLargestNode = 1 << 30;
+  if (far <= kLargestNode) return;
+  refuse("expected node numbers up to " + lattice::three_digits(kLargestNode), lattice::three_digits(far), far / kLargestNode, lattice);
+}
+
+void expect_nodes(const Cells& lower, const Cells& upper, const Lattice& lattice) {
   double nodes = 1.0;
   double far = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
     nodes *= static_cast<double>(upper[k] - lower[k] + 1);
     far = std::max({far, std::abs(static_cast<double>(lower[k])), std::abs(static_cast<double>(upper[k]))});
   }
-  const auto refuse = [&](const std::string& expected, const std::string& found, double factor) {
-    throw Error(ErrorKind::Limit, {.place = "",
-                                   .key = "lattice.cell",
-                                   .expected = expected,
-                                   .found = found + " with cells of " + lattice::three_digits(lattice.cell) + " m",
-                                   .hint = "use cells of at least " +
-                                           lattice::three_digits(1.05 * factor * lattice.cell) + " m"});
-  };
-  if (far > kLargestNode) {
-    refuse("expected node numbers up to " + lattice::three_digits(kLargestNode), lattice::three_digits(far),
-           far / kLargestNode);
-  }
+  expect_near_nodes(far, lattice);
   if (nodes > static_cast<double>(kMarchNodes)) {
-    refuse("expected at most " + std::to_string(kMarchNodes) + " lattice nodes around the body",
-           "about " + lattice::three_digits(nodes), std::cbrt(nodes / static_cast<double>(kMarchNodes)));
+    refuse("expected at most " + std::to_string(kMarchNodes) + " lattice nodes around the body", "about " + lattice::three_digits(nodes),
+           std::cbrt(nodes / static_cast<double>(kMarchNodes)), lattice);
   }
 }
 

@@ -61,6 +61,9 @@ struct SamplerMemory {
 /// F at a node of the block or of one beyond its upper faces, 0 where only the sign is known. @pre 0 <= x, y, z <= 16
 [[nodiscard]] float value_at(const BlockTable& table, const Block& block, int x, int y, int z);
 
+/// @param far  the largest of the coordinates of nodes, whatever its sign   @throws Error{Limit} when it is too large for the lattice
+void expect_near_nodes(double far, const Lattice& lattice);
+
 /// @throws Error{Limit} when these nodes are too many
 void expect_nodes(const blobs::Cells& lower, const blobs::Cells& upper, const Lattice& lattice);
 

@@ -15,6 +15,7 @@
 
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/core/io/open_temporaries.h"
 #include "supple/render/image.h"
 
 namespace supple::render {
@@ -178,6 +179,7 @@ void encode_film(const std::filesystem::path& folder, const std::string& stem, i
   arguments.insert(arguments.end(), encoding.begin() + 2, encoding.end());
   arguments.insert(arguments.end(), {"-metadata", "comment=" + identity, temporary.string()});
 
+  const io::OpenTemporary open(temporary.c_str());
   std::error_code ignored;
   Outcome outcome;
   try {

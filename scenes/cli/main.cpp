@@ -17,11 +17,13 @@
 #include <vector>
 
 #include "benchmarks.h"
+#include "last_resort.h"
 #include "progress_bar.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/scenes/check.h"
 #include "supple/scenes/inspect.h"
-#include "supple/scenes/output_limits.h"
+#include "supple/scenes/limits.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
@@ -66,7 +68,8 @@ struct Arguments {
   std::vector<std::string> words;
   int threads = 0;
   int at_once = 0;
-  double memory = 0.0;
+  double memory = 0.0;      // [byte]; 0: not given
+  double time_limit = 0.0;  // [s]; 0: none
   int cells = 0;
   double error = 0.0;
   double gain = 8.0;
@@ -121,9 +124,10 @@ scenes::SimulationOptions simulation_options(int threads) {
 }
 
 /// Of a simulation that is looked at only.
-scenes::SimulationOptions question_options(int threads) {
+scenes::SimulationOptions question_options(int threads, double memory) {
   scenes::SimulationOptions options = simulation_options(threads);
   options.questions = true;
+  if (memory > 0.0) options.memory = memory;
   return options;
 }
 
@@ -138,7 +142,9 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.profile = arguments.profile;
   options.context = arguments.context;
   options.frames_at_once = arguments.at_once;
-  options.memory = 1e9 * arguments.memory;
+  options.memory = arguments.memory;
+  if (arguments.memory > 0.0) options.scene_memory = arguments.memory;
+  options.time_limit = arguments.time_limit;
   options.delaunay = simulation_options(0).delaunay;
   options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
   options.interrupt = &interrupted;
@@ -217,20 +223,14 @@ int compare(const Arguments& arguments) {
 
 int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
-  scenes::check_pictures(scene);
-  scenes::Simulation simulation(scene, question_options(1));
-  try {
-    scenes::expect_output_sizes(simulation, scenes::requested_outputs(scene));
-  } catch (const Error& error) {
-    throw Error(ErrorKind::Scene, error.faults());
-  }
-  for (const std::string& warning : simulation.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
-  simulation.expect_steps();
+  const double build = arguments.memory > 0.0 ? arguments.memory : scenes::kCheckMemory;
+  const scenes::CheckReport found = scenes::check_scene(scene, question_options(1, arguments.memory), build);
+  for (const std::string& warning : found.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
     const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
-    const std::size_t objects = scene.objects.size(), particles = simulation.model().particles.size();
-    std::printf("%s: no fault found (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(), objects, plural(objects),
-                particles, plural(particles), scene.frame_count());
+    std::printf("%s: %s (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(),
+                found.built ? "no fault found" : "no fault found in keys, files and counts", found.objects, plural(found.objects), found.particles,
+                plural(found.particles), found.frames);
   }
   return 0;
 }
@@ -238,7 +238,7 @@ int check(const Arguments& arguments) {
 int explain(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.simulate_only) scene.output = {};
-  scenes::Simulation simulation(std::move(scene), question_options(1));
+  scenes::Simulation simulation(std::move(scene), question_options(1, arguments.memory));
   std::fputs(scenes::explain(simulation).c_str(), stdout);
   return 0;
 }
@@ -247,7 +247,7 @@ int query(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.error > 0.0) scene.contact.error = arguments.error;
   const std::uint64_t fingerprint = scene.content_hash;
-  scenes::Simulation simulation(std::move(scene), question_options(arguments.threads));
+  scenes::Simulation simulation(std::move(scene), question_options(arguments.threads, arguments.memory));
   if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, fingerprint));
   std::string answer;
   if (arguments.query == "forces") {
@@ -303,11 +303,18 @@ double number_in(const std::string& text) {
   return good ? value : std::numeric_limits<double>::quiet_NaN();
 }
 
+void memory_flag(CLI::App* verb, Arguments& a, const std::string& what) {
+  const auto bytes = [](const std::string& text) {
+    const double value = scenes::parse_bytes(text);
+    return value > 0.0 ? std::string() : "expected an amount of memory > 0, such as 4G, 800M or (in GB) 0.8, found " + text;
+  };
+  verb->add_option_function<std::string>("--memory", [&a](const std::string& text) { a.memory = scenes::parse_bytes(text); }, what)->check(bytes);
+}
+
 void drawing_flags(CLI::App* verb, Arguments& a) {
   verb->add_option("--at-once", a.at_once, "frames in work at the same time (default: one a thread, as memory allows; changes no bit)")
       ->check(CLI::Range(0, 64));
-  verb->add_option("--memory", a.memory, "for frames at the same time [GB] (default: half of what is free)")
-      ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0, found " + text; });
+  memory_flag(verb, a, "for the scene, which is refused if it takes more (default: 8G), and for frames at the same time (default: half of what is free)");
 }
 
 int parse_and_call(int argc, char** argv) {
@@ -324,6 +331,8 @@ int parse_and_call(int argc, char** argv) {
   run_verb->add_flag("--resume", a.resume, "continue from the last saved state in the folder");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
   drawing_flags(run_verb, a);
+  run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume goes on from the last saved state")
+      ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
   run_verb->add_flag("--render-only", a.render_only, "pictures and film from the saved states of an earlier run, as `supple render`");
   run_verb->footer("Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
 
@@ -341,6 +350,7 @@ int parse_and_call(int argc, char** argv) {
   export_verb->add_option("--particles", a.particles, "particles and bonds: csv, vtk");
   export_verb->add_option("--contacts", a.contacts, "points of the contact surfaces: csv, vtk");
   export_verb->add_option("--samples", a.sample_tables, "points spread evenly over the surfaces: csv, vtk");
+  memory_flag(export_verb, a, "for the scene, which is refused if it takes more (default: 8G)");
   export_verb->footer("Example: supple export scenes/library/contacts/two_balls.yaml --out out/two_balls --mesh usd --particles vtk");
 
   CLI::App* info_verb = app.add_subcommand("info", "what a run folder holds: outcome, audits, times, files");
@@ -359,11 +369,13 @@ int parse_and_call(int argc, char** argv) {
   CLI::App* check_verb = app.add_subcommand("check", "read a scene and report every fault in it");
   scene_option(check_verb, a);
   check_verb->add_flag("--quiet", a.quiet, "print faults only");
+  memory_flag(check_verb, a, "to look at all of the scene (default: 200M, and counts alone of a scene that takes more)");
   check_verb->footer("Example: supple check my_scene.yaml");
 
   CLI::App* explain_verb = app.add_subcommand("explain", "print the stages a scene runs, each with the reason");
   scene_option(explain_verb, a);
   explain_verb->add_flag("--simulate-only", a.simulate_only, "as if no output were requested");
+  memory_flag(explain_verb, a, "for the scene, which is refused if it takes more (default: 8G)");
   explain_verb->footer("Example: supple explain scenes/library/contacts/two_balls.yaml");
 
   CLI::App* query_verb = app.add_subcommand("query", "forces, contact, field or mesh of a state, as JSON");
@@ -382,6 +394,7 @@ int parse_and_call(int argc, char** argv) {
   query_verb->add_option("--threads", a.threads, "threads")->check(CLI::Range(0, 1024));
   query_verb->add_flag("--samples", a.samples, "contact: every point of the contact surface too");
   query_verb->add_flag("--json", a.json, "JSON (always; accepted for scripts)");
+  memory_flag(query_verb, a, "for the scene, which is refused if it takes more (default: 8G)");
   query_verb->footer("Example: supple query contact scenes/library/contacts/two_balls.yaml --error 1e-6");
 
   CLI::App* bench_verb = app.add_subcommand("bench", "benchmarks of a source tree: time beside size, error and hash");
@@ -432,6 +445,7 @@ void flush_output() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  supple::tool::prepare_last_resort();
   try {
     const int code = parse_and_call(argc, argv);
     flush_output();

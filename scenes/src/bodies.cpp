@@ -261,13 +261,16 @@ void fade_blends(const Model& model, const core::LinkState& links, std::span<con
       return any ? best : 1.0;
     };
     implicit::Blend& blend = body.skeleton.blend;
+    std::vector<std::vector<std::uint32_t>> members;  // particles by node
+    for (std::uint32_t i = 0; i < blend.node.size(); ++i) {
+      if (members.size() <= blend.node[i]) members.resize(blend.node[i] + std::size_t{1});
+      members[blend.node[i]].push_back(body.particle[i]);
+    }
     for (implicit::BlendEdge& e : blend.edge) {
       e.weight = 0.0;
-      for (std::uint32_t i = 0; i < blend.node.size(); ++i) {
-        if (blend.node[i] != e.a) continue;
-        for (std::uint32_t j = 0; j < blend.node.size(); ++j) {
-          if (blend.node[j] == e.b) e.weight = std::max(e.weight, between(body.particle[i], body.particle[j]));
-        }
+      if (std::max(e.a, e.b) >= members.size()) continue;
+      for (const std::uint32_t p : members[e.a]) {
+        for (const std::uint32_t q : members[e.b]) e.weight = std::max(e.weight, between(p, q));
       }
     }
   }

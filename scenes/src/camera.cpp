@@ -20,8 +20,8 @@ Row row_of(const CameraKeyDesc& key) {
 Row interpolate(const std::vector<CameraKeyDesc>& keys, double time) {
   if (time <= keys.front().time) return row_of(keys.front());
   if (time >= keys.back().time) return row_of(keys.back());
-  std::size_t k = 0;
-  while (keys[k + 1].time <= time) ++k;
+  const auto next = std::upper_bound(keys.begin(), keys.end(), time, [](double t, const CameraKeyDesc& key) { return t < key.time; });
+  const auto k = static_cast<std::size_t>(next - keys.begin()) - 1;
   const auto slope = [&keys](std::size_t i) -> Row {
     if (i == 0 || i + 1 == keys.size()) return Row::Zero();
     return (row_of(keys[i + 1]) - row_of(keys[i - 1])) / (keys[i + 1].time - keys[i - 1].time);

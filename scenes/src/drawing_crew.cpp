@@ -64,6 +64,9 @@ DrawingCrew::DrawingCrew(const Scene& scene, const RunOptions& options, const Ou
     for (Member& member : members_) member.thread = std::thread([this, &member] { begin(member); });
   } catch (const std::system_error&) {
     // The machine has no more threads: those that began, and the leader, draw all.
+  } catch (...) {
+    dismiss(true);  // threads that began must be joined
+    throw;
   }
 }
 
@@ -119,7 +122,7 @@ void DrawingCrew::fail(int frame) {
 void DrawingCrew::begin(Member& member) {
   try {
     std::unique_lock lock(opening_);
-    Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt});
+    Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt, options_.scene_memory});
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);
     lock.unlock();
     work(simulation, writer);
@@ -151,6 +154,11 @@ void DrawingCrew::work(Simulation& simulation, FrameWriter& writer) {
   }
   const std::lock_guard lock(mutex_);
   leader_.result.pictures_kept += kept;
+}
+
+void DrawingCrew::leave() {
+  dismiss(true);
+  book();
 }
 
 void DrawingCrew::join() {

@@ -45,6 +45,8 @@ class DrawingCrew {
   /// No more states come: draws with the others what is left, and books the work of all.
   /// @throws what the first of the frames that failed threw
   void join();
+  /// The same, but frames that nobody has begun stay undrawn.
+  void leave();
 
  private:
   struct Member;

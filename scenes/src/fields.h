@@ -177,20 +177,22 @@ void check_cameras(Archive& archive, const Scene& d) {
     for (int frame = 1; !camera.keys.empty() && frame <= d.frame_count(); ++frame) {
       const render::Camera at = camera_at(camera, (frame - 1) / d.frame_rate, d.duration);
       const Vec3 sight = at.look_at - at.from;
-      const std::string when = " in frame " + std::to_string(frame);
       const bool apart = sight.norm() > 0.0;
-      archive.check(apart, key, "expected 'from' apart from 'look_at' at all times", "one point" + when, "add a key beside it");
       const bool across = sight.cross(at.up).norm() > 1e-6 * sight.norm() * at.up.norm();
+      if (apart && across) continue;
+      const std::string when = " in frame " + std::to_string(frame);
+      archive.check(apart, key, "expected 'from' apart from 'look_at' at all times", "one point" + when, "add a key beside it");
       archive.check(!apart || across, key, "expected a line of sight across 'up' at all times", "one along it" + when, "choose another 'up'");
-      if (!apart || !across) break;
+      break;
     }
   }
+  std::map<std::string, std::size_t> named;
   for (std::size_t i = 0; i < d.cameras.size(); ++i) {
     const std::string key = "cameras[" + std::to_string(i) + "].name";
     archive.check(!d.cameras[i].name.empty(), key, "expected a name", "nothing", "this key is required");
-    for (std::size_t k = 0; k < i; ++k)
-      archive.check(d.cameras[k].name != d.cameras[i].name, key, "expected a unique name", '\'' + shown(d.cameras[i].name) + '\'',
-                    "cameras[" + std::to_string(k) + "] has it already");
+    const auto [first, fresh] = named.try_emplace(d.cameras[i].name, i);
+    archive.check(fresh, key, "expected a unique name", '\'' + shown(d.cameras[i].name) + '\'',
+                  "cameras[" + std::to_string(first->second) + "] has it already");
   }
 }
 
@@ -239,7 +241,10 @@ void fields(Archive& archive, Scene& d) {
                 "expected an explicit method beside a law with paper_literal, which has no energy",
                 std::string(name_of(d.integrator.method)), "use 'symplectic' or 'rk4'");
   check_names(archive, d);
-  if (d.duration * d.frame_rate <= 1e6) check_cameras(archive, d);
+  const double views = std::floor(d.duration * d.frame_rate) * static_cast<double>(std::max<std::size_t>(d.cameras.size(), 1));
+  archive.check(d.cameras.size() < 2 || views <= 1e6, "cameras", "expected at most 1000000 pictures, one a frame and camera", number_text(views),
+                "ask for fewer cameras or frames");
+  if (views <= 1e6) check_cameras(archive, d);
 }
 
 

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <map>
 
+#include "arrangement.h"
 #include "model_contact.h"
 #include "model_faults.h"
 #include "model_laws.h"
 #include "model_skeleton.h"
 #include "model_volume.h"
-#include "supple/core/arrange.h"
+#include "point_tree.h"
 #include "supple/core/error.h"
-#include "supple/core/io/mesh_files.h"
 
 namespace supple::scenes {
 namespace {
@@ -19,127 +19,6 @@ namespace {
 constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
 
 constexpr double kBelievable = 1e4;     // ways of a particle over the size of everything, and over that in a frame
-
-core::NormalDirection direction_of(NormalKind normal) {
-  return normal == NormalKind::Radial ? core::NormalDirection::Radial : core::NormalDirection::Axis;
-}
-
-/// The shortest rotation from z to a direction.
-Quat from_z_to(const Vec3& direction) {
-  const Vec3 a = direction.normalized();
-  if (a.z() < -1.0 + 1e-12) return Quat(0.0, 1.0, 0.0, 0.0);
-  return Quat(1.0 + a.z(), -a.y(), a.x(), 0.0).normalized();
-}
-
-/// Without particles where the file that has them cannot be read.
-core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std::string& key, ModelFaults& faults) {
-  core::Arrangement out;
-  switch (d.arrange) {
-    case ArrangeKind::Single: out = core::arrange_single(); break;
-    case ArrangeKind::Line: out = core::arrange_line(d.count, d.spacing); break;
-    case ArrangeKind::Ring: out = core::arrange_ring(d.count, d.radius, direction_of(d.normal)); break;
-    case ArrangeKind::Grid: out = core::arrange_grid(d.columns, d.rows, d.spacing, d.layers); break;
-    case ArrangeKind::Spiral:
-      out = core::arrange_spiral(d.count, d.inner_radius, d.outer_radius, d.turns, direction_of(d.normal));
-      break;
-    case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
-    case ArrangeKind::File:
-      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); }).value_or(std::vector<Vec3>());
-      out.orientation.assign(out.position.size(), Quat::Identity());
-      break;
-  }
-  if (d.disorder > 0.0) core::disorder(out, d.disorder);
-  core::place(out, Pose{d.at, from_z_to(d.axis) * core::rotation_exp(d.angle * Vec3::UnitZ())});
-  return out;
-}
-
-/// Nearest neighbours by a tree of halves (Bentley 1975).
-class NearestNeighbours {
- public:
-  explicit NearestNeighbours(std::span<const Vec3> points) : points_(points.begin(), points.end()), index_(points.size()) {
-    std::iota(index_.begin(), index_.end(), std::size_t{0});
-    divide(0, points_.size(), 0);
-    for (std::size_t i = 0; i < index_.size(); ++i) points_[i] = points[index_[i]];
-  }
-
-  /// Distance of each point to its nearest neighbour; infinite for a single one.
-  [[nodiscard]] std::vector<double> distances() const {
-    std::vector<double> out(points_.size());
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      double least = std::numeric_limits<double>::infinity();
-      search(i, 0, points_.size(), 0, least);
-      out[index_[i]] = std::sqrt(least);
-    }
-    return out;
-  }
-
- private:
-  struct Plane {
-    Eigen::Index axis = 0;
-    double at = 0.0;
-  };
-  static constexpr std::size_t kLeaf = 8;
-
-  void divide(std::size_t begin, std::size_t end, std::size_t node) {
-    if (end - begin <= kLeaf) return;
-    Box box;
-    for (std::size_t i = begin; i < end; ++i) box.include(points_[index_[i]]);
-    Plane plane;
-    box.extent().maxCoeff(&plane.axis);
-    const auto at = [&](std::size_t i) { return index_.begin() + static_cast<std::ptrdiff_t>(i); };
-    const std::size_t middle = begin + (end - begin) / 2;
-    std::nth_element(at(begin), at(middle), at(end),
-                     [&](std::size_t a, std::size_t b) { return points_[a][plane.axis] < points_[b][plane.axis]; });
-    plane.at = points_[index_[middle]][plane.axis];
-    if (plane_.size() <= node) plane_.resize(node + 1);
-    plane_[node] = plane;
-    divide(begin, middle, 2 * node + 1);
-    divide(middle, end, 2 * node + 2);
-  }
-
-  /// Squared distance; what is beyond a plane farther away than the least so far is passed by.
-  void search(std::size_t own, std::size_t begin, std::size_t end, std::size_t node, double& least) const {
-    if (end - begin <= kLeaf) {
-      for (std::size_t i = begin; i < end; ++i) {
-        if (i != own) least = std::min(least, (points_[i] - points_[own]).squaredNorm());
-      }
-      return;
-    }
-    const std::size_t middle = begin + (end - begin) / 2;
-    const double beyond = points_[own][plane_[node].axis] - plane_[node].at;
-    if (beyond < 0.0) {
-      search(own, begin, middle, 2 * node + 1, least);
-      if (beyond * beyond < least) search(own, middle, end, 2 * node + 2, least);
-    } else {
-      search(own, middle, end, 2 * node + 2, least);
-      if (beyond * beyond < least) search(own, begin, middle, 2 * node + 1, least);
-    }
-  }
-
-  std::vector<Vec3> points_;          ///< in the order of the leaves
-  std::vector<std::size_t> index_;    ///< of each of these
-  std::vector<Plane> plane_;
-};
-
-/// Largest distance of two points: pairs in falling order of their distances from the centre, cut when none can win.
-double largest_distance(std::span<const Vec3> points) {
-  if (points.empty()) return 0.0;
-  Vec3 centre = Vec3::Zero();
-  for (const Vec3& p : points) centre += p;
-  centre /= static_cast<double>(points.size());
-  std::vector<Vec3> sorted(points.begin(), points.end());
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [&](const Vec3& a, const Vec3& b) { return (a - centre).squaredNorm() > (b - centre).squaredNorm(); });
-  double largest = 0.0;
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    const double reach = (sorted[i] - centre).norm();
-    if (2.0 * reach <= largest) break;
-    for (std::size_t j = i + 1; j < sorted.size() && reach + (sorted[j] - centre).norm() > largest; ++j) {
-      largest = std::max(largest, (sorted[i] - sorted[j]).norm());
-    }
-  }
-  return largest;
-}
 
 /// Which particles are hinges, and the types of the others.
 void set_kinds(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model, ModelFaults& faults) {
@@ -169,6 +48,30 @@ double largest_radius(const implicit::Primitive& p) {
   return box.lower.cwiseAbs().cwiseMax(box.upper).norm();
 }
 
+/// The solids that single particles carry; particles with the same entries of the skeleton share one.
+class CarriedSolids {
+ public:
+  CarriedSolids(const ObjectDesc& d, const implicit::Skeleton& skeleton, std::uint32_t n, bool planar) : skeleton_(skeleton), planar_(planar), entries_(n) {
+    for (std::uint32_t k = 0; k < d.skeleton.size(); ++k) {
+      for (const int given : d.skeleton[k].particles) {
+        const std::int64_t index = given < 0 ? std::int64_t{given} + n : given;
+        if (index >= 0 && index < n) entries_[static_cast<std::size_t>(index)].push_back(k);
+      }
+    }
+  }
+  const CarriedSolid& of(std::uint32_t particle) {
+    const auto [place, fresh] = solids_.try_emplace(entries_[particle]);  // entries without a list belong to all
+    if (fresh) place->second = carried_solid(skeleton_, particle, planar_);
+    return place->second;
+  }
+
+ private:
+  const implicit::Skeleton& skeleton_;
+  bool planar_;
+  std::vector<std::vector<std::uint32_t>> entries_;
+  std::map<std::vector<std::uint32_t>, CarriedSolid> solids_;
+};
+
 /// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
@@ -193,20 +96,20 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
 
   if (d.volume && !object.skeleton.primitive.empty()) hold_volume(d, key, n, std::move(volume), object, faults);
 
-  const std::vector<double> nearest = NearestNeighbours(arrangement.position).distances();
+  const PointTree tree(arrangement.position);
+  const std::vector<double> nearest = tree.nearest_distances();
   Vec3 centre = Vec3::Zero();
   for (const Vec3& p : arrangement.position) centre += p;
   centre /= n;  // all masses of an object are equal
-  const bool all_alike = std::all_of(d.skeleton.begin(), d.skeleton.end(), [](const SkeletonDesc& s) { return s.particles.empty(); });
   // The frame of a lone particle is turned to the principal axes of its solid; no laws read it.
-  CarriedSolid lone;
+  CarriedSolids solids(d, object.skeleton, n, scene.planar);
   std::vector<Quat> turn(n, Quat::Identity());
   for (std::uint32_t i = 0; i < n; ++i) {
     Vec3 axes = d.particles.inertia_axes;
     if (d.particles.inertia_radius) {
       axes.setConstant(*d.particles.inertia_radius);
     } else if (axes.isZero() && (n == 1 || d.separate)) {
-      if (i == 0 || !all_alike) lone = carried_solid(object.skeleton, i, scene.planar);
+      const CarriedSolid& lone = solids.of(i);
       axes = lone.axes;
       if (scene.planar) axes.setConstant(std::sqrt(0.5 * (axes.x() * axes.x() + axes.y() * axes.y())));  // it turns about z alone
       turn[i] = lone.turn;
@@ -237,7 +140,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
   }
   turn_primitives(turn, object.skeleton);
   if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);
-  if (n > 1) object.rest_diameter = largest_distance(arrangement.position);
+  if (n > 1) object.rest_diameter = tree.largest_distance();
 }
 
 void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model,
@@ -360,8 +263,11 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
 
 }  // namespace
 
-Model build_model(const Scene& scene) {
+Model build_model(const Scene& scene, double memory) {
   SUPPLE_EXPECTS(scene.duration > 0.0 && scene.frame_rate > 0.0);  // scenes need not come from a file
+  SceneCounts counts = count_scene(scene, memory);
+  std::erase_if(counts.count, [](const Count& count) { return rule_of(count.what).drawn; });
+  MemoryBudget budget(scene, std::move(counts), memory);
   Model model;
   ModelFaults faults(scene);
   model.smallest_length = std::numeric_limits<double>::infinity();
@@ -409,7 +315,7 @@ Model build_model(const Scene& scene) {
       model.interactions.medium.push_back({static_cast<std::uint32_t>(i), d.medium->linear, d.medium->angular});
     }
   }
-  build_contact(scene, model, faults);
+  build_contact(scene, budget, model, faults);
   faults.raise();
   model.links = core::make_links(model.particles, model.rest, model.interactions, link_rules);
 

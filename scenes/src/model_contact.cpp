@@ -123,17 +123,24 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
 }
 
 /// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
-void add_mesh(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults, FixedBody& body) try {
+void add_mesh(const Scene& scene, const ObstacleDesc& d, MemoryBudget& budget, ModelFaults& faults, FixedBody& body) try {
+  const std::string key = "obstacles." + d.name;
   auto read = faults.read(key + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
   if (!read) return;
   Mesh& mesh = *read;
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
-  for (Vec3& x : mesh.position) x = d.at + turn * x;
+  Box box;
+  for (Vec3& x : mesh.position) box.include(x = d.at + turn * x);
+  const double voxels = d.voxel ? (box.extent() / *d.voxel).array().max(1.0).prod() : 0.0;
+  if (voxels <= static_cast<double>(implicit::MeshSolidOptions{}.max_voxels)) {
+    budget.add({.what = Counted::Voxels, .key = key + ".voxel", .number = voxels});
+    budget.expect();
+  }
   body.solid = implicit::MeshSolid(mesh, {.voxel = d.voxel.value_or(0.0), .slope = d.slope});
 } catch (const Error& error) {
   if (error.kind() != ErrorKind::Scene) throw;
   const Fault& fault = error.faults().front();
-  faults.add(key + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
+  faults.add("obstacles." + d.name + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
 }
 
 /// Primitives that sum; refused ones leave a fault and `body` as it is.
@@ -157,7 +164,7 @@ void add_primitives(const ObstacleDesc& d, const std::string& key, ModelFaults& 
   }
 }
 
-void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
+void add_fixed_bodies(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults) {
   if (scene.ground && scene.ground->collides) {
     const GroundDesc& d = *scene.ground;
     model.fixed.push_back({.name = "ground",
@@ -175,7 +182,7 @@ void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
     } else if (d.shape == ObstacleName::Heights) {
       body.solid = height_field(scene, d, "obstacles." + d.name, faults);
     } else if (d.shape == ObstacleName::Mesh) {
-      add_mesh(scene, d, "obstacles." + d.name, faults, body);
+      add_mesh(scene, d, budget, faults, body);
     } else if (d.shape == ObstacleName::Implicit) {
       add_primitives(d, "obstacles." + d.name, faults, body);
     }
@@ -324,20 +331,29 @@ void find_bonded(Model& model) {
   }
 }
 
-/// Whether the seeds of an object's surface, by the boxes of its supports, stay within what memory holds.
-bool seeds_fit(const ObjectModel& object, const core::ParticleState& rest, double spacing) {
-  constexpr double kMostSeeds = 2e8, kMostInRow = 5e5;
-  std::vector<Pose> poses;
-  for (std::uint32_t i = object.first; i < object.last; ++i) poses.push_back({rest.position[i], rest.orientation[i]});
-  implicit::PlacedSkeleton placed;
-  implicit::place_skeleton(object.skeleton, poses, placed);
-  double seeds = 0.0, longest = 0.0;
-  for (const Box& box : placed.support) {
-    const Vec3 side = box.extent() / spacing;
-    seeds += 2.0 * (side.x() * side.y() + side.y() * side.z() + side.z() * side.x());
-    longest = std::max(longest, side.maxCoeff());
-  }
-  return seeds <= kMostSeeds && longest <= kMostInRow;
+/// The seeds of a primitive, by the faces of its surface's box, or by a ball around what sends rays from its centre.
+double seeds_of(const implicit::Primitive& primitive, double iso, double spacing) {
+  const bool star = primitive.shape == implicit::ShapeKind::Ellipsoid || primitive.shape == implicit::ShapeKind::Superquadric ||
+                    primitive.shape == implicit::ShapeKind::Directed;
+  const double share = implicit::iso_distance(primitive.kernel, iso) / primitive.kernel.radius;
+  Vec3 side = implicit::support_box(primitive).extent() / spacing;
+  if (star) return std::numbers::pi * std::pow(share * side.maxCoeff(), 2);
+  side = (side.array() - 2.0 * (1.0 - share) * primitive.kernel.radius * primitive.stretch.minCoeff() / spacing).max(1.0);
+  return 2.0 * (side.x() * side.y() + side.y() * side.z() + side.z() * side.x());
+}
+
+double count_seeds(const ObjectModel& object, double spacing) {
+  double seeds = 0.0;
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) seeds += seeds_of(primitive, object.skeleton.iso, spacing);
+  return seeds;
+}
+
+/// Rows of seeds have numbers that fit an int, with room to spare.
+bool rows_fit(const ObjectModel& object, double spacing) {
+  constexpr double kMostInRow = 5e5;
+  return std::all_of(object.skeleton.primitive.begin(), object.skeleton.primitive.end(), [spacing](const implicit::Primitive& primitive) {
+    return implicit::support_box(primitive).extent().maxCoeff() <= kMostInRow * spacing;
+  });
 }
 
 }  // namespace
@@ -385,8 +401,8 @@ double dissipation_for(double restitution, double speed) {
   return 0.5 * (low + high) / speed;
 }
 
-void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
-  add_fixed_bodies(scene, model, faults);
+void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults) {
+  add_fixed_bodies(scene, budget, model, faults);
   model.contact.error = scene.contact.error;
   model.contact.only = rule_of(scene.contact.rule);
   model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy
@@ -437,14 +453,18 @@ void build_contact(const Scene& scene, Model& model, ModelFaults& faults) {
     double thinnest = object.iso_radius;  // obstacles have no samples: those of the object see the thinnest of their shapes
     for (const FixedBody& body : model.fixed) thinnest = std::min(thinnest, body.iso_radius);
     const double spacing = scene.contact.sample_spacing.value_or(2.0 * thinnest / kSamplesAcross);
-    if (!seeds_fit(object, model.rest, spacing)) {
-      faults.add("contact.sample_spacing", "expected surface samples that memory holds",
-                 "those of '" + object.name + "' " + short_text(spacing) + " m apart",
-                 "ask for a larger sample_spacing, or for fewer or thicker parts");
+    if (!rows_fit(object, spacing)) {
+      faults.add("contact.sample_spacing", "expected at most 500000 surface samples in a row", "more on '" + object.name + "', " + short_text(spacing) + " m apart",
+                 "ask for a larger sample_spacing, or for shorter or thicker parts");
       continue;
     }
+    budget.add({.what = Counted::Samples, .key = scene.contact.sample_spacing ? "contact.sample_spacing" : "objects." + object.name + ".skeleton",
+                .number = count_seeds(object, spacing)});
     object.sample_spacing = spacing;
-    object.samples = implicit::make_sample_layout(object.skeleton, spacing);
+  }
+  budget.expect();
+  for (ObjectModel& object : model.objects) {
+    if (object.sample_spacing > 0.0) object.samples = implicit::make_sample_layout(object.skeleton, object.sample_spacing);
   }
 }
 

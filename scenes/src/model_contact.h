@@ -2,6 +2,7 @@
 /// The part of a model that concerns contact: rules, materials of pairs, samples, repulsion, and the contact frequency.
 #pragma once
 
+#include "memory_budget.h"
 #include "model_faults.h"
 #include "supple/scenes/model.h"
 
@@ -18,6 +19,7 @@ namespace supple::scenes {
 /// Bodies of an object that may touch each other, by what is known at the start; of those that may break off it counts two.
 [[nodiscard]] std::size_t own_contacts(const ObjectModel& object);
 
-void build_contact(const Scene& scene, Model& model, ModelFaults& faults);
+/// @param budget  counts surface samples and the voxels of meshes before they are made
+void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults);
 
 }  // namespace supple::scenes

@@ -12,6 +12,25 @@
 namespace supple::scenes {
 namespace {
 
+constexpr double kGeometricTail = 1e-3;  // |f| at the range of a geometric cohesion over the largest attraction
+
+core::LinearCohesion linear_cohesion(const InteractionDesc& d, double rest_distance) {
+  return {.r0 = d.rest_distance.value_or(rest_distance), .f0 = d.scale_force.value_or(0.0), .a = d.shape, .eta = d.eta};
+}
+
+double distance_of_maximum(const InteractionDesc& d, double r0) {
+  return d.maximum_ratio ? *d.maximum_ratio * r0 : d.maximum_distance.value_or(0.0);
+}
+
+/// Nothing where the attraction is not largest beyond the rest distance r0, or no force is given.
+std::optional<core::Cohesion> cohesion_of(const InteractionDesc& d, double r0) {
+  if (d.gain && d.alpha) return core::Cohesion::from_gain(r0, *d.gain, *d.alpha);
+  const double r_m = distance_of_maximum(d, r0);
+  if (!(r_m > r0) || !(d.maximum_force || d.scale_force)) return std::nullopt;
+  if (d.scale_force) return core::Cohesion::from_ratio(r0, r_m / r0, *d.scale_force);
+  return core::Cohesion::from_maximum(r0, r_m, *d.maximum_force);
+}
+
 /// Those bonds whose particles interact completely.
 core::Bonds complete_bonds(const core::Bonds& bonds, const core::ParticleSet& set, bool hinges_join) {
   core::Bonds complete;
@@ -157,7 +176,7 @@ class LawBuilder {
       add_list(laws.geometric_lennard_jones, d.cut_off.value_or(0.0), lennard_jones(d, r0));
     } else if (d.law == LawKind::LinearCohesion) {
       const core::LinearCohesion law = linear_cohesion(d, r0);
-      add_list(laws.geometric_linear_cohesion, d.within.value_or(law.influence_radius(kGeometricTail)), law);
+      add_list(laws.geometric_linear_cohesion, geometric_range(d).value_or(0.0), law);
     } else {
       const core::Cohesion law = cohesion(d, r0, key);
       const double range = d.within.value_or(law.influence_radius(kGeometricTail));
@@ -167,10 +186,6 @@ class LawBuilder {
         add_list(laws.geometric_cohesion, range, law);
       }
     }
-  }
-
-  core::LinearCohesion linear_cohesion(const InteractionDesc& d, double rest_distance) {
-    return {.r0 = d.rest_distance.value_or(rest_distance), .f0 = d.scale_force.value_or(0.0), .a = d.shape, .eta = d.eta};
   }
 
   core::LennardJones lennard_jones(const InteractionDesc& d, double rest_distance) {
@@ -278,16 +293,10 @@ class LawBuilder {
 
   core::Cohesion cohesion(const InteractionDesc& d, double rest_distance, const std::string& key) {
     const double r0 = d.rest_distance.value_or(rest_distance);
-    if (d.gain && d.alpha) return core::Cohesion::from_gain(r0, *d.gain, *d.alpha);
-    const double r_m = d.maximum_ratio ? *d.maximum_ratio * r0 : d.maximum_distance.value_or(0.0);
-    if (!(r_m > r0) || !(d.maximum_force || d.scale_force)) {
-      faults_.add_once(key + ".maximum_distance",
-                       "expected more than the rest distance of every bond, " + number_text(r0) + " m here",
-                       number_text(r_m), "");
-      return {.r0 = r0, .f0 = 1.0};
-    }
-    if (d.scale_force) return core::Cohesion::from_ratio(r0, r_m / r0, *d.scale_force);
-    return core::Cohesion::from_maximum(r0, r_m, *d.maximum_force);
+    if (const std::optional<core::Cohesion> law = cohesion_of(d, r0)) return *law;
+    faults_.add_once(key + ".maximum_distance", "expected more than the rest distance of every bond, " + number_text(r0) + " m here",
+                     number_text(distance_of_maximum(d, r0)), "");
+    return {.r0 = r0, .f0 = 1.0};
   }
 
   /// Least squares over the pair: R = r . (n_B - n_A) / |n_B - n_A|^2 (the inverse problem of Form::fit_curvature).
@@ -306,8 +315,6 @@ class LawBuilder {
   }
 
   static constexpr double kGayBerneSwitch = 0.9;  // of the cut-off
-  /// |f| at the range of a geometric cohesion over the largest attraction.
-  static constexpr double kGeometricTail = 1e-3;
 
   Model& model_;
   ModelFaults& faults_;
@@ -323,6 +330,22 @@ void add_laws(const std::vector<InteractionDesc>& interactions, const ObjectMode
               ModelFaults& faults) {
   LawBuilder laws(model, faults, object, key);
   for (std::size_t k = 0; k < interactions.size(); ++k) laws.add(interactions[k], k);
+}
+
+std::optional<double> geometric_range(const InteractionDesc& d) {
+  const double r0 = d.rest_distance.value_or(0.0);
+  switch (d.law) {
+    case LawKind::GayBerne:
+    case LawKind::LennardJones: return d.cut_off.value_or(0.0);
+    case LawKind::Coplanarity:
+    case LawKind::CoNormality:
+    case LawKind::CoCircularity: return d.range.value_or(0.0);
+    case LawKind::LinearCohesion: return d.within.value_or(linear_cohesion(d, r0).influence_radius(kGeometricTail));
+    default: break;
+  }
+  if (d.within) return d.within;
+  const std::optional<core::Cohesion> law = cohesion_of(d, r0);
+  return law ? std::optional(law->influence_radius(kGeometricTail)) : std::nullopt;
 }
 
 }  // namespace supple::scenes

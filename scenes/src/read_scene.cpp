@@ -6,13 +6,13 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <optional>
 
 #include "camera.h"
 #include "read_scene_archive.h"
 #include "scene_places.h"
 #include "supple/core/hash.h"
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
@@ -125,13 +125,19 @@ bool among(const std::array<std::string_view, N>& keys, std::string_view key) {
   return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
-/// What a scene's file names stand for. A file that cannot be read is a fault of whoever needs it.
+/// What a scene's file names stand for. A file that cannot be read, or is larger than any that is, is a fault of whoever needs it.
 void add_file(const std::filesystem::path& path, Hasher& hasher) {
+  constexpr std::uintmax_t kPart = std::uintmax_t{1} << 26;  // that is in memory at once [byte]
   std::error_code status;
   if (!std::filesystem::is_regular_file(path, status)) return;
   std::ifstream file(path, std::ios::binary);
-  const std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  hasher.add(content);
+  const std::uintmax_t size = std::filesystem::file_size(path, status);
+  if (status || size > io::kLargestInput) return;
+  std::string part(static_cast<std::size_t>(std::min(size, kPart)), '\0');
+  do {
+    file.read(part.data(), static_cast<std::streamsize>(part.size()));
+    hasher.add(std::string_view(part.data(), static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0))));
+  } while (file && file.peek() != std::ifstream::traits_type::eof());
 }
 
 /// @param taken   whether a key counts, on every level

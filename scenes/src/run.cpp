@@ -22,6 +22,7 @@
 #include "drawing_crew.h"
 #include "frame_writer.h"
 #include "output_files.h"
+#include "read_scene_faults.h"
 #include "result_file.h"
 #include "search_files.h"
 #include "warnings.h"
@@ -117,6 +118,7 @@ void check_needs(const Scene& scene, const RunOptions& options, const OutputRequ
                                         .hint = "frame n shows t = (n - 1) / frame_rate"});
   }
   if (!outputs.images) return;
+  expect_within(scene, count_scene(scene, options.scene_memory), options.scene_memory);
   check_pictures(scene);
   if (outputs.film && options.frames.empty()) render::find_film_program();
 }
@@ -141,6 +143,25 @@ bool was_interrupted(const RunOptions& options, RunResult& result) {
   return true;
 }
 
+/// From its making on.
+class TimeLimit {
+ public:
+  /// @param seconds  0: none
+  explicit TimeLimit(double seconds) : seconds_(seconds) {}
+  /// Whether it has passed; the result says so then.
+  [[nodiscard]] bool passed(RunResult& result) const {
+    if (!(seconds_ > 0.0) || seconds_since(begin_) < seconds_) return false;
+    result.reason = "time limit: expected an end within " + short_text(seconds_) + " s, found frame " + std::to_string(result.frames) +
+                    " saved; --resume goes on from it";
+    result.exit_code = static_cast<int>(ErrorKind::Limit);
+    return true;
+  }
+
+ private:
+  double seconds_;
+  Clock::time_point begin_ = Clock::now();
+};
+
 /// Runs `body`, which fills `result`; whatever happens a report of this name is left behind.
 template <class Body>
 RunResult guarded(const Scene& scene, const RunOptions& options, const char* report_name,
@@ -151,7 +172,8 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   const auto begin = Clock::now();
   try {
     body(result);
-    result.outcome = result.exit_code == 0 ? "done" : "interrupted";
+    const bool limited = result.exit_code == static_cast<int>(ErrorKind::Limit);
+    result.outcome = result.exit_code == 0 ? "done" : limited ? outcome_of(ErrorKind::Limit) : "interrupted";
   } catch (const Interrupted&) {
     (void)was_interrupted(options, result);
     result.outcome = "interrupted";
@@ -240,7 +262,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
                                        .hint = "run the scene first: supple run SCENE --out FOLDER"});
     }
     const double before = resident_bytes();
-    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt});
+    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt, options.scene_memory});
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, *last);
     std::vector<int> frames;
@@ -337,6 +359,7 @@ std::set<int> parse_frames(const std::string& text) {
 }
 
 RunResult run_scene(const Scene& scene, const RunOptions& options) {
+  const TimeLimit limit(options.time_limit);
   const OutputRequest outputs = outputs_of(scene, options);
   const std::string name = scene_name(scene);
   io::make_writable_folder(options.folder / "states");
@@ -355,20 +378,21 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {
+    const auto stopped = [&] { return was_interrupted(options, result) || limit.passed(result); };
     check_needs(scene, options, outputs);
     if (options.overwrite && !options.resume) {
       for (const std::string& earlier : saved_scenes(options.folder)) remove_outputs(options.folder, earlier);
     }
     if (!options.resume) remove_outputs(options.folder, name);
     const double before = resident_bytes();
-    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt});
+    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt, options.scene_memory});
     const int frame_count = scene.frame_count();
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, frame_count);
     if (options.resume) {
       if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
         for (int frame = 1; writer.writes_frames() && frame <= *last; ++frame) {
-          if (was_interrupted(options, result)) return;
+          if (stopped()) return;
           State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
           if (!writer.renews(frame, state.hash())) continue;
           simulation->restore(std::move(state));
@@ -393,7 +417,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     std::optional<DrawingCrew> crew;
     std::exception_ptr diverged;
     try {
-      while (result.frames < frame_count && !was_interrupted(options, result)) {
+      while (result.frames < frame_count && !stopped()) {
         // The first picture shows what each needs.
         if (!crew && writer.pictures_drawn() > 0 && !writer.needs_order()) {
           std::vector<int> frames = frames_to_draw(options, result.frames + 1, frame_count);
@@ -405,7 +429,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         }
         const int next = simulation->frame() + 1;
         crew ? crew->simulating(next) : report("simulate", next, static_cast<double>(next - 1) / frame_count);
-        while (simulation->frame() < next && !was_interrupted(options, result)) simulation->step();
+        while (simulation->frame() < next && !stopped()) simulation->step();
         if (simulation->frame() < next) break;
         if (crew) {
           save();
@@ -420,11 +444,11 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
       diverged = std::current_exception();  // what came before is still drawn
     }
     if (crew) {
-      crew->join();
+      limit.passed(result) ? crew->leave() : crew->join();
       show_last(*simulation, options, name, result.frames);
     }
     if (diverged) std::rethrow_exception(diverged);
-    if (was_interrupted(options, result)) return;
+    if (stopped()) return;
     finish(writer, *simulation, report, result);
   });
 }

@@ -14,7 +14,7 @@ namespace supple::scenes {
 
 Simulation::Impl::Impl(Scene s, SimulationOptions o)
     : scene(std::move(s)),
-      model(build_model(scene)),
+      model(build_model(scene, o.memory)),
       options(std::move(o)),
       executor(options.threads),
       plan(plan_step(scene, model, requested_outputs(scene))),

@@ -108,6 +108,25 @@ TEST(Bonds, WithinADistanceAreThoseOfTheRange) {
   EXPECT_EQ(bonds.second, (std::vector<std::uint32_t>{2, 3, 4}));
 }
 
+TEST(Bonds, AreCountedWithoutBeingMade) {
+  for (const std::uint32_t particles : {0U, 1U, 2U, 7U}) {
+    for (const int steps : {1, 2, 5, 9}) EXPECT_EQ(count_bonds_along(particles, steps), bonds_along(0, particles, steps).first.size()) << particles << ' ' << steps;
+  }
+  EXPECT_EQ(count_bonds_along(1'000'000, 1000), 999'499'500U);  // n s - s (s + 1) / 2
+  const std::vector<Vec3> grid = arrange_grid(12, 9, 0.1, 3).position;
+  const auto all = static_cast<std::uint32_t>(grid.size());
+  for (const double range : {0.05, 0.15, 0.31, 1e9}) {
+    const BondCount count = count_bonds_within(grid, range);
+    EXPECT_EQ(count.number, bonds_within(grid, 0, all, range).first.size()) << range;
+    EXPECT_FALSE(count.estimated);
+  }
+  // Of 10,000 points, each with all later ones, one in 19 is looked at: of their sum over n (n - 1) / 2 a share of 19 / n is missing or too much at most.
+  const std::vector<Vec3> many = arrange_grid(100, 100, 0.1).position;
+  const BondCount count = count_bonds_within(many, 1e9);
+  EXPECT_TRUE(count.estimated);
+  EXPECT_NEAR(static_cast<double>(count.number), 10000.0 * 9999.0 / 2.0, 19.0 * 10000.0);
+}
+
 TEST(Spiral, RefusesWhatIsNoSpiral) {
   EXPECT_THROW((void)arrange_spiral(1, 0.1, 0.5, 1.0, NormalDirection::Axis), ContractViolation);
   EXPECT_THROW((void)arrange_spiral(5, 0.5, 0.5, 1.0, NormalDirection::Axis), ContractViolation);

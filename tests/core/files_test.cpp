@@ -140,6 +140,25 @@ TEST_F(Files, OfPointsMayHaveHeadersCommentsAndAnySeparator) {
   EXPECT_EQ(points, (std::vector<Vec3>{Vec3(1, 2, 3), Vec3(4, 5, 6), Vec3(7, 8, 9)}));
 }
 
+TEST_F(Files, OfMorePointsThanAreTakenAreRefusedAtTheFirstBeyond) {
+  io::write_atomically(path("p.csv"), std::string_view("1,2,3\n4,5,6\n7,8,9\nno number\n"));
+  expect_error(ErrorKind::Scene, "p.csv:3", [&] { static_cast<void>(io::read_points_csv(path("p.csv"), 2)); });
+  io::write_atomically(path("q.csv"), std::string_view("1,2,3\n4,5,6\n"));
+  EXPECT_EQ(io::read_points_csv(path("q.csv"), 2).size(), 2U);
+}
+
+TEST_F(Files, ThatAreBeingWrittenAreRemovedWithoutUnwinding) {
+  io::AtomicFile whole(path("whole"));
+  whole.commit();
+  io::AtomicFile file(path("part"));
+  file.append(std::string_view("half"));
+  const auto left = [&] { return std::distance(std::filesystem::directory_iterator(path("whole").parent_path()), {}); };
+  const auto before = left();
+  io::remove_open_temporaries();
+  EXPECT_EQ(left(), before - 1);
+  EXPECT_TRUE(std::filesystem::exists(path("whole")));
+}
+
 TEST_F(Files, OfPointsNameEveryLineThatIsNotThreeNumbers) {
   io::write_atomically(path("p.csv"), std::string_view("1,2,3\n1,2\n1,2,3,4\n1,,3\nx,y,z\n1,nan,3\n1,2,inf\n4,5,6\n"));
   try {

@@ -9,6 +9,7 @@
 #include "support/allocations.h"
 #include "supple/core/error.h"
 #include "supple/implicit/march_cubes.h"
+#include "supple/implicit/mesh_limits.h"
 #include "supple/implicit/mesh_solid.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/implicit/surface_grid.h"
@@ -59,6 +60,22 @@ TEST(Refusals, TakeNoMemory) {
   // At most as many blocks as are allowed are listed, and the largest list is that of a grid: 48 bytes for each of 390,625
   // blocks with its candidate and a box between them, thrice where a list moves to twice the room.
   for (const auto& [name, act] : refused) EXPECT_LT(bytes_of_refusal(act), 3 * 48 * 390'625 + 4'000'000) << name;
+}
+
+/// Whatever their size, numbers of nodes are compared before anything is looked for on the lattice.
+TEST(Refusals, OfCellsFarTooSmallNameCellsThatFit) {
+  const Body ball = body_of({{wyvill_point(1.0), Vec3::Zero()}});
+  for (const double cell : {1e-12, 1e-50}) {
+    try {
+      expect_marchable(ball.field, lattice_of(cell), Executor(1));
+      ADD_FAILURE() << cell;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::Limit);
+      EXPECT_EQ(error.faults().front().key, "lattice.cell");
+      EXPECT_EQ(error.faults().front().expected, "expected node numbers up to 1.07e+09");
+    }
+  }
+  EXPECT_NO_THROW(expect_marchable(ball.field, lattice_of(0.1), Executor(1)));
 }
 
 }  // namespace

@@ -53,6 +53,12 @@ expect 2 '' run
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
 expect 2 '1 to 3' run good.yaml --out frames --frames 9 --progress none
 expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
+expect 2 '--memory' check good.yaml --memory 4X
+expect 6 'in 1 kB of memory' run good.yaml --out small --memory 1k --progress none
+expect 6 'expected at most' check good.yaml --memory 1k
+expect 2 '--time-limit' run good.yaml --out limited --time-limit 0 --progress none
+expect 6 'time limit' run good.yaml --out limited --time-limit 1e-9 --simulate-only --progress none
+expect 0 '' run good.yaml --out limited --resume --simulate-only --progress none
 expect 2 '' query nonsense good.yaml
 for error in 1e-12 0 0.5 nan; do
   expect 2 "expected a number from 1e-10 to 0.1, found $error" query contact good.yaml --error "$error"

@@ -269,6 +269,35 @@ TEST_F(Run, StopsAtASignalAndResumesToTheSameBits) {
   EXPECT_EQ(resumed.state_hash, whole.state_hash);
 }
 
+TEST_F(Run, EndsAtItsTimeLimitAfterASavedState) {
+  RunOptions o = options();
+  o.simulate_only = true;
+  o.folder = folder_ / "whole";
+  const RunResult whole = run_scene(scene_, o);
+  o.folder = folder_ / "limited";
+  o.time_limit = 1e-9;
+  const RunResult limited = run_scene(scene_, o);
+  EXPECT_EQ(limited.outcome, "limit");
+  EXPECT_EQ(limited.exit_code, 6);
+  EXPECT_EQ(limited.frames, 1);
+  EXPECT_EQ(limited.reason.rfind("time limit: expected an end within 1e-09 s, found frame 1 saved", 0), 0U) << limited.reason;
+  EXPECT_TRUE(fs::exists(folder_ / "limited/states/drops.0001.state"));
+  o.time_limit = 1e9;
+  o.resume = true;
+  const RunResult resumed = run_scene(scene_, o);
+  EXPECT_EQ(resumed.outcome, "done");
+  EXPECT_EQ(resumed.state_hash, whole.state_hash);
+}
+
+TEST_F(Run, RefusesASceneForItsMemoryWithAReport) {
+  RunOptions o = options();
+  o.scene_memory = 1e4;
+  const RunResult result = run_scene(scene_, o);
+  EXPECT_EQ(result.outcome, "limit");
+  EXPECT_EQ(result.exit_code, 6);
+  EXPECT_NE(result.reason.find("in 10 kB of memory"), std::string::npos) << result.reason;
+}
+
 // A restart does not count what was done before it.
 TEST_F(Run, ReportsTheRateOfTheFramesThatItDid) {
   RunOptions o = options();

@@ -14,7 +14,7 @@
 namespace supple::io {
 namespace {
 
-constexpr std::size_t kMaxPointFile = std::size_t{1} << 30;
+constexpr std::size_t kMaxPointFile = std::size_t{1} << 27;
 constexpr std::size_t kMaxFaults = 20;
 
 template <class T>
@@ -134,7 +134,7 @@ void write_csv(const std::filesystem::path& path, std::span<const TableColumn> c
   write_atomically(path, text);
 }
 
-std::vector<Vec3> read_points_csv(const std::filesystem::path& path) {
+std::vector<Vec3> read_points_csv(const std::filesystem::path& path, std::size_t most) {
   const std::vector<std::byte> bytes = read_file(path, kMaxPointFile);
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -152,6 +152,13 @@ std::vector<Vec3> read_points_csv(const std::filesystem::path& path) {
     if (line.empty()) continue;
     Vec3 point;
     if (parse_point(line, point)) {
+      if (points.size() == most) {
+        throw Error(ErrorKind::Scene, Fault{.place = path.string() + ':' + std::to_string(number),
+                                            .key = {},
+                                            .expected = "expected at most " + std::to_string(most) + " points",
+                                            .found = "one more",
+                                            .hint = "divide them among several files"});
+      }
       points.push_back(point);
     } else if (!(header_allowed && starts_like_a_name(line) && !line.starts_with("nan") && !line.starts_with("inf"))) {
       faults.push_back(Fault{.place = path.string() + ':' + std::to_string(number),

@@ -16,7 +16,6 @@
 namespace supple::io {
 namespace {
 
-constexpr std::size_t kLargestFile = std::size_t{2} << 30;
 
 [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found) {
   throw Error(ErrorKind::Scene, Fault{.place = place, .key = {}, .expected = expected, .found = found, .hint = {}});
@@ -253,7 +252,7 @@ Mesh read_ply(std::string_view text, const std::string& path) {
 Mesh read_mesh(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".obj" && extension != ".ply") refuse(path.string(), "expected a mesh in a file .obj or .ply", "'" + extension + '\'');
-  const std::vector<std::byte> bytes = read_file(path, kLargestFile);
+  const std::vector<std::byte> bytes = read_file(path, kLargestInput);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   Mesh mesh = extension == ".obj" ? read_obj(text, path.string()) : read_ply(text, path.string());
   if (mesh.triangle.empty()) refuse(path.string(), "expected a mesh with faces", "none");

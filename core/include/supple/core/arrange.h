@@ -50,7 +50,16 @@ struct Bonds {
   std::vector<std::uint32_t> second;
 };
 [[nodiscard]] Bonds bonds_along(std::uint32_t begin, std::uint32_t end, int steps);
+/// How many bonds `bonds_along` makes of `particles`.
+[[nodiscard]] std::uint64_t count_bonds_along(std::uint64_t particles, int steps);
 /// Bonds between particles of [begin, end) nearer than `distance` [m], sorted.
 [[nodiscard]] Bonds bonds_within(std::span<const Vec3> position, std::uint32_t begin, std::uint32_t end, double distance);
+
+/// How many bonds `bonds_within` makes of all particles, without making any.
+struct BondCount {
+  std::uint64_t number = 0;
+  bool estimated = false;  ///< there are so many that one particle of several stands for all
+};
+[[nodiscard]] BondCount count_bonds_within(std::span<const Vec3> position, double distance);
 
 }  // namespace supple::core

@@ -20,6 +20,7 @@
 #include "supple/implicit/solids.h"
 #include "supple/implicit/surface_samples.h"
 #include "supple/implicit/volume.h"
+#include "supple/scenes/limits.h"
 #include "supple/scenes/scene.h"
 #include "supple/scenes/solid_motion.h"
 
@@ -124,8 +125,9 @@ struct Model {
 
 /// @throws Error{Scene} for what only the whole scene shows (a pair naming an absent object, an iso value that no kernel
 /// reaches, two particles at one place with a bond between them ...), with the key concerned.
+/// @param memory  that it may take [byte]   @throws OverBudget before more is allocated
 /// @pre duration, frame rate and masses are positive, as in every scene that was read
-[[nodiscard]] Model build_model(const Scene& scene);
+[[nodiscard]] Model build_model(const Scene& scene, double memory = kDefaultMemory);
 
 /// Where in its object a body is from.
 struct BodyOrigin {

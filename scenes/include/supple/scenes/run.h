@@ -41,6 +41,8 @@ struct RunOptions {
   std::string context = "auto";                 ///< auto, osmesa or egl
   int frames_at_once = 0;                       ///< in work at the same time where pictures are drawn, the one that is simulated too; 0: one a thread, as memory allows
   double memory = 0.0;                          ///< for that, beyond the first one [byte]; 0: half of what the machine has free
+  double scene_memory = kDefaultMemory;         ///< that the scene may take, by what is counted before it is built [byte]
+  double time_limit = 0.0;                      ///< stop between two steps after this long [s]; 0: never. Leaves ErrorKind::Limit
   std::function<void(const Progress&)> progress{}; ///< never twice at the same time, but from several threads; may be empty
   const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step, or in a Delaunay mesh (the signal's number)
 };

@@ -35,6 +35,7 @@ struct SimulationOptions {
   bool profile = false;        ///< time every step, not every 64th
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps go on
+  double memory = kDefaultMemory;  ///< that the scene may take, by what is counted before it is built [byte]
   bool questions = false;      ///< about states only: a start that needs finer steps than time_step.max_substeps is refused by the first step, not before
 };
 
@@ -81,7 +82,7 @@ struct ParticleChange {
 
 class Simulation {
  public:
-  /// @throws Error{Scene} when the model cannot be built; unless `options.questions`, Error{Limit} as `expect_steps`
+  /// @throws OverBudget when the scene takes more than options.memory; Error{Scene} when the model cannot be built; unless `options.questions`, Error{Limit} as `expect_steps`
   explicit Simulation(Scene scene, SimulationOptions options = {});
   ~Simulation();
   Simulation(Simulation&&) noexcept;

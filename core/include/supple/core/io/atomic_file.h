@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "supple/core/io/open_temporaries.h"
+
 namespace supple::io {
 
 /// Writes `bytes` under `path` by temporary file, fsync and rename.
@@ -33,9 +35,13 @@ class AtomicFile {
   void write(std::span<const std::byte> bytes);
 
   std::filesystem::path path_, temporary_;
+  OpenTemporary open_;
   std::vector<std::byte> buffer_;
   int descriptor_ = -1;
 };
+
+/// The largest file that scenes take points, meshes or pictures from [byte].
+inline constexpr std::size_t kLargestInput = std::size_t{1} << 29;
 
 /// The whole file. @throws Error{Io} when it cannot be read, Error{Limit} when it is larger than `limit` bytes.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit);

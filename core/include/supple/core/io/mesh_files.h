@@ -28,8 +28,11 @@ struct TableColumn {
 /// @throws Error{Io}
 void write_csv(const std::filesystem::path& path, std::span<const TableColumn> columns);
 
+/// Points that `read_points_csv` takes unless told otherwise.
+inline constexpr std::size_t kMostPoints = 2'000'000;
+
 /// Points from a CSV file: three numbers a line, an optional header line, '#' comments.
-/// @throws Error{Io} when absent, Error{Scene} with file:line for a line that is not three finite numbers.
-[[nodiscard]] std::vector<Vec3> read_points_csv(const std::filesystem::path& path);
+/// @throws Error{Io} when absent, Error{Scene} with file:line for a line that is not three finite numbers, and for more than `most` points.
+[[nodiscard]] std::vector<Vec3> read_points_csv(const std::filesystem::path& path, std::size_t most = kMostPoints);
 
 }  // namespace supple::io

@@ -1,0 +1,53 @@
+#include "last_resort.h"
+
+#include <cxxabi.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <typeinfo>
+
+#include "supple/core/error.h"
+#include "supple/core/io/open_temporaries.h"
+#include "supple/scenes/run.h"
+
+namespace supple::tool {
+namespace {
+
+constexpr std::size_t kReserve = std::size_t{1} << 20;  // [byte]
+std::atomic<void*> reserve{nullptr};
+
+/// A new-handler. @throws std::bad_alloc
+void let_reserve_go() {
+  std::free(reserve.exchange(nullptr));
+  throw std::bad_alloc();
+}
+
+void say(const char* text) { static_cast<void>(!::write(STDERR_FILENO, text, std::strlen(text))); }
+
+/// Allocates nothing, and calls only what is safe in any state of the program.
+[[noreturn]] void end_program() {
+  const std::type_info* type = abi::__cxa_current_exception_type();
+  const bool no_memory = type != nullptr && (*type == typeid(std::bad_alloc) || *type == typeid(std::bad_array_new_length));
+  say(no_memory ? scenes::kOutOfMemory : "internal fault: an exception that no code could handle");
+  if (!no_memory && type != nullptr) {
+    say(": ");
+    say(type->name());
+  }
+  say("\n");
+  io::remove_open_temporaries();
+  _exit(static_cast<int>(no_memory ? ErrorKind::Limit : ErrorKind::Internal));
+}
+
+}  // namespace
+
+void prepare_last_resort() {
+  reserve = std::malloc(kReserve);
+  std::set_new_handler(let_reserve_go);
+  std::set_terminate(end_program);
+}
+
+}  // namespace supple::tool

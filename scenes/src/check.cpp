@@ -1,0 +1,60 @@
+#include "supple/scenes/check.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "supple/scenes/output_limits.h"
+#include "supple/scenes/run.h"
+
+namespace supple::scenes {
+namespace {
+
+/// The sentence that tells why a scene was not built.
+std::string not_built(const SceneCounts& counts, double build) {
+  const Count& most = *std::max_element(counts.count.begin(), counts.count.end(), [](const Count& a, const Count& b) { return (rule_of(a.what).drawn ? 0.0 : a.bytes()) < (rule_of(b.what).drawn ? 0.0 : b.bytes()); });
+  return most.key + ": the scene was counted, not built: with " + count_text(most) + ' ' + std::string(rule_of(most.what).name) + " it takes about " +
+         bytes_text(counts.undrawn_bytes()) + " of memory, more than the " + bytes_text(build) + " that a check takes; --memory lets it take more";
+}
+
+void build_and_look(const Scene& scene, const SimulationOptions& options, CheckReport& report) {
+  Simulation simulation(scene, options);
+  try {
+    expect_output_sizes(simulation, requested_outputs(scene));
+  } catch (const Error& error) {
+    throw Error(ErrorKind::Scene, error.faults());
+  }
+  report.built = true;
+  report.particles = simulation.model().particles.size();
+  report.warnings = simulation.warnings();
+  simulation.expect_steps();
+}
+
+}  // namespace
+
+CheckReport check_scene(const Scene& scene, SimulationOptions options, double build) {
+  CheckReport report;
+  report.objects = scene.objects.size();
+  report.frames = scene.frame_count();
+  const double allowed = std::max(options.memory, build);
+  const SceneCounts counts = count_scene(scene, build);
+  expect_within(scene, counts, allowed);
+  for (const Count& count : counts.count) {
+    if (count.what == Counted::Particles) report.particles += static_cast<std::size_t>(count.number);
+  }
+  if (counts.undrawn_bytes() > build) {
+    report.warnings.push_back(not_built(counts, build));
+    return report;
+  }
+  check_pictures(scene);
+  options.questions = true;
+  options.memory = build;
+  try {
+    build_and_look(scene, options, report);
+  } catch (const OverBudget& over) {  // by what only the model counts
+    expect_within(scene, over.counts(), allowed);
+    report.warnings = {not_built(over.counts(), build)};
+  }
+  return report;
+}
+
+}  // namespace supple::scenes

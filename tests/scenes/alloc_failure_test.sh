@@ -1,0 +1,75 @@
+#!/usr/bin/env bash
+# Allocations that fail: the run says so and ends with exit code 6, temporary files are gone, and what it saved is whole: --resume ends in
+# the same state as an undisturbed run.
+#   alloc_failure_test.sh SUPPLE LIBRARY SCRATCH [STEP]
+# STEP: every how many allocations one fails; without it about forty, spread over all, and the last dozen, where the report is written.
+set -u
+supple=$1
+library=$2
+scratch=$3
+rm -rf "$scratch"
+mkdir -p "$scratch"
+cd "$scratch" || exit 1
+failures=0
+
+cat > scene.yaml <<'SCENE'
+schema: 1
+duration: 0.05 s
+frame_rate: 60
+objects:
+  - name: left
+    particles: {arrange: single, at: [-0.25, 0, 0], velocity: [1, 0, 0], mass: 0.1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.5}}]
+    contact: {modulus: 1e4, friction: 0.3}
+  - name: right
+    particles: {arrange: line, count: 3, spacing: 0.2, at: [0.35, 0, 0.05], mass: 0.1}
+    interactions: [{law: bond_frame, stretch: 500, rotation: 1}]
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.4}}]
+    contact: {modulus: 1e4, friction: 0.3}
+ground: {height: -0.4}
+output: {particles: [csv, vtk], contacts: csv, mesh: ply, cell: 12 cm}
+SCENE
+
+# run FOLDER FLAGS...; the variables of alloc_failure.cpp are those of this shell.
+run() {
+  local folder=$1
+  shift
+  "$supple" run scene.yaml --out "$folder" --progress none --threads "${threads:-1}" "$@" > out.txt 2> err.txt < /dev/null
+}
+state_of() { grep -m1 '"state_hash"' "$1/result.json"; }
+fail() {
+  echo "$1"
+  cat err.txt
+  failures=$((failures + 1))
+}
+
+SUPPLE_FAIL_COUNT=$scratch/count LD_PRELOAD=$library run whole || { cat err.txt; exit 1; }
+count=$(cat count)
+state=$(state_of whole)
+if (( count < 1000 )); then
+  echo "expected more than 1000 allocations, found $count"
+  exit 1
+fi
+
+# ends N: the N-th allocation fails.
+ends() {
+  local n=$1 code
+  rm -rf broken
+  SUPPLE_FAIL_AT=$n LD_PRELOAD=$library run broken
+  code=$?
+  # Few are asked for by what goes on without them.
+  [[ $code == 6 || $code == 0 ]] || fail "allocation $n of $count fails: expected exit 6, found $code and:"
+  [[ $code == 0 ]] || grep -q 'memory' err.txt || fail "allocation $n of $count fails: expected a message about memory, found:"
+  [[ -z $(find broken -name '.*.tmp' 2> /dev/null) ]] || fail "allocation $n of $count fails: a temporary file is left"
+  if [[ -d broken ]]; then
+    run broken --resume || fail "after allocation $n failed: expected that --resume goes on, found:"
+    [[ $(state_of broken) == "$state" ]] || fail "after allocation $n failed: expected $state, found $(state_of broken)"
+  fi
+}
+
+step=${4:-$(( count / 40 ))}
+for ((n = step; n < count - 12; n += step)); do ends "$n"; done
+for ((n = count - 12; n <= count; ++n)); do ends "$n"; done
+threads=3
+for ((n = 7 * step; n < count; n += 9 * step)); do ends "$n"; done
+exit $((failures > 0))
