@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -65,6 +69,82 @@ TEST_F(ReadMesh, CutsFacesIntoFansAndCountsFromTheLast) {
   EXPECT_EQ(text.triangle.size(), 1u);
 }
 
+TEST_F(ReadMesh, ReadsTextBehindAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF", obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const std::string ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+                          "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  for (const auto& [name, text] : {std::pair{"b.obj", obj}, std::pair{"b.ply", ply}}) {
+    const Mesh mesh = read_mesh(file(name, mark + text));
+    ASSERT_EQ(mesh.position.size(), 3u) << name;
+    EXPECT_EQ(mesh.position[1], Vec3(1, 0, 0)) << name;
+    EXPECT_EQ(mesh.triangle.size(), 1u) << name;
+  }
+}
+
+TEST_F(ReadMesh, JoinsLinesOfObjThatEndInABackslash) {
+  const Mesh mesh = read_mesh(file("j.obj", "v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 \\\r\n 3\nf 1 \\\n3 \\\n4\n"));
+  ASSERT_EQ(mesh.position.size(), 4u);
+  EXPECT_EQ(mesh.position[0], Vec3(0, 0, 0));
+  EXPECT_EQ(mesh.triangle, (std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {0, 2, 3}}));
+  // Named by the line that a statement begins in, and each line once.
+  expect_refused("j.obj", "v 0 0 0\nv 1 \\\n0\nv 2 2 2\n", "j.obj:2: expected 'v' and three finite numbers");
+  expect_refused("j.obj", "v 0 0 \\\n0\nv 1 0\n", "j.obj:3: expected 'v' and three finite numbers, found 'v 1 0'");
+}
+
+TEST_F(ReadMesh, ReadsBinaryPlyOfEitherByteOrder) {
+  const auto bytes = [](auto value, bool big) {
+    std::string raw(sizeof value, '\0');
+    std::memcpy(raw.data(), &value, sizeof value);
+    if (big != (std::endian::native == std::endian::big)) std::reverse(raw.begin(), raw.end());
+    return raw;
+  };
+  for (const bool big : {false, true}) {
+    std::string text = std::string("ply\nformat binary_") + (big ? "big" : "little") +
+                       "_endian 1.0\nelement vertex 3\nproperty float x\nproperty double y\nproperty short z\nproperty uchar red\nelement face 1\n"
+                       "property list uchar uint vertex_indices\nend_header\n";
+    for (int i = 0; i < 3; ++i) {
+      text += bytes(0.5F * static_cast<float>(i), big) + bytes(1.0 / (3.0 + i), big) + bytes(static_cast<std::int16_t>(-300 * i), big) + bytes(std::uint8_t{7}, big);
+    }
+    text += bytes(std::uint8_t{3}, big) + bytes(std::uint32_t{2}, big) + bytes(std::uint32_t{0}, big) + bytes(std::uint32_t{1}, big);
+    const Mesh mesh = read_mesh(file("e.ply", text));
+    EXPECT_EQ(mesh.position, (std::vector<Vec3>{{0.0, 1.0 / 3.0, 0.0}, {0.5, 0.25, -300.0}, {1.0, 0.2, -600.0}})) << big;
+    EXPECT_EQ(mesh.triangle, (std::vector<std::array<std::uint32_t, 3>>{{2, 0, 1}})) << big;
+    text.pop_back();
+    expect_refused("e.ply", text, "expected a number for every property, found the end of the file");
+  }
+}
+
+TEST_F(ReadMesh, CutsFacesWithCornersThatPointInwardsIntoWhatTheyHold) {
+  // An L of 3 unit squares that begins at each of its corners, either way round, and one with a corner in the middle of a side.
+  const std::vector<Vec3> outline{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}, {1, 2, 0}, {0, 2, 0}};
+  std::string vertices;
+  for (const Vec3& x : outline) vertices += "v " + std::to_string(x.x()) + ' ' + std::to_string(x.y()) + " 0\n";
+  for (const bool all : {false, true}) {
+    for (std::size_t first = 0; first < outline.size(); ++first) {
+      for (const bool reversed : {false, true}) {
+        std::string face = "f";
+        std::size_t corners = 0;
+        for (std::size_t k = 0; k < outline.size(); ++k) {
+          const std::size_t at = (first + (reversed ? outline.size() - k : k)) % outline.size();
+          if (!all && at == 1) continue;  // (1, 0) lies on a side
+          face += ' ' + std::to_string(at + 1);
+          ++corners;
+        }
+        const Mesh mesh = read_mesh(file("l.obj", vertices + face + '\n'));
+        EXPECT_EQ(mesh.triangle.size(), corners - 2);
+        double area = 0.0, absolute = 0.0;
+        for (const auto& t : mesh.triangle) {
+          const double own = 0.5 * (mesh.position[t[1]] - mesh.position[t[0]]).cross(mesh.position[t[2]] - mesh.position[t[0]]).z();
+          area += own;
+          absolute += std::abs(own);
+        }
+        EXPECT_DOUBLE_EQ(area, reversed ? -3.0 : 3.0) << face;
+        EXPECT_DOUBLE_EQ(absolute, 3.0) << face;  // no triangle runs the other way, so none lies outside
+      }
+    }
+  }
+}
+
 TEST_F(ReadMesh, SaysWhereAFileIsNotAMesh) {
   expect_refused("a.obj", "v 0 0\n", "a.obj:1: expected 'v' and three finite numbers, found 'v 0 0'");
   expect_refused("a.obj", "v 0 0 0\nf 1 2 3\n", "a.obj:2: expected 'f' and numbers of vertices above it");
@@ -72,7 +152,7 @@ TEST_F(ReadMesh, SaysWhereAFileIsNotAMesh) {
   expect_refused("a.obj", "v 0 0 0\n", "expected a mesh with faces, found none");
   expect_refused("a.stl", "solid\n", "expected a mesh in a file .obj or .ply, found '.stl'");
   expect_refused("a.ply", "plie\n", "a.ply:1: expected a file that begins with 'ply'");
-  expect_refused("a.ply", "ply\nformat binary_big_endian 1.0\n", "expected ascii or binary_little_endian");
+  expect_refused("a.ply", "ply\nformat binary_middle_endian 1.0\n", "expected ascii, binary_little_endian or binary_big_endian");
   const std::string head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
   expect_refused("a.ply", head + "end_header\n1 2\n", "expected a finite number for every property, found the end of the file");
   expect_refused("a.ply", head + "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n3 0 1 2\n",

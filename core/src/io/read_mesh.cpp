@@ -1,6 +1,8 @@
 #include "supple/core/io/read_mesh.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -24,7 +26,25 @@ namespace {
 /// The words of a text, line by line.
 class Lines {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {}
+  explicit Lines(std::string_view text) : rest_(text) {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
+  }
+  /// The next line with those that it goes on in after a backslash at its end.
+  /// @param whole  receives the text of lines that were joined   @return false at the end
+  bool next_joined(std::string_view& line, std::string& whole) {
+    if (!next(line)) return false;
+    if (!line.ends_with('\\')) return true;
+    whole.clear();
+    do {
+      line.remove_suffix(1);
+      whole.append(line).push_back(' ');
+      if (!next(line)) line = {};
+    } while (line.ends_with('\\'));
+    whole.append(line);
+    line = whole;
+    return true;
+  }
   /// @return false at the end
   bool next(std::string_view& line) {
     if (rest_.empty()) return false;
@@ -63,18 +83,61 @@ std::optional<Number> parse(std::string_view word) {
   return value;
 }
 
-void add_fan(const std::vector<std::uint32_t>& corner, Mesh& mesh) {
-  for (std::size_t k = 2; k < corner.size(); ++k) mesh.triangle.push_back({corner[0], corner[k - 1], corner[k]});
+/// Whether x lies in a triangle of the plane or on its border; counter-clockwise along `normal`.
+bool lies_in(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& normal) {
+  const auto left = [&](const Vec3& p, const Vec3& q) { return (q - p).cross(x - p).dot(normal) >= 0.0; };
+  return left(a, b) && left(b, c) && left(c, a);
+}
+
+/// Appends the triangles of a face: a fan, or where corners point inwards, triangles that no other corner lies in, cut off one after another
+/// (Meisters 1975, "Polygons Have Ears").
+void add_face(std::vector<std::uint32_t> corner, const std::string& place, Mesh& mesh) {
+  constexpr std::size_t kMostCorners = 4096;  // as each is looked at for each
+  const auto at = [&](std::size_t k) -> const Vec3& { return mesh.position[corner[k]]; };
+  Vec3 normal = Vec3::Zero();
+  for (std::size_t k = 2; k < corner.size(); ++k) normal += (at(k - 1) - at(0)).cross(at(k) - at(0));
+  const auto turns_left = [&](std::size_t k) {
+    const std::size_t n = corner.size();
+    return (at(k) - at((k + n - 1) % n)).cross(at((k + 1) % n) - at(k)).dot(normal) > 0.0;
+  };
+  bool convex = true;
+  for (std::size_t k = 0; k < corner.size(); ++k) convex = convex && turns_left(k);
+  if (!convex && corner.size() > kMostCorners) {
+    refuse(place, "expected at most " + std::to_string(kMostCorners) + " corners of a face that is not convex", std::to_string(corner.size()));
+  }
+  const auto is_ear = [&](std::size_t k) {
+    if (convex) return true;
+    const std::size_t n = corner.size(), last = (k + n - 1) % n, next = (k + 1) % n;
+    if (!turns_left(k)) return false;
+    for (std::size_t i = (next + 1) % n; i != last; i = (i + 1) % n) {
+      const bool is_corner = corner[i] == corner[last] || corner[i] == corner[k] || corner[i] == corner[next];
+      if (!is_corner && lies_in(at(i), at(last), at(k), at(next), normal)) return false;
+    }
+    return true;
+  };
+  std::size_t ear = 1;  // of convex faces always the second corner, which makes a fan
+  for (std::size_t n = corner.size(); n > 3; n = corner.size()) {
+    std::size_t tried = 0;
+    while (tried < n && !is_ear(ear % n)) {
+      ++ear;
+      ++tried;
+    }
+    ear %= n;  // any where there is none: the face crosses itself, or has no area
+    mesh.triangle.push_back({corner[(ear + n - 1) % n], corner[ear], corner[(ear + 1) % n]});
+    corner.erase(corner.begin() + static_cast<std::ptrdiff_t>(ear));
+  }
+  if (corner.size() == 3) mesh.triangle.push_back({corner[0], corner[1], corner[2]});
 }
 
 Mesh read_obj(std::string_view text, const std::string& path) {
   Mesh mesh;
   Lines lines(text);
   std::string_view line;
+  std::string joined;
   std::vector<std::uint32_t> corner;
-  while (lines.next(line)) {
+  for (std::size_t first = 1; lines.next_joined(line, joined); first = lines.number() + 1) {
     const std::string whole(line.substr(0, 60));
-    const std::string place = path + ':' + std::to_string(lines.number());
+    const std::string place = path + ':' + std::to_string(first);
     line = line.substr(0, line.find('#'));
     const std::string_view kind = take_word(line);
     if (kind == "v") {
@@ -97,11 +160,13 @@ Mesh read_obj(std::string_view text, const std::string& path) {
         corner.push_back(static_cast<std::uint32_t>(at));
       }
       if (corner.size() < 3) refuse(place, "expected a face of at least three corners", '\'' + whole + '\'');
-      add_fan(corner, mesh);
+      add_face(corner, place, mesh);
     }
   }
   return mesh;
 }
+
+enum class PlyFormat { Text, LittleEndian, BigEndian };
 
 enum class PlyType { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
 
@@ -132,10 +197,10 @@ struct PlyElement {
 /// Numbers of a PLY file one after another, from text or from bytes.
 class PlyNumbers {
  public:
-  PlyNumbers(std::string_view content, bool binary, const std::string& path) : rest_(content), binary_(binary), path_(path) {}
+  PlyNumbers(std::string_view content, PlyFormat format, const std::string& path) : rest_(content), format_(format), path_(path) {}
 
   double next(PlyType type) {
-    if (!binary_) {
+    if (format_ == PlyFormat::Text) {
       const std::size_t begin = std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size());
       const std::size_t end = std::min(rest_.find_first_of(" \t\r\n", begin), rest_.size());
       const std::string_view word = rest_.substr(begin, end - begin);
@@ -162,20 +227,25 @@ class PlyNumbers {
   Number take() {
     Number value{};
     if (rest_.size() < sizeof value) refuse(path_, "expected a number for every property", "the end of the file");
-    std::memcpy(&value, rest_.data(), sizeof value);
+    std::array<char, sizeof value> bytes;
+    std::copy_n(rest_.data(), sizeof value, bytes.data());
+    const bool swapped = (format_ == PlyFormat::BigEndian) != (std::endian::native == std::endian::big);
+    if (swapped) std::reverse(bytes.begin(), bytes.end());
+    std::memcpy(&value, bytes.data(), sizeof value);
     rest_.remove_prefix(sizeof value);
     return value;
   }
 
   std::string_view rest_;
-  bool binary_;
+  PlyFormat format_;
   const std::string& path_;
 };
 
 Mesh read_ply(std::string_view text, const std::string& path) {
   Lines lines(text);
   std::string_view line;
-  bool binary = false, ended = false, first = true;
+  PlyFormat format = PlyFormat::Text;
+  bool ended = false, first = true;
   std::vector<PlyElement> elements;
   while (!ended && lines.next(line)) {
     const std::string place = path + ':' + std::to_string(lines.number());
@@ -185,8 +255,9 @@ Mesh read_ply(std::string_view text, const std::string& path) {
     first = false;
     if (kind == "format") {
       const std::string_view name = take_word(line);
-      binary = name == "binary_little_endian";
-      if (!binary && name != "ascii") refuse(place, "expected ascii or binary_little_endian", '\'' + whole + '\'');
+      if (name == "binary_little_endian") format = PlyFormat::LittleEndian;
+      else if (name == "binary_big_endian") format = PlyFormat::BigEndian;
+      else if (name != "ascii") refuse(place, "expected ascii, binary_little_endian or binary_big_endian", '\'' + whole + '\'');
     } else if (kind == "element") {
       PlyElement element{.name = std::string(take_word(line)), .count = 0, .properties = {}};
       const std::optional<std::size_t> count = parse<std::size_t>(take_word(line));
@@ -213,7 +284,7 @@ Mesh read_ply(std::string_view text, const std::string& path) {
   if (!ended) refuse(path, "expected 'end_header'", "the end of the file");
 
   Mesh mesh;
-  PlyNumbers numbers(lines.rest(), binary, path);
+  PlyNumbers numbers(lines.rest(), format, path);
   std::vector<std::uint32_t> corner;
   for (const PlyElement& element : elements) {
     for (std::size_t k = 0; k < element.count; ++k) {
@@ -237,7 +308,7 @@ Mesh read_ply(std::string_view text, const std::string& path) {
           }
           corner.push_back(static_cast<std::uint32_t>(index));
         }
-        add_fan(corner, mesh);
+        add_face(corner, path, mesh);
       }
       if (element.name != "vertex") continue;
       if (!x.allFinite()) refuse(path, "expected finite positions", "vertex " + std::to_string(k));

@@ -1,5 +1,5 @@
 /// @file supple/core/io/read_mesh.h
-/// Triangle meshes from other tools: Wavefront OBJ, and PLY in text or little-endian binary.
+/// Triangle meshes from other tools: Wavefront OBJ, and PLY in text or binary.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace supple::io {
 
-/// Positions and faces alone; faces with more corners are cut into fans. The extension decides, .obj or .ply.
+/// Positions and faces alone; faces with more corners are cut into triangles, convex ones into fans. The extension decides, .obj or .ply.
 /// @throws Error{Io} when absent, Error{Scene} naming the place where the file is not what it should be.
 [[nodiscard]] Mesh read_mesh(const std::filesystem::path& path);
 
