@@ -473,6 +473,21 @@ objects:
 }
 
 // Six that move make 15 pairs, and each of them two with what stands still.
+TEST(SeparateBodies, MayBeginInOnePlace) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  std::ofstream(folder / "twice.csv") << "0,0,0\n0,0,0\n";
+  const std::string head = "schema: 1\nduration: 1\nframe_rate: 10\nobjects:\n  - name: twins\n    skeleton: [{shape: point, kernel: {radius: 0.1}}]\n";
+  for (const char* rest : {"    particles: {arrange: file, file: twice.csv}\n    separate: true\n",
+                           "    particles: {arrange: file, file: twice.csv, velocity: [1, 0, 0]}\n    separate: true\n    contact: {modulus: 1e4}\n",
+                           "    particles: {arrange: file, file: twice.csv, inertia_radius: 0.05}\n"}) {
+    Simulation simulation = make(head + rest, folder);
+    EXPECT_DOUBLE_EQ(simulation.model().smallest_length, simulation.model().objects[0].iso_radius) << rest;
+    simulation.advance_to(3);
+    EXPECT_TRUE(simulation.state().particles.position[1].allFinite()) << rest;
+  }
+}
+
 TEST(SeparateBodies, AreCountedAsPairsOneByOne) {
   Simulation simulation = make(row_of_balls(true) + "ground: {height: -1}\nobstacles: [{name: end, shape: plane, at: [3, 0, 0], normal: [-1, 0, 0]}]\n");
   simulation.step();
