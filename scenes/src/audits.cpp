@@ -67,6 +67,19 @@ void book_audits(const Model& model, const std::vector<Body>& bodies, double ene
   book_shapes(model, state.particles, r);
 }
 
+double unaccounted_energy(double energy, const State& state) {
+  return energy - state.record.initial_energy - state.ledger.external_work + state.ledger.dissipated;
+}
+
+std::optional<double> find_created_energy(const Energies& now, double before, const State& state) {
+  constexpr double kNearlyAll = 0.9;
+  const double created = unaccounted_energy(now.total(), state) - before;
+  // Energies of pair laws may be below 0: what leaves such a well has that much, and comes from below.
+  const double well = std::max(0.0, -(now.interaction + now.contact));
+  const double all = std::max(state.record.largest_energy, now.total()) + 2.0 * well;
+  return created > kNearlyAll * all ? std::optional(created) : std::nullopt;
+}
+
 Audits audits_of(const RunRecord& r) {
   return {.momentum_error = share(r.momentum_error, r.momentum_scale),
           .angular_momentum_error = share(r.angular_momentum_error, r.angular_momentum_scale),

@@ -136,7 +136,10 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
     model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
     if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
-    model.smallest_length = std::min({model.smallest_length, nearest[i], n == 1 ? 0.5 * object.rest_diameter : nearest[i]});
+    // Bodies that only meet by their surfaces may begin anywhere; what begins in one place has no distance to resolve.
+    const bool only_touches = d.separate && object.iso_radius > 0.0;
+    const double alone = n == 1 ? 0.5 * object.rest_diameter : object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff();
+    model.smallest_length = std::min({model.smallest_length, nearest[i] > 0.0 && std::isfinite(nearest[i]) && !only_touches ? nearest[i] : alone});
   }
   turn_primitives(turn, object.skeleton);
   if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);

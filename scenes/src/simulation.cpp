@@ -47,6 +47,7 @@ Simulation::Impl::Impl(Scene s, SimulationOptions o)
   state.halvings = (options.questions ? wanted_halvings : first_halvings)(scene, model, integrator, laws, state);
   leave_overlapping();
   book_audits();
+  created_before = 0.0;
   place_cameras();
   warnings = find_odd_start(scene, context(), state.particles, pulled);
 }
@@ -76,6 +77,7 @@ void Simulation::Impl::step() {
   } else {
     refine_step();
   }
+  if (!created_before && energies_balance()) created_before = unaccounted_energy(energies().total(), state);
   if (fixes_step(scene)) {
     step_begin = state.particles;
     if (!state.kick.valid) check_fixed_push();  // else the step before has done so
@@ -125,6 +127,7 @@ void Simulation::Impl::step() {
     state.substep = 0;
     ++state.frame;
     book_audits();
+    check_energy();
   }
 }
 

@@ -57,6 +57,7 @@ void Simulation::Impl::take(State other) {
   arrays = other.particles;
   state = std::move(other);
   state.particles = std::move(arrays);
+  created_before.reset();
   form_bodies();
   form_laws();
   SUPPLE_EXPECTS(state.samples.size() == bodies.size());

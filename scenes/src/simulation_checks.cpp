@@ -1,7 +1,10 @@
 #include "simulation_impl.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
+#include "audits.h"
 #include "pieces.h"
 #include "read_scene_faults.h"
 #include "scene_places.h"
@@ -66,6 +69,54 @@ void Simulation::Impl::watch_pressing() {
   }
   watch.look(context(), frame, time(), state.record);
   if (barrier && hold_cores(context(), frame, state.particles, state.ledger, state.record)) state.kick.valid = false;
+}
+
+/// Whether all that acts has an energy, whose changes are booked: volumes that are held are pumped up, some rules that may be asked for follow from none, and
+/// obstacles may jump within steps that the scene fixes.
+bool Simulation::Impl::energies_balance() const {
+  const bool pumped = std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.holds_volume; });
+  const bool jumps = fixes_step(scene) && model.solid_speed > 0.0;
+  return !pumped && !jumps && model.interactions.literal_form.empty() && model.reaction.split == collision::SplitRule::Energy;
+}
+
+/// At a frame: a run whose energy comes from nowhere shows nothing of the scene any more. @throws Error{Diverged}
+void Simulation::Impl::check_energy() {
+  constexpr double kNoMotion = 1e-10;  // of the speed that is believed to be possible: a millionth of the size of everything in a frame
+  if (!energies_balance()) return;
+  const Energies now = energies();
+  const std::optional<double> created = find_created_energy(now, created_before.value_or(0.0), state);
+  const double slow = kNoMotion * model.believable.margin;
+  double mass = 0.0;
+  for (const double m : model.particles.mass) mass += m;
+  if (!created || !(*created > 0.5 * mass * slow * slow)) return;
+  double most = -1.0, own_mass = 0.0, speed = 0.0;
+  const ObjectModel* fastest = nullptr;
+  for (const ObjectModel& object : model.objects) {
+    double energy = 0.0, m = 0.0, v = 0.0;
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      m += model.particles.mass[i];
+      energy += 0.5 * model.particles.mass[i] * state.particles.velocity[i].squaredNorm();
+      v = std::max(v, state.particles.velocity[i].norm());
+    }
+    if (energy <= most) continue;
+    most = energy;
+    own_mass = m;
+    speed = v;
+    fastest = &object;
+  }
+  const double given = std::max(0.0, now.total() - *created);
+  const Error error(ErrorKind::Diverged,
+                    Fault{.place = scene.source.string(),
+                          .key = {},
+                          .expected = "diverged at step " + std::to_string(state.steps) + " (t = " + short_text(time()) + " s): '" + fastest->name +
+                                      "' moves at up to " + short_text(speed) + " m/s, where all the energy that the run was given, " + short_text(given) +
+                                      " J, could move it at " + short_text(std::sqrt(2.0 * given / own_mass)) + " m/s",
+                          .found = short_text(*created) + " J from nowhere",
+                          .hint = fixes_step(scene) ? "the scene fixes its own time step; let time_step.substeps be auto"
+                                                    : "check stiffness, mass and strength of the objects concerned"});
+  drop_results();
+  if (last_frame.record.valid) take(last_frame);
+  throw error;
 }
 
 void Simulation::Impl::throw_too_coarse(const TooCoarse& found) {

@@ -59,6 +59,7 @@ struct Simulation::Impl {
   SearchCounts searches;      ///< of the meshes of this state,
   SearchCounts all_searches;  ///< and of all so far
   bool coarse_noted = false;  ///< in the warnings
+  std::optional<double> created_before;  ///< energy unaccounted for where stepping began; none: not looked at yet [J]
 
   // Steps.
   Impl(Scene s, SimulationOptions o);
@@ -100,6 +101,8 @@ struct Simulation::Impl {
   void check_fixed_push();
   const Frame& seen_contacts(const StageContext& quiet);
   void watch_pressing();
+  [[nodiscard]] bool energies_balance() const;
+  void check_energy();
   [[noreturn]] void throw_too_coarse(const TooCoarse& found);
   [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const;
   /// For looks that are no part of a step.

@@ -229,5 +229,61 @@ TEST(FixedStep, IsNamedByExplain) {
       << explained("size: 0.1 ms");
 }
 
+/// Four particles in a row, whose stiffest mode has 2.6 times the frequency that steps of 5 ms hold; a load sets it off.
+std::string stiff_bar(const std::string& time_step, const std::string& rest = "") {
+  return "schema: 1\nduration: 0.2 s\nframe_rate: 100\ntime_step: {" + time_step + "}\n" + rest + R"(
+objects:
+  - name: bar
+    particles: {arrange: line, count: 4, spacing: 0.1, mass: 0.1}
+    interactions: [{law: bond_frame, within: 0.15, stretch: 3000, rotation: 1}]
+    loads: [{particle: 0, force: [0, 0, 1], until: 0.02}]
+)";
+}
+
+TEST(CreatedEnergy, EndsTheRunAndSaysWhoMovesHowFast) {
+  Simulation simulation = make(stiff_bar("substeps: 2"));
+  const std::string error = end_of(simulation, 21);
+  // The load of 1 N over 20 ms gives 20 mN s, and with it 0.0017 J.
+  for (const char* words : {"test.yaml: diverged at step ", "'bar' moves at up to ", " m/s, where all the energy that the run was given, 0.00170", " J from nowhere",
+                            "the scene fixes its own time step; let time_step.substeps be auto"}) {
+    EXPECT_TRUE(holds(error, words)) << error;
+  }
+  EXPECT_LT(simulation.frame(), 21);
+  EXPECT_LT(simulation.audits().energy_error, 0.9);  // the state is the last one before
+  Simulation fine = make(stiff_bar("substeps: auto"));
+  EXPECT_EQ(end_of(fine, 21), "");
+  Simulation coarse = make(stiff_bar("substeps: 4"));  // stable, though more than the margin of automatic ones allows
+  EXPECT_EQ(end_of(coarse, 21), "");
+}
+
+TEST(CreatedEnergy, IsNotThatOfAProjectile) {
+  const std::string ball = R"(
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0.2, 0, 0], velocity: [400, 0, 0], mass: 0.1}
+    skeleton: [{shape: point, kernel: {radius: 0.1}}]
+    contact: {modulus: 1e4}
+  - name: wall
+    particles: {arrange: single, at: [0.5, 0, 0], mass: 1}
+    skeleton: [{shape: square, half_size: 0.3, turn_axis: [0, 1, 0], turn_deg: 90, kernel: {radius: 0.1}}]
+    contact: {modulus: 1e4}
+)";
+  // It flies through what holds a hundred-thousandth of its energy.
+  Simulation simulation = make("schema: 1\nduration: 2 ms\nframe_rate: 1000\ntime_step: {max_substeps: 65536}\n" + ball);
+  EXPECT_EQ(end_of(simulation, 3), "");
+  EXPECT_EQ(simulation.state().record.overloads.size(), 1u);
+  EXPECT_GT(simulation.state().particles.position[0].x(), 0.9);
+}
+
+TEST(CreatedEnergy, IsLookedForFromWhereAStateIsTakenUp) {
+  Simulation simulation = make(stiff_bar("substeps: auto"));
+  simulation.advance_to(3);
+  State pushed = simulation.state();
+  for (Vec3& v : pushed.particles.velocity) v.x() += 1e3;
+  simulation.restore(pushed);
+  EXPECT_EQ(end_of(simulation, 21), "");
+  EXPECT_GT(simulation.state().particles.velocity[0].x(), 900.0);
+}
+
 }  // namespace
 }  // namespace supple::scenes

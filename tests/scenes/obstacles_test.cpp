@@ -297,14 +297,45 @@ TEST(Obstacles, OfHeightsThatRiseEvenlyAreThePlane) {
   write_heights(folder / "slope.csv", [](double x, double y) { return 0.24 * x - 0.32 * y; });
   const std::string exact = "contact: {error: 1e-8}\n";
   Simulation heights = make(ball_over(exact + "obstacles: [{name: slope, shape: heights, file: slope.csv, modulus: 1e4}]"), folder);
-  // F = h(x, y) - z is the distance from the plane over the cosine of its slope.
-  Simulation plane = make(ball_over(exact + "obstacles: [{name: slope, shape: plane, normal: [-0.24, 0.32, 1], modulus: " + std::to_string(1e4 * std::sqrt(1.16)) + "}]"));
+  Simulation plane = make(ball_over(exact + "obstacles: [{name: slope, shape: plane, normal: [-0.24, 0.32, 1], modulus: 1e4}]"));
   run(heights, 7);
   run(plane, 7);
   const Vec3 at = plane.state().particles.position[0];
   EXPECT_GT(heights.contacts().summary.size(), 0u);
   EXPECT_GT((at - Vec3(0.02, 0.01, 0.25)).norm(), 0.1);  // down the slope
   EXPECT_LT((heights.state().particles.position[0] - at).norm(), 1e-6);
+}
+
+/// What a ball of radius 0.1 m, pressed 5 mm into z = 0.2 x, meets at a place.
+std::string ball_on_ramp(double x, const std::string& obstacle) {
+  const double z = 0.2 * x + 0.095 * std::sqrt(1.04);
+  return R"(
+schema: 1
+duration: 1
+contact: {error: 1e-6}
+objects:
+  - name: ball
+    particles: {arrange: single, at: [)" + std::to_string(x) + ", 0.03, " + std::to_string(z) + R"(], mass: 0.1}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 1e4}
+obstacles: [)" + obstacle + "]\n";
+}
+
+TEST(Obstacles, OfHeightsArePlanesUpToTheirBorders) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  write_heights(folder / "ramp.csv", [](double x, double) { return 0.2 * x; });
+  for (const double x : {-1.55, -1.0, 0.0, 0.333, 1.2, 1.5, 1.53}) {
+    Simulation plane = make(ball_on_ramp(x, "{name: ramp, shape: plane, normal: [-0.2, 0, 1]}"));
+    Simulation heights = make(ball_on_ramp(x, "{name: ramp, shape: heights, file: ramp.csv}"), folder);
+    ASSERT_EQ(plane.contacts().summary.size(), 1u);
+    ASSERT_EQ(heights.contacts().summary.size(), 1u) << x;
+    const Vec3 expected = plane.contact_forces()[0];
+    EXPECT_LT((heights.contact_forces()[0] - expected).norm(), 2e-6 * expected.norm()) << x;
+    EXPECT_NEAR(heights.contacts().summary[0].largest_overlap, plane.contacts().summary[0].largest_overlap, 1e-6) << x;
+  }
+  // Nothing is there beyond the last heights.
+  Simulation beyond = make(ball_on_ramp(1.75, "{name: ramp, shape: heights, file: ramp.csv}"), folder);
+  EXPECT_TRUE(beyond.contacts().summary.empty());
 }
 
 TEST(Obstacles, OfHeightsHoldABallInTheirHollow) {
@@ -442,6 +473,21 @@ objects:
 }
 
 // Six that move make 15 pairs, and each of them two with what stands still.
+TEST(SeparateBodies, MayBeginInOnePlace) {
+  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  fs::create_directories(folder);
+  std::ofstream(folder / "twice.csv") << "0,0,0\n0,0,0\n";
+  const std::string head = "schema: 1\nduration: 1\nframe_rate: 10\nobjects:\n  - name: twins\n    skeleton: [{shape: point, kernel: {radius: 0.1}}]\n";
+  for (const char* rest : {"    particles: {arrange: file, file: twice.csv}\n    separate: true\n",
+                           "    particles: {arrange: file, file: twice.csv, velocity: [1, 0, 0]}\n    separate: true\n    contact: {modulus: 1e4}\n",
+                           "    particles: {arrange: file, file: twice.csv, inertia_radius: 0.05}\n"}) {
+    Simulation simulation = make(head + rest, folder);
+    EXPECT_DOUBLE_EQ(simulation.model().smallest_length, simulation.model().objects[0].iso_radius) << rest;
+    simulation.advance_to(3);
+    EXPECT_TRUE(simulation.state().particles.position[1].allFinite()) << rest;
+  }
+}
+
 TEST(SeparateBodies, AreCountedAsPairsOneByOne) {
   Simulation simulation = make(row_of_balls(true) + "ground: {height: -1}\nobstacles: [{name: end, shape: plane, at: [3, 0, 0], normal: [-1, 0, 0]}]\n");
   simulation.step();

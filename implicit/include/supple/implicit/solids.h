@@ -1,6 +1,6 @@
 /// @file supple/implicit/solids.h
 /// Solids that do not give way: walls, blocks and terrain for bodies to meet. Each is a ScalarField of one part whose value is
-/// `slope` times a depth, so that with a modulus P its pressure rises by P slope a metre. HalfSpace is in field.h.
+/// `slope` times a depth, so that with a modulus P its pressure rises by P slope a metre. HalfSpace is in field.h, terrain in height_field.h.
 #pragma once
 
 #include <cstdint>
@@ -41,39 +41,6 @@ class SolidBox {
   Vec3 half_;
   double rounding_;
   double slope_;
-};
-
-/// Ground of varying height, {z <= h(x, y)}: F = slope (h(x, y) - z). h is the bicubic spline through heights on a regular
-/// grid as a sum of cubic B-splines (de Boor 1978, "A Practical Guide to Splines", ch. IX-XIII), constant beyond its
-/// borders; C^2 inside.
-class HeightField {
- public:
-  /// @param heights  h at corner + spacing (i, j), row j after row, shape [rows][columns] [m]
-  /// @pre columns, rows >= 2, spacing > 0, slope > 0
-  HeightField(const Vec3& corner, double spacing, std::size_t columns, std::size_t rows, std::span<const double> heights,
-              double slope);
-
-  void evaluate(std::span<const Vec3> points, std::span<double> values) const;
-  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
-  void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const;
-  [[nodiscard]] Interval bound(const Box& box) const;
-  [[nodiscard]] double gradient_bound(const Box& box) const;
-  [[nodiscard]] Box surface_box() const;
-  [[nodiscard]] double feature_size() const;
-  /// h and its slopes dh/dx, dh/dy at (x, y).
-  [[nodiscard]] Vec3 height(double x, double y) const;
-  /// The surface over the grid, `finer` quadrangles along each side of a cell of it.
-  [[nodiscard]] Mesh mesh(int finer) const;
-
- private:
-  [[nodiscard]] std::size_t index(std::size_t i, std::size_t j) const { return j * (columns_ + 2) + i; }
-
-  Vec3 corner_;
-  double spacing_;
-  std::size_t columns_, rows_;
-  std::vector<double> coefficient_;  // of the cubic B-spline, with one more on each border, shape [rows + 2][columns + 2]
-  double slope_;
-  double steepest_;                  // bound of |grad h|
 };
 
 /// Another field, which must outlive it, moved rigidly: F(x) = F_0(q^-1 (x - p)).

@@ -16,6 +16,7 @@
 #include "supple/core/interactions.h"
 #include "supple/core/links.h"
 #include "supple/implicit/field.h"
+#include "supple/implicit/height_field.h"
 #include "supple/implicit/mesh_solid.h"
 #include "supple/implicit/solids.h"
 #include "supple/implicit/surface_samples.h"
