@@ -1,6 +1,7 @@
 # One module = one library target, made the same way: warnings, determinism flags, header set, install and export.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
+include(SuppleLibraries)
 
 find_program(SUPPLE_CCACHE ccache)
 if(SUPPLE_CCACHE AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
@@ -37,23 +38,58 @@ if(SUPPLE_SANITIZE)
   endif()
 endif()
 
-# What most files include is read once a target; a quarter to a third of the compiler's time otherwise.
+# What most files include is read once for all that are compiled with the same options; a quarter to a third of the compiler's time
+# otherwise.
 option(SUPPLE_PRECOMPILE_HEADERS "Precompile the headers of Eigen, GoogleTest and the standard library" ${PROJECT_IS_TOP_LEVEL})
-function(supple_precompile target)
-  if(SUPPLE_PRECOMPILE_HEADERS)
-    target_precompile_headers(${target} PRIVATE
-      <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <numbers> <numeric> <optional> <span>
-      <string> <string_view> <tuple> <utility> <vector> <Eigen/Core> <Eigen/Geometry> ${ARGN})
+set(supple_common_headers
+  <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <numbers> <numeric> <optional> <span>
+  <string> <string_view> <tuple> <utility> <vector> <Eigen/Core> <Eigen/Geometry>)
+
+# supple_precompile(TARGET OWNER PIC LIBRARIES headers...): those of OWNER, a target that has nothing else and is made for the first TARGET.
+# It has no macros of its own: GCC takes precompiled headers for files with more of them, not with fewer.
+function(supple_precompile target owner pic libraries)
+  if(NOT SUPPLE_PRECOMPILE_HEADERS)
+    return()
+  endif()
+  if(NOT TARGET ${owner})
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${owner}.cpp CONTENT "// Nothing but precompiled headers.\n")
+    add_library(${owner} OBJECT ${PROJECT_BINARY_DIR}/${owner}.cpp)
+    target_link_libraries(${owner} PRIVATE ${libraries} supple_flags)
+    set_target_properties(${owner} PROPERTIES POSITION_INDEPENDENT_CODE ${pic})
+    target_precompile_headers(${owner} PRIVATE ${supple_common_headers} ${ARGN})
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-      target_compile_options(${target} PRIVATE -fpch-preprocess)  # lets ccache read the compiler's input
+      target_compile_options(${owner} PRIVATE -fpch-preprocess)  # lets ccache read the compiler's input
     endif()
+  endif()
+  target_precompile_headers(${target} REUSE_FROM ${owner})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(${target} PRIVATE -fpch-preprocess)
   endif()
 endfunction()
 
-# supple_module(NAME HEADERS h... SOURCES s... [PUBLIC targets] [PRIVATE targets])
-# HEADERS are relative to include/supple/NAME.
+# Files of a module that have no name in common are compiled as one (together.cmake): half of the compiler's time for all of them, more
+# for one that changed. So by default builds with tests, where one works on them, compile each on its own.
+if(SUPPLE_BUILD_TESTS)
+  set(supple_unity_build OFF)
+else()
+  set(supple_unity_build ON)
+endif()
+option(SUPPLE_UNITY_BUILD "Compile files of a module in groups" ${supple_unity_build})
+
+# supple_together("file file..." ...): the groups of a module. scripts/together.py makes and checks them.
+function(supple_together)
+  set(number 0)
+  foreach(group IN LISTS ARGN)
+    math(EXPR number "${number} + 1")
+    separate_arguments(files UNIX_COMMAND "${group}")
+    set_source_files_properties(${files} PROPERTIES UNITY_GROUP group_${number})
+  endforeach()
+endfunction()
+
+# supple_module(NAME [OWN_OPTIONS] HEADERS h... SOURCES s... [PUBLIC targets] [PRIVATE targets])
+# HEADERS are relative to include/supple/NAME. OWN_OPTIONS: it is compiled in another way than the others, so shares no precompiled headers.
 function(supple_module name)
-  cmake_parse_arguments(arg "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "OWN_OPTIONS" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target supple_${name})
   add_library(${target} ${arg_SOURCES})
   add_library(supple::${name} ALIAS ${target})
@@ -62,13 +98,17 @@ function(supple_module name)
   target_include_directories(${target} PRIVATE src)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:supple_flags>)
-  supple_precompile(${target})
+  if(NOT arg_OWN_OPTIONS)
+    supple_precompile(${target} supple_headers ON Eigen3::Eigen)
+  endif()
   set_target_properties(${target} PROPERTIES
     EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON INSTALL_RPATH "$ORIGIN"
-    VERIFY_INTERFACE_HEADER_SETS ON)
-  install(TARGETS ${target} EXPORT suppleTargets
+    VERIFY_INTERFACE_HEADER_SETS ON UNITY_BUILD ${SUPPLE_UNITY_BUILD} UNITY_BUILD_MODE GROUP)
+  set_property(GLOBAL APPEND PROPERTY SUPPLE_INSTALLED ${name})
+  install(TARGETS ${target} EXPORT supple_${name}Targets
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
     FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT supple_${name}Targets NAMESPACE supple:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
 endfunction()
 
 # supple_test(MODULE SOURCES s... [LIBRARIES targets]): one test program per module, <module>_tests.
@@ -80,17 +120,26 @@ function(supple_test module)
   add_executable(${module}_tests ${arg_SOURCES} ${source_dir})
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
-  supple_precompile(${module}_tests <gtest/gtest.h> <filesystem> <fstream> <sstream>)
+  supple_precompile(${module}_tests supple_test_headers OFF "supple::core;GTest::gtest_main" <gtest/gtest.h> <filesystem> <fstream> <sstream>)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/tests-tmp)  # two builds may test at the same time
   gtest_discover_tests(${module}_tests
     PROPERTIES LABELS ${module} ENVIRONMENT TEST_TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT 600)
 endfunction()
 
+# The package for CMake, the scenes, the documents and the licence; the libraries install themselves.
 function(supple_install_package)
+  get_property(SUPPLE_INSTALLED GLOBAL PROPERTY SUPPLE_INSTALLED)
+  list(JOIN SUPPLE_INSTALLED " " SUPPLE_INSTALLED)
+  get_property(SUPPLE_RENDER_LIBRARIES GLOBAL PROPERTY SUPPLE_RENDER_LIBRARIES)
+  list(JOIN SUPPLE_RENDER_LIBRARIES " " SUPPLE_RENDER_LIBRARIES)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/suppleConfig.cmake.in
     ${PROJECT_BINARY_DIR}/suppleConfig.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/suppleConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-  install(EXPORT suppleTargets NAMESPACE supple:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
   install(FILES ${PROJECT_BINARY_DIR}/suppleConfig.cmake ${PROJECT_BINARY_DIR}/suppleConfigVersion.cmake
-    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
+    ${PROJECT_SOURCE_DIR}/cmake/SuppleLibraries.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
+  install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN reports EXCLUDE)
+  if(scenes IN_LIST SUPPLE_MODULES)
+    install(DIRECTORY scenes/library DESTINATION ${CMAKE_INSTALL_DATADIR}/supple/scenes)
+  endif()
 endfunction()

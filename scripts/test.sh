@@ -30,7 +30,8 @@ logs=$supple_root/build/logs
 install_packages build run test python
 
 part "planted defects have places" "$logs/mutate_check.log" "$here/mutate.sh" --check || true
-if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON \
+part "names in files built together" "$logs/together.log" "$here/together.py" || true
+if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_UNITY_BUILD=ON \
   -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3; then
   part "tests (release)" "$logs/tests_release.log" run_tests release || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true
@@ -38,7 +39,7 @@ if part "build (release)" "$logs/build_release.log" configure_and_build release 
 else
   for name in "tests (release)" "installed package" "small film"; do skip_part "$name" "no build"; done
 fi
-if part "build (sanitizers)" "$logs/build_asan.log" configure_and_build asan all; then
+if part "build (sanitizers)" "$logs/build_asan.log" configure_and_build asan all -DSUPPLE_UNITY_BUILD=ON; then
   part "tests (sanitizers)" "$logs/tests_asan.log" run_tests asan || true
 else
   skip_part "tests (sanitizers)" "no build"

@@ -1,7 +1,12 @@
 #include "fields_info.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
+
+#include "read_scene_faults.h"
 
 namespace supple::scenes {
 namespace {
@@ -22,28 +27,77 @@ std::string bracketed(const T& values, const Text& text) {
   return out + ']';
 }
 
-}  // namespace
-
-std::string InfoArchive::default_of(double value, const Rule& rule) {
+std::string number_default(double value, const Rule& rule) {
   if (!std::isfinite(value) || !rule.holds(value)) return "";
   if (!rule.degrees) return number_text(value);
   return number_text(std::round(value * 180.0 / std::numbers::pi * 1e4) / 1e4);  // for reading, so rounded
 }
 
-std::string InfoArchive::default_of(const Vec3& value, const Rule& rule) {
-  const std::size_t count = std::min<std::size_t>(rule.most_items, 3);
-  return bracketed(std::span(value.data(), count), number_text);
+/// What a key that is left out stands for.
+std::string default_of(const Member& member, const Rule& rule) {
+  const MemberType& type = *member.type;
+  if (type.optional) return rule.automatic ? "auto" : "";
+  switch (type.type) {
+    case FieldType::Number: return number_default(member.as<double>(), rule);
+    case FieldType::Whole: return std::to_string(member.as<int>());
+    case FieldType::Boolean: return member.as<bool>() ? "true" : "false";
+    case FieldType::Text: return '"' + member.as<std::string>() + '"';
+    case FieldType::Choice: return std::string(type.choices[type.chosen(member.at)]);
+    case FieldType::Choices: {
+      const std::optional<std::size_t> first = type.first(member.at);
+      return first ? std::string(type.choices[*first]) : "none";
+    }
+    case FieldType::Vector: return bracketed(std::span(member.as<Vec3>().data(), std::min<std::size_t>(rule.most_items, 3)), number_text);
+    case FieldType::Wholes: return bracketed(member.as<std::vector<int>>(), [](int v) { return std::to_string(v); });
+    case FieldType::Vectors:
+    case FieldType::Texts:
+    case FieldType::Mapping:
+    case FieldType::Mappings: break;
+  }
+  return "";
 }
 
-std::string InfoArchive::default_of(const std::vector<int>& value, const Rule& /*rule*/) {
-  return bracketed(value, [](int v) { return std::to_string(v); });
+}  // namespace
+
+void InfoArchive::field(const Member& member, const Label& label, const Rule& rule) {
+  const MemberType& type = *member.type;
+  FieldInfo& info = list.emplace_back();
+  info.key = label.key;
+  info.meaning = label.meaning;
+  info.type = type.type;
+  info.required = label.required;
+  info.may_be_absent = type.optional;
+  info.rule = rule;
+  info.choices = type.choices;
+  if (!label.required) info.default_text = default_of(member, rule);
+  if (type.fields == nullptr) return;
+  MappingInfo mapping = mapping_info(type);
+  info.children = std::move(mapping.keys);
+  info.may_be_empty = mapping.may_be_empty;
+}
+
+void EmptyArchive::check(bool holds, const std::string& /*key*/, std::string /*expected*/, std::string /*found*/, std::string /*hint*/) {
+  complete = complete && holds;
+}
+
+void EmptyArchive::field(const Member& /*member*/, const Label& label, const Rule& rule) {
+  if (label.required) complete = complete && !rule.when.applies();
+}
+
+MappingInfo mapping_info(const MemberType& type) {
+  InfoArchive keys;
+  EmptyArchive empty;
+  const std::shared_ptr<void> listed = type.make(), defaults = type.make();
+  type.fields(keys, listed.get());
+  type.fields(empty, defaults.get());
+  return {.keys = std::move(keys.list), .may_be_empty = empty.complete};
 }
 
 const std::vector<FieldInfo>& scene_fields() {
   static const std::vector<FieldInfo> list = [] {
     InfoArchive archive;
     Scene scene;
-    fields(archive, scene);
+    scene_members(archive, scene);
     return std::move(archive.list);
   }();
   return list;

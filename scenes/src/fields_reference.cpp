@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fields_info.h"
+#include "read_scene_faults.h"
 #include "supple/scenes/read_scene.h"
 
 namespace supple::scenes {

@@ -223,7 +223,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");
   } else {
     ReadArchive archive(faults, *root, "");
-    fields(archive, scene);
+    scene_members(archive, scene);
     archive.finish();
   }
   faults.raise();

@@ -1,6 +1,8 @@
 #include "read_scene_archive.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numbers>
 
 namespace supple::scenes {
@@ -107,6 +109,102 @@ std::string ReadArchive::mapping_hint(const Node& node, const std::vector<FieldI
   std::vector<std::string_view> names;
   for (const FieldInfo& info : keys) names.push_back(info.key);
   return "write {key: value} with one or more of " + joined(names) + ',';
+}
+
+void ReadArchive::field(const Member& member, const Label& label, const Rule& rule) {
+  if (!rule.when.choices.empty() && faults_.has(path_of(rule.when.selector))) {
+    known_.push_back(label.key);  // the kind is not known, so nothing can be said about its keys
+    return;
+  }
+  if (!rule.when.applies()) {
+    idle_.push_back({label.key, rule.when});
+    return;
+  }
+  known_.push_back(label.key);
+  const std::string path = path_of(label.key);
+  if (const Node::Entry* entry = mapping_.find(label.key)) {
+    read(*entry->value, path, member, rule);
+  } else if (label.required) {
+    const MemberType& type = *member.type;
+    faults_.add(mapping_.mark, path, "expected " + expectation(type.type, type.choices, rule), "nothing", "this key is required");
+  }
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, const Member& member, const Rule& rule) {
+  const MemberType& type = *member.type;
+  switch (type.type) {
+    case FieldType::Number: return read_one<double>(node, path, member, rule);
+    case FieldType::Whole: return read_one<int>(node, path, member, rule);
+    case FieldType::Boolean: return read_one<bool>(node, path, member, rule);
+    case FieldType::Vector: return read_one<Vec3>(node, path, member, rule);
+    case FieldType::Text: return read(node, path, member.as<std::string>(), rule);
+    case FieldType::Vectors: return read(node, path, member.as<std::vector<Vec3>>(), rule);
+    case FieldType::Wholes: return read(node, path, member.as<std::vector<int>>(), rule);
+    case FieldType::Texts: return read(node, path, member.as<std::vector<std::string>>(), rule);
+    case FieldType::Choice:
+      if (const auto index = read_choice(node, path, type.choices)) type.choose(member.at, *index);
+      return;
+    case FieldType::Choices: return read_choices(node, path, member);
+    case FieldType::Mapping: return read_mapping(node, path, member);
+    case FieldType::Mappings:
+      if (!read_items(node, path, rule, "mappings")) return;
+      for (std::size_t i = 0; i < node.items.size(); ++i)
+        read_members(*node.items[i], path + '[' + std::to_string(i) + ']', type, type.add(member.at));
+      return;
+  }
+}
+
+template <class T>
+void ReadArchive::read_one(const Node& node, const std::string& path, const Member& member, const Rule& rule) {
+  if (!member.type->optional) return read(node, path, member.as<T>(), rule);
+  if (rule.automatic && node.kind == Node::Kind::Scalar && node.text == "auto") return;
+  const std::size_t before = faults_.count();
+  T value{};
+  read(node, path, value, rule);
+  if (faults_.count() == before) member.as<std::optional<T>>() = value;
+}
+
+void ReadArchive::read_choices(const Node& node, const std::string& path, const Member& member) {
+  const MemberType& type = *member.type;
+  type.clear(member.at);
+  if (node.kind != Node::Kind::List) {
+    if (node.kind == Node::Kind::Scalar && node.text == "none") return;
+    if (const auto index = read_choice(node, path, type.choices, FieldType::Choices)) type.choose(member.at, *index);
+    return;
+  }
+  std::vector<std::size_t> taken;
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    // A word that is refused stands for the first one.
+    const std::size_t one = read_choice(*node.items[i], path + '[' + std::to_string(i) + ']', type.choices).value_or(0);
+    if (std::find(taken.begin(), taken.end(), one) != taken.end()) continue;
+    taken.push_back(one);
+    type.choose(member.at, one);
+  }
+}
+
+void ReadArchive::read_mapping(const Node& node, const std::string& path, const Member& member) {
+  const MemberType& type = *member.type;
+  if (!type.optional) return read_members(node, path, type, member.at);
+  const bool word = node.kind == Node::Kind::Scalar && !node.quoted;
+  if (word && node.text == "false") return;
+  void* one = type.add(member.at);
+  if (!word || node.text != "true") return read_members(node, path, type, one);
+  Node empty;
+  empty.kind = Node::Kind::Mapping;
+  empty.mark = node.mark;
+  read_members(empty, path, type, one);
+}
+
+void ReadArchive::read_members(const Node& node, const std::string& path, const MemberType& type, void* one) {
+  if (node.kind != Node::Kind::Mapping) return refuse(node, path, type);
+  ReadArchive inner(faults_, node, path);
+  type.fields(inner, one);
+  inner.finish();
+}
+
+void ReadArchive::refuse(const Node& node, const std::string& path, const MemberType& type) {
+  const MappingInfo info = mapping_info(type);
+  fault(node, path, "expected a mapping", mapping_hint(node, info.keys, info.may_be_empty) + (type.optional ? " or false for none" : ""));
 }
 
 void ReadArchive::check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) {

@@ -2,60 +2,32 @@
 /// The archive that reads: one per mapping of the file.
 #pragma once
 
-#include <algorithm>
-#include <concepts>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "fields.h"
 #include "fields_info.h"
 #include "read_scene_faults.h"
 #include "yaml_tree.h"
 
 namespace supple::scenes {
 
-class ReadArchive {
+class ReadArchive final : public FieldArchive {
  public:
   /// @param mapping  a Mapping node   @param path  its key path, "" for the whole scene
   ReadArchive(FaultList& faults, const Node& mapping, std::string path)
       : faults_(faults), mapping_(mapping), path_(std::move(path)) {}
 
-  template <class T>
-  void operator()(std::string_view key, T& value, const Rule& rule, std::string_view /*meaning*/) {
-    field(key, value, rule, false);
-  }
-  template <class T>
-  void required(std::string_view key, T& value, const Rule& rule, std::string_view /*meaning*/) {
-    field(key, value, rule, true);
-  }
-  [[nodiscard]] bool given(std::string_view key) const { return mapping_.find(key) != nullptr; }
+  [[nodiscard]] bool given(std::string_view key) const override { return mapping_.find(key) != nullptr; }
   /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or
   /// another key of this mapping seems misspelt, which may be the one that `key` misses.
-  void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint);
-  /// Reports keys that no field took, and relations that do not hold. Call after `fields`.
+  void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) override;
+  /// Reports keys that no field took, and relations that do not hold. Call after the fields.
   void finish();
 
  private:
-  template <class T>
-  void field(std::string_view key, T& value, const Rule& rule, bool required) {
-    if (!rule.when.choices.empty() && faults_.has(path_of(rule.when.selector))) {
-      known_.push_back(key);  // the kind is not known, so nothing can be said about its keys
-      return;
-    }
-    if (!rule.when.applies()) {
-      idle_.push_back({key, rule.when});
-      return;
-    }
-    known_.push_back(key);
-    const std::string path = path_of(key);
-    if (const Node::Entry* entry = mapping_.find(key)) {
-      read(*entry->value, path, value, rule);
-    } else if (required) {
-      faults_.add(mapping_.mark, path, "expected " + expectation(value, rule), "nothing", "this key is required");
-    }
-  }
+  void field(const Member& member, const Label& label, const Rule& rule) override;
 
   [[nodiscard]] std::string path_of(std::string_view key) const {
     return path_.empty() ? std::string(key) : path_ + '.' + std::string(key);
@@ -64,6 +36,9 @@ class ReadArchive {
     faults_.add(node.mark, path, std::move(expected), node.described(), std::move(hint));
   }
 
+  void read(const Node& node, const std::string& path, const Member& member, const Rule& rule);
+  template <class T>
+  void read_one(const Node& node, const std::string& path, const Member& member, const Rule& rule);
   void read(const Node& node, const std::string& path, double& value, const Rule& rule);
   void read(const Node& node, const std::string& path, int& value, const Rule& rule);
   void read(const Node& node, const std::string& path, bool& value, const Rule& rule);
@@ -77,83 +52,12 @@ class ReadArchive {
   std::optional<std::size_t> read_choice(const Node& node, const std::string& path, std::span<const std::string_view> names,
                                          FieldType type = FieldType::Choice);
 
-  template <class E>
-    requires std::is_enum_v<E>
-  void read(const Node& node, const std::string& path, E& value, const Rule& /*rule*/) {
-    if (const auto index = read_choice(node, path, EnumNames<E>::names)) value = static_cast<E>(*index);
-  }
-
-  template <class E>
-    requires std::is_enum_v<E>
-  void read(const Node& node, const std::string& path, std::vector<E>& value, const Rule& rule) {
-    value.clear();
-    if (node.kind != Node::Kind::List) {
-      if (node.kind == Node::Kind::Scalar && node.text == "none") return;
-      if (const auto index = read_choice(node, path, EnumNames<E>::names, FieldType::Choices)) value = {static_cast<E>(*index)};
-      return;
-    }
-    for (std::size_t i = 0; i < node.items.size(); ++i) {
-      E one{};
-      read(*node.items[i], path + '[' + std::to_string(i) + ']', one, rule);
-      if (std::find(value.begin(), value.end(), one) == value.end()) value.push_back(one);
-    }
-  }
-
-  template <class T>
-    requires std::same_as<T, double> || std::same_as<T, int> || std::same_as<T, bool> || std::same_as<T, Vec3>
-  void read(const Node& node, const std::string& path, std::optional<T>& value, const Rule& rule) {
-    if (rule.automatic && node.kind == Node::Kind::Scalar && node.text == "auto") return;
-    const std::size_t before = faults_.count();
-    T read_value{};
-    read(node, path, read_value, rule);
-    if (faults_.count() == before) value = read_value;
-  }
-
-  template <Described D>
-  void read(const Node& node, const std::string& path, D& value, const Rule& /*rule*/) {
-    if (node.kind != Node::Kind::Mapping) {
-      refuse<D>(node, path, false);
-      return;
-    }
-    ReadArchive inner(faults_, node, path);
-    fields(inner, value);
-    inner.finish();
-  }
-
-  template <Described D>
-  void read(const Node& node, const std::string& path, std::optional<D>& value, const Rule& rule) {
-    if (node.kind == Node::Kind::Scalar && !node.quoted && node.text == "false") return;
-    value.emplace();
-    if (node.kind == Node::Kind::Scalar && !node.quoted && node.text == "true") {
-      Node empty;
-      empty.kind = Node::Kind::Mapping;
-      empty.mark = node.mark;
-      read(empty, path, *value, rule);
-    } else if (node.kind != Node::Kind::Mapping) {
-      refuse<D>(node, path, true);
-    } else {
-      read(node, path, *value, rule);
-    }
-  }
-
-  template <Described D>
-  void read(const Node& node, const std::string& path, std::vector<D>& value, const Rule& rule) {
-    if (!read_items(node, path, rule, "mappings")) return;
-    for (std::size_t i = 0; i < node.items.size(); ++i) {
-      read(*node.items[i], path + '[' + std::to_string(i) + ']', value.emplace_back(), rule);
-    }
-  }
-
+  void read_choices(const Node& node, const std::string& path, const Member& member);
+  void read_mapping(const Node& node, const std::string& path, const Member& member);
+  /// The members of one description. @pre node: a Mapping
+  void read_members(const Node& node, const std::string& path, const MemberType& type, void* one);
   /// A fault at what is no mapping.
-  template <Described D>
-  void refuse(const Node& node, const std::string& path, bool may_be_absent) {
-    InfoArchive keys;
-    EmptyArchive empty;
-    D listed{}, defaults{};
-    fields(keys, listed);
-    fields(empty, defaults);
-    fault(node, path, "expected a mapping", mapping_hint(node, keys.list, empty.complete) + (may_be_absent ? " or false for none" : ""));
-  }
+  void refuse(const Node& node, const std::string& path, const MemberType& type);
   /// What to write instead of `node`. @param may_be_empty  {} is complete
   static std::string mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty);
 

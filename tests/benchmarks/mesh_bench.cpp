@@ -37,8 +37,8 @@
 #include "supple/implicit/surface_grid.h"
 #ifdef SUPPLE_HAS_CGAL
 #include "supple/cgal/surface_meshes.h"
-#include "usage.h"
 #endif
+#include "usage.h"
 
 namespace {
 
