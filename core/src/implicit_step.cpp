@@ -3,27 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cross_matrix.h"
 #include "damping.h"
 #include "pair_hessians.h"
 #include "step.h"
-#include "supple/core/math.h"
 
 namespace supple::core {
 namespace {
-
-/// Inverse of the right Jacobian of the exponential: log(exp(delta) exp(phi)) = delta + J_r^-1 phi + O(phi^2).
-Mat3 inverse_right_jacobian(const Vec3& delta) {
-  const double angle2 = delta.squaredNorm();
-  const Mat3 cross = cross_matrix(delta);
-  double factor = 1.0 / 12.0 + angle2 / 720.0;
-  if (angle2 > 1e-4) {
-    const double angle = std::sqrt(angle2);
-    const math::SinCos half = math::sin_cos(0.5 * angle);
-    factor = (1.0 - 0.5 * angle * half.cos / half.sin) / angle2;
-  }
-  return Mat3::Identity() + 0.5 * cross + factor * cross * cross;
-}
 
 void turn(Quat& q, const Vec3& rotation) {
   q = rotation_exp(rotation) * q;
@@ -48,7 +33,7 @@ class StepPotential {
         inertial += delta.dot(set_.inertia[i].cwiseProduct(delta));
       }
     }
-    return 0.5 / (h_ * h_) * inertial + potential_energy(set_, pose, interactions_);
+    return 0.5 / (h_ * h_) * inertial + potential_energy(set_, pose, interactions_) + buffers_.contact.value(pose);
   }
 
   /// Leaves the loads of the pair laws in `buffers.laws` and the gradient in `buffers.gradient`.
@@ -72,20 +57,37 @@ class StepPotential {
             free_rotation(set_.pinned[i], pose.orientation[i] * inertial - buffers_.laws.torque[i]);
       }
     }
+    if (buffers_.contact.empty()) return;
+    buffers_.contact.add_gradient(pose, buffers_.gradient);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto row = static_cast<Eigen::Index>(6 * i);
+      buffers_.gradient.segment<3>(row) = free_translation(set_.pinned[i], buffers_.gradient.segment<3>(row));
+      buffers_.gradient.segment<3>(row + 3) = free_rotation(set_.pinned[i], buffers_.gradient.segment<3>(row + 3));
+    }
+  }
+
+  /// The same with the factor of the last `solve`. @return false: it has none
+  bool refine() {
+    if (!factorised_) return false;
+    buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
+    return true;
   }
 
   /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
   void solve(const IntegratorSettings& settings, const ParticleState& pose, StepReport& report) {
     const bool direct = 6 * set_.size() <= static_cast<std::size_t>(settings.direct_unknowns);
+    factorised_ = false;
     if (direct) {
       assemble(pose, HessianKind::Exact);
-      if (buffers_.solver.factorise(buffers_.hessian)) {
+      factorised_ = buffers_.solver.factorise(buffers_.hessian);
+      if (factorised_) {
         buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
         return;
       }
     }
     assemble(pose, HessianKind::PositiveSemiDefinite);
-    if (direct && buffers_.solver.factorise(buffers_.hessian)) {
+    factorised_ = direct && buffers_.solver.factorise(buffers_.hessian);
+    if (factorised_) {
       buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
       return;
     }
@@ -106,6 +108,8 @@ class StepPotential {
       buffers_.bonded.emplace_back(a, b);
       buffers_.blocks.push_back(h);
     });
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& coupled = buffers_.contact.coupled();
+    if (!buffers_.contact.empty()) buffers_.bonded.insert(buffers_.bonded.end(), coupled.begin(), coupled.end());
     buffers_.hessian.begin(set_.pinned, buffers_.bonded);
     for (std::size_t i = 0; i < set_.size(); ++i) {
       const Mat3 jacobian = inverse_right_jacobian(turned(pose, i)) * pose.orientation[i].conjugate().toRotationMatrix();
@@ -116,6 +120,7 @@ class StepPotential {
       buffers_.hessian.add_particle(static_cast<std::uint32_t>(i), h);
     }
     for (std::size_t k = 0; k < buffers_.blocks.size(); ++k) buffers_.hessian.add_pair(k, buffers_.blocks[k]);
+    buffers_.contact.add_hessian(pose, buffers_.blocks.size(), buffers_.hessian);
   }
 
   const ParticleSet& set_;
@@ -124,6 +129,7 @@ class StepPotential {
   double h_;
   InteractionWorkspace& pairs_;
   ImplicitBuffers& buffers_;
+  bool factorised_ = false;  ///< the matrix of the last `solve`
 };
 
 /// Size of a correction: positions over `length`, angles in radians.
@@ -163,10 +169,23 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
   constexpr double kRoundOff = 1e-14;    // of the potential
   constexpr double kLargestTurn = 0.5;   // [rad] in one correction
   constexpr int kMostHalvings = 30;
+  constexpr int kMostLags = 8;           // times that friction follows the normal forces
+  constexpr double kLagged = 1e-3;       // of all normal forces: a change that friction does not follow any more
+  constexpr double kStuck = 1e-3;       // of the stick speed: what a last correction may change of a slip
   report.within_tolerance = false;
-  double value = potential.value(buffers.pose);
-  potential.differentiate(buffers.pose);
+  double value = 0.0;
+  int lags = 0;
+  const auto begin_at_pose = [&] {
+    if (lags < kMostLags && buffers.contact.lag_friction(buffers.pose) > kLagged) {
+      ++lags;
+    } else {
+      lags = kMostLags;
+    }
+    potential.differentiate(buffers.pose);
+  };
+  begin_at_pose();
   for (int iteration = 0; iteration < settings.max_iterations; ++iteration) {
+    if (iteration == 0 || !buffers.contact.empty()) value = potential.value(buffers.pose);
     if ((buffers.gradient.array() == 0.0).all()) {
       report.last_correction = 0.0;
       report.within_tolerance = true;
@@ -178,7 +197,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     if (!std::isfinite(report.last_correction)) return;
 
     // A correction within the tolerance is the last one. Its gain may be less than the potential's rounding errors.
-    const bool last = report.last_correction <= settings.tolerance;
+    const bool last = report.last_correction <= settings.tolerance && buffers.contact.stick_ratio(buffers.correction) <= kStuck;
     const double slope = buffers.gradient.dot(buffers.correction);
     const double angle = largest_angle(buffers.correction);
     double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
@@ -186,7 +205,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     double next = value;
     for (int halving = 0; halving < kMostHalvings; ++halving) {
       move(buffers.pose, buffers.correction, share, buffers.trial);
-      next = potential.value(buffers.trial);
+      if (!last) next = potential.value(buffers.trial);
       found = last || next <= value + kDescent * share * slope + kRoundOff * std::abs(value);
       if (found) break;
       share *= 0.5;
@@ -194,8 +213,14 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     if (!found) return;
     std::swap(buffers.pose, buffers.trial);
     value = next;
-    potential.differentiate(buffers.pose);
+    begin_at_pose();
     if (last) {
+      // Friction is so steep in the slip that what is left of the correction would be felt by the velocities.
+      if (!buffers.contact.empty() && potential.refine()) {
+        move(buffers.pose, buffers.correction, 1.0, buffers.trial);
+        std::swap(buffers.pose, buffers.trial);
+        potential.differentiate(buffers.pose);
+      }
       report.within_tolerance = true;
       return;
     }
@@ -274,15 +299,17 @@ void book_external_work(const ParticleSet& set, const ParticleState& start, cons
 
 }  // namespace
 
-StepReport advance_implicit(const IntegratorSettings& settings, const ParticleSet& set,
-                            const Interactions& interactions, const ForceModel& forces, double time, double dt,
-                            ParticleState& state, KickState& kick, Ledger& ledger, const Executor& executor,
-                            InteractionWorkspace& pairs, ImplicitBuffers& buffers) {
+StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                            const StepTarget& target, const StepTools& tools, ImplicitBuffers& buffers) {
+  const ParticleSet& set = problem.set;
+  const Interactions& interactions = problem.interactions;
+  ParticleState& state = target.state;
+  Ledger& ledger = target.ledger;
   const bool midpoint = settings.method == Integrator::ImplicitMidpoint;
   const double h = midpoint ? 0.5 * dt : dt;
   const std::size_t n = set.size();
   for (ParticleState* s : {&buffers.flight, &buffers.pose, &buffers.trial}) s->resize(n);
-  kick.valid = false;
+  target.kick.valid = false;
   StepReport report{.substeps = 1, .force_evaluations = 1};
 
   stop_pinned(set, state);
@@ -293,19 +320,26 @@ StepReport advance_implicit(const IntegratorSettings& settings, const ParticleSe
   if (midpoint) {
     buffers.frozen.reset(n);
     fly(set, state, buffers.frozen, h, buffers.pose);
-    freeze(set, interactions, forces, time + h, buffers.pose, executor, pairs, buffers);
+    freeze(set, interactions, problem.forces, time + h, buffers.pose, tools.executor, tools.pairs, buffers);
   } else {
-    freeze(set, interactions, forces, time + h, state, executor, pairs, buffers);
+    freeze(set, interactions, problem.forces, time + h, state, tools.executor, tools.pairs, buffers);
   }
   fly(set, state, buffers.frozen, h, buffers.flight);
 
-  StepPotential potential(set, interactions, executor, h, pairs, buffers);
+  buffers.points.clear();
+  if (problem.contact != nullptr) problem.contact->find(buffers.flight, time + h, buffers.points);
+  // The start is kept: `state` changes before the contacts are booked.
+  buffers.start = state;
+  buffers.contact.begin(set, buffers.points, buffers.start, buffers.flight, {.h = h, .end_factor = midpoint ? 2.0 : 1.0},
+                        problem.contact != nullptr ? problem.contact->stick_speed : 1.0);
+
+  StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
   // Stiff bonds make free flight a bad first guess: the pose before the step may be a better one.
   buffers.pose = potential.value(buffers.flight) <= potential.value(state) ? buffers.flight : state;
   minimise(settings, potential, buffers, report);
 
-  buffers.trial = state;  // the start of the step from here on
-  const ParticleState& start = buffers.trial;
+  const ParticleState& start = buffers.start;
+  if (problem.contact != nullptr) buffers.contact.finish(buffers.pose, dt, buffers.laws, ledger, problem.contact->load);
   finish(set, start, dt, buffers, state, ledger);
   for (std::size_t i = 0; i < n; ++i) {
     if (midpoint && !holds_position(set, i)) {

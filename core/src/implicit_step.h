@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "contact_term.h"
 #include "step_hessian.h"
 #include "supple/core/integrators.h"
 
@@ -11,23 +12,24 @@ namespace supple::core {
 
 struct ImplicitBuffers {
   ForceSample sample;
-  Loads laws;       ///< of the pair laws
+  Loads laws;       ///< of the pair laws; at the end of contact, too
   Loads unused;     ///< external loads that the pair laws come with
   Loads frozen;     ///< all loads outside the pair laws
   ParticleState flight;  ///< after free flight under the frozen loads
+  ParticleState start;   ///< after the first half of the damping
   ParticleState pose;
   ParticleState trial;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> bonded;
   std::vector<PairHessian> blocks;
+  ContactPoints points;
+  ContactTerm contact;
   StepHessian hessian;
   StepSolver solver;
   Eigen::VectorXd gradient;
   Eigen::VectorXd correction;
 };
 
-StepReport advance_implicit(const IntegratorSettings& settings, const ParticleSet& set,
-                            const Interactions& interactions, const ForceModel& forces, double time, double dt,
-                            ParticleState& state, KickState& kick, Ledger& ledger, const Executor& executor,
-                            InteractionWorkspace& pairs, ImplicitBuffers& buffers);
+StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                            const StepTarget& target, const StepTools& tools, ImplicitBuffers& buffers);
 
 }  // namespace supple::core

@@ -124,15 +124,17 @@ void StepHessian::add_pair(std::size_t index, const PairHessian& h) {
   const auto [first, second] = pairs_[index];
   add_diagonal(first, h.topLeftCorner<6, 6>());
   add_diagonal(second, h.bottomRightCorner<6, 6>());
-  const std::uint32_t low = std::min(first, second);
-  const std::uint32_t high = std::max(first, second);
-  const Mat6 block = first < second ? Mat6(h.bottomLeftCorner<6, 6>()) : Mat6(h.topRightCorner<6, 6>());
+  add_coupling(index, first < second ? Mat6(h.bottomLeftCorner<6, 6>()) : Mat6(h.topRightCorner<6, 6>()));
+}
+
+void StepHessian::add_coupling(std::size_t index, const Mat6& h) {
+  const auto [low, high] = std::minmax(pairs_[index].first, pairs_[index].second);
   for (int c = 0; c < 6; ++c) {
     if (held(low, c)) continue;
     double* const column = matrix_.valuePtr() + matrix_.outerIndexPtr()[6 * static_cast<Eigen::Index>(low) + c] +
                            (6 - c) + 6 * static_cast<std::ptrdiff_t>(rank_[index]);
     for (int r = 0; r < 6; ++r) {
-      if (!held(high, r)) column[r] += block(r, c);
+      if (!held(high, r)) column[r] += h(r, c);
     }
   }
 }

@@ -24,6 +24,8 @@ class StepHessian {
   void add_particle(std::uint32_t i, const Mat6& h);
   /// The Hessian of pair `index` of the list given to `begin`.
   void add_pair(std::size_t index, const PairHessian& h);
+  /// Only what couples the two particles of pair `index`. @param h  rows of the particle with the larger number
+  void add_coupling(std::size_t index, const Mat6& h);
   [[nodiscard]] const Eigen::SparseMatrix<double>& matrix() const { return matrix_; }
   /// Raised whenever the pattern changes.
   [[nodiscard]] std::uint64_t pattern() const { return pattern_; }

@@ -48,7 +48,8 @@ template <class Archive>
 void fields(Archive& archive, IntegratorDesc& d) {
   using enum MethodName;
   archive("method", d.method, {},
-          "auto: symplectic unless stiffness makes backward_euler cheaper by far; `supple explain` says which and why");
+          "auto: symplectic unless stiffness makes backward_euler cheaper by far; `supple explain` says which and why. backward_euler and "
+          "implicit_midpoint solve contact and friction within the step, so that what friction holds stays");
   archive("rotation", d.rotation, Rule{}.only("method", d.method, {Auto, Symplectic}),
           "of free bodies: about one principal axis after another, or about the axis of the middle attitude");
   archive("tolerance", d.tolerance,

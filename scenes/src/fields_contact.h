@@ -50,7 +50,7 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("rule", d.rule, {}, "points of the contact surface: along the seeds' rays, in polar rings about the peak, on triangles that are refined; auto: polar where it fits, else what meets the error");
   archive("split", d.split, {}, "how forces reach the particles: gradient of the contact energy, or by contribution");
   archive("core", d.core, {}, "soft: bodies pressed too hard pass one another, which is reported; barrier: deep cores turn back what approaches");
-  archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out; pairs that a time step would turn back, to and fro, have a higher one");
+  archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out; pairs that an explicit time step would turn back, to and fro, have a higher one; implicit methods have one that shows no creep");
   archive("stick", d.stick, {}, "friction by springs that hold up to the Coulomb limit: what should stay stays; absent: it creeps");
   archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
   archive("bulge_volume", d.bulge_volume, {}, "in place of 'bulge': as high as holds the volume that the contact displaces, to 1e-3 of it; a warning tells where the fields or 'bulge_width' do not let it");

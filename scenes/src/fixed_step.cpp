@@ -233,13 +233,12 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
 
 std::optional<TooCoarse> find_unstable_contact(const StageContext& context, const TakenStep& step,
                                                const std::vector<implicit::SampleState>& samples, const Frame& seen, double limit,
-                                               bool rigid, Frame& trial) {
+                                               Frame& trial) {
   std::vector<collision::PartMobility> mobility;
   find_mobility(context, step.after, seen, mobility);
   // What half a step's push makes of the kinetic energy of a pair that holds `energy`, beyond what there is [J].
   const auto gain = [&](const Summary& s, double energy) {
-    const double inverse_mass = rigid ? 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b)
-                                      : collision::approach_inverse_mass(seen.bodies, mobility, s);
+    const double inverse_mass = collision::approach_inverse_mass(seen.bodies, mobility, s);
     if (!(inverse_mass > 0.0)) return 0.0;
     const double push = step.size * s.force.norm() * inverse_mass / std::sqrt(limit);  // [m/s]
     const double speed = std::max(collision::measure_approach(seen.bodies, s).speed, 0.0);

@@ -33,9 +33,9 @@ struct TakenStep {
 /// The first pair that half a step's push would give more energy than there is: from rest more than its contact holds (of a
 /// linear spring, omega step > 2, the limit of velocity Verlet), or by damping more than it holds and comes with.
 /// @param seen  with the contact surface after the step  @param limit  of (omega step)^2 of the method
-/// @param rigid  bodies are pushed as wholes, as by implicit methods  @param trial  to be used for energies; may be `seen`
+/// @param trial  to be used for energies; may be `seen`
 [[nodiscard]] std::optional<TooCoarse> find_unstable_contact(const StageContext& context, const TakenStep& step,
                                                              const std::vector<implicit::SampleState>& samples, const Frame& seen,
-                                                             double limit, bool rigid, Frame& trial);
+                                                             double limit, Frame& trial);
 
 }  // namespace supple::scenes

@@ -498,4 +498,19 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   profile.present += frame.surface.point.size();
 }
 
+void linearise_reactions(const StageContext& context, Frame& frame, core::ContactPoints& out) {
+  frame.reaction = {};
+  frame.traction_force.clear();
+  frame.pair_power.clear();
+  out.clear();
+  if (frame.surface.summary.empty()) return;
+  StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
+  StageTimer timer(profile, context.every_call);
+  std::vector<std::span<const std::uint32_t>> particles(frame.bodies.size());
+  for (std::size_t i = 0; i < context.bodies.size(); ++i) particles[i] = context.bodies[i].particle;
+  collision::linearise_contacts(frame.bodies, context.rules, frame.surface, particles, frame.linearise, out);
+  profile.visited += frame.surface.point.size();
+  profile.present += frame.surface.point.size();
+}
+
 }  // namespace supple::scenes

@@ -9,6 +9,7 @@
 
 #include "supple/collision/deformed_field.h"
 #include "supple/collision/find_contacts.h"
+#include "supple/collision/linearise.h"
 #include "supple/collision/react.h"
 #include "supple/collision/sleep.h"
 #include "supple/core/content_versions.h"
@@ -86,6 +87,7 @@ struct Frame {
   collision::ReactionReport reaction;
   std::vector<Vec3> traction_force;           ///< by pair of `surface`
   std::vector<double> pair_power;             ///< that damping and friction take [W], by pair of `surface`
+  collision::LineariseScratch linearise;      ///< of implicit steps
 
   // bodies that rest, placed and boxed once
   std::vector<std::uint32_t> resting;         ///< ascending
@@ -152,6 +154,9 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
 
 /// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
 void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
+
+/// Stage 7 of implicit steps: the contact surface as points whose pressure is linear in the approach.
+void linearise_reactions(const StageContext& context, Frame& frame, core::ContactPoints& out);
 
 /// All that the field of a body depends on, bit by bit; fixed ones follow those that move.
 void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words);

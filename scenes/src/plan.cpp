@@ -250,13 +250,18 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   if (plan.reason.empty()) plan.reason = std::string(name_of(scene.integrator.method)) + ": the scene asks for it";
   const bool implicit = core::is_implicit(plan.settings.method);
   plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? 1e-9 : 1e-6);
-  plan.limiting_frequency = implicit ? model.contact_frequency : all;
+  plan.limiting_frequency = !implicit ? all : plan.chosen ? model.contact_frequency : 0.0;
   if (plan.settings.method == Integrator::Adaptive) {
     plan.limiting_frequency = 0.0;
     plan.settings.first_step = core::stable_step({.frequency = all});
     if (!std::isfinite(plan.settings.first_step)) plan.settings.first_step = 0.0;
   }
   return plan;
+}
+
+double stick_speed(const Scene& scene, const Model& model) {
+  constexpr double kCreep = 1e-7;  // smallest lengths a second [1/s]
+  return std::min(scene.contact.friction_speed, kCreep * model.smallest_length);
 }
 
 bool well_formed(const StepPlan& plan) {

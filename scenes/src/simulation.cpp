@@ -24,6 +24,7 @@ Simulation::Impl::Impl(Scene s, SimulationOptions o)
       workspace(model.particles, laws),
       integrator(plan_integrator(scene, model)),
       pulled(model, bodies) {
+  if (core::is_implicit(integrator.settings.method)) model.reaction.friction_speed = stick_speed(scene, model);
   if (scene.output.meshing.method == MeshingName::Delaunay && !options.delaunay) {
     ModelFaults faults(scene);
     faults.add("output.meshing.method", "expected a program with the component supple_cgal for delaunay", "one without it",
@@ -97,9 +98,14 @@ void Simulation::Impl::step() {
     StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
     // Timed with the force evaluation inside, whose share `Simulation::profile` takes off again.
     StageTimer timer(p, options.profile);
-    const core::StepReport report =
-        core::advance(integrator.settings, particles, awake_laws, forces, time(), dt(), state.particles,
-                      state.kick, state.ledger, executor, workspace, integrator_workspace);
+    core::ImplicitContact contact = implicit_contact();
+    const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr},
+                                                  time(), dt(), {state.particles, state.kick, state.ledger},
+                                                  {executor, workspace, integrator_workspace});
+    if (contact.find) {
+      frame.pair_power.resize(contact.load.size());
+      for (std::size_t k = 0; k < contact.load.size(); ++k) frame.pair_power[k] = contact.load[k].dissipated / dt();
+    }
     book_work(report);
     for (const std::uint32_t i : awake) p.visited += bodies[i].origin.is_group() ? 0 : bodies[i].particle.size();
     p.present += particles.size();
@@ -148,7 +154,7 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
     p.visited += counts.pairs_visited;
     p.present += counts.pairs_present;
   }
-  if (contact_on()) {
+  if (contact_on() && !core::is_implicit(integrator.settings.method)) {
     StageContext now = context();
     now.time = at;
     find_contact_surface(now, at_state, state.samples, frame, false);
@@ -156,10 +162,25 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
   }
 }
 
+/// Contact as a part of an implicit step; nothing to find where the method is explicit or nothing touches.
+core::ImplicitContact Simulation::Impl::implicit_contact() {
+  core::ImplicitContact contact{.find = {}, .stick_speed = model.reaction.friction_speed};
+  if (!core::is_implicit(integrator.settings.method)) return contact;
+  frame.surface.clear();
+  if (!contact_on()) return contact;
+  contact.find = [this](const core::ParticleState& pose, double at, core::ContactPoints& out) {
+    StageContext now = context();
+    now.time = at;
+    find_contact_surface(now, pose, state.samples, frame, false);
+    linearise_reactions(now, frame, out);
+  };
+  return contact;
+}
+
 /// After a step: springs of friction yield and follow their contacts. What the dissipative loads put into them is not lost.
 void Simulation::Impl::commit_friction() {
   const collision::StickRule& rule = model.reaction.stick;
-  if (!(rule.stiffness > 0.0) || awake.empty() || !contact_on()) return;
+  if (!(rule.stiffness > 0.0) || awake.empty() || !contact_on() || core::is_implicit(integrator.settings.method)) return;
   if (integrator.settings.method != core::Integrator::Symplectic) {
     // The last trial of other methods need not be the state they end with.
     std::vector<implicit::SampleState> trial = state.samples;

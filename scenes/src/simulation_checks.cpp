@@ -37,14 +37,14 @@ void Simulation::Impl::check_fixed_step() {
 /// Where pairs are pushed by forces of the present state. @throws Error{Diverged}
 void Simulation::Impl::check_fixed_push() {
   const core::Integrator method = integrator.settings.method;
-  // The adaptive method takes as many steps within one as contacts ask for.
-  if (method == core::Integrator::Adaptive || !contact_on() || contact_bounds_hold(model, step_begin, dt())) return;
+  // The adaptive method takes as many steps within one as contacts ask for; implicit steps hold any.
+  if (method == core::Integrator::Adaptive || core::is_implicit(method) || !contact_on() || contact_bounds_hold(model, step_begin, dt())) return;
   Profile unused{};
   const StageContext quiet = quiet_context(unused);
   const TakenStep step{.before = step_begin, .after = state.particles, .end = time(), .size = dt()};
   const double limit = method == core::Integrator::RungeKutta4 ? 8.0 : 4.0;
   const auto found =
-      find_unstable_contact(quiet, step, state.samples, seen_contacts(quiet), limit, core::is_implicit(method), pulled);
+      find_unstable_contact(quiet, step, state.samples, seen_contacts(quiet), limit, pulled);
   if (found) throw_too_coarse(*found);
 }
 

@@ -67,12 +67,16 @@ struct Simulation::Impl {
   void step();
   void refine_step();
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
+  core::ImplicitContact implicit_contact();
   void commit_friction();
   void book_work(const core::StepReport& report);
   [[nodiscard]] double frame_time() const { return 1.0 / scene.frame_rate; }
   [[nodiscard]] double dt() const { return std::ldexp(frame_time(), -state.halvings); }
-  /// For which loads act unchanged [s]; the adaptive method chooses steps of its own.
-  [[nodiscard]] double held_step() const { return integrator.settings.method != core::Integrator::Adaptive ? dt() : 0.0; }
+  /// For which friction acts unchanged [s]: explicit steps of a size that is known.
+  [[nodiscard]] double held_step() const {
+    const core::Integrator method = integrator.settings.method;
+    return method == core::Integrator::Adaptive || core::is_implicit(method) ? 0.0 : dt();
+  }
   [[nodiscard]] double time() const { return (state.frame - 1) * frame_time() + state.substep * dt(); }
   [[nodiscard]] bool contact_on() const { return !options.skip || plan.on(Stage::FindContacts); }
 

@@ -100,7 +100,7 @@ Result run(System s, const IntegratorSettings& settings, double dt) {
   const auto steps = static_cast<int>(std::lround(s.end / dt));
   const double begin = cpu_seconds();
   for (int k = 0; k < steps && result.sound; ++k) {
-    advance(settings, s.p.set, s.laws, forces, k * dt, dt, s.p.state, kick, ledger, executor, pairs, workspace);
+    advance(settings, {s.p.set, s.laws, forces}, k * dt, dt, {s.p.state, kick, ledger}, {executor, pairs, workspace});
     result.sound = !find_divergence(s.p.set, s.p.state, 1e3, 1e6).found;
   }
   result.cpu = cpu_seconds() - begin;

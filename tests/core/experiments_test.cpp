@@ -47,7 +47,7 @@ double tip_deflection(int bonds, double force, double shear_stiffness) {
   for (int k = 0; k < 40 && std::abs(p.state.position.back().z() - before) > 1e-9 * std::abs(before); ++k) {
     before = p.state.position.back().z();
     const StepReport report =
-        advance(settings, p.set, interactions, forces, 10.0 * k, 10.0, p.state, kick, ledger, executor, pairs, workspace);
+        advance(settings, {p.set, interactions, forces}, 10.0 * k, 10.0, {p.state, kick, ledger}, {executor, pairs, workspace});
     EXPECT_TRUE(report.within_tolerance) << bonds << " bonds, step " << k;
     for (Vec3& v : p.state.velocity) v.setZero();
     for (Vec3& l : p.state.angular_momentum) l.setZero();

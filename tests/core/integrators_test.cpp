@@ -24,6 +24,7 @@ struct System {
   KickState kick;
   Ledger ledger;
   IntegratorWorkspace workspace;
+  ImplicitContact* contact = nullptr;
   double time = 0.0;
   StepReport report;  ///< sums over all steps
 
@@ -42,7 +43,7 @@ struct System {
   void run(const ForceModel& forces, double dt, int steps, const Executor& executor, InteractionWorkspace& pairs) {
     for (int k = 0; k < steps; ++k) {
       const StepReport step =
-          advance(settings, p.set, interactions, forces, time, dt, p.state, kick, ledger, executor, pairs, workspace);
+          advance(settings, {p.set, interactions, forces, contact}, time, dt, {p.state, kick, ledger}, {executor, pairs, workspace});
       report.substeps += step.substeps;
       report.rejected += step.rejected;
       report.force_evaluations += step.force_evaluations;

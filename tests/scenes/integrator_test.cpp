@@ -1,7 +1,9 @@
 /// The key `integrator`: what each choice does to a scene, and what `auto` chooses.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "supple/core/error.h"
 #include "supple/scenes/query.h"
@@ -170,11 +172,68 @@ objects:
       simulation.step_frame();
       lowest = std::min(lowest, simulation.state().particles.position[0].z());
     }
-    // It falls .17 m to the ground in .19 s and is at the top again at .4 s, but for a little of the energy.
+    // It falls .17 m to the ground in .19 s and is at the top again at .4 s, but for a little of the energy; backward Euler takes more of it.
     EXPECT_GT(lowest, 0.1) << name;
     EXPECT_LT(lowest, 0.25) << name;
-    EXPECT_NEAR(simulation.state().particles.position[0].z(), 0.4, 0.05) << name;
+    EXPECT_NEAR(simulation.state().particles.position[0].z(), 0.4, std::string(name) == "backward_euler" ? 0.2 : 0.05) << name;
     EXPECT_LT(simulation.audits().momentum_error, 1e-12) << name;
+  }
+}
+
+/// A table of four feet on a slope of 20 degrees, whose friction with it is `friction`.
+Simulation table_on_slope(const std::string& integrator, double friction, int threads = 1) {
+  return make(R"(
+schema: 1
+duration: 2 s
+frame_rate: 24
+gravity: [0, 0, -9.81]
+)" + method(integrator) + R"(
+objects:
+  - name: table
+    particles: {arrange: single, at: [-0.3504, 0, 0.2068], axis: [0.342020143, 0, 0.939692621], mass: 0.5, inertia_radius: 0.12}
+    skeleton:
+      - {shape: point, at: [0.1, 0.1, -0.03], kernel: {type: wyvill, radius: 0.1}}
+      - {shape: point, at: [0.1, -0.1, -0.03], kernel: {type: wyvill, radius: 0.1}}
+      - {shape: point, at: [-0.1, 0.1, -0.03], kernel: {type: wyvill, radius: 0.1}}
+      - {shape: point, at: [-0.1, -0.1, -0.03], kernel: {type: wyvill, radius: 0.1}}
+    contact: {modulus: 5e4, dissipation: 1}
+obstacles: [{name: slope, shape: plane, normal: [0.342020143, 0, 0.939692621], modulus: 1e9}]
+pairs: [{objects: [table, slope], friction: )" + std::to_string(friction) + "}]\n", threads);
+}
+
+TEST(ImplicitContact, HoldsATableBelowTheAngleOfFrictionWithoutSprings) {
+  Simulation simulation = table_on_slope("backward_euler", 0.5);
+  run(simulation, 13);  // it has settled
+  const Vec3 before = simulation.state().particles.position[0];
+  run(simulation, 37);
+  EXPECT_LT((simulation.state().particles.position[0] - before).norm(), 1e-6 * 0.2) << "of its size, in a second";
+  EXPECT_TRUE(simulation.integration().within_tolerance);
+}
+
+TEST(ImplicitContact, LetsATableSlideWithWhatFrictionLeaves) {
+  for (const std::string& name : {"backward_euler", "implicit_midpoint"}) {
+    Simulation simulation = table_on_slope(name, 0.2);
+    run(simulation, 7);
+    const double before = simulation.state().particles.velocity[0].norm();
+    run(simulation, 13);
+    const double gained = simulation.state().particles.velocity[0].norm() - before;
+    const double slope = 20.0 * std::numbers::pi / 180.0;
+    const double expected = 0.25 * 9.81 * (std::sin(slope) - 0.2 * std::cos(slope));
+    EXPECT_NEAR(gained, expected, 5e-3 * expected) << name;
+  }
+}
+
+TEST(ImplicitContact, GivesTheSameBitsForAnyThreadsAndAfterARestart) {
+  for (const std::string& name : {"backward_euler", "implicit_midpoint"}) {
+    Simulation one = table_on_slope(name, 0.3), four = table_on_slope(name, 0.3, 4);
+    run(one, 5);
+    Simulation again = table_on_slope(name, 0.3);
+    again.restore(one.state());
+    run(one, 9);
+    run(four, 9);
+    run(again, 9);
+    EXPECT_EQ(four.state_hash(), one.state_hash()) << name;
+    EXPECT_EQ(again.state_hash(), one.state_hash()) << name;
   }
 }
 

@@ -16,12 +16,14 @@
 ///   Pi = 1/(2 h^2) sum_i (m |x - x~|^2 + delta^T I delta) + U(x, q),   delta = log(q~^-1 q) in body axes,
 /// with x~, q~ the free flight over h under the loads outside U; implicit midpoint takes it with h = dt/2 as its middle
 /// and continues by the mirrored half step. The minimum is sought by Newton's method with the Hessians of the pair laws
-/// and a line search. Loads that are not in `Interactions` (contact) are frozen over the step: at its start in backward
-/// Euler, at the middle of free flight in the midpoint rule. They keep the limit omega dt < 2 of their own frequency.
+/// and a line search. Contact is a part of the potential (compliant_contact.h): it is found once a step, at the pose that free
+/// flight under the external loads leads to, and is linear about it. Other loads that are not in `Interactions` are frozen over the
+/// step: at its start in backward Euler, at the middle of free flight in the midpoint rule.
 #pragma once
 
 #include <memory>
 
+#include "supple/core/compliant_contact.h"
 #include "supple/core/executor.h"
 #include "supple/core/integrate.h"
 
@@ -71,14 +73,35 @@ class IntegratorWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// One step of size dt by the chosen method. Books work, dissipation and impulses to `ledger` by the quadrature of the
-/// method. `pairs` is the workspace of `interactions`; the implicit methods use it. The substep that `Adaptive` would try next is kept in `kick`, so that a run continues with the same bits.
+/// What moves and what acts on it.
+struct StepProblem {
+  const ParticleSet& set;
+  const Interactions& interactions;
+  const ForceModel& forces;
+  /// Of the implicit methods: contact as a part of the step; `forces` then leave it out. Null: all that acts beside the pair laws is frozen.
+  ImplicitContact* contact = nullptr;
+};
+
+/// What a step changes.
+struct StepTarget {
+  ParticleState& state;
+  KickState& kick;
+  Ledger& ledger;
+};
+
+/// What a step works with. `pairs` is the workspace of `StepProblem::interactions`; the implicit methods use it.
+struct StepTools {
+  const Executor& executor;
+  InteractionWorkspace& pairs;
+  IntegratorWorkspace& workspace;
+};
+
+/// One step of size dt by the chosen method. Books work, dissipation and impulses to the ledger by the quadrature of the
+/// method. The substep that `Adaptive` would try next is kept in `kick`, so that a run continues with the same bits.
 /// Momentum is exact in every method: velocities change by the loads alone, not by what Newton's method left.
 /// Deterministic: substeps and iterations follow from the state alone. The explicit methods allocate nothing after the
 /// first step.
-StepReport advance(const IntegratorSettings& settings, const ParticleSet& set, const Interactions& interactions,
-                   const ForceModel& forces, double time, double dt, ParticleState& state, KickState& kick,
-                   Ledger& ledger, const Executor& executor, InteractionWorkspace& pairs,
-                   IntegratorWorkspace& workspace);
+StepReport advance(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt, const StepTarget& target,
+                   const StepTools& tools);
 
 }  // namespace supple::core

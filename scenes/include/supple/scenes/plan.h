@@ -84,13 +84,17 @@ struct IntegratorPlan {
   double pair_frequency = 0.0;  ///< largest of the pair laws about rest [rad/s]
   bool chosen = false;          ///< by the cost model: `integrator.method` is auto and the scene does not fix the step
   std::string reason;
-  /// Frequency that limits the step [rad/s]: implicit methods leave out the pair laws, the adaptive one finds its own.
+  /// Frequency that limits the step [rad/s]. The adaptive method finds its own; implicit methods need none, but one that `auto` took resolves contact.
   double limiting_frequency = 0.0;
 };
 
 /// `auto` takes velocity Verlet unless a frame needs more of its steps than `time_step.max_substeps`, or more by
 /// kImplicitCost than backward Euler does at the limits that remain to it: a count of steps, never a clock.
 [[nodiscard]] IntegratorPlan plan_integrator(const Scene& scene, const Model& model);
+
+/// Of implicit methods: the speed below which friction fades out [m/s]. What friction holds creeps no faster, so it is far below what a
+/// scene shows.
+[[nodiscard]] double stick_speed(const Scene& scene, const Model& model);
 
 /// What a step of backward Euler costs in steps of velocity Verlet, about: three corrections, each with the Hessian of
 /// every pair and a Cholesky factor, are worth 110 for a chain of 10 particles and 2300 for a shell of 1000.

@@ -1,0 +1,66 @@
+/// @file supple/core/compliant_contact.h
+/// Contact as a part of an implicit step. The contact surface is given by quadrature points at a predicted pose; at each of
+/// them the pressure is linear in how far the two bodies approach there, and both bodies move there as the weighted mean of
+/// their particles. The step then minimises, beside inertia and pair laws,
+///   sum_q l_n(u_q . n) + sum_q l_t(v_q),
+/// u_q the displacement of body A relative to B within the step, v_q their relative velocity along the surface at its end:
+///   l_n' = w [p + g (u - u_p) . n]_+ (1 + d u . n / h)_+     pressure, and damping (Hunt & Crossley 1975); increases, so l_n is convex,
+///   l_t' = mu N f1(|v_q|) v_q / |v_q|                        Coulomb friction, N the normal force of the last iterate (Li et al. 2020),
+/// with weight w, pressure p and approach u_p . n at the predicted pose, and the slope g of the pressure in the approach: for parallel
+/// layers p = g_A d_A = g_B d_B, so g = g_A g_B / (g_A + g_B). Compare Castro, Permenter & Han 2022 ("unconstrained convex formulation").
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "supple/core/particles.h"
+
+namespace supple::core {
+
+/// Which body of a pair has no particles: an obstacle.
+enum class ObstacleSide : std::uint8_t { None, A, B };
+
+/// The contacts of all pairs of bodies at one pose; one array per attribute.
+struct ContactPoints {
+  struct Pair {
+    std::uint32_t begin = 0, end = 0;  ///< its points
+    double friction = 0.0;             ///< mu [1]
+    double dissipation = 0.0;          ///< d [s/m]
+    ObstacleSide obstacle = ObstacleSide::None;
+  };
+  std::vector<Pair> pair;
+
+  std::vector<Vec3> point;        ///< X [m]
+  std::vector<Vec3> normal;       ///< n, unit, out of A and into B
+  std::vector<double> weight;     ///< w [m^2]
+  std::vector<double> pressure;   ///< p [Pa]
+  std::vector<double> slope;      ///< g [Pa/m], >= 0
+  std::vector<Vec3> obstacle_velocity;  ///< of the obstacle at the point [m/s]; zero where there is none
+
+  /// Row q holds the particles that move with the bodies at point q, [offset[q], offset[q + 1]). Shares of A are positive and sum to 1,
+  /// those of B are negative and sum to -1.
+  std::vector<std::uint32_t> offset;
+  std::vector<std::uint32_t> particle;
+  std::vector<double> share;
+
+  void clear();
+};
+
+/// What a step did to a pair.
+struct ContactPairLoad {
+  Vec3 force = Vec3::Zero();  ///< on A [N]; B gets the opposite
+  double dissipated = 0.0;    ///< by damping and friction in the step [J], >= 0
+};
+
+/// Fills in the contacts at a pose and a time.
+using ContactModel = std::function<void(const ParticleState& pose, double time, ContactPoints& out)>;
+
+struct ImplicitContact {
+  ContactModel find;
+  /// Below which friction fades out [m/s]: what holds creeps at most so fast, or at a thousandth of the pair's relative speed if that is more.
+  double stick_speed = 1e-8;
+  std::vector<ContactPairLoad> load{};  ///< of the last step, by ContactPoints::pair
+};
+
+}  // namespace supple::core
