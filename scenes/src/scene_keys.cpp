@@ -71,8 +71,13 @@ std::string content_text(const std::filesystem::path& path) {
   std::error_code status;
   if (!std::filesystem::is_regular_file(path, status)) return "absent";
   std::ifstream file(path, std::ios::binary);
-  const std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  return "content " + to_hex(hash_bytes(std::as_bytes(std::span(content))));
+  std::string part(std::size_t{1} << 20, '\0');  // what is in memory at once
+  Hasher hasher;
+  while (file) {
+    file.read(part.data(), static_cast<std::streamsize>(part.size()));
+    hasher.add(std::string_view(part).substr(0, static_cast<std::size_t>(file.gcount())));
+  }
+  return "content " + to_hex(hasher.value());
 }
 
 std::string value_text(double value, const Rule& rule) { return rule.degrees ? degrees_text(value) : number_text(value); }
