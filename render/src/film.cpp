@@ -104,33 +104,36 @@ std::string number_text(double value) {
   return text;
 }
 
-/// Of the pictures of a film and of how they are encoded; a part of the film itself.
-std::string identity_of(const std::vector<std::string>& arguments, const std::vector<std::filesystem::path>& pictures) {
+constexpr std::string_view kPictures = "pictures ";
+constexpr std::string_view kNote = "; note ";
+
+/// Of the pictures of a film and of how they are encoded, and its note; a part of the film itself.
+std::string identity_of(const std::vector<std::string>& arguments, const std::vector<std::filesystem::path>& pictures, const std::string& note) {
   Hasher hasher;
   for (const std::string& argument : arguments) hasher.add(std::string_view(argument));
   for (const std::filesystem::path& picture : pictures) {
     std::ifstream in(picture, std::ios::binary);
     hasher.add(std::string_view(std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}));
   }
-  return "pictures " + to_hex(hasher.value());
+  return std::string(kPictures) + to_hex(hasher.value()) + std::string(kNote) + note + ';';
 }
 
-/// Whether an MP4 says so in its box of facts, without reading its pictures.
-bool says(const std::filesystem::path& film, const std::string& identity) {
+/// The facts about an MP4, which stand before its pictures; empty for what is none of ours.
+std::string facts_of(const std::filesystem::path& film) {
   std::error_code absent;
   const std::uintmax_t length = std::filesystem::file_size(film, absent);
-  if (absent) return false;
+  if (absent) return {};
   std::ifstream in(film, std::ios::binary);
   for (std::array<unsigned char, 8> head{}; in.read(reinterpret_cast<char*>(head.data()), head.size());) {
     const std::size_t size = std::size_t{head[0]} << 24 | std::size_t{head[1]} << 16 | std::size_t{head[2]} << 8 | std::size_t{head[3]};
-    if (size < head.size() || size > length) return false;
+    if (size < head.size() || size > length) return {};
     const std::string_view kind(reinterpret_cast<const char*>(&head[4]), 4);
-    if (kind == "mdat") return false;  // the facts come first in films of `encode_film`
+    if (kind == "mdat") return {};  // the facts come first in films of `encode_film`
     std::string box(size - head.size(), '\0');
-    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) return false;
-    if (kind == "moov") return box.find(identity) != std::string::npos;
+    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) return {};
+    if (kind == "moov") return box;
   }
-  return false;
+  return {};
 }
 
 }  // namespace
@@ -150,7 +153,8 @@ void find_film_program() {
 }
 
 void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
-                 const std::filesystem::path& film) {
+                 const FilmFile& file) {
+  const std::filesystem::path& film = file.path;
   SUPPLE_EXPECTS(0 <= first && first <= last);
   SUPPLE_EXPECTS(std::isfinite(frame_rate) && frame_rate > 0.0);
   // ffmpeg ends the film without a word where a number is missing.
@@ -166,8 +170,8 @@ void encode_film(const std::filesystem::path& folder, const std::string& stem, i
       "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-pix_fmt", "yuv420p",
       "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv",
       "-movflags", "+faststart", "-f", "mp4"};
-  const std::string identity = identity_of(encoding, pictures);
-  if (says(film, identity)) return;
+  const std::string identity = identity_of(encoding, pictures, file.note);
+  if (facts_of(film).find(identity) != std::string::npos) return;
 
   const std::filesystem::path temporary =
       std::filesystem::absolute(film).parent_path() /
@@ -202,6 +206,15 @@ void encode_film(const std::filesystem::path& folder, const std::string& stem, i
     std::filesystem::remove(temporary, ignored);
     fail(film.string(), "cannot be written: " + error.message(), {});
   }
+}
+
+std::optional<std::string> film_note(const std::filesystem::path& film) {
+  const std::string facts = facts_of(film);
+  const std::size_t pictures = facts.find(kPictures);
+  const std::size_t note = pictures == std::string::npos ? pictures : facts.find(kNote, pictures);
+  const std::size_t end = note == std::string::npos ? note : facts.find(';', note + kNote.size());
+  if (end == std::string::npos) return std::nullopt;
+  return facts.substr(note + kNote.size(), end - note - kNote.size());
 }
 
 }  // namespace supple::render

@@ -39,6 +39,11 @@ namespace fs = std::filesystem;
 constexpr int kUsage = 2;
 constexpr int kInternal = 1;
 
+constexpr const char* kFilmRule =
+    "A film (and its contact sheet) shows frames of one look: the film is made where all frames from 1 to the last one simulated have\n"
+    "a picture, drawn by this build with the same keys. Else there is no film, an earlier one that shows others is removed, and a\n"
+    "warning names the frames.\n\n";
+
 std::atomic<int> interrupted{0};
 
 /// The first one is seen between two steps, a second one ends the program.
@@ -246,9 +251,9 @@ int explain(const Arguments& arguments) {
 int query(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.error > 0.0) scene.contact.error = arguments.error;
-  const std::uint64_t fingerprint = scene.content_hash;
+  const scenes::StateOrigin origin = scenes::origin_of(scene);
   scenes::Simulation simulation(std::move(scene), question_options(arguments.threads, arguments.memory));
-  if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, fingerprint));
+  if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, origin));
   std::string answer;
   if (arguments.query == "forces") {
     answer = scenes::query_forces(simulation);
@@ -328,20 +333,22 @@ int parse_and_call(int argc, char** argv) {
   CLI::App* run_verb = app.add_subcommand("run", "simulate, surface, render and film a scene");
   run_flags(run_verb, a);
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, of whatever scene");
-  run_verb->add_flag("--resume", a.resume, "continue from the last saved state in the folder");
+  run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; those lost or damaged are simulated again");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
   drawing_flags(run_verb, a);
   run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume goes on from the last saved state")
       ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
   run_verb->add_flag("--render-only", a.render_only, "pictures and film from the saved states of an earlier run, as `supple render`");
-  run_verb->footer("Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
+  run_verb->footer(std::string(kFilmRule) +
+                   "With --frames a run ends with the last of them, result.json says how far it came, and --resume goes on from there.\n\n"
+                   "Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
 
   CLI::App* render_verb = app.add_subcommand("render", "draw the frames of a run again from its saved states");
   run_flags(render_verb, a);
   render_verb->add_flag("--overwrite", a.overwrite, "draw pictures that are there and up to date again, too");
   drawing_flags(render_verb, a);
   render_verb->add_flag("--sheet", a.sheet, "only the contact sheet, of the frames that are there");
-  render_verb->footer("Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
+  render_verb->footer(std::string(kFilmRule) + "Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
 
   CLI::App* export_verb = app.add_subcommand("export", "files for other tools from the saved states of a run");
   run_flags(export_verb, a);

@@ -69,7 +69,7 @@ void bind_scene(py::module_& module) {
                              "Names of the objects, sorted; particles are numbered in this order.")
       .def_property_readonly(
           "content_hash", [](const Scene& s) { return to_hex(s.content_hash); },
-          "Of all keys but those of looks, output and duration: what saved states belong to.")
+          "Of all keys that act on the motion: what saved states belong to.")
       .def("__repr__", [](const Scene& s) {
         return "<supple.Scene '" + scenes::scene_name(s) + "', " + std::to_string(s.objects.size()) + " objects, " +
                std::to_string(s.frame_count()) + " frames>";

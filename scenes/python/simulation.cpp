@@ -18,7 +18,7 @@ using Shared = std::shared_ptr<Handle>;
 /// A state apart from its simulation, and which scene it belongs to.
 struct SavedState {
   scenes::State state;
-  std::uint64_t scene = 0;
+  scenes::StateOrigin origin;
 };
 
 /// Lets `slice(simulation, go_on)` work until it returns true, or cancel() was called. Between slices, which end at a
@@ -73,18 +73,18 @@ struct Frames {
 
 SavedState copy_state(Handle& handle) {
   return handle.use([](const scenes::Simulation& simulation) {
-    return SavedState{simulation.state(), simulation.scene().content_hash};
+    return SavedState{simulation.state(), scenes::origin_of(simulation.scene())};
   });
 }
 
 void restore(Handle& handle, const SavedState& saved) {
   handle.use([&](scenes::Simulation& simulation) {
-    if (saved.scene != simulation.scene().content_hash) {
+    if (saved.origin.scene != simulation.scene().content_hash) {
       throw Error(ErrorKind::Usage,
                   Fault{.place = "state",
                         .key = {},
                         .expected = "expected a state of this scene, " + to_hex(simulation.scene().content_hash),
-                        .found = to_hex(saved.scene),
+                        .found = to_hex(saved.origin.scene),
                         .hint = "adopt() goes on from states of scenes with other numbers"});
     }
     simulation.restore(saved.state);
@@ -158,7 +158,7 @@ void bind_results(py::module_& module) {
           "save",
           [](const SavedState& s, const std::filesystem::path& path) {
             const py::gil_scoped_release others_run;
-            scenes::save_state(path, s.state, s.scene);
+            scenes::save_state(path, s.state, s.origin);
           },
           py::arg("path"), "Writes a checkpoint file, the same as `supple run` leaves in states/.")
       .def("__repr__", [](const SavedState& s) {
@@ -271,13 +271,13 @@ Simulation bind_simulation(py::module_& module) {
       .def(
           "save",
           [](Handle& h, const std::filesystem::path& path) {
-            h.use([&](const scenes::Simulation& s) { scenes::save_state(path, s.state(), s.scene().content_hash); });
+            h.use([&](const scenes::Simulation& s) { scenes::save_state(path, s.state(), scenes::origin_of(s.scene())); });
           },
           py::arg("path"), "Writes a checkpoint file, the same as `supple run` leaves in states/.")
       .def(
           "load",
           [](Handle& h, const std::filesystem::path& path) {
-            h.use([&](scenes::Simulation& s) { s.restore(scenes::load_state(path, s.scene().content_hash)); });
+            h.use([&](scenes::Simulation& s) { s.restore(scenes::load_state(path, scenes::origin_of(s.scene()))); });
           },
           py::arg("path"),
           "Continues from a checkpoint file. Raises Error of kind \"corrupt\" when it is not exactly what was written, "

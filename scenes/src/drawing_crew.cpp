@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <numeric>
 #include <system_error>
 
-#include "output_files.h"
+#include "saved_frames.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/executor.h"
 
@@ -15,20 +16,9 @@ namespace {
 
 double free_bytes() { return static_cast<double>(sysconf(_SC_AVPHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)); }
 
-/// As booked, without what `Simulation::profile` takes off.
-Profile booked(Simulation& simulation) {
-  Profile profile;
-  for (std::size_t s = 0; s < profile.size(); ++s) profile[s] = simulation.profile(static_cast<Stage>(s));
-  return profile;
-}
-
-/// Of all stages; that of `Integrate` holds those before it.
-double cpu_seconds(const Profile& booked) {
-  constexpr auto kIntegrate = static_cast<std::size_t>(Stage::Integrate);
-  double inner = 0.0, after = 0.0;
-  for (std::size_t s = 0; s < kIntegrate; ++s) inner += booked[s].cpu_s;
-  for (std::size_t s = kIntegrate + 1; s < booked.size(); ++s) after += booked[s].cpu_s;
-  return std::max(inner, booked[kIntegrate].cpu_s) + after;
+/// Of all stages.
+double cpu_seconds(const Profile& profile) {
+  return std::accumulate(profile.begin(), profile.end(), 0.0, [](double sum, const StageProfile& stage) { return sum + stage.cpu_s; });
 }
 
 }  // namespace
@@ -52,7 +42,7 @@ int crew_size(const RunOptions& options, std::size_t frames, double share) {
 DrawingCrew::DrawingCrew(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, std::vector<int> frames, int saved,
                          int members, Leader leader, Reporter& report)
     : scene_(scene), options_(options), outputs_(outputs), frames_(std::move(frames)), leader_(leader), report_(report),
-      profile_before_(booked(leader.simulation)), pictures_before_(leader.writer.picture_times()), cpu_before_(process_cpu_seconds()),
+      profile_before_(leader.simulation.profile()), pictures_before_(leader.writer.picture_times()), cpu_before_(process_cpu_seconds()),
       members_(static_cast<std::size_t>(members - 1)), saved_(saved) {
   leader.result.frames_at_once = members;
   options_.threads = std::max(1, Executor(options.threads).threads() / members);
@@ -126,7 +116,7 @@ void DrawingCrew::begin(Member& member) {
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);
     lock.unlock();
     work(simulation, writer);
-    member.profile = booked(simulation);
+    member.profile = simulation.profile();
     member.pictures = writer.picture_times();
     member.pictures_drawn = writer.pictures_drawn();
     writer.add_warnings(member.warnings);
@@ -140,7 +130,7 @@ void DrawingCrew::work(Simulation& simulation, FrameWriter& writer) {
   int kept = 0;
   while (const int frame = next_frame()) {
     try {
-      State state = load_state(state_path(options_.folder, scene_name(scene_), frame), scene_.content_hash);
+      State state = load_frame(options_.folder, scene_, frame);
       if (options_.overwrite || writer.renews(frame, state.hash())) {
         simulation.restore(std::move(state));
         writer.write(simulation, report, 0.0);
@@ -176,14 +166,14 @@ void DrawingCrew::join() {
 /// Clocks count the CPU time of the process, so each saw the work of all: what they booked is scaled by one factor, so that
 /// it adds up to what was taken.
 void DrawingCrew::book() {
-  double seen = cpu_seconds(booked(leader_.simulation)) - cpu_seconds(profile_before_);
+  double seen = cpu_seconds(leader_.simulation.profile()) - cpu_seconds(profile_before_);
   for (const Member& member : members_) seen += cpu_seconds(member.profile);
   const double share = std::min(1.0, (process_cpu_seconds() - cpu_before_) / std::max(seen, 1e-9));
 
   for (std::size_t s = 0; s < profile_before_.size(); ++s) {
     StageProfile& sum = leader_.simulation.profile(static_cast<Stage>(s));
     const StageProfile& before = profile_before_[s];
-    for (const auto part : {&StageProfile::cpu_s, &StageProfile::first_s, &StageProfile::later_s})
+    for (const auto part : {&StageProfile::cpu_s, &StageProfile::first_s, &StageProfile::later_s, &StageProfile::apart_s})
       sum.*part = before.*part + share * (sum.*part - before.*part);
   }
   RunResult& result = leader_.result;

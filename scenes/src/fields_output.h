@@ -66,7 +66,7 @@ void fields(Archive& archive, FilmDesc& d) {
 template <class Archive>
 void fields(Archive& archive, OutputDesc& d) {
   archive("images", d.images, {}, "a PNG a frame");
-  archive("film", d.film, {}, "an MP4 of the images, by ffmpeg");
+  archive("film", d.film, {}, "an MP4 of the images, by ffmpeg; of one look: where frames lack a picture, or have one of another size or other keys, none is made, and an earlier one that shows others is removed");
   archive("contacts", d.contacts, {}, "points of the contact surfaces, and of every pair that touches force, area, energy and dissipation, a frame; vtk: .vtp files and a .pvd each");
   archive("particles", d.particles, {}, "particles and bonds a frame; vtk: .vtp files and a .pvd");
   archive("samples", d.samples, {}, "points spread evenly over the surfaces a frame, which ride on their particles: id, owner, normal and area; as if nothing touched; vtk: .vtp files and a .pvd");

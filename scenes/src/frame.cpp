@@ -11,7 +11,6 @@
 namespace supple::scenes {
 namespace {
 
-constexpr std::uint64_t kTimedEvery = 64;
 constexpr std::size_t kBodyBlock = 16;
 
 Box box_of(const implicit::PlacedSkeleton& placed) {
@@ -311,17 +310,20 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
   view_fixed_bodies(model, 0.0, true, *this);
 }
 
-StageTimer::StageTimer(StageProfile& profile, bool every_call)
-    : profile_(profile), timed_(every_call || profile.calls == 0 || profile.calls % kTimedEvery == 1) {
+void StageProfile::scale() {
+  cpu_s = apart_s + first_s;
+  if (timed > 1) cpu_s += later_s * static_cast<double>(calls - 1) / static_cast<double>(timed - 1);
+  cpu_s = std::max(cpu_s, 0.0);  // of next to nothing, without what the clock took
+}
+
+StageTimer::StageTimer(StageProfile& profile, bool timed) : profile_(profile), timed_(timed || profile.calls == 0) {
   ++profile.calls;
   if (timed_) begin_ = process_cpu_seconds();
 }
 
 StageTimer::~StageTimer() {
-  StageProfile& p = profile_;
-  if (timed_) (p.timed++ == 0 ? p.first_s : p.later_s) += process_cpu_seconds() - begin_;
-  p.cpu_s = p.first_s;
-  if (p.timed > 1) p.cpu_s += p.later_s * static_cast<double>(p.calls - 1) / static_cast<double>(p.timed - 1);
+  if (timed_) (profile_.timed++ == 0 ? profile_.first_s : profile_.later_s) += process_cpu_seconds() - begin_ - process_cpu_clock_cost();
+  profile_.scale();
 }
 
 std::uint32_t body_led_by(const std::vector<Body>& bodies, std::uint32_t particle) {
@@ -377,7 +379,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     frame.pressed.clear();
   };
   {
-    StageTimer timer(profile(Stage::PlaceSkeleton), context.every_call);
+    StageTimer timer(profile(Stage::PlaceSkeleton), context.timed);
     place_contact_bodies(context, particles, frame);
     for_awake(context, [&](std::size_t i) { profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size(); });
     profile(Stage::PlaceSkeleton).present += frame.primitives_present;
@@ -386,7 +388,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   // Bodies whose supports reach no other body cannot touch: their fields are not even indexed.
   const bool near = !frame.reached.empty();
   {
-    StageTimer timer(profile(Stage::IndexField), context.every_call);
+    StageTimer timer(profile(Stage::IndexField), context.timed);
     const auto index_one = [&](std::size_t i) {
       index(context, i, frame);
       frame.surface_box[i] = frame.field[i].surface_box();
@@ -407,7 +409,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   }
   if (context.skip && !near) return nothing_touches();
   {
-    StageTimer timer(profile(Stage::SampleSurface), context.every_call);
+    StageTimer timer(profile(Stage::SampleSurface), context.timed);
     const auto usable = [&](std::uint32_t i) {
       return i >= bodies.size() || frame.near[i] != 0 || (!context.skip && collides(context, bodies[i]));
     };
@@ -430,7 +432,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
     }
   }
   {
-    StageTimer timer(profile(Stage::FindContacts), context.every_call);
+    StageTimer timer(profile(Stage::FindContacts), context.timed);
     if (!frame.pairs_present) frame.pairs_present = count_present_pairs(context);
     profile(Stage::FindContacts).present += *frame.pairs_present;
     profile(Stage::FindContacts).visited += frame.pairs.size();
@@ -439,7 +441,7 @@ void find_contact_surface(const StageContext& context, const core::ParticleState
   }
   if (context.skip && frame.candidates.pair.empty()) return nothing_touches();
   {
-    StageTimer timer(profile(Stage::SolveContactSurface), context.every_call);
+    StageTimer timer(profile(Stage::SolveContactSurface), context.timed);
     collision::ContactSettings settings = model.contact;
     settings.energy = energy;
     collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
@@ -461,7 +463,7 @@ void apply_reactions(const StageContext& context, Frame& frame, core::ForceSampl
   frame.pair_power.clear();
   if (context.skip && frame.surface.summary.empty()) return;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
-  StageTimer timer(profile, context.every_call);
+  StageTimer timer(profile, context.timed);
   context.executor.for_blocks(frame.pressed.size(), kBodyBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const std::uint32_t i = frame.pressed[k];
@@ -505,7 +507,7 @@ void linearise_reactions(const StageContext& context, Frame& frame, core::Contac
   out.clear();
   if (frame.surface.summary.empty()) return;
   StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
-  StageTimer timer(profile, context.every_call);
+  StageTimer timer(profile, context.timed);
   std::vector<std::span<const std::uint32_t>> particles(frame.bodies.size());
   for (std::size_t i = 0; i < context.bodies.size(); ++i) particles[i] = context.bodies[i].particle;
   collision::linearise_contacts(frame.bodies, context.rules, frame.surface, particles, frame.linearise, out);

@@ -97,10 +97,10 @@ struct Frame {
   Frame(const Model& model, const std::vector<Body>& all);
 };
 
-/// Measures one call of a stage: the first and every 64th after it, which stand for the others, or every call when profiling.
+/// Measures one call of a stage: the first one, and those of steps that are timed, which stand for the others.
 class StageTimer {
  public:
-  StageTimer(StageProfile& profile, bool every_call);
+  StageTimer(StageProfile& profile, bool timed);
   ~StageTimer();
   StageTimer(const StageTimer&) = delete;
   StageTimer& operator=(const StageTimer&) = delete;
@@ -118,7 +118,7 @@ struct StageContext {
   const Executor& executor;
   Profile& profile;
   bool skip = true;
-  bool every_call = false;
+  bool timed = false;                                 ///< stages are measured
   const implicit::DelaunayMesher* delaunay = nullptr;
   const std::atomic<int>* interrupt = nullptr;        ///< see SimulationOptions::interrupt
   double time = 0.0;                                  ///< that obstacles are led by [s]

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "frame_looks.h"
 #include "frame_tables.h"
 #include "output_files.h"
 #include "search_files.h"
@@ -83,6 +84,7 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
   }
   if (outputs_.images) {
     image_formats_ = scene.output.images ? scene.output.images->formats : ImagesDesc{}.formats;
+    look_ = look();
     pictures_ = std::make_unique<ScenePictures>(scene, model, context_kind(options.context), options.threads);
   }
   if (outputs_.samples) samples_ = std::make_unique<SceneSamples>(scene.output.sampling, model.cell);
@@ -128,11 +130,10 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
   write_tables(simulation);
 }
 
-std::string FrameWriter::fingerprint(std::uint64_t state_hash) const {
+std::string FrameWriter::look() const {
   Hasher hasher;
   hasher.add(std::string_view(program_identity()));
   hasher.add(scene_.picture_hash);
-  hasher.add(state_hash);
   hasher.add(std::string_view(options_.context));
   return to_hex(hasher.value());
 }
@@ -142,7 +143,7 @@ fs::path FrameWriter::picture_path(std::size_t camera, int frame, ImageName form
 }
 
 bool FrameWriter::pictures_are_current(int frame, std::uint64_t state_hash) const {
-  const std::string wanted = fingerprint(state_hash);
+  const std::string wanted = picture_fingerprint(look_, state_hash);
   for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
     for (const ImageName format : image_formats_) {
       const fs::path path = picture_path(camera, frame, format);
@@ -185,8 +186,14 @@ void FrameWriter::follow(Simulation& simulation, Reporter& report, double done) 
 
 void FrameWriter::draw(Simulation& simulation, Reporter& report, double done) {
   const int frame = simulation.frame();
-  const std::string mark = fingerprint(simulation.state_hash());
+  const std::string mark = picture_fingerprint(look_, simulation.state_hash());
   report("render", frame, done);
+  if (pictures_drawn_ == 0) {  // of a crew the leader draws first
+    for (const std::string& name : image_names_) {
+      if (remove_stale_film(options_.folder, name, look_, 0)) removed_films_.insert(name);
+      remove_stale_sheet(options_.folder, name, look_);
+    }
+  }
   for (std::size_t camera = 0; camera < image_names_.size(); ++camera) {
     render::Image image;
     render::LinearImage linear;
@@ -281,28 +288,34 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
   report("film", last, 0.99);
   fs::path first_film;
   for (const std::string& name : image_names_) {
-    write_contact_sheet(options_.folder, name, last);
-    const fs::path film = outputs_.film ? make_film(name, last) : fs::path();
+    const fs::path film = make_film(name, last);
     if (first_film.empty()) first_film = film;
   }
   return first_film;
 }
 
-/// Of one camera, if all its frames are there, in one size.
+/// The contact sheet, and the film if all frames are there in one look. An earlier film that shows others does not stay.
 fs::path FrameWriter::make_film(const std::string& name, int last) {
-  const PictureSize size = picture_size(frame_path(options_.folder, name, 1));
-  for (int frame = 1; frame <= last; ++frame) {
-    const fs::path path = frame_path(options_.folder, name, frame);
-    const bool there = fs::exists(path);
-    if (there && picture_size(path) == size) continue;
-    warnings_.push_back("no film: frame " + std::to_string(frame) + " of " + name +
-                        (there ? " has another size than frame 1" : " has no picture"));
-    return {};
+  const FrameLooks looks = look_at_frames(options_.folder, name, last);
+  write_contact_sheet(options_.folder, name, looks);
+  const std::string why_not = told(looks, name);
+  if (outputs_.film && why_not.empty()) {
+    const fs::path film = options_.folder / (name + ".mp4");
+    const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);
+    render::encode_film(options_.folder / "frames", name, 1, last, frame_rate, {film, film_note_of(looks.look, last)});
+    return film;
   }
-  const fs::path film = options_.folder / (name + ".mp4");
-  const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);
-  render::encode_film(options_.folder / "frames", name, 1, last, frame_rate, film);
-  return film;
+  const std::string look = looks.others.empty() ? looks.look : std::string();  // of two looks no film is current
+  if (remove_stale_film(options_.folder, name, look, last)) removed_films_.insert(name);
+  const bool removed = removed_films_.contains(name);
+  if (outputs_.film) {
+    warnings_.push_back("no film: " + why_not + (removed ? "; the earlier " + name + ".mp4, which shows others, is removed" : ""));
+  } else if (removed) {
+    warnings_.push_back(name + ".mp4 is removed: it shows other pictures than frames/ holds");
+  } else if (!looks.others.empty()) {
+    warnings_.push_back(why_not + " and " + (looks.others.size() == 1 ? "is" : "are") + " left out of " + name + "_sheet.png");
+  }
+  return {};
 }
 
 }  // namespace supple::scenes

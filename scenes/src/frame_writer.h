@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -59,7 +60,7 @@ class FrameWriter {
  private:
   [[nodiscard]] bool wanted(int frame) const { return options_.frames.empty() || options_.frames.contains(frame); }
   [[nodiscard]] std::filesystem::path picture_path(std::size_t camera, int frame, ImageName format) const;
-  [[nodiscard]] std::string fingerprint(std::uint64_t state_hash) const;
+  [[nodiscard]] std::string look() const;
   [[nodiscard]] bool files_are_there(int frame) const;
   void write(Simulation& simulation, Reporter& report, double done, bool draws, bool files);
   [[nodiscard]] bool pictures_are_current(int frame, std::uint64_t state_hash) const;
@@ -82,6 +83,8 @@ class FrameWriter {
   std::unique_ptr<io::UsdAnimation> animation_;
   std::unique_ptr<SceneSamples> samples_;
   SceneGrids grids_;
+  std::string look_;  // of pictures, see frame_looks.h
+  std::set<std::string> removed_films_;
   int pictures_drawn_ = 0;
   int images_ = 0;
   double encode_s_ = 0.0;

@@ -184,7 +184,8 @@ std::string describe_run(const fs::path& folder) {
   text += line("  outcome     %s%s%s", text_at(report, "outcome").c_str(), reason.empty() ? "" : ": ", reason.c_str());
   text += line("  frames      %.0f of %.0f", number_at(report, "frames"), number_at(report, "frame_count"));
   text += line("  state       %s", text_at(report, "state_hash").c_str());
-  text += line("  wall time   %.2f s, peak memory %.0f MB", number_at(report, "wall_s"), number_at(report, "peak_memory_mb"));
+  text += line("  wall time   %.2f s, CPU time %.2f s, peak memory %.0f MB", number_at(report, "wall_s"), number_at(report, "cpu_s"),
+               number_at(report, "peak_memory_mb"));
   if (report.contains("steps")) {
     text += line("  simulated   %.4g s in %.0f steps, the last of %.3g s", number_at(report, "simulated_s"), number_at(report, "steps"),
                  number_at(report, "time_step_s"));
@@ -221,6 +222,8 @@ Comparison compare_runs(const ComparisonOptions& options) {
   const std::map<int, fs::path> first = frames_of(options.first, options.camera),
                                 second = frames_of(options.second, options.camera);
   io::make_writable_folder(options.folder / "frames");
+  std::error_code absent;
+  fs::remove(options.folder / "compare.mp4", absent);  // of an earlier comparison
   constexpr int kGap = 2;
   Comparison result;
   for (const auto& [frame, path] : first) {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <map>
 #include <string_view>
 #include <utility>
 
@@ -25,10 +23,6 @@ constexpr std::array kParts = {Part{"states", false, {".state"}},        Part{"f
                                Part{"meshes", true, {".ply", ".obj"}},   Part{"searches", false, {".json"}},
                                Part{"grids", false, {".vdb"}},           Part{"contacts", true, {".csv", ".vtp"}},
                                Part{"particles", false, {".csv", ".vtp"}}, Part{"samples", false, {".csv", ".vtp"}}};
-constexpr int kSheetColumns = 4;
-constexpr int kSheetRows = 3;
-constexpr int kSheetImageWidth = 320;
-constexpr int kSheetGap = 4;
 
 /// "NAME" of "NAME.0001.EXTENSION" with an extension of the part; empty: no file that frames have there.
 std::string stem_of_frame(const Part& part, const fs::path& file) {
@@ -106,41 +100,6 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
   for (const char* report : {"result.json", "render.json", "export.json"}) old.push_back(folder / report);
   std::error_code ignored;
   for (const fs::path& path : old) fs::remove(path, ignored);
-}
-
-PictureSize picture_size(const fs::path& path) {
-  std::array<unsigned char, 24> head{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(head.data()), head.size());
-  if (!file) return {};
-  const auto number = [&head](std::size_t at) {
-    return static_cast<int>(head[at] << 24U | head[at + 1] << 16U | head[at + 2] << 8U | head[at + 3]);
-  };
-  return {number(16), number(20)};
-}
-
-fs::path write_contact_sheet(const fs::path& folder, const std::string& name, int last) {
-  std::map<PictureSize, std::vector<int>> frames;
-  for (int frame = 1; frame <= last; ++frame) {
-    const fs::path path = frame_path(folder, name, frame);
-    if (fs::exists(path)) frames[picture_size(path)].push_back(frame);
-  }
-  // Frames may have been drawn again in another size: the sheet is of those that most have.
-  const auto most = std::max_element(frames.begin(), frames.end(),
-                                     [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
-  if (most == frames.end()) return {};
-  const std::vector<int>& present = most->second;
-  const int wanted = std::min<int>(kSheetColumns * kSheetRows, static_cast<int>(present.size()));
-  std::vector<render::Image> images;
-  for (int k = 0; k < wanted; ++k) {
-    const std::size_t index =
-        wanted == 1 ? 0 : static_cast<std::size_t>(std::lround(k * (static_cast<double>(present.size()) - 1) / (wanted - 1)));
-    const render::Image frame = render::read_png(frame_path(folder, name, present[index]));
-    images.push_back(render::downscale(frame, std::min(kSheetImageWidth, frame.width)));
-  }
-  const fs::path sheet = folder / (name + "_sheet.png");
-  render::write_png(sheet, render::contact_sheet(images, kSheetColumns, kSheetGap));
-  return sheet;
 }
 
 }  // namespace supple::scenes

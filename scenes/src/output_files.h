@@ -4,10 +4,8 @@
 #include <filesystem>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "supple/render/image.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
@@ -26,14 +24,6 @@ void remove_outputs(const std::filesystem::path& folder, const std::string& name
 
 /// Removes files of an interrupted run of this scene that never got their names.
 void remove_temporaries(const std::filesystem::path& folder, const std::string& name);
-
-/// Width and height of a PNG, by its head; zeros of what is none.
-using PictureSize = std::pair<int, int>;
-[[nodiscard]] PictureSize picture_size(const std::filesystem::path& path);
-
-/// NAME_sheet.png: twelve frames spread over those of 1 .. last that exist, of the size that most have, 3 rows of 4. Empty
-/// when none does.
-std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, int last);
 
 /// Books process CPU time of a scope on a stage.
 class StageClock {

@@ -9,8 +9,19 @@
 namespace supple::scenes {
 namespace {
 
-/// Looks for the note NT_GNU_BUILD_ID in the notes of the first object, which is the program.
+/// Whether an object (the program or a library) holds an address.
+bool holds(const dl_phdr_info& object, ElfW(Addr) address) {
+  for (int i = 0; i < object.dlpi_phnum; ++i) {
+    const auto& segment = object.dlpi_phdr[i];
+    const ElfW(Addr) begin = object.dlpi_addr + segment.p_vaddr;
+    if (segment.p_type == PT_LOAD && begin <= address && address < begin + segment.p_memsz) return true;
+  }
+  return false;
+}
+
+/// Looks for the note NT_GNU_BUILD_ID in the notes of the object that holds this function: the tool, or the Python module.
 int find_build_id(dl_phdr_info* object, std::size_t /*size*/, void* result) {
+  if (!holds(*object, reinterpret_cast<ElfW(Addr)>(&find_build_id))) return 0;
   for (int i = 0; i < object->dlpi_phnum; ++i) {
     const auto& segment = object->dlpi_phdr[i];
     if (segment.p_type != PT_NOTE) continue;

@@ -5,7 +5,7 @@
 
 namespace supple::scenes {
 
-/// The build id that the linker put into the program; its version where there is none.
+/// The build id that the linker put into the program, or into the Python module; its version where there is none.
 [[nodiscard]] std::string program_identity();
 
 }  // namespace supple::scenes

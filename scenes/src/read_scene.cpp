@@ -1,17 +1,14 @@
 #include "supple/scenes/read_scene.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <optional>
 
-#include "camera.h"
 #include "read_scene_archive.h"
+#include "scene_keys.h"
 #include "scene_places.h"
-#include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
@@ -112,82 +109,6 @@ class Override {
   std::string_view rest_;
 };
 
-/// Keys that change a picture but not the motion: a run with other values continues, or is drawn again.
-constexpr std::array<std::string_view, 15> kLooks = {"title",  "camera", "cameras",   "light",   "lights",  "background",
-                                                     "output", "colour", "roughness", "look",    "visible", "duration", "render", "texture", "meshing"};
-
-/// Keys of a scene that change no picture, and those of its output that do.
-constexpr std::array<std::string_view, 2> kUnseen = {"title", "duration"};
-constexpr std::array<std::string_view, 3> kSeenOutput = {"images", "meshing", "cell"};
-
-template <std::size_t N>
-bool among(const std::array<std::string_view, N>& keys, std::string_view key) {
-  return std::find(keys.begin(), keys.end(), key) != keys.end();
-}
-
-/// What a scene's file names stand for. A file that cannot be read, or is larger than any that is, is a fault of whoever needs it.
-void add_file(const std::filesystem::path& path, Hasher& hasher) {
-  constexpr std::uintmax_t kPart = std::uintmax_t{1} << 26;  // that is in memory at once [byte]
-  std::error_code status;
-  if (!std::filesystem::is_regular_file(path, status)) return;
-  std::ifstream file(path, std::ios::binary);
-  const std::uintmax_t size = std::filesystem::file_size(path, status);
-  if (status || size > io::kLargestInput) return;
-  std::string part(static_cast<std::size_t>(std::min(size, kPart)), '\0');
-  do {
-    file.read(part.data(), static_cast<std::streamsize>(part.size()));
-    hasher.add(std::string_view(part.data(), static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0))));
-  } while (file && file.peek() != std::ifstream::traits_type::eof());
-}
-
-/// @param taken   whether a key counts, on every level
-/// @param folder  where files named by keys `file` are looked for
-void add_content(const Node& node, const auto& taken, const std::filesystem::path& folder, Hasher& hasher) {
-  hasher.add(static_cast<std::uint64_t>(node.kind));
-  hasher.add(node.text);
-  for (const Node* item : node.items) add_content(*item, taken, folder, hasher);
-  std::vector<const Node::Entry*> entries;
-  for (const Node::Entry& entry : node.entries) {
-    if (taken(entry.key)) entries.push_back(&entry);
-  }
-  std::sort(entries.begin(), entries.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
-  for (const Node::Entry* entry : entries) {
-    hasher.add(entry->key);
-    add_content(*entry->value, taken, folder, hasher);
-    if (entry->key == "file" && entry->value->kind == Node::Kind::Scalar) add_file(folder / entry->value->text, hasher);
-  }
-}
-
-/// Of everything that decides the motion, whatever the order of the keys.
-std::uint64_t content_hash(const Node& root, const std::filesystem::path& folder) {
-  Hasher hasher;
-  add_content(root, [](std::string_view key) { return !among(kLooks, key); }, folder, hasher);
-  return hasher.value();
-}
-
-/// Of everything that decides a picture of a given state.
-std::uint64_t picture_hash(const Scene& scene, const Node& root, const std::filesystem::path& folder) {
-  const auto all = [](std::string_view /*key*/) { return true; };
-  Hasher hasher;
-  const std::span<const CameraDesc> cameras = cameras_of(scene);
-  const bool turns = std::any_of(cameras.begin(), cameras.end(), [](const CameraDesc& c) { return c.turntable != 0.0; });
-  if (turns) hasher.add(scene.duration);
-  std::vector<const Node::Entry*> seen;
-  for (const Node::Entry& entry : root.entries) {
-    if (entry.key != "output" && !among(kUnseen, entry.key)) seen.push_back(&entry);
-    if (entry.key != "output") continue;
-    for (const Node::Entry& inner : entry.value->entries) {
-      if (among(kSeenOutput, inner.key)) seen.push_back(&inner);
-    }
-  }
-  std::sort(seen.begin(), seen.end(), [](const auto* a, const auto* b) { return a->key < b->key; });
-  for (const Node::Entry* entry : seen) {
-    hasher.add(entry->key);
-    add_content(*entry->value, all, folder, hasher);
-  }
-  return hasher.value();
-}
-
 }  // namespace
 
 int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
@@ -234,8 +155,10 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   scene.source = folder / name;
   places->root = root;
   scene.places = places;
-  scene.content_hash = content_hash(*root, folder);
-  scene.picture_hash = picture_hash(scene, *root, folder);
+  const SceneKeys motion = motion_keys(scene, folder);
+  scene.motion_keys = std::make_shared<const std::string>(text_of(motion));
+  scene.content_hash = hash_of(motion);
+  scene.picture_hash = hash_of(picture_keys(scene, folder));
   return scene;
 }
 

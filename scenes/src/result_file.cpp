@@ -40,7 +40,7 @@ ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 }  // namespace
 
-void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, double wall_s) {
+void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken) {
   ordered_json json;
   json["scene"] = scene_name(scene);
   json["title"] = scene.title;
@@ -121,7 +121,8 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["pictures"] = pictures;
   json["film"] = result.film.empty() ? ordered_json(nullptr) : ordered_json(result.film.filename().string());
   json["peak_memory_mb"] = peak_memory_mb();
-  json["wall_s"] = wall_s;
+  json["wall_s"] = taken.wall;
+  json["cpu_s"] = taken.cpu;
   io::write_atomically(result.report, std::string_view(json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"));
 }
 

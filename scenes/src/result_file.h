@@ -5,7 +5,13 @@
 
 namespace supple::scenes {
 
+/// What a command took [s].
+struct TimeTaken {
+  double wall = 0.0;
+  double cpu = 0.0;  ///< of all threads
+};
+
 /// @param simulation  may be null when the run failed before it began
-void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, double wall_s);
+void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken);
 
 }  // namespace supple::scenes

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <new>
 #include <optional>
 #include <string_view>
@@ -20,12 +21,15 @@
 #include <vector>
 
 #include "drawing_crew.h"
+#include "frame_looks.h"
 #include "frame_writer.h"
 #include "output_files.h"
 #include "read_scene_faults.h"
 #include "result_file.h"
+#include "saved_frames.h"
 #include "search_files.h"
 #include "warnings.h"
+#include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
@@ -69,13 +73,6 @@ class FolderLock {
   int file_ = -1;
 };
 
-std::optional<int> last_saved_frame(const fs::path& folder, const std::string& name, int frame_count) {
-  for (int frame = frame_count; frame >= 1; --frame) {
-    if (fs::exists(state_path(folder, name, frame))) return frame;
-  }
-  return std::nullopt;
-}
-
 /// A run is continued in its own folder only. @throws Error{Io} where there are states and none is of this name
 void check_continues(const fs::path& folder, const std::string& name) {
   const std::set<std::string> saved = saved_scenes(folder);
@@ -106,21 +103,25 @@ std::string outcome_of(ErrorKind kind) {
   return "internal";
 }
 
-/// What pictures need and a scene only names is looked for before hours of work, and before anything is removed; and
-/// that the frames asked for are some of the scene's.
+/// That the frames asked for are some of the scene's. @throws Error{Usage}
+void check_frames(const Scene& scene, const std::set<int>& frames) {
+  if (frames.empty() || (*frames.begin() <= scene.frame_count() && *frames.rbegin() >= 1)) return;
+  throw Error(ErrorKind::Usage, Fault{.place = "--frames",
+                                      .key = {},
+                                      .expected = "expected a frame from 1 to " + std::to_string(scene.frame_count()),
+                                      .found = *frames.rbegin() < 1 ? "none after 0" : "none before " + std::to_string(*frames.begin()),
+                                      .hint = "frame n shows t = (n - 1) / frame_rate"});
+}
+
+/// What pictures need and a scene only names is looked for before hours of work, and before anything is removed.
 /// @throws Error
 void check_needs(const Scene& scene, const RunOptions& options, const OutputRequest& outputs) {
-  if (!options.frames.empty() && (*options.frames.begin() > scene.frame_count() || *options.frames.rbegin() < 1)) {
-    throw Error(ErrorKind::Usage, Fault{.place = "--frames",
-                                        .key = {},
-                                        .expected = "expected a frame from 1 to " + std::to_string(scene.frame_count()),
-                                        .found = *options.frames.rbegin() < 1 ? "none after 0" : "none before " + std::to_string(*options.frames.begin()),
-                                        .hint = "frame n shows t = (n - 1) / frame_rate"});
-  }
   if (!outputs.images) return;
   expect_within(scene, count_scene(scene, options.scene_memory), options.scene_memory);
   check_pictures(scene);
-  if (outputs.film && options.frames.empty()) render::find_film_program();
+  const std::set<int>& frames = options.frames;
+  const bool from_first = frames.empty() || (*frames.begin() == 1 && *frames.rbegin() == static_cast<int>(frames.size()));
+  if (outputs.film && from_first) render::find_film_program();
 }
 
 constexpr int kSignalExit = 128;
@@ -170,6 +171,7 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   result.folder = options.folder;
   result.report = options.folder / report_name;
   const auto begin = Clock::now();
+  const double cpu_before = process_cpu_seconds();
   try {
     body(result);
     const bool limited = result.exit_code == static_cast<int>(ErrorKind::Limit);
@@ -214,7 +216,7 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   }
   // Where nothing was done, the report of an earlier run stays.
   const bool refused = result.exit_code != 0 && result.frames == 0 && fs::exists(result.report);
-  if (!refused) write_result_file(scene, result, simulation ? &*simulation : nullptr, seconds_since(begin));
+  if (!refused) write_result_file(scene, result, simulation ? &*simulation : nullptr, {seconds_since(begin), process_cpu_seconds() - cpu_before});
   return result;
 }
 
@@ -228,8 +230,66 @@ std::vector<int> frames_to_draw(const RunOptions& options, int first, int last) 
 }
 
 /// The report is of the run as a whole.
-void show_last(Simulation& simulation, const RunOptions& options, const std::string& name, int last) {
-  if (simulation.frame() != last) simulation.restore(load_state(state_path(options.folder, name, last), simulation.scene().content_hash));
+void show_last(Simulation& simulation, const RunOptions& options, int last) {
+  if (simulation.frame() != last) simulation.restore(load_frame(options.folder, simulation.scene(), last));
+}
+
+void save_frame(const fs::path& folder, const Simulation& simulation) {
+  save_state(state_path(folder, scene_name(simulation.scene()), simulation.frame()), simulation.state(), origin_of(simulation.scene()));
+}
+
+/// What a run that goes on works with.
+struct Resuming {
+  const Scene& scene;
+  const RunOptions& options;
+  Simulation& simulation;
+  FrameWriter& writer;
+  Reporter& report;
+  RunResult& result;
+  const std::function<bool()>& stopped;  ///< by a signal or by the time limit
+};
+
+/// Makes the state of a frame from the one before it, which is there, and saves it. @return false where the run was stopped first
+bool simulate_again(const Resuming& run, int frame, double done) {
+  Simulation& simulation = run.simulation;
+  run.report("simulate", frame, done);
+  if (frame > 1 && simulation.frame() != frame - 1) simulation.restore(load_frame(run.options.folder, run.scene, frame - 1));
+  while (simulation.frame() < frame && !run.stopped()) simulation.step();
+  if (simulation.frame() < frame) return false;
+  save_frame(run.options.folder, simulation);
+  return true;
+}
+
+/// Frames `first` to `last` of those saved: what they lack is written, and a state that is lost or damaged is simulated again.
+/// @return false where the run was stopped first
+bool take_up(const Resuming& run, int first, int last, UnusableFrames& unusable) {
+  for (int frame = first; frame <= last; ++frame) {
+    if (run.stopped()) return false;
+    const double done = static_cast<double>(frame) / last;
+    std::optional<State> state = usable_frame(run.options.folder, run.scene, frame, unusable);
+    const bool again = !state;
+    if (again && !simulate_again(run, frame, done)) return false;
+    const bool renews = run.writer.writes_frames() && run.writer.renews(frame, again ? run.simulation.state_hash() : state->hash());
+    if (!again && (renews || frame == last)) run.simulation.restore(std::move(*state));
+    if (renews) run.writer.renew(run.simulation, run.report, done);
+  }
+  run.result.frames = last;
+  return true;
+}
+
+/// Goes on from the saved states, if there are any. Where nothing is written of frames, those before the first one saved are not
+/// missed. @return false where the run was stopped first
+bool resume(const Resuming& run) {
+  const auto saved = saved_range(run.options.folder, scene_name(run.scene), run.scene.frame_count());
+  if (!saved) return true;
+  UnusableFrames unusable;
+  int first = run.writer.writes_frames() ? 1 : saved->first;
+  if (first > 1 && !usable_frame(run.options.folder, run.scene, first, unusable)) first = 1;
+  unusable = {};
+  const bool whole = take_up(run, first, saved->last, unusable);
+  const std::vector<std::string> told = unusable.told();
+  run.result.warnings.insert(run.result.warnings.end(), told.begin(), told.end());
+  return whole;
 }
 
 /// Files over all frames, and what was drawn.
@@ -246,6 +306,16 @@ void finish(FrameWriter& writer, Simulation& simulation, Reporter& report, RunRe
 RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, const char* report_name) {
   const bool pictures_only = outputs.images;
   const std::string name = scene_name(scene);
+  check_frames(scene, options.frames);
+  const auto saved = saved_range(options.folder, name, scene.frame_count());
+  if (!saved) {
+    throw Error(ErrorKind::Io, Fault{.place = (options.folder / "states").string(),
+                                     .key = {},
+                                     .expected = "expected saved states of a run",
+                                     .found = "none",
+                                     .hint = "run the scene first: supple run SCENE --out FOLDER"});
+  }
+  const int last = saved->last;
   io::make_writable_folder(options.folder);
   const FolderLock lock(options.folder);
   remove_temporaries(options.folder, name);
@@ -253,20 +323,12 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
   std::optional<Simulation> simulation;
   return guarded(scene, options, report_name, simulation, [&](RunResult& result) {
     check_needs(scene, options, outputs);
-    const auto last = last_saved_frame(options.folder, name, scene.frame_count());
-    if (!last) {
-      throw Error(ErrorKind::Io, Fault{.place = (options.folder / "states").string(),
-                                       .key = {},
-                                       .expected = "expected saved states of a run",
-                                       .found = "none",
-                                       .hint = "run the scene first: supple run SCENE --out FOLDER"});
-    }
     const double before = resident_bytes();
     simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt, options.scene_memory});
     FrameWriter writer(scene, simulation->model(), options, outputs);
-    Reporter report(options, *last);
+    Reporter report(options, last);
     std::vector<int> frames;
-    for (int frame = 1; frame <= *last; ++frame) {
+    for (int frame = 1; frame <= last; ++frame) {
       const bool wanted = options.frames.empty() || options.frames.contains(frame);
       // Samples depend on all frames before.
       if (wanted || (outputs.samples && frame < *options.frames.rbegin())) frames.push_back(frame);
@@ -277,23 +339,23 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
       if (pictures_only && writer.pictures_drawn() > 0) {  // the first one shows what each needs
         const int members = crew_size(options, frames.size() - i, resident_bytes() - before);
         if (members > 1) {
-          DrawingCrew crew(scene, options, outputs, {frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end()}, *last, members,
+          DrawingCrew crew(scene, options, outputs, {frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end()}, last, members,
                            {*simulation, writer, result}, report);
           crew.join();
           if (was_interrupted(options, result)) return;
           break;
         }
       }
-      State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
+      State state = load_frame(options.folder, scene, frame);
       if (pictures_only && !options.overwrite && !writer.renews(frame, state.hash())) {
         ++result.pictures_kept;
         continue;
       }
       simulation->restore(std::move(state));
-      writer.write(*simulation, report, static_cast<double>(frame) / *last);
+      writer.write(*simulation, report, static_cast<double>(frame) / last);
     }
-    show_last(*simulation, options, name, *last);
-    result.frames = *last;
+    show_last(*simulation, options, last);
+    result.frames = last;
     finish(writer, *simulation, report, result);
   });
 }
@@ -301,6 +363,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
 }  // namespace
 
 void leave_failure(const fs::path& folder, const std::string& name, const Error& error) {
+  if (error.kind() != ErrorKind::Scene) return;
   try {
     if (fs::exists(folder / kResultFile)) return;
     io::make_writable_folder(folder);
@@ -312,7 +375,7 @@ void leave_failure(const fs::path& folder, const std::string& name, const Error&
     result.outcome = outcome_of(error.kind());
     result.reason = error.what();
     result.exit_code = static_cast<int>(error.kind());
-    write_result_file(scene, result, nullptr, 0.0);
+    write_result_file(scene, result, nullptr, {});
   } catch (const Error&) {
     // The first error is the one to report; this folder cannot take a file.
   }
@@ -362,6 +425,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
   const TimeLimit limit(options.time_limit);
   const OutputRequest outputs = outputs_of(scene, options);
   const std::string name = scene_name(scene);
+  check_frames(scene, options.frames);
   io::make_writable_folder(options.folder / "states");
   const FolderLock lock(options.folder);
   remove_temporaries(options.folder, name);
@@ -378,7 +442,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, kResultFile, simulation, [&](RunResult& result) {
-    const auto stopped = [&] { return was_interrupted(options, result) || limit.passed(result); };
+    const std::function<bool()> stopped = [&] { return was_interrupted(options, result) || limit.passed(result); };
     check_needs(scene, options, outputs);
     if (options.overwrite && !options.resume) {
       for (const std::string& earlier : saved_scenes(options.folder)) remove_outputs(options.folder, earlier);
@@ -386,30 +450,18 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     if (!options.resume) remove_outputs(options.folder, name);
     const double before = resident_bytes();
     simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt, options.scene_memory});
-    const int frame_count = scene.frame_count();
+    const int last_frame = options.frames.empty() ? scene.frame_count() : std::min(scene.frame_count(), *options.frames.rbegin());
     FrameWriter writer(scene, simulation->model(), options, outputs);
-    Reporter report(options, frame_count);
-    if (options.resume) {
-      if (const auto last = last_saved_frame(options.folder, name, frame_count)) {
-        for (int frame = 1; writer.writes_frames() && frame <= *last; ++frame) {
-          if (stopped()) return;
-          State state = load_state(state_path(options.folder, name, frame), scene.content_hash);
-          if (!writer.renews(frame, state.hash())) continue;
-          simulation->restore(std::move(state));
-          writer.renew(*simulation, report, static_cast<double>(frame) / frame_count);
-        }
-        simulation->restore(load_state(state_path(options.folder, name, *last), scene.content_hash));
-        result.frames = *last;
-      }
-    }
+    Reporter report(options, last_frame);
+    if (options.resume && !resume({scene, options, *simulation, writer, report, result, stopped})) return;
     const auto save = [&] {
-      save_state(state_path(options.folder, name, simulation->frame()), simulation->state(), scene.content_hash);
+      save_frame(options.folder, *simulation);
       result.frames = simulation->frame();
     };
     if (result.frames == 0) {
       // Frames that are asked for may lie far behind.
       if (!options.frames.empty() && !options.frames.contains(1)) expect_output_sizes(*simulation, outputs);
-      writer.write(*simulation, report, 1.0 / frame_count);
+      writer.write(*simulation, report, 1.0 / last_frame);
       save();
     }
     RunOptions drawing = options;
@@ -417,10 +469,10 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     std::optional<DrawingCrew> crew;
     std::exception_ptr diverged;
     try {
-      while (result.frames < frame_count && !stopped()) {
+      while (result.frames < last_frame && !stopped()) {
         // The first picture shows what each needs.
         if (!crew && writer.pictures_drawn() > 0 && !writer.needs_order()) {
-          std::vector<int> frames = frames_to_draw(options, result.frames + 1, frame_count);
+          std::vector<int> frames = frames_to_draw(options, result.frames + 1, last_frame);
           const int members = crew_size(options, frames.size(), resident_bytes() - before);
           if (members > 1) {
             crew.emplace(scene, drawing, outputs, std::move(frames), result.frames, members,
@@ -428,14 +480,14 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
           }
         }
         const int next = simulation->frame() + 1;
-        crew ? crew->simulating(next) : report("simulate", next, static_cast<double>(next - 1) / frame_count);
+        crew ? crew->simulating(next) : report("simulate", next, static_cast<double>(next - 1) / last_frame);
         while (simulation->frame() < next && !stopped()) simulation->step();
         if (simulation->frame() < next) break;
         if (crew) {
           save();
           if (!crew->saved(next)) break;
         } else {
-          writer.write(*simulation, report, static_cast<double>(next) / frame_count);
+          writer.write(*simulation, report, static_cast<double>(next) / last_frame);
           save();
         }
       }
@@ -445,7 +497,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     }
     if (crew) {
       limit.passed(result) ? crew->leave() : crew->join();
-      show_last(*simulation, options, name, result.frames);
+      show_last(*simulation, options, result.frames);
     }
     if (diverged) std::rethrow_exception(diverged);
     if (stopped()) return;
@@ -462,9 +514,9 @@ RunResult render_run(const Scene& scene, const RunOptions& options) {
 
 std::vector<fs::path> make_sheets(const Scene& scene, const fs::path& folder) {
   std::vector<fs::path> sheets;
-  if (const auto last = last_saved_frame(folder, scene_name(scene), scene.frame_count())) {
+  if (const auto saved = saved_range(folder, scene_name(scene), scene.frame_count())) {
     for (const std::string& name : image_names(scene)) {
-      const fs::path sheet = write_contact_sheet(folder, name, *last);
+      const fs::path sheet = write_contact_sheet(folder, name, look_at_frames(folder, name, saved->last));
       if (!sheet.empty()) sheets.push_back(sheet);
     }
   }

@@ -8,9 +8,24 @@
 #include "held_volumes.h"
 #include "model_faults.h"
 #include "pieces.h"
+#include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 
 namespace supple::scenes {
+namespace {
+
+constexpr std::uint64_t kTimedEvery = 61;  // see StageProfile::cpu_s
+
+/// What was measured of the stages that a step calls, and two readings of the clock for each time [s].
+double measured_inside(const Profile& profile) {
+  double sum = 0.0;
+  for (std::size_t s = 0; s < static_cast<std::size_t>(Stage::Integrate); ++s) {
+    sum += profile[s].first_s + profile[s].later_s + 2.0 * process_cpu_clock_cost() * static_cast<double>(profile[s].timed);
+  }
+  return sum;
+}
+
+}  // namespace
 
 Simulation::Impl::Impl(Scene s, SimulationOptions o)
     : scene(std::move(s)),
@@ -60,7 +75,7 @@ StageContext Simulation::Impl::context() {
           .executor = executor,
           .profile = profile,
           .skip = options.skip,
-          .every_call = options.profile,
+          .timed = timed,
           .delaunay = &options.delaunay,
           .interrupt = options.interrupt,
           .time = time(),
@@ -69,7 +84,30 @@ StageContext Simulation::Impl::context() {
           .sticks = &state.sticks};
 }
 
+/// A step, and the audits of a frame that it ends. Steps are measured as a whole with all stages inside, or not at all. Those in
+/// which all sleep are no calls, so that each one measured stands for those up to the next.
 void Simulation::Impl::step() {
+  StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
+  timed = options.profile || steps_made % kTimedEvery == 0;
+  const std::uint64_t calls = p.calls;
+  const double inside = timed ? measured_inside(profile) : 0.0, begin = timed ? process_cpu_seconds() : 0.0;
+  make_step();
+  ++steps_made;
+  const double end = timed ? process_cpu_seconds() : 0.0;
+  const double taken = timed ? end - begin - process_cpu_clock_cost() - (measured_inside(profile) - inside) : 0.0;
+  if (timed && p.calls == calls) p.apart_s += taken * static_cast<double>(options.profile ? 1 : kTimedEvery);
+  if (timed && p.calls > calls) (p.timed++ == 0 ? p.first_s : p.later_s) += taken;
+  timed = false;
+  if (state.substep == 0) {
+    const double before = process_cpu_seconds();
+    book_audits();
+    p.apart_s += process_cpu_seconds() - before;
+    check_energy();
+  }
+  p.scale();
+}
+
+void Simulation::Impl::make_step() {
   drop_results();
   if (state.substep == 0) {
     last_frame = state;
@@ -96,8 +134,6 @@ void Simulation::Impl::step() {
     frame.surface.clear();
   } else {
     StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
-    // Timed with the force evaluation inside, whose share `Simulation::profile` takes off again.
-    StageTimer timer(p, options.profile);
     core::ImplicitContact contact = implicit_contact();
     const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr},
                                                   time(), dt(), {state.particles, state.kick, state.ledger},
@@ -107,6 +143,7 @@ void Simulation::Impl::step() {
       for (std::size_t k = 0; k < contact.load.size(); ++k) frame.pair_power[k] = contact.load[k].dissipated / dt();
     }
     book_work(report);
+    ++p.calls;
     for (const std::uint32_t i : awake) p.visited += bodies[i].origin.is_group() ? 0 : bodies[i].particle.size();
     p.present += particles.size();
   }
@@ -132,8 +169,6 @@ void Simulation::Impl::step() {
   if (state.substep == (1 << state.halvings)) {
     state.substep = 0;
     ++state.frame;
-    book_audits();
-    check_energy();
   }
 }
 
@@ -148,7 +183,7 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
   out.reset(particles.size());
   if (!options.skip || plan.on(Stage::Interact)) {
     StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
-    StageTimer timer(p, options.profile);
+    StageTimer timer(p, timed);
     const core::InteractionCounts counts = core::accumulate_interactions(
         particles, at_state, awake_laws, at, executor, workspace, out.internal, out.external);
     p.visited += counts.pairs_visited;
@@ -353,13 +388,7 @@ const SearchCounts& Simulation::searches() const { return impl_->searches; }
 
 Audits Simulation::audits() const { return audits_of(impl_->state.record); }
 
-Profile Simulation::profile() const {
-  Profile profile = impl_->profile;
-  double& integrate = profile[static_cast<std::size_t>(Stage::Integrate)].cpu_s;
-  for (std::size_t s = 0; s < static_cast<std::size_t>(Stage::Integrate); ++s) integrate -= profile[s].cpu_s;
-  integrate = std::max(integrate, 0.0);
-  return profile;
-}
+Profile Simulation::profile() const { return impl_->profile; }
 
 StageProfile& Simulation::profile(Stage stage) { return impl_->profile[static_cast<std::size_t>(stage)]; }
 

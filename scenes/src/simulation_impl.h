@@ -26,6 +26,8 @@ struct Simulation::Impl {
   Executor executor;
   StepPlan plan;
   Profile profile{};
+  bool timed = false;            ///< the stages of the step under way are measured
+  std::uint64_t steps_made = 0;  ///< by this object
   State state;
   State last_frame;
   core::ParticleState step_begin;  ///< of the last step, where the scene fixes it
@@ -65,6 +67,7 @@ struct Simulation::Impl {
   Impl(Scene s, SimulationOptions o);
   StageContext context();
   void step();
+  void make_step();
   void refine_step();
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
   core::ImplicitContact implicit_contact();

@@ -2,14 +2,15 @@
 
 #include <cstring>
 
-#include "supple/core/error.h"
+#include "program_identity.h"
+#include "scene_keys.h"
 #include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 12;
+constexpr std::uint64_t kVersion = 13;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -97,12 +98,39 @@ void load_record(StateReader& in, RunRecord& r) {
   }
 }
 
-[[noreturn]] void corrupt(const std::filesystem::path& path, const std::string& what) {
-  throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
-                                        .key = {},
-                                        .expected = "expected a complete saved state",
-                                        .found = what,
-                                        .hint = "remove the file and run the scene again"});
+Fault fault_of(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
+  return {.place = path.string(), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)};
+}
+
+[[noreturn]] void damaged(const std::filesystem::path& path, std::string found) {
+  throw DamagedState(ErrorKind::Corrupt, fault_of(path, "expected a complete saved state", std::move(found),
+                                                  "`supple run --resume` goes on from the last good one before it"));
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
+  throw Error(ErrorKind::Corrupt, fault_of(path, std::move(expected), std::move(found), std::move(hint)));
+}
+
+/// "do this, or that"
+std::string either(const std::string& one, const std::string& other) { return one.empty() || other.empty() ? one + other : one + ", " + other; }
+
+[[noreturn]] void refuse_scene(const std::filesystem::path& path, const StateOrigin& origin, const std::string& keys, const std::string& otherwise) {
+  const KeyDifferences differ = origin.keys && !keys.empty() ? differences(keys_in(*origin.keys), keys_in(keys)) : KeyDifferences{};
+  refuse(path, "expected a state of this scene", differ.found.empty() ? "one of another scene" : "one of a scene with " + differ.found,
+         either(differ.set.empty() ? "use the scene file and the --set that it was made with" : "its scene is this one with " + differ.set, otherwise));
+}
+
+void check_wanted(const std::filesystem::path& path, const State& state, const std::string& program, const StateWanted& wanted) {
+  if (wanted.frame && (state.frame != *wanted.frame || state.substep != 0)) {
+    const std::string frame = std::to_string(state.frame);
+    refuse(path, "expected the state of frame " + std::to_string(*wanted.frame),
+           state.substep == 0 ? "that of frame " + frame : "one between frames " + frame + " and " + std::to_string(state.frame + 1),
+           "give the file its own name, or remove it: `supple run --resume` makes it anew");
+  }
+  if (wanted.same_program && program != program_identity()) {
+    refuse(path, "expected a state of this build of supple", "one of another build, whose steps may differ in a bit",
+           "go on with that build, or use --overwrite to run the scene again");
+  }
 }
 
 }  // namespace
@@ -129,11 +157,15 @@ std::uint64_t State::hash() const {
   return hasher.value();
 }
 
-void save_state(const std::filesystem::path& path, const State& state, std::uint64_t fingerprint) {
+StateOrigin origin_of(const Scene& scene) { return {scene.content_hash, scene.motion_keys}; }
+
+void save_state(const std::filesystem::path& path, const State& state, const StateOrigin& origin) {
   StateWriter out;
   out.write(kMagic);
   out.write(kVersion);
-  out.write(fingerprint);
+  out.write(origin.scene);
+  out.write(origin.keys ? std::string_view(*origin.keys) : std::string_view());
+  out.write(std::string_view(program_identity()));
   for (const std::int32_t value : {state.frame, state.substep, state.halvings}) {
     out.write(static_cast<std::uint64_t>(static_cast<std::uint32_t>(value)));
   }
@@ -160,34 +192,28 @@ void save_state(const std::filesystem::path& path, const State& state, std::uint
   io::write_atomically(path, std::span<const std::byte>(out.bytes()));
 }
 
-State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
+State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted) {
   const std::vector<std::byte> bytes = io::read_file(path, kLargestFile);
-  if (bytes.size() < 4 * sizeof(std::uint64_t)) corrupt(path, "a file of " + std::to_string(bytes.size()) + " bytes");
+  if (bytes.size() < 4 * sizeof(std::uint64_t)) damaged(path, "a file of " + std::to_string(bytes.size()) + " bytes");
   const std::span<const std::byte> content(bytes.data(), bytes.size() - sizeof(std::uint64_t));
   std::uint64_t check = 0;
   std::memcpy(&check, bytes.data() + content.size(), sizeof check);
-  if (check != hash_bytes(content)) corrupt(path, "content that does not match its checksum");
+  if (check != hash_bytes(content)) damaged(path, "content that does not match its checksum");
 
   StateReader in(content);
   std::uint64_t magic = 0, version = 0, scene = 0;
+  std::string keys, program;
   in.read(magic);
   in.read(version);
-  in.read(scene);
-  if (magic != kMagic) corrupt(path, "another kind of file");
+  if (magic != kMagic) refuse(path, "expected a saved state", "another kind of file", {});
   if (version != kVersion) {
-    throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
-                                          .key = {},
-                                          .expected = "expected a saved state of version " + std::to_string(kVersion),
-                                          .found = "version " + std::to_string(version) + ", of another version of supple",
-                                          .hint = "use --overwrite to run the scene again"});
+    refuse(path, "expected a saved state of version " + std::to_string(kVersion),
+           "version " + std::to_string(version) + ", of another version of supple", either("run the scene again", wanted.otherwise));
   }
-  if (scene != fingerprint) {
-    throw Error(ErrorKind::Corrupt, Fault{.place = path.string(),
-                                          .key = {},
-                                          .expected = "expected a state of this scene",
-                                          .found = "one of another scene, or of other parameters",
-                                          .hint = "use --overwrite to start again, or another --out folder"});
-  }
+  in.read(scene);
+  in.read(keys);
+  in.read(program);
+  if (scene != origin.scene) refuse_scene(path, origin, keys, wanted.otherwise);
   State state;
   for (std::int32_t* value : {&state.frame, &state.substep, &state.halvings}) {
     std::uint64_t raw = 0;
@@ -219,7 +245,8 @@ State load_state(const std::filesystem::path& path, std::uint64_t fingerprint) {
   state.sleep.load(in);
   state.sticks.load(in);
   load_record(in, state.record);
-  if (!in.at_end()) corrupt(path, "bytes after the end");
+  if (!in.at_end()) refuse(path, "expected a saved state", "one with bytes after its end", {});
+  check_wanted(path, state, program, wanted);
   return state;
 }
 

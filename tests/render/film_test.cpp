@@ -85,6 +85,19 @@ TEST(Film, IsKeptAsLongAsItHoldsTheSamePicturesAtTheSameRate) {
   EXPECT_EQ(folder.file_count(), 4U);
 }
 
+TEST(Film, CarriesANoteThatIsReadWithoutItsPictures) {
+  const Folder folder;
+  write_frames(folder, "ball", 1, 3, 16, 16);
+  EXPECT_EQ(film_note(folder / "film.mp4"), std::nullopt);
+  encode_film(folder.path(), "ball", 1, 3, 24.0, {folder / "film.mp4", "0123abcd of 3"});
+  EXPECT_EQ(film_note(folder / "film.mp4"), "0123abcd of 3");
+  const Environment program("SUPPLE_FFMPEG", "/no/such/ffmpeg");
+  EXPECT_NO_THROW(encode_film(folder.path(), "ball", 1, 3, 24.0, {folder / "film.mp4", "0123abcd of 3"}));
+  EXPECT_ANY_THROW(encode_film(folder.path(), "ball", 1, 3, 24.0, {folder / "film.mp4", "another"}));
+  std::ofstream(folder / "film.mp4") << "no film; note by hand;";
+  EXPECT_EQ(film_note(folder / "film.mp4"), std::nullopt);
+}
+
 TEST(Film, NamesThePackageWhenFfmpegIsAbsentAndKeepsTheFrames) {
   const Folder folder;
   write_frames(folder, "ball", 1, 2, 16, 16);

@@ -87,6 +87,41 @@ printf 'schema: 1\nduration: 5 ms\nframe_rate: 1000\nground: {modulus: 1e9}\ntim
 printf '  - name: ball\n    particles: {at: [0, 0, 0.2], velocity: [0, 0, -600], mass: 0.001}\n' >> passes.yaml
 printf '    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]\n    contact: {modulus: 1e8}\n' >> passes.yaml
 expect 5 "at t = 0.001 s 'ball' and 'ground' go" run passes.yaml --out passes --progress none
+# A state of a scene with another key: the one that differs, and what to add.
+expect 0 '' run good.yaml --out heavy --progress none --simulate-only --set objects.ball.particles.mass=2
+expect 7 'with objects.ball.particles.mass=2 (here 1); its scene is this one with --set objects.ball.particles.mass=2' query forces good.yaml --state heavy/states/good.0002.state
+if grep -qF -- '--overwrite' err.txt; then
+  echo 'query: expected no advice that it does not take, found:'
+  cat err.txt
+  failures=$((failures + 1))
+fi
+expect 0 '' query forces good.yaml --state heavy/states/good.0002.state --set objects.ball.particles.mass=2
+# A run ends with the last frame asked for, and goes on from there.
+expect 0 '' run good.yaml --out part --frames 1-2 --progress none --simulate-only
+[[ ! -e part/states/good.0003.state ]] || { echo 'run --frames 1-2: frame 3 was simulated'; failures=$((failures + 1)); }
+expect 0 '' run good.yaml --out part --resume --progress none --simulate-only
+[[ $(grep state_hash part/result.json) == $(grep state_hash good/result.json) ]] || { echo 'run --resume: another final state'; failures=$((failures + 1)); }
+# States under the names of others, and lost ones.
+cp part/states/good.0001.state part/states/good.0003.state
+expect 7 'expected the state of frame 3, found that of frame 1' run good.yaml --out part --resume --progress none --simulate-only
+expect 7 'expected the state of frame 3, found that of frame 1' export good.yaml --out part --mesh usd --progress none
+expect 7 'expected the state of frame 3, found that of frame 1' render good.yaml --out part --progress none
+rm part/states/good.000[23].state
+expect 0 '' run good.yaml --out part --resume --progress none --simulate-only
+rm part/states/good.0002.state
+expect 0 'frame 2 is simulated again: its saved state is lost' run good.yaml --out part --resume --progress none --simulate-only
+# What acts on nothing: a run may be drawn with another floor.
+for set in 'ground={height: -1, collides: false}' 'pairs=[]' 'camera={from: [0, -4, 1], look_at: [0, 0, 0]}'; do
+  expect 0 '' render good.yaml --out part --progress none --set "$set" --set 'output.images={size: [32, 24]}'
+done
+# Nothing is left of a scene that could not be read.
+expect 4 'nosuch.yaml' run nosuch.yaml --progress none
+expect 4 '' run nosuch.yaml --out nothing_read --progress none
+expect 4 'run the scene first' render good.yaml --out nothing_read --progress none
+for folder in out nothing_read; do
+  [[ ! -e $folder ]] || { echo "$folder: expected nothing, found a folder"; failures=$((failures + 1)); }
+done
+
 printf 'x' >> good/states/good.0002.state
 expect 7 'checksum' query forces good.yaml --state good/states/good.0002.state
 

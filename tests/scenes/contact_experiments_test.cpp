@@ -167,8 +167,8 @@ pairs: [{objects: [ball, floor], dissipation: 0.5}]
   while (simulation.state().particles.velocity[0].z() < 0.0 || simulation.state().particles.position[0].z() < 0.101) {
     if (restart && simulation.state().particles.position[0].z() < 0.09) {
       const fs::path file = fs::path(::testing::TempDir()) / "pair_work.state";
-      save_state(file, simulation.state(), 1);
-      simulation.restore(load_state(file, 1));
+      save_state(file, simulation.state(), {.scene = 1});
+      simulation.restore(load_state(file, {.scene = 1}));
       restart = false;
     }
     simulation.step();

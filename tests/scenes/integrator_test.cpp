@@ -102,10 +102,10 @@ TEST(IntegratorKey, KeepsTheBitsOfARestartAndOfEveryNumberOfThreads) {
     Simulation whole = make(text);
     run(whole, 4);
     const fs::path path = fs::path(testing::TempDir()) / ("integrator_" + name + ".state");
-    save_state(path, whole.state(), 7);
+    save_state(path, whole.state(), {.scene = 7});
     run(whole, 8);
     Simulation resumed = make(text, 3);
-    resumed.restore(load_state(path, 7));
+    resumed.restore(load_state(path, {.scene = 7}));
     run(resumed, 8);
     EXPECT_EQ(whole.state_hash(), resumed.state_hash()) << name;
     fs::remove(path);

@@ -130,8 +130,8 @@ TEST(Overload, OfConcentricBallsHoldsTheEnergyOfTheSofter) {
 TEST(Overload, IsKeptWithTheState) {
   const Simulation simulation = run(balls(15.0), 8);
   const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "overload.state";
-  save_state(file, simulation.state(), 1);
-  const State loaded = load_state(file, 1);
+  save_state(file, simulation.state(), {.scene = 1});
+  const State loaded = load_state(file, {.scene = 1});
   ASSERT_EQ(loaded.record.overloads.size(), 1u);
   EXPECT_EQ(loaded.record.overloads[0].b, "right");
   EXPECT_EQ(loaded.record.overloads[0].energy, simulation.state().record.overloads[0].energy);

@@ -361,14 +361,14 @@ TEST(SceneDeterminism, RestartFromASavedStateGivesTheSameBits) {
   run(whole, 10);
   for (int k = 0; k < 5; ++k) whole.step();  // in the middle of a frame too
   const fs::path path = fs::path(testing::TempDir()) / "restart.state";
-  save_state(path, whole.state(), 42);
+  save_state(path, whole.state(), {.scene = 42});
   run(whole, 16);
 
   Simulation resumed(scene);
-  resumed.restore(load_state(path, 42));
+  resumed.restore(load_state(path, {.scene = 42}));
   run(resumed, 16);
   EXPECT_EQ(whole.state_hash(), resumed.state_hash());
-  EXPECT_THROW((void)load_state(path, 43), Error);
+  EXPECT_THROW((void)load_state(path, {.scene = 43}), Error);
   fs::remove(path);
 }
 

@@ -141,9 +141,9 @@ TEST(Sleep, HasTheSameBitsForAnyThreadsAndWhenContinued) {
   }));
   const fs::path file = fs::temp_directory_path() / "supple_sleep.state";
   for (const State& state : saved) {
-    save_state(file, state, 7);
+    save_state(file, state, {.scene = 7});
     Simulation continued = make(scene, {.threads = 2});
-    continued.restore(load_state(file, 7));
+    continued.restore(load_state(file, {.scene = 7}));
     EXPECT_EQ(run(continued, 140), hash);
   }
   fs::remove(file);

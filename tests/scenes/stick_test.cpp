@@ -132,8 +132,8 @@ TEST(Stick, GoesOnFromASavedStateWithTheSameBits) {
   run(whole, 12);
   run(first, 6);
   const std::filesystem::path file = std::filesystem::temp_directory_path() / "supple_stick.state";
-  save_state(file, first.state(), 7);
-  second.restore(load_state(file, 7));
+  save_state(file, first.state(), {.scene = 7});
+  second.restore(load_state(file, {.scene = 7}));
   std::filesystem::remove(file);
   ASSERT_FALSE(second.state().sticks.spring.empty());
   run(second, 6);

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace supple::render {
@@ -52,13 +54,23 @@ struct ImageDifference {
 /// @pre pictures of one size, gain > 0
 [[nodiscard]] ImageDifference compare(const Image& a, const Image& b, double gain);
 
+/// A film to be made, and a word about its pictures that it carries (printable, without semicolon).
+struct FilmFile {
+  FilmFile(std::filesystem::path file, std::string word = {}) : path(std::move(file)), note(std::move(word)) {}  // NOLINT: a path will do
+  std::filesystem::path path;
+  std::string note;
+};
+
 /// Encodes frames folder/stem.0001.png ... (first .. last) to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg
 /// program, into a temporary file that is renamed when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names
 /// another program or its path. Odd sizes are stretched to even ones. A film there that already holds the same pictures at the
-/// same rate (it says so in its comment) is kept.
+/// same rate and note (it says so in its comment) is kept.
 /// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line).
 void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
-                 const std::filesystem::path& film);
+                 const FilmFile& film);
+
+/// The note of a film that `encode_film` made; nothing for any other file, or none. Reads its head only.
+[[nodiscard]] std::optional<std::string> film_note(const std::filesystem::path& film);
 
 /// Looks for the program that `encode_film` starts. @throws Error{Io} when it is absent
 void find_film_program();

@@ -30,10 +30,10 @@ struct Progress {
 
 struct RunOptions {
   std::filesystem::path folder;                 ///< where everything goes
-  std::set<int> frames{};                        ///< frames to output; empty: all
+  std::set<int> frames{};                        ///< frames to output; empty: all. `run_scene` simulates no further than the last of them
   int threads = 0;                              ///< 0: all the machine has
   bool overwrite = false;                       ///< a folder with a result may be replaced
-  bool resume = false;                          ///< continue from the last state in the folder
+  bool resume = false;                          ///< continue from the states in the folder; those that are lost or damaged are simulated again
   bool simulate_only = false;                   ///< no images, meshes, grids, samples or film
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
@@ -102,8 +102,8 @@ std::vector<std::filesystem::path> make_sheets(const Scene& scene, const std::fi
 /// export.json as its report. @throws Error{Usage} when no file is asked for
 [[nodiscard]] RunResult export_run(const Scene& scene, const RunOptions& options);
 
-/// Leaves a result.json that says why a run could not begin (a faulty scene, say). Does nothing where the folder cannot
-/// be made or holds an earlier result.
+/// Leaves a result.json that says what is wrong with a scene that was read. Does nothing where the scene could not be read (Error{Io}),
+/// the folder cannot be made, or it holds an earlier result.
 void leave_failure(const std::filesystem::path& folder, const std::string& name, const Error& error);
 
 /// File stem of a scene: its file name without extension.

@@ -444,7 +444,8 @@ struct Scene {
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key
   std::shared_ptr<const ScenePlaces> places;  ///< where its keys stand in that file, for messages; not a key
-  std::uint64_t content_hash = 0;     ///< of all keys but those of looks, output and duration, and of files they name; not a key
+  std::uint64_t content_hash = 0;     ///< of all keys that act on the motion, and of files they name: what saved states belong to; not a key
+  std::shared_ptr<const std::string> motion_keys;  ///< these keys with their values, for messages; not a key
   std::uint64_t picture_hash = 0;     ///< of all keys that decide a picture of a state, and of files they name; not a key
 
   /// Frame n shows t = (n - 1) / frame_rate; frame 1 is the initial state.

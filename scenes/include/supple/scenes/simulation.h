@@ -32,7 +32,7 @@ namespace supple::scenes {
 struct SimulationOptions {
   int threads = 1;             ///< 0: all the machine has; the result does not depend on it
   bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
-  bool profile = false;        ///< time every step, not every 64th
+  bool profile = false;        ///< time every step, not every 61st
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps go on
   double memory = kDefaultMemory;  ///< that the scene may take, by what is counted before it is built [byte]
@@ -41,14 +41,18 @@ struct SimulationOptions {
 
 /// Work of one stage so far.
 struct StageProfile {
-  std::uint64_t calls = 0;
-  double cpu_s = 0.0;          ///< unless profiling, measured on the first and every 64th call after it, and scaled; where several frames
-                               ///< are in work at the same time, shared out so that all stages add up to what was taken
+  std::uint64_t calls = 0;     ///< of `advance`: steps
+  double cpu_s = 0.0;          ///< of this stage alone. Unless profiling, measured in the first and every 61st step (a prime, so that what comes
+                               ///< back every 2^k steps is met as often as it is there) and scaled by calls; where several frames are in work at
+                               ///< the same time, shared out so that all stages add up to what was taken
   double first_s = 0.0;        ///< measured of the first call: what that sets up is not scaled
   double later_s = 0.0;        ///< measured of later calls
+  double apart_s = 0.0;        ///< measured of what calls do now and then, always, and not scaled
   std::uint64_t timed = 0;     ///< calls that were measured
   std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... looked at
   std::uint64_t present = 0;   ///< of so many
+  /// Brings `cpu_s` up to date with the others.
+  void scale();
 };
 using Profile = std::array<StageProfile, kStageCount>;
 
@@ -165,7 +169,7 @@ class Simulation {
   [[nodiscard]] std::vector<std::string> warnings() const;
   /// What searches found for all meshes made of the present state, and which were not searched.
   [[nodiscard]] const SearchCounts& searches() const;
-  /// Work by stage; the time of `advance` is without the force evaluations inside it.
+  /// Work by stage; `advance` is all of a step but the stages before it.
   [[nodiscard]] Profile profile() const;
   /// Where a stage outside the simulation (render, export) books its work.
   [[nodiscard]] StageProfile& profile(Stage stage);

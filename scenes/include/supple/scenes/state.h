@@ -4,11 +4,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "supple/collision/sleep.h"
 #include "supple/collision/stick.h"
+#include "supple/core/error.h"
 #include "supple/core/integrate.h"
 #include "supple/core/links.h"
 #include "supple/core/particles.h"
@@ -76,9 +79,29 @@ struct State {
   [[nodiscard]] std::uint64_t hash() const;    ///< of everything but the record
 };
 
-/// Checkpoints: versioned, little-endian, with a hash over the content and the fingerprint of the scene.
-void save_state(const std::filesystem::path& path, const State& state, std::uint64_t fingerprint);
-/// @throws Error{Corrupt} when the file is not exactly what was written, or belongs to another scene; Error{Io}
-[[nodiscard]] State load_state(const std::filesystem::path& path, std::uint64_t fingerprint);
+/// Which scene a state belongs to.
+struct StateOrigin {
+  std::uint64_t scene = 0;                   ///< Scene::content_hash
+  std::shared_ptr<const std::string> keys{}; ///< Scene::motion_keys, so that a message can name those that differ; may be empty
+};
+[[nodiscard]] StateOrigin origin_of(const Scene& scene);
+
+/// What a saved state must be besides whole and of the scene.
+struct StateWanted {
+  std::optional<int> frame{};  ///< the state at this frame, as `supple run` leaves one; absent: any
+  bool same_program = false;   ///< saved by this build of the program, whose steps give the same bits
+  std::string otherwise{};     ///< what else to do about a state of another scene: "or ..."
+};
+
+/// A file that is not what was written under its name: it was cut off, or a byte of it changed.
+class DamagedState : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Checkpoints: versioned, little-endian, with a hash over the content, the scene, its keys and the build of the program.
+void save_state(const std::filesystem::path& path, const State& state, const StateOrigin& origin);
+/// @throws DamagedState; Error{Corrupt} when the state is whole and not what is wanted; Error{Io}
+[[nodiscard]] State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted = {});
 
 }  // namespace supple::scenes

@@ -1,0 +1,41 @@
+/// @file frame_looks.h
+/// Which look the frames of a run have: a film and a contact sheet show frames of one look. The look is all that decides a picture
+/// beside the state: the scene's keys that pictures show, the context and the build of the program.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace supple::scenes {
+
+/// Fingerprint of a picture; look_in gives the look that it begins with.
+[[nodiscard]] std::string picture_fingerprint(const std::string& look, std::uint64_t state_hash);
+[[nodiscard]] std::string look_in(const std::string& fingerprint);
+
+/// Frames 1 .. last by the look of their PNGs, ascending.
+struct FrameLooks {
+  std::string look;          ///< that most have; of the first of those that as many have
+  std::vector<int> most;     ///< with this look
+  std::vector<int> others;   ///< with another one
+  std::vector<int> absent;   ///< without a picture
+  bool sizes_differ = false;
+};
+[[nodiscard]] FrameLooks look_at_frames(const std::filesystem::path& folder, const std::string& name, int last);
+
+/// "frame 8 of k has another look than the others"; empty where all are there in one look.
+[[nodiscard]] std::string told(const FrameLooks& looks, const std::string& name);
+
+/// The note of a film of frames 1 .. last with this look.
+[[nodiscard]] std::string film_note_of(const std::string& look, int last);
+/// Removes NAME.mp4 if a run made it and it is not of these frames and this look.
+/// @param last  0: any number of frames   @return whether there was such a film
+bool remove_stale_film(const std::filesystem::path& folder, const std::string& name, const std::string& look, int last);
+/// Removes NAME_sheet.png if a run made it of another look.
+void remove_stale_sheet(const std::filesystem::path& folder, const std::string& name, const std::string& look);
+
+/// NAME_sheet.png: twelve frames spread over those with the look that most have, 3 rows of 4. Empty when there are none.
+std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, const FrameLooks& looks);
+
+}  // namespace supple::scenes

@@ -1,0 +1,48 @@
+/// @file scene_keys.h
+/// The keys of a scene that decide something, each with the value that was read: two scenes say the same where these are equal,
+/// whatever the order, units and defaults written out in their files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "supple/scenes/scene.h"
+
+namespace supple::scenes {
+
+/// A key whose value is not the default.
+struct SceneKey {
+  std::string path;      ///< "objects.ball.particles.mass"; items of a list by name or index
+  std::string value;     ///< as in a file; kGiven for a mapping, the hash of its content for a file
+  std::string fallback;  ///< the value where the key is left out; kNone where no value says so
+  friend bool operator==(const SceneKey&, const SceneKey&) = default;
+};
+using SceneKeys = std::vector<SceneKey>;  ///< by path, ascending
+
+inline constexpr std::string_view kGiven = "given";
+inline constexpr std::string_view kNone = "none";
+
+/// What acts on the motion: neither looks and outputs, nor grounds, obstacles, pairs and rules of contact that touch nothing by what
+/// the scene says. That nothing comes near an obstacle no rule tells, so obstacles count that something may touch.
+/// @param folder  where files that the scene names are
+[[nodiscard]] SceneKeys motion_keys(const Scene& scene, const std::filesystem::path& folder);
+/// What decides a picture of a given state.
+[[nodiscard]] SceneKeys picture_keys(const Scene& scene, const std::filesystem::path& folder);
+
+[[nodiscard]] std::uint64_t hash_of(const SceneKeys& keys);
+/// One line a key, for files.
+[[nodiscard]] std::string text_of(const SceneKeys& keys);
+/// @throws Error{Corrupt} for what is no such text
+[[nodiscard]] SceneKeys keys_in(std::string_view text);
+
+/// What two scenes differ in, for a message.
+struct KeyDifferences {
+  std::string found;  ///< "objects.ball.particles.mass=2 (here 1)", of the other scene first; the first few of them
+  std::string set;    ///< "--set objects.ball.particles.mass=2", which makes this scene the other one; empty where --set cannot
+};
+[[nodiscard]] KeyDifferences differences(const SceneKeys& here, const SceneKeys& other);
+
+}  // namespace supple::scenes
