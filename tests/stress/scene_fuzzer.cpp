@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kTriesToMinimise = 200;
+constexpr std::chrono::seconds kTimeToMinimise{30};  // of one fault
 constexpr const char* kName = "fuzz.yaml";
 
 struct Origin {
@@ -54,7 +56,9 @@ class SceneFuzzer {
     const fs::path folder = input.origin->file.parent_path();
     const std::string kind = found.what.substr(0, found.what.find(':'));
     if (input.value) {
+      const auto begin = std::chrono::steady_clock::now();
       const auto fails = [&](const Value& value) {
+        if (std::chrono::steady_clock::now() - begin > kTimeToMinimise) return false;
         const Tally tally = watch(0, 1, limits(), settings_.scratch / "minimise.log", [&](std::uint64_t) { return look(print_value(value), folder); });
         return !tally.faults.empty() && tally.faults.front().what.substr(0, tally.faults.front().what.find(':')) == kind;
       };

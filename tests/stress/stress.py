@@ -85,7 +85,8 @@ def run_row(row, context):
 
 def tell(row, asked, outcome, seconds):
     result = "passed" if not outcome.faults else f"{len(outcome.faults)} FAULTS"
-    print(f"{row.name:<14} {outcome.reached} of {asked} {row.unit}, {result}, {seconds:.0f} s{', ' + outcome.note if outcome.note else ''}", flush=True)
+    of_asked = f" of {asked}" if row.asked > 1 else ""
+    print(f"{row.name:<14} {outcome.reached}{of_asked} {row.unit}, {result}, {seconds:.0f} s{', ' + outcome.note if outcome.note else ''}", flush=True)
     for fault in outcome.faults[:MOST_FAULTS_TOLD]:
         print("    " + fault)
     if len(outcome.faults) > MOST_FAULTS_TOLD:
