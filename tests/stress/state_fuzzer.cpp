@@ -22,7 +22,7 @@ constexpr int kFrames = 3;
 
 struct Saved {
   std::string bytes;
-  std::uint64_t fingerprint = 0;
+  scenes::StateOrigin origin;
   std::uint64_t hash = 0;
   std::int32_t frame = 0;
 };
@@ -36,11 +36,11 @@ class StateFuzzer {
     const fs::path path = settings_.scratch / "seed.state";
     for (const char* name : kScenes) {
       scenes::Simulation simulation(scenes::read_scene(settings_.sources / "scenes/library" / (std::string(name) + ".yaml")));
-      const std::uint64_t fingerprint = simulation.scene().content_hash;
+      const scenes::StateOrigin origin = scenes::origin_of(simulation.scene());
       for (int frame = 1; frame <= kFrames; ++frame) {
         if (frame > 1) simulation.step_frame();
-        scenes::save_state(path, simulation.state(), fingerprint);
-        saved_.push_back({file_text(path), fingerprint, simulation.state_hash(), frame});
+        scenes::save_state(path, simulation.state(), origin);
+        saved_.push_back({file_text(path), origin, simulation.state_hash(), frame});
       }
     }
   }
@@ -52,7 +52,7 @@ class StateFuzzer {
     std::string fault;
     Trial trial = judged("fuzz.state", [&] {
       try {
-        const scenes::State state = scenes::load_state(path, saved->fingerprint);
+        const scenes::State state = scenes::load_state(path, saved->origin);
         // The end of another state may be all of it.
         const bool known = std::any_of(saved_.begin(), saved_.end(), [&bytes = bytes, &state](const Saved& s) {
           return s.bytes == bytes && s.hash == state.hash() && s.frame == state.frame;
