@@ -231,6 +231,7 @@ int check(const Arguments& arguments) {
     const std::size_t objects = scene.objects.size(), particles = simulation.model().particles.size();
     std::printf("%s: no fault found (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(), objects, plural(objects),
                 particles, plural(particles), scene.frame_count());
+    std::fputs(scenes::describe_mesh_obstacles(simulation.model()).c_str(), stdout);
   }
   return 0;
 }

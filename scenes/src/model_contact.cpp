@@ -126,14 +126,12 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
 void add_mesh(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults, FixedBody& body) try {
   auto read = faults.read(key + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
   if (!read) return;
-  Mesh& mesh = *read;
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
-  for (Vec3& x : mesh.position) x = d.at + turn * x;
-  body.solid = implicit::MeshSolid(mesh, {.voxel = d.voxel.value_or(0.0), .slope = d.slope});
+  body.solid = implicit::MeshSolid(*read, {.slope = d.slope, .pose = {d.at, turn}});
 } catch (const Error& error) {
   if (error.kind() != ErrorKind::Scene) throw;
   const Fault& fault = error.faults().front();
-  faults.add(key + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
+  faults.add(key + ".file", fault.expected, fault.found, fault.hint);
 }
 
 /// Primitives that sum; refused ones leave a fault and `body` as it is.
