@@ -1,6 +1,7 @@
 /// @file mesh_probes.cpp
 /// Small balls pressed into the faces of mesh solids by a hundredth of their size, in places spread evenly over the area; one JSON object a mesh and error.
-/// Without files: a box, a gear and an anchor of crossing shells. A ball that finds no contact shows a surface that is elsewhere.
+/// Without files: a box, a gear and an anchor of crossing shells. A ball that finds no contact, or a place as far behind a face that is
+/// outside ("hollow") though the mesh is thicker there, shows a surface that is elsewhere.
 ///   mesh_probes [PROBES] [FILE.obj|.ply ...]
 #include <algorithm>
 #include <cmath>
@@ -58,7 +59,7 @@ std::vector<std::pair<Vec3, Vec3>> spread(const Mesh& mesh, int count) {
 }
 
 void probe(const Named& named, int count) {
-  constexpr double kDepth = 0.01, kRadius = 0.03;  // of the size
+  constexpr double kDepth = 0.01, kRadius = 0.015;  // of the size
   const double begin = cpu_microseconds();
   const implicit::MeshSolid solid(named.mesh, {.slope = 1.0});
   const double built_ms = 1e-3 * (cpu_microseconds() - begin);
@@ -75,6 +76,8 @@ void probe(const Named& named, int count) {
   implicit::FieldView(solid).evaluate(near, value, slope);
   const double evaluation_ns = 1e3 * (cpu_microseconds() - asked) / static_cast<double>(near.size());
 
+  int hollow = 0;  // places that far behind a face that are outside
+  for (const auto& [x, n] : places) hollow += implicit::FieldView(solid).value(x - kDepth * size * n) > 0.0 ? 0 : 1;
   Rigid ball(linear_sphere(kRadius * size), kLinearModulus * 1e5, 0.2 * kRadius * size);
   const Pose still;
   const Executor executor(1);
@@ -102,9 +105,9 @@ void probe(const Named& named, int count) {
       evaluations += static_cast<double>(s.evaluations) / count;
     }
     std::sort(cpu.begin(), cpu.end());
-    std::printf("{\"name\": \"collision/mesh_probes/%s/error=%g\", \"triangles\": %zu, \"built_ms\": %.1f, \"evaluation_ns\": %.0f, \"probes\": %d, \"missed\": %d, "
+    std::printf("{\"name\": \"collision/mesh_probes/%s/error=%g\", \"triangles\": %zu, \"built_ms\": %.1f, \"evaluation_ns\": %.0f, \"probes\": %d, \"hollow\": %d, \"missed\": %d, "
                 "\"unmet\": %d, \"by_polar\": %d, \"cpu_us_median\": %.0f, \"cpu_us_90_of_100\": %.0f, \"cpu_us_worst\": %.0f, \"evaluations_mean\": %.0f}\n",
-                named.name.c_str(), error, solid.mesh().triangle.size(), built_ms, evaluation_ns, count, missed, unmet, by_polar, cpu[cpu.size() / 2],
+                named.name.c_str(), error, solid.mesh().triangle.size(), built_ms, evaluation_ns, count, hollow, missed, unmet, by_polar, cpu[cpu.size() / 2],
                 cpu[cpu.size() * 9 / 10], cpu.back(), evaluations);
     std::fflush(stdout);
   }
