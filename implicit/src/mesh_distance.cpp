@@ -178,7 +178,7 @@ void MeshDistance::keep_exact(const Vec3& x, int beyond) {
   const auto high = [&](std::size_t axis) { return std::min(place.cell[axis] + 2 + more, size_[axis] - 1); };
   for (std::size_t c = low(2); c <= high(2); ++c) {
     for (std::size_t b = low(1); b <= high(1); ++b) {
-      std::fill(weight_.begin() + static_cast<std::ptrdiff_t>(node(low(0), b, c)), weight_.begin() + static_cast<std::ptrdiff_t>(node(high(0), b, c)) + 1, std::uint8_t{1});
+      std::fill_n(weight_.begin() + static_cast<std::ptrdiff_t>(node(low(0), b, c)), high(0) - low(0) + 1, std::uint8_t{1});
     }
   }
 }

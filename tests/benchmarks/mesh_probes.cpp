@@ -105,7 +105,8 @@ void probe(const Named& named, int count) {
       evaluations += static_cast<double>(s.evaluations) / count;
     }
     std::sort(cpu.begin(), cpu.end());
-    std::printf("{\"name\": \"collision/mesh_probes/%s/error=%g\", \"triangles\": %zu, \"built_ms\": %.1f, \"evaluation_ns\": %.0f, \"probes\": %d, \"hollow\": %d, \"missed\": %d, "
+    std::printf("{\"name\": \"collision/mesh_probes/%s/error=%g\", \"triangles\": %zu, \"built_ms\": %.1f, "
+                "\"evaluation_ns\": %.0f, \"probes\": %d, \"hollow\": %d, \"missed\": %d, "
                 "\"unmet\": %d, \"by_polar\": %d, \"cpu_us_median\": %.0f, \"cpu_us_90_of_100\": %.0f, \"cpu_us_worst\": %.0f, \"evaluations_mean\": %.0f}\n",
                 named.name.c_str(), error, solid.mesh().triangle.size(), built_ms, evaluation_ns, count, hollow, missed, unmet, by_polar, cpu[cpu.size() / 2],
                 cpu[cpu.size() * 9 / 10], cpu.back(), evaluations);

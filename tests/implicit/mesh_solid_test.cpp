@@ -29,7 +29,8 @@ constexpr double kCells = 128.0;
 
 TEST(MeshSolid, IsNearTheExactDistance) {
   // Weights of a cubic B-spline have a mean square distance of a cell from where it is asked for, and a distance changes by the way at most.
-  for (const Mesh& mesh : {block(Vec3(0.5, 0.3, 0.2)), gear(24, 0.4, 0.5, 0.1), octahedral_sphere(0.5, 4), both(block(Vec3(0.5, 0.02, 0.02)), block(Vec3(0.02, 0.5, 0.001)))}) {
+  for (const Mesh& mesh : {block(Vec3(0.5, 0.3, 0.2)), gear(24, 0.4, 0.5, 0.1), octahedral_sphere(0.5, 4),
+                           both(block(Vec3(0.5, 0.02, 0.02)), block(Vec3(0.02, 0.5, 0.001)))}) {
     const MeshSolid solid(mesh, {.slope = 1.0});
     const ExactDistance exact(closed_surface(mesh));
     const double cell = solid.report().size / kCells;
