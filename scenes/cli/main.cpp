@@ -236,6 +236,7 @@ int check(const Arguments& arguments) {
     std::printf("%s: %s (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(),
                 found.built ? "no fault found" : "no fault found in keys, files and counts", found.objects, plural(found.objects), found.particles,
                 plural(found.particles), found.frames);
+    std::fputs(found.mesh_obstacles.c_str(), stdout);
   }
   return 0;
 }
