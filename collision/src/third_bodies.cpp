@@ -182,9 +182,7 @@ double UnitedField::feature_size() const {
 /// @return whether there are several
 bool Teams::gather(std::span<const ContactBody> bodies, std::uint32_t body, std::uint32_t obstacle, std::span<const std::uint32_t> partners, Team& team) {
   const auto joins = [&](std::uint32_t c, std::uint32_t member) {
-    if (!same_stuff(bodies[c], bodies[member])) return false;
-    const Comparison found = compare(bodies[c], bodies[member], bodies[body].field);
-    return found.tie && found.less && found.more;
+    return same_stuff(bodies[c], bodies[member]) && compare(bodies[c], bodies[member], bodies[body].field).tie;
   };
   std::vector<std::uint32_t>& member = team.member;
   member.assign(1, obstacle);

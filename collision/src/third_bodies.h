@@ -1,6 +1,6 @@
 /// @file third_bodies.h
-/// Obstacles are one solid, whose pressure is the largest of theirs. Where one of two presses less all over their common part, the other one has what both
-/// press alike on, as on flush faces. Others that press alike on areas, as boxes with one top, are met as one body, whose contact the first of them has.
+/// Obstacles are one solid, whose pressure is the largest of theirs. Those that press alike on areas, as flush faces do, are met as one body, whose contact
+/// the first of them has. Where they are not of one material, the one that nowhere presses less has such areas, else the first.
 #pragma once
 
 #include <cstdint>

@@ -104,7 +104,8 @@ TEST(UnitedObstacles, ThatAreFlushAreAsOne) {
     const ContactSettings settings{.error = error};
     Meeting one(at, {{kGround}});
     const Sum alone = sum_of(one.stage.solve(settings));
-    const std::vector<std::vector<Obstacle>> flush{{{kGround}, {slab}}, {{slab}, {kGround}}, {{slab}, {same}}, {{kGround}, {slab}, {wide}}, {{wide}, {same}, {kGround}, {slab}}};
+    const std::vector<std::vector<Obstacle>> flush{{{kGround}, {slab}}, {{slab}, {kGround}}, {{slab}, {same}},
+                                                   {{kGround}, {slab}, {wide}}, {{wide}, {same}, {kGround}, {slab}}};
     for (std::size_t k = 0; k < flush.size(); ++k) {
       Meeting several(at, flush[k]);
       const ContactSurface& s = several.stage.solve(settings);
