@@ -403,6 +403,35 @@ TEST(Obstacles, OfHeightsArePlanesUpToTheirBorders) {
   EXPECT_TRUE(beyond.contacts().summary.empty());
 }
 
+TEST(Obstacles, ThatAreFlushHoldABallOnce) {
+  const auto over = [](const std::string& solids) {
+    return make(R"(
+schema: 1
+duration: 0.5
+gravity: [0, 0, -9.81]
+contact: {error: 0.01}
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0.05, 0.03, 0.095], mass: 0.1}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 1e4, dissipation: 1}
+)" + solids);
+  };
+  const std::string slab = "{name: slab, shape: box, at: [0, 0, -0.2], half_sizes: [0.5, 0.5, 0.2]}";
+  const std::string right = "{name: right, shape: box, at: [0.6, 0, -0.2], half_sizes: [0.61, 0.5, 0.2]}";
+  Simulation alone = over("ground: true\n");
+  const double force = alone.contact_forces().at(0).z();
+  alone.advance_to(13);
+  for (const std::string& solids : {"ground: true\nobstacles: [" + slab + "]\n", "obstacles: [" + slab + ", " + right + "]\n", "ground: true\nobstacles: [" + right + ", " + slab + "]\n"}) {
+    Simulation flush = over(solids);
+    ASSERT_EQ(flush.contacts().summary.size(), 1u) << solids;
+    EXPECT_NEAR(flush.contact_forces()[0].z(), force, 0.02 * force) << solids;
+    flush.advance_to(13);
+    EXPECT_NEAR(flush.state().particles.position[0].z(), alone.state().particles.position[0].z(), 1e-4) << solids;
+    EXPECT_LT(flush.audits().energy_error, 0.02) << solids;
+  }
+}
+
 TEST(Obstacles, OfHeightsHoldABallInTheirHollow) {
   const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
   write_heights(folder / "hollow.csv", [](double x, double y) { return 0.4 * ((x - 0.1) * (x - 0.1) + (y + 0.2) * (y + 0.2)) - 0.1; });
