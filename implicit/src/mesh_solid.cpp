@@ -97,10 +97,16 @@ Mesh flat_faces(const Mesh& mesh) {
 }
 
 /// Signed distances to a mesh [m] on a lattice around it, cut off beyond the band outside.
+/// The unit in which floats hold distances of cells of this size [m]: 1, or a power of two where floats end in metres.
+double unit_of(double voxel) {
+  constexpr double kLeast = 1e-30, kMost = 1e30;
+  return voxel >= kLeast && voxel <= kMost ? 1.0 : std::ldexp(1.0, std::ilogb(voxel));
+}
+
 struct Distances {
   Vec3 corner = Vec3::Zero();
   std::array<std::size_t, 3> size{};
-  std::vector<float> at;  // x fastest
+  std::vector<float> at;  // x fastest, over unit_of(voxel)
   double deepest = 0.0;
 };
 
@@ -118,6 +124,7 @@ Distances distances_to(const Mesh& mesh, const Box& box, double voxel) {
     grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(Triangles{mesh, made.corner, voxel}, *transform,
                                                            static_cast<float>(kBand), std::numeric_limits<float>::max());
   });
+  const double unit = unit_of(voxel);
   made.at.reserve(made.size[0] * made.size[1] * made.size[2]);
   const auto nodes_of = grid->getConstAccessor();
   for (std::size_t k = 0; k < made.size[2]; ++k) {
@@ -125,7 +132,7 @@ Distances distances_to(const Mesh& mesh, const Box& box, double voxel) {
       for (std::size_t i = 0; i < made.size[0]; ++i) {
         const float cells = nodes_of.getValue({static_cast<int>(i), static_cast<int>(j), static_cast<int>(k)});
         const double distance = static_cast<double>(std::min(cells, static_cast<float>(kBand))) * voxel;
-        made.at.push_back(static_cast<float>(distance));
+        made.at.push_back(static_cast<float>(distance / unit));
         made.deepest = std::max(made.deepest, -distance);
       }
     }
@@ -239,13 +246,14 @@ double MeshSolid::evaluate(const Vec3& point, Vec3* gradient) const {
       slope += Vec3(weight * along, y.slope[b] * z.value[c] * line, y.value[b] * z.slope[c] * line);
     }
   }
+  const double unit = unit_of(voxel_);
   if (gradient != nullptr) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (beyond[axis]) slope[static_cast<Eigen::Index>(axis)] = 0.0;
     }
-    *gradient = (-slope_ / voxel_) * slope;
+    *gradient = (-slope_ / (voxel_ / unit)) * slope;
   }
-  return -slope_ * value;
+  return -slope_ * (value * unit);
 }
 
 void MeshSolid::evaluate(std::span<const Vec3> points, std::span<double> values) const {

@@ -46,6 +46,26 @@ std::vector<Vec3> directions(int count) {
 
 double value(const MeshSolid& solid, const Vec3& x) { return FieldView(solid).value(x); }
 
+Vec3 gradient(const MeshSolid& solid, const Vec3& x) {
+  double unused = 0.0;
+  Vec3 found;
+  solid.evaluate({&x, 1}, {&unused, 1}, {&found, 1});
+  return found;
+}
+
+TEST(MeshSolid, IsTheSameInAnyUnitOfLength) {
+  // Powers of two: 1e-45, where floats end, 1e-30 and 1e45. Nothing is rounded otherwise.
+  const MeshSolid solid(sphere(1.0, 3), {});
+  for (const int power : {-150, -98, 150}) {
+    const double scale = std::ldexp(1.0, power);
+    const MeshSolid scaled(sphere(scale, 3), {});
+    for (const Vec3& u : directions(40)) {
+      for (const double radius : {0.8, 1.0, 1.02}) EXPECT_EQ(value(scaled, scale * radius * u), scale * value(solid, radius * u)) << power;
+      EXPECT_EQ(gradient(scaled, scale * u), gradient(solid, u)) << power;
+    }
+  }
+}
+
 TEST(MeshSolid, ComesNearASphereWithTheSquareOfTheVoxel) {
   // The spline adds h^2 / 6 times the Laplacian 2 / R of the distance; the triangles take less than 1e-4 of the radius.
   constexpr double kRadius = 0.8, kSlope = 3.0;
