@@ -73,4 +73,9 @@ for ((n = step; n <= count; n += step)); do ends "$n"; done
 for ((n = count - count / 30; n <= count; n += 17)); do ends "$n"; done
 threads=3
 for ((n = 7 * step; n < count; n += 9 * step)); do ends "$n"; done
+threads=1
+# malloc, which Eigen calls: arrays that are resized are not destroyed twice.
+SUPPLE_FAIL_KIND=malloc SUPPLE_FAIL_COUNT=$scratch/count LD_PRELOAD=$library run whole --overwrite || { cat err.txt; exit 1; }
+count=$(cat count)
+for ((n = count / 20; n <= count; n += count / 20)); do SUPPLE_FAIL_KIND=malloc ends "$n"; done
 exit $((failures > 0))
