@@ -8,6 +8,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -452,8 +453,10 @@ void flush_output() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  supple::tool::prepare_last_resort();
+namespace {
+
+/// @return the exit code
+int call(int argc, char** argv) {
   try {
     const int code = parse_and_call(argc, argv);
     flush_output();
@@ -472,4 +475,17 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "internal fault: %s\n", error.what());
     return kInternal;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  supple::tool::prepare_last_resort();
+  const int code = call(argc, argv);
+  // Where memory ran out, arrays of Eigen that were being resized hold what was freed: what threads keep for life is not destroyed.
+  if (code == static_cast<int>(supple::ErrorKind::Limit)) {
+    std::fflush(nullptr);
+    std::_Exit(code);
+  }
+  return code;
 }

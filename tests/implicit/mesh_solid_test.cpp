@@ -46,6 +46,18 @@ TEST(MeshSolid, IsNearTheExactDistance) {
   }
 }
 
+TEST(MeshSolid, IsTheSameInAnyUnitOfLength) {
+  // Powers of two near 1e-45, 1e-30 and 1e45: nothing is rounded otherwise.
+  const MeshSolid solid(octahedral_sphere(1.0, 3), {.slope = 1.0});
+  for (const int power : {-150, -98, 150}) {
+    const double scale = std::ldexp(1.0, power);
+    const MeshSolid scaled(octahedral_sphere(scale, 3), {.slope = 1.0});
+    for (const Vec3& u : places({Vec3::Constant(-1.02), Vec3::Constant(1.02)}, 40)) {
+      EXPECT_EQ(value(scaled, scale * u), scale * value(solid, u)) << power;
+    }
+  }
+}
+
 TEST(MeshSolid, IsExactBesideFlatFaces) {
   const Vec3 half(0.5, 0.4, 0.3), at(0.3, -0.2, 0.1);
   const MeshSolid solid(block(half), {.slope = 3.0, .pose = {at, kTurn}});
