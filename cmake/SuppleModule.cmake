@@ -75,6 +75,10 @@ else()
   set(supple_unity_build ON)
 endif()
 option(SUPPLE_UNITY_BUILD "Compile files of a module in groups" ${supple_unity_build})
+if(SUPPLE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # GCC takes the files of a group for headers, where types of a file's own may not be parts of others.
+  target_compile_options(supple_flags INTERFACE -Wno-subobject-linkage)
+endif()
 
 # supple_together("file file..." ...): the groups of a module. scripts/together.py makes and checks them.
 function(supple_together)
