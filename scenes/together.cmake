@@ -5,7 +5,7 @@ supple_together(
    src/fields_reference.cpp src/frame_tables.cpp src/held_volumes.cpp src/look_columns.cpp src/model_volume.cpp"
   "src/fixed_step.cpp src/frame.cpp src/pieces.cpp src/search_files.cpp"
   "src/frame_meshes.cpp src/inspect.cpp src/overload.cpp src/solid_motion.cpp"
-  "src/model.cpp src/model_contact.cpp src/scene_samples.cpp"
+  "src/model.cpp src/scene_samples.cpp"
   "src/model_laws.cpp src/model_skeleton.cpp src/output_files.cpp src/read_scene.cpp"
   "src/picture.cpp src/probe.cpp src/read_scene_faults.cpp src/rest.cpp src/scene_grids.cpp
    src/simulation_changes.cpp"
