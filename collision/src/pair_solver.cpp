@@ -275,8 +275,9 @@ bool PairSolver::panels(const Job& job, PairResult& out) {
   PanelRule rule;
   return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
     third_levels_.clear();
-    for (const std::uint32_t c : third_) {
-      if (job.bodies[c].field.bound(job.overlap).upper > 0.0) third_levels_.push_back({&job.bodies[c], c > pair.b});
+    for (std::size_t t = 0; t < third_.size(); ++t) {
+      const ContactBody& third = thirds_.all()[t];
+      if (third.field.bound(job.overlap).upper > 0.0) third_levels_.push_back({&third, third_[t] > pair.b});
     }
     const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
     for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;

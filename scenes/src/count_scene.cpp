@@ -6,6 +6,7 @@
 
 #include "arrangement.h"
 #include "fields_particles.h"
+#include "frame_looks.h"
 #include "model_laws.h"
 #include "output_files.h"
 #include "supple/core/pair_laws.h"

@@ -24,10 +24,11 @@ constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
 constexpr int kSheetGap = 4;
 
-using Size = std::pair<int, int>;
+fs::path sheet_path(const fs::path& folder, const std::string& name) { return folder / (name + "_sheet.png"); }
 
-/// Width and height of a PNG, by its head; zeros of what is none.
-Size picture_size(const fs::path& path) {
+}  // namespace
+
+PictureSize picture_size(const fs::path& path) {
   std::array<unsigned char, 24> head{};
   std::ifstream file(path, std::ios::binary);
   file.read(reinterpret_cast<char*>(head.data()), head.size());
@@ -38,17 +39,13 @@ Size picture_size(const fs::path& path) {
   return {number(16), number(20)};
 }
 
-fs::path sheet_path(const fs::path& folder, const std::string& name) { return folder / (name + "_sheet.png"); }
-
-}  // namespace
-
 std::string picture_fingerprint(const std::string& look, std::uint64_t state_hash) { return look + to_hex(state_hash); }
 
 std::string look_in(const std::string& fingerprint) { return fingerprint.substr(0, kHashDigits); }
 
 FrameLooks look_at_frames(const fs::path& folder, const std::string& name, int last) {
   FrameLooks out;
-  using Look = std::pair<std::string, Size>;
+  using Look = std::pair<std::string, PictureSize>;
   std::map<Look, std::vector<int>> frames;
   for (int frame = 1; frame <= last; ++frame) {
     const fs::path path = frame_path(folder, name, frame);

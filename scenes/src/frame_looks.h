@@ -6,9 +6,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace supple::scenes {
+
+/// Width and height of a PNG, by its head; zeros of what is none.
+using PictureSize = std::pair<int, int>;
+[[nodiscard]] PictureSize picture_size(const std::filesystem::path& path);
 
 /// Fingerprint of a picture; look_in gives the look that it begins with.
 [[nodiscard]] std::string picture_fingerprint(const std::string& look, std::uint64_t state_hash);
