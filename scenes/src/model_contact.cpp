@@ -125,15 +125,14 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
 
 /// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
 void add_mesh(const Scene& scene, const ObstacleDesc& d, ModelFaults& faults, FixedBody& body) try {
-  const std::string key = "obstacles." + d.name;
-  auto read = faults.read(key + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
+  auto read = faults.read("obstacles." + d.name + ".file", [&] { return io::read_mesh(scene.source.parent_path() / d.file); });
   if (!read) return;
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
   body.solid = implicit::MeshSolid(*read, {.slope = d.slope, .pose = {d.at, turn}});
 } catch (const Error& error) {
   if (error.kind() != ErrorKind::Scene) throw;
   const Fault& fault = error.faults().front();
-  faults.add(key + ".file", fault.expected, fault.found, fault.hint);
+  faults.add("obstacles." + d.name + ".file", fault.expected, fault.found, fault.hint);
 }
 
 /// Primitives that sum; refused ones leave a fault and `body` as it is.

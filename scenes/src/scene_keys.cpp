@@ -16,7 +16,10 @@
 #include <utility>
 
 #include "camera.h"
-#include "fields_info.h"
+#include "fields.h"
+#include "fields_archive.h"
+#include "read_scene_faults.h"
+#include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 
@@ -110,6 +113,11 @@ template <class T>
 std::string value_text(const std::optional<T>& value, const Rule& rule) {
   return value ? value_text(*value, rule) : rule.automatic ? "auto" : std::string(kNone);
 }
+
+/// What a key holds: of optional ones and lists of mappings one of them.
+template <class T> struct FieldValue { using type = T; };
+template <class T> struct FieldValue<std::optional<T>> { using type = T; };
+template <Described D> struct FieldValue<std::vector<D>> { using type = D; };
 
 /// Values of keys that are no mappings, with which a mapping begins.
 class DefaultArchive {
