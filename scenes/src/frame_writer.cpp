@@ -301,7 +301,7 @@ fs::path FrameWriter::make_film(const std::string& name, int last) {
   }
   const fs::path film = options_.folder / (name + ".mp4");
   const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);
-  render::encode_film(options_.folder / "frames", name, 1, last, frame_rate, film);
+  render::encode_film({options_.folder / "frames", name, 1, last, frame_rate}, film, options_.interrupt);
   return film;
 }
 

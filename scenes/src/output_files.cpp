@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <string_view>
 #include <utility>
 
 #include "frame.h"
 #include "supple/core/cpu_time.h"
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
@@ -69,13 +71,14 @@ void remove_temporaries(const fs::path& folder, const std::string& name) {
   const auto look = [&](const fs::path& path) {
     const std::string file = path.filename().string();
     const bool ours = file.starts_with('.' + name + '.') || file.starts_with('.' + name + '_') ||
+                      file.starts_with(".probe.") ||
                       file.starts_with(".result.json.") || file.starts_with(".render.json.") || file.starts_with(".export.json.");
     if (ours && file.ends_with(".tmp")) left.push_back(path);
   };
   for_each_file(folder, look);
   for (const Part& part : kParts) for_each_file(folder / part.folder, look);
   std::error_code ignored;
-  for (const fs::path& path : left) fs::remove(path, ignored);
+  for (const fs::path& path : left) fs::remove_all(path, ignored);  // a film is made in a folder
 }
 
 std::set<std::string> saved_scenes(const fs::path& folder) {
@@ -109,12 +112,11 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
 }
 
 PictureSize picture_size(const fs::path& path) {
-  std::array<unsigned char, 24> head{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(head.data()), head.size());
-  if (!file) return {};
+  std::array<std::byte, 24> head{};
+  if (io::read_start(path, head).value_or(0) < head.size()) return {};
   const auto number = [&head](std::size_t at) {
-    return static_cast<int>(head[at] << 24U | head[at + 1] << 16U | head[at + 2] << 8U | head[at + 3]);
+    const auto byte = [&](std::size_t k) { return std::to_integer<std::uint32_t>(head[at + k]); };
+    return static_cast<int>(byte(0) << 24U | byte(1) << 16U | byte(2) << 8U | byte(3));
   };
   return {number(16), number(20)};
 }

@@ -24,7 +24,7 @@ namespace supple::scenes {
 /// does not write.
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
-/// Removes files of an interrupted run of this scene that never got their names.
+/// Removes files of an interrupted run of this scene that never got their names, and folders in which its films were made.
 void remove_temporaries(const std::filesystem::path& folder, const std::string& name);
 
 /// Width and height of a PNG, by its head; zeros of what is none.
