@@ -44,7 +44,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
       break;
     case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
     case ArrangeKind::File:
-      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(scene.source.parent_path() / d.file); }).value_or(std::vector<Vec3>());
+      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(named_file(scene.source.parent_path(), d.file)); }).value_or(std::vector<Vec3>());
       out.orientation.assign(out.position.size(), Quat::Identity());
       break;
   }
@@ -233,7 +233,9 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
     model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
     if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
-    model.smallest_length = std::min({model.smallest_length, nearest[i], n == 1 ? 0.5 * object.rest_diameter : nearest[i]});
+    // Particles may lie at one place; then their sizes are the lengths of the scene.
+    const double length = n == 1 ? 0.5 * object.rest_diameter : nearest[i] > 0.0 ? nearest[i] : axes.maxCoeff();
+    model.smallest_length = std::min(model.smallest_length, length);
   }
   turn_primitives(turn, object.skeleton);
   if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);

@@ -4,15 +4,16 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <optional>
+#include <span>
 
 #include "camera.h"
 #include "read_scene_archive.h"
 #include "scene_places.h"
 #include "supple/core/hash.h"
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
@@ -29,7 +30,7 @@ class Override {
       if (rest_[0] == '.' && rest_.size() < path_.size()) rest_.remove_prefix(1);
       const std::string done(path_.substr(0, path_.size() - rest_.size()));
       Node* node = *slot;
-      if (node->kind == Node::Kind::Scalar && !node->quoted && node->text == "true") {
+      if (node->boolean() == true) {
         node = tree_.make(Node::Kind::Mapping, mark_);  // `images: true` is `images: {}`
       } else {
         node = tree_.copy(*node);
@@ -125,13 +126,18 @@ bool among(const std::array<std::string_view, N>& keys, std::string_view key) {
   return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
+constexpr std::size_t kLargestFile = std::size_t{2} << 30;  // [bytes], of those that scenes name
+
 /// What a scene's file names stand for. A file that cannot be read is a fault of whoever needs it.
 void add_file(const std::filesystem::path& path, Hasher& hasher) {
   std::error_code status;
   if (!std::filesystem::is_regular_file(path, status)) return;
-  std::ifstream file(path, std::ios::binary);
-  const std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  hasher.add(content);
+  try {
+    const std::vector<std::byte> content = io::read_file(path, kLargestFile);
+    hasher.add(std::string_view(reinterpret_cast<const char*>(content.data()), content.size()));
+  } catch (const Error&) {
+    return;
+  }
 }
 
 /// @param taken   whether a key counts, on every level
@@ -243,12 +249,12 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
                                      .hint = ""});
   };
   if (std::filesystem::is_directory(path, status)) fail("a folder");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) fail(std::filesystem::exists(path, status) ? "a file that cannot be opened" : "nothing");
+  const std::string name = path.filename().string();  // outputs are named so, also in files that cannot hold any name
+  if (std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; })) fail("a name with control characters");
   std::string text(kLargestText + 1, '\0');  // one more than allowed, so that a larger file is seen as such
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) fail("a file that cannot be read");
-  text.resize(static_cast<std::size_t>(file.gcount()));
+  const auto size = io::read_start(path, std::as_writable_bytes(std::span(text)));
+  if (!size) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
+  text.resize(*size);
   Scene scene = parse_scene(text, path.string(), path.parent_path(), overrides);
   scene.source = path;
   return scene;

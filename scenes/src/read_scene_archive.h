@@ -31,8 +31,9 @@ class ReadArchive {
     field(key, value, rule, true);
   }
   [[nodiscard]] bool given(std::string_view key) const { return mapping_.find(key) != nullptr; }
-  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or
-  /// another key of this mapping seems misspelt, which may be the one that `key` misses.
+  [[nodiscard]] bool sound(std::string_view key) const;
+  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or, where
+  /// it is one of this mapping, another one of them is lost or seems misspelt, which may be what `key` misses.
   void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint);
   /// Reports keys that no field took, and relations that do not hold. Call after `fields`.
   void finish();
@@ -53,7 +54,7 @@ class ReadArchive {
     if (const Node::Entry* entry = mapping_.find(key)) {
       read(*entry->value, path, value, rule);
     } else if (required) {
-      faults_.add(mapping_.mark, path, "expected " + expectation(value, rule), "nothing", "this key is required");
+      missing_.push_back({std::string(key), rule.when.selector, "expected " + expectation(value, rule)});
     }
   }
 
@@ -106,7 +107,11 @@ class ReadArchive {
     const std::size_t before = faults_.count();
     T read_value{};
     read(node, path, read_value, rule);
-    if (faults_.count() == before) value = read_value;
+    if (faults_.count() == before) {
+      value = read_value;
+    } else {
+      lost_ = true;
+    }
   }
 
   template <Described D>
@@ -122,9 +127,9 @@ class ReadArchive {
 
   template <Described D>
   void read(const Node& node, const std::string& path, std::optional<D>& value, const Rule& rule) {
-    if (node.kind == Node::Kind::Scalar && !node.quoted && node.text == "false") return;
+    if (node.boolean() == false) return;
     value.emplace();
-    if (node.kind == Node::Kind::Scalar && !node.quoted && node.text == "true") {
+    if (node.boolean() == true) {
       Node empty;
       empty.kind = Node::Kind::Mapping;
       empty.mark = node.mark;
@@ -157,9 +162,20 @@ class ReadArchive {
   /// What to write instead of `node`. @param may_be_empty  {} is complete
   static std::string mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty);
 
+  /// Faults of keys that no field took. @return whether one of them seems misspelt
+  bool finish_unknown();
+  void finish_idle();
+
   struct Idle {
     std::string_view key;
     When when;
+  };
+
+  /// A required key that is not given.
+  struct Missing {
+    std::string key;
+    std::string_view selector;  ///< for whose value it is required; empty: always
+    std::string expected;
   };
 
   /// A relation that does not hold.
@@ -172,6 +188,8 @@ class ReadArchive {
   std::string path_;
   std::vector<std::string_view> known_;
   std::vector<Idle> idle_;
+  std::vector<Missing> missing_;
+  bool lost_ = false;  ///< a key is given whose value is faulty, and there is no default in its place
   std::vector<Broken> broken_;
 };
 
