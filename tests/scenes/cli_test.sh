@@ -134,7 +134,7 @@ cmp plain/meshes.usda broken/meshes.usda && cmp <(sed 's/plain/broken/g' plain.t
 
 # ffmpeg ends with the run, and what it was writing goes.
 sed 's/^objects:/output: {images: {size: [64, 48], samples: 1}, film: true}\nobjects:/' good.yaml > film.yaml
-printf '#!/bin/sh\necho $$ > "%s/ffmpeg.pid"\nfor last; do :; done\necho half > "$last"\nsleep 600\nexec ffmpeg "$@"\n' "$PWD" > slow_ffmpeg
+printf '#!/bin/sh\necho $$ > "%s/ffmpeg.pid"\nfor last; do :; done\necho half > "$last"\nexec sleep 600\n' "$PWD" > slow_ffmpeg
 chmod +x slow_ffmpeg
 lives() { grep -qE '^[0-9]+ \(.*\) [^ZX]' "/proc/$1/stat" 2> /dev/null; }
 # start_film FOLDER OPTIONS...: a run up to where ffmpeg works; $run and $film are the processes.
