@@ -8,5 +8,5 @@ supple_together(
   "src/march_rule.cpp src/react.cpp"
   "src/middle_rule.cpp src/sleep.cpp src/smooth_bound.cpp src/touch_kinks.cpp"
   "src/polar_columns.cpp src/rim_corners.cpp src/squeezed_region.cpp"
-  "src/polar_rule.cpp src/stick.cpp"
+  "src/polar_rule.cpp src/stick.cpp src/third_bodies.cpp"
   "src/sample_rule.cpp src/sigma_mesh.cpp")

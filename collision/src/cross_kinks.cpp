@@ -106,7 +106,7 @@ bool PolarRuleSolver::taken_by_thirds() {
   follow_rim();
   evaluate_thirds(fine_rim_);
   for (std::size_t i = 0; i < fine_rim_.size(); ++i) {
-    if (!taken(fine_rim_.size(), i, 0.0)) return false;
+    if (!taken(fine_rim_.size(), i, -at_rim())) return false;
   }
   return true;
 }
@@ -127,17 +127,21 @@ bool PolarRuleSolver::kinks_cross(PairPressure& pressure) {
   if (third_.empty()) return !crossing_.empty();
   thirds_seen_.assign(third_.size(), 0);
   std::vector<const Vec3*> inside(third_.size(), nullptr);
-  const auto look = [&](std::span<const Vec3> points, std::size_t i, double p) {
-    for (std::size_t t = 0; t < third_.size(); ++t) {
-      const bool harder = third_value_[t * points.size() + i] > p;
-      thirds_seen_[t] |= harder ? 1 : 2;
-      if (harder && p > 0.0) inside[t] = &points[i];
-    }
-  };
   evaluate_thirds(node_.point);
-  for (std::size_t i = 0; i < node_.size(); ++i) look(node_.point, i, pressure_[i]);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    for (std::size_t i = 0; i < node_.size(); ++i) {
+      const bool harder = third_value_[t * node_.size() + i] > pressure_[i];
+      thirds_seen_[t] |= harder ? 1 : 2;
+      if (harder && pressure_[i] > 0.0) inside[t] = &node_.point[i];
+    }
+  }
   evaluate_thirds(fine_rim_);
-  for (std::size_t i = 0; i < fine_rim_.size(); ++i) look(fine_rim_, i, 0.0);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    for (std::size_t i = 0; i < fine_rim_.size(); ++i) {
+      const double p = third_value_[t * fine_rim_.size() + i];
+      if (std::abs(p) > at_rim()) thirds_seen_[t] |= p > 0.0 ? 1 : 2;
+    }
+  }
   imprints_.clear();
   cover(cover_);
   for (std::size_t t = 0; t < third_.size(); ++t) {

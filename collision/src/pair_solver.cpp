@@ -59,55 +59,87 @@ void Partners::build(std::size_t bodies, std::span<const BodyPair> pairs) {
   offset[bodies] = static_cast<std::uint32_t>(partner.size());
 }
 
-/// Partners of either body whose surfaces may reach the overlap.
-void PairSolver::find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap) {
-  const auto reaches = [&](std::uint32_t c) { return overlap_at_once(boxes[c], overlap); };
+/// Partners of either body whose surfaces may reach the overlap; of teams of obstacles the first ones, and not that of the pair.
+void PairSolver::find_thirds(const Job& job, const BodyPair& pair, const Partners& partners) {
   third_.clear();
   third_bodies_.clear();
-  for (const std::uint32_t c : partners.of(pair.a)) {
-    if (reaches(c) && c != pair.b) third_.push_back(c);
-  }
-  for (const std::uint32_t c : partners.of(pair.b)) {
-    if (!reaches(c) || c == pair.a) continue;
-    const auto place = std::lower_bound(third_.begin(), third_.end(), c);
-    if (place == third_.end() || *place != c) third_.insert(place, c);
-  }
+  const auto add = [&](std::uint32_t c) {
+    if (c == pair.a || c == pair.b || !overlap_at_once(job.boxes[c], job.overlap)) return;
+    const Team* const team = teams_.of(c);
+    if (team != nullptr && team == team_) return;
+    const std::uint32_t first = team != nullptr ? team->member.front() : c;
+    const auto place = std::lower_bound(third_.begin(), third_.end(), first);
+    if (place == third_.end() || *place != first) third_.insert(place, first);
+  };
+  for (const std::uint32_t c : partners.of(pair.a)) add(c);
+  for (const std::uint32_t c : partners.of(pair.b)) add(c);
+  const auto meets = [&partners](std::uint32_t body, std::uint32_t c) {
+    const std::span<const std::uint32_t> all = partners.of(body);
+    return std::binary_search(all.begin(), all.end(), c);
+  };
+  thirds_.set(job.bodies, job.a, job.b, pair, third_, teams_, meets);
 }
 
-/// Whether a third body presses on the patches nearly as much as the pair does.
-bool PairSolver::thirds_press(const Job& job, const PairResult& out) {
+/// The team of the pair's obstacle, if it has one. @return whether the pair has its contact
+bool PairSolver::join_team(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners, const BodyPair& pair) {
+  teams_.clear();
+  team_ = nullptr;
+  if (bodies[pair.a].fixed == bodies[pair.b].fixed) return true;
+  const std::uint32_t obstacle = bodies[pair.a].fixed ? pair.a : pair.b, body = pair.a + pair.b - obstacle;
+  teams_.find(bodies, body, partners.of(body));
+  team_ = teams_.of(obstacle);
+  if (team_ == nullptr) return true;
+  if (team_->member.front() != obstacle) return false;
+  team_seeds_.clear();
+  for (const std::uint32_t c : team_->member) {
+    const BodyPair other{std::min(body, c), std::max(body, c)};
+    const auto k = static_cast<std::size_t>(std::lower_bound(candidates.pair.begin(), candidates.pair.end(), other) - candidates.pair.begin());
+    const auto seeds = std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
+    team_seeds_.insert(team_seeds_.end(), seeds.begin(), seeds.end());
+  }
+  const Box own = bodies[body].field.surface_box(), all = team_->field.surface_box();
+  team_overlap_ = {own.lower.cwiseMax(all.lower), own.upper.cwiseMin(all.upper)};
+  return true;
+}
+
+/// How third bodies press on the patches, and whether nearly as much as the pair does. Those near are kept.
+PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& out) {
   Box patch;
+  rim_.clear();
   for (const PolarCover& cover : patches_.covers()) {
-    for (const Vec3& x : cover.rim) patch.include(x);
+    rim_.insert(rim_.end(), cover.rim.begin(), cover.rim.end());
     patch.include(cover.frame.origin);
   }
+  for (const Vec3& x : rim_) patch.include(x);
   for (const Vec3& x : out.points.point) patch.include(x);
-  const double margin = 0.05 * out.summary.largest_pressure;
-  value_.resize(out.points.point.size());
+  const double largest = out.summary.largest_pressure, margin = 0.05 * largest, at_rim = kAtRim * job.settings().error * largest;
+  const std::size_t points = out.points.point.size();
+  taken_.assign(points + rim_.size(), 0);
+  value_.resize(taken_.size());
   bool press = false;
-  for (const std::uint32_t c : third_) {
-    const ContactBody& third = job.bodies[c];
-    if (!job.boxes[c].overlaps(patch) || clear_of(third, patch) || third.field.bound(patch).upper <= 0.0) continue;
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    const ContactBody& third = thirds_.all()[t];
+    if (!(teams_.of(third_[t]) != nullptr || job.boxes[third_[t]].overlaps(patch)) || clear_of(third, patch) || third.field.bound(patch).upper <= 0.0) continue;
     third_bodies_.push_back(&third);
-    third.field.evaluate(out.points.point, value_);
+    third.field.evaluate(out.points.point, std::span(value_).first(points));
+    third.field.evaluate(rim_, std::span(value_).subspan(points));
     for (std::size_t i = 0; i < value_.size(); ++i) {
-      const double p = third.material.modulus * value_[i];
-      press = press || p > out.points.pressure[i] - margin;
+      // Beyond the outermost nodes the pressure of the pair falls to zero.
+      const double p = third.material.modulus * value_[i], own = i < points ? out.points.pressure[i] : 0.0;
+      press = press || p > (i < points ? own - margin : at_rim);
+      if (p > (i < points ? own : -at_rim)) taken_[i] = 1;
     }
     for (const PolarCover& cover : patches_.covers()) press = press || imprint_.find(job.polar.pressure, cover, third, margin).has_value();
-    // Beyond the outermost nodes the pressure of the pair falls to zero.
-    for (const PolarCover& cover : patches_.covers()) {
-      for (std::size_t k = 0; k < cover.rim.size() && !press; ++k) press = third.field.value(cover.rim[k]) > 0.0;
-    }
   }
-  return press;
+  if (!press) return Pressing::None;
+  return std::find(taken_.begin(), taken_.end(), 0) == taken_.end() ? Pressing::All : Pressing::Some;
 }
 
 /// The third bodies that reach the overlap.
 void PairSolver::take_all_thirds(const Job& job) {
   third_bodies_.clear();
-  for (const std::uint32_t c : third_) {
-    if (job.bodies[c].field.bound(job.overlap).upper > 0.0) third_bodies_.push_back(&job.bodies[c]);
+  for (const ContactBody& third : thirds_.all()) {
+    if (third.field.bound(job.overlap).upper > 0.0) third_bodies_.push_back(&third);
   }
 }
 
@@ -259,7 +291,12 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   RuleReason reason = !any ? RuleReason::Asked : fits ? RuleReason::Fits : RuleReason::NoGraph;
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
-    if (any && !third_.empty() && thirds_press(job, out)) {
+    const Pressing pressing = any && !third_.empty() ? thirds_press(job, out) : Pressing::None;
+    if (pressing == Pressing::All) {
+      out.clear();
+      return;
+    }
+    if (pressing == Pressing::Some) {
       // The squeezed regions of bodies with several parts are not cut that exactly.
       fits = !job.parted() && polar_cut(job, out);
       if (!fits) reason = RuleReason::ThirdBody;
@@ -360,17 +397,20 @@ void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
 void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
                        std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out) {
   const BodyPair pair = candidates.pair[k];
-  const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
-  PairPressure pressure(a, b);
   out.summary.bodies = pair;
   out.clear();
   patches_.forget();
+  if (!join_team(bodies, candidates, partners, pair)) return;
+  const bool several = team_ != nullptr;
+  const ContactBody& a = several && bodies[pair.a].fixed ? team_->body : bodies[pair.a];
+  const ContactBody& b = several && bodies[pair.b].fixed ? team_->body : bodies[pair.b];
+  PairPressure pressure(a, b);
 
-  const Box& overlap = candidates.overlap[k];
+  const Box& overlap = several ? team_overlap_ : candidates.overlap[k];
   const std::span<const Vec3> seeds =
-      std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
+      several ? std::span<const Vec3>(team_seeds_) : std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
   const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
-  const bool convex = candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
+  const bool convex = !several && candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
   const double diagonal = overlap.extent().norm();
   double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
   // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
@@ -378,9 +418,9 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
   if (!std::isfinite(extent)) return;  // two half-spaces
 
-  find_thirds(pair, partners, boxes, overlap);
   const Region least = settings.energy ? Region::Sums : Region::None;
   Job job{bodies, boxes, overlap, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
+  find_thirds(job, pair, partners);
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
   job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();

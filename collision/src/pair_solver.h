@@ -12,6 +12,7 @@
 #include "polar_patches.h"
 #include "sample_rule.h"
 #include "squeezed_region.h"
+#include "third_bodies.h"
 #include "supple/collision/find_contacts.h"
 
 namespace supple::collision {
@@ -46,8 +47,11 @@ class PairSolver {
     [[nodiscard]] bool parted() const { return a.pose.size() > 1 || b.pose.size() > 1; }
   };
 
-  void find_thirds(const BodyPair& pair, const Partners& partners, std::span<const Box> boxes, const Box& overlap);
-  bool thirds_press(const Job& job, const PairResult& out);
+  bool join_team(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners, const BodyPair& pair);
+  void find_thirds(const Job& job, const BodyPair& pair, const Partners& partners);
+  /// Of third bodies on the patches of a pair: nowhere near as hard, or harder on some of them, or all over.
+  enum class Pressing : std::uint8_t { None, Some, All };
+  Pressing thirds_press(const Job& job, const PairResult& out);
   void find_patches(const Job& job, std::span<const Vec3> seeds);
   bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
   bool polar(const Job& job, PairResult& out);
@@ -70,9 +74,16 @@ class PairSolver {
   SampleRuleSolver samples_;
   MarchRuleSolver march_;
   SqueezedRegion region_;
+  Teams teams_;                  ///< of the body of the pair
+  const Team* team_ = nullptr;   ///< of the pair's obstacle
+  Box team_overlap_;
+  std::vector<Vec3> team_seeds_;
   std::vector<std::uint32_t> third_;
+  ThirdBodies thirds_;  ///< in the same order
   std::vector<const ContactBody*> third_bodies_;
   std::vector<double> value_;
+  std::vector<Vec3> rim_;
+  std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
   PairResult kept_;  ///< what another rule has left
 };
 

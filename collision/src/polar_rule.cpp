@@ -321,6 +321,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
                             std::span<const ContactBody* const> third, bool round, bool follow, bool faces, PatchPoints& points) {
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   extent_ = extent;
+  error_ = settings.error;
   third_ = third;
   imprints_.clear();
   uneven_ = false;

@@ -31,6 +31,9 @@ inline constexpr double kLeastMild = 1e-6;
 /// Errors below which rays are parted at mild kinks, though angles are not.
 inline constexpr double kMildPartedBelow = 5e-5;
 
+/// Over the error asked for times the pressure at the peak: pressures of third bodies at the rim that say nothing, as rims are off by more.
+inline constexpr double kAtRim = 0.1;
+
 class PolarRuleSolver {
  public:
   /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
@@ -169,6 +172,7 @@ class PolarRuleSolver {
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);
+  [[nodiscard]] double at_rim() const { return kAtRim * error_ * frame_.peak; }
   [[nodiscard]] bool taken_by_thirds();
   bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
   void find_imprints(PairPressure& pressure);
@@ -340,6 +344,7 @@ class PolarRuleSolver {
   double thickness_ = 0.0;
   bool may_go_through_ = false;  // one body through the other: not balls and half-spaces, whose surfaces meet in one circle, and not where third bodies press
 
+  double error_ = 0.0;                 // asked for
   std::span<const ContactBody* const> third_;
   bool cut_ = false;                   // nodes where a third body presses harder do not count
   std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other

@@ -32,7 +32,7 @@ void add_to_region(PairPressure& pressure, int side, std::size_t begin, std::vec
 }
 
 /// What is positive within the region, one after the other for all places: the own pressure, by how much that of the other body exceeds it, and
-/// by how much those of third ones [Pa].
+/// by how much those of third ones, which of obstacles are held against its own [Pa].
 void SqueezedRegion::find_margins(const Lost& lost, std::span<const Vec3> at) {
   const std::size_t n = at.size();
   margin_.resize(margins(lost) * n);
@@ -44,8 +44,10 @@ void SqueezedRegion::find_margins(const Lost& lost, std::span<const Vec3> at) {
     std::copy(rest.begin(), rest.end(), spared.begin());
     third_.resize(n);
     for (const ContactBody* body : lost.third) {
+      // Of obstacles, which are one solid, only the one that presses hardest loses space.
+      const std::span<const double> harder = body->fixed && lost.pressure.body(lost.side).fixed ? own : rest;
       body->field.evaluate(at, third_);
-      for (std::size_t i = 0; i < n; ++i) spared[i] = std::min(spared[i], rest[i] - body->material.modulus * third_[i]);
+      for (std::size_t i = 0; i < n; ++i) spared[i] = std::min(spared[i], harder[i] - body->material.modulus * third_[i]);
     }
   }
   for (std::size_t i = 0; i < n && !lost.equal; ++i) rest[i] -= own[i];

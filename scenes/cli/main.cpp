@@ -8,6 +8,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -249,6 +250,7 @@ int check(const Arguments& arguments) {
     print(std::cout, "%s: %s (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(),
                 found.built ? "no fault found" : "no fault found in keys, files and counts", found.objects, plural(found.objects), found.particles,
                 plural(found.particles), found.frames);
+    std::cout << found.mesh_obstacles;
   }
   return 0;
 }
@@ -464,14 +466,8 @@ void flush_output() {
   throw Error(ErrorKind::Io, Fault{.place = "standard output", .key = {}, .expected = "cannot be written", .found = {}, .hint = {}});
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  // Before anything is opened, or a file would get the number of what is closed, and the text that is printed there.
-  const bool silent = supple::io::occupy_standard_descriptors()[STDOUT_FILENO];
-  std::signal(SIGCHLD, SIG_DFL);  // our parent may ignore it, which hides how ffmpeg ends
-  std::ios::sync_with_stdio(false);
-  supple::tool::prepare_last_resort();
+/// @param silent  nobody reads standard output   @return the exit code
+int call(int argc, char** argv, bool silent) {
   try {
     const int code = parse_and_call(argc, argv, silent);
     flush_output();
@@ -492,4 +488,21 @@ int main(int argc, char** argv) {
     std::cerr << "internal fault: " << error.what() << '\n';
     return kInternal;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Before anything is opened, or a file would get the number of what is closed, and the text that is printed there.
+  const bool silent = supple::io::occupy_standard_descriptors()[STDOUT_FILENO];
+  std::signal(SIGCHLD, SIG_DFL);  // our parent may ignore it, which hides how ffmpeg ends
+  std::ios::sync_with_stdio(false);
+  supple::tool::prepare_last_resort();
+  const int code = call(argc, argv, silent);
+  // Where memory ran out, arrays of Eigen that were being resized hold what was freed: what threads keep for life is not destroyed.
+  if (code == static_cast<int>(supple::ErrorKind::Limit)) {
+    std::cout.flush();
+    std::_Exit(code);
+  }
+  return code;
 }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "supple/scenes/output_limits.h"
+#include "supple/scenes/query.h"
 #include "supple/scenes/run.h"
 
 namespace supple::scenes {
@@ -26,6 +27,7 @@ void build_and_look(const Scene& scene, const SimulationOptions& options, CheckR
   report.built = true;
   report.particles = simulation.model().particles.size();
   report.warnings = simulation.warnings();
+  report.mesh_obstacles = describe_mesh_obstacles(simulation.model());
   simulation.expect_steps();
 }
 

@@ -213,7 +213,7 @@ void fields(Archive& archive, Scene& d) {
   archive("time_step", d.time_step, {}, "how finely time is cut; a run of whose energy nine tenths come from nowhere (no start, load or obstacle gave them) ends with exit code 5 and names the fastest object, but for laws with paper_literal, contact.split: contribution, held volumes, and obstacles that are led in steps which the scene fixes, whose energies do not balance");
   archive("integrator", d.integrator, {}, "how a step is made");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
-  archive("obstacles", d.obstacles, {}, "solids that stand still or are led along");
+  archive("obstacles", d.obstacles, {}, "solids that stand still or are led along; with the ground they are one solid, whose pressure is the largest of theirs: what is flush counts once, as a contact with the first of them (the ground, then by name), and what shall be one body should overlap, as faces that only meet leave a groove");
   archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
   archive("contact", d.contact, {}, "how contact is computed");
   archive("sleep", d.sleep, {}, "bodies that rest are not moved until something touches them or a load on them changes; absent: never");

@@ -105,8 +105,7 @@ void fields(Archive& archive, ObstacleDesc& d) {
   archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh, Implicit}), "rotation");
   archive("keys", d.keys, {}, "places at times; before the first and after the last it stands still; absent: always");
   archive("between", d.between, {}, "how keys are joined; smooth: at rest wherever it turns back, so that it never goes beyond a key");
-  archive.required("file", d.file, only(file_name(), {Heights, ObstacleName::Mesh}), "CSV of x, y, z [m] on a regular grid, between whose points the ground is smooth and goes no higher or lower than they do; at its borders it ends, with upright sides; a mesh as OBJ or PLY [m]; relative to the scene's folder");
-  archive("voxel", d.voxel, only(above(0.0, kLength).or_auto(), {ObstacleName::Mesh}), "cell of the lattice that keeps its distances, about which edges are rounded; auto: a 64th of its longest side, or finer where it is thinner");
+  archive.required("file", d.file, only(file_name(), {Heights, ObstacleName::Mesh}), "CSV of x, y, z [m] on a regular grid, between whose points the ground is smooth and goes no higher or lower than they do; at its borders it ends, with upright sides; a closed mesh as OBJ or PLY [m], exact where it is thin, its edges rounded over less than a hundredth of its longest side elsewhere ('supple check' tells); a shell in another one bounds a cavity if it runs the other way round, shells that overlap are one solid; relative to the scene's folder");
   archive.required("skeleton", d.skeleton, only({}, {Implicit}), "primitives that sum, about 'at'");
   archive("iso", d.iso, only(inside(0.0, 1.0, kNumber), {Implicit}), "value of the field on its surface");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");

@@ -123,24 +123,16 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
 }
 
 /// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
-void add_mesh(const Scene& scene, const ObstacleDesc& d, MemoryBudget& budget, ModelFaults& faults, FixedBody& body) try {
+void add_mesh(const Scene& scene, const ObstacleDesc& d, ModelFaults& faults, FixedBody& body) try {
   const std::string key = "obstacles." + d.name;
   auto read = faults.read(key + ".file", [&] { return io::read_mesh(named_file(scene.source.parent_path(), d.file)); });
   if (!read) return;
-  Mesh& mesh = *read;
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
-  Box box;
-  for (Vec3& x : mesh.position) box.include(x = d.at + turn * x);
-  const double voxels = d.voxel ? (box.extent() / *d.voxel).array().max(1.0).prod() : 0.0;
-  if (voxels <= static_cast<double>(implicit::MeshSolidOptions{}.max_voxels)) {
-    budget.add({.what = Counted::Voxels, .key = key + ".voxel", .number = voxels});
-    budget.expect();
-  }
-  body.solid = implicit::MeshSolid(mesh, {.voxel = d.voxel.value_or(0.0), .slope = d.slope});
+  body.solid = implicit::MeshSolid(*read, {.slope = d.slope, .pose = {d.at, turn}});
 } catch (const Error& error) {
   if (error.kind() != ErrorKind::Scene) throw;
   const Fault& fault = error.faults().front();
-  faults.add("obstacles." + d.name + (fault.key == "voxel" ? ".voxel" : ".file"), fault.expected, fault.found, fault.hint);
+  faults.add("obstacles." + d.name + ".file", fault.expected, fault.found, fault.hint);
 }
 
 /// Primitives that sum; refused ones leave a fault and `body` as it is.
@@ -164,7 +156,7 @@ void add_primitives(const ObstacleDesc& d, const std::string& key, ModelFaults& 
   }
 }
 
-void add_fixed_bodies(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults) {
+void add_fixed_bodies(const Scene& scene, Model& model, ModelFaults& faults) {
   if (scene.ground && scene.ground->collides) {
     const GroundDesc& d = *scene.ground;
     model.fixed.push_back({.name = "ground",
@@ -182,7 +174,7 @@ void add_fixed_bodies(const Scene& scene, MemoryBudget& budget, Model& model, Mo
     } else if (d.shape == ObstacleName::Heights) {
       body.solid = height_field(scene, d, "obstacles." + d.name, faults);
     } else if (d.shape == ObstacleName::Mesh) {
-      add_mesh(scene, d, budget, faults, body);
+      add_mesh(scene, d, faults, body);
     } else if (d.shape == ObstacleName::Implicit) {
       add_primitives(d, "obstacles." + d.name, faults, body);
     }
@@ -402,7 +394,7 @@ double dissipation_for(double restitution, double speed) {
 }
 
 void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults) {
-  add_fixed_bodies(scene, budget, model, faults);
+  add_fixed_bodies(scene, model, faults);
   model.contact.error = scene.contact.error;
   model.contact.only = rule_of(scene.contact.rule);
   model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy

@@ -347,4 +347,18 @@ std::string explain(Simulation& simulation) {
   return out;
 }
 
+std::string describe_mesh_obstacles(const Model& model) {
+  std::string text;
+  for (const FixedBody& body : model.fixed) {
+    const auto* solid = std::get_if<implicit::MeshSolid>(&body.solid);
+    if (solid == nullptr) continue;
+    const implicit::MeshSolid::Report& report = solid->report();
+    text += "  obstacle " + body.name + ": surface of " + std::to_string(solid->mesh().triangle_count()) + " triangles, ";
+    text += "off by at most " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) + " % of its size";
+    if (report.crossing > 0) text += ", as " + std::to_string(report.crossing) + " triangles of its file cross or touch others";
+    text += '\n';
+  }
+  return text;
+}
+
 }  // namespace supple::scenes

@@ -108,6 +108,25 @@ void add_missed(const Model& model, std::vector<std::string>& warnings) {
   }
 }
 
+/// Meshes of obstacles that are not taken as they are.
+void add_mended_meshes(const Model& model, std::vector<std::string>& warnings) {
+  constexpr double kMuch = 0.01;  // of the size
+  for (const FixedBody& body : model.fixed) {
+    const auto* solid = std::get_if<implicit::MeshSolid>(&body.solid);
+    if (solid == nullptr) continue;
+    const implicit::MeshSolid::Report& report = solid->report();
+    const std::string key = "obstacles." + body.name + ".file: ";
+    if (report.turned > 0) {
+      warnings.push_back(key + std::to_string(report.turned) + (report.turned == 1 ? " triangle is" : " triangles are") +
+                         " turned, which ran around the other way than most of those that they share edges with");
+    }
+    if (report.deviation > kMuch * report.size) {
+      warnings.push_back(key + "the surface is off by up to " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) +
+                         " % of its size" + (report.crossing > 0 ? ", where triangles cross; unite its shells" : ""));
+    }
+  }
+}
+
 /// Where the scene says how far apart the samples of contact are [m].
 void add_wide_samples(const Model& model, double spacing, std::vector<std::string>& warnings) {
   const std::string key = "contact.sample_spacing: ";
@@ -198,6 +217,7 @@ std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& 
   add_passing(context.model, warnings);
   add_without_surface(context, particles, frame, warnings);
   add_missed(context.model, warnings);
+  add_mended_meshes(context.model, warnings);
   add_idle(scene, context.model, warnings);
   if (scene.contact.sample_spacing) add_wide_samples(context.model, *scene.contact.sample_spacing, warnings);
   return warnings;

@@ -15,7 +15,7 @@ namespace supple::scenes {
 [[nodiscard]] bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair);
 
 /// What is odd about the start: bodies deep in one another, parts of an object that pass through each other, objects without a
-/// surface, cells and samples of contact that miss objects, and keys
+/// surface, cells and samples of contact that miss objects, meshes of obstacles that had to be mended, and keys
 /// without an effect.
 /// @param frame  of the contacts at the start
 [[nodiscard]] std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles,

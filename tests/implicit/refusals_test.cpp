@@ -10,7 +10,6 @@
 #include "supple/core/error.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/mesh_limits.h"
-#include "supple/implicit/mesh_solid.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/implicit/surface_grid.h"
 
@@ -28,13 +27,6 @@ std::uint64_t bytes_of_refusal(const std::function<void()>& act) {
     EXPECT_EQ(error.faults().size(), 1u);
   }
   return test::most_bytes() - before;
-}
-
-Mesh tetrahedron() {
-  Mesh mesh;
-  mesh.position = {Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
-  mesh.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-  return mesh;
 }
 
 // All of them ask for a billion nodes or more, 4 GB in single precision.
@@ -55,7 +47,6 @@ TEST(Refusals, TakeNoMemory) {
       {"tetrahedra", [&] { (void)polygonise(ball, lattice_of(1e-6), executor); }},
       {"tetrahedra of two", [&] { (void)polygonise_partition(bodies, lattice_of(1e-6), executor); }},
       {"grid", [&] { (void)make_surface_grid(ball, grid(1e-6), executor); }},
-      {"solid", [&] { (void)MeshSolid(tetrahedron(), {.voxel = 1e-4}); }},
   };
   // At most as many blocks as are allowed are listed, and the largest list is that of a grid: 48 bytes for each of 390,625
   // blocks with its candidate and a box between them, thrice where a list moves to twice the room.

@@ -410,7 +410,6 @@ void add_contact(std::vector<Option>& all) {
   obstacle("between=linear", "shape: plane, between: $, keys: [{time: 0, at: [0, 0, -0.13]}, {time: 0.2, at: [0, 0, -0.1]}]", "smooth", "linear");
   obstacle("file", "shape: heights, at: [0, 0, -0.12], file: $", "heights.csv", "more_heights.csv");
   obstacle("shape=mesh", "at: [0, 0, -0.2], $", "shape: box, half_sizes: [0.5, 0.5, 0.1]", "shape: mesh, file: block.obj");
-  obstacle("voxel", "at: [0, 0, -0.2], shape: mesh, file: block.obj, voxel: $", "0.05", "0.04");
   obstacle("shape=implicit", "at: [0, 0, -0.2], $", "shape: box, half_sizes: [0.5, 0.5, 0.1]",
            "shape: implicit, skeleton: [{shape: rectangle, half_sizes: [0.5, 0.5], kernel: {radius: 0.2}}]");
   const std::string plate = "at: [0, 0, -0.2], shape: implicit, skeleton: [{shape: rectangle, half_sizes: [0.5, 0.5], kernel: ";

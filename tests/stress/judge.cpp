@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "fuzzers.h"
-#include "supple/scenes/output_limits.h"
+#include "supple/scenes/check.h"
 #include "supple/scenes/plan.h"
 #include "supple/scenes/run.h"
 #include "supple/scenes/simulation.h"
@@ -127,13 +127,7 @@ Trial judged(const std::string& name, const std::function<void()>& use) {
   return trial;
 }
 
-void check_scene(const scenes::Scene& scene) {
-  scenes::check_pictures(scene);
-  scenes::Simulation simulation(scene, {.threads = 1, .delaunay = delaunay(), .questions = true});
-  scenes::expect_output_sizes(simulation, scenes::requested_outputs(scene));
-  (void)simulation.warnings();
-  simulation.expect_steps();
-}
+void check_scene(const scenes::Scene& scene) { (void)scenes::check_scene(scene, {.threads = 1, .delaunay = delaunay()}); }
 
 std::string run_two_frames(scenes::Scene scene, const fs::path& folder) {
   check_scene(scene);

@@ -1,28 +1,38 @@
 /// @file supple/implicit/mesh_solid.h
-/// A closed triangle mesh as a solid that stands still: its signed distances on a lattice, made by OpenVDB, as a smooth field.
+/// A closed triangle mesh as a solid that stands still.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <vector>
+#include <memory>
 
 #include "supple/core/mesh.h"
 #include "supple/implicit/field_view.h"
 
 namespace supple::implicit {
 
+class MeshDistance;
+
 struct MeshSolidOptions {
-  double voxel = 0.0;                     ///< edge of a cell [m]; 0: a 64th of the mesh's longest side, or finer where the mesh is thinner
-  double slope = 1.0;                     ///< |grad F| beside faces [1/m], > 0
-  std::uint64_t max_voxels = 64'000'000;  ///< of the lattice around the mesh; refused beyond
+  double slope = 1.0;  ///< |grad F| [1/m], > 0
+  Pose pose{};         ///< where the mesh is put
 };
 
-/// F = -slope times the signed distance. The distances are the coefficients of a cubic B-spline on the lattice, so F is C^2
-/// and edges are rounded over about a cell; beside a smooth surface F errs by voxel^2 / 6 times its Laplacian, on a sphere of
-/// radius R by voxel^2 / 3 R in distance. Beyond a few cells outside the mesh F stays what it is there.
+/// F = -slope times the signed distance, smoothed over a 128th of the longest side (C^2: edges are rounded), and exact where the solid or a gap is thin.
+/// Inside is where triangles go around a point at least once, either way: a shell in another one bounds a cavity if it runs the other way round, and shells
+/// that overlap are one solid. Beyond a few cells outside F stays what it is there.
 class MeshSolid {
  public:
-  /// Vertices at one place count as one. @throws Error{Scene}, keys `mesh` for one that is not closed, `voxel` for too many cells or none in thin parts
+  /// What was found of the mesh.
+  struct Report {
+    std::size_t turned = 0;    ///< triangles that ran around the other way than most of their shell
+    std::size_t crossing = 0;  ///< triangles that pass through or touch others that are not their neighbours
+    double deviation = 0.0;    ///< by which the surface is elsewhere than that of the mesh, at most [m]
+    double size = 0.0;         ///< longest side of its box [m]
+  };
+
+  /// Vertices at one place count as one, and those without a triangle do not count. Triangles that run around the other way than most of those
+  /// that they share edges with are turned.
+  /// @throws Error{Scene}, key `mesh`, for one that is not closed, that has only one side or that encloses nothing, with the edge concerned
   MeshSolid(const Mesh& mesh, const MeshSolidOptions& options);
 
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
@@ -31,22 +41,24 @@ class MeshSolid {
   [[nodiscard]] Interval bound(const Box& box) const;
   [[nodiscard]] double gradient_bound(const Box& box) const;
   [[nodiscard]] Box surface_box() const { return box_; }
-  [[nodiscard]] double feature_size() const { return 4.0 * voxel_; }
-  [[nodiscard]] double voxel() const { return voxel_; }
-  /// The triangles it was made from, with a normal of each face at its corners.
-  [[nodiscard]] const Mesh& mesh() const { return mesh_; }
+  /// The thickness that all but a hundredth of its surface has at least, or a sixteenth of its longest side.
+  [[nodiscard]] double feature_size() const { return feature_size_; }
+  /// The triangles that bound it, with the normal of each face at its corners.
+  [[nodiscard]] const Mesh& mesh() const { return *mesh_; }
+  [[nodiscard]] const Report& report() const { return report_; }
 
  private:
   double evaluate(const Vec3& point, Vec3* gradient) const;
-  [[nodiscard]] std::size_t index(std::size_t i, std::size_t j, std::size_t k) const { return (k * size_[1] + j) * size_[0] + i; }
 
-  Mesh mesh_;
-  Vec3 corner_ = Vec3::Zero();  // node (0, 0, 0)
-  double voxel_, slope_;
-  std::array<std::size_t, 3> size_{};
-  std::vector<float> distance_;  // at the nodes, x fastest
-  double deepest_ = 0.0;         // largest distance inside
+  std::shared_ptr<const MeshDistance> distance_;  // where the mesh is given
+  std::shared_ptr<const Mesh> mesh_;
+  Vec3 position_;
+  Mat3 rotation_;
+  double slope_;
+  double feature_size_ = 0.0;
+  double deepest_ = 0.0;  // bound of the distance inside
   Box box_;
+  Report report_;
 };
 
 }  // namespace supple::implicit

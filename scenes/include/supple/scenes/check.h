@@ -15,6 +15,7 @@ struct CheckReport {
   int frames = 0;
   bool built = false;                  ///< false: the scene is so large that its counts alone were looked at
   std::vector<std::string> warnings;
+  std::string mesh_obstacles;          ///< a line for each: how far its surface is from its triangles; empty unless built
 };
 
 /// Looks for faults of a scene that was read: counts what it takes, builds it, looks for the files of its pictures, at the sizes of its

@@ -29,4 +29,7 @@ struct MeshQuery {
 /// The plan as text (`supple explain`): stages with reasons, time step (or why none can be made), sizes, contacts.
 [[nodiscard]] std::string explain(Simulation& simulation);
 
+/// A line for each obstacle of a mesh: its triangles, and by how much its surface differs from them (`supple check`); empty without any.
+[[nodiscard]] std::string describe_mesh_obstacles(const Model& model);
+
 }  // namespace supple::scenes

@@ -352,7 +352,6 @@ struct ObstacleDesc {
   std::vector<ObstacleKeyDesc> keys;  ///< instead of `at` and `turn`, rising in time
   LeadName between = LeadName::Smooth;
   std::string file;                   ///< heights: CSV of x, y, z on a regular grid; mesh: OBJ or PLY; beside the scene
-  std::optional<double> voxel;        ///< mesh [m]; absent: a 64th of its longest side, or finer where it is thinner
   std::vector<SkeletonDesc> skeleton; ///< implicit: about `at`
   double iso = 0.5;                   ///< implicit
   Vec3 colour = Vec3(0.72, 0.74, 0.78);  ///< sRGB
