@@ -255,6 +255,35 @@ bool PairSolver::march(const Job& job, PairResult& out) {
   }, out);
 }
 
+/// What the solution by panels gives to `solve_in_order`.
+struct PanelRule {
+  PanelOutcome outcome;
+  [[nodiscard]] const PatchSums& sums() const { return outcome.sums; }
+  [[nodiscard]] double estimate() const { return outcome.estimate; }
+  [[nodiscard]] double thickness() const { return outcome.thickness; }
+};
+
+bool PairSolver::panels(const Job& job, PairResult& out) {
+  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return false;
+  const BodyPair pair = out.summary.bodies;
+  PairPressure& pressure = job.polar.pressure;
+  std::vector<Vec3> starts(job.seeds.begin(), job.seeds.end());
+  if (starts.empty()) {
+    finder_.start_from_scan(pressure, job.overlap, starts_);
+    for (const StartPoint& inside : starts_.inside) starts.push_back(inside.at);
+  }
+  PanelRule rule;
+  return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
+    third_levels_.clear();
+    for (const std::uint32_t c : third_) {
+      if (job.bodies[c].field.bound(job.overlap).upper > 0.0) third_levels_.push_back({&job.bodies[c], c > pair.b});
+    }
+    const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
+    for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;
+    return fits;
+  }, out);
+}
+
 /// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.
 /// @param have  `out` holds a result already   @return whether it holds one
 bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
@@ -279,9 +308,36 @@ bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
   return have;
 }
 
+/// Whether polar patches would be many, or crossed by many kinks, so that panels cost less.
+bool PairSolver::suits_panels(const Job& job) const {
+  constexpr std::size_t kFewHills = 3, kManyPrimitives = 16;
+  constexpr double kWide = 2.0;     // overlaps, in features of the bodies
+  constexpr double kFinest = 1e-4;  // error: below, panels may miss slivers of that size between their nodes
+  if (job.settings().error < kFinest) return false;
+  const auto many = [](const ContactBody& body) { return body.skeleton != nullptr && body.skeleton->primitive.size() >= kManyPrimitives; };
+  if (!many(job.a) && !many(job.b)) return false;
+  return patches_.hills() > kFewHills || job.polar.extent > kWide * job.polar.pressure.feature_size();
+}
+
 void PairSolver::choose(const Job& job, PairResult& out) {
   const ContactRule only = job.settings().only;
   const bool any = only == ContactRule::None;
+  if (only == ContactRule::Panels) {
+    if (!panels(job, out)) {
+      begin_anew(job, out);
+      if (patches_.any_touches(job.polar.pressure, job.polar.extent, job.convex)) out.summary.error_estimate = 1.0;
+    }
+    out.summary.reason = RuleReason::Asked;
+    return;
+  }
+  if (any && suits_panels(job)) {
+    if (panels(job, out) && meets(out, job.settings().error)) {
+      out.summary.reason = RuleReason::ManyHills;
+      return;
+    }
+    begin_anew(job, out);
+    third_bodies_.clear();
+  }
   bool fits = (any || only == ContactRule::Polar) && polar(job, out);
   // Bodies that overlap where rings find no Sigma lie in each other, or one is so thin that Sigma is far from where rings begin.
   const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && job.overlap.lower.allFinite() && job.overlap.upper.allFinite() &&
@@ -291,7 +347,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   RuleReason reason = !any ? RuleReason::Asked : fits ? RuleReason::Fits : RuleReason::NoGraph;
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
-    const Pressing pressing = any && !third_.empty() ? thirds_press(job, out) : Pressing::None;
+    const Pressing pressing = third_.empty() ? Pressing::None : thirds_press(job, out);
     if (pressing == Pressing::All) {
       out.clear();
       return;
@@ -299,7 +355,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
     if (pressing == Pressing::Some) {
       // The squeezed regions of bodies with several parts are not cut that exactly.
       fits = !job.parted() && polar_cut(job, out);
-      if (!fits) reason = RuleReason::ThirdBody;
+      if (!fits && any) reason = RuleReason::ThirdBody;
     }
   }
   if (!fits && only == ContactRule::Polar) {
@@ -419,7 +475,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (!std::isfinite(extent)) return;  // two half-spaces
 
   const Region least = settings.energy ? Region::Sums : Region::None;
-  Job job{bodies, boxes, overlap, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
+  Job job{bodies, boxes, overlap, seeds, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
   find_thirds(job, pair, partners);
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());

@@ -9,6 +9,7 @@
 #include "imprint.h"
 #include "march_rule.h"
 #include "pair_result.h"
+#include "panel_rule.h"
 #include "polar_patches.h"
 #include "sample_rule.h"
 #include "squeezed_region.h"
@@ -40,6 +41,7 @@ class PairSolver {
     std::span<const ContactBody> bodies;
     std::span<const Box> boxes;
     const Box& overlap;
+    std::span<const Vec3> seeds;
     const ContactBody &a, &b;
     PolarJob polar;
     bool convex;
@@ -58,7 +60,9 @@ class PairSolver {
   bool polar_cut(const Job& job, PairResult& out);
   bool samples(const Job& job, bool few, PairResult& out);
   bool march(const Job& job, PairResult& out);
+  bool panels(const Job& job, PairResult& out);
   bool stand_in(const Job& job, bool have, PairResult& out);
+  [[nodiscard]] bool suits_panels(const Job& job) const;
   void choose(const Job& job, PairResult& out);
   void take_all_thirds(const Job& job);
   void begin_anew(const Job& job, PairResult& out);
@@ -73,6 +77,10 @@ class PairSolver {
   ImprintFinder imprint_;
   SampleRuleSolver samples_;
   MarchRuleSolver march_;
+  PanelRoom panel_room_;
+  PeakFinder finder_;
+  StartPoints starts_;
+  std::vector<ThirdLevel> third_levels_;
   SqueezedRegion region_;
   Teams teams_;                  ///< of the body of the pair
   const Team* team_ = nullptr;   ///< of the pair's obstacle

@@ -37,6 +37,8 @@ class PolarPatches {
   bool solve(const PolarJob& job, PairResult& out);
 
   [[nodiscard]] std::span<const PolarCover> covers() const { return std::span(covers_).first(cover_count_); }
+  /// How many hills of the pressure there seem to be.
+  [[nodiscard]] std::size_t hills() const { return starts_.hill.size(); }
   [[nodiscard]] bool empty() const { return cover_count_ == 0; }
   /// No patches, whatever was found.
   void forget() { cover_count_ = 0; }

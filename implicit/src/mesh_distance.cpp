@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace supple::implicit {
@@ -60,7 +61,8 @@ void MeshDistance::lay_lattice() {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     size_[axis] = static_cast<std::size_t>(std::ceil(exact_.box().extent()[static_cast<Eigen::Index>(axis)] / cell_) + 2.0 * kMargin + 1.0);
   }
-  distance_.assign(size_[0] * size_[1] * size_[2], static_cast<float>(kBand * cell_));
+  unit_ = std::ldexp(1.0, std::ilogb(cell_));
+  distance_.assign(size_[0] * size_[1] * size_[2], static_cast<float>(kBand * cell_ / unit_));
   weight_.assign(distance_.size(), 0);
   part_.assign(distance_.size(), Part::Spline);
   for (std::size_t k = 0; k < size_[2]; k += kBlock) {
@@ -77,7 +79,7 @@ void MeshDistance::fill(std::size_t i, std::size_t j, std::size_t k) {
   for (std::size_t c = k; c < std::min(k + kBlock, size_[2]); ++c) {
     for (std::size_t b = j; b < std::min(j + kBlock, size_[1]); ++b) {
       for (std::size_t a = i; a < std::min(i + kBlock, size_[0]); ++a) {
-        distance_[node(a, b, c)] = static_cast<float>(std::min(exact_.at(place_of(a, b, c), nullptr), kBand * cell_));
+        distance_[node(a, b, c)] = static_cast<float>(std::min(exact_.at(place_of(a, b, c), nullptr), kBand * cell_) / unit_);
       }
     }
   }
@@ -100,6 +102,7 @@ MeshDistance::Place MeshDistance::cell_at(const Vec3& x) const {
 template <class Number>
 double MeshDistance::spline(const std::vector<Number>& coefficient, const Place& place, Vec3* slope) const {
   const Weights x(place.t[0]), y(place.t[1]), z(place.t[2]);
+  const double unit = std::is_same_v<Number, float> ? unit_ : 1.0;  // of distances
   double value = 0.0;
   Vec3 sum = Vec3::Zero();
   for (std::size_t c = 0; c < 4; ++c) {
@@ -119,9 +122,9 @@ double MeshDistance::spline(const std::vector<Number>& coefficient, const Place&
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (place.beyond[axis]) sum[static_cast<Eigen::Index>(axis)] = 0.0;
     }
-    *slope = sum / cell_;
+    *slope = sum / (cell_ / unit);
   }
-  return value;
+  return value * unit;
 }
 
 double MeshDistance::at(const Vec3& x, Vec3* slope) const {
@@ -151,7 +154,7 @@ void MeshDistance::find_poor_cells() {
   for (std::size_t k = 1; k + 2 < size_[2]; ++k) {
     for (std::size_t j = 1; j + 2 < size_[1]; ++j) {
       for (std::size_t i = 1; i + 2 < size_[0]; ++i) {
-        const double here = static_cast<double>(distance_[node(i, j, k)]);
+        const double here = static_cast<double>(distance_[node(i, j, k)]) * unit_;
         if (std::abs(here) > kNear * cell_) continue;
         const Vec3 at = place_of(i, j, k), middle = at + Vec3::Constant(0.5 * cell_);
         if (std::abs(spline(distance_, cell_at(at), nullptr) - here) > kPoor * cell_) keep_exact(at, 1);

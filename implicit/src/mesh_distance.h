@@ -51,7 +51,8 @@ class MeshDistance {
   Vec3 corner_ = Vec3::Zero();  // node (0, 0, 0)
   double cell_ = 0.0;
   std::array<std::size_t, 3> size_{};
-  std::vector<float> distance_;       // at the nodes, x fastest [m]
+  double unit_ = 1.0;                 // the power of two below `cell_`, so that floats hold distances of any size [m]
+  std::vector<float> distance_;       // at the nodes, x fastest, over `unit_`
   std::vector<std::uint8_t> weight_;  // of the exact distance, at the nodes
   std::vector<Part> part_;            // of the cell above each node
   Box exact_box_;                     // of the cells where the exact distance has a part

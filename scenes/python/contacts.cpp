@@ -65,7 +65,7 @@ void add_summary(Class& type) {
           "Bound of the relative error of elastic_force, area and centre_of_pressure [1].")
       .def_property_readonly(
           "rule", [](const T& p) { return scenes::rule_name(p.summary().rule); },
-          "What integrates: \"polar\", \"samples\" or \"march\"; \"none\" where nothing touches.")
+          "What integrates: \"polar\", \"samples\", \"march\" or \"panels\"; \"none\" where nothing touches.")
       .def_property_readonly(
           "patches", [](const T& p) { return p.summary().patches; }, "Connected parts of the contact surface.")
       .def_property_readonly(

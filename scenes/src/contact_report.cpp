@@ -41,6 +41,7 @@ const char* rule_name(collision::ContactRule rule) {
     case collision::ContactRule::Polar: return "polar";
     case collision::ContactRule::Samples: return "samples";
     case collision::ContactRule::March: return "march";
+    case collision::ContactRule::Panels: return "panels";
     case collision::ContactRule::None: break;
   }
   return "none";

@@ -47,7 +47,7 @@ void fields(Archive& archive, StickDesc& d) {
 template <class Archive>
 void fields(Archive& archive, ContactDesc& d) {
   archive("error", d.error, between(1e-10, 0.1, kNumber), "relative error of force, area and centre of pressure");
-  archive("rule", d.rule, {}, "points of the contact surface: along the seeds' rays, in polar rings about the peak, on triangles that are refined; auto: polar where it fits, else what meets the error");
+  archive("rule", d.rule, {}, "points of the contact surface: along the seeds' rays, in polar rings about the peak, on triangles that are refined, on panels cut at the rim; auto: panels where the pressure has many hills, polar where it fits, else what meets the error");
   archive("split", d.split, {}, "how forces reach the particles: gradient of the contact energy, or by contribution");
   archive("core", d.core, {}, "soft: bodies pressed too hard pass one another, which is reported; barrier: deep cores turn back what approaches");
   archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out; pairs that an explicit time step would turn back, to and fro, have a higher one; implicit methods have one that shows no creep");

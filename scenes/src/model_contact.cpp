@@ -35,6 +35,7 @@ collision::ContactRule rule_of(RuleName name) {
     case RuleName::Samples: return collision::ContactRule::Samples;
     case RuleName::Polar: return collision::ContactRule::Polar;
     case RuleName::March: return collision::ContactRule::March;
+    case RuleName::Panels: return collision::ContactRule::Panels;
     case RuleName::Auto: break;
   }
   return collision::ContactRule::None;

@@ -111,7 +111,7 @@ std::string meshing_of(const Scene& scene, const Model& model) {
 /// Which rule samples the contact surface, and why.
 std::string rule_of_contact(const ContactDesc& d) {
   if (d.rule != RuleName::Auto) return std::string(name_of(d.rule)) + ": the scene asks for it";
-  return "auto: polar where patches are seen whole from their peak, else samples or march, whichever meets the error, to " + number_text(d.error);
+  return "auto: panels where the pressure has many hills, polar where patches are seen whole from their peak, else samples or march, whichever meets the error, to " + number_text(d.error);
 }
 
 }  // namespace

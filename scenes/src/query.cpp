@@ -40,6 +40,7 @@ std::string reason_text(collision::RuleReason reason) {
     case collision::RuleReason::NoGraph: return "a patch that is no graph over a disc";
     case collision::RuleReason::ThirdBody: return "a third body presses on the patch";
     case collision::RuleReason::Unmet: return "its bound is smaller than that of polar rings, which is larger than asked";
+    case collision::RuleReason::ManyHills: return "a patch, or patches, of many hills: panels serve them all at once";
     case collision::RuleReason::Within: return "one lies in the other, which presses as hard all over or harder: energy, but no surface and no force";
     case collision::RuleReason::NoSkeleton: return "no polar patch, and no skeleton to send rays from";
   }

@@ -2,7 +2,7 @@
 /// What changes when two bodies in contact change places, are turned and moved together, or are a thousandth or a thousand times as
 /// large: the largest relative change of force, area and centre of pressure over many random poses, for each case and error asked for,
 /// one JSON object a line. Nothing should but for round-off, 1e-9.
-///   contact_invariance [POSES] [CASE|all] [auto|samples|polar|march] [SEED]
+///   contact_invariance [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED]
 #include <cstdio>
 #include <string>
 #include <string_view>
@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   using namespace supple;
   using namespace supple::benchmarks;
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
-  constexpr std::string_view kUsage = "contact_invariance [POSES] [CASE|all] [auto|samples|polar|march] [SEED]";
+  constexpr std::string_view kUsage = "contact_invariance [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED]";
   answer_usage(argc, argv, kUsage, 4);
   const int poses = argc > 1 ? whole_number(kUsage, argv[1]) : 1000;
   const std::string_view only = argc > 2 ? argv[2] : "all", rule = argc > 3 ? argv[3] : "auto";

@@ -5,7 +5,7 @@
 /// bodies. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are measured against the finest rule for the two bodies seen otherwise, which has other nodes; what it
 /// may itself be off by is added to the bounds. Poses whose patch a kink of a field crosses are told apart.
-///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
+///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
 /// --marched: where there is no closed form the reference is marching, which has neither rays nor panels.
 /// --all-rays: bodies that are the same all around an axis get every ray, as others do, and not one that stands for all.
 #include <cstdio>
@@ -162,7 +162,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  constexpr std::string_view kUsage = "contact_poses [POSES] [CASE|all] [auto|samples|polar|march] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]";
+  constexpr std::string_view kUsage = "contact_poses [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]";
   answer_usage(argc, argv, kUsage, 9, {{"--all-rays"}, {"--marched"}, {"--depths", 2}});
   std::vector<std::string_view> words;
   std::optional<std::array<double, 2>> depths;

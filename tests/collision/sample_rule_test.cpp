@@ -194,11 +194,12 @@ TEST(ContactRules, AgreeOnForcesOfPartsAndKeepMomenta) {
 }
 
 TEST(ContactRules, TakeWhicheverCostsLessWhereNoPolarPatchFits) {
-  // A ring of blobs on a plane, and one around a ball: the patch is an annulus, narrow there and wide here.
+  // A ring of blobs on a plane, fewer than panels are chosen for, and one around a ball: the patch is an annulus, narrow there and wide here.
+  constexpr std::uint32_t kBlobs = 15;
   std::vector<implicit::Primitive> blobs;
   std::vector<Pose> parts;
-  for (std::uint32_t k = 0; k < 16; ++k) {
-    const auto [s, c] = math::sin_cos(2.0 * kPi * k / 16);
+  for (std::uint32_t k = 0; k < kBlobs; ++k) {
+    const auto [s, c] = math::sin_cos(2.0 * kPi * k / kBlobs);
     blobs.push_back(Lumps::blob(k, Vec3::Zero()));
     blobs.back().kernel = implicit::Kernel::wyvill(0.7);
     parts.push_back({Vec3(c, s, 0.3), kTurn});

@@ -373,6 +373,7 @@ void add_contact(std::vector<Option>& all) {
   on_ground("contact.rule=samples", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "samples");
   on_ground("contact.rule=polar", rubs, ground + "contact: {error: 1e-2, rule: $}", "march", "polar");
   on_ground("contact.rule=march", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "march");
+  on_ground("contact.rule=panels", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "panels");
   on_ground("contact.friction_speed", rubs, ground + "contact: {friction_speed: $}", "0.001", "5");
   on_ground("contact.stick.stiffness", rubs, ground + "contact: {stick: {stiffness: $}}", "10", "20");
   on_ground("contact.stick.damping", rubs, ground + "contact: {stick: {stiffness: 10, damping: $}}", "0", "0.05");

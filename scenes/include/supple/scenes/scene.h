@@ -286,7 +286,7 @@ struct PairDesc {
 };
 
 enum class SplitName : std::uint8_t { Energy, Contribution };
-enum class RuleName : std::uint8_t { Auto, Samples, Polar, March };
+enum class RuleName : std::uint8_t { Auto, Samples, Polar, March, Panels };
 enum class CoreName : std::uint8_t { Soft, Barrier };
 
 /// contact.stick: friction that holds
