@@ -1,10 +1,10 @@
 supple_together(
   "src/arrangement.cpp src/audits.cpp src/bodies.cpp src/check.cpp src/count_scene.cpp src/draw_picture.cpp
-   src/fields.cpp src/fields_members.cpp src/fields_reference.cpp src/held_volumes.cpp src/output_limits.cpp
-   src/scene_places.cpp"
+   src/fields.cpp src/fields_members.cpp src/fields_reference.cpp src/folder_lock.cpp src/held_volumes.cpp"
   "src/camera.cpp src/contact_report.cpp src/contact_work.cpp src/divide.cpp src/drawing_crew.cpp src/fields_info.cpp
    src/frame.cpp"
-  "src/fixed_step.cpp src/frame_looks.cpp src/frame_meshes.cpp src/limits.cpp"
+  "src/fixed_step.cpp src/frame_looks.cpp src/frame_meshes.cpp src/limits.cpp src/output_limits.cpp
+   src/scene_places.cpp"
   "src/frame_tables.cpp src/frame_writer.cpp src/look_columns.cpp src/model.cpp src/model_volume.cpp
    src/point_tree.cpp"
   "src/inspect.cpp src/model_contact.cpp src/model_skeleton.cpp"

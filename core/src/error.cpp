@@ -1,9 +1,39 @@
 #include "supple/core/error.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace supple {
 namespace {
+
+/// Length of the UTF-8 character that a text begins with, or 0 where it is malformed.
+std::size_t character_length(std::string_view text) {
+  const auto byte = [text](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
+  const unsigned first = byte(0);
+  const std::size_t length = first < 0x80U ? 1 : first >= 0xC2U && first <= 0xDFU ? 2 : (first & 0xF0U) == 0xE0U ? 3 : first >= 0xF0U && first <= 0xF4U ? 4 : 0;
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((byte(k) & 0xC0U) != 0x80U) return 0;
+  }
+  return length;
+}
+
+/// Names and contents of files may hold anything: what a terminal would obey, and what is no text, is shown by its bytes.
+std::string printable(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const auto byte = static_cast<unsigned char>(text.front());
+    const std::size_t length = byte < 0x20 || byte == 0x7F ? 0 : character_length(text);
+    if (length == 0) {
+      constexpr std::string_view kDigits = "0123456789abcdef";
+      out.append("\\x") += kDigits[byte >> 4U];
+      out += kDigits[byte & 15U];
+    } else {
+      out += text.substr(0, length);
+    }
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  return out;
+}
 
 std::string join(const std::vector<Fault>& faults) {
   std::string text;
@@ -32,7 +62,7 @@ std::string Fault::message() const {
   append(": ", expected);
   if (!found.empty()) append(expected.empty() ? ": " : ", ", "found " + found);
   append("; ", hint);
-  return text;
+  return printable(text);
 }
 
 Error::Error(ErrorKind kind, Fault fault) : Error(kind, std::vector<Fault>{std::move(fault)}) {}

@@ -1,20 +1,18 @@
-#include <fcntl.h>
-#include <spawn.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
-#include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
-#include <sstream>
 #include <system_error>
 
+#include "child_process.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/core/interrupt.h"
+#include "supple/core/io/atomic_file.h"
 #include "supple/core/io/open_temporaries.h"
 #include "supple/render/image.h"
 
@@ -22,6 +20,7 @@ namespace supple::render {
 namespace {
 
 constexpr const char* kInstallHint = "apt-get install ffmpeg";
+constexpr std::size_t kLargestPicture = std::size_t{1} << 32;  // [bytes]
 
 [[noreturn]] void fail(const std::string& place, const std::string& what, const std::string& hint) {
   throw Error(ErrorKind::Io, Fault{.place = place, .key = {}, .expected = what, .found = {}, .hint = hint});
@@ -54,66 +53,57 @@ std::string last_line(const std::string& text) {
   return text.substr(begin, end + 1 - begin);
 }
 
-struct Outcome {
-  int status = 0;        ///< as waitpid gives it
-  std::string messages;  ///< the end of what the program wrote to its error stream
-};
-
-/// Runs a program of the search path without a shell, its input empty, and collects its error stream.
-/// @throws Error{Io} when there is no such program.
-Outcome run(const std::vector<std::string>& arguments) {
-  int pipe_ends[2];
-  if (::pipe2(pipe_ends, O_CLOEXEC) != 0) fail(arguments[0], std::system_category().message(errno), {});
-  posix_spawn_file_actions_t actions;
-  ::posix_spawn_file_actions_init(&actions);
-  ::posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  ::posix_spawn_file_actions_adddup2(&actions, pipe_ends[1], STDERR_FILENO);
-
-  std::vector<std::string> words = arguments;
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  pid_t child = 0;
-  const int code = ::posix_spawnp(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  ::posix_spawn_file_actions_destroy(&actions);
-  ::close(pipe_ends[1]);
-  if (code != 0) {
-    ::close(pipe_ends[0]);
-    fail(arguments[0], "cannot be started: " + std::system_category().message(code), kInstallHint);
-  }
-
-  Outcome outcome;
-  char buffer[4096];
-  for (;;) {
-    const ssize_t count = ::read(pipe_ends[0], buffer, sizeof buffer);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) break;
-    outcome.messages.append(buffer, static_cast<std::size_t>(count));
-    if (outcome.messages.size() > 65536) outcome.messages.erase(0, 32768);
-  }
-  ::close(pipe_ends[0]);
-  while (::waitpid(child, &outcome.status, 0) < 0 && errno == EINTR) {
-  }
-  return outcome;
+[[noreturn]] void fail_to_start(const std::string& program, const std::string& why) {
+  fail(program, "cannot be started: " + why, kInstallHint);
 }
 
+std::filesystem::path film_program() {
+  const std::string name = program_name();
+  std::filesystem::path program = find_program(name);
+  if (program.empty()) fail_to_start(name, std::generic_category().message(ENOENT));
+  return program;
+}
+
+/// Where ffmpeg writes, beside the film. It goes with whatever is in it; once it has gone, what still runs has nowhere to write to.
+class TemporaryFolder {
+ public:
+  explicit TemporaryFolder(const std::filesystem::path& film) : path_(io::temporary_name(film)), open_(path_.c_str()) {
+    std::error_code error;
+    std::filesystem::remove_all(path_, error);  // of a process that had this number
+    std::filesystem::create_directory(path_, error);
+    if (error) fail(film.string(), "cannot be written: " + error.message(), {});
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  io::OpenTemporary open_;
+};
+
+/// The shortest text of the same number: from 29.97002997002997 ffmpeg finds the rate 30000/1001, from fewer digits it does not.
 std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
 constexpr std::string_view kPictures = "pictures ";
 constexpr std::string_view kNote = "; note ";
 
 /// Of the pictures of a film and of how they are encoded, and its note; a part of the film itself.
-std::string identity_of(const std::vector<std::string>& arguments, const std::vector<std::filesystem::path>& pictures, const std::string& note) {
+std::string identity_of(const std::vector<std::string>& arguments, const std::vector<std::filesystem::path>& pictures, const std::string& note,
+                        const std::atomic<int>* interrupt) {
   Hasher hasher;
   for (const std::string& argument : arguments) hasher.add(std::string_view(argument));
   for (const std::filesystem::path& picture : pictures) {
-    std::ifstream in(picture, std::ios::binary);
-    hasher.add(std::string_view(std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}));
+    heed(interrupt);
+    const std::vector<std::byte> bytes = io::read_file(picture, kLargestPicture);
+    hasher.add(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   }
   return std::string(kPictures) + to_hex(hasher.value()) + std::string(kNote) + note + ';';
 }
@@ -138,74 +128,52 @@ std::string facts_of(const std::filesystem::path& film) {
 
 }  // namespace
 
-void find_film_program() {
-  const std::string program = program_name();
-  if (program.find('/') != std::string::npos) {
-    if (::access(program.c_str(), X_OK) == 0) return;
-  } else {
-    const char* path = std::getenv("PATH");
-    std::istringstream folders(path == nullptr ? "/usr/local/bin:/usr/bin:/bin" : path);
-    for (std::string folder; std::getline(folders, folder, ':');) {
-      if (::access(((folder.empty() ? "." : folder) + '/' + program).c_str(), X_OK) == 0) return;
-    }
-  }
-  fail(program, "cannot be started: " + std::generic_category().message(ENOENT), kInstallHint);
-}
+void find_film_program() { (void)film_program(); }
 
-void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
-                 const FilmFile& file) {
-  const std::filesystem::path& film = file.path;
-  SUPPLE_EXPECTS(0 <= first && first <= last);
-  SUPPLE_EXPECTS(std::isfinite(frame_rate) && frame_rate > 0.0);
+void encode_film(const FilmSource& source, const std::filesystem::path& film, const std::atomic<int>* interrupt) {
+  SUPPLE_EXPECTS(0 <= source.first && source.first <= source.last);
+  SUPPLE_EXPECTS(std::isfinite(source.frame_rate) && source.frame_rate > 0.0);
   // ffmpeg ends the film without a word where a number is missing.
   std::vector<std::filesystem::path> pictures;
-  for (int frame = first; frame <= last; ++frame) {
-    pictures.push_back(folder / frame_name(stem, frame));
+  for (int frame = source.first; frame <= source.last; ++frame) {
+    pictures.push_back(source.folder / frame_name(source.stem, frame));
     if (!std::filesystem::exists(pictures.back())) fail(pictures.back().string(), "a frame of the film is missing", "render it first");
   }
   const std::vector<std::string> encoding = {
-      "-framerate", number_text(frame_rate), "-frames:v", std::to_string(last - first + 1),
+      "-framerate", number_text(source.frame_rate), "-frames:v", std::to_string(source.last - source.first + 1),
       // 4:2:0 needs even sizes: an odd edge is stretched by one pixel.
       "-vf", "scale=ceil(iw/2)*2:ceil(ih/2)*2:flags=lanczos:out_color_matrix=bt709:out_range=tv,format=yuv420p",
       "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-pix_fmt", "yuv420p",
       "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv",
       "-movflags", "+faststart", "-f", "mp4"};
-  const std::string identity = identity_of(encoding, pictures, file.note);
+  const std::string identity = identity_of(encoding, pictures, source.note, interrupt);
   if (facts_of(film).find(identity) != std::string::npos) return;
 
-  const std::filesystem::path temporary =
-      std::filesystem::absolute(film).parent_path() /
-      ('.' + film.filename().string() + '.' + std::to_string(::getpid()) + ".tmp");
-  const std::filesystem::path frames = std::filesystem::absolute(folder);
+  const std::filesystem::path program = film_program();
+  const std::filesystem::path target = std::filesystem::absolute(film);
+  const TemporaryFolder temporary(target);
+  const std::filesystem::path unfinished = temporary.path() / "film.mp4";
+  const std::filesystem::path frames = std::filesystem::absolute(source.folder);
   std::vector<std::string> arguments = {
-      program_name(), "-hide_banner", "-nostdin", "-loglevel", "error", "-y",
-      encoding[0], encoding[1], "-start_number", std::to_string(first), "-i", as_pattern((frames / stem).string()) + ".%04d.png"};
+      program.string(), "-hide_banner", "-nostdin", "-loglevel", "error", "-y", encoding[0], encoding[1],
+      "-start_number", std::to_string(source.first), "-i", as_pattern((frames / source.stem).string()) + ".%04d.png"};
   arguments.insert(arguments.end(), encoding.begin() + 2, encoding.end());
-  arguments.insert(arguments.end(), {"-metadata", "comment=" + identity, temporary.string()});
+  arguments.insert(arguments.end(), {"-metadata", "comment=" + identity, unfinished.string()});
 
-  const io::OpenTemporary open(temporary.c_str());
-  std::error_code ignored;
-  Outcome outcome;
+  const io::OpenTemporary open(unfinished.c_str());
+  ProgramEnd end;
   try {
-    outcome = run(arguments);
-  } catch (...) {
-    std::filesystem::remove(temporary, ignored);
-    throw;
+    end = run_program(program, arguments, interrupt);
+  } catch (const std::system_error& error) {
+    fail_to_start(program.string(), error.code().message());
   }
-  if (!WIFEXITED(outcome.status) || WEXITSTATUS(outcome.status) != 0) {
-    std::filesystem::remove(temporary, ignored);
-    const std::string said = last_line(outcome.messages);
-    // A shell's way to say that a program is absent; posix_spawn of older systems reports it so, too.
-    const bool absent = WIFEXITED(outcome.status) && WEXITSTATUS(outcome.status) == 127;
-    fail(film.string(), arguments[0] + " failed" + (said.empty() ? std::string() : ": " + said),
-         absent ? kInstallHint : "the frames are kept in " + folder.string());
+  if (!WIFEXITED(end.status) || WEXITSTATUS(end.status) != 0) {
+    const std::string said = last_line(end.messages);
+    const bool absent = WIFEXITED(end.status) && WEXITSTATUS(end.status) == 127;  // a shell's way to say that a program is
+    fail(film.string(), program.string() + " failed" + (said.empty() ? std::string() : ": " + said),
+         absent ? kInstallHint : "the frames are kept in " + source.folder.string());
   }
-  std::error_code error;
-  std::filesystem::rename(temporary, film, error);
-  if (error) {
-    std::filesystem::remove(temporary, ignored);
-    fail(film.string(), "cannot be written: " + error.message(), {});
-  }
+  io::rename_whole(unfinished, target);
 }
 
 std::optional<std::string> film_note(const std::filesystem::path& film) {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <memory>
 #include <string_view>
 
@@ -180,10 +179,8 @@ void write_png(const std::filesystem::path& path, const Image& image, std::strin
 
 std::string png_fingerprint(const std::filesystem::path& path) {
   constexpr std::size_t kHead = 1024;  // our chunks before the pixels are far shorter
-  std::array<char, kHead> head{};
-  std::ifstream in(path, std::ios::binary);
-  in.read(head.data(), kHead);
-  const std::string_view text(head.data(), static_cast<std::size_t>(in.gcount()));
+  std::array<std::byte, kHead> head{};
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), io::read_start(path, head).value_or(0));
   if (text.size() < kSignature.size() || std::memcmp(text.data(), kSignature.data(), kSignature.size()) != 0) return {};
   for (std::size_t at = kSignature.size(); at + 8 <= text.size();) {
     const std::size_t length = get_u32(reinterpret_cast<const std::byte*>(text.data() + at));

@@ -14,14 +14,19 @@
 #include <limits>
 #include <new>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "benchmarks.h"
 #include "last_resort.h"
+#include "print.h"
 #include "progress_bar.h"
+#include "usage.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
+#include "supple/core/interrupt.h"
+#include "supple/core/io/descriptor.h"
 #include "supple/scenes/check.h"
 #include "supple/scenes/inspect.h"
 #include "supple/scenes/limits.h"
@@ -35,10 +40,12 @@
 namespace {
 
 using namespace supple;
+using tool::print;
 namespace fs = std::filesystem;
 
 constexpr int kUsage = 2;
 constexpr int kInternal = 1;
+constexpr int kSignalExit = 128;
 
 constexpr const char* kFilmRule =
     "A film (and its contact sheet) shows frames of one look: the film is made where all frames from 1 to the last one simulated have\n"
@@ -51,6 +58,11 @@ std::atomic<int> interrupted{0};
 void on_signal(int number) {
   interrupted = number;
   std::signal(number, SIG_DFL);
+}
+
+void heed_signals() {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
 }
 
 struct Arguments {
@@ -93,27 +105,27 @@ struct Arguments {
 };
 
 void print_profile(const scenes::RunResult& result) {
-  std::printf("stages: see \"stages\" in %s\n", result.report.c_str());
+  print(std::cout, "stages: see \"stages\" in %s\n", result.report.c_str());
   if (result.pictures.images == 0) return;
   const auto& t = result.pictures.render;
-  std::printf("pictures: %d, CPU ms in all: context %.1f, shaders %.1f, upload %.1f, draw %.1f, read back %.1f, encode %.1f\n",
+  print(std::cout, "pictures: %d, CPU ms in all: context %.1f, shaders %.1f, upload %.1f, draw %.1f, read back %.1f, encode %.1f\n",
               result.pictures.images, 1e3 * t.context, 1e3 * t.shaders, 1e3 * t.upload, 1e3 * t.draw, 1e3 * t.read_back,
               1e3 * result.pictures.encode_s);
 }
 
 int report(const scenes::RunResult& result, const Arguments& arguments) {
-  for (const std::string& warning : result.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  for (const std::string& warning : result.warnings) print(std::cerr, "warning: %s\n", warning.c_str());
   if (result.outcome != "done") {
-    std::fprintf(stderr, "%s\n", result.reason.c_str());
-    std::fprintf(stderr, "stopped: %s, last good frame %d, %s\n", result.outcome.c_str(), result.frames,
+    print(std::cerr, "%s\n", result.reason.c_str());
+    print(std::cerr, "stopped: %s, last good frame %d, %s\n", result.outcome.c_str(), result.frames,
                  result.report.c_str());
     return result.exit_code;
   }
   if (!arguments.quiet) {
-    std::printf("folder: %s\n", result.folder.c_str());
-    if (result.pictures_kept > 0) std::printf("frames: %d drawn, %d kept\n", result.pictures_drawn, result.pictures_kept);
-    if (!result.film.empty()) std::printf("film:   %s\n", result.film.c_str());
-    std::printf("result: %s (state %s)\n", result.report.c_str(), to_hex(result.state_hash).c_str());
+    print(std::cout, "folder: %s\n", result.folder.c_str());
+    if (result.pictures_kept > 0) print(std::cout, "frames: %d drawn, %d kept\n", result.pictures_drawn, result.pictures_kept);
+    if (!result.film.empty()) print(std::cout, "film:   %s\n", result.film.c_str());
+    print(std::cout, "result: %s (state %s)\n", result.report.c_str(), to_hex(result.state_hash).c_str());
     if (arguments.profile) print_profile(result);
   }
   return 0;
@@ -154,8 +166,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.delaunay = simulation_options(0).delaunay;
   options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
   options.interrupt = &interrupted;
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  heed_signals();
   return options;
 }
 
@@ -188,7 +199,7 @@ int run(const Arguments& arguments) {
 int render(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.sheet) {
-    for (const auto& sheet : scenes::make_sheets(scene, folder_of(scene, arguments))) std::printf("sheet:  %s\n", sheet.c_str());
+    for (const auto& sheet : scenes::make_sheets(scene, folder_of(scene, arguments))) print(std::cout, "sheet:  %s\n", sheet.c_str());
     return 0;
   }
   tool::ProgressBar bar = make_bar(arguments);
@@ -211,19 +222,21 @@ int export_files(Arguments arguments) {
 }
 
 int compare(const Arguments& arguments) {
+  heed_signals();
   const scenes::Comparison result = scenes::compare_runs({.first = arguments.scene,
                                                           .second = arguments.other,
                                                           .folder = arguments.out.empty() ? "out/compare" : arguments.out,
                                                           .gain = arguments.gain,
                                                           .film = !arguments.no_film,
-                                                          .camera = arguments.camera});
+                                                          .camera = arguments.camera,
+                                                          .interrupt = &interrupted});
   const auto worst = std::min_element(result.frames.begin(), result.frames.end(),
                                       [](const auto& a, const auto& b) { return a.psnr < b.psnr; });
   const auto equal = std::count_if(result.frames.begin(), result.frames.end(), [](const auto& f) { return f.largest == 0; });
-  std::printf("frames: %zu in both, %td equal, %d and %d in one only\n", result.frames.size(), equal, result.only_first,
+  print(std::cout, "frames: %zu in both, %td equal, %d and %d in one only\n", result.frames.size(), equal, result.only_first,
               result.only_second);
-  std::printf("worst:  frame %d, PSNR %.2f dB, largest difference %d of 255\n", worst->frame, worst->psnr, worst->largest);
-  if (!result.film.empty()) std::printf("film:   %s\n", result.film.c_str());
+  print(std::cout, "worst:  frame %d, PSNR %.2f dB, largest difference %d of 255\n", worst->frame, worst->psnr, worst->largest);
+  if (!result.film.empty()) print(std::cout, "film:   %s\n", result.film.c_str());
   return 0;
 }
 
@@ -231,13 +244,13 @@ int check(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   const double build = arguments.memory > 0.0 ? arguments.memory : scenes::kCheckMemory;
   const scenes::CheckReport found = scenes::check_scene(scene, question_options(1, arguments.memory), build);
-  for (const std::string& warning : found.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  for (const std::string& warning : found.warnings) print(std::cerr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
     const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
-    std::printf("%s: %s (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(),
+    print(std::cout, "%s: %s (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(),
                 found.built ? "no fault found" : "no fault found in keys, files and counts", found.objects, plural(found.objects), found.particles,
                 plural(found.particles), found.frames);
-    std::fputs(found.mesh_obstacles.c_str(), stdout);
+    std::cout << found.mesh_obstacles;
   }
   return 0;
 }
@@ -246,7 +259,7 @@ int explain(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   if (arguments.simulate_only) scene.output = {};
   scenes::Simulation simulation(std::move(scene), question_options(1, arguments.memory));
-  std::fputs(scenes::explain(simulation).c_str(), stdout);
+  std::cout << scenes::explain(simulation);
   return 0;
 }
 
@@ -273,14 +286,14 @@ int query(const Arguments& arguments) {
   } else {
     answer = scenes::query_mesh(simulation, {.cells = arguments.cells, .out = arguments.out});
   }
-  std::fputs(answer.c_str(), stdout);
+  std::cout << answer;
   return 0;
 }
 
 int bench(const Arguments& arguments) {
   const std::string& group = arguments.group.empty() && !arguments.words.empty() ? arguments.words.front() : arguments.group;
   if (!arguments.list && !group.empty()) tool::run_benchmark(group, arguments.words);
-  std::fputs(tool::list_benchmarks().c_str(), stdout);
+  std::cout << tool::list_benchmarks();
   return 0;
 }
 
@@ -324,8 +337,10 @@ void drawing_flags(CLI::App* verb, Arguments& a) {
   memory_flag(verb, a, "for the scene, which is refused if it takes more (default: 8G), and for frames at the same time (default: half of what is free)");
 }
 
-int parse_and_call(int argc, char** argv) {
+/// @param silent  nobody reads standard output: what only accompanies files is not printed
+int parse_and_call(int argc, char** argv, bool silent) {
   Arguments a;
+  a.quiet = silent;
   CLI::App app("supple: oriented particles, implicit surfaces, exact contact");
   app.set_version_flag("--version", SUPPLE_VERSION);
   app.require_subcommand(1);
@@ -422,6 +437,7 @@ int parse_and_call(int argc, char** argv) {
   } catch (const CLI::CallForHelp& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
+    tool::expect_known_words(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
     app.exit(error);
     return kUsage;
   }
@@ -430,7 +446,7 @@ int parse_and_call(int argc, char** argv) {
   if (render_verb->parsed()) return render(a);
   if (export_verb->parsed()) return export_files(a);
   if (info_verb->parsed()) {
-    std::fputs(scenes::describe_run(a.scene).c_str(), stdout);
+    std::cout << scenes::describe_run(a.scene);
     return 0;
   }
   if (compare_verb->parsed()) return compare(a);
@@ -438,7 +454,7 @@ int parse_and_call(int argc, char** argv) {
   if (explain_verb->parsed()) return explain(a);
   if (bench_verb->parsed()) return bench(a);
   if (reference_verb->parsed()) {
-    std::fputs((a.json ? scenes::scene_json_schema() : scenes::scene_reference()).c_str(), stdout);
+    std::cout << (a.json ? scenes::scene_json_schema() : scenes::scene_reference());
     return 0;
   }
   return query(a);
@@ -446,33 +462,30 @@ int parse_and_call(int argc, char** argv) {
 
 /// @throws Error{Io} where what was printed could not be written
 void flush_output() {
-  std::cout.flush();
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return;
+  if (std::cout.flush().good()) return;
   throw Error(ErrorKind::Io, Fault{.place = "standard output", .key = {}, .expected = "cannot be written", .found = {}, .hint = {}});
 }
 
-}  // namespace
-
-namespace {
-
-/// @return the exit code
-int call(int argc, char** argv) {
+/// @param silent  nobody reads standard output   @return the exit code
+int call(int argc, char** argv, bool silent) {
   try {
-    const int code = parse_and_call(argc, argv);
+    const int code = parse_and_call(argc, argv, silent);
     flush_output();
     return code;
   } catch (const supple::Error& error) {
     std::cout.flush();
-    std::fprintf(stderr, "%s\n", error.what());
+    std::cerr << error.what() << '\n';
     return static_cast<int>(error.kind());
+  } catch (const supple::Interrupted&) {
+    return kSignalExit + interrupted;
   } catch (const std::filesystem::filesystem_error& error) {
-    std::fprintf(stderr, "%s\n", error.what());
+    std::cerr << error.what() << '\n';
     return static_cast<int>(supple::ErrorKind::Io);
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "%s\n", supple::scenes::kOutOfMemory);
+    std::cerr << supple::scenes::kOutOfMemory << '\n';
     return static_cast<int>(supple::ErrorKind::Limit);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "internal fault: %s\n", error.what());
+    std::cerr << "internal fault: " << error.what() << '\n';
     return kInternal;
   }
 }
@@ -480,11 +493,15 @@ int call(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Before anything is opened, or a file would get the number of what is closed, and the text that is printed there.
+  const bool silent = supple::io::occupy_standard_descriptors()[STDOUT_FILENO];
+  std::signal(SIGCHLD, SIG_DFL);  // our parent may ignore it, which hides how ffmpeg ends
+  std::ios::sync_with_stdio(false);
   supple::tool::prepare_last_resort();
-  const int code = call(argc, argv);
+  const int code = call(argc, argv, silent);
   // Where memory ran out, arrays of Eigen that were being resized hold what was freed: what threads keep for life is not destroyed.
   if (code == static_cast<int>(supple::ErrorKind::Limit)) {
-    std::fflush(nullptr);
+    std::cout.flush();
     std::_Exit(code);
   }
   return code;

@@ -3,6 +3,9 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <iostream>
+
+#include "print.h"
 
 namespace supple::tool {
 namespace {
@@ -29,21 +32,20 @@ ProgressStyle progress_style(const std::string& name) {
 void ProgressBar::show(const scenes::Progress& progress) {
   if (style_ == ProgressStyle::None) return;
   if (style_ == ProgressStyle::Plain) {
-    std::fprintf(stderr, "frame %d/%d stage %s rate %.2f left %s\n", progress.frame, progress.frame_count,
+    print(std::cerr, "frame %d/%d stage %s rate %.2f left %s\n", progress.frame, progress.frame_count,
                  progress.stage.c_str(), progress.frames_per_s, clock(progress.left_s).c_str());
     return;
   }
   const int filled = progress.frame_count > 0 ? kBarWidth * progress.frame / progress.frame_count : 0;
   std::string bar(static_cast<std::size_t>(filled), '#');
   bar.resize(kBarWidth, '.');
-  std::fprintf(stderr, "\r[%s] frame %d/%d  %-8s  %5.1f frames/s  left %s   ", bar.c_str(), progress.frame,
+  print(std::cerr, "\r[%s] frame %d/%d  %-8s  %5.1f frames/s  left %s   ", bar.c_str(), progress.frame,
                progress.frame_count, progress.stage.c_str(), progress.frames_per_s, clock(progress.left_s).c_str());
-  std::fflush(stderr);
   drawn_ = true;
 }
 
 void ProgressBar::finish() {
-  if (drawn_) std::fputc('\n', stderr);
+  if (drawn_) std::cerr << '\n';
   drawn_ = false;
 }
 

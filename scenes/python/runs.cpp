@@ -29,40 +29,55 @@ std::set<int> frames_of(const Frames& frames) {
   return {};
 }
 
-/// Calls verb(scene, options) on a thread of its own, while this one sees to signals. What `progress` or a signal
-/// raises ends the run after its step and is raised here then.
-RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options,
-               const py::object& progress) {
-  constexpr std::chrono::milliseconds kSlice(50);
+/// A call on a thread of its own, while this one sees to signals. What Python code or a signal raises meanwhile ends it
+/// by `interrupt` and is raised here then.
+class Watched {
+ public:
   std::atomic<int> interrupt{0};
-  std::exception_ptr raised;
-  const auto guarded = [&](const auto& body) {
+
+  /// Runs Python code that belongs to the call; this thread holds the interpreter.
+  template <class Body>
+  void guarded(const Body& body) {
     try {
-      if (!raised) body();
+      if (!raised_) body();
     } catch (const py::error_already_set&) {
-      raised = std::current_exception();
+      raised_ = std::current_exception();
       interrupt = SIGINT;
     }
-  };
-  options.interrupt = &interrupt;
+  }
+
+  template <class Body>
+  auto call(const Body& body) {
+    constexpr std::chrono::milliseconds kSlice(50);
+    auto result = std::async(std::launch::async, body);
+    for (bool done = false; !done;) {
+      {
+        const py::gil_scoped_release others_run;
+        done = result.wait_for(kSlice) == std::future_status::ready;
+      }
+      guarded([] {
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      });
+    }
+    if (raised_) std::rethrow_exception(raised_);
+    return result.get();
+  }
+
+ private:
+  std::exception_ptr raised_;
+};
+
+RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options,
+               const py::object& progress) {
+  Watched watched;
+  options.interrupt = &watched.interrupt;
   if (!progress.is_none()) {
     options.progress = [&](const Progress& now) {
       const py::gil_scoped_acquire hold;
-      guarded([&] { progress(now); });
+      watched.guarded([&] { progress(now); });
     };
   }
-  std::future<RunResult> result = std::async(std::launch::async, verb, std::cref(scene), std::cref(options));
-  for (bool done = false; !done;) {
-    {
-      const py::gil_scoped_release others_run;
-      done = result.wait_for(kSlice) == std::future_status::ready;
-    }
-    guarded([] {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    });
-  }
-  if (raised) std::rethrow_exception(raised);
-  return result.get();
+  return watched.call([&] { return verb(scene, options); });
 }
 
 RunResult run(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, bool resume,
@@ -169,9 +184,16 @@ void bind_runs(py::module_& module) {
   module.def(
       "compare",
       [](const Path& first, const Path& second, const Path& folder, double gain, bool film, const std::string& camera) {
-        const py::gil_scoped_release others_run;
-        return scenes::compare_runs(
-            {.first = first, .second = second, .folder = folder, .gain = gain, .film = film, .camera = camera});
+        Watched watched;
+        return watched.call([&] {
+          return scenes::compare_runs({.first = first,
+                                       .second = second,
+                                       .folder = folder,
+                                       .gain = gain,
+                                       .film = film,
+                                       .camera = camera,
+                                       .interrupt = &watched.interrupt});
+        });
       },
       py::arg("first"), py::arg("second"), py::arg("folder"), py::kw_only(), py::arg("gain") = 8.0,
       py::arg("film") = true, py::arg("camera") = "",

@@ -6,6 +6,7 @@
 /// An archive offers
 ///   archive(key, member, rule, meaning), archive.required(key, member, rule, meaning)
 ///   archive.given(key)                              whether the file names the key
+///   archive.sound(key)                              whether its value is what the file means: false where it, or what stands for it, is faulty
 ///   archive.check(holds, key, expected, found, hint)  a relation between keys; `key` may be a path below this mapping
 #pragma once
 
@@ -61,7 +62,8 @@ void fields(Archive& archive, IntegratorDesc& d) {
 template <class Archive>
 void check_particles(Archive& archive, const ObjectDesc& d) {
   const std::optional<int> count = particle_count(d.particles);
-  if (!count) return;
+  const auto sound = [&](const char* key) { return archive.sound("particles." + std::string(key)); };
+  if (!count || !sound("arrange") || !sound("count") || !sound("columns") || !sound("rows") || !sound("layers") || !sound("frequency")) return;
   const auto check = [&](const std::string& key, int particle) {
     archive.check(particle >= -*count && particle < *count, key, particle_range(static_cast<std::uint32_t>(*count)),
                   std::to_string(particle), "");
@@ -122,7 +124,7 @@ void fields(Archive& archive, ObjectDesc& d) {
                   "expected the object's volume to be held by primitive", d.volume ? std::string(name_of(d.volume->of)) : "not held",
                   "add 'volume: {of: primitive}'");
   }
-  archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking, "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
+  archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking || !archive.sound("breaking"), "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
   archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
   archive.check(!(d.breaking && literal_laws(d)), "breaking", "expected no law with paper_literal, which has no energy", "one", "");
@@ -145,7 +147,10 @@ void check_names(Archive& archive, const Scene& d) {
   };
   for (std::size_t i = 0; i < d.objects.size(); ++i) check_unique(d.objects[i].name, "objects[" + std::to_string(i) + ']');
   for (std::size_t i = 0; i < d.obstacles.size(); ++i) check_unique(d.obstacles[i].name, "obstacles[" + std::to_string(i) + ']');
-  if (index.contains("")) return;  // a name is missing, so nothing can be said about pairs
+  // What pairs may name is not known where a name is missing, or the key that lists it is misspelt.
+  const bool unknown = (d.objects.empty() && !archive.sound("objects")) || (d.obstacles.empty() && !archive.sound("obstacles")) ||
+                       (!d.ground && !archive.sound("ground"));
+  if (index.contains("") || unknown) return;
   std::vector<std::string_view> names;
   for (const auto& [name, place] : index) names.push_back(name);
   if (d.ground) names.emplace_back("ground");

@@ -28,8 +28,9 @@ struct MemberType {
   std::size_t (*chosen)(const void* member) = nullptr;      ///< Choice: its index
   void (*choose)(void* member, std::size_t index) = nullptr;  ///< Choice: sets it; Choices: adds it at the end
   void (*clear)(void* member) = nullptr;                    ///< Choices
-  std::optional<std::size_t> (*first)(const void* member) = nullptr;  ///< Choices: index of the first, none of an empty list
+  std::vector<std::size_t> (*all_chosen)(const void* member) = nullptr;  ///< Choices: the indices in their order
   void* (*add)(void* member) = nullptr;                     ///< Mappings: a new one at the end; optional Mapping: a new one in its place
+  std::vector<void*> (*all)(void* member) = nullptr;        ///< Mapping, Mappings: every one, none of an empty optional
   void (*fields)(FieldArchive& archive, void* one) = nullptr;  ///< Mapping, Mappings: the members of one of them
   std::shared_ptr<void> (*make)() = nullptr;                ///< Mapping, Mappings: one of its own, with all defaults
 };
@@ -64,6 +65,8 @@ class FieldArchive {
   }
   /// Whether the file names the key.
   [[nodiscard]] virtual bool given(std::string_view /*key*/) const { return false; }
+  /// Whether the value of a key is what the file means: false where it, or what stands for it, is faulty.
+  [[nodiscard]] virtual bool sound(std::string_view /*key*/) const { return true; }
   /// A relation between keys; `key` may be a path below this mapping, or "" for the mapping itself.
   virtual void check(bool /*holds*/, const std::string& /*key*/, std::string /*expected*/, std::string /*found*/, std::string /*hint*/) {}
 
@@ -109,13 +112,19 @@ void describe_list(MemberType& out) {
     out.choices = EnumNames<One>::names;
     out.choose = [](void* member, std::size_t index) { static_cast<Value*>(member)->push_back(static_cast<One>(index)); };
     out.clear = [](void* member) { static_cast<Value*>(member)->clear(); };
-    out.first = [](const void* member) -> std::optional<std::size_t> {
-      const Value& list = *static_cast<const Value*>(member);
-      return list.empty() ? std::nullopt : std::optional(static_cast<std::size_t>(list.front()));
+    out.all_chosen = [](const void* member) {
+      std::vector<std::size_t> indices;
+      for (const One one : *static_cast<const Value*>(member)) indices.push_back(static_cast<std::size_t>(one));
+      return indices;
     };
   } else {
     out.type = FieldType::Mappings;
     out.add = [](void* member) -> void* { return &static_cast<Value*>(member)->emplace_back(); };
+    out.all = [](void* member) {
+      std::vector<void*> every;
+      for (One& one : *static_cast<Value*>(member)) every.push_back(&one);
+      return every;
+    };
     describe<One>(out);
   }
 }
@@ -145,7 +154,15 @@ MemberType describe_member() {
   } else {
     static_assert(Described<Value>, "a member of a scene needs a field list");
     out.type = FieldType::Mapping;
-    if constexpr (!std::same_as<T, Value>) out.add = [](void* member) -> void* { return &static_cast<T*>(member)->emplace(); };
+    if constexpr (std::same_as<T, Value>) {
+      out.all = [](void* member) { return std::vector<void*>{member}; };
+    } else {
+      out.add = [](void* member) -> void* { return &static_cast<T*>(member)->emplace(); };
+      out.all = [](void* member) {
+        T& value = *static_cast<T*>(member);
+        return value ? std::vector<void*>{&*value} : std::vector<void*>();
+      };
+    }
     describe<Value>(out);
   }
   return out;

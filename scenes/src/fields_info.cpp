@@ -44,8 +44,8 @@ std::string default_of(const Member& member, const Rule& rule) {
     case FieldType::Text: return '"' + member.as<std::string>() + '"';
     case FieldType::Choice: return std::string(type.choices[type.chosen(member.at)]);
     case FieldType::Choices: {
-      const std::optional<std::size_t> first = type.first(member.at);
-      return first ? std::string(type.choices[*first]) : "none";
+      const std::vector<std::size_t> chosen = type.all_chosen(member.at);
+      return chosen.empty() ? "none" : std::string(type.choices[chosen.front()]);
     }
     case FieldType::Vector: return bracketed(std::span(member.as<Vec3>().data(), std::min<std::size_t>(rule.most_items, 3)), number_text);
     case FieldType::Wholes: return bracketed(member.as<std::vector<int>>(), [](int v) { return std::to_string(v); });

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
 
 #include "fields_rules.h"
@@ -19,13 +18,7 @@ void fields(Archive& archive, TextureDesc& d) {
   archive("colour", d.colour, between(0.0, 1.0, kNumber).only("pattern", d.pattern, {Checker, Stripes}), "sRGB, in turn with the object's");
   archive("size", d.size, above(0.0, kLength), "edge of a cube, thickness of a slice, width of the picture");
   archive("axis", d.axis, direction().only("pattern", d.pattern, {Stripes}), "across the slices");
-  archive.required("file", d.file, Rule{}.only("pattern", d.pattern, {Picture}), "PNG, relative to the scene's folder");
-  if (d.pattern == Picture) {
-    const std::filesystem::path file = d.file;
-    const bool climbs = std::find(file.begin(), file.end(), "..") != file.end();
-    archive.check(!d.file.empty() && file.is_relative() && !climbs, "file", "expected a file inside the scene's folder",
-                  '\'' + shown(d.file) + '\'', "");
-  }
+  archive.required("file", d.file, file_name().only("pattern", d.pattern, {Picture}), "PNG, relative to the scene's folder");
 }
 
 template <class Archive>

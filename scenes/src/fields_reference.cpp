@@ -36,13 +36,22 @@ void write_tables(const std::vector<FieldInfo>& list, const std::string& path, s
   }
 }
 
+void write_units(std::string& out) {
+  out += "## Units\n\nProducts, quotients and powers of these are units, too: `N s/m`, `kg/m^3`, `1/s`.\n\n"
+         "| of | units | words for some of them |\n|---|---|---|\n";
+  for (const UnitsOfKind& kind : known_units()) {
+    out += "| " + std::string(kind.noun) + " | " + joined(kind.units) + " | " + joined(kind.words) + " |\n";
+  }
+  out += '\n';
+}
+
 Json number_schema(const Rule& rule, bool whole) {
   Json number{{"type", whole ? "integer" : "number"}};
   if (std::isfinite(rule.low)) number[rule.low_open ? "exclusiveMinimum" : "minimum"] = rule.low;
   if (std::isfinite(rule.high)) number[rule.high_open ? "exclusiveMaximum" : "maximum"] = rule.high;
   Json any = Json::array({number});
   if (!whole && !rule.quantity.unit.empty()) {
-    any.push_back({{"type", "string"}, {"pattern", R"(^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *[A-Za-z%1/].*$)"}});
+    any.push_back({{"type", "string"}, {"pattern", R"(^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *[A-Za-z%1/\u00b0\u00b5\u03bc].*$)"}});
   }
   if (rule.automatic) any.push_back({{"const", "auto"}});
   return any.size() == 1 ? number : Json{{"anyOf", any}};
@@ -125,8 +134,10 @@ std::string scene_reference() {
   std::string out =
       "# Scene files\n\n"
       "YAML (and so JSON). Bare numbers are SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted after their dimension has been\n"
-      "checked. Numbers are 0 or between 1e-50 and 1e50 in size. Keys that end in `_deg` are in degrees.\n"
+      "checked. Numbers are 0 or between 1e-50 and 1e50 in size, and may be fractions: `30000/1001`, `5/8 in`. Keys that end in\n"
+      "`_deg` are in degrees. `true` and `false` may be written `True`, `TRUE`, `False`, `FALSE`.\n"
       "`--set objects.ball.particles.mass=2` overrides any key. This page is generated from the lists that read scenes.\n\n";
+  write_units(out);
   write_tables(scene_fields(), "", out);
   return out;
 }

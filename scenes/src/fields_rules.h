@@ -133,6 +133,7 @@ struct Rule {
   bool automatic = false;  ///< `auto` is the same as leaving the key out
   bool direction = false;  ///< a vector that must not vanish
   bool name = false;       ///< text that must be an identifier
+  bool file = false;       ///< text that must name a file inside the scene's folder
   std::size_t least_items = 0;
   std::size_t most_items = std::numeric_limits<std::size_t>::max();
   When when = {};
@@ -181,6 +182,7 @@ struct Rule {
 }
 [[nodiscard]] inline Rule direction() { return {.direction = true}; }
 [[nodiscard]] inline Rule identifier() { return {.name = true}; }
+[[nodiscard]] inline Rule file_name() { return {.file = true}; }
 
 /// "a length > 0 [m]", "a number in [0, 1]", "a whole number >= 1"
 [[nodiscard]] std::string rule_text(const Rule& rule, bool whole);

@@ -117,7 +117,7 @@ void fields(Archive& archive, SkeletonDesc& d) {
   const bool closed_form = d.kernel.type == KernelName::Wyvill || d.kernel.type == KernelName::Murakami || d.kernel.type == KernelName::Cauchy;
   archive.check(!d.convolve || closed_form, "kernel.type", "expected one of wyvill, murakami, cauchy with convolve",
                 '\'' + std::string(name_of(d.kernel.type)) + '\'', "");
-  archive.check(d.kernel.radius > 0.0 || own_scale, "kernel.radius", "expected a length > 0 [m]", "nothing",
+  archive.check(d.kernel.radius > 0.0 || own_scale || !archive.sound("shape"), "kernel.radius", "expected a length > 0 [m]", "nothing",
                 "this key is required");
 }
 

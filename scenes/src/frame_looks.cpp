@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "output_files.h"
 #include "saved_frames.h"
 #include "supple/core/hash.h"
+#include "supple/core/io/atomic_file.h"
 #include "supple/render/image.h"
 
 namespace supple::scenes {
@@ -29,12 +31,11 @@ fs::path sheet_path(const fs::path& folder, const std::string& name) { return fo
 }  // namespace
 
 PictureSize picture_size(const fs::path& path) {
-  std::array<unsigned char, 24> head{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(head.data()), head.size());
-  if (!file) return {};
+  std::array<std::byte, 24> head{};
+  if (io::read_start(path, head).value_or(0) < head.size()) return {};
   const auto number = [&head](std::size_t at) {
-    return static_cast<int>(head[at] << 24U | head[at + 1] << 16U | head[at + 2] << 8U | head[at + 3]);
+    const auto byte = [&](std::size_t k) { return std::to_integer<std::uint32_t>(head[at + k]); };
+    return static_cast<int>(byte(0) << 24U | byte(1) << 16U | byte(2) << 8U | byte(3));
   };
   return {number(16), number(20)};
 }

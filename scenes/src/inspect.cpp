@@ -9,8 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "folder_lock.h"
 #include "output_files.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"
 #include "supple/render/image.h"
@@ -21,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+constexpr const char* kComparison = "compare";  // name of its pictures and of its film
 constexpr std::size_t kLargestReport = std::size_t{1} << 24;
 constexpr double kUsualRate = 24.0;
 
@@ -222,11 +225,14 @@ Comparison compare_runs(const ComparisonOptions& options) {
   const std::map<int, fs::path> first = frames_of(options.first, options.camera),
                                 second = frames_of(options.second, options.camera);
   io::make_writable_folder(options.folder / "frames");
+  const FolderLock lock(options.folder);
+  remove_temporaries(options.folder, kComparison);
   std::error_code absent;
   fs::remove(options.folder / "compare.mp4", absent);  // of an earlier comparison
   constexpr int kGap = 2;
   Comparison result;
   for (const auto& [frame, path] : first) {
+    heed(options.interrupt);
     const auto other = second.find(frame);
     if (other == second.end()) {
       ++result.only_first;
@@ -239,7 +245,7 @@ Comparison compare_runs(const ComparisonOptions& options) {
     }
     const render::ImageDifference difference = render::compare(pair[0], pair[1], options.gain);
     const std::array<render::Image, 3> row{pair[0], pair[1], difference.picture};
-    render::write_png(frame_path(options.folder, "compare", frame), render::contact_sheet(row, 3, kGap));
+    render::write_png(frame_path(options.folder, kComparison, frame), render::contact_sheet(row, 3, kGap));
     result.frames.push_back({frame, difference.psnr, difference.largest});
   }
   result.only_second = static_cast<int>(second.size() - result.frames.size());
@@ -259,7 +265,7 @@ Comparison compare_runs(const ComparisonOptions& options) {
     double rate = kUsualRate;
     if (fs::exists(options.first / "result.json")) rate = number_at(read_report(options.first), "frame_rate");
     result.film = options.folder / "compare.mp4";
-    render::encode_film(options.folder / "frames", "compare", begin, end, rate > 0.0 ? rate : kUsualRate, result.film);
+    render::encode_film({options.folder / "frames", kComparison, begin, end, rate > 0.0 ? rate : kUsualRate}, result.film, options.interrupt);
   }
   return result;
 }

@@ -7,6 +7,7 @@
 
 #include "frame.h"
 #include "supple/core/cpu_time.h"
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
@@ -63,13 +64,14 @@ void remove_temporaries(const fs::path& folder, const std::string& name) {
   const auto look = [&](const fs::path& path) {
     const std::string file = path.filename().string();
     const bool ours = file.starts_with('.' + name + '.') || file.starts_with('.' + name + '_') ||
+                      file.starts_with(".probe.") ||
                       file.starts_with(".result.json.") || file.starts_with(".render.json.") || file.starts_with(".export.json.");
     if (ours && file.ends_with(".tmp")) left.push_back(path);
   };
   for_each_file(folder, look);
   for (const Part& part : kParts) for_each_file(folder / part.folder, look);
   std::error_code ignored;
-  for (const fs::path& path : left) fs::remove(path, ignored);
+  for (const fs::path& path : left) fs::remove_all(path, ignored);  // a film is made in a folder
 }
 
 std::set<std::string> saved_scenes(const fs::path& folder) {

@@ -22,7 +22,7 @@ namespace supple::scenes {
 /// does not write.
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
-/// Removes files of an interrupted run of this scene that never got their names.
+/// Removes files of an interrupted run of this scene that never got their names, and folders in which its films were made.
 void remove_temporaries(const std::filesystem::path& folder, const std::string& name);
 
 /// Books process CPU time of a scope on a stage.

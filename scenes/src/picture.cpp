@@ -84,7 +84,7 @@ render::Paint paint_of(const std::optional<TextureDesc>& texture, const std::fil
   paint.colour = texture->colour;
   paint.size = texture->size;
   paint.axis = texture->axis;
-  if (texture->pattern == PatternName::Picture) paint.picture = std::make_shared<const render::Image>(render::read_png(folder / texture->file));
+  if (texture->pattern == PatternName::Picture) paint.picture = std::make_shared<const render::Image>(render::read_png(named_file(folder, texture->file)));
   return paint;
 }
 

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
+#include <cstddef>
 #include <optional>
+#include <span>
 
 #include "read_scene_archive.h"
 #include "scene_keys.h"
@@ -26,7 +27,7 @@ class Override {
       if (rest_[0] == '.' && rest_.size() < path_.size()) rest_.remove_prefix(1);
       const std::string done(path_.substr(0, path_.size() - rest_.size()));
       Node* node = *slot;
-      if (node->kind == Node::Kind::Scalar && !node->quoted && node->text == "true") {
+      if (node->boolean() == true) {
         node = tree_.make(Node::Kind::Mapping, mark_);  // `images: true` is `images: {}`
       } else {
         node = tree_.copy(*node);
@@ -172,12 +173,12 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
                                      .hint = ""});
   };
   if (std::filesystem::is_directory(path, status)) fail("a folder");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) fail(std::filesystem::exists(path, status) ? "a file that cannot be opened" : "nothing");
+  const std::string name = path.filename().string();  // outputs are named so, also in files that cannot hold any name
+  if (std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; })) fail("a name with control characters");
   std::string text(kLargestText + 1, '\0');  // one more than allowed, so that a larger file is seen as such
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) fail("a file that cannot be read");
-  text.resize(static_cast<std::size_t>(file.gcount()));
+  const auto size = io::read_start(path, std::as_writable_bytes(std::span(text)));
+  if (!size) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
+  text.resize(*size);
   Scene scene = parse_scene(text, path.string(), path.parent_path(), overrides);
   scene.source = path;
   return scene;

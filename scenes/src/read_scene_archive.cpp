@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 
 namespace supple::scenes {
@@ -16,6 +17,18 @@ bool is_identifier(std::string_view text) {
   return !text.empty() && letter(text[0]) && text.size() <= 100 && std::all_of(text.begin(), text.end(), [](char c) {
     return letter(c) || (c >= '0' && c <= '9') || c == '.' || c == '-';
   });
+}
+
+/// Lines may break.
+bool has_controls(std::string_view text) {
+  return std::any_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < 0x20 && c != '\n' && c != '\t') || c == 0x7F; });
+}
+
+/// Of names of files as scenes have them.
+bool is_inside(std::string_view text) {
+  const std::filesystem::path file(text);
+  const bool odd = has_controls(text) || text.find_first_of("\n\t") != std::string_view::npos;
+  return !text.empty() && !odd && file.is_relative() && std::find(file.begin(), file.end(), "..") == file.end();
 }
 
 /// Words of other tools and of the physics for keys that we name differently.
@@ -57,6 +70,20 @@ std::string expected_text(FieldType type, const Rule& rule) {
 std::string automatic_hint(std::string_view text, const Rule& rule) {
   constexpr std::array<std::string_view, 1> kWords{"auto"};
   return rule.automatic && !nearest_word(text, kWords).empty() ? "did you mean 'auto'?" : "";
+}
+
+/// For words that YAML 1.1 and other tools take for true or false.
+std::string boolean_hint(const Node& node) {
+  if (node.kind != Node::Kind::Scalar) return "";
+  std::string word = node.text;
+  std::transform(word.begin(), word.end(), word.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  for (const std::string_view yes : {"true", "yes", "y", "on", "1"}) {
+    if (word == yes) return "did you mean true?";
+  }
+  for (const std::string_view no : {"false", "no", "n", "off", "0"}) {
+    if (word == no) return "did you mean false?";
+  }
+  return "";
 }
 
 /// Where else a key of this name exists: "objects.particles", or "" when nowhere or at the top.
@@ -126,7 +153,7 @@ void ReadArchive::field(const Member& member, const Label& label, const Rule& ru
     read(*entry->value, path, member, rule);
   } else if (label.required) {
     const MemberType& type = *member.type;
-    faults_.add(mapping_.mark, path, "expected " + expectation(type.type, type.choices, rule), "nothing", "this key is required");
+    missing_.push_back({std::string(label.key), rule.when.selector, "expected " + expectation(type.type, type.choices, rule)});
   }
 }
 
@@ -161,7 +188,11 @@ void ReadArchive::read_one(const Node& node, const std::string& path, const Memb
   const std::size_t before = faults_.count();
   T value{};
   read(node, path, value, rule);
-  if (faults_.count() == before) member.as<std::optional<T>>() = value;
+  if (faults_.count() == before) {
+    member.as<std::optional<T>>() = value;
+  } else {
+    lost_ = true;
+  }
 }
 
 void ReadArchive::read_choices(const Node& node, const std::string& path, const Member& member) {
@@ -185,10 +216,10 @@ void ReadArchive::read_choices(const Node& node, const std::string& path, const 
 void ReadArchive::read_mapping(const Node& node, const std::string& path, const Member& member) {
   const MemberType& type = *member.type;
   if (!type.optional) return read_members(node, path, type, member.at);
-  const bool word = node.kind == Node::Kind::Scalar && !node.quoted;
-  if (word && node.text == "false") return;
+  const std::optional<bool> word = node.boolean();
+  if (word == false) return;
   void* one = type.add(member.at);
-  if (!word || node.text != "true") return read_members(node, path, type, one);
+  if (word != true) return read_members(node, path, type, one);
   Node empty;
   empty.kind = Node::Kind::Mapping;
   empty.mark = node.mark;
@@ -211,45 +242,70 @@ void ReadArchive::check(bool holds, const std::string& key, std::string expected
   if (!holds) broken_.push_back({key, std::move(expected), std::move(found), std::move(hint)});
 }
 
-void ReadArchive::finish() {
+bool ReadArchive::finish_unknown() {
   bool misspelt = false;
+  std::vector<std::string_view> names;  // kinds share keys
+  for (const std::string_view name : known_) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
   for (const Node::Entry& entry : mapping_.entries) {
     const std::string_view key = entry.key;
-    if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-    const std::string path = (path_.empty() ? "" : path_ + '.') + shown(key);
-    std::vector<std::string_view> users;
-    const When* when = nullptr;
-    for (const Idle& idle : idle_) {
-      if (idle.key != key) continue;
-      users.insert(users.end(), idle.when.choices.begin(), idle.when.choices.end());
-      when = &idle.when;
-    }
-    if (when != nullptr) {
-      const std::string selector(when->selector);
-      faults_.add(entry.mark, path, "has no meaning with " + selector + ": " + std::string(when->current), "",
-                  "it belongs to " + selector + ": " + joined(users));
-      continue;
-    }
-    std::vector<std::string_view> names;  // kinds share keys
-    for (const std::string_view name : known_) {
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-    }
+    const bool idle = std::any_of(idle_.begin(), idle_.end(), [&](const Idle& one) { return one.key == key; });
+    if (idle || std::find(names.begin(), names.end(), key) != names.end()) continue;
     std::string hint = "known: " + joined(names);
     const std::string_view ours = our_word(key);
-    std::string near = std::find(known_.begin(), known_.end(), ours) != known_.end() ? std::string(ours) : "";
-    if (near.empty()) near = nearest_word(key, known_);
+    std::string near = std::find(names.begin(), names.end(), ours) != names.end() ? std::string(ours) : "";
+    if (near.empty()) near = nearest_word(key, names);
     if (!near.empty()) {
       misspelt = true;
-      if (mapping_.find(near) == nullptr) faults_.withdraw(path_of(near));  // that it is missing
+      if (mapping_.find(near) == nullptr) faults_.doubt(path_of(near));
       hint = "did you mean '" + near + "'? (" + hint + ')';
     } else if (const std::string home = home_of(key, scene_fields(), ""); !home.empty() && home != path_) {
       hint = "a key of this name belongs to " + home + " (" + hint + ')';
     }
-    faults_.add(entry.mark, path, "unknown key", "", hint);
+    faults_.add(entry.mark, path_of(shown(key)), "unknown key", "", hint);
   }
+  return misspelt;
+}
+
+/// Keys that belong to other values of a selector, unless the selector's own is not known.
+void ReadArchive::finish_idle() {
+  for (const Node::Entry& entry : mapping_.entries) {
+    if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+    std::vector<std::string_view> users;
+    const When* when = nullptr;
+    for (const Idle& idle : idle_) {
+      if (idle.key != entry.key) continue;
+      users.insert(users.end(), idle.when.choices.begin(), idle.when.choices.end());
+      when = &idle.when;
+    }
+    if (when == nullptr || faults_.has(path_of(when->selector))) continue;
+    const std::string selector(when->selector);
+    faults_.add(entry.mark, path_of(shown(entry.key)), "has no meaning with " + selector + ": " + std::string(when->current), "",
+                "it belongs to " + selector + ": " + joined(users));
+  }
+}
+
+bool ReadArchive::sound(std::string_view key) const {
+  if (faults_.has(path_of(key))) return false;
+  const std::array<std::string_view, 1> own{key.substr(0, key.find('.'))};
+  if (mapping_.find(own[0]) != nullptr) return true;
+  return std::none_of(mapping_.entries.begin(), mapping_.entries.end(), [&](const Node::Entry& entry) {
+    return std::find(known_.begin(), known_.end(), entry.key) == known_.end() && !nearest_word(entry.key, own).empty();
+  });
+}
+
+void ReadArchive::finish() {
+  const bool misspelt = finish_unknown();
+  for (Missing& missing : missing_) {
+    const std::string path = path_of(missing.key);
+    if (faults_.has(path) || (!missing.selector.empty() && faults_.has(path_of(missing.selector)))) continue;
+    faults_.add(mapping_.mark, path, std::move(missing.expected), "nothing", "this key is required");
+  }
+  finish_idle();
   for (Broken& relation : broken_) {
     const std::string& key = relation.key;
-    if (misspelt && key.find_first_of(".[") == std::string::npos) continue;
+    if ((misspelt || lost_) && key.find_first_of(".[") == std::string::npos) continue;
     const std::string path = path_.empty() ? key : key.empty() ? path_ : path_ + '.' + key;
     if (!key.empty() && faults_.has(path)) continue;
     faults_.add(mark_of(mapping_, key), path, std::move(relation.expected), std::move(relation.found), std::move(relation.hint));
@@ -285,16 +341,21 @@ void ReadArchive::read(const Node& node, const std::string& path, int& value, co
 }
 
 void ReadArchive::read(const Node& node, const std::string& path, bool& value, const Rule& rule) {
-  if (node.kind == Node::Kind::Scalar && !node.quoted && (node.text == "true" || node.text == "false")) {
-    value = node.text == "true";
+  if (const std::optional<bool> read_value = node.boolean()) {
+    value = *read_value;
   } else {
-    fault(node, path, expected_text(FieldType::Boolean, rule), node.kind == Node::Kind::Scalar ? automatic_hint(node.text, rule) : "");
+    const std::string automatic = node.kind == Node::Kind::Scalar ? automatic_hint(node.text, rule) : "";
+    fault(node, path, expected_text(FieldType::Boolean, rule), automatic.empty() ? boolean_hint(node) : automatic);
   }
 }
 
 void ReadArchive::read(const Node& node, const std::string& path, std::string& value, const Rule& rule) {
   if (node.kind != Node::Kind::Scalar) {
     fault(node, path, rule.name ? "expected a name" : "expected text", "");
+  } else if (rule.file && !is_inside(node.text)) {
+    fault(node, path, "expected a file inside the scene's folder", "");
+  } else if (has_controls(node.text)) {
+    fault(node, path, "expected text without control characters", "");
   } else if (rule.name && !is_identifier(node.text)) {
     fault(node, path, "expected a name", "names are at most 100 letters, digits, '_', '.', '-', and begin with a letter or '_'");
   } else {

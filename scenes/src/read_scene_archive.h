@@ -20,8 +20,9 @@ class ReadArchive final : public FieldArchive {
       : faults_(faults), mapping_(mapping), path_(std::move(path)) {}
 
   [[nodiscard]] bool given(std::string_view key) const override { return mapping_.find(key) != nullptr; }
-  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or
-  /// another key of this mapping seems misspelt, which may be the one that `key` misses.
+  [[nodiscard]] bool sound(std::string_view key) const override;
+  /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or, where
+  /// it is one of this mapping, another one of them is lost or seems misspelt, which may be what `key` misses.
   void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) override;
   /// Reports keys that no field took, and relations that do not hold. Call after the fields.
   void finish();
@@ -61,9 +62,20 @@ class ReadArchive final : public FieldArchive {
   /// What to write instead of `node`. @param may_be_empty  {} is complete
   static std::string mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty);
 
+  /// Faults of keys that no field took. @return whether one of them seems misspelt
+  bool finish_unknown();
+  void finish_idle();
+
   struct Idle {
     std::string_view key;
     When when;
+  };
+
+  /// A required key that is not given.
+  struct Missing {
+    std::string key;
+    std::string_view selector;  ///< for whose value it is required; empty: always
+    std::string expected;
   };
 
   /// A relation that does not hold.
@@ -76,6 +88,8 @@ class ReadArchive final : public FieldArchive {
   std::string path_;
   std::vector<std::string_view> known_;
   std::vector<Idle> idle_;
+  std::vector<Missing> missing_;
+  bool lost_ = false;  ///< a key is given whose value is faulty, and there is no default in its place
   std::vector<Broken> broken_;
 };
 

@@ -15,22 +15,6 @@ constexpr std::size_t kMostKept = 1000;  // a hostile file may hold a fault per 
 
 bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
 
-/// Damerau-Levenshtein distance (optimal string alignment).
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0U : 1U)});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
-    }
-    std::swap(before, last);
-    std::swap(last, row);
-  }
-  return last[b.size()];
-}
-
 }  // namespace
 
 std::uint32_t SourceTexts::add(std::string name, std::string text, bool whole) {
@@ -59,18 +43,19 @@ void FaultList::add(Mark mark, std::string key, std::string expected, std::strin
   faults_.push_back({mark, Fault{"", std::move(key), std::move(expected), std::move(found), std::move(hint)}});
 }
 
-void FaultList::withdraw(std::string_view key) {
-  count_ -= std::erase_if(faults_, [key](const Placed& placed) { return placed.fault.key == key; });
+void FaultList::doubt(std::string key) {
+  if (doubted_.size() < kMostKept) doubted_.push_back(std::move(key));
 }
 
 bool FaultList::has(std::string_view key) const {
-  return std::any_of(faults_.begin(), faults_.end(), [&](const Placed& placed) {
-    const std::string_view other = placed.fault.key;
+  const auto concerns = [key](std::string_view other) {
     if (other.empty()) return false;
     const std::string_view above = other.size() < key.size() ? other : key;
     const std::string_view below = other.size() < key.size() ? key : other;
     return below.starts_with(above) && (below.size() == above.size() || below[above.size()] == '.' || below[above.size()] == '[');
-  });
+  };
+  return std::any_of(faults_.begin(), faults_.end(), [&](const Placed& placed) { return concerns(placed.fault.key); }) ||
+         std::any_of(doubted_.begin(), doubted_.end(), concerns);
 }
 
 void FaultList::raise() const {
@@ -132,20 +117,6 @@ std::string joined(std::span<const std::string_view> words) {
     text += word;
   }
   return text;
-}
-
-std::string nearest_word(std::string_view word, std::span<const std::string_view> words) {
-  if (word.size() > 40) return "";
-  std::string_view best;
-  std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
-  for (const std::string_view candidate : words) {
-    const std::size_t distance = edit_distance(word, candidate);
-    if (distance < least && distance < candidate.size()) {
-      least = distance;
-      best = candidate;
-    }
-  }
-  return std::string(best);
 }
 
 std::string known_hint(std::string_view name, std::span<const std::string_view> names) {

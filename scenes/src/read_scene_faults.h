@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/nearest_word.h"
 
 namespace supple::scenes {
 
@@ -46,10 +47,10 @@ class FaultList {
   /// @param texts  outlives the list
   explicit FaultList(const SourceTexts& texts) : texts_(texts) {}
   void add(Mark mark, std::string key, std::string expected, std::string found, std::string hint);
-  /// Forgets what is listed at this very key.
-  void withdraw(std::string_view key);
+  /// The value of this key is not known, because of a fault that is listed at another one.
+  void doubt(std::string key);
   [[nodiscard]] std::size_t count() const { return count_; }
-  /// A fault at this key, above it or below it is listed.
+  /// A fault at this key, above it or below it is listed, or its value is not known.
   [[nodiscard]] bool has(std::string_view key) const;
   /// @throws Error{Scene} with the first 20 by place, when there is any.
   void raise() const;
@@ -62,6 +63,7 @@ class FaultList {
 
   const SourceTexts& texts_;
   std::vector<Placed> faults_;
+  std::vector<std::string> doubted_;
   std::size_t count_ = 0;
 };
 
@@ -75,8 +77,6 @@ class FaultList {
 [[nodiscard]] std::string particle_range(std::uint32_t n);
 /// "a, b, c"
 [[nodiscard]] std::string joined(std::span<const std::string_view> words);
-/// The word nearest to `word` by edit distance (with transpositions), or "" when none is near.
-[[nodiscard]] std::string nearest_word(std::string_view word, std::span<const std::string_view> words);
 /// Hint for a name that there is not: the nearest one, if one is near, and all.
 [[nodiscard]] std::string known_hint(std::string_view name, std::span<const std::string_view> names);
 

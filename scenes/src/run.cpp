@@ -1,9 +1,6 @@
 #include "supple/scenes/run.h"
 
-#include <sys/file.h>
 #include <sys/resource.h>
-#include <fcntl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -21,6 +18,7 @@
 #include <vector>
 
 #include "drawing_crew.h"
+#include "folder_lock.h"
 #include "frame_looks.h"
 #include "frame_writer.h"
 #include "output_files.h"
@@ -42,36 +40,6 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-/// Holds the run folder for one process; a second run of the same folder is told so.
-class FolderLock {
- public:
-  explicit FolderLock(const fs::path& folder) {
-    const fs::path path = folder / ".lock";
-    file_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (file_ < 0) {
-      throw Error(ErrorKind::Io, Fault{.place = path.string(),
-                                       .key = {},
-                                       .expected = "expected a file that can be written",
-                                       .found = std::system_category().message(errno),
-                                       .hint = "it holds the folder for one run; remove it, or choose another --out"});
-    }
-    if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
-      close(file_);
-      throw Error(ErrorKind::Io, Fault{.place = folder.string(),
-                                       .key = {},
-                                       .expected = "expected an output folder that no other run uses",
-                                       .found = "one that is locked",
-                                       .hint = "wait for the other run or choose another --out"});
-    }
-  }
-  ~FolderLock() { close(file_); }
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-
- private:
-  int file_ = -1;
-};
 
 /// A run is continued in its own folder only. @throws Error{Io} where there are states and none is of this name
 void check_continues(const fs::path& folder, const std::string& name) {

@@ -1,13 +1,15 @@
 #include "scene_keys.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <concepts>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -16,12 +18,11 @@
 #include <utility>
 
 #include "camera.h"
-#include "fields.h"
 #include "fields_archive.h"
 #include "read_scene_faults.h"
-#include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/descriptor.h"
 
 namespace supple::scenes {
 namespace {
@@ -75,12 +76,17 @@ std::string content_text(const std::filesystem::path& path) {
   std::error_code status;
   if (!std::filesystem::is_regular_file(path, status)) return "absent";
   if (std::filesystem::file_size(path, status) > io::kLargestInput) return "too large";
-  std::ifstream file(path, std::ios::binary);
+  const io::Descriptor file = io::open_file(path, O_RDONLY);
   std::string part(std::size_t{1} << 20, '\0');  // what is in memory at once
   Hasher hasher;
-  while (file) {
-    file.read(part.data(), static_cast<std::streamsize>(part.size()));
-    hasher.add(std::string_view(part).substr(0, static_cast<std::size_t>(file.gcount())));
+  for (bool whole = false; !whole;) {
+    std::size_t used = 0;
+    while (!whole && used < part.size()) {
+      const ssize_t count = io::retried([&] { return ::read(file.get(), part.data() + used, part.size() - used); });
+      whole = count <= 0;
+      if (!whole) used += static_cast<std::size_t>(count);
+    }
+    hasher.add(std::string_view(part).substr(0, used));
   }
   return "content " + to_hex(hasher.value());
 }
@@ -96,11 +102,6 @@ std::string value_text(const Vec3& value, const Rule& rule) {
   }
   return '[' + text + ']';
 }
-template <class E>
-  requires std::is_enum_v<E>
-std::string value_text(E value, const Rule& /*rule*/) {
-  return std::string(name_of(value));
-}
 template <class T>
 std::string value_text(const std::vector<T>& values, const Rule& rule) {
   Rule each = rule;
@@ -114,46 +115,55 @@ std::string value_text(const std::optional<T>& value, const Rule& rule) {
   return value ? value_text(*value, rule) : rule.automatic ? "auto" : std::string(kNone);
 }
 
-/// What a key holds: of optional ones and lists of mappings one of them.
-template <class T> struct FieldValue { using type = T; };
-template <class T> struct FieldValue<std::optional<T>> { using type = T; };
-template <Described D> struct FieldValue<std::vector<D>> { using type = D; };
+template <class T>
+std::string one_text(const Member& member, const Rule& rule) {
+  return member.type->optional ? value_text(member.as<std::optional<T>>(), rule) : value_text(member.as<T>(), rule);
+}
+
+/// The value of a member that is no mapping, as in a file.
+std::string member_text(const Member& member, const Rule& rule) {
+  const MemberType& type = *member.type;
+  switch (type.type) {
+    case FieldType::Number: return one_text<double>(member, rule);
+    case FieldType::Whole: return one_text<int>(member, rule);
+    case FieldType::Boolean: return one_text<bool>(member, rule);
+    case FieldType::Vector: return one_text<Vec3>(member, rule);
+    case FieldType::Text: return value_text(member.as<std::string>(), rule);
+    case FieldType::Vectors: return value_text(member.as<std::vector<Vec3>>(), rule);
+    case FieldType::Wholes: return value_text(member.as<std::vector<int>>(), rule);
+    case FieldType::Texts: return value_text(member.as<std::vector<std::string>>(), rule);
+    case FieldType::Choice: return std::string(type.choices[type.chosen(member.at)]);
+    case FieldType::Choices: {
+      std::vector<std::string_view> words;
+      for (const std::size_t index : type.all_chosen(member.at)) words.push_back(type.choices[index]);
+      return '[' + joined(words) + ']';
+    }
+    case FieldType::Mapping:
+    case FieldType::Mappings: break;
+  }
+  return "";
+}
 
 /// Values of keys that are no mappings, with which a mapping begins.
-class DefaultArchive {
+class DefaultArchive final : public FieldArchive {
  public:
   std::vector<std::pair<std::string_view, std::string>> texts;
 
-  template <class T>
-  void operator()(std::string_view key, T& value, const Rule& rule, std::string_view /*meaning*/) {
-    using Value = typename FieldValue<T>::type;
-    if constexpr (!Described<Value>) {
-      if (rule.when.applies()) texts.emplace_back(key, value_text(value, rule));
-    }
+ private:
+  void field(const Member& member, const Label& label, const Rule& rule) override {
+    if (member.type->fields == nullptr && rule.when.applies()) texts.emplace_back(label.key, member_text(member, rule));
   }
-  template <class T>
-  void required(std::string_view key, T& value, const Rule& rule, std::string_view meaning) {
-    (*this)(key, value, rule, meaning);
-  }
-  [[nodiscard]] static bool given(std::string_view /*key*/) { return false; }
-  static void check(bool /*holds*/, const std::string& /*key*/, const std::string& /*expected*/, const std::string& /*found*/,
-                    const std::string& /*hint*/) {}
 };
 
-template <Described D>
-const DefaultArchive& defaults_of() {
-  static const DefaultArchive archive = [] {
-    DefaultArchive made;
-    D defaults{};
-    fields(made, defaults);
-    return made;
-  }();
-  return archive;
-}
+/// The text of the key `name` of a mapping; empty where it has none.
+class NameArchive final : public FieldArchive {
+ public:
+  std::string name;
 
-template <class D>
-concept Named = requires(const D& d) {
-  { d.name } -> std::convertible_to<std::string>;
+ private:
+  void field(const Member& member, const Label& label, const Rule& /*rule*/) override {
+    if (label.key == "name" && member.type->type == FieldType::Text) name = member.as<std::string>();
+  }
 };
 
 /// What every mapping of a scene is listed with.
@@ -161,32 +171,31 @@ struct Listing {
   Taken taken;
   std::filesystem::path folder;  ///< where files are looked for
   SceneKeys keys{};
+  std::map<void (*)(FieldArchive&, void*), DefaultArchive> defaults{};  ///< of each type of mapping, by its members
 };
 
-/// The archive that lists values other than the defaults; one per mapping.
-class KeyArchive {
- public:
-  template <Described D>
-  static void list_mapping(Listing& listing, const std::string& path, D& value) {
-    KeyArchive archive(listing, path, defaults_of<D>());
-    fields(archive, value);
-  }
+const DefaultArchive& defaults_of(const MemberType& type, Listing& listing) {
+  const auto [at, fresh] = listing.defaults.try_emplace(type.fields);
+  if (fresh) type.fields(at->second, type.make().get());
+  return at->second;
+}
 
-  template <class T>
-  void operator()(std::string_view key, T& value, const Rule& rule, std::string_view /*meaning*/) {
-    if (rule.when.applies() && listing_.taken(mapping_, key)) list(key, value, rule);
-  }
-  template <class T>
-  void required(std::string_view key, T& value, const Rule& rule, std::string_view meaning) {
-    (*this)(key, value, rule, meaning);
-  }
-  [[nodiscard]] static bool given(std::string_view /*key*/) { return false; }
-  static void check(bool /*holds*/, const std::string& /*key*/, const std::string& /*expected*/, const std::string& /*found*/,
-                    const std::string& /*hint*/) {}
+/// The archive that lists values other than the defaults; one per mapping.
+class KeyArchive final : public FieldArchive {
+ public:
+  /// @param mapping  its path, "" for the scene
+  KeyArchive(Listing& listing, std::string mapping, const DefaultArchive& defaults)
+      : listing_(listing), mapping_(std::move(mapping)), defaults_(defaults) {}
 
  private:
-  KeyArchive(Listing& listing, const std::string& mapping, const DefaultArchive& defaults)
-      : listing_(listing), mapping_(mapping), defaults_(defaults) {}
+  void field(const Member& member, const Label& label, const Rule& rule) override {
+    if (!rule.when.applies() || !listing_.taken(mapping_, label.key)) return;
+    if (member.type->fields != nullptr) {
+      list_mappings(member, label.key);
+    } else {
+      list(member, label.key, rule);
+    }
+  }
 
   [[nodiscard]] std::string path_of(std::string_view key) const {
     return mapping_.empty() ? std::string(key) : mapping_ + '.' + std::string(key);
@@ -195,51 +204,43 @@ class KeyArchive {
     listing_.keys.push_back({std::move(path), std::move(value), std::string(fallback)});
   }
 
-  template <class T>
-  void list(std::string_view key, T& value, const Rule& rule) {
-    if constexpr (std::is_same_v<T, std::string>) {
-      if (key == "file") {
-        if (!value.empty()) add(path_of(key), content_text(listing_.folder / value), kNone);
-        return;
-      }
+  void list(const Member& member, std::string_view key, const Rule& rule) {
+    if (key == "file" && member.type->type == FieldType::Text) {
+      const std::string& name = member.as<std::string>();
+      if (!name.empty()) add(path_of(key), content_text(listing_.folder / name), kNone);
+      return;
     }
     const auto usual = std::find_if(defaults_.texts.begin(), defaults_.texts.end(), [&](const auto& text) { return text.first == key; });
     const std::string_view fallback = usual == defaults_.texts.end() ? kNone : std::string_view(usual->second);
-    std::string text = value_text(value, rule);
+    std::string text = member_text(member, rule);
     if (text != fallback) add(path_of(key), std::move(text), fallback);
   }
-  template <Described D>
-  void list(std::string_view key, D& value, const Rule& /*rule*/) {
-    list_mapping(listing_, path_of(key), value);
-  }
-  template <Described D>
-  void list(std::string_view key, std::optional<D>& value, const Rule& /*rule*/) {
-    if (!value) return;
-    add(path_of(key), std::string(kGiven), "false");
-    list_mapping(listing_, path_of(key), *value);
-  }
-  template <Described D>
-  void list(std::string_view key, std::vector<D>& values, const Rule& /*rule*/) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const std::string item = path_of(key) + item_name(values[i], i);
-      add(item, std::string(kGiven), kNone);
-      list_mapping(listing_, item, values[i]);
+
+  void list_mappings(const Member& member, std::string_view key) {
+    const MemberType& type = *member.type;
+    const std::vector<void*> all = type.all(member.at);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      std::string path = path_of(key);
+      if (type.type == FieldType::Mappings) {
+        // The order of pairs says nothing.
+        path += mapping_.empty() && key == "pairs" ? pair_name(member.as<std::vector<PairDesc>>()[i]) : item_name(type, all[i], i);
+        add(path, std::string(kGiven), kNone);
+      } else if (type.optional) {
+        add(path, std::string(kGiven), "false");
+      }
+      KeyArchive inner(listing_, std::move(path), defaults_of(type, listing_));
+      type.fields(inner, all[i]);
     }
   }
-  template <class D>
-  static std::string item_name(const D& value, std::size_t index) {
-    if constexpr (Named<D>) return '.' + value.name;
-    return '[' + std::to_string(index) + ']';
+  static std::string item_name(const MemberType& type, void* one, std::size_t index) {
+    NameArchive names;
+    type.fields(names, one);
+    return names.name.empty() ? '[' + std::to_string(index) + ']' : '.' + names.name;
   }
-  /// The order of pairs says nothing.
-  static std::string item_name(const PairDesc& pair, std::size_t /*index*/) {
-    std::string text;
-    for (const std::string& name : pair.objects) text += (text.empty() ? "(" : ", ") + name;
-    return text + ')';
-  }
+  static std::string pair_name(const PairDesc& pair) { return '(' + joined(std::vector<std::string_view>(pair.objects.begin(), pair.objects.end())) + ')'; }
 
   Listing& listing_;
-  const std::string& mapping_;  ///< its path, "" for the scene
+  std::string mapping_;
   const DefaultArchive& defaults_;
 };
 
@@ -322,7 +323,11 @@ void leave_out_pairs(const Touching& touching, Scene& scene) {
 
 SceneKeys keys_of(Scene scene, Taken taken, const std::filesystem::path& folder) {
   Listing listing{taken, folder};
-  KeyArchive::list_mapping(listing, "", scene);
+  Scene empty;
+  DefaultArchive defaults;
+  scene_members(defaults, empty);
+  KeyArchive archive(listing, "", defaults);
+  scene_members(archive, scene);
   std::sort(listing.keys.begin(), listing.keys.end(), [](const SceneKey& a, const SceneKey& b) { return a.path < b.path; });
   return std::move(listing.keys);
 }

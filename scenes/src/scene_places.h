@@ -2,6 +2,7 @@
 /// Where the keys of a scene stand in its file, for faults that only the whole scene shows.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,6 +35,10 @@ auto read_for(const std::string& key, Read&& read) try {
   }
   throw Error(error.kind(), std::move(faults));
 }
+
+/// Where a file lies that a scene in this folder names. @throws Error{Io} where that is a pipe, a device or a folder: reading it may
+/// never end
+[[nodiscard]] std::filesystem::path named_file(const std::filesystem::path& folder, const std::string& name);
 
 /// Throws the error again, its faults with the places of their keys.
 [[noreturn]] void rethrow_with_places(const Scene& scene, const Error& error);

@@ -1,6 +1,5 @@
 #include "search_files.h"
 
-#include <fstream>
 #include <string_view>
 #include <system_error>
 
@@ -14,6 +13,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr const char* kFolder = "searches";
+constexpr std::size_t kLargestFile = std::size_t{1} << 28;  // [bytes]
 
 std::uint64_t count_at(const ordered_json& object, std::string_view key) {
   const auto at = object.find(key);
@@ -51,8 +51,9 @@ SearchCounts searches_of(const ordered_json& json) {
 /// Counts in a file; none where it is absent or not ours.
 SearchCounts read_counts(const fs::path& path) {
   if (!fs::exists(path)) return {};
-  std::ifstream file(path);
-  const ordered_json json = ordered_json::parse(file, nullptr, false);
+  const std::vector<std::byte> text = io::read_file(path, kLargestFile);
+  const char* begin = reinterpret_cast<const char*>(text.data());
+  const ordered_json json = ordered_json::parse(begin, begin + text.size(), nullptr, false);
   return json.is_object() ? searches_of(json) : SearchCounts{};
 }
 

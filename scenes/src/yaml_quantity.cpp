@@ -21,47 +21,67 @@ struct Unit {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Dimension kNoDimension{};
 
+constexpr double kInch = 0.0254, kPound = 0.45359237, kPoundForce = kPound * 9.80665;  // by definition
+constexpr double kTurn = 360.0 * kDegree;
+
+/// By what they measure, in the order in which messages and the reference list them.
 constexpr std::array kUnits{
     Unit{"m", 1.0, kLength.dimension},       Unit{"km", 1e3, kLength.dimension},     Unit{"dm", 1e-1, kLength.dimension},
     Unit{"cm", 1e-2, kLength.dimension},     Unit{"mm", 1e-3, kLength.dimension},    Unit{"um", 1e-6, kLength.dimension},
+    Unit{"nm", 1e-9, kLength.dimension},     Unit{"pm", 1e-12, kLength.dimension},   Unit{"Mm", 1e6, kLength.dimension},
+    Unit{"in", kInch, kLength.dimension},    Unit{"ft", 12.0 * kInch, kLength.dimension},
+    Unit{"yd", 36.0 * kInch, kLength.dimension}, Unit{"mi", 63360.0 * kInch, kLength.dimension},
     Unit{"kg", 1.0, kMass.dimension},        Unit{"g", 1e-3, kMass.dimension},       Unit{"mg", 1e-6, kMass.dimension},
-    Unit{"t", 1e3, kMass.dimension},         Unit{"s", 1.0, kTime.dimension},        Unit{"ms", 1e-3, kTime.dimension},
-    Unit{"us", 1e-6, kTime.dimension},       Unit{"min", 60.0, kTime.dimension},     Unit{"Hz", 1.0, kRate.dimension},
-    Unit{"kHz", 1e3, kRate.dimension},       Unit{"rad", 1.0, kAngle.dimension},     Unit{"deg", kDegree, kAngle.dimension},
-    Unit{"N", 1.0, kForce.dimension},        Unit{"mN", 1e-3, kForce.dimension},     Unit{"kN", 1e3, kForce.dimension},
-    Unit{"MN", 1e6, kForce.dimension},       Unit{"Pa", 1.0, kPressure.dimension},   Unit{"kPa", 1e3, kPressure.dimension},
-    Unit{"MPa", 1e6, kPressure.dimension},   Unit{"GPa", 1e9, kPressure.dimension},  Unit{"J", 1.0, kTorque.dimension},
-    Unit{"mJ", 1e-3, kTorque.dimension},     Unit{"kJ", 1e3, kTorque.dimension},     Unit{"%", 1e-2, kNoDimension},
+    Unit{"ug", 1e-9, kMass.dimension},       Unit{"ng", 1e-12, kMass.dimension},     Unit{"t", 1e3, kMass.dimension},
+    Unit{"lb", kPound, kMass.dimension},     Unit{"oz", kPound / 16.0, kMass.dimension},
+    Unit{"s", 1.0, kTime.dimension},         Unit{"ms", 1e-3, kTime.dimension},      Unit{"us", 1e-6, kTime.dimension},
+    Unit{"ns", 1e-9, kTime.dimension},       Unit{"ps", 1e-12, kTime.dimension},     Unit{"min", 60.0, kTime.dimension},
+    Unit{"h", 3600.0, kTime.dimension},      Unit{"d", 86400.0, kTime.dimension},
+    Unit{"Hz", 1.0, kRate.dimension},        Unit{"kHz", 1e3, kRate.dimension},      Unit{"MHz", 1e6, kRate.dimension},
+    Unit{"GHz", 1e9, kRate.dimension},
+    Unit{"rad", 1.0, kAngle.dimension},      Unit{"mrad", 1e-3, kAngle.dimension},   Unit{"deg", kDegree, kAngle.dimension},
+    Unit{"arcmin", kDegree / 60.0, kAngle.dimension}, Unit{"arcsec", kDegree / 3600.0, kAngle.dimension},
+    Unit{"gon", kTurn / 400.0, kAngle.dimension},     Unit{"rev", kTurn, kAngle.dimension},
+    Unit{"rpm", kTurn / 60.0, kSpin.dimension},
+    Unit{"N", 1.0, kForce.dimension},        Unit{"nN", 1e-9, kForce.dimension},     Unit{"uN", 1e-6, kForce.dimension},
+    Unit{"mN", 1e-3, kForce.dimension},      Unit{"kN", 1e3, kForce.dimension},      Unit{"MN", 1e6, kForce.dimension},
+    Unit{"lbf", kPoundForce, kForce.dimension},
+    Unit{"Pa", 1.0, kPressure.dimension},    Unit{"hPa", 1e2, kPressure.dimension},  Unit{"kPa", 1e3, kPressure.dimension},
+    Unit{"MPa", 1e6, kPressure.dimension},   Unit{"GPa", 1e9, kPressure.dimension},  Unit{"bar", 1e5, kPressure.dimension},
+    Unit{"atm", 101325.0, kPressure.dimension}, Unit{"psi", kPoundForce / (kInch * kInch), kPressure.dimension},
+    Unit{"J", 1.0, kTorque.dimension},       Unit{"mJ", 1e-3, kTorque.dimension},    Unit{"kJ", 1e3, kTorque.dimension},
+    Unit{"MJ", 1e6, kTorque.dimension},      Unit{"%", 1e-2, kNoDimension},
 };
 
-/// Units that scenes do not know, and what to write for one of them.
-struct OtherUnit {
-  std::string_view name, instead;
-};
-constexpr std::array kOtherUnits{
-    OtherUnit{"nm", "1e-9 m"},      OtherUnit{"pm", "1e-12 m"},       OtherUnit{"Mm", "1e6 m"},        OtherUnit{"in", "0.0254 m"},
-    OtherUnit{"inch", "0.0254 m"},  OtherUnit{"ft", "0.3048 m"},      OtherUnit{"yd", "0.9144 m"},     OtherUnit{"mi", "1609.344 m"},
-    OtherUnit{"ns", "1e-9 s"},      OtherUnit{"ps", "1e-12 s"},       OtherUnit{"h", "3600 s"},        OtherUnit{"hr", "3600 s"},
-    OtherUnit{"d", "86400 s"},      OtherUnit{"day", "86400 s"},      OtherUnit{"ug", "1e-9 kg"},      OtherUnit{"ng", "1e-12 kg"},
-    OtherUnit{"lb", "0.45359237 kg"}, OtherUnit{"oz", "0.028349523125 kg"}, OtherUnit{"mrad", "1e-3 rad"}, OtherUnit{"gon", "0.9 deg"},
-    OtherUnit{"rev", "360 deg"},    OtherUnit{"turn", "360 deg"},     OtherUnit{"arcmin", "1/60 deg"}, OtherUnit{"arcsec", "1/3600 deg"},
-    OtherUnit{"MHz", "1e6 Hz"},     OtherUnit{"GHz", "1e9 Hz"},       OtherUnit{"uN", "1e-6 N"},       OtherUnit{"nN", "1e-9 N"},
-    OtherUnit{"lbf", "4.4482216152605 N"}, OtherUnit{"hPa", "100 Pa"}, OtherUnit{"bar", "1e5 Pa"},     OtherUnit{"atm", "101325 Pa"},
-    OtherUnit{"psi", "6894.757 Pa"}, OtherUnit{"MJ", "1e6 J"},
-};
-
-/// Other words for units that scenes know.
 struct UnitWord {
   std::string_view word, unit;
 };
+/// Words and signs for units that are taken as well. The micro sign is one character in Latin-1 and another one in Greek.
 constexpr std::array kUnitWords{
-    UnitWord{"meter", "m"},     UnitWord{"meters", "m"},      UnitWord{"metre", "m"},    UnitWord{"metres", "m"},    UnitWord{"micron", "um"},
-    UnitWord{"microns", "um"},  UnitWord{"\u00b5m", "um"},    UnitWord{"\u03bcm", "um"}, UnitWord{"gram", "g"},      UnitWord{"grams", "g"},
-    UnitWord{"Kg", "kg"},     UnitWord{"KG", "kg"},       UnitWord{"tonne", "t"},     UnitWord{"tonnes", "t"},      UnitWord{"ton", "t"},      UnitWord{"sec", "s"},       UnitWord{"secs", "s"},
-    UnitWord{"second", "s"},    UnitWord{"seconds", "s"},     UnitWord{"msec", "ms"},    UnitWord{"\u00b5s", "us"},  UnitWord{"\u03bcs", "us"},
-    UnitWord{"mins", "min"},    UnitWord{"minute", "min"},    UnitWord{"minutes", "min"}, UnitWord{"degree", "deg"}, UnitWord{"degrees", "deg"},
-    UnitWord{"\u00b0", "deg"},  UnitWord{"radian", "rad"},    UnitWord{"radians", "rad"}, UnitWord{"percent", "%"},
+    UnitWord{"meter", "m"},       UnitWord{"meters", "m"},      UnitWord{"metre", "m"},       UnitWord{"metres", "m"},
+    UnitWord{"micron", "um"},     UnitWord{"microns", "um"},    UnitWord{"inch", "in"},       UnitWord{"inches", "in"},
+    UnitWord{"foot", "ft"},       UnitWord{"feet", "ft"},       UnitWord{"yard", "yd"},       UnitWord{"yards", "yd"},
+    UnitWord{"mile", "mi"},       UnitWord{"miles", "mi"},      UnitWord{"gram", "g"},        UnitWord{"grams", "g"},
+    UnitWord{"tonne", "t"},       UnitWord{"tonnes", "t"},      UnitWord{"lbs", "lb"},        UnitWord{"pound", "lb"},
+    UnitWord{"pounds", "lb"},     UnitWord{"ounce", "oz"},      UnitWord{"ounces", "oz"},     UnitWord{"sec", "s"},
+    UnitWord{"secs", "s"},        UnitWord{"second", "s"},      UnitWord{"seconds", "s"},     UnitWord{"msec", "ms"},
+    UnitWord{"mins", "min"},      UnitWord{"minute", "min"},    UnitWord{"minutes", "min"},   UnitWord{"hr", "h"},
+    UnitWord{"hour", "h"},        UnitWord{"hours", "h"},       UnitWord{"day", "d"},         UnitWord{"days", "d"},
+    UnitWord{"degree", "deg"},    UnitWord{"degrees", "deg"},   UnitWord{"radian", "rad"},    UnitWord{"radians", "rad"},
+    UnitWord{"turn", "rev"},      UnitWord{"turns", "rev"},     UnitWord{"percent", "%"},     UnitWord{"\u00b0", "deg"},
+    UnitWord{"\u00b5m", "um"},    UnitWord{"\u03bcm", "um"},    UnitWord{"\u00b5g", "ug"},    UnitWord{"\u03bcg", "ug"},
+    UnitWord{"\u00b5s", "us"},    UnitWord{"\u03bcs", "us"},    UnitWord{"\u00b5N", "uN"},    UnitWord{"\u03bcN", "uN"},
 };
+/// Words that mean another unit to some, or are misspelt: the unit is suggested only.
+constexpr std::array kUnclearWords{UnitWord{"Kg", "kg"}, UnitWord{"KG", "kg"}, UnitWord{"ton", "t"}, UnitWord{"tons", "t"}};
+
+/// Null: none.
+const Unit* find_unit(std::string_view name) {
+  const auto* const word = std::find_if(kUnitWords.begin(), kUnitWords.end(), [&](const UnitWord& w) { return w.word == name; });
+  if (word != kUnitWords.end()) name = word->unit;
+  const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.name == name; });
+  return unit == kUnits.end() ? nullptr : unit;
+}
 
 /// Of numbers that are not zero: products of six of them are still finite, and so are their inverses.
 constexpr double kSmallest = 1e-50, kLargest = 1e50;
@@ -79,14 +99,16 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// A decimal number at the start of `text`: [+-] digits [. digits] [e digits].
+/// A number at the start of a text.
 struct Leading {
   std::size_t length = 0;  // 0: none
   double value = 0.0;
   bool in_range = true;
   bool octal_looking = false;
+  bool divides_by_zero = false;
 };
-Leading leading_number(std::string_view text) {
+/// [+-] digits [. digits] [e digits]
+Leading leading_decimal(std::string_view text) {
   std::size_t i = !text.empty() && (text[0] == '+' || text[0] == '-') ? 1 : 0;
   const std::size_t start = i;
   while (i < text.size() && digit(text[i])) ++i;
@@ -114,6 +136,25 @@ Leading leading_number(std::string_view text) {
   return out;
 }
 
+/// A decimal number, or one over another: "30000/1001", rounded once.
+Leading leading_number(std::string_view text) {
+  Leading out = leading_decimal(text);
+  std::size_t i = out.length;
+  while (i < text.size() && text[i] == ' ') ++i;
+  if (out.length == 0 || i == text.size() || text[i] != '/') return out;
+  ++i;
+  while (i < text.size() && text[i] == ' ') ++i;
+  if (i == text.size() || !(digit(text[i]) || text[i] == '.')) return out;  // the unit begins with it
+  const Leading below = leading_decimal(text.substr(i));
+  if (below.length == 0) return out;
+  out.length = i + below.length;
+  out.divides_by_zero = below.value == 0.0;
+  out.octal_looking = out.octal_looking || below.octal_looking;
+  out.value /= below.value;
+  out.in_range = out.in_range && below.in_range && in_range(out.value);
+  return out;
+}
+
 std::string plain_decimal(std::string_view text) {
   std::string out(text.substr(0, text[0] == '-' ? 1 : 0));
   text.remove_prefix(text[0] == '-' || text[0] == '+' ? 1 : 0);
@@ -125,10 +166,8 @@ std::string plain_decimal(std::string_view text) {
 /// @param wanted  whose units are suggested; null: all
 std::string unknown_unit_hint(std::string_view name, const Dimension* wanted) {
   const std::string unknown = "unknown unit '" + shown(name) + '\'';
-  const auto* const word = std::find_if(kUnitWords.begin(), kUnitWords.end(), [&](const UnitWord& w) { return w.word == name; });
-  if (word != kUnitWords.end()) return unknown + "; did you mean '" + std::string(word->unit) + "'?";
-  const auto* const other = std::find_if(kOtherUnits.begin(), kOtherUnits.end(), [&](const OtherUnit& u) { return u.name == name; });
-  if (other != kOtherUnits.end()) return unknown + "; 1 " + std::string(name) + " is " + std::string(other->instead);
+  const auto* const word = std::find_if(kUnclearWords.begin(), kUnclearWords.end(), [&](const UnitWord& w) { return w.word == name; });
+  if (word != kUnclearWords.end()) return unknown + "; did you mean '" + std::string(word->unit) + "'?";
   std::vector<std::string_view> names;
   for (const Unit& u : kUnits) {
     if (wanted == nullptr || u.dimension == *wanted) names.push_back(u.name);
@@ -174,8 +213,8 @@ UnitText read_unit(std::string_view text, const Dimension& wanted) {
     }
     i = j;
     if (name == "1" && sign == 1) continue;
-    const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.name == name; });
-    if (unit == kUnits.end()) {
+    const Unit* const unit = find_unit(name);
+    if (unit == nullptr) {
       const bool alone = name.size() == text.size() && std::any_of(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.dimension == wanted; });
       out.hint = unknown_unit_hint(name, alone ? &wanted : nullptr);
       return out;
@@ -195,7 +234,8 @@ UnitText read_unit(std::string_view text, const Dimension& wanted) {
 }
 
 std::string_view noun_of(const Dimension& dimension) {
-  for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce, kTorque,
+  if (dimension == kTorque.dimension) return "energy or torque";
+  for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce,
                             kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed,
                             kVolume}) {
     if (q.dimension == dimension) return q.noun;
@@ -234,7 +274,12 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
     return out;
   }
   if (number.octal_looking) {
-    out.hint = "a leading zero looks octal; write " + plain_decimal(text.substr(0, number.length));
+    const std::string_view written = text.substr(0, number.length);
+    out.hint = "a leading zero looks octal" + (written.find('/') == std::string_view::npos ? "; write " + plain_decimal(written) : std::string());
+    return out;
+  }
+  if (number.divides_by_zero) {
+    out.hint = "numbers must be finite";
     return out;
   }
   const std::string_view rest = trimmed(text.substr(number.length));
@@ -272,10 +317,24 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
   return out;
 }
 
+std::vector<UnitsOfKind> known_units() {
+  std::vector<UnitsOfKind> kinds;
+  for (const Unit& unit : kUnits) {
+    const std::string_view noun = noun_of(unit.dimension);
+    auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const UnitsOfKind& k) { return k.noun == noun; });
+    if (kind == kinds.end()) kind = kinds.insert(kinds.end(), {.noun = noun, .units = {}, .words = {}});
+    kind->units.push_back(unit.name);
+    for (const UnitWord& word : kUnitWords) {
+      if (word.unit == unit.name) kind->words.push_back(word.word);
+    }
+  }
+  return kinds;
+}
+
 WholeText read_whole(std::string_view text) {
   WholeText out;
   text = trimmed(text);
-  const Leading number = leading_number(text);
+  const Leading number = leading_decimal(text);
   if (number.length == 0 || number.length != text.size()) {
     out.hint = not_a_number_hint(text);
     return out;

@@ -1,10 +1,12 @@
 /// @file yaml_quantity.h
-/// Numbers with units: a bare number is SI, "5 cm" is converted after its dimension has been checked.
+/// Numbers with units: a bare number is SI, "5 cm" is converted after its dimension has been checked. Fractions are numbers, too:
+/// "30000/1001", "5/8 in".
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace supple::scenes {
 
@@ -51,6 +53,14 @@ struct QuantityText {
 };
 [[nodiscard]] QuantityText read_quantity(std::string_view text, const Quantity& quantity);
 
+/// Units of one kind, in the order of messages and of the reference.
+struct UnitsOfKind {
+  std::string_view noun;                 ///< "length"
+  std::vector<std::string_view> units;   ///< "m", "km", ...
+  std::vector<std::string_view> words;   ///< taken for some of these, too: "metres"
+};
+[[nodiscard]] std::vector<UnitsOfKind> known_units();
+
 /// A scalar read as a whole number.
 struct WholeText {
   bool ok = false;
@@ -59,7 +69,7 @@ struct WholeText {
 };
 [[nodiscard]] WholeText read_whole(std::string_view text);
 
-/// True when the whole text is a plain decimal number.
+/// True when the whole text is a number, or a fraction of two.
 [[nodiscard]] bool looks_like_number(std::string_view text);
 
 }  // namespace supple::scenes

@@ -269,6 +269,17 @@ const Node::Entry* Node::find(std::string_view key) const {
   return entry == entries.end() ? nullptr : &*entry;
 }
 
+std::optional<bool> Node::boolean() const {
+  if (kind != Kind::Scalar || quoted) return std::nullopt;
+  for (const std::string_view word : {"true", "True", "TRUE"}) {
+    if (text == word) return true;
+  }
+  for (const std::string_view word : {"false", "False", "FALSE"}) {
+    if (text == word) return false;
+  }
+  return std::nullopt;
+}
+
 std::string Node::described() const {
   switch (kind) {
     case Kind::Null: return "nothing";

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +36,8 @@ struct Node {
   std::size_t height = 0;      ///< levels below this node
 
   [[nodiscard]] const Entry* find(std::string_view key) const;
+  /// What an unquoted scalar says as YAML 1.2 spells it: true, True, TRUE, false, False or FALSE; none for anything else.
+  [[nodiscard]] std::optional<bool> boolean() const;
   /// "nothing", "a mapping", "a list of 3", -0.2, 'text': what a message says was found.
   [[nodiscard]] std::string described() const;
 };

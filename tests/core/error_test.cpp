@@ -24,6 +24,11 @@ TEST(Faults, LeaveEmptyPartsOut) {
             "dt: found 0; give a step");
 }
 
+TEST(Faults, ShowWhatATerminalWouldObeyByItsBytes) {
+  const Fault fault{.place = "a\nb.csv:1", .key = {}, .expected = "expected text", .found = "'\x1b[2J \u00e9 \xff \xe2\x82'", .hint = "\x7f"};
+  EXPECT_EQ(fault.message(), "a\\x0ab.csv:1: expected text, found '\\x1b[2J \u00e9 \\xff \\xe2\\x82'; \\x7f");
+}
+
 TEST(Errors, HoldAllFaultsAndTheirKind) {
   const Error error(ErrorKind::Scene, {Fault{.place = "a", .key = {}, .expected = "x", .found = {}, .hint = {}},
                                        Fault{.place = "b", .key = {}, .expected = "y", .found = {}, .hint = {}}});

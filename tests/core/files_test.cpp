@@ -1,10 +1,14 @@
 #include <gtest/gtest.h>
+#include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -14,6 +18,7 @@
 #include "supple/core/io/mesh_files.h"
 #include "supple/core/io/usd_file.h"
 #include "supple/core/io/vtk_files.h"
+#include "support/broken_calls.h"
 
 namespace {
 
@@ -154,9 +159,24 @@ TEST_F(Files, ThatAreBeingWrittenAreRemovedWithoutUnwinding) {
   file.append(std::string_view("half"));
   const auto left = [&] { return std::distance(std::filesystem::directory_iterator(path("whole").parent_path()), {}); };
   const auto before = left();
+  const std::filesystem::path folder = path("folder");
+  const io::OpenTemporary open_folder(folder.c_str()), open_inside((folder / "inside").c_str());
+  std::filesystem::create_directory(folder);
+  io::write_atomically(folder / "inside", std::string_view("half"));
   io::remove_open_temporaries();
   EXPECT_EQ(left(), before - 1);
   EXPECT_TRUE(std::filesystem::exists(path("whole")));
+}
+
+TEST_F(Files, OfPointsHaveTheirColumnsInOrder) {
+  for (const char* head : {"x,y,z", "X; Y; Z", "x y z", "\"x\",\"y\",\"z\"", "x [m], y [m], z [m]", "x_m,y_m,z_m", "east,north,up", "Points:0,Points:1,Points:2", "x,y"}) {
+    io::write_atomically(path("p.csv"), std::string(head) + "\n1,2,3\n");
+    EXPECT_EQ(io::read_points_csv(path("p.csv")), std::vector<Vec3>{Vec3(1, 2, 3)}) << head;
+  }
+  for (const char* head : {"z,y,x", "Y; X; Z", "z y x", "\"y\",\"x\",\"z\"", "x [m], z [m], y [m]", "y_m,x_m,z_m"}) {
+    io::write_atomically(path("p.csv"), std::string(head) + "\n1,2,3\n");
+    expect_error(ErrorKind::Scene, "p.csv:1: expected the columns x, y, z in this order, found '", [&] { (void)io::read_points_csv(path("p.csv")); });
+  }
 }
 
 TEST_F(Files, OfPointsNameEveryLineThatIsNotThreeNumbers) {
@@ -253,11 +273,12 @@ TEST_F(Files, OfPointsAsTablesNameEveryComponent) {
 }
 
 TEST_F(Files, OfSequencesNameTimesAndFiles) {
-  const std::vector<io::TimedFile> files{{0.0, "particles/a.0001.vtp"}, {0.125, "particles/a & b.vtp"}};
+  const std::vector<io::TimedFile> files{{0.0, "particles/a.0001.vtp"}, {0.125, "particles/a & b.vtp"}, {0.25, "a\"<\n"}};
   io::write_pvd(path("a.pvd"), files);
   const std::string text = text_of(path("a.pvd"));
   EXPECT_NE(text.find("<DataSet timestep=\"0\" part=\"0\" file=\"particles/a.0001.vtp\"/>"), std::string::npos);
   EXPECT_NE(text.find("<DataSet timestep=\"0.125\" part=\"0\" file=\"particles/a &amp; b.vtp\"/>"), std::string::npos);
+  EXPECT_NE(text.find("file=\"a&quot;&lt;&#10;\"/>"), std::string::npos);
 }
 
 TEST_F(Files, OfAnimationsOfManyObjectsNeedFewAtATime) {
@@ -319,6 +340,87 @@ TEST_F(Files, OfAnimationsKeepWhatStaysByItsFirstAndLastFrame) {
   EXPECT_EQ(samples(second, "visibility"), (std::vector<int>{1, 2, 3}));
   EXPECT_NE(text.find("startTimeCode = 1"), std::string::npos);
   EXPECT_NE(text.find("endTimeCode = 4"), std::string::npos);
+}
+
+/// Runs `body` in a process of its own, which ends with what it returns.
+template <class Body>
+int exit_code_of(const Body& body) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    int code = 1;
+    try {
+      code = body();
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+    }
+    ::_exit(code);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// A triangle that moves, over three frames.
+void write_animation(const fs::path& file) {
+  const std::array objects = {io::UsdObject{.name = "triangle", .colour = Vec3(1, 0, 0), .roughness = 0.5}};
+  io::UsdAnimation animation(file, 24.0, objects);
+  for (int frame = 1; frame <= 3; ++frame) {
+    Mesh mesh;
+    mesh.position = {Vec3(0.1 * frame, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
+    mesh.normal.assign(3, Vec3::UnitZ());
+    mesh.triangle = {{0, 1, 2}};
+    const std::array meshes = {static_cast<const Mesh*>(&mesh)};
+    animation.add_frame(frame, meshes, {});
+  }
+  animation.finish();
+}
+
+TEST_F(Files, AreWholeWhereSignalsBreakCallsOff) {
+  write_animation(path("plain.usda"));
+  constexpr int kNoFilter = 77;
+  const int code = exit_code_of([&] {
+    if (!test::break_off_calls()) return kNoFilter;
+    write_animation(path("broken.usda"));
+    const std::string text(200000, 'x');
+    io::write_atomically(path("long.txt"), std::string_view(text));
+    io::make_writable_folder(path("folder"));
+    std::array<std::byte, 300> start{};
+    const bool same = text_of(path("long.txt")) == text && io::read_start(path("long.txt"), start) == start.size();
+    return same ? 0 : 1;
+  });
+  if (code == kNoFilter) GTEST_SKIP() << "no filter of system calls here";
+  EXPECT_EQ(code, 0);
+  EXPECT_EQ(text_of(path("broken.usda")), text_of(path("plain.usda")));
+  EXPECT_EQ(file_count(), 4U);
+}
+
+TEST_F(Files, NeverGetTheNumbersOfStandardStreams) {
+  const int code = exit_code_of([&] {
+    for (const int number : {0, 1, 2}) ::close(number);
+    const io::Descriptor descriptor = io::open_file(path("direct.txt"), O_WRONLY | O_CREAT);
+    io::AtomicFile file(path("a.txt"));
+    file.append("of the file");
+    for (const int number : {0, 1, 2}) {
+      if (::write(number, "of a library", 12) != -1) return 2;
+    }
+    file.commit();
+    return descriptor.get() > 2 && ::fcntl(descriptor.get(), F_GETFD) == FD_CLOEXEC ? 0 : 3;
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_EQ(text_of(path("a.txt")), "of the file");
+  EXPECT_EQ(text_of(path("direct.txt")), "");
+}
+
+TEST_F(Files, LeaveClosedStandardStreamsToTheSystem) {
+  const int code = exit_code_of([&] {
+    ::close(0);
+    ::close(2);
+    if (io::occupy_standard_descriptors() != std::array{true, false, true}) return 2;
+    if (io::occupy_standard_descriptors() != std::array{false, false, false}) return 3;
+    char byte = 0;
+    return ::read(0, &byte, 1) == 0 && ::write(2, "text", 4) == -1 ? 0 : 4;  // nothing to read, and what is printed fails
+  });
+  EXPECT_EQ(code, 0);
 }
 
 }  // namespace

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # The command line as users meet it: exit codes, the first words of messages, and nothing half-written.
-#   cli_test.sh SUPPLE SCRATCH
+#   cli_test.sh SUPPLE SCRATCH BROKEN_CALLS   the last: a library to load first, with which signals break calls of the system off
 set -u
 supple=$1
 scratch=$2
+broken_calls=$3
 rm -rf "$scratch"
 mkdir -p "$scratch"
 cd "$scratch" || exit 1
@@ -50,6 +51,12 @@ expect 4 'absent.yaml' check absent.yaml
 expect 4 'plain_file' run good.yaml --out plain_file/out --progress none
 expect 4 '--overwrite' run good.yaml --out good --progress none
 expect 2 '' run
+expect 2 "supple: expected a command, found 'rn'; did you mean 'run'? (known: run, render" rn good.yaml
+expect 2 "found 'simulate'; known: run, render, export, info, compare, check, explain, query, bench, reference" simulate good.yaml
+expect 2 "supple: expected an option, found '--verson'; did you mean '--version'?" --verson
+expect 2 "supple run: expected an option, found '--thread'; did you mean '--threads'?" run good.yaml --thread 2
+expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" run -out elsewhere good.yaml
+expect 2 "supple check: expected an option, found '--camera'; known: --help, --set, --quiet" check good.yaml --camera=left
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
 expect 2 '1 to 3' run good.yaml --out frames --frames 9 --progress none
 expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
@@ -132,6 +139,76 @@ if "$supple" reference > /dev/full 2> err.txt || ! grep -qF 'standard output' er
   echo 'output that could not be written was not missed'
   failures=$((failures + 1))
 fi
+
+fault() {
+  echo "$*"
+  failures=$((failures + 1))
+}
+
+# Files that scenes name are regular ones, inside their folder.
+mkfifo pipe.csv
+for file in pipe.csv ../good.yaml /etc/hostname '"p.csv\0x"'; do
+  printf '%s\nobjects:\n  - name: ball\n    particles: {arrange: file, file: %s}\n    skeleton: [{shape: point, kernel: {radius: 0.5}}]\n' \
+    "$head_text" "$file" > names.yaml
+  timeout 20 "$supple" check names.yaml > out.txt 2> err.txt < /dev/null
+  code=$?
+  [[ $code == 3 || $code == 4 ]] && grep -qE 'expected a (regular file|file inside)' err.txt || fault "check with file $file: exit $code, $(cat err.txt)"
+done
+rm pipe.csv
+
+# Standard streams that are closed: what is printed lands in no file of the run.
+sed 's/^objects:/output: {mesh: [ply, usd], cell: 0.1}\nobjects:/' good.yaml > meshes.yaml
+"$supple" run meshes.yaml --out closed --progress plain <&- >&- 2>&-
+code=$?
+[[ $code == 0 ]] || fault "run with closed streams: exit $code"
+if grep -rlE 'frame .* stage|folder:' closed; then fault 'printed text is in files'; fi
+"$supple" reference >&- 2> err.txt
+code=$?
+[[ $code == 4 ]] || fault "reference without standard output: exit $code"
+
+# Signals break calls of the system off: the run is the same.
+"$supple" run meshes.yaml --out plain --progress none > plain.txt
+LD_PRELOAD=$broken_calls "$supple" run meshes.yaml --out broken --progress none > broken.txt 2> err.txt
+code=$?
+[[ $code == 0 ]] || fault "run with calls that break off: exit $code, $(cat err.txt)"
+cmp plain/meshes.usda broken/meshes.usda && cmp <(sed 's/plain/broken/g' plain.txt) broken.txt || fault 'broken calls changed files or text'
+
+# ffmpeg ends with the run, and what it was writing goes.
+sed 's/^objects:/output: {images: {size: [64, 48], samples: 1}, film: true}\nobjects:/' good.yaml > film.yaml
+printf '#!/bin/sh\necho $$ > "%s/ffmpeg.pid"\nfor last; do :; done\necho half > "$last"\nexec sleep 600\n' "$PWD" > slow_ffmpeg
+chmod +x slow_ffmpeg
+lives() { grep -qE '^[0-9]+ \(.*\) [^ZX]' "/proc/$1/stat" 2> /dev/null; }
+# start_film FOLDER OPTIONS...: a run up to where ffmpeg works; $run and $film are the processes.
+start_film() {
+  rm -f ffmpeg.pid
+  SUPPLE_FFMPEG=$PWD/slow_ffmpeg "$supple" run film.yaml --out "$@" --progress none > out.txt 2> err.txt &
+  run=$!
+  for ((k = 0; k < 3000; ++k)); do
+    [[ -s ffmpeg.pid ]] && find "$1" -name 'film.mp4' -size +0 | grep -q . && break
+    sleep 0.02
+  done
+  film=$(cat ffmpeg.pid)
+}
+for signal in INT TERM; do
+  start_film "film_$signal"
+  kill -s $signal "$run"
+  wait "$run"
+  code=$?
+  [[ $signal == INT && $code == 130 || $signal == TERM && $code == 143 ]] || fault "signal $signal while ffmpeg works: exit $code"
+  ! lives "$film" || fault "ffmpeg outlives a run that $signal ends"
+  [[ -z $(find "film_$signal" -name '*.tmp' -o -name '*.mp4') ]] || fault "files of ffmpeg are left: $(find "film_$signal" -name '*.mp4')"
+  [[ -s film_$signal/states/film.0003.state ]] || fault "no state of the last frame after $signal"
+  grep -q '"outcome": "interrupted"' "film_$signal/result.json" || fault "no outcome after $signal"
+done
+start_film film_KILL
+kill -9 "$run"
+wait "$run" 2> /dev/null
+for ((k = 0; k < 500; ++k)); do lives "$film" && sleep 0.02; done
+! lives "$film" || fault 'ffmpeg outlives a run that is killed'
+touch film_KILL/frames/.film.0001.png.1.0.tmp film_KILL/states/.probe.1.0.tmp
+expect 0 '' run film.yaml --out film_KILL --resume --progress none
+[[ -s film_KILL/film.mp4 ]] || fault 'no film after --resume'
+[[ -z $(find film_KILL -name '*.tmp') ]] || fault "temporary files of a dead run are left: $(find film_KILL -name '*.tmp')"
 
 grep -q '"outcome": "diverged"' diverged/result.json || { echo 'no outcome for the diverged run'; failures=$((failures + 1)); }
 expect 3 '' run nan.yaml --out invalid --progress none

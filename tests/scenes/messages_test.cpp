@@ -1,5 +1,7 @@
 /// What a user reads when a scene is wrong, word for word: tests/golden/messages/NAME.yaml and NAME.txt.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -120,6 +122,31 @@ obstacles:
   expect(text, ErrorKind::Io, {"objects.ball.particles.file", "objects.cube.particles.file"});
   expect(solids, ErrorKind::Io, {"obstacles.hill.file", "obstacles.roof.file"});
   expect(solids + "pairs: [{objects: [ball, cube], friction: 0.1}]\n", ErrorKind::Scene, {"obstacles.hill.file", "obstacles.roof.file", "pairs[0]"});
+}
+
+TEST(Messages, OfPipesDevicesAndFoldersNameTheirKeyAtOnce) {
+  const fs::path place = fs::temp_directory_path() / ("supple_messages_" + std::to_string(::getpid()));
+  fs::create_directories(place / "folder");
+  ASSERT_EQ(::mkfifo((place / "pipe").c_str(), 0600), 0);
+  fs::create_symlink("/dev/zero", place / "device");
+  const std::string head = "schema: 1\nduration: 1\nobjects:\n  - {name: ball, particles: ", skeleton = ", skeleton: [{shape: point, kernel: {radius: 0.1}}]}\n";
+  for (const auto& [file, found] : {std::pair{"pipe", "a pipe"}, {"device", "a device or a socket"}, {"folder", "a folder"}}) {
+    const std::string name(file);
+    for (const std::string& text : {head + "{arrange: file, file: " + name + "}" + skeleton,
+                                    head + "{}" + skeleton + "obstacles: [{name: hill, shape: heights, file: " + name + "}]\n",
+                                    head + "{}" + skeleton + "obstacles: [{name: hill, shape: mesh, file: " + name + "}]\n"}) {
+      try {
+        (void)build_model(parse_scene(text, "scene.yaml", place));
+        ADD_FAILURE() << "read: " << file;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::Io);
+        EXPECT_EQ(error.faults().at(0).expected, "expected a regular file");
+        EXPECT_EQ(error.faults().at(0).found, found);
+        EXPECT_TRUE(error.faults().at(0).key.ends_with(".file")) << error.faults().at(0).key;
+      }
+    }
+  }
+  fs::remove_all(place);
 }
 
 TEST(Messages, AreAtLeastForty) { EXPECT_GE(names().size(), 40u); }

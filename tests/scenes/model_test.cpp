@@ -1,6 +1,7 @@
 #include "supple/scenes/model.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -139,6 +140,19 @@ TEST(Model, RefusesScenesMadeByHandThatNoFileCouldAskFor) {
     rate.frame_rate = duration.duration = mass.objects[0].particles.mass = wrong;
     for (const Scene* s : {&rate, &duration, &mass}) EXPECT_THROW((void)build_model(*s), ContractViolation) << wrong;
   }
+}
+
+TEST(Model, HasALengthWhereParticlesLieAtOnePlace) {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("supple_model_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "twice.csv") << "0, 0, 0\n0, 0, 0\n";
+  const auto length = [&](const std::string& rest) {
+    return build_model(parse_scene(std::string(kHead) + "  - {name: a, particles: {arrange: file, file: twice.csv" + rest + "}\n", "test.yaml", folder)).smallest_length;
+  };
+  EXPECT_EQ(length(", inertia_radius: 0.02}"), 0.02);
+  const double ball = length("}, separate: true, skeleton: [{shape: point, kernel: {radius: 0.1}}]");
+  EXPECT_NEAR(ball, 0.1 * kIso, 1e-6);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Model, DoesNotDependOnTheOrderOfObjectsInTheFile) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
 #include <filesystem>
@@ -11,6 +13,7 @@
 
 #include "supple/core/error.h"
 #include "support/source_dir.h"
+#include "yaml_quantity.h"
 
 namespace supple::scenes {
 namespace {
@@ -121,6 +124,61 @@ TEST(SceneReader, ConvertsUnits) {
   EXPECT_EQ(parse("schema: 1\nduration: 2 min\nframe_rate: 12 Hz\nobjects: [{name: a, particles: {}}]").duration, 120.0);
 }
 
+TEST(SceneReader, TakesEveryUnitItKnows) {
+  // By definition: international yard and pound (1959), standard gravity 9.80665 m/s^2, atmosphere 101325 Pa.
+  const auto read = [](const std::string& text, const Quantity& quantity) {
+    const QuantityText found = read_quantity(text, quantity);
+    EXPECT_TRUE(found.ok) << text << ": " << found.hint;
+    return found.value;
+  };
+  struct Case {
+    const char* text;
+    Quantity quantity;
+    double value;
+  };
+  for (const Case& c : {Case{"1 in", kLength, 0.0254},           {"12 in", kLength, 0.3048},           {"1 ft", kLength, 0.3048},
+                        {"1 yd", kLength, 0.9144},               {"1 mi", kLength, 1609.344},          {"2 nm", kLength, 2e-9},
+                        {"2 inches", kLength, 0.0508},           {"3 feet", kLength, 0.9144},          {"5 metres", kLength, 5.0},
+                        {"5 \u00b5m", kLength, 5e-6},            {"5 \u03bcm", kLength, 5e-6},         {"1 lb", kMass, 0.45359237},
+                        {"16 oz", kMass, 0.45359237},            {"2 \u00b5g", kMass, 2e-9},           {"3 h", kTime, 10800.0},
+                        {"2 days", kTime, 172800.0},             {"3 ns", kTime, 3e-9},                {"5 seconds", kTime, 5.0},
+                        {"2 MHz", kRate, 2e6},                   {"1 lbf", kForce, 4.4482216152605},   {"1 psi", kPressure, 6894.757293168361},
+                        {"1 atm", kPressure, 101325.0},          {"2 bar", kPressure, 2e5},            {"3 MJ", kEnergy, 3e6},
+                        {"1 rev", kAngle, 360.0},                {"100 gon", kAngle, 90.0},            {"30 arcmin", kAngle, 0.5},
+                        {"90 degrees", kAngle, 90.0},            {"90\u00b0", kAngle, 90.0},           {"60 rpm", kSpin, 2.0 * std::numbers::pi},
+                        {"1 rev/s", kSpin, 2.0 * std::numbers::pi}, {"36 km/h", kSpeed, 10.0},         {"1 lb/in^3", {"density", "", {-3, 1, 0, 0}}, 27679.904710203125},
+                        {"50 percent", kNumber, 0.5}}) {
+    EXPECT_NEAR(read(c.text, c.quantity), c.value, 1e-14 * c.value) << c.text;
+  }
+  for (const UnitsOfKind& kind : known_units()) {
+    const auto of_noun = [&](const Quantity& q) { return kind.noun == q.noun || (q.noun == kTorque.noun && kind.noun == "energy or torque"); };
+    const std::array kQuantities{kNumber, kLength, kMass, kTime, kRate, kAngle, kSpin, kForce, kTorque, kPressure};
+    const auto* const quantity = std::find_if(kQuantities.begin(), kQuantities.end(), of_noun);
+    ASSERT_NE(quantity, kQuantities.end()) << kind.noun;
+    for (const auto* names : {&kind.units, &kind.words}) {
+      for (const std::string_view name : *names) EXPECT_GT(read("2 " + std::string(name), *quantity), 0.0);
+    }
+  }
+  EXPECT_EQ(read("5 inch", kLength), 5 * 0.0254);
+}
+
+TEST(SceneReader, TakesFractions) {
+  const auto rate = [](const std::string& text) {
+    return parse("schema: 1\nduration: 1001\nframe_rate: " + text + "\nobjects: [{name: a, particles: {}}]");
+  };
+  EXPECT_EQ(rate("30000/1001").frame_rate, 30000.0 / 1001.0);
+  EXPECT_EQ(rate("30000 / 1001 Hz").frame_rate, 30000.0 / 1001.0);
+  EXPECT_EQ(rate("30000/1001").frame_count(), 30001);
+  EXPECT_EQ(parse(object_with("mass: 1/4 kg")).objects[0].particles.mass, 0.25);
+  EXPECT_EQ(parse(object_with("at: [-5/8 in, 1/2, .5/2 m]")).objects[0].particles.at, Vec3(-0.625 * 0.0254, 0.5, 0.25));
+  EXPECT_EQ(parse(object_with("spin: [3/2 rad/s, 2 1/s, 1/2 1/s]")).objects[0].particles.spin, Vec3(1.5, 2.0, 0.5));
+  const auto hint = [](const std::string& mass) { return faults_of(object_with("mass: " + mass)).at(0).hint; };
+  EXPECT_EQ(hint("1/0"), "numbers must be finite");
+  EXPECT_EQ(hint("1/03"), "a leading zero looks octal");
+  EXPECT_EQ(hint("1e40/1e-40"), "numbers are 0 or between 1e-50 and 1e50 in size");
+  EXPECT_TRUE(hint("1/2/3").starts_with("unknown unit '3'; known: m, km, "));
+}
+
 TEST(SceneReader, TellsWhatToWriteForUnitsItDoesNotKnow) {
   const auto hint = [](const std::string& key, const std::string& unit) {
     const std::vector<Fault> faults = faults_of(object_with(key + ": 5 " + unit));
@@ -130,24 +188,47 @@ TEST(SceneReader, TellsWhatToWriteForUnitsItDoesNotKnow) {
     std::string key, unit, text;
   };
   const std::string kSpacing = "arrange: line, count: 2, spacing";
-  for (const Case& c : std::vector<Case>{{kSpacing, "nm", "1 nm is 1e-9 m"},
-                                         {kSpacing, "inch", "1 inch is 0.0254 m"},
-                                         {kSpacing, "meters", "did you mean 'm'?"},
-                                         {kSpacing, "\u00b5m", "did you mean 'um'?"},
-                                         {kSpacing, "kkm", "did you mean 'km'?"},
-                                         {kSpacing, "xm", "known: m, km, dm, cm, mm, um"},
-                                         {kSpacing, "furlong", "known: m, km, dm, cm, mm, um"},
+  for (const Case& c : std::vector<Case>{{kSpacing, "kkm", "did you mean 'km'?"},
+                                         {kSpacing, "xm", "known: m, km, dm, cm, mm, um, nm, pm, Mm, in, ft, yd, mi"},
+                                         {kSpacing, "furlong", "known: m, km, dm, cm, mm, um, nm, pm, Mm, in, ft, yd, mi"},
                                          {"mass", "kgs", "did you mean 'kg'?"},
                                          {"mass", "Kg", "did you mean 'kg'?"},
-                                         {"mass", "lb", "1 lb is 0.45359237 kg"},
-                                         {"angle_deg", "degrees", "did you mean 'deg'?"},
-                                         {"angle_deg", "rev", "1 rev is 360 deg"}}) {
+                                         {"mass", "ton", "did you mean 't'?"}}) {
     const std::string found = hint(c.key, c.unit);
     EXPECT_TRUE(found.ends_with(c.text)) << c.unit << ": " << found;
   }
-  const auto duration = faults_of("schema: 1\nduration: 3 ns\nobjects: [{name: a, particles: {}}]");
-  EXPECT_EQ(duration.at(0).hint, "unknown unit 'ns'; 1 ns is 1e-9 s");
-  EXPECT_EQ(faults_of(object_with("velocity: [5 km/h, 0, 0]")).at(0).hint, "unknown unit 'h'; 1 h is 3600 s");
+  EXPECT_EQ(faults_of(object_with("mass: 5 ft lbf")).at(0).hint, "'ft lbf' is a unit of energy or torque");
+}
+
+TEST(SceneReader, TakesBooleansAsYamlSpellsThem) {
+  const auto visible = [](const std::string& word) { return parse(object_with("", "ground: {visible: " + word + "}\n")).ground->visible; };
+  for (const char* word : {"true", "True", "TRUE"}) EXPECT_TRUE(visible(word)) << word;
+  for (const char* word : {"false", "False", "FALSE"}) EXPECT_FALSE(visible(word)) << word;
+  EXPECT_TRUE(parse(object_with("", "ground: True\n")).ground);
+  EXPECT_FALSE(parse(object_with("", "ground: FALSE\n")).ground);
+  EXPECT_TRUE(parse(object_with("", "output: {meshing: {search: True}}\n")).output.meshing.search);
+  const auto hint = [](const std::string& word) { return faults_of(object_with("", "ground: {visible: " + word + "}\n")).at(0).hint; };
+  for (const char* word : {"yes", "Yes", "on", "tRUE", "1"}) EXPECT_EQ(hint(word), "did you mean true?") << word;
+  for (const char* word : {"no", "Off", "n", "0"}) EXPECT_EQ(hint(word), "did you mean false?") << word;
+  for (const char* word : {"\"true\"", "maybe", "[]"}) EXPECT_FALSE(hint(word).ends_with("false?")) << word;
+}
+
+TEST(SceneReader, RefusesTextThatNoFormatCanHold) {
+  const auto fault = [](const std::string& text) { return faults_of(text).at(0); };
+  const std::string scene = "schema: 1\nduration: 1\nobjects: [{name: a, particles: {}}]\n";
+  EXPECT_EQ(fault(scene + "title: \"a\\x1b[2Jb\"\n").expected, "expected text without control characters");
+  EXPECT_EQ(parse(scene + "title: \"<a> & 'b' \\u00e9\\nc\"\n").title, "<a> & 'b' \u00e9\nc");
+  for (const char* name : {"../a.csv", "/a.csv", "b/../../a.csv", "\"\"", "\"a.csv\\0b\"", "\"a\\nb\""}) {
+    const std::string file(name);
+    const std::string particles = "schema: 1\nduration: 1\nobjects: [{name: a, particles: {arrange: file, file: " + file + "}}]\n";
+    for (const std::string& text : {particles, scene + "obstacles: [{name: b, shape: mesh, file: " + file + "}]\n",
+                                    scene + "ground: {texture: {pattern: picture, file: " + file + "}}\n"}) {
+      EXPECT_EQ(fault(text).expected, "expected a file inside the scene's folder") << text;
+    }
+  }
+  for (const char* name : {"a b", "a/b", "\"a\\nb\"", "\"a\\\"b\"", "\u00e9", "1a", "-a"}) {
+    EXPECT_EQ(fault("schema: 1\nduration: 1\nobjects: [{name: " + std::string(name) + ", particles: {}}]\n").expected, "expected a name") << name;
+  }
 }
 
 TEST(SceneReader, TakesFalseAsAbsentAndTrueAsTheDefaults) {

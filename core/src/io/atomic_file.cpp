@@ -23,20 +23,23 @@ namespace {
                                    .hint = {}});
 }
 
-/// A file descriptor that is closed on every way out.
-class Descriptor {
- public:
-  explicit Descriptor(int value) : value_(value) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return value_; }
+/// Makes the rename itself durable; a file system that cannot do it still has the file.
+void sync_folder(const std::filesystem::path& folder) {
+  const Descriptor descriptor = open_file(folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
+  if (descriptor.is_open()) (void)retried([&] { return ::fsync(descriptor.get()); });
+}
 
- private:
-  int value_;
-};
+/// Gives what was written under `from` the name `to`, on the disk, too. 0 on success, errno otherwise.
+int publish(Descriptor& descriptor, const std::filesystem::path& from, const std::filesystem::path& to) {
+  int code = retried([&] { return ::fsync(descriptor.get()); }) != 0 ? errno : 0;
+  const int closed = descriptor.close();
+  if (code == 0) code = closed;
+  if (code == 0 && retried([&] { return ::rename(from.c_str(), to.c_str()); }) != 0) code = errno;
+  if (code == 0) sync_folder(to.parent_path());
+  return code;
+}
+
+}  // namespace
 
 std::filesystem::path temporary_name(const std::filesystem::path& path) {
   static std::atomic<unsigned> counter{0};
@@ -44,40 +47,17 @@ std::filesystem::path temporary_name(const std::filesystem::path& path) {
                                std::to_string(counter.fetch_add(1)) + ".tmp");
 }
 
-/// 0 on success, errno otherwise.
-int write_all(int descriptor, std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
-    if (written < 0) {
-      if (errno == EINTR) continue;
-      return errno;
-    }
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
-  return 0;
-}
-
-/// Makes the rename itself durable; a file system that cannot do it still has the file.
-void sync_folder(const std::filesystem::path& folder) {
-  const Descriptor descriptor(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (descriptor.get() >= 0) static_cast<void>(::fsync(descriptor.get()));
-}
-
-}  // namespace
-
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), temporary_(temporary_name(path_)), open_(temporary_.c_str()) {
-  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) fail(path_, "cannot be written", errno);
+  descriptor_ = open_file(temporary_, O_WRONLY | O_CREAT | O_EXCL);
+  if (!descriptor_.is_open()) fail(path_, "cannot be written", errno);
 }
 
 AtomicFile::~AtomicFile() {
-  if (descriptor_ < 0) return;
-  ::close(descriptor_);
-  ::unlink(temporary_.c_str());
+  if (descriptor_.is_open()) ::unlink(temporary_.c_str());
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
-  if (const int code = write_all(descriptor_, bytes)) fail(path_, "cannot be written", code);
+  if (const int code = write_all(descriptor_.get(), bytes)) fail(path_, "cannot be written", code);
 }
 
 void AtomicFile::append(std::span<const std::byte> bytes) {
@@ -96,18 +76,19 @@ void AtomicFile::append(std::span<const std::byte> bytes) {
 void AtomicFile::append(std::string_view text) { append(std::as_bytes(std::span<const char>(text))); }
 
 void AtomicFile::commit() {
-  SUPPLE_EXPECTS(descriptor_ >= 0);
+  SUPPLE_EXPECTS(descriptor_.is_open());
   write(buffer_);
   buffer_.clear();
-  int code = ::fsync(descriptor_) != 0 ? errno : 0;
-  if (::close(descriptor_) != 0 && code == 0) code = errno;
-  descriptor_ = -1;
-  if (code == 0 && ::rename(temporary_.c_str(), path_.c_str()) != 0) code = errno;
-  if (code != 0) {
+  if (const int code = publish(descriptor_, temporary_, path_)) {
     ::unlink(temporary_.c_str());
     fail(path_, "cannot be written", code);
   }
-  sync_folder(path_.parent_path());
+}
+
+void rename_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
+  Descriptor descriptor = open_file(from, O_RDONLY);
+  const int code = descriptor.is_open() ? publish(descriptor, from, to) : errno;
+  if (code != 0) fail(to, "cannot be written", code);
 }
 
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
@@ -121,8 +102,8 @@ void write_atomically(const std::filesystem::path& path, std::string_view text) 
 }
 
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit) {
-  const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (descriptor.get() < 0) fail(path, "cannot be read", errno);
+  const Descriptor descriptor = open_file(path, O_RDONLY);
+  if (!descriptor.is_open()) fail(path, "cannot be read", errno);
   struct stat status {};
   if (::fstat(descriptor.get(), &status) != 0) fail(path, "cannot be read", errno);
   if (S_ISDIR(status.st_mode)) fail(path, "cannot be read", EISDIR);
@@ -141,11 +122,8 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
   std::size_t used = 0;
   for (;;) {
     if (used == bytes.size()) bytes.resize(used + 4096);
-    const ssize_t count = ::read(descriptor.get(), bytes.data() + used, bytes.size() - used);
-    if (count < 0) {
-      if (errno == EINTR) continue;
-      fail(path, "cannot be read", errno);
-    }
+    const ssize_t count = retried([&] { return ::read(descriptor.get(), bytes.data() + used, bytes.size() - used); });
+    if (count < 0) fail(path, "cannot be read", errno);
     if (count == 0) break;
     used += static_cast<std::size_t>(count);
     if (used > limit) refuse(used);
@@ -154,14 +132,27 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
   return bytes;
 }
 
+std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes) {
+  const Descriptor descriptor = open_file(path, O_RDONLY);
+  if (!descriptor.is_open()) return std::nullopt;
+  std::size_t used = 0;
+  while (used < bytes.size()) {
+    const ssize_t count = retried([&] { return ::read(descriptor.get(), bytes.data() + used, bytes.size() - used); });
+    if (count < 0) return std::nullopt;
+    if (count == 0) break;
+    used += static_cast<std::size_t>(count);
+  }
+  return used;
+}
+
 void make_writable_folder(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
   if (error) fail(path, "cannot be made a folder", error.value());
   const std::filesystem::path probe = temporary_name(path / "probe");
   {
-    const Descriptor descriptor(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-    if (descriptor.get() < 0) fail(path, "files cannot be made in this folder", errno);
+    const Descriptor descriptor = open_file(probe, O_WRONLY | O_CREAT | O_EXCL);
+    if (!descriptor.is_open()) fail(path, "files cannot be made in this folder", errno);
   }
   ::unlink(probe.c_str());
 }

@@ -1,5 +1,6 @@
 #include "supple/core/io/mesh_files.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -58,9 +59,29 @@ bool parse_point(std::string_view line, Vec3& point) {
   return line.empty();
 }
 
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
 bool starts_like_a_name(std::string_view line) {
   const char c = line.front();
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '"' || c == '_';
+  return is_letter(c) || c == '"' || c == '_';
+}
+
+/// Whether a head names columns x, y, z, but in another order. Units may follow ("x [m]", "x_m"); other names say nothing.
+bool swaps_axes(std::string_view head) {
+  std::string axes;
+  while (!head.empty()) {
+    if (is_separator(head.front()) || head.front() == '"') {
+      head.remove_prefix(1);
+      continue;
+    }
+    const bool alone = head.size() == 1 || !is_letter(head[1]);
+    axes += alone && is_letter(head.front()) ? static_cast<char>(head.front() | 0x20) : '?';
+    std::size_t end = 1;
+    const auto ends = [&] { return is_separator(head[end]) && !(head[end] == ' ' && end + 1 < head.size() && !is_letter(head[end + 1])); };
+    while (end < head.size() && !ends()) ++end;
+    head.remove_prefix(end);
+  }
+  return axes.size() == 3 && axes != "xyz" && std::is_permutation(axes.begin(), axes.end(), "xyz");
 }
 
 }  // namespace
@@ -160,6 +181,12 @@ std::vector<Vec3> read_points_csv(const std::filesystem::path& path, std::size_t
                                             .hint = "divide them among several files"});
       }
       points.push_back(point);
+    } else if (header_allowed && swaps_axes(line)) {
+      faults.push_back(Fault{.place = path.string() + ':' + std::to_string(number),
+                             .key = {},
+                             .expected = "expected the columns x, y, z in this order",
+                             .found = '\'' + std::string(line.substr(0, 60)) + '\'',
+                             .hint = {}});
     } else if (!(header_allowed && starts_like_a_name(line) && !line.starts_with("nan") && !line.starts_with("inf"))) {
       faults.push_back(Fault{.place = path.string() + ':' + std::to_string(number),
                              .key = {},

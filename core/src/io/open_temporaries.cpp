@@ -41,8 +41,10 @@ OpenTemporary::~OpenTemporary() {
 }
 
 void remove_open_temporaries() noexcept {
-  for (const Slot& slot : slots) {
-    if (slot.use.load(std::memory_order_acquire) == Use::Known) static_cast<void>(::unlink(slot.path.data()));
+  for (const auto remove : {::unlink, ::rmdir}) {
+    for (const Slot& slot : slots) {
+      if (slot.use.load(std::memory_order_acquire) == Use::Known) static_cast<void>(remove(slot.path.data()));
+    }
   }
 }
 

@@ -1,22 +1,24 @@
 #include "supple/core/io/usd_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <numbers>
 #include <optional>
 #include <set>
 #include <system_error>
-#include <unistd.h>
 #include <vector>
 
 #include "number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/descriptor.h"
 
 namespace supple::io {
 namespace {
@@ -41,37 +43,27 @@ struct Piece {
 class Scratch {
  public:
   explicit Scratch(const std::filesystem::path& beside) : path_(beside) {
-    std::string pattern = (beside.parent_path() / ".usd.XXXXXX.tmp").string();
-    const int descriptor = ::mkstemps(pattern.data(), 4);
-    if (descriptor < 0) fail(path_, errno);
-    ::unlink(pattern.c_str());
-    file_ = ::fdopen(descriptor, "w+");
-    if (file_ == nullptr) {
-      const int code = errno;
-      ::close(descriptor);
-      fail(path_, code);
-    }
+    const std::filesystem::path name = temporary_name(beside);
+    file_ = open_file(name, O_RDWR | O_CREAT | O_EXCL, 0600);
+    if (!file_.is_open()) fail(path_, errno);
+    ::unlink(name.c_str());
   }
-  ~Scratch() { std::fclose(file_); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
 
   [[nodiscard]] Piece append(std::string_view text) {
-    if (::fseeko(file_, size_, SEEK_SET) != 0 || std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail(path_, errno);
+    if (const int code = write_all_at(file_.get(), std::as_bytes(std::span(text)), size_)) fail(path_, code);
     const Piece piece{size_, text.size()};
     size_ += static_cast<off_t>(text.size());
     return piece;
   }
   void copy_to(AtomicFile& out, const Piece& piece) {
     std::string text(piece.size, '\0');
-    if (::fseeko(file_, piece.at, SEEK_SET) != 0) fail(path_, errno);
-    if (std::fread(text.data(), 1, text.size(), file_) != text.size()) fail(path_, EIO);
+    if (const int code = read_all_at(file_.get(), std::as_writable_bytes(std::span(text)), piece.at)) fail(path_, code);
     out.append(text);
   }
 
  private:
   std::filesystem::path path_;
-  std::FILE* file_ = nullptr;
+  Descriptor file_;
   off_t size_ = 0;
 };
 

@@ -19,6 +19,10 @@ std::string attribute(std::string_view text) {
       case '&': out += "&amp;"; break;
       case '<': out += "&lt;"; break;
       case '"': out += "&quot;"; break;
+      // Readers make spaces of these.
+      case '\n': out += "&#10;"; break;
+      case '\r': out += "&#13;"; break;
+      case '\t': out += "&#9;"; break;
       default: out += c;
     }
   }

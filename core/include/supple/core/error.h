@@ -30,7 +30,7 @@ struct Fault {
   std::string found{};     ///< e.g. "-0.2"; may be empty
   std::string hint{};      ///< e.g. "did you mean 'radius'?"; may be empty
 
-  /// place: key: expected, found FOUND; HINT   (empty parts left out)
+  /// place: key: expected, found FOUND; HINT   (empty parts left out, control characters and what is no UTF-8 as \xNN)
   [[nodiscard]] std::string message() const;
 };
 

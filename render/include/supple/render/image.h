@@ -2,6 +2,7 @@
 /// 8-bit sRGB images and what is made of them: PNG files, contact sheets, films.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -54,20 +55,23 @@ struct ImageDifference {
 /// @pre pictures of one size, gain > 0
 [[nodiscard]] ImageDifference compare(const Image& a, const Image& b, double gain);
 
-/// A film to be made, and a word about its pictures that it carries (printable, without semicolon).
-struct FilmFile {
-  FilmFile(std::filesystem::path file, std::string word = {}) : path(std::move(file)), note(std::move(word)) {}  // NOLINT: a path will do
-  std::filesystem::path path;
-  std::string note;
+/// The pictures of a film: folder/stem.0001.png ..., first to last.
+struct FilmSource {
+  std::filesystem::path folder;
+  std::string stem;
+  int first = 1, last = 1;
+  double frame_rate = 24.0;  ///< [1/s]
+  std::string note{};        ///< a word about the pictures that the film carries (printable, without semicolon)
 };
 
-/// Encodes frames folder/stem.0001.png ... (first .. last) to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg
-/// program, into a temporary file that is renamed when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names
-/// another program or its path. Odd sizes are stretched to even ones. A film there that already holds the same pictures at the
-/// same rate and note (it says so in its comment) is kept.
-/// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line).
-void encode_film(const std::filesystem::path& folder, const std::string& stem, int first, int last, double frame_rate,
-                 const FilmFile& film);
+/// Encodes pictures to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg program, in a temporary folder beside `film` that
+/// goes with it, and renames it when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names another program or its
+/// path. Odd sizes are stretched to even ones. A film there that already holds the same pictures at the
+/// same rate and note (it says so in its comment) is kept. ffmpeg never outlives the call, also where the process is killed.
+/// @param interrupt  ends ffmpeg when set by another thread or a signal; null: never
+/// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line),
+///   Interrupted; no film is left then but one of before
+void encode_film(const FilmSource& source, const std::filesystem::path& film, const std::atomic<int>* interrupt = nullptr);
 
 /// The note of a film that `encode_film` made; nothing for any other file, or none. Reads its head only.
 [[nodiscard]] std::optional<std::string> film_note(const std::filesystem::path& film);

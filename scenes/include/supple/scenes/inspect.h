@@ -2,6 +2,7 @@
 /// Looking at runs that are done: what `supple info` and `supple compare` do.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ struct ComparisonOptions {
   double gain = 8.0;                    ///< of the difference pictures
   bool film = true;
   std::string camera{};                 ///< whose frames, where a run has several cameras
+  const std::atomic<int>* interrupt = nullptr;  ///< ends the comparison when set by another thread or a signal; null: never
 };
 
 struct FrameComparison {
@@ -34,7 +36,8 @@ struct Comparison {
 
 /// Puts the frames of two runs side by side with their difference (absolute, times gain): folder/frames/compare.0001.png,
 /// compare.mp4 and compare.csv (frame, PSNR, largest difference).
-/// @throws Error{Io} without a common frame, Error{Usage} when the sizes differ or it is open which camera is meant
+/// @throws Error{Io} without a common frame or where another process uses the folder, Error{Usage} when the sizes differ or it
+///   is open which camera is meant, Interrupted
 [[nodiscard]] Comparison compare_runs(const ComparisonOptions& options);
 
 }  // namespace supple::scenes

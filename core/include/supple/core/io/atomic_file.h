@@ -4,10 +4,12 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "supple/core/io/descriptor.h"
 #include "supple/core/io/open_temporaries.h"
 
 namespace supple::io {
@@ -37,14 +39,23 @@ class AtomicFile {
   std::filesystem::path path_, temporary_;
   OpenTemporary open_;
   std::vector<std::byte> buffer_;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
 };
 
 /// The largest file that scenes take points, meshes or pictures from [byte].
 inline constexpr std::size_t kLargestInput = std::size_t{1} << 29;
 
+/// A hidden name beside `path` that this process has not given before: .NAME.PROCESS.COUNT.tmp
+[[nodiscard]] std::filesystem::path temporary_name(const std::filesystem::path& path);
+
+/// Gives a file that another program wrote its final name, after fsync. @throws Error{Io}; it keeps its first name then.
+void rename_whole(const std::filesystem::path& from, const std::filesystem::path& to);
+
 /// The whole file. @throws Error{Io} when it cannot be read, Error{Limit} when it is larger than `limit` bytes.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit);
+
+/// Fills `bytes` with the start of a file. @return how many there are; none, with errno, where it cannot be read
+[[nodiscard]] std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes);
 
 /// Creates the folder (and its parents) and checks that files can be made in it. @throws Error{Io} otherwise.
 void make_writable_folder(const std::filesystem::path& path);

@@ -1,0 +1,14 @@
+/// @file supple/core/nearest_word.h
+/// What a misspelt word may have meant.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace supple {
+
+/// The word nearest to `word` by edit distance (with transpositions), or "" when none is near. Of several the first.
+[[nodiscard]] std::string nearest_word(std::string_view word, std::span<const std::string_view> words);
+
+}  // namespace supple
