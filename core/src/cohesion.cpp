@@ -123,7 +123,8 @@ double Cohesion::slope(double distance) const {
 double Cohesion::energy(double distance) const {
   // Panels are at most one width of the Gaussian and half the distance to the pole at v = -1 wide: the rule then
   // converges like 5.8^-32.
-  const double v = distance / r0 - 1.0;
+  constexpr double kNearest = 1e-12;  // of r0: nearer by, panels would be lost in the rounding of v
+  const double v = std::max(distance / r0, kNearest) - 1.0;
   const double width = std::min(1.0, 1.0 / std::sqrt(a));
   double sum = 0.0;
   if (v >= 0.0) {

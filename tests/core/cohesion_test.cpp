@@ -117,6 +117,15 @@ TEST(CohesionEnergy, HasTheForceAsItsGradient) {
   }
 }
 
+TEST(CohesionEnergy, IsFiniteHoweverNearThePole) {
+  const Cohesion law = unit_law(4.0);
+  const double near = law.energy(1e-11);
+  for (const double d : {1e-15, 1e-17, 1e-300, 0.0}) {
+    EXPECT_GT(law.energy(d), near) << d;
+    EXPECT_LT(law.energy(d), 2.0 * near) << d;  // it grows as -log d
+  }
+}
+
 TEST(CohesionEnergy, TendsToTheBindingEnergy) {
   for (const double a : {0.1, 1.0, 16.0 / 3.0, 20.0, 39.0, 41.0, 120.0}) {
     const Cohesion law{.r0 = 2.0, .f0 = 5.0, .a = a};
