@@ -63,7 +63,10 @@ class SceneCounter {
   }
   void add_texture(const std::optional<TextureDesc>& texture, const std::string& key) {
     if (!texture || texture->pattern != PatternName::Picture) return;
-    const auto [width, height] = picture_size(scene_.source.parent_path() / texture->file);
+    const std::filesystem::path path = scene_.source.parent_path() / texture->file;
+    std::error_code absent;
+    if (!std::filesystem::is_regular_file(path, absent)) return;  // what is none, as a pipe, is told when it is read
+    const auto [width, height] = picture_size(path);
     add(Counted::TexturePixels, key, static_cast<double>(width) * static_cast<double>(height));
   }
   /// Frames at the same time are made as far as memory allows.

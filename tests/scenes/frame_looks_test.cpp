@@ -32,7 +32,7 @@ const Sets kSmall{"output.images.size=[48, 32]"};
 
 std::vector<std::byte> bytes_of(const fs::path& path) { return io::read_file(path, std::size_t{1} << 24); }
 
-class Looks : public testing::Test {
+class LooksOfFrames : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
@@ -51,7 +51,7 @@ class Looks : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(Looks, OfTwoKindsMakeNoFilmAndRemoveTheEarlierOne) {
+TEST_F(LooksOfFrames, OfTwoKindsMakeNoFilmAndRemoveTheEarlierOne) {
   const RunResult mixed = render_run(scene(kRed), options({4}));
   EXPECT_EQ(mixed.outcome, "done") << mixed.reason;
   EXPECT_TRUE(mixed.film.empty());
@@ -76,14 +76,14 @@ TEST_F(Looks, OfTwoKindsMakeNoFilmAndRemoveTheEarlierOne) {
   EXPECT_TRUE(red.warnings.empty());
 }
 
-TEST_F(Looks, ThatCameBackMakeTheSameFilm) {
+TEST_F(LooksOfFrames, ThatCameBackMakeTheSameFilm) {
   const std::vector<std::byte> before = bytes_of(film());
   ASSERT_TRUE(render_run(scene(kRed), options({2})).film.empty());
   EXPECT_EQ(render_run(scene(), options({2})).film, film());
   EXPECT_EQ(bytes_of(film()), before);
 }
 
-TEST_F(Looks, DrawnAgainInAnotherSizeLeaveTheSheetOfTheOthersAndNoFilm) {
+TEST_F(LooksOfFrames, DrawnAgainInAnotherSizeLeaveTheSheetOfTheOthersAndNoFilm) {
   RunResult drawn = render_run(scene(kSmall), options({1, 2}));
   ASSERT_EQ(drawn.outcome, "done") << drawn.reason;
   EXPECT_EQ(drawn.pictures_drawn, 2);
@@ -95,14 +95,14 @@ TEST_F(Looks, DrawnAgainInAnotherSizeLeaveTheSheetOfTheOthersAndNoFilm) {
   EXPECT_FALSE(render_run(scene(kSmall), options()).film.empty());
 }
 
-TEST_F(Looks, OfAnotherSizeLeaveNoFilmWhereNoneIsAskedFor) {
+TEST_F(LooksOfFrames, OfAnotherSizeLeaveNoFilmWhereNoneIsAskedFor) {
   const RunResult drawn = render_run(scene({kSmall[0], "output.film=false"}), options());
   EXPECT_EQ(drawn.warnings, Sets{"drops.mp4 is removed: it shows other pictures than frames/ holds"});
   EXPECT_FALSE(fs::exists(film()));
   EXPECT_EQ(render::read_png(sheet()).width, 4 * 48 + 5 * 4);
 }
 
-TEST_F(Looks, ThatAreTheSameKeepTheFilmWhereNoneIsAskedFor) {
+TEST_F(LooksOfFrames, ThatAreTheSameKeepTheFilmWhereNoneIsAskedFor) {
   fs::remove(folder_ / "frames/drops.0003.png");
   const RunResult drawn = render_run(scene({"output.film=false"}), options());
   EXPECT_EQ(drawn.pictures_drawn, 1);
@@ -110,20 +110,20 @@ TEST_F(Looks, ThatAreTheSameKeepTheFilmWhereNoneIsAskedFor) {
   EXPECT_TRUE(fs::exists(film()));
 }
 
-TEST_F(Looks, OfFramesThatAreAbsentAreNoReasonToRemoveAFilm) {
+TEST_F(LooksOfFrames, OfFramesThatAreAbsentAreNoReasonToRemoveAFilm) {
   for (const char* lost : {"frames/drops.0001.png", "frames/drops.0002.png"}) fs::remove(folder_ / lost);
   const RunResult drawn = render_run(scene(), options({3}));
   EXPECT_EQ(drawn.warnings, Sets{"no film: frames 1-2 of drops have no picture"});
   EXPECT_TRUE(fs::exists(film()));
 }
 
-TEST_F(Looks, OfAFilmThatThisProgramDidNotMakeAreNotItsToRemove) {
+TEST_F(LooksOfFrames, OfAFilmThatThisProgramDidNotMakeAreNotItsToRemove) {
   std::ofstream(film()) << "cut by hand";
   (void)render_run(scene({kRed[0], "output.film=false"}), options());
   EXPECT_TRUE(fs::exists(film()));
 }
 
-TEST_F(Looks, LeaveNoStaleFilmWhereASignalEndsTheDrawing) {
+TEST_F(LooksOfFrames, LeaveNoStaleFilmWhereASignalEndsTheDrawing) {
   std::atomic<int> signal{0};
   RunOptions o = options();
   o.interrupt = &signal;
@@ -134,7 +134,7 @@ TEST_F(Looks, LeaveNoStaleFilmWhereASignalEndsTheDrawing) {
   EXPECT_FALSE(fs::exists(sheet()));
 }
 
-TEST_F(Looks, OfALongerRunMakeALongerFilm) {
+TEST_F(LooksOfFrames, OfALongerRunMakeALongerFilm) {
   RunOptions first = options({1, 2, 3});
   first.overwrite = true;
   const RunResult part = run_scene(scene(), first);
@@ -150,7 +150,7 @@ TEST_F(Looks, OfALongerRunMakeALongerFilm) {
   EXPECT_NE(bytes_of(film()), of_three);
 }
 
-TEST_F(Looks, OfAComparisonLeaveNoFilmOfAnEarlierOne) {
+TEST_F(LooksOfFrames, OfAComparisonLeaveNoFilmOfAnEarlierOne) {
   const ComparisonOptions two{.first = folder_, .second = folder_, .folder = folder_ / "same"};
   ASSERT_TRUE(fs::exists(compare_runs(two).film));
   fs::remove(folder_ / "frames/drops.0002.png");

@@ -211,7 +211,7 @@ TEST(ImplicitContact, HoldsATableBelowTheAngleOfFrictionWithoutSprings) {
 }
 
 TEST(ImplicitContact, LetsATableSlideWithWhatFrictionLeaves) {
-  for (const std::string& name : {"backward_euler", "implicit_midpoint"}) {
+  for (const std::string name : {"backward_euler", "implicit_midpoint"}) {
     Simulation simulation = table_on_slope(name, 0.2);
     run(simulation, 7);
     const double before = simulation.state().particles.velocity[0].norm();
@@ -224,7 +224,7 @@ TEST(ImplicitContact, LetsATableSlideWithWhatFrictionLeaves) {
 }
 
 TEST(ImplicitContact, GivesTheSameBitsForAnyThreadsAndAfterARestart) {
-  for (const std::string& name : {"backward_euler", "implicit_midpoint"}) {
+  for (const std::string name : {"backward_euler", "implicit_midpoint"}) {
     Simulation one = table_on_slope(name, 0.3), four = table_on_slope(name, 0.3, 4);
     run(one, 5);
     Simulation again = table_on_slope(name, 0.3);
