@@ -178,7 +178,7 @@ TEST(UnitedObstacles, HoldBodiesOfSeveralPartsOnce) {
 
 TEST(UnitedObstacles, MayBeMeshesOrOfSeveralMaterials) {
   const SolidBox block = box(Vec3(0, 0, -1), Vec3(3, 3, 1)), left = box(Vec3(-1.7, 0, -1), Vec3(2, 3, 1)), right = box(Vec3(1.7, 0, -1), Vec3(2, 3, 1));
-  const implicit::MeshSolid mesh(block.mesh(), {.voxel = 0.1});
+  const implicit::MeshSolid mesh(block.mesh(), {});
   const Vec3 at(0.07, 0.03, 0.9);
   Meeting alone(at, {{kGround}}), flush(at, {{kGround}, {mesh}});
   const Sum one = sum_of(alone.stage.solve({.error = 1e-3}));
