@@ -388,7 +388,7 @@ TEST_F(Files, AreWholeWhereSignalsBreakCallsOff) {
     const bool same = text_of(path("long.txt")) == text && io::read_start(path("long.txt"), start) == start.size();
     return same ? 0 : 1;
   });
-  if (code == kNoFilter) GTEST_SKIP() << "no filter of system calls here";
+  EXPECT_NE(code, kNoFilter) << "the kernel lets no process filter its system calls, so this cannot be tried";
   EXPECT_EQ(code, 0);
   EXPECT_EQ(text_of(path("broken.usda")), text_of(path("plain.usda")));
   EXPECT_EQ(file_count(), 4U);

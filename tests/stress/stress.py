@@ -107,7 +107,7 @@ def report_line(row, context, outcome, seconds):
 
 HEAD = """# Reliability
 
-A run is killed, the disk fills, a scene is hostile: nothing is lost, nothing half-written is left under a final name, and the user is told
+A run is killed, the disk fills, a scene is hostile: nothing is lost, nothing half-written is left under a final name, and a message says
 what happened and what to do. `scripts/stress.sh` tries this, a row of the table at a time, and `--report` writes the lines of the rows that
 it ran; the others keep their last line. "Asked" is what a full run tries, "reached" what the last run tried. `scripts/stress.sh --self-test`
 plants faults and expects to find them.
