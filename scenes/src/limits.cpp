@@ -13,7 +13,7 @@ namespace supple::scenes {
 namespace {
 
 /// By Counted. Measured as the growth of the resident memory of `supple check` with their number, on x86-64.
-constexpr std::array<CountRule, 12> kRules{{{"particles", "ask for fewer", 510.0},
+constexpr std::array<CountRule, 11> kRules{{{"particles", "ask for fewer", 510.0},
                                            {"primitives", "let fewer particles carry them, or ask for fewer on each", 1250.0},
                                            {"bonds", "ask for fewer neighbours, or a shorter distance", 680.0},
                                            {"bonds of friction", "ask for fewer neighbours, or a shorter distance", 40.0},
@@ -23,7 +23,6 @@ constexpr std::array<CountRule, 12> kRules{{{"particles", "ask for fewer", 510.0
                                            {"surface samples", "ask for a larger contact.sample_spacing, or for thicker parts", 300.0},
                                            {"bytes of its file", "ask for a smaller file", 6.0},
                                            {"pixels of a texture", "ask for a smaller picture", 6.0},
-                                           {"voxels", "ask for a larger voxel", 16.0},
                                            {"samples of an image", "ask for a smaller image, or for fewer samples of a pixel", 24.0, true}}};
 constexpr std::string_view kUnits = "kMGT";
 

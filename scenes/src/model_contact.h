@@ -19,7 +19,7 @@ namespace supple::scenes {
 /// Bodies of an object that may touch each other, by what is known at the start; of those that may break off it counts two.
 [[nodiscard]] std::size_t own_contacts(const ObjectModel& object);
 
-/// @param budget  counts surface samples and the voxels of meshes before they are made
+/// @param budget  counts surface samples before they are made
 void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults);
 
 }  // namespace supple::scenes

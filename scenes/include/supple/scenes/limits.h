@@ -18,7 +18,7 @@ inline constexpr double kDefaultMemory = 8e9;
 inline constexpr double kCheckMemory = 2e8;
 
 /// What scenes may have very many of.
-enum class Counted : std::uint8_t { Particles, Primitives, Bonds, FrictionBonds, NeighbourPairs, Laws, Bodies, Samples, FileBytes, TexturePixels, Voxels, ImageSamples };
+enum class Counted : std::uint8_t { Particles, Primitives, Bonds, FrictionBonds, NeighbourPairs, Laws, Bodies, Samples, FileBytes, TexturePixels, ImageSamples };
 
 /// How much memory one of them takes.
 struct CountRule {
