@@ -1,0 +1,98 @@
+/// @file march_refined.h
+/// The meshes of marching cubes on one lattice: that of its cells, those whose triangles are cut into four, again and again, and their
+/// errors. From call to call a tile keeps the vertices that cutting adds, and its error, where its triangles and all of their vertices
+/// are what they were, to the last bit, and no primitive that is different reaches where the field was asked for them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "mesh/cubes/march_mesher.h"
+#include "mesh/cut_crossings.h"
+
+namespace supple::implicit::march {
+
+/// What cutting triangles needs; kept for its memory.
+struct CutScratch {
+  std::vector<std::array<std::uint32_t, 3>> middle;
+  std::vector<std::uint32_t> start, target, edge;
+  [[nodiscard]] std::uint64_t bytes() const {
+    return middle.capacity() * sizeof(middle[0]) + (start.capacity() + target.capacity() + edge.capacity()) * sizeof(std::uint32_t);
+  }
+};
+
+class RefinedMarcher {
+ public:
+  /// Makes the mesh of the cells. @param field  to be kept until the next call
+  void march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor);
+  /// Makes it anew, with nothing of earlier calls: counts are then those of a fresh mesher. Meshes and errors stay valid.
+  void march_anew(const Executor& executor);
+  /// The next mesh of the cells has nothing of this one.
+  void forget() { marcher_.kept = false; }
+
+  /// Valid until the next call of march(). @param may_cross  itself; the same in all calls until then
+  [[nodiscard]] const Mesh& mesh(int refinements, bool may_cross, const Executor& executor, CutScratch& scratch);
+  /// centroid_error of that mesh. @pre the mesh was asked for since march()
+  [[nodiscard]] double error(int refinements, const Executor& executor);
+
+  /// Of the mesh of the cells, and edges of the last mesh that was asked for.
+  [[nodiscard]] const MarchCounts& counts() const { return counts_; }
+  /// Whether nothing of it was kept.
+  [[nodiscard]] bool whole() const { return marcher_.whole(); }
+  /// What a fresh mesher counts at most.
+  [[nodiscard]] MarchCounts most_counts() const { return marcher_.most_counts(counts_); }
+  /// Of all meshes and what is kept of them [byte].
+  [[nodiscard]] std::uint64_t bytes() const;
+  [[nodiscard]] Mesh take_mesh(int refinements);
+
+ private:
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  /// The vertices that cutting the triangles of a tile adds, and where the field was asked for them.
+  struct TileVertices {
+    std::uint32_t first = 0, count = 0;
+    Box asked;
+  };
+  struct TileError {
+    double error = 0.0;  ///< [m]
+    Box asked;
+  };
+  /// After so many cuts.
+  struct Step {
+    bool made = false, measured = false;
+    Mesh mesh;                        ///< but for the first one, which is the marcher's
+    std::vector<TileVertices> added;  ///< by tile
+    std::vector<TileError> error;     ///< by tile
+    std::vector<std::uint8_t> same;   ///< by vertex: bit for bit the one of the last call in its place
+    std::vector<StraightEdge> straight;
+  };
+
+  void list();
+  void find_changes();
+  void cut(int step, bool may_cross, const Executor& executor, CutScratch& scratch);
+  [[nodiscard]] Mesh& mesh_of(int step) { return step == 0 ? marcher_.mesh : now_[static_cast<std::size_t>(step)].mesh; }
+  [[nodiscard]] bool differs(const Box& asked) const;
+  /// Calls use(triangle number) for the triangles of a tile after so many cuts.
+  template <class Use>
+  static void for_triangles(const TileTriangles& tile, int step, const Use& use) {
+    const std::size_t parts = std::size_t{1} << (2 * step);
+    for (std::size_t n = parts * tile.first; n < parts * (tile.first + tile.count); ++n) use(n);
+  }
+  [[nodiscard]] bool is_same(const TileTriangles& tile, int step);
+
+  Marcher marcher_;
+  FieldView field_;
+  bool skip_ = true;
+  MarchCounts counts_;
+  double feature_ = 0.0;              ///< of the field [m]
+  bool listed_ = false;               ///< what follows is of this call
+  std::vector<TileTriangles> tiles_;
+  std::vector<std::size_t> first_, last_first_;  ///< of the triangles of tiles, now and in the last call
+  std::vector<std::uint32_t> last_tile_;         ///< by tile: its number in the last call; kNone where its triangles are others
+  ChangedTiles blob_changes_;         ///< of a body of Wyvill points
+  std::vector<Reach> blob_reaches_;   ///< that these are of
+  bool all_differs_ = true;
+  std::array<Step, kMostRefinements + 1> now_, last_;
+};
+
+}  // namespace supple::implicit::march

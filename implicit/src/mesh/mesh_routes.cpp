@@ -1,0 +1,202 @@
+#include "supple/implicit/mesh_routes.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "field/field_index.h"
+#include "skeleton/shapes.h"
+#include "supple/core/error.h"
+#include "supple/implicit/surface_grid.h"
+
+namespace supple::implicit {
+namespace {
+
+constexpr double kNodes = 512.0;  ///< of a leaf
+/// Of a primitive at a node: a value in single or double precision, a value with its gradient in double precision [ns].
+constexpr double kSingleValue = 0.1, kValue = 0.7, kGradient = 1.1;
+/// Of a leaf besides: bounds, roots and triangles of about 45 vertices; bounds, the tree, and volumeToMesh [ns].
+constexpr double kCubesLeaf = 3500.0, kGridLeaf = 10000.0;
+/// Of a primitive, to find it near a leaf [ns].
+constexpr double kPrimitive = 200.0;
+/// Vertices of a leaf by way of a grid, and how often each is evaluated: twice and a half on their way onto the surface, once for normals.
+constexpr double kGridVertices = 45.0, kLooksAtVertex = 3.5;
+/// Leaves of the band, three cells wide on each side, for one that holds surface.
+constexpr double kBandLeaves = 1.8;
+
+bool is_blobs(const Skeleton& skeleton) {
+  return skeleton.blend.rule == BlendRule::Sum &&
+         std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(), [](const Primitive& p) {
+           return p.shape == ShapeKind::Point && p.kernel.kind == KernelKind::Wyvill && p.stretch == Vec3::Ones();
+         });
+}
+
+/// Least radius of curvature of a Bezier curve [m], and whether it is less than the distance of the surface there.
+struct Bend {
+  double radius = std::numeric_limits<double>::infinity();
+  bool within_surface = false;
+};
+Bend bend_of(const Primitive& p, double iso) {
+  constexpr int kSteps = 32;
+  const double thickness = evaluate(p.kernel, 0.0).value > iso ? iso_distance(p.kernel, iso) : 0.0;
+  Bend bend;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double t = static_cast<double>(i) / kSteps;
+    const BezierPoint g = bezier(p.control, t);
+    const double speed = g.first.norm(), turn = g.first.cross(g.second).norm();
+    if (!(turn > 0.0)) continue;
+    const double radius = speed * speed * speed / turn;
+    bend.radius = std::min(bend.radius, radius);
+    bend.within_surface = bend.within_surface || radius < thickness * (1.0 + (p.taper - 1.0) * t);
+  }
+  return bend;
+}
+
+/// Over which a primitive's gradient turns far [m].
+double turning_length(const Primitive& p, double iso) {
+  const double feature = feature_of(p);
+  switch (p.shape) {
+    case ShapeKind::Ring:
+    case ShapeKind::Arc: return std::min(feature, p.size.x() * p.stretch.minCoeff());
+    case ShapeKind::Curve: return std::min(feature, bend_of(p, iso).radius * p.stretch.minCoeff());
+    case ShapeKind::Superquadric: return feature * std::min(p.exponent[0], p.exponent[1]);
+    default: return feature;
+  }
+}
+
+bool decides(const Skeleton& skeleton) {
+  const bool several = skeleton.blend.node.empty() ? skeleton.part_count > 1
+                                                   : std::any_of(skeleton.blend.node.begin(), skeleton.blend.node.end(),
+                                                                 [&](std::uint32_t n) { return n != skeleton.blend.node.front(); });
+  if (skeleton.blend.rule == BlendRule::Gradient && several) return false;
+  // Where two sides of a lone curve are as near, directions between both are tried, by a slope over squared distance that never vanishes.
+  const bool lone = skeleton.primitive.size() == 1;
+  return std::none_of(skeleton.primitive.begin(), skeleton.primitive.end(), [&](const Primitive& p) {
+    return p.shape == ShapeKind::Curve && (!lone || p.kernel.kind == KernelKind::BlancSchlick) && bend_of(p, skeleton.iso).within_surface;
+  });
+}
+
+/// Whether eight cubes are looked at side by side: EighthBounds::know.
+bool goes_by_eighths(const Skeleton& skeleton) {
+  return skeleton.blend.rule == BlendRule::Sum && std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(), [](const Primitive& p) {
+    if (p.convolved || (p.kernel.kind != KernelKind::Wyvill && p.kernel.kind != KernelKind::Gascuel)) return false;
+    switch (p.shape) {
+      case ShapeKind::Segment: return p.taper == 1.0;
+      case ShapeKind::Point:
+      case ShapeKind::Rectangle:
+      case ShapeKind::Box:
+      case ShapeKind::Ellipsoid:
+      case ShapeKind::Disc: return true;
+      default: return false;
+    }
+  });
+}
+
+/// Supports that hold the middle of one of them, on average over some.
+double local_overlap(std::span<const Box> supports) {
+  constexpr std::size_t kLooks = 8;
+  const std::size_t looks = std::min(supports.size(), kLooks);
+  std::array<Vec3, kLooks> middle;
+  for (std::size_t k = 0; k < looks; ++k) middle[k] = supports[(2 * k + 1) * supports.size() / (2 * looks)].centre();
+  std::size_t held = 0;
+  for (const Box& box : supports) {
+    for (std::size_t k = 0; k < looks; ++k) held += box.contains(middle[k]) ? 1 : 0;
+  }
+  return looks > 0 ? static_cast<double>(held) / static_cast<double>(looks) : 0.0;
+}
+
+/// Of a search, in the time that marching cubes take: for cubes of the lattice, and for halving those near the surface until their edges
+/// are some part of the length on which gradients turn. Bounds of overlapping primitives add up where their gradients cancel.
+struct SearchWork {
+  double lattice = 0.0, alone = 0.0, overlapping = 0.0;
+};
+constexpr SearchWork kBlobSearch{.lattice = 0.5, .alone = 0.0, .overlapping = 5.0};
+constexpr SearchWork kEighthSearch{.lattice = 0.1, .alone = 12.0, .overlapping = 8.0};
+constexpr SearchWork kSumSearch{.lattice = 0.2, .alone = 130.0, .overlapping = 85.0};
+/// Of a primitive smaller than a cell, about a thousand cubes [ms].
+constexpr double kLeastHalved = 1.0;
+/// What nearest points on other shapes than points cost beside theirs.
+constexpr double kOtherShapes = 2.5;
+/// Of tetrahedra: of a leaf, and of the rim of a contact [ms].
+constexpr double kDividedLeaf = 0.04, kRim = 0.8;
+/// Of two bodies that touch, for some hundred cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
+/// there, of balls and of shapes with edges.
+constexpr double kContact = 0.2, kMoreBalls = 1.0, kMoreShapes = 170.0;
+
+/// CPU time of marching cubes [ms].
+double cubes_ms(const Skeleton& skeleton, std::span<const Box> supports, double cell) {
+  const bool points = std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(),
+                                  [](const Primitive& p) { return p.shape == ShapeKind::Point; });
+  return (points ? 1.0 : kOtherShapes) * estimate_routes(skeleton, supports, cell).cubes_ms;
+}
+
+/// @param overlap  see local_overlap   @param mesh_ms  see cubes_ms
+double search_ms(const SearchWork& work, const Skeleton& skeleton, double overlap, double mesh_ms, double cell) {
+  if (skeleton.primitive.empty()) return 0.0;
+  constexpr std::size_t kLooks = 1024;
+  const std::size_t count = skeleton.primitive.size(), stride = 1 + count / kLooks;
+  double coarseness = 0.0, looks = 0.0;
+  for (std::size_t i = 0; i < count; i += stride, looks += 1.0) {
+    const double ratio = cell / turning_length(skeleton.primitive[i], skeleton.iso);
+    coarseness += ratio * ratio * ratio;
+  }
+  const double halved = (work.alone + work.overlapping * overlap) * coarseness / looks;
+  return work.lattice * mesh_ms + std::min(halved * mesh_ms, kLeastHalved * static_cast<double>(count));
+}
+
+}  // namespace
+
+RouteEstimate estimate_routes(const Skeleton& skeleton, std::span<const Box> supports, double cell) {
+  SUPPLE_EXPECTS(cell > 0.0);
+  RouteEstimate estimate;
+  Box all;
+  double volume = 0.0;
+  for (const Box& box : supports) {
+    all = all.united(box);
+    volume += box.extent().prod();
+  }
+  if (all.empty()) return estimate;
+  const Vec3 e = all.extent();
+  const double leaf = 8.0 * cell;
+  estimate.leaves = std::max(1.0, 2.0 * (e.x() * e.y() + e.y() * e.z() + e.z() * e.x()) / (leaf * leaf));
+  estimate.overlap = std::clamp(volume / e.prod(), 1.0, static_cast<double>(supports.size()));
+  const double at_nodes = kNodes * estimate.overlap;
+  const double find = kPrimitive * static_cast<double>(supports.size());
+  const double value = is_blobs(skeleton) ? kSingleValue : kValue;
+  estimate.cubes_ms = 1e-6 * (find + estimate.leaves * (at_nodes * value + kCubesLeaf));
+  const double at_vertices = kLooksAtVertex * kGridVertices * estimate.overlap * kGradient;
+  if (cell < kLeastGridCell) {
+    estimate.openvdb_ms = std::numeric_limits<double>::infinity();  // there is no such grid
+    return estimate;
+  }
+  estimate.openvdb_ms = 1e-6 * (find + estimate.leaves * (kBandLeaves * (at_nodes * kGradient + kGridLeaf) + at_vertices));
+  return estimate;
+}
+
+SearchEstimate estimate_search(const Skeleton& skeleton, std::span<const Box> supports, double cell) {
+  const bool blobs = is_blobs(skeleton);
+  const double mesh_ms = cubes_ms(skeleton, supports, cell);
+  return {.decides = blobs || decides(skeleton),
+          .search_ms = search_ms(blobs ? kBlobSearch : goes_by_eighths(skeleton) ? kEighthSearch : kSumSearch, skeleton, local_overlap(supports), mesh_ms, cell),
+          .mesh_ms = mesh_ms};
+}
+
+SearchEstimate estimate_search(std::span<const DividingBody> bodies, std::span<const std::array<std::size_t, 2>> pairs, double cell) {
+  SearchEstimate all;
+  std::vector<double> more_ms;  // by body, of each of its contacts
+  for (const DividingBody& body : bodies) {
+    const double overlap = local_overlap(body.supports);
+    more_ms.push_back((is_blobs(*body.skeleton) ? kMoreBalls : kMoreShapes) * std::max(overlap - 1.0, 0.0));
+    all.decides = all.decides && decides(*body.skeleton);
+    all.search_ms += search_ms(kSumSearch, *body.skeleton, overlap, cubes_ms(*body.skeleton, body.supports, cell), cell);
+    all.mesh_ms += kDividedLeaf * estimate_routes(*body.skeleton, body.supports, cell).leaves;
+  }
+  for (const auto& [a, b] : pairs) {
+    all.search_ms += kContact + std::max(more_ms[a], more_ms[b]);
+    all.mesh_ms += kRim;
+  }
+  return all;
+}
+
+}  // namespace supple::implicit

@@ -1,0 +1,94 @@
+/// @file drawing_crew.h
+/// Frames drawn at the same time, from saved states.
+#pragma once
+
+#include <condition_variable>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "output/frame_writer.h"
+#include "supple/scenes/run.h"
+#include "supple/scenes/simulation.h"
+
+namespace supple::scenes {
+
+/// Memory of this process [byte].
+[[nodiscard]] double resident_bytes();
+/// How many frames to have in work at once when each needs `share` bytes; one where clocks are to be exact.
+[[nodiscard]] int crew_size(const RunOptions& options, std::size_t frames, double share);
+
+/// Each member has a simulation and a renderer of its own, so that no byte depends on the others. The thread that made the
+/// crew is a member too: it may go on simulating first, and joins with its own.
+class DrawingCrew {
+ public:
+  /// Of the thread that makes the crew, with what it has booked so far.
+  struct Leader {
+    Simulation& simulation;
+    FrameWriter& writer;
+    RunResult& result;
+  };
+
+  /// @param frames  to draw, ascending   @param saved  the last of them whose state is there
+  DrawingCrew(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, std::vector<int> frames, int saved, int members,
+              Leader leader, Reporter& report);
+  ~DrawingCrew();  ///< waits for frames in hand, leaves the others
+  DrawingCrew(const DrawingCrew&) = delete;
+  DrawingCrew& operator=(const DrawingCrew&) = delete;
+
+  /// States up to this frame are there. @return false where the crew has given up
+  [[nodiscard]] bool saved(int frame);
+  /// Reports that `frame` is being simulated, unless frames before it are still being drawn.
+  void simulating(int frame);
+  /// No more states come: draws with the others what is left, and books the work of all.
+  /// @throws what the first of the frames that failed threw
+  void join();
+  /// The same, but frames that nobody has begun stay undrawn.
+  void leave();
+
+ private:
+  struct Member;
+  void begin(Member& member);
+  void work(Simulation& simulation, FrameWriter& writer);
+  /// The next frame to draw; 0: none. Waits where states are still to come.
+  [[nodiscard]] int next_frame();
+  void done();
+  void fail(int frame);
+  /// @param leave  whether frames that nobody has begun stay undrawn
+  void dismiss(bool leave);
+  void book();
+  [[nodiscard]] bool interrupted() const { return options_.interrupt != nullptr && options_.interrupt->load() != 0; }
+
+  struct Member {
+    std::thread thread;
+    Profile profile{};
+    PictureTimes pictures;
+    int pictures_drawn = 0;
+    std::vector<std::string> warnings;
+  };
+
+  const Scene& scene_;
+  RunOptions options_;
+  OutputRequest outputs_;
+  std::vector<int> frames_;
+  Leader leader_;
+  Reporter& report_;
+  Profile profile_before_;
+  PictureTimes pictures_before_;
+  double cpu_before_;
+
+  std::mutex opening_;  // libraries of contexts are opened one after the other
+  std::mutex mutex_;    // of all below
+  std::condition_variable change_;
+  std::vector<Member> members_;
+  std::size_t next_ = 0;
+  int at_work_ = 0;
+  int saved_;
+  bool complete_ = false;  // no more states come
+  std::exception_ptr failure_;
+  int failed_ = std::numeric_limits<int>::max();
+};
+
+}  // namespace supple::scenes

@@ -1,0 +1,90 @@
+#include "supple/core/executor.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+#include <vector>
+
+#include "supple/core/error.h"
+#include "support/allocations.h"
+
+namespace {
+
+using namespace supple;
+
+class Executors : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Threads, Executors, testing::Values(1, 2, 3, 8));
+
+TEST_P(Executors, CoverEveryIndexOnceInBlocksOfTheGivenSize) {
+  const Executor executor(GetParam());
+  EXPECT_EQ(executor.threads(), GetParam());
+  for (const std::size_t n : {0U, 1U, 9U, 10U, 11U, 1000U}) {
+    std::vector<std::atomic<int>> seen(n);
+    std::atomic<bool> aligned{true};
+    executor.for_blocks(n, 10, [&](std::size_t begin, std::size_t end) {
+      if (begin % 10 != 0 || end > n || (end - begin != 10 && end != n)) aligned = false;
+      for (std::size_t i = begin; i < end; ++i) ++seen[i];
+    });
+    EXPECT_TRUE(aligned);
+    for (const auto& count : seen) EXPECT_EQ(count, 1);
+  }
+}
+
+TEST_P(Executors, RethrowTheFirstFailureInBlockOrderAfterAllBlocksEnded) {
+  const Executor executor(GetParam());
+  std::atomic<int> blocks{0};
+  try {
+    executor.for_blocks(100, 1, [&](std::size_t begin, std::size_t) {
+      ++blocks;
+      if (begin % 30 == 17) throw std::runtime_error(std::to_string(begin));
+    });
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "17");
+  }
+  EXPECT_EQ(blocks, 100);
+}
+
+TEST_P(Executors, SumWithTheSameBits) {
+  const auto term = [](std::size_t i) {
+    const auto x = static_cast<double>(i);
+    return std::sin(x) * 1e3 / (1.0 + x);
+  };
+  for (const std::size_t n : {0U, 1U, 256U, 257U, 100003U}) {
+    EXPECT_EQ(ordered_sum(Executor(GetParam()), n, term), ordered_sum(Executor(1), n, term)) << n;
+  }
+}
+
+TEST_P(Executors, SumWithinASum) {
+  const Executor executor(GetParam());
+  const auto inner = [&](std::size_t i) {
+    return ordered_sum(executor, 1000, [i](std::size_t j) { return i == j ? 1.0 : 0.0; });
+  };
+  EXPECT_EQ(ordered_sum(executor, 1000, inner), 1000.0);
+}
+
+TEST_P(Executors, RunLibraryCodeInside) {
+  bool ran = false;
+  Executor(GetParam()).run([&] { ran = true; });
+  EXPECT_TRUE(ran);
+}
+
+TEST(Executor, SumsWithoutAllocatingAfterTheFirstCall) {
+  const Executor executor(1);
+  const std::function<double(std::size_t)> term = [](std::size_t i) { return static_cast<double>(i); };
+  EXPECT_EQ(ordered_sum(executor, 1000, term), 499500.0);
+  const std::uint64_t before = supple::test::allocation_count();
+  EXPECT_EQ(ordered_sum(executor, 1000, term), 499500.0);
+  EXPECT_EQ(supple::test::allocation_count(), before);
+}
+
+TEST(Executor, TakesAllThreadsForZeroAndRefusesNegativeCounts) {
+  EXPECT_GE(Executor(0).threads(), 1);
+  EXPECT_THROW(Executor(-1), ContractViolation);
+  EXPECT_THROW(Executor(1).for_blocks(5, 0, [](std::size_t, std::size_t) {}), ContractViolation);
+}
+
+}  // namespace
