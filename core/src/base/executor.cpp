@@ -124,25 +124,4 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
 
 void Executor::run(const std::function<void()>& body) const { impl_->arena.execute([&] { body(); }); }
 
-double ordered_sum(const Executor& executor, std::size_t n, const std::function<double(std::size_t)>& map) {
-  const auto block_sum = [&map](std::size_t begin, std::size_t end) {
-    double sum = 0.0;
-    for (std::size_t i = begin; i < end; ++i) sum += map(i);
-    return sum;
-  };
-  if (n <= kReduceBlock) return block_sum(0, n);
-
-  // The buffer is taken out of its slot while in use, so that a nested call finds the slot empty, not our sums.
-  thread_local std::vector<double> kept;
-  std::vector<double> partial = std::move(kept);
-  partial.assign((n - 1) / kReduceBlock + 1, 0.0);
-  executor.for_blocks(n, kReduceBlock, [&](std::size_t begin, std::size_t end) {
-    partial[begin / kReduceBlock] = block_sum(begin, end);
-  });
-  double sum = 0.0;
-  for (const double value : partial) sum += value;
-  kept = std::move(partial);
-  return sum;
-}
-
 }  // namespace supple

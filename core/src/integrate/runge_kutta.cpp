@@ -252,13 +252,13 @@ StepReport advance_adaptively(const IntegratorSettings& settings, double time, d
 
 }  // namespace
 
-StepReport advance_runge_kutta(const IntegratorSettings& settings, const ParticleSet& set,
-                               const Interactions& interactions, const ForceModel& forces, double time, double dt,
-                               ParticleState& state, KickState& kick, Ledger& ledger, RungeKuttaBuffers& buffers) {
+StepReport advance_runge_kutta(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                               const StepTarget& target, RungeKuttaBuffers& buffers) {
+  const auto& [state, kick, ledger] = target;
   const bool adaptive = settings.method == Integrator::Adaptive;
-  stop_pinned(set, state);
+  stop_pinned(problem.set, state);
   kick.valid = false;
-  Stepper stepper(adaptive ? kPrince : kClassic, set, interactions, forces, buffers);
+  Stepper stepper(adaptive ? kPrince : kClassic, problem.set, problem.interactions, problem.forces, buffers);
   StepReport report;
   if (adaptive) {
     report = advance_adaptively(settings, time, dt, state, kick.next_step, ledger, stepper);

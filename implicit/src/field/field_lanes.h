@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "field/field_index.h"
 
@@ -39,20 +40,25 @@ struct Bounds {
 /// Sets a bit for each primitive of the hierarchy whose support may meet `box`, and in `summary` a bit for each word.
 void collect(const Field::Index& index, const Bounds& box, std::uint64_t* bits, std::uint64_t* summary);
 
-/// F (and grad F unless null) at n points from the given primitives, summed in the order of `ids`.
-void evaluate_ids(const Primitives& in, const std::uint32_t* ids, std::size_t id_count, const Vec3* points,
-                  std::size_t n, double* values, Vec3* gradients);
+/// Points and where what is found there goes.
+struct Batch {
+  const Vec3* points;
+  std::size_t count;
+  double* values;
+  Vec3* gradients;  ///< null: none is asked for
+};
+
+/// F (and grad F) at points from the given primitives, summed in the order of `ids`.
+void evaluate_ids(const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at);
 
 /// As above, the candidates filtered from the packs anew for every few points (two vectors).
-/// @param ids  scratch, room for 8 pack_count + kSpill
+/// @param ids  scratch, room for 8 packs.size() + kSpill
 /// @return kernel evaluations made
-std::uint64_t evaluate_packs(const Primitives& in, const LeafPack* pack, std::size_t pack_count, std::uint32_t* ids,
-                             const Vec3* points, std::size_t n, double* values, Vec3* gradients);
+std::uint64_t evaluate_packs(const Primitives& in, std::span<const LeafPack> packs, std::uint32_t* ids, const Batch& at);
 
-/// f and grad f of each primitive alone at n <= kPack points: values[kPack i + j] belongs to ids[i] and points[j],
+/// f and grad f of each primitive alone at at most kPack points: values[kPack i + j] belongs to ids[i] and points[j],
 /// likewise gradients[(kPack i + j)].
-void evaluate_each(const Primitives& in, const std::uint32_t* ids, std::size_t id_count, const Vec3* points,
-                   std::size_t n, double* values, Vec3* gradients);
+void evaluate_each(const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at);
 
 /// Sums over the primitives that a box touches.
 struct BoundSums {

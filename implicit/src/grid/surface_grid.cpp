@@ -78,11 +78,6 @@ std::uint64_t SurfaceGrid::active_voxels() const {
   return impl_->grid->activeVoxelCount();
 }
 
-std::uint64_t SurfaceGrid::memory_bytes() const {
-  SUPPLE_EXPECTS(impl_ != nullptr);
-  return impl_->grid->memUsage();
-}
-
 std::uint64_t SurfaceGrid::hash() const {
   SUPPLE_EXPECTS(impl_ != nullptr);
   return hash_of(*impl_->grid);

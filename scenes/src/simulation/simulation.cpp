@@ -8,6 +8,7 @@
 #include "simulation/contact_work.h"
 #include "simulation/held_volumes.h"
 #include "simulation/pieces.h"
+#include "simulation/stages.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 
@@ -193,7 +194,7 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
     StageContext now = context();
     now.time = at;
     find_contact_surface(now, at_state, state.samples, frame, false);
-    apply_reactions(now, frame, out);
+    stages::react(now, frame, out);
   }
 }
 
@@ -207,7 +208,7 @@ core::ImplicitContact Simulation::Impl::implicit_contact() {
     StageContext now = context();
     now.time = at;
     find_contact_surface(now, pose, state.samples, frame, false);
-    linearise_reactions(now, frame, out);
+    stages::linearise(now, frame, out);
   };
   return contact;
 }

@@ -73,22 +73,6 @@ class IntegratorWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What moves and what acts on it.
-struct StepProblem {
-  const ParticleSet& set;
-  const Interactions& interactions;
-  const ForceModel& forces;
-  /// Of the implicit methods: contact as a part of the step; `forces` then leave it out. Null: all that acts beside the pair laws is frozen.
-  ImplicitContact* contact = nullptr;
-};
-
-/// What a step changes.
-struct StepTarget {
-  ParticleState& state;
-  KickState& kick;
-  Ledger& ledger;
-};
-
 /// What a step works with. `pairs` is the workspace of `StepProblem::interactions`; the implicit methods use it.
 struct StepTools {
   const Executor& executor;

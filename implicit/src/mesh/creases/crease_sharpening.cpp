@@ -28,9 +28,9 @@ std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
 
 class Sharpener {
  public:
-  Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-            bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh)
-      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), skip_(skip), changes_(changes), memory_(memory), crossings_(crossings), mesh_(mesh),
+  Sharpener(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh)
+      : whole_(field.whole), fields_(field.fields), lattice_(field.lattice), owner_(field.owner), skip_(field.skip), changes_(changes),
+        memory_(memory), crossings_(crossings), mesh_(mesh),
         steps_(std::move(mesh.triangle)), safe_(steps_.triangles().size(), true) {}
 
   /// @return cells that keep a crease cut off
@@ -386,9 +386,9 @@ class Sharpener {
 
 }  // namespace
 
-std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh) {
-  return Sharpener(whole, fields, lattice, owner, skip, changes, memory, crossings, mesh).run();
+std::uint64_t sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings,
+                      Mesh& mesh) {
+  return Sharpener(field, changes, memory, crossings, mesh).run();
 }
 
 }  // namespace supple::implicit

@@ -121,7 +121,7 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
   memory_.begin_call(others || changes.all);
   if (comparable_) std::swap(mesh_, last_mesh_);
   mesh_ = marcher_.mesh;
-  blunt_cells_ = sharpen(field, views, lattice, owner_, skip, changes, memory_, crossings_, mesh_);
+  blunt_cells_ = sharpen({field, views, lattice, owner_, skip}, changes, memory_, crossings_, mesh_);
   memory_.end_call();
   node_ = std::move(present);
   made_ = true;

@@ -391,7 +391,7 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std:
   Carried carried;
   AllVertices& all = join(partition, keeps, carried, lattice, count);
   std::vector<FacetPart> parts = join_facets(partition, changed, all, has_mesh, executor, carried);
-  cut_at_rims(fields, has_mesh, lattice, executor, all, parts, carried, partition.rims, count);
+  cut_at_rims({fields, has_mesh, lattice, executor}, all, parts, carried, partition.rims, count);
   partition.vertices = static_cast<std::uint32_t>(all.use_end.size());
   std::vector<Mesh> meshes = write_meshes(fields.size(), all, parts, has_mesh, executor);
   auto part = parts.begin();

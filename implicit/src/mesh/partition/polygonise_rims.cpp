@@ -266,9 +266,9 @@ void keep(const AllVertices& all, const RimCrossings& crossings, std::vector<std
 
 }  // namespace
 
-void cut_at_rims(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, const Lattice& lattice,
-                 const Executor& executor, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
+void cut_at_rims(const CutBodies& bodies, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
                  PolygoniseCounts& counts) {
+  const auto& [fields, has_mesh, lattice, executor] = bodies;
   if (all.cover.empty()) {
     kept = {};
     for (FacetPart& part : parts) {

@@ -93,11 +93,18 @@ inline void renumber(std::span<const std::uint32_t> number, std::span<Facet> fac
 /// What was found at rims, see rim_crossings.h.
 struct KeptRims;
 
+/// The bodies that are meshed together.
+struct CutBodies {
+  std::span<const FieldView> fields;
+  std::span<const std::uint8_t> has_mesh;
+  const Lattice& lattice;
+  const Executor& executor;
+};
+
 /// Cuts the facets that rims cross, and adds vertices on these.
 /// @param carried  gets the numbers of vertices on rims
 /// @param kept  in: what the last call found, in its numbers; out: the same of this one
-void cut_at_rims(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, const Lattice& lattice,
-                 const Executor& executor, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
+void cut_at_rims(const CutBodies& bodies, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
                  PolygoniseCounts& counts);
 
 }  // namespace supple::implicit::lattice
