@@ -78,10 +78,16 @@ struct LinkChange {
   [[nodiscard]] bool any() const noexcept { return broke + yielded > 0; }
 };
 
+/// Particles and what acts between them now.
+struct LinkedParticles {
+  const ParticleSet& set;
+  const ParticleState& state;
+  const Interactions& present;  ///< what `intact` gives for the present state of the links; after a change it must be made again
+};
+
 /// Between two steps: breaks and yields what must, `dt` after the last call. The energy that goes is booked as
-/// dissipated. `present` is what `intact` gave for `links_state`; after a change it must be made again.
-LinkChange update_links(const ParticleSet& set, const ParticleState& state, const Interactions& present,
-                        const Links& links, double dt, LinkState& links_state, Ledger& ledger);
+/// dissipated.
+LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger);
 
 /// The interactions without the bonds (and friction) of broken links, with the present rest data.
 [[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);
