@@ -81,7 +81,7 @@ class Order {
                                  .key = goal.key,
                                  .expected = "expected an error of at most " + three_digits(goal.error) + " m",
                                  .found = three_digits(found) + " m with triangles of " + three_digits(spacing_at(goal.first, level)) + " m" +
-                                          goal.where + ", and so many that reach it do not fit",
+                                          goal.where + ", and a mesh that meets it is too large",
                                  .hint = "allow at least " + three_digits(1.05 * reachable) + " m"});
 }
 
@@ -90,8 +90,8 @@ class Order {
   std::vector<Fault> faults = size.faults();
   for (Fault& fault : faults) {
     fault.key = goal.key;
-    fault.expected += " to begin with";
-    fault.hint = "leave out the error and " + fault.hint;
+    fault.expected += " in the coarsest mesh";
+    fault.hint = "remove the error and " + fault.hint;
   }
   throw Error(ErrorKind::Limit, std::move(faults));
 }

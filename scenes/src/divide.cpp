@@ -9,7 +9,7 @@
 namespace supple::scenes {
 namespace {
 
-/// What must not touch may overlap, and divides nothing there.
+/// Bodies that never touch may overlap, and do not divide space there.
 void find_strangers(const Model& model, const std::vector<Body>& bodies, Division& division) {
   std::vector<std::vector<std::size_t>> stranger(division.body.size());
   bool any = false;

@@ -36,7 +36,7 @@ render::ContextKind context_kind(const std::string& name) {
                                       .hint = {}});
 }
 
-/// Of the file that a frame has in this format; none where all frames share one.
+/// Extension of the file of a frame in this format; none where all frames share one file.
 std::string extension_of(TableName format) { return format == TableName::Csv ? ".csv" : ".vtp"; }
 std::string extension_of(MeshName format) {
   switch (format) {
@@ -120,7 +120,7 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
   if (meshes != nullptr) {
     write_searches(options_.folder, name_, frame, simulation.searches());
   } else if (grids) {
-    (void)simulation.division();  // finds bulges that hold too little
+    (void)simulation.division();  // finds bulges that hold too little volume
     write_short_bulges(options_.folder, name_, frame, simulation.searches());
   }
   if (animation_) add_to_animation(simulation, *meshes);
@@ -309,7 +309,7 @@ fs::path FrameWriter::make_film(const std::string& name, int last) {
   if (remove_stale_film(options_.folder, name, look, last)) removed_films_.insert(name);
   const bool removed = removed_films_.contains(name);
   if (outputs_.film) {
-    warnings_.push_back("no film: " + why_not + (removed ? "; the earlier " + name + ".mp4, which shows others, is removed" : ""));
+    warnings_.push_back("no film: " + why_not + (removed ? "; an earlier " + name + ".mp4 of other pictures is removed" : ""));
   } else if (removed) {
     warnings_.push_back(name + ".mp4 is removed: it shows other pictures than frames/ holds");
   } else if (!looks.others.empty()) {

@@ -29,7 +29,7 @@ State load_frame(const fs::path& folder, const Scene& scene, int frame) {
                                      .key = {},
                                      .expected = "expected the saved state of frame " + std::to_string(frame),
                                      .found = "none",
-                                     .hint = "`supple run --resume` makes it from the last one before it"});
+                                     .hint = "`supple run --resume` computes it from the last one before it"});
   }
   return load_state(path, origin_of(scene), {.frame = frame, .otherwise = kOtherwise});
 }
