@@ -30,7 +30,7 @@ struct FrameLooks {
 [[nodiscard]] FrameLooks look_at_frames(const std::filesystem::path& folder, const std::string& name, int last);
 
 /// "frame 8 of k has another look than the others"; empty where all are there in one look.
-[[nodiscard]] std::string told(const FrameLooks& looks, const std::string& name);
+[[nodiscard]] std::string describe_looks(const FrameLooks& looks, const std::string& name);
 
 /// The comment in a film file of frames 1 .. last with this look.
 [[nodiscard]] std::string film_note_of(const std::string& look, int last);

@@ -298,7 +298,7 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
 fs::path FrameWriter::make_film(const std::string& name, int last) {
   const FrameLooks looks = look_at_frames(options_.folder, name, last);
   write_contact_sheet(options_.folder, name, looks);
-  const std::string why_not = told(looks, name);
+  const std::string why_not = describe_looks(looks, name);
   if (outputs_.film && why_not.empty()) {
     const fs::path film = options_.folder / (name + ".mp4");
     const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);

@@ -92,7 +92,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
   ordered_json json;
   json["time_s"] = simulation.time();
   json["cpu_us"] = 1e6 * cpu_s;
-  const double asked = simulation.model().contact.error;
+  const double given_error = simulation.model().contact.error;
   ordered_json pairs = ordered_json::array();
   for (std::size_t k = 0; k < surface.summary.size(); ++k) {
     const auto& s = surface.summary[k];
@@ -110,8 +110,8 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},
                          {"error_bound", s.error_estimate},
-                         {"error_asked", asked},
-                         {"error_met", !misses_error(s, asked)},
+                         {"error_asked", given_error},
+                         {"error_met", !misses_error(s, given_error)},
                          {"patches", s.patches},
                          {"points", s.points},
                          {"evaluations", s.evaluations}};
@@ -335,11 +335,11 @@ std::string explain(Simulation& simulation) {
   if (!plan.on(Stage::SolveContactSurface)) return out;
   const std::vector<collision::ContactSurface::Summary>& pairs = simulation.contacts().summary;
   constexpr std::size_t kMostShown = 10;
-  const double asked = model.contact.error;
+  const double given_error = model.contact.error;
   line("\n%zu contact%s at frame %d", pairs.size(), plural(pairs.size()), simulation.frame());
   for (std::size_t k = 0; k < std::min(pairs.size(), kMostShown); ++k) {
     const auto& s = pairs[k];
-    const std::string missed = misses_error(s, asked) ? ", above the given " + short_text(asked) : "";
+    const std::string missed = misses_error(s, given_error) ? ", above the given " + short_text(given_error) : "";
     line("  %s, %s: %s (%s), %llu points, error estimate %.1e%s", body_name(simulation, s.bodies.a).c_str(),
          body_name(simulation, s.bodies.b).c_str(), rule_name(s.rule), reason_text(s.reason).c_str(),
          static_cast<unsigned long long>(s.points), s.error_estimate, missed.c_str());

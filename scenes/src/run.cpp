@@ -255,8 +255,8 @@ bool resume(const Resuming& run) {
   if (first > 1 && !usable_frame(run.options.folder, run.scene, first, unusable)) first = 1;
   unusable = {};
   const bool whole = take_up(run, first, saved->last, unusable);
-  const std::vector<std::string> told = unusable.told();
-  run.result.warnings.insert(run.result.warnings.end(), told.begin(), told.end());
+  const std::vector<std::string> sentences = unusable.sentences();
+  run.result.warnings.insert(run.result.warnings.end(), sentences.begin(), sentences.end());
   return whole;
 }
 

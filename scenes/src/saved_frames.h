@@ -26,7 +26,7 @@ struct UnusableFrames {
   std::vector<int> lost;
   std::vector<int> damaged;
   /// "frame 12 is simulated again: its saved state is lost"
-  [[nodiscard]] std::vector<std::string> told() const;
+  [[nodiscard]] std::vector<std::string> sentences() const;
 };
 
 /// The state of a frame, to continue from; nothing where it is absent or damaged, which is recorded.

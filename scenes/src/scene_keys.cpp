@@ -28,7 +28,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::size_t kMostTold = 6;  // keys in a message
+constexpr std::size_t kMostShown = 6;  // keys in a message
 
 /// Keys that change pictures and files but not the motion, on every level.
 constexpr std::array<std::string_view, 20> kLooks = {
@@ -420,20 +420,20 @@ KeyDifferences differences(const SceneKeys& here, const SceneKeys& other) {
     const SceneKey *mine = find(here, path), *theirs = find(other, path);
     if (mine != nullptr && theirs != nullptr && mine->value == theirs->value) continue;
     const bool inside = within_another(path, here, other);
-    if (!inside && ++count <= kMostTold) {
-      const auto told = [](const SceneKey* key, const SceneKey* instead) {
+    if (!inside && ++count <= kMostShown) {
+      const auto value_of = [](const SceneKey* key, const SceneKey* instead) {
         if (key != nullptr) return key->value;
         return instead->value == kGiven ? std::string(kNone) : instead->fallback;
       };
-      out.found += (out.found.empty() ? "" : ", ") + path + '=' + told(theirs, mine) + " (here " + told(mine, theirs) + ')';
+      out.found += (out.found.empty() ? "" : ", ") + path + '=' + value_of(theirs, mine) + " (here " + value_of(mine, theirs) + ')';
     }
     if (inside && theirs == nullptr) continue;  // goes with its mapping
     const std::string set = setting(theirs, mine);
     settable = settable && !set.empty();
     out.set += (out.set.empty() ? "" : " ") + set;
   }
-  if (count > kMostTold) out.found += " and " + std::to_string(count - kMostTold) + " more";
-  if (!settable || count > kMostTold) out.set.clear();
+  if (count > kMostShown) out.found += " and " + std::to_string(count - kMostShown) + " more";
+  if (!settable || count > kMostShown) out.set.clear();
   return out;
 }
 

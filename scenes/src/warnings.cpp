@@ -234,30 +234,30 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
   }
 }
 
-bool misses_error(const collision::ContactSurface::Summary& contact, double asked) {
+bool misses_error(const collision::ContactSurface::Summary& contact, double given_error) {
   constexpr double kSlack = 1.01;  // rules end slightly above the given error
-  return contact.error_estimate > kSlack * asked;
+  return contact.error_estimate > kSlack * given_error;
 }
 
 void UnmetContacts::look(const StageContext& context, const collision::ContactSurface& surface, double time) {
-  const double asked = context.model.contact.error;
+  const double given_error = context.model.contact.error;
   const auto kind = [&](std::uint32_t body) -> const std::string& {
     const bool is_group = body < context.bodies.size() && context.bodies[body].origin.is_group();
     return (is_group ? body_name : object_name)(context.model, context.bodies, body);
   };
   for (const auto& s : surface.summary) {
-    if (!misses_error(s, asked) || s.force.norm() == 0.0) continue;  // without force: the given rule does not fit
+    if (!misses_error(s, given_error) || s.force.norm() == 0.0) continue;  // without force: the given rule does not fit
     Worst& worst = worst_[{kind(s.bodies.a), kind(s.bodies.b)}];
     if (worst.times++ == 0) worst.first = time;
     if (s.error_estimate > worst.bound) worst = {s.error_estimate, time, worst.first, worst.times};
   }
 }
 
-void UnmetContacts::add_to(double asked, std::vector<std::string>& warnings) const {
+void UnmetContacts::add_to(double given_error, std::vector<std::string>& warnings) const {
   for (const auto& [pair, worst] : worst_) {
     std::array<char, 160> numbers{};
     std::snprintf(numbers.data(), numbers.size(), " misses the given %.2g: its largest error estimate is %.2g at t = %.6g s, and %llu are too large from t = %.6g s on",
-                  asked, worst.bound, worst.time, static_cast<unsigned long long>(worst.times), worst.first);
+                  given_error, worst.bound, worst.time, static_cast<unsigned long long>(worst.times), worst.first);
     warnings.push_back("contact.error: contact of '" + pair.first + "' and '" + pair.second + '\'' + numbers.data());
   }
 }
@@ -307,14 +307,14 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
            warning.starts_with(bulging);
   });
   std::string text;
-  const auto add = [&](bool told, const char* what, std::uint64_t count) {
-    if (told) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
+  const auto add = [&](bool shown, const char* what, std::uint64_t count) {
+    if (shown) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
   };
   const std::uint64_t bulges = all.not_searched(Unsearched::Bulges);
-  const bool asked = meshing.search.value_or(false) && all.pieces + all.undecided + bulges > 0;
-  add(asked || all.pieces > 0, "pieces of surfaces between the nodes of the lattice, found and added to the meshes of all frames", all.pieces);
-  add(asked || all.undecided > 0, "undecided cells, where a piece may be missing", all.undecided);
-  add(asked || bulges > 0, "meshes of bodies that bulge, which are not searched", bulges);
+  const bool requested = meshing.search.value_or(false) && all.pieces + all.undecided + bulges > 0;
+  add(requested || all.pieces > 0, "pieces of surfaces between the nodes of the lattice, found and added to the meshes of all frames", all.pieces);
+  add(requested || all.undecided > 0, "undecided cells, where a piece may be missing", all.undecided);
+  add(requested || bulges > 0, "meshes of bodies that bulge, which are not searched", bulges);
   for (const auto& [why, what] : {std::pair{Unsearched::Undecided, "meshes that auto does not search, as cells along blends by gradients or tight bends would stay undecided"},
                                   std::pair{Unsearched::Cost, "meshes that auto does not search, as that would cost far more than meshing"}}) {
     add(all.not_searched(why) > 0, what, all.not_searched(why));

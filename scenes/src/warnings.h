@@ -26,7 +26,7 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
                     std::vector<std::string>& warnings);
 
 /// Whether the error estimate of a contact exceeds the given error by more than the tolerance of the rules.
-[[nodiscard]] bool misses_error(const collision::ContactSurface::Summary& contact, double asked);
+[[nodiscard]] bool misses_error(const collision::ContactSurface::Summary& contact, double given_error);
 
 /// Contacts whose error estimate exceeds the given error, by objects. Starts empty after a restart.
 class UnmetContacts {
@@ -34,7 +34,7 @@ class UnmetContacts {
   /// At the end of a step. @param time  [s]
   void look(const StageContext& context, const collision::ContactSurface& surface, double time);
   /// One sentence per pair of objects.
-  void add_to(double asked, std::vector<std::string>& warnings) const;
+  void add_to(double given_error, std::vector<std::string>& warnings) const;
 
  private:
   struct Worst {

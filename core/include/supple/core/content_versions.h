@@ -59,7 +59,7 @@ class ContentVersions {
   struct Content {
     std::vector<std::uint64_t> words;
     std::uint64_t number = 0;
-    bool asked = true;  ///< in this frame
+    bool requested = true;  ///< in this frame
   };
   std::multimap<std::uint64_t, Content> content_;  ///< by hash
   std::uint64_t next_ = 0;

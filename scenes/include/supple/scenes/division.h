@@ -17,9 +17,9 @@ struct Division {
   std::vector<collision::BodyPair> pair;       ///< which of them divide each other
   std::vector<collision::ContactBody> placed;  ///< all bodies, the fixed ones last; claims view it
   std::vector<collision::ClaimField> claim;    ///< of each `body`
-  std::vector<std::vector<std::size_t>> stranger;  ///< for each `body`: the bodies in reach that it never touches and passes through, ascending; empty: none for any body
+  std::vector<std::vector<std::size_t>> excluded;  ///< for each `body`: the bodies in reach that it never touches and passes through, ascending; empty: none for any body
   /// Whether body[k] passes through another one.
-  [[nodiscard]] bool passes(std::size_t k) const { return !stranger.empty() && !stranger[k].empty(); }
+  [[nodiscard]] bool passes(std::size_t k) const { return !excluded.empty() && !excluded[k].empty(); }
   /// The claims that can reduce the region of body[k].
   [[nodiscard]] std::vector<std::size_t> others_of(std::size_t k) const;
   Division() = default;
