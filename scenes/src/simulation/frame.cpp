@@ -37,8 +37,8 @@ std::uint64_t count_never(const StageContext& context, const ObjectModel& object
   return never;
 }
 
-/// Pairs that may ever touch. The particles of a `separate` object are alike to the rules, and so are components that do not break
-/// but for the pairs listed, so the first stands for all. Groups are looked at one by one.
+/// Pairs that may ever touch. The particles of a `separate` object have the same rules, and so have components that do not break
+/// except for the listed pairs, so the first one represents all. Groups are checked one by one.
 std::uint64_t count_present_pairs(const StageContext& context) {
   struct Kind {
     std::uint32_t first = 0;
@@ -46,7 +46,7 @@ std::uint64_t count_present_pairs(const StageContext& context) {
   };
   const std::vector<Body>& bodies = context.bodies;
   std::vector<Kind> kinds;
-  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of those whose bodies are alike
+  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of objects with equal bodies
   const auto count = static_cast<std::uint32_t>(bodies.size() + context.model.fixed.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     if (i < bodies.size()) {
@@ -97,7 +97,7 @@ void index(const StageContext& context, std::size_t i, Frame& frame) {
   frame.indexed[i] = 1;
 }
 
-/// What contact sees of one body.
+/// The contact body of one body.
 void view_body(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
   const Model& model = context.model;
   const Body& own = context.bodies[i];
@@ -117,7 +117,7 @@ void view_body(const StageContext& context, const core::ParticleState& particles
   }
 }
 
-/// A solid that is led along, at its place; its field.
+/// A moving solid at its position, and its field.
 implicit::FieldView lead(const FixedBody& body, double time, LedSolid& led) {
   const SolidPlace place = place_at(body.motion, time);
   led.pose = place.pose;
@@ -141,7 +141,7 @@ implicit::FieldView lead(const FixedBody& body, double time, LedSolid& led) {
       led.solid);
 }
 
-/// Fixed bodies, after the others: all of them when `first_time`, then those that are led along.
+/// Fixed bodies, after the others: all of them when `first_time`, then the moving ones.
 void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& frame) {
   const std::size_t first = frame.reach.size() - model.fixed.size();
   for (std::size_t k = 0; k < model.fixed.size(); ++k) {
@@ -176,7 +176,7 @@ void for_awake(const StageContext& context, const Use& use) {
   }
 }
 
-/// The same from several threads; bodies share nothing there.
+/// The same from several threads; bodies share no data there.
 template <class Use>
 void for_awake_at_once(const StageContext& context, const Use& use) {
   const std::size_t count = context.awake != nullptr ? context.awake->size() : context.bodies.size();
@@ -251,7 +251,7 @@ void flag_reached(const StageContext& context, Frame& frame) {
   std::sort(frame.reached.begin(), frame.reached.end());
 }
 
-/// Where the surfaces of a pair may meet, and the parts that reach there: the only ones that are sampled, unless both bodies are
+/// Where the surfaces of a pair may meet, and the parts in reach: the only ones that are sampled, unless both bodies are
 /// convex, which need no samples to find each other. A rule on State alone, so it decides which kept distances move on.
 void flag_sampled(const StageContext& context, Frame& frame) {
   for (const std::uint32_t i : frame.reached) {
@@ -264,7 +264,7 @@ void flag_sampled(const StageContext& context, Frame& frame) {
   for (const collision::BodyPair& pair : frame.pairs) {
     const auto reaches = [&](std::size_t i) { return i >= context.bodies.size() || frame.near[i] != 0; };
     if ((frame.convex[pair.a] != 0 && frame.convex[pair.b] != 0) || !reaches(pair.a) || !reaches(pair.b)) continue;
-    // Samples look as far as they lie apart, which blends and slopes widen.
+    // Samples search as far as their spacing, which blends and slopes widen.
     const double margin = 2.0 * std::max(spacing_of(pair.a), spacing_of(pair.b));
     const Box shared = frame.surface_box[pair.a].intersection(frame.surface_box[pair.b]).inflated(margin);
     for (const std::uint32_t i : {pair.a, pair.b}) {
@@ -313,7 +313,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
 void StageProfile::scale() {
   cpu_s = apart_s + first_s;
   if (timed > 1) cpu_s += later_s * static_cast<double>(calls - 1) / static_cast<double>(timed - 1);
-  cpu_s = std::max(cpu_s, 0.0);  // of next to nothing, without what the clock took
+  cpu_s = std::max(cpu_s, 0.0);  // for very short times, without the duration of the clock reading
 }
 
 StageTimer::StageTimer(StageProfile& profile, bool timed) : profile_(profile), timed_(timed || profile.calls == 0) {
