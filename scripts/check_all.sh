@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The slower checks, before a release: a second compiler, static analysis, all checks of its sanitizers, the thread sanitizer, headers that stand alone,
-# the installed package. Writes docs/checks.md. Planted defects take hours and have scripts/mutate.sh.
+# The slower checks, for use before a release: clang, static analysis, clang's sanitizers, the thread sanitizer, every header compiled alone,
+# the installed package. Writes docs/checks.md. Planted defects take hours and are run by scripts/mutate.sh.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -22,7 +22,7 @@ logs=$supple_root/build/logs
 clang_build=$supple_root/build/clang
 sanitizer_build=$supple_root/build/asan_clang
 
-# Without precompiled headers: clang reads none of GCC's, and what a file uses it must include.
+# Without precompiled headers: clang cannot read those of GCC, and every file must include what it uses.
 configure_clang() {
   cmake -S "$supple_root" -B "$clang_build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=clang++ -DSUPPLE_PRECOMPILE_HEADERS=OFF \
     -DSUPPLE_WARNINGS_AS_ERRORS=ON -DSUPPLE_BUILD_TESTS=ON -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \

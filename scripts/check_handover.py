@@ -1,8 +1,8 @@
-"""Opens the files of a run with the software that people have and compares them with what the run says of itself.
+"""Opens the files of a run with USD, VTK, OpenEXR and Blender and compares them with each other and with the tables of the run.
 
     check_handover.py FOLDER NAME      after: supple run SCENE with output {mesh: [usd, obj, ply], particles: [csv, vtk],
                                        contacts: [csv, vtk], meshing: {motion: true}}
-Needs usd-core, vtk, OpenEXR, numpy and, where present, bpy (Blender). Prints one line a check and ends with 1 if one fails.
+Needs usd-core, vtk, OpenEXR, numpy and, where present, bpy (Blender). Prints one line per check; exit code 1 if one fails.
 """
 import csv
 import pathlib
@@ -22,7 +22,7 @@ def check(what, holds, detail=""):
 
 
 def read_ply(path):
-    """Positions, triangles and columns of our binary PLY."""
+    """Positions, triangles and columns of a binary PLY file of supple."""
     data = path.read_bytes()
     end = data.index(b"end_header\n") + 11
     header = data[:end].decode().split("\n")

@@ -1,6 +1,6 @@
 # shellcheck shell=bash
 # Debian packages by purpose, and how they are installed. Sourced by the other scripts:
-#   install_packages build run      installs what is missing of these sets, does nothing when all is there
+#   install_packages build run      installs the missing packages of these sets
 
 declare -A supple_packages=(
   [build]="cmake ninja-build g++ ccache

@@ -1,13 +1,13 @@
 # shellcheck shell=bash
-# The installed package as a stranger meets it. Sourced.
+# Checks the installed package from a minimal external project. Sourced.
 
-# What each component stands on beside those before it: CMake packages, and libraries that are found by file.
+# Dependencies of each component beyond those of the components it needs: CMake packages, and libraries found by file.
 declare -A component_packages=([core]="Eigen3 TBB hwy" [implicit]="" [cgal]="" [collision]="" [render]="OpenEXR" [scenes]="yaml-cpp")
 declare -A component_libraries=([core]="" [implicit]="openvdb" [cgal]="gmp mpfr" [collision]="" [render]="deflate embree3" [scenes]="")
 declare -A component_needs=([core]="" [implicit]="core" [cgal]="core implicit" [collision]="core implicit" [render]="core"
   [scenes]="core implicit collision render")
 
-# check_component NAME PREFIX SCRATCH: builds tests/package/component against it and runs that, all that it does not stand on hidden.
+# check_component NAME PREFIX SCRATCH: builds and runs tests/package/component against one component, with all libraries hidden that it does not need.
 check_component() {
   local name=$1 prefix=$2 build=$3/component_$1 one hide=() packages="" libraries=""
   for one in ${component_needs[$name]} "$name"; do packages+=" ${component_packages[$one]}" libraries+=" ${component_libraries[$one]}"; done
@@ -22,15 +22,15 @@ check_component() {
     -DCOMPONENT="$name" "${hide[@]}" && cmake --build "$build" && "$build/component"
 }
 
-# check_package BUILD_FOLDER: installs it into a scratch prefix and moves that, checks that no path of the source, of the build or of a
-# library went along and that scenes, documents and licence did, tries each component alone, builds tests/package against all of it and
-# runs that on a scene.
+# check_package BUILD_FOLDER: installs a build into a scratch prefix and moves it; checks that no path of the source, the build or a
+# library is exported and that scenes, documents and licence are installed; tests each component alone; builds tests/package against
+# the whole package and runs it on a scene.
 check_package() {
   local build=$1 scratch=$supple_root/build/package name
   rm -rf "$scratch"
   cmake --install "$build" --prefix "$scratch/first" && mv "$scratch/first" "$scratch/prefix" || return 1
   if grep -rnE --include='*.cmake' "$supple_root|[\"; ]/[A-Za-z0-9_./+-]*\.(so|a)" "$scratch/prefix"; then
-    echo "error: the installed package names a place of the machine it was built on (lines above)"
+    echo "error: the installed package contains absolute paths of the build machine (lines above)"
     return 1
   fi
   for name in LICENSE architecture.md ball_hits_spiral.yaml; do
@@ -43,7 +43,7 @@ check_package() {
   cmake -S "$supple_root/tests/package" -B "$scratch/build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
     -DCMAKE_PREFIX_PATH="$scratch/prefix" || return 1
   cmake --build "$scratch/build" || return 1
-  "$scratch/build/stranger" "$supple_root/tests/package/two_balls.yaml" || return 1
+  "$scratch/build/minimal_project" "$supple_root/tests/package/two_balls.yaml" || return 1
   [[ -d $build/python ]] || return 0
   local package
   package=$(find "$scratch/prefix" -path '*/supple/__init__.py')

@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Parts of a longer script, each with one line on the terminal, its output in a log, and its time. Sourced.
+# Runs the parts of a longer script: one line with the time on the terminal, the output in a log. Sourced.
 
 export CCACHE_SLOPPINESS=pch_defines,time_macros
 

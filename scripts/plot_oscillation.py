@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Figure 4 of Lombardo & Puech 1995: how three particles shake after their release, under two laws.
+"""Figure 4 of Lombardo & Puech 1995: oscillation of three particles after their release, under two laws.
 
 Runs scenes/library/figures/oscillation_{lennard_jones,cohesion}.yaml once for every release ratio and draws
 sqrt(sum |v_i - mean v|^2), the oscillation measure O(t) per time, as SVG. Python's standard library only.

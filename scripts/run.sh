@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# From a scene file to a film: installs what is missing, builds, simulates, renders.
+# From a scene file to a film: installs missing packages, builds, simulates, renders.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -17,7 +17,7 @@ fi
 
 scene=$1
 shift
-# A path counts from where the command is typed; failing that, from the project's folder.
+# A path is relative to the current folder, or else to the project's folder.
 if [[ ! -e $scene && -e $supple_root/$scene ]]; then scene=$supple_root/$scene; fi
 if [[ ! -f $scene ]]; then
   echo "error: $scene: expected a scene file, found none; see scenes/library" >&2
@@ -26,7 +26,7 @@ fi
 name=$(basename "$scene")
 name=${name%.*}
 
-# Without --out the folder is ours, and an earlier result in it is replaced, or continued when --resume asks for that.
+# Without --out the output goes to out/NAME, where an earlier result is replaced, or continued with --resume.
 own_folder=1 replace=1
 for argument in "$@"; do
   case $argument in
@@ -41,7 +41,7 @@ fi
 
 install_packages build run
 tests=()
-# The first build is without tests; later ones keep what the folder was configured for.
+# The first build is without tests; later builds keep the configuration of the folder.
 [[ -f $supple_root/build/release/CMakeCache.txt ]] || tests=(-DSUPPLE_BUILD_TESTS=OFF)
 part "build (release)" "$supple_root/build/logs/run_build.log" configure_and_build release supple_tool "${tests[@]}" || exit 1
 

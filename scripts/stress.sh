@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What must never happen, tried: hostile and mutated inputs, failing memory and disks, kills, races, long runs. Rows and counts: docs/reliability.md.
+# Stress tests: hostile and mutated inputs, failing memory and disks, kills, races, long runs. Rows and counts: docs/reliability.md.
 #   scripts/stress.sh [ROW...] [--seed N] [--share 0.1] [--report] [--self-test]     all rows when none is named, about an hour on two cores
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -15,12 +15,12 @@ for word in "$@"; do
 done
 
 install_packages build run test
-# Another build folder is taken as it is.
+# Another build folder is used as it is, without building.
 if [[ $build == "$supple_root/build/release" ]]; then
   log=$supple_root/build/logs/stress_build.log
   mkdir -p "$(dirname "$log")"
   targets=(stress supple_tool scenes_tests collision_tests implicit_tests core_tests core_stress contact_stress)
-  # A folder that is configured keeps its options.
+  # A configured folder keeps its options.
   [[ -f $build/build.ninja ]] || cmake -S "$supple_root" --preset release -DSUPPLE_BUILD_TESTS=ON >"$log" 2>&1
   cmake --build "$build" --target "${targets[@]}" >>"$log" 2>&1 || { tail -n 40 "$log" && exit 1; }
 fi

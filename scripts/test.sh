@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Everything a change must pass: optimised build and its tests, the libraries under address and undefined-behaviour
-# sanitizers, the installed package as a stranger uses it, and a small film from end to end.
+# Everything a change must pass: optimised build and tests, the tests under address and undefined-behaviour
+# sanitizers, a minimal external project on the installed package, and a small film from end to end.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -15,7 +15,7 @@ fi
 
 run_tests() { cd "$supple_root" && ctest --preset "$1" -j "$supple_jobs" --no-tests=error; }
 
-# A film of a few small frames, from the scene file to the MP4, checked by what it leaves.
+# Makes a film of a few small frames, from the scene file to the MP4, and checks the files.
 small_film() {
   local out=$supple_root/build/small_film
   rm -rf "$out"

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Files that are compiled as one (MODULE/together.cmake).
+"""Groups of source files that are compiled as one translation unit (MODULE/together.cmake).
 
-Two files go together when neither holds, anywhere in its text, a name that the other keeps to itself: an anonymous namespace, a static,
-an alias, a macro. So nothing that a file says changes its meaning beside the others of its group.
+Two files may share a group when neither contains, anywhere in its text, a name that is private to the other: in an anonymous namespace, a
+static, an alias, a macro. So no name changes its meaning beside the other files of its group.
 
 usage: scripts/together.py [--write] [MODULE ...]     all modules when none is named
-Says which groups break that rule and exits with 1 if one does. --write makes the groups anew, of at most 50,000 characters.
+Lists the groups that break this rule; exit code 1 if there are any. --write makes new groups of at most 50,000 characters.
 """
 import re
 import sys
@@ -14,10 +14,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = ["core", "implicit", "collision", "render", "scenes"]
 LARGEST_GROUP = 50_000  # characters
-# What cannot be in a group: vector code that includes itself, namespaces that are opened as a whole, macros of one file alone, headers of
-# OpenGL that exclude each other, and OpenVDB, which is large.
+# Files that cannot be in a group: vector code that includes itself, using-directives of namespaces, macros of a single file, OpenGL
+# headers that exclude each other, and OpenVDB, which is large.
 ALONE = re.compile(r"HWY_TARGET_INCLUDE|^using namespace |SUPPLE_VERSION|<GL/osmesa.h>|<EGL/egl.h>|<openvdb/", re.MULTILINE)
-# Groups that are given: they open the same namespaces, or have compile options of their own.
+# Fixed groups: they use the same namespaces, or have compile options of their own.
 GIVEN = {
     "implicit": [["src/grid/surface_grid.cpp", "src/grid/grid_leaves.cpp", "src/grid/grid_updater.cpp", "src/grid/union_updater.cpp"]],
     "render": [["src/path/integrator.cpp", "src/path/details.cpp", "src/path/tracer.cpp", "src/path/paint.cpp"],
@@ -31,7 +31,7 @@ def without_texts(source: str) -> str:
 
 
 def own_names(source: str) -> set:
-    """Names that a file keeps to itself, by the lines that begin at the left margin."""
+    """Private names of a file, from the lines that begin at the left margin."""
     names, own = set(), False
     for line in source.split("\n"):
         if re.match(r"\}\s*// namespace\s*$", line):

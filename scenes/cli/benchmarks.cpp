@@ -21,24 +21,24 @@ struct Group {
   std::string_view name;
   std::string_view program;
   std::string_view measures;
-  bool names = false;  ///< what follows the group in a name is for the program
+  bool names = false;  ///< the program takes the rest of a name that begins with the group
 };
 
 constexpr std::array<Group, 14> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
-    {"core/integrators", "integrator_bench", "time against error of every integrator; a file name after it: plot (SVG)"},
-    {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
+    {"core/integrators", "integrator_bench", "time against error of every integrator; with a file name: plot (SVG)"},
+    {"core/stability", "core_stress", "largest stable steps; with a file name: map (SVG)"},
     {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)", true},
-    {"implicit/mesh", "mesh_bench", "surface meshes beside their error (w1/64 to w4/512)", true},
-    {"collision", "contact_bench", "one contact query: time, points and error; a file name after it: that of collision/rules, too"},
-    {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; after it: poses, case"},
-    {"collision/invariance", "contact_invariance", "what changes in swapped, turned and scaled queries; after it: poses, case"},
-    {"collision/thin", "contact_thin", "contact queries of bodies that barely overlap; after it: poses, seed"},
-    {"collision/rules", "contact_rules", "time against error of the rules of the contact surface; a file name after it: plot (SVG)"},
-    {"collision/stability", "contact_stress", "contact tried hard; after it: --seed N, file name of a map (SVG)"},
-    {"collision/pile", "contact_pile", "steps of settled balls and of 100,000; after it: numbers of balls"},
-    {"collision/conservation", "contact_conservation", "momenta and energy of free balls; after it: steps"},
-    {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a stated noise)", true},
+    {"implicit/mesh", "mesh_bench", "surface meshes and their errors (w1/64 to w4/512)", true},
+    {"collision", "contact_bench", "one contact query: time, points and error; with a file name: also the plot of collision/rules"},
+    {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; arguments: number of poses, case"},
+    {"collision/invariance", "contact_invariance", "differences between swapped, rotated and scaled queries; arguments: number of poses, case"},
+    {"collision/thin", "contact_thin", "contact queries of bodies that barely overlap; arguments: number of poses, seed"},
+    {"collision/rules", "contact_rules", "time against error of the rules of the contact surface; with a file name: plot (SVG)"},
+    {"collision/stability", "contact_stress", "stability of contact in extreme scenes; arguments: --seed N, file name of a map (SVG)"},
+    {"collision/pile", "contact_pile", "steps of settled balls, up to 100,000; arguments: numbers of balls"},
+    {"collision/conservation", "contact_conservation", "momenta and energy of free balls; arguments: number of steps"},
+    {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a given noise)", true},
 }};
 
 fs::path program_path(const Group& group) { return fs::read_symlink("/proc/self/exe").parent_path() / group.program; }
@@ -57,7 +57,7 @@ std::string list_benchmarks() {
 }
 
 void run_benchmark(const std::string& group, std::span<const std::string> arguments) {
-  // The longest name that leads: "core/stability" before "core", whose program takes the rest of the name.
+  // The longest group that begins the name: "core/stability" before "core", whose program takes the rest of the name.
   const Group* found = nullptr;
   for (const Group& known : kGroups) {
     const bool leads = group == known.name || group.starts_with(std::string(known.name) + '/');
@@ -70,7 +70,7 @@ void run_benchmark(const std::string& group, std::span<const std::string> argume
                                         .key = {},
                                         .expected = "expected a group of benchmarks",
                                         .found = "'" + group + "'",
-                                        .hint = "known: " + known + "; supple bench --list tells what they measure"});
+                                        .hint = "known: " + known + "; supple bench --list says what they measure"});
   }
   const fs::path program = program_path(*found);
   std::vector<std::string> words{program.string()};

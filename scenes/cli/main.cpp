@@ -48,13 +48,13 @@ constexpr int kInternal = 1;
 constexpr int kSignalExit = 128;
 
 constexpr const char* kFilmRule =
-    "A film (and its contact sheet) shows frames of one look: the film is made where all frames from 1 to the last one simulated have\n"
-    "a picture, drawn by this build with the same keys. Else there is no film, an earlier one that shows others is removed, and a\n"
+    "A film and a contact sheet contain only pictures drawn by the same build with the same keys. The film is made if all frames from\n"
+    "1 to the last simulated one have such a picture. Otherwise there is no film, an earlier film of other pictures is removed, and a\n"
     "warning names the frames.\n\n";
 
 std::atomic<int> interrupted{0};
 
-/// The first one is seen between two steps, a second one ends the program.
+/// The first signal ends the run between two steps, a second one ends the program.
 void on_signal(int number) {
   interrupted = number;
   std::signal(number, SIG_DFL);
@@ -141,7 +141,7 @@ scenes::SimulationOptions simulation_options(int threads) {
   return options;
 }
 
-/// Of a simulation that is looked at only.
+/// Of a simulation that answers questions and takes no step.
 scenes::SimulationOptions question_options(int threads, double memory) {
   scenes::SimulationOptions options = simulation_options(threads);
   options.questions = true;
@@ -299,20 +299,20 @@ int bench(const Arguments& arguments) {
 
 void scene_option(CLI::App* verb, Arguments& a) {
   verb->add_option("scene", a.scene, "scene file (YAML)")->required();
-  verb->add_option("--set", a.set, "override a key, e.g. --set objects.ball.particles.mass=2")->take_all();
+  verb->add_option("--set", a.set, "override a key, e.g. --set objects.ball.particles.mass=2; may be repeated")->take_all();
 }
 
 void run_flags(CLI::App* verb, Arguments& a) {
   scene_option(verb, a);
   verb->add_option("--out", a.out, "output folder (default: out/NAME)");
   verb->add_option("--frames", a.frames, "frames to output, e.g. 1-50,60,70-90:2 (default: all)");
-  verb->add_option("--threads", a.threads, "threads (default: all; changes no bit)")->check(CLI::Range(0, 1024));
+  verb->add_option("--threads", a.threads, "number of threads (default: all); does not change results")->check(CLI::Range(0, 1024));
   verb->add_option("--progress", a.progress, "auto, bar, plain or none")
       ->check(CLI::IsMember({"auto", "bar", "plain", "none"}));
-  verb->add_option("--context", a.context, "OpenGL context: auto, osmesa or egl")
+  verb->add_option("--context", a.context, "OpenGL context: auto, osmesa (software) or egl")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}));
-  verb->add_flag("--profile", a.profile, "time every call of every stage");
-  verb->add_flag("--quiet", a.quiet, "print faults only");
+  verb->add_flag("--profile", a.profile, "measures the time of every stage");
+  verb->add_flag("--quiet", a.quiet, "print warnings and errors only");
 }
 
 /// NaN where the text is no finite number.
@@ -332,104 +332,104 @@ void memory_flag(CLI::App* verb, Arguments& a, const std::string& what) {
 }
 
 void drawing_flags(CLI::App* verb, Arguments& a) {
-  verb->add_option("--at-once", a.at_once, "frames in work at the same time (default: one a thread, as memory allows; changes no bit)")
+  verb->add_option("--at-once", a.at_once, "frames drawn at the same time (default: one per thread, as memory allows); does not change results")
       ->check(CLI::Range(0, 64));
-  memory_flag(verb, a, "for the scene, which is refused if it takes more (default: 8G), and for frames at the same time (default: half of what is free)");
+  memory_flag(verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G), and for frames drawn at the same time (default: half of the free memory)");
 }
 
-/// @param silent  nobody reads standard output: what only accompanies files is not printed
+/// @param silent  standard output is closed: text that only accompanies files is not printed
 int parse_and_call(int argc, char** argv, bool silent) {
   Arguments a;
   a.quiet = silent;
-  CLI::App app("supple: oriented particles, implicit surfaces, exact contact");
+  CLI::App app("supple simulates and draws deformable bodies: oriented particles, implicit surfaces, exact contact");
   app.set_version_flag("--version", SUPPLE_VERSION);
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done, 1 internal fault, 2 usage, 3 scene invalid, 4 input/output, 5 diverged, 6 limit,\n"
-             "7 corrupt checkpoint, 130/143 interrupted.");
+  app.footer("Exit codes: 0 done, 1 internal error, 2 usage, 3 invalid scene, 4 input/output, 5 diverged, 6 limit,\n"
+             "7 unusable saved state, 130/143 interrupted.");
 
-  CLI::App* run_verb = app.add_subcommand("run", "simulate, surface, render and film a scene");
+  CLI::App* run_verb = app.add_subcommand("run", "simulate a scene and write its outputs");
   run_flags(run_verb, a);
-  run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, of whatever scene");
-  run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; those lost or damaged are simulated again");
-  run_verb->add_flag("--simulate-only", a.simulate_only, "no surface, image or film");
+  run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, whatever its scene");
+  run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; frames whose states are lost or damaged are simulated again");
+  run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or tables");
   drawing_flags(run_verb, a);
-  run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume goes on from the last saved state")
+  run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume continues from the last saved state")
       ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
-  run_verb->add_flag("--render-only", a.render_only, "pictures and film from the saved states of an earlier run, as `supple render`");
+  run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
   run_verb->footer(std::string(kFilmRule) +
-                   "With --frames a run ends with the last of them, result.json says how far it came, and --resume goes on from there.\n\n"
+                   "With --frames a run ends after the last of them; result.json holds its last frame, and --resume continues from there.\n\n"
                    "Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");
 
   CLI::App* render_verb = app.add_subcommand("render", "draw the frames of a run again from its saved states");
   run_flags(render_verb, a);
-  render_verb->add_flag("--overwrite", a.overwrite, "draw pictures that are there and up to date again, too");
+  render_verb->add_flag("--overwrite", a.overwrite, "draw all pictures again, also those that are up to date");
   drawing_flags(render_verb, a);
-  render_verb->add_flag("--sheet", a.sheet, "only the contact sheet, of the frames that are there");
+  render_verb->add_flag("--sheet", a.sheet, "make only the contact sheet, from the existing pictures");
   render_verb->footer(std::string(kFilmRule) + "Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
 
-  CLI::App* export_verb = app.add_subcommand("export", "files for other tools from the saved states of a run");
+  CLI::App* export_verb = app.add_subcommand("export", "write files for other tools from the saved states of a run");
   run_flags(export_verb, a);
-  export_verb->add_option("--mesh", a.meshes, "surfaces: ply, obj, usd, separated by commas");
+  export_verb->add_option("--mesh", a.meshes, "meshes of the surfaces: ply, obj, usd, separated by commas");
   export_verb->add_option("--grid", a.grids, "fields: vdb");
   export_verb->add_option("--particles", a.particles, "particles and bonds: csv, vtk");
   export_verb->add_option("--contacts", a.contacts, "points of the contact surfaces: csv, vtk");
   export_verb->add_option("--samples", a.sample_tables, "points spread evenly over the surfaces: csv, vtk");
-  memory_flag(export_verb, a, "for the scene, which is refused if it takes more (default: 8G)");
+  memory_flag(export_verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G)");
   export_verb->footer("Example: supple export scenes/library/contacts/two_balls.yaml --out out/two_balls --mesh usd --particles vtk");
 
-  CLI::App* info_verb = app.add_subcommand("info", "what a run folder holds: outcome, audits, times, files");
+  CLI::App* info_verb = app.add_subcommand("info", "show what a run folder holds: outcome, audits, times, files");
   info_verb->add_option("run", a.scene, "run folder")->required();
   info_verb->footer("Example: supple info out/two_balls");
 
-  CLI::App* compare_verb = app.add_subcommand("compare", "frames of two runs side by side, with their difference");
+  CLI::App* compare_verb = app.add_subcommand("compare", "put frames of two runs side by side, with their difference");
   compare_verb->add_option("first", a.scene, "run folder")->required();
   compare_verb->add_option("second", a.other, "run folder")->required();
   compare_verb->add_option("--out", a.out, "output folder (default: out/compare)");
-  compare_verb->add_option("--gain", a.gain, "of the difference pictures")->check(CLI::Range(1.0, 255.0));
-  compare_verb->add_option("--camera", a.camera, "whose frames, where a run has several cameras");
+  compare_verb->add_option("--gain", a.gain, "factor of the differences in the pictures (default: 8)")->check(CLI::Range(1.0, 255.0));
+  compare_verb->add_option("--camera", a.camera, "camera whose frames are compared, for runs with several cameras");
   compare_verb->add_flag("--no-film", a.no_film, "frames and table only");
   compare_verb->footer("Example: supple compare out/literal out/consistent --out out/compare");
 
-  CLI::App* check_verb = app.add_subcommand("check", "read a scene and report every fault in it");
+  CLI::App* check_verb = app.add_subcommand("check", "read a scene and report every error in it");
   scene_option(check_verb, a);
-  check_verb->add_flag("--quiet", a.quiet, "print faults only");
-  memory_flag(check_verb, a, "to look at all of the scene (default: 200M, and counts alone of a scene that takes more)");
+  check_verb->add_flag("--quiet", a.quiet, "print warnings and errors only");
+  memory_flag(check_verb, a, "limit of memory of the check (default: 200M); of a scene that needs more only the counts are checked");
   check_verb->footer("Example: supple check my_scene.yaml");
 
-  CLI::App* explain_verb = app.add_subcommand("explain", "print the stages a scene runs, each with the reason");
+  CLI::App* explain_verb = app.add_subcommand("explain", "print which stages a scene runs, each with the reason");
   scene_option(explain_verb, a);
   explain_verb->add_flag("--simulate-only", a.simulate_only, "as if no output were requested");
-  memory_flag(explain_verb, a, "for the scene, which is refused if it takes more (default: 8G)");
+  memory_flag(explain_verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G)");
   explain_verb->footer("Example: supple explain scenes/library/contacts/two_balls.yaml");
 
-  CLI::App* query_verb = app.add_subcommand("query", "forces, contact, field or mesh of a state, as JSON");
+  CLI::App* query_verb = app.add_subcommand("query", "print forces, contact, field or mesh of a state as JSON");
   query_verb->add_option("what", a.query, "forces, contact, field or mesh")
       ->required()
       ->check(CLI::IsMember({"forces", "contact", "field", "mesh"}));
   scene_option(query_verb, a);
-  query_verb->add_option("--state", a.state, "a saved state instead of the initial one");
-  query_verb->add_option("--points", a.points, "field: CSV of points");
+  query_verb->add_option("--state", a.state, "saved state to use instead of the initial one");
+  query_verb->add_option("--points", a.points, "field: CSV file of points (x, y, z in m)");
   query_verb->add_option("--cells", a.cells, "mesh: cells along the longest side")->check(CLI::Range(4, 4096));
   query_verb->add_option("--out", a.out, "mesh: .ply or .obj file, or folder, to write");
-  query_verb->add_option("--error", a.error, "contact: relative error asked for, 1e-10 to 0.1")->check([](const std::string& text) {
+  query_verb->add_option("--error", a.error, "contact: relative error, 1e-10 to 0.1, instead of contact.error")->check([](const std::string& text) {
     const double error = number_in(text);  // CLI::Range prints its bounds with six digits
     return error >= 1e-10 && error <= 0.1 ? std::string() : "expected a number from 1e-10 to 0.1, found " + text;
   });
-  query_verb->add_option("--threads", a.threads, "threads")->check(CLI::Range(0, 1024));
-  query_verb->add_flag("--samples", a.samples, "contact: every point of the contact surface too");
+  query_verb->add_option("--threads", a.threads, "number of threads (default: all)")->check(CLI::Range(0, 1024));
+  query_verb->add_flag("--samples", a.samples, "contact: also every quadrature point of the contact surface");
   query_verb->add_flag("--json", a.json, "JSON (always; accepted for scripts)");
-  memory_flag(query_verb, a, "for the scene, which is refused if it takes more (default: 8G)");
+  memory_flag(query_verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G)");
   query_verb->footer("Example: supple query contact scenes/library/contacts/two_balls.yaml --error 1e-6");
 
-  CLI::App* bench_verb = app.add_subcommand("bench", "benchmarks of a source tree: time beside size, error and hash");
-  bench_verb->add_option("group", a.group, "group or group/name, e.g. core or core/melt; its program gets what follows, options too");
+  CLI::App* bench_verb = app.add_subcommand("bench", "run benchmarks of a source tree: time, size, error and hash");
+  bench_verb->add_option("group", a.group, "group or group/name, e.g. core or core/melt; further arguments and options are passed to its program");
   bench_verb->allow_extras();
-  bench_verb->add_flag("--list", a.list, "the groups");
-  bench_verb->add_flag("--json", a.json, "JSON lines (always where there are lines; accepted for scripts)");
+  bench_verb->add_flag("--list", a.list, "list the groups");
+  bench_verb->add_flag("--json", a.json, "JSON lines (always; accepted for scripts)");
   bench_verb->footer("Example: supple bench core/integrators integrators.svg");
 
   CLI::App* reference_verb = app.add_subcommand("reference", "print every key of scene files, with defaults and units");
-  reference_verb->add_flag("--schema", a.json, "as a JSON Schema, for editors");
+  reference_verb->add_flag("--schema", a.json, "print a JSON Schema for editors instead");
   reference_verb->footer("Example: supple reference --schema > supple.schema.json");
 
   try {
@@ -466,7 +466,7 @@ void flush_output() {
   throw Error(ErrorKind::Io, Fault{.place = "standard output", .key = {}, .expected = "cannot be written", .found = {}, .hint = {}});
 }
 
-/// @param silent  nobody reads standard output   @return the exit code
+/// @param silent  standard output is closed   @return the exit code
 int call(int argc, char** argv, bool silent) {
   try {
     const int code = parse_and_call(argc, argv, silent);

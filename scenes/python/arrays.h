@@ -1,4 +1,4 @@
-/// NumPy arrays that show memory of the library.
+/// NumPy arrays over memory of the library.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -37,7 +37,7 @@ inline py::array view(std::span<const Quat> v, const py::handle& base) {
   return view(v.empty() ? nullptr : v.front().coeffs().data(), {std::ssize(v), 4}, base);
 }
 
-/// An array of its own from what a call gave back.
+/// An array that owns the values.
 template <class T>
 py::array own(std::vector<T> values) {
   const auto owner = std::make_shared<std::vector<T>>(std::move(values));

@@ -1,4 +1,4 @@
-/// What the files of the Python module share: one function a topic, and a simulation as Python holds it.
+/// Declarations that the files of the Python module share: one function per topic, and a simulation as Python holds it.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -52,7 +52,7 @@ class Handle {
     const std::lock_guard turn(queue_);
     return std::forward<F>(f)(simulation_);
   }
-  /// For what never changes: the scene, and where arrays lie.
+  /// For what never changes: the scene, and the addresses of arrays.
   [[nodiscard]] const scenes::Simulation& fixed() const { return simulation_; }
 
   std::atomic<bool> cancelled{false};
@@ -64,7 +64,7 @@ class Handle {
 
 using Simulation = py::class_<Handle, std::shared_ptr<Handle>>;
 
-/// The class, and what it has by itself; topics add their calls to it.
+/// The class with its basic methods; topics add theirs.
 Simulation bind_simulation(py::module_& module);
 void bind_particles(py::module_& module, Simulation& simulation);
 void bind_contacts(py::module_& module, Simulation& simulation);

@@ -38,69 +38,69 @@ py::array rows(const Pair& pair, const std::vector<T>& column) {
   return view(std::span<const T>(column).subspan(pair.of().first, pair.of().last - pair.of().first), keep(pair.report));
 }
 
-/// What a pair of a report and a contact of two bodies alone have in common.
+/// Properties that ContactPair and PairContact have in common.
 template <class Class>
 void add_summary(Class& type) {
   using T = typename Class::type;
   type.def_property_readonly(
           "elastic_force", [](const T& p) { return vector(p.summary().force); },
-          "On a, without damping and friction [N], shape (3,); b gets the opposite.")
+          "Force on a, without damping and friction [N], shape (3,); b gets the opposite.")
       .def_property_readonly(
           "moment", [](const T& p) { return vector(p.summary().moment); },
-          "Of elastic_force about the world origin [N m], shape (3,).")
+          "Moment of elastic_force about the world origin [N m], shape (3,).")
       .def_property_readonly(
-          "centre_of_pressure", [](const T& p) { return vector(p.summary().centre_of_pressure); }, "[m], shape (3,)")
+          "centre_of_pressure", [](const T& p) { return vector(p.summary().centre_of_pressure); }, "Centre of pressure [m], shape (3,)")
       .def_property_readonly(
-          "area", [](const T& p) { return p.summary().area; }, "[m^2]")
+          "area", [](const T& p) { return p.summary().area; }, "Area of the contact surface [m^2]")
       .def_property_readonly(
           "load", [](const T& p) { return p.summary().load; }, "Integral of the pressure over the contact surface [N].")
       .def_property_readonly(
-          "energy", [](const T& p) { return p.summary().energy; }, "Of compression [J].")
+          "energy", [](const T& p) { return p.summary().energy; }, "Energy of compression [J].")
       .def_property_readonly(
-          "largest_pressure", [](const T& p) { return p.summary().largest_pressure; }, "[Pa]")
+          "largest_pressure", [](const T& p) { return p.summary().largest_pressure; }, "Largest pressure [Pa]")
       .def_property_readonly(
-          "largest_overlap", [](const T& p) { return p.summary().largest_overlap; }, "Of the undeformed bodies [m].")
+          "largest_overlap", [](const T& p) { return p.summary().largest_overlap; }, "Largest overlap of the undeformed bodies [m].")
       .def_property_readonly(
           "error_estimate", [](const T& p) { return p.summary().error_estimate; },
-          "Bound of the relative error of elastic_force, area and centre_of_pressure [1].")
+          "Estimate of the relative error of elastic_force, area and centre_of_pressure, the largest of the three [1].")
       .def_property_readonly(
           "rule", [](const T& p) { return scenes::rule_name(p.summary().rule); },
-          "What integrates: \"polar\", \"samples\", \"march\" or \"panels\"; \"none\" where nothing touches.")
+          "Quadrature rule: \"polar\", \"samples\", \"march\" or \"panels\"; \"none\" where nothing touches.")
       .def_property_readonly(
-          "patches", [](const T& p) { return p.summary().patches; }, "Connected parts of the contact surface.")
+          "patches", [](const T& p) { return p.summary().patches; }, "Number of contact patches.")
       .def_property_readonly(
-          "evaluations", [](const T& p) { return p.summary().evaluations; }, "Field evaluations spent.");
+          "evaluations", [](const T& p) { return p.summary().evaluations; }, "Number of field evaluations.");
 }
 
 void bind_pair(py::module_& module) {
   py::class_<Pair> pair(
       module, "ContactPair",
-      "Two bodies that touch, and the points of their contact surface: sums over the points are integrals.");
+      "Two bodies in contact, and the quadrature points of their contact surface: sums over the points are integrals.");
   pair.def_property_readonly(
           "a", [](const Pair& p) { return p.of().a; }, "Name of the first body.")
       .def_property_readonly(
           "b", [](const Pair& p) { return p.of().b; }, "Name of the second body.")
       .def_property_readonly(
           "force", [](const Pair& p) { return vector(p.of().force); },
-          "On a, damping and friction included [N], shape (3,); b gets the opposite.")
+          "Force on a, damping and friction included [N], shape (3,); b gets the opposite.")
       .def_property_readonly(
-          "dissipated_power", [](const Pair& p) { return p.of().dissipated_power; }, "By damping and friction [W].")
+          "dissipated_power", [](const Pair& p) { return p.of().dissipated_power; }, "Power dissipated by damping and friction [W].")
       .def_property_readonly(
-          "dissipated_work", [](const Pair& p) { return p.of().dissipated_work; }, "By damping and friction since the start [J].")
+          "dissipated_work", [](const Pair& p) { return p.of().dissipated_work; }, "Work dissipated by damping and friction since the start [J].")
       .def_property_readonly(
           "point", [](const Pair& p) { return rows(p, p.report->points.point); },
-          "[m], shape (points, 3), a view of the report.")
+          "Positions [m], shape (points, 3), a view of the report.")
       .def_property_readonly(
           "normal", [](const Pair& p) { return rows(p, p.report->points.normal); },
-          "Unit, out of a and into b, shape (points, 3), a view of the report.")
+          "Unit normals, out of a and into b, shape (points, 3), a view of the report.")
       .def_property_readonly(
           "point_area", [](const Pair& p) { return rows(p, p.report->points.area); },
-          "What each point stands for [m^2], shape (points,), a view of the report.")
+          "Area that each point stands for [m^2], shape (points,), a view of the report.")
       .def_property_readonly(
           "pressure", [](const Pair& p) { return rows(p, p.report->points.pressure); },
-          "[Pa], shape (points,), a view of the report.")
+          "Elastic pressure [Pa], shape (points,), a view of the report.")
       .def("__repr__", [](const Pair& p) {
-        return py::str("<supple.ContactPair {} and {}, |force| = {:.4g} N, area = {:.4g} m^2, error at most {:.1e}>")
+        return py::str("<supple.ContactPair {} and {}, |force| = {:.4g} N, area = {:.4g} m^2, error estimate {:.1e}>")
             .format(p.of().a, p.of().b, p.of().force.norm(), p.of().area, p.of().error_estimate);
       });
   add_summary(pair);
@@ -111,21 +111,21 @@ void bind_pair(py::module_& module) {
       .def_readonly("b", &PairContact::b, "Name of the second body.")
       .def_property_readonly(
           "touching", [](const PairContact& p) { return !p.surface->summary.empty(); },
-          "Whether the bodies overlap, and may touch.")
+          "Whether the bodies overlap and may touch.")
       .def_property_readonly(
           "point", [](const PairContact& p) { return view(p.surface->point, keep(p.surface)); },
-          "[m], shape (points, 3).")
+          "Positions [m], shape (points, 3).")
       .def_property_readonly(
           "normal", [](const PairContact& p) { return view(p.surface->normal, keep(p.surface)); },
-          "Unit, out of a and into b, shape (points, 3).")
+          "Unit normals, out of a and into b, shape (points, 3).")
       .def_property_readonly(
           "point_area", [](const PairContact& p) { return view(p.surface->area, keep(p.surface)); },
-          "What each point stands for [m^2], shape (points,).")
+          "Area that each point stands for [m^2], shape (points,).")
       .def_property_readonly(
           "pressure", [](const PairContact& p) { return view(p.surface->pressure, keep(p.surface)); },
-          "[Pa], shape (points,).")
+          "Elastic pressure [Pa], shape (points,).")
       .def("__repr__", [](const PairContact& p) {
-        return py::str("<supple.PairContact {} and {}, |force| = {:.4g} N, area = {:.4g} m^2, error at most {:.1e}>")
+        return py::str("<supple.PairContact {} and {}, |force| = {:.4g} N, area = {:.4g} m^2, error estimate {:.1e}>")
             .format(p.a, p.b, p.summary().force.norm(), p.summary().area, p.summary().error_estimate);
       });
   add_summary(alone);
@@ -152,7 +152,7 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
   bind_pair(module);
   py::class_<Contacts>(
       module, "Contacts",
-      "All contacts of one state, a report that later steps leave alone. Iterating goes through its pairs.")
+      "All contacts of one state. It is a copy, which later steps do not change. Iterates over its pairs.")
       .def_property_readonly(
           "pairs",
           [](const Contacts& c) {
@@ -160,35 +160,35 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
             for (std::size_t k = 0; k < c.report->pairs.size(); ++k) pairs.push_back({c.report, k});
             return pairs;
           },
-          "The pairs that touch, as ContactPair, sorted by the numbers of their bodies, fixed bodies last.")
+          "The pairs in contact, as ContactPair, sorted by the numbers of their bodies, fixed bodies last.")
       .def_property_readonly(
           "pair", [](const Contacts& c) { return view(c.report->points.pair, keep(c.report)); },
           "Which of `pairs` each point belongs to, shape (points,), a view of the report.")
       .def_property_readonly(
           "point", [](const Contacts& c) { return view(c.report->points.point, keep(c.report)); },
-          "Of all pairs [m], shape (points, 3), a view of the report.")
+          "Quadrature points of all pairs [m], shape (points, 3), a view of the report.")
       .def_property_readonly(
           "normal", [](const Contacts& c) { return view(c.report->points.normal, keep(c.report)); },
-          "Unit, out of the first body of the pair, shape (points, 3), a view of the report.")
+          "Unit normals, out of the first body of the pair, shape (points, 3), a view of the report.")
       .def_property_readonly(
           "point_area", [](const Contacts& c) { return view(c.report->points.area, keep(c.report)); },
-          "What each point stands for [m^2], shape (points,), a view of the report.")
+          "Area that each point stands for [m^2], shape (points,), a view of the report.")
       .def_property_readonly(
           "pressure", [](const Contacts& c) { return view(c.report->points.pressure, keep(c.report)); },
-          "[Pa], shape (points,), a view of the report.")
+          "Elastic pressure [Pa], shape (points,), a view of the report.")
       .def_property_readonly(
           "force", [](const Contacts& c) { return view(c.report->loads.force, keep(c.report)); },
-          "On every particle, damping and friction included [N], shape (particles, 3), a view of the report.")
+          "Contact force on every particle, damping and friction included [N], shape (particles, 3), a view of the report.")
       .def_property_readonly(
           "torque", [](const Contacts& c) { return view(c.report->loads.torque, keep(c.report)); },
-          "On every particle about its centre [N m], shape (particles, 3), a view of the report.")
+          "Contact torque on every particle about its centre [N m], shape (particles, 3), a view of the report.")
       .def_property_readonly(
-          "energy", [](const Contacts& c) { return c.report->energy; }, "Of all pairs [J].")
+          "energy", [](const Contacts& c) { return c.report->energy; }, "Energy of compression of all pairs [J].")
       .def_property_readonly(
-          "dissipated_power", [](const Contacts& c) { return c.report->dissipated_power; }, "Of all pairs [W].")
+          "dissipated_power", [](const Contacts& c) { return c.report->dissipated_power; }, "Power dissipated by all pairs [W].")
       .def_property_readonly(
           "dissipated_work", [](const Contacts& c) { return c.report->dissipated_work; },
-          "By damping and friction of all pairs since the start [J].")
+          "Work dissipated by damping and friction of all pairs since the start [J].")
       .def("__len__", [](const Contacts& c) { return c.report->pairs.size(); })
       .def("__iter__", [](const py::object& self) { return py::iter(self.attr("pairs")); })
       .def("__getitem__", [](const Contacts& c, py::ssize_t k) {
@@ -198,27 +198,27 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
       });
 
   using core::LawReport;
-  py::class_<LawReport, std::shared_ptr<LawReport>>(module, "LawLoads", "What one law does to the particles.")
+  py::class_<LawReport, std::shared_ptr<LawReport>>(module, "LawLoads", "Forces, torques and energy of one law.")
       .def_property_readonly(
           "name", [](const LawReport& l) { return l.name; },
           "\"OBJECT/LAW\", \"gravity\", \"external\" or \"contact\".")
       .def_property_readonly(
-          "energy", [](const LawReport& l) { return l.energy; }, "[J]; 0 of gravity and external loads.")
+          "energy", [](const LawReport& l) { return l.energy; }, "Energy [J]; 0 for gravity and external loads.")
       .def_property_readonly(
           "force", [](const std::shared_ptr<LawReport>& l) { return view(l->loads.force, keep(l)); },
-          "[N], shape (particles, 3).")
+          "Force on every particle [N], shape (particles, 3).")
       .def_property_readonly(
           "torque", [](const std::shared_ptr<LawReport>& l) { return view(l->loads.torque, keep(l)); },
-          "About each particle's centre [N m], shape (particles, 3).")
+          "Torque on every particle about its centre [N m], shape (particles, 3).")
       .def("__repr__", [](const LawReport& l) {
         return py::str("<supple.LawLoads {}, energy = {:.6g} J>").format(l.name, l.energy);
       });
 
   simulation.def("contacts", &report, "All contacts of the current state.")
       .def("contact", &contact, py::arg("a"), py::arg("b"), py::arg("error") = 1e-4,
-           "The contact of two bodies as they are, as if there were no others, by their names (\"ground\" and "
+           "The contact of two bodies in the current state as if there were no others, by their names (\"ground\" and "
            "obstacles have names, too).\n\n"
-           "error  relative error asked for, from 1e-10 to 0.1; error_estimate of the answer is a bound of what is "
+           "error  required relative error, from 1e-10 to 0.1; error_estimate of the answer is the estimate of the error that was "
            "reached.")
       .def(
           "contact_capacity",
@@ -228,9 +228,9 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
             });
           },
           py::arg("a"), py::arg("b"),
-          "The largest contact energy [J] that two touching bodies can reach when they are pushed on along their "
-          "force; what approaches with\n"
-          "more kinetic energy passes.")
+          "The largest contact energy [J] that two touching bodies can reach when they are pushed together along their "
+          "contact force; bodies that approach with\n"
+          "more kinetic energy pass through each other.")
       .def(
           "forces",
           [](Handle& h) {
@@ -240,7 +240,7 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
             }
             return laws;
           },
-          "Forces, torques and energies law by law, as a list of LawLoads; the last one is \"contact\".");
+          "Forces, torques and energies of each law, as a list of LawLoads; the last one is \"contact\".");
 }
 
 }  // namespace supple::python

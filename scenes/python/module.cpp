@@ -1,11 +1,11 @@
-/// The Python module `supple._supple`: converts and calls; nothing lives here that a user of the library lacks.
+/// The Python module `supple._supple`: converts arguments and calls the library.
 #include <string>
 
 #include "bindings.h"
 
 namespace {
 
-/// pybind11 before 2.12 reads the arrays of NumPy 2 by the layout of NumPy 1: numbers would be wrong without a word.
+/// pybind11 before 2.12 reads the arrays of NumPy 2 by the layout of NumPy 1: numbers would be wrong without a message.
 void check_numpy(const pybind11::module_& module) {
   const auto version = pybind11::module_::import("numpy").attr("__version__").cast<std::string>();
   constexpr bool kKnowsTwo = PYBIND11_VERSION_HEX >= 0x020C0000;
@@ -13,7 +13,7 @@ void check_numpy(const pybind11::module_& module) {
   if (kKnowsTwo || version.starts_with("1.")) return;
   throw pybind11::import_error(
       "supple was built with pybind11 " PYBIND11_TOSTRING(PYBIND11_VERSION_MAJOR) "." PYBIND11_TOSTRING(
-          PYBIND11_VERSION_MINOR) ", which knows NumPy 1 only; found NumPy " +
+          PYBIND11_VERSION_MINOR) ", which supports NumPy 1 only; found NumPy " +
       version +
       ". Build it with pybind11 2.12 or later, or use a Python that has NumPy 1 "
       "(Debian 12: -DPython_EXECUTABLE=/usr/bin/python3).");

@@ -12,7 +12,7 @@ struct Particles {
   std::shared_ptr<Handle> of;
 };
 
-/// Arrays stay where they are for the life of a simulation; only to learn where, a call waits for its turn.
+/// Arrays keep their addresses for the life of a simulation; only reading an address waits for other calls.
 template <auto member>
 py::array state_view(const Particles& p) {
   const auto rows =
@@ -82,22 +82,22 @@ void bind_particles(py::module_& module, Simulation& simulation) {
                         "angular_velocity are views:\n"
                         "they cost nothing, follow the simulation and keep it alive, and cannot be written to "
                         "(Simulation.set_particles does\n"
-                        "that). Copy what shall outlast the next step.")
+                        "that). Copy data that must outlast the next step.")
       .def_property_readonly("position", &state_view<&ParticleState::position>,
                              "World position [m], shape (n, 3), a view.")
       .def_property_readonly("orientation", &state_view<&ParticleState::orientation>,
                              "Quaternion x, y, z, w, body to world, unit length, shape (n, 4), a view.")
-      .def_property_readonly("velocity", &state_view<&ParticleState::velocity>, "[m/s], shape (n, 3), a view.")
+      .def_property_readonly("velocity", &state_view<&ParticleState::velocity>, "World velocity [m/s], shape (n, 3), a view.")
       .def_property_readonly("angular_momentum", &state_view<&ParticleState::angular_momentum>,
-                             "About the particle's centre, world axes [kg m^2/s], shape (n, 3), a view.")
-      .def_property_readonly("angular_velocity", &angular_velocities, "World axes [rad/s], shape (n, 3), computed.")
-      .def_property_readonly("mass", &set_view<&ParticleSet::mass>, "[kg], shape (n,), a view.")
+                             "Angular momentum about the particle's centre, world axes [kg m^2/s], shape (n, 3), a view.")
+      .def_property_readonly("angular_velocity", &angular_velocities, "Angular velocity, world axes [rad/s], shape (n, 3), computed.")
+      .def_property_readonly("mass", &set_view<&ParticleSet::mass>, "Mass [kg], shape (n,), a view.")
       .def_property_readonly("inertia", &set_view<&ParticleSet::inertia>,
                              "Principal moments, body axes [kg m^2], shape (n, 3), a view.")
       .def_property_readonly("normal", &set_view<&ParticleSet::normal>,
                              "The fixed unit vector of each particle, body axes, shape (n, 3), a view.")
       .def_property_readonly("object", &set_view<&ParticleSet::object>,
-                             "Number of its object in Scene.objects, shape (n,), a view.")
+                             "Number of the particle's object in Scene.objects, shape (n,), a view.")
       .def_property_readonly(
           "pinned", &set_view<&ParticleSet::pinned>,
           "Sum of 1: position held, 2: orientation held, 4: moves in its plane z = const; shape (n,), a view.")
@@ -112,12 +112,12 @@ void bind_particles(py::module_& module, Simulation& simulation) {
       .def("set_particles", &set_particles, py::kw_only(), py::arg("position") = py::none(),
            py::arg("orientation") = py::none(), py::arg("velocity") = py::none(),
            py::arg("angular_momentum") = py::none(), py::arg("angular_velocity") = py::none(),
-           "Places and moves the particles as asked for, between two steps; what is not given stays. Shapes and units "
+           "Sets positions, orientations or velocities of all particles between two steps; what is not given stays. Shapes and units "
            "are those of Particles;\n"
-           "orientations are normalised, angular_velocity may take the place of angular_momentum, and what pins hold "
+           "orientations are normalised, angular_velocity may replace angular_momentum, and what pins hold "
            "keeps no velocity.\n\n"
-           "What this changes of momentum, angular momentum and energy is booked as given from outside, so that the "
-           "audits hold.");
+           "Changes of momentum, angular momentum and energy are booked in the ledger as external, so that the "
+           "audits stay valid.");
 }
 
 }  // namespace supple::python

@@ -29,8 +29,8 @@ std::set<int> frames_of(const Frames& frames) {
   return {};
 }
 
-/// A call on a thread of its own, while this one sees to signals. What Python code or a signal raises meanwhile ends it
-/// by `interrupt` and is raised here then.
+/// A call on a thread of its own, while this one handles signals. An exception of Python code or of a signal ends it
+/// by `interrupt` and is then raised here.
 class Watched {
  public:
   std::atomic<int> interrupt{0};
@@ -107,52 +107,52 @@ RunResult export_files(const Scene& scene, const Path& folder, const Frames& fra
 }  // namespace
 
 void bind_runs(py::module_& module) {
-  py::class_<Progress>(module, "Progress", "Where a run is.")
+  py::class_<Progress>(module, "Progress", "Progress of a run.")
       .def_readonly("stage", &Progress::stage, "\"simulate\", \"surface\", \"render\" or \"film\".")
-      .def_readonly("frame", &Progress::frame, "The frame at work.")
-      .def_readonly("frame_count", &Progress::frame_count, "Of so many.")
-      .def_readonly("elapsed_s", &Progress::elapsed_s, "Since the start [s].")
-      .def_readonly("left_s", &Progress::left_s, "Estimate [s]; negative while unknown.")
-      .def_readonly("frames_per_s", &Progress::frames_per_s, "0 while unknown [1/s].");
-  py::class_<RunResult>(module, "RunResult", "How a run ended and what it left behind.")
+      .def_readonly("frame", &Progress::frame, "Present frame.")
+      .def_readonly("frame_count", &Progress::frame_count, "Number of frames.")
+      .def_readonly("elapsed_s", &Progress::elapsed_s, "Time since the start of the run [s].")
+      .def_readonly("left_s", &Progress::left_s, "Estimated time to the end [s]; negative while unknown.")
+      .def_readonly("frames_per_s", &Progress::frames_per_s, "Frames per second [1/s]; 0 while unknown.");
+  py::class_<RunResult>(module, "RunResult", "How a run ended and which files it wrote.")
       .def_readonly("outcome", &RunResult::outcome,
                     "\"done\", \"diverged\", \"interrupted\", \"limit\", \"io\" or \"invalid\".")
-      .def_readonly("reason", &RunResult::reason, "Empty when done.")
-      .def_readonly("exit_code", &RunResult::exit_code, "What the command line tool would end with.")
+      .def_readonly("reason", &RunResult::reason, "Why the run ended, as a sentence; empty when done.")
+      .def_readonly("exit_code", &RunResult::exit_code, "Exit code of the command line tool for this outcome.")
       .def_readonly("frames", &RunResult::frames, "The last frame reached.")
       .def_property_readonly(
-          "state_hash", [](const RunResult& r) { return to_hex(r.state_hash); }, "Of the last state.")
+          "state_hash", [](const RunResult& r) { return to_hex(r.state_hash); }, "Hash of the last state.")
       .def_property_readonly(
-          "folder", [](const RunResult& r) { return r.folder; }, "Where everything went.")
+          "folder", [](const RunResult& r) { return r.folder; }, "Output folder.")
       .def_property_readonly(
-          "report", [](const RunResult& r) { return r.report; }, "result.json, render.json or export.json.")
+          "report", [](const RunResult& r) { return r.report; }, "Path of result.json, render.json or export.json.")
       .def_property_readonly(
           "film", [](const RunResult& r) { return r.film.empty() ? std::optional<Path>() : r.film; },
-          "None: there is none.")
+          "Path of the film, or None.")
       .def_property_readonly(
-          "warnings", [](const RunResult& r) { return r.warnings; }, "As sentences.")
+          "warnings", [](const RunResult& r) { return r.warnings; }, "Warnings, as sentences.")
       .def("__repr__", [](const RunResult& r) {
         return py::str("<supple.RunResult {}, {} frames in {}>").format(r.outcome, r.frames, r.folder.string());
       });
 
   constexpr const char* kCommon =
-      "\n\nframes    which to output, e.g. \"1-50,60,70-90:2\" or [1, 5, 9]; all unless given\n"
-      "threads   0: all the machine has; changes no bit\n"
-      "progress  called with a Progress now and then; what it raises ends the run after its step, as Control-C does\n\n"
-      "Returns a RunResult however the run ended: see its outcome and reason. Raises Error where there can be no "
-      "report: the folder cannot\n"
+      "\n\nframes    frames to output, e.g. \"1-50,60,70-90:2\" or [1, 5, 9]; default: all\n"
+      "threads   number of threads, 0: all of the machine; does not change results\n"
+      "progress  called with a Progress from time to time; an exception in it ends the run after the present step, as Control-C does\n\n"
+      "Returns a RunResult however the run ended: see its outcome and reason. Raises Error where no report can be "
+      "written: the folder cannot\n"
       "be made, is in use, or holds an earlier result.";
   const std::string run_doc = std::string(
-                                  "A whole run from scene to files, as `supple run`: pictures, film, states, tables "
+                                  "Runs a scene and writes its files, as `supple run` does: pictures, film, states, tables "
                                   "and result.json in `folder`.") +
                               kCommon;
   const std::string render_doc = std::string(
-                                     "Draws the frames of an earlier run again from its saved states, as `supple "
-                                     "render`; pictures that are up to date are kept\nunless overwrite.") +
+                                     "Draws the frames of an earlier run from its saved states, as `supple "
+                                     "render` does; pictures that are up to date are kept\nunless overwrite is true.") +
                                  kCommon;
   const std::string export_doc =
       std::string(
-          "Writes the files that the scene's `output` asks for from the saved states of a run, as `supple export`.") +
+          "Writes the files of the scene's `output` from the saved states of a run, as `supple export` does.") +
       kCommon;
   module.def("run", &run, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(),
              py::arg("threads") = 0, py::arg("overwrite") = false, py::arg("resume") = false,
@@ -164,23 +164,23 @@ void bind_runs(py::module_& module) {
              py::arg("frames") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
              export_doc.c_str());
   module.def("info", &scenes::describe_run, py::arg("folder"),
-             "What a run folder holds, for reading: outcome, audits, times, files.");
+             "Describes a run folder in text: outcome, audits, times, files.");
 
   using scenes::Comparison;
   using scenes::FrameComparison;
-  py::class_<FrameComparison>(module, "FrameComparison", "A frame of two runs.")
-      .def_readonly("frame", &FrameComparison::frame, "Its number.")
-      .def_readonly("psnr", &FrameComparison::psnr, "[dB], infinite for equal pictures.")
-      .def_readonly("largest", &FrameComparison::largest, "Difference of a channel, 0 to 255.");
-  py::class_<Comparison>(module, "Comparison", "Two runs, picture by picture.")
+  py::class_<FrameComparison>(module, "FrameComparison", "One frame of two runs, compared.")
+      .def_readonly("frame", &FrameComparison::frame, "Number of the frame.")
+      .def_readonly("psnr", &FrameComparison::psnr, "Peak signal-to-noise ratio [dB]; infinite for equal pictures.")
+      .def_readonly("largest", &FrameComparison::largest, "Largest difference of a channel, 0 to 255.");
+  py::class_<Comparison>(module, "Comparison", "Two runs, compared picture by picture.")
       .def_property_readonly(
           "frames", [](const Comparison& c) { return c.frames; },
-          "Those that both have, as FrameComparison, ascending.")
-      .def_readonly("only_first", &Comparison::only_first, "How many only the first one has.")
-      .def_readonly("only_second", &Comparison::only_second, "How many only the second one has.")
+          "The frames that both have, as FrameComparison, ascending.")
+      .def_readonly("only_first", &Comparison::only_first, "Number of frames that only the first run has.")
+      .def_readonly("only_second", &Comparison::only_second, "Number of frames that only the second run has.")
       .def_property_readonly(
           "film", [](const Comparison& c) { return c.film.empty() ? std::optional<Path>() : c.film; },
-          "None: there is none.");
+          "Path of the film, or None.");
   module.def(
       "compare",
       [](const Path& first, const Path& second, const Path& folder, double gain, bool film, const std::string& camera) {
@@ -197,7 +197,7 @@ void bind_runs(py::module_& module) {
       },
       py::arg("first"), py::arg("second"), py::arg("folder"), py::kw_only(), py::arg("gain") = 8.0,
       py::arg("film") = true, py::arg("camera") = "",
-      "Puts the frames of two run folders side by side with their difference, times gain, into folder/frames, "
+      "Puts the frames of two run folders side by side with their difference (times gain) and writes folder/frames, "
       "compare.mp4 and compare.csv.");
 }
 

@@ -51,12 +51,12 @@ std::vector<std::string> object_names(const Scene& scene) {
 
 void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(
-      module, "Scene", "What a scene file says, checked. It does not change; read it again with other values instead.")
-      .def_property_readonly("name", &scenes::scene_name, "File name without extension; what output files are called.")
+      module, "Scene", "The checked content of a scene file. It is immutable; to change a value, read the file again with overrides.")
+      .def_property_readonly("name", &scenes::scene_name, "File name without extension; output files have this name.")
       .def_property_readonly(
           "source", [](const Scene& s) { return s.source; }, "The file it was read from.")
       .def_property_readonly(
-          "title", [](const Scene& s) { return s.title; }, "What the file calls it.")
+          "title", [](const Scene& s) { return s.title; }, "Title that the file gives.")
       .def_property_readonly(
           "duration", [](const Scene& s) { return s.duration; }, "[s]")
       .def_property_readonly(
@@ -69,7 +69,7 @@ void bind_scene(py::module_& module) {
                              "Names of the objects, sorted; particles are numbered in this order.")
       .def_property_readonly(
           "content_hash", [](const Scene& s) { return to_hex(s.content_hash); },
-          "Of all keys that act on the motion: what saved states belong to.")
+          "Hash of all keys that act on the motion; saved states belong to scenes of the same hash.")
       .def("__repr__", [](const Scene& s) {
         return "<supple.Scene '" + scenes::scene_name(s) + "', " + std::to_string(s.objects.size()) + " objects, " +
                std::to_string(s.frame_count()) + " frames>";
@@ -78,17 +78,17 @@ void bind_scene(py::module_& module) {
   module.def(
       "read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(),
       "Reads and checks a scene file.\n\n"
-      "overrides  {\"objects.ball.particles.mass\": 2} or [\"objects.ball.particles.mass=2\"]: keys set before the "
+      "overrides  {\"objects.ball.particles.mass\": 2} or [\"objects.ball.particles.mass=2\"]: keys that are set before the "
       "checks, as by\n"
       "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n\n"
       "Raises Error with every fault of the file, each with place, key, expectation, finding and hint.");
   module.def("parse_scene", &parse, py::arg("text"), py::arg("overrides") = py::none(), py::kw_only(),
              py::arg("folder") = ".", py::arg("name") = "scene.yaml",
-             "The same from text. `name` stands for the file in messages, `folder` is where files that the scene names "
-             "are looked for.");
+             "As read_scene, from text. `name` stands for the file in messages; files that the scene names are read from "
+             "`folder`.");
   module.def("check", &check, py::arg("scene"),
-             "Looks for what only a simulation or its pictures would miss. Returns warnings about the start, as "
-             "sentences; raises Error\n"
+             "Checks what only building the simulation and its pictures shows. Returns warnings about the initial state as "
+             "sentences. Raises Error\n"
              "where the scene cannot be simulated or drawn.");
   module.def("explain", &explain, py::arg("scene"),
              "The stages of a step, each with the reason it runs or not, as text.");

@@ -15,14 +15,14 @@ namespace {
 using scenes::Scene;
 using Shared = std::shared_ptr<Handle>;
 
-/// A state apart from its simulation, and which scene it belongs to.
+/// A copy of a state, and the scene it belongs to.
 struct SavedState {
   scenes::State state;
   scenes::StateOrigin origin;
 };
 
-/// Lets `slice(simulation, go_on)` work until it returns true, or cancel() was called. Between slices, which end at a
-/// step, other threads get their turn and signals are seen.
+/// Calls `slice(simulation, go_on)` until it returns true or cancel() is called. Between slices, which end at a
+/// step, other threads get their turn and signals are handled.
 template <class Slice>
 bool in_slices(Handle& handle, const Slice& slice) {
   using Clock = std::chrono::steady_clock;
@@ -56,7 +56,7 @@ int frame_of(Handle& handle) {
   return handle.use([](const scenes::Simulation& simulation) { return simulation.frame(); });
 }
 
-/// What `for frame in simulation.frames()` goes through.
+/// The iterator of `for frame in simulation.frames()`.
 struct Frames {
   Shared of;
   int last = 0;
@@ -85,7 +85,7 @@ void restore(Handle& handle, const SavedState& saved) {
                         .key = {},
                         .expected = "expected a state of this scene, " + to_hex(simulation.scene().content_hash),
                         .found = to_hex(saved.origin.scene),
-                        .hint = "adopt() goes on from states of scenes with other numbers"});
+                        .hint = "adopt() continues from states of scenes with other values"});
     }
     simulation.restore(saved.state);
   });
@@ -93,28 +93,28 @@ void restore(Handle& handle, const SavedState& saved) {
 
 void bind_results(py::module_& module) {
   py::class_<scenes::Energies>(module, "Energies", "Energies of a state [J].")
-      .def_readonly("kinetic", &scenes::Energies::kinetic, "Of all particles.")
-      .def_readonly("interaction", &scenes::Energies::interaction, "Of the laws between particles.")
-      .def_readonly("contact", &scenes::Energies::contact, "Of compression, springs of friction included.")
-      .def_property_readonly("total", &scenes::Energies::total, "Sum of the three.")
+      .def_readonly("kinetic", &scenes::Energies::kinetic, "Kinetic energy of all particles [J].")
+      .def_readonly("interaction", &scenes::Energies::interaction, "Energy of the laws between particles [J].")
+      .def_readonly("contact", &scenes::Energies::contact, "Energy of compression, springs of friction included [J].")
+      .def_property_readonly("total", &scenes::Energies::total, "Sum of the three [J].")
       .def("__repr__", [](const scenes::Energies& e) {
         return py::str("Energies(kinetic={!r}, interaction={!r}, contact={!r})")
             .format(e.kinetic, e.interaction, e.contact);
       });
 
   using scenes::Audits;
-  py::class_<Audits>(module, "Audits", "Relative errors since frame 1, the largest seen at a frame so far.")
-      .def_readonly("momentum_error", &Audits::momentum_error, "Over the largest sum of m |v| [1].")
+  py::class_<Audits>(module, "Audits", "Relative conservation errors since frame 1; each is the largest at any frame so far.")
+      .def_readonly("momentum_error", &Audits::momentum_error, "Error of the momentum over the largest sum of m |v| [1].")
       .def_readonly("angular_momentum_error", &Audits::angular_momentum_error,
-                    "Over the largest sum of |x - c| m |v| + |L| [1].")
-      .def_readonly("energy_error", &Audits::energy_error, "Over the largest total energy [1].")
+                    "Error of the angular momentum over the largest sum of |x - c| m |v| + |L| [1].")
+      .def_readonly("energy_error", &Audits::energy_error, "Error of the energy balance over the largest total energy [1].")
       .def_readonly("energy_returned", &Audits::energy_returned,
-                    "What damping and friction gave back, over the same [1].")
+                    "Energy that damping and friction returned, over the largest total energy [1].")
       .def_readonly("contact_residual", &Audits::contact_residual,
                     "Largest difference of the two pressures on a contact surface, relative [1].")
-      .def_readonly("largest_overlap", &Audits::largest_overlap, "Of the undeformed bodies [m].")
+      .def_readonly("largest_overlap", &Audits::largest_overlap, "Largest overlap of undeformed bodies [m].")
       .def_readonly("largest_overlap_share", &Audits::largest_overlap_share,
-                    "Over the thickness of the thinner body [1].")
+                    "Largest overlap over the thickness of the thinner body [1].")
       .def("__repr__", [](const Audits& a) {
         return py::str(
                    "Audits(momentum_error={:.3g}, angular_momentum_error={:.3g}, energy_error={:.3g}, "
@@ -123,49 +123,49 @@ void bind_results(py::module_& module) {
       });
 
   using core::Ledger;
-  py::class_<Ledger>(module, "Ledger", "What crossed the border of the system since frame 1.")
-      .def_readonly("external_work", &Ledger::external_work, "Of loads, gravity and led obstacles [J].")
-      .def_readonly("dissipated", &Ledger::dissipated, "Taken by friction and damping [J].")
+  py::class_<Ledger>(module, "Ledger", "Work, heat and impulses that entered or left the system since frame 1.")
+      .def_readonly("external_work", &Ledger::external_work, "Work of loads, gravity and obstacles moved by keys [J].")
+      .def_readonly("dissipated", &Ledger::dissipated, "Energy dissipated by friction and damping [J].")
       .def_property_readonly(
-          "external_impulse", [](const Ledger& l) { return vector(l.external_impulse); }, "[N s], shape (3,)")
+          "external_impulse", [](const Ledger& l) { return vector(l.external_impulse); }, "Impulse of loads, gravity and obstacles [N s], shape (3,)")
       .def_property_readonly(
           "external_angular_impulse", [](const Ledger& l) { return vector(l.external_angular_impulse); },
           "About the world origin [N m s], shape (3,)")
       .def_property_readonly(
-          "pin_impulse", [](const Ledger& l) { return vector(l.pin_impulse); }, "[N s], shape (3,)")
+          "pin_impulse", [](const Ledger& l) { return vector(l.pin_impulse); }, "Impulse of the pins [N s], shape (3,)")
       .def_property_readonly(
           "pin_angular_impulse", [](const Ledger& l) { return vector(l.pin_angular_impulse); },
           "About the world origin [N m s], shape (3,)");
 
   using core::Motion;
   py::class_<Motion>(module, "Motion", "Kinetic energy and momenta of all particles.")
-      .def_readonly("kinetic_energy", &Motion::kinetic_energy, "[J]")
+      .def_readonly("kinetic_energy", &Motion::kinetic_energy, "Kinetic energy [J]")
       .def_property_readonly(
-          "momentum", [](const Motion& m) { return vector(m.momentum); }, "[N s], shape (3,)")
+          "momentum", [](const Motion& m) { return vector(m.momentum); }, "Momentum [N s], shape (3,)")
       .def_property_readonly(
           "angular_momentum", [](const Motion& m) { return vector(m.angular_momentum); },
           "About the world origin [N m s], shape (3,)");
 
   py::class_<SavedState>(module, "State",
-                         "All that is needed to continue with the same bits; a copy that later steps leave alone.")
+                         "All that is needed to continue with the same bits. It is a copy, which later steps do not change.")
       .def_property_readonly(
           "frame", [](const SavedState& s) { return s.state.frame; }, "The last frame reached.")
       .def_property_readonly(
-          "steps", [](const SavedState& s) { return s.state.steps; }, "Steps since the start.")
+          "steps", [](const SavedState& s) { return s.state.steps; }, "Number of steps since the start.")
       .def_property_readonly(
-          "state_hash", [](const SavedState& s) { return to_hex(s.state.hash()); }, "As that of the simulation.")
+          "state_hash", [](const SavedState& s) { return to_hex(s.state.hash()); }, "Hash of the state, equal to Simulation.state_hash at that time.")
       .def(
           "save",
           [](const SavedState& s, const std::filesystem::path& path) {
             const py::gil_scoped_release others_run;
             scenes::save_state(path, s.state, s.origin);
           },
-          py::arg("path"), "Writes a checkpoint file, the same as `supple run` leaves in states/.")
+          py::arg("path"), "Writes a saved-state file, as `supple run` does in states/.")
       .def("__repr__", [](const SavedState& s) {
         return "<supple.State, frame " + std::to_string(s.state.frame) + ", " + to_hex(s.state.hash()) + ">";
       });
 
-  py::class_<Frames>(module, "Frames", "Goes through the frames of a simulation.")
+  py::class_<Frames>(module, "Frames", "Iterates over the frames of a simulation.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &Frames::next);
 }
@@ -175,28 +175,28 @@ void bind_results(py::module_& module) {
 Simulation bind_simulation(py::module_& module) {
   bind_results(module);
   Simulation simulation(module, "Simulation",
-                        "A scene in motion. Asking for meshes, contacts, pictures or energies never changes a later "
-                        "state, and the number of threads changes\n"
-                        "no bit.\n\n"
-                        "Long calls let other Python threads run, and calls from several threads wait for each other, "
-                        "which those that step let happen between two steps.\n"
-                        "Control-C ends a call at a step; the simulation can go on from there.");
+                        "A simulation of a scene. Reading meshes, contacts, pictures or energies never changes a later "
+                        "state, and the number of threads does\n"
+                        "not change results.\n\n"
+                        "Long calls let other Python threads run. Calls from several threads wait for each other; "
+                        "calls that step let others in between two steps.\n"
+                        "Control-C ends a call after a step; the simulation can continue from there.");
   simulation
       .def(py::init([](const Scene& scene, int threads, bool profile) {
              const py::gil_scoped_release others_run;
              return std::make_shared<Handle>(scene, scenes::SimulationOptions{.threads = threads, .profile = profile});
            }),
            py::arg("scene"), py::kw_only(), py::arg("threads") = 1, py::arg("profile") = false,
-           "threads  0: all the machine has\nprofile  time every call of every stage, not a sample of them\n\n"
+           "threads  number of threads, 0: all of the machine\nprofile  measure the time of every call of every stage instead of a sample of the calls\n\n"
            "Raises Error where the scene cannot be simulated.")
       .def_property_readonly(
-          "scene", [](const Handle& h) -> const Scene& { return h.fixed().scene(); }, "What it was made from.")
+          "scene", [](const Handle& h) -> const Scene& { return h.fixed().scene(); }, "The scene that is simulated.")
       .def_property_readonly("frame", &frame_of, "The last frame reached; 1 at the start.")
       .def_property_readonly(
-          "time", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.time(); }); }, "[s]")
+          "time", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.time(); }); }, "Present time [s].")
       .def_property_readonly(
           "time_step", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.time_step(); }); },
-          "Of the current frame interval [s].")
+          "Time step in the current frame interval [s].")
       .def_property_readonly(
           "state_hash",
           [](Handle& h) { return to_hex(h.use([](const scenes::Simulation& s) { return s.state_hash(); })); },
@@ -209,7 +209,7 @@ Simulation bind_simulation(py::module_& module) {
               slices[py::str(o.name)] = py::slice(o.first, o.last, 1);
             return slices;
           },
-          "Which rows of the particles each object has: {name: slice}.")
+          "Rows of the particles of each object: {name: slice}.")
       .def_property_readonly(
           "bodies",
           [](Handle& h) {
@@ -219,7 +219,7 @@ Simulation bind_simulation(py::module_& module) {
               return names;
             });
           },
-          "Names of what has a surface of its own: objects, or the pieces that they broke into (\"plate.1\", ...); then the groups of a "
+          "Names of the bodies: objects, or the pieces that they broke into (\"plate.1\", ...); then the groups of a "
           "blending graph that touch each other (\"hand.group2\", ...).")
       .def_property_readonly(
           "fixed_bodies",
@@ -228,22 +228,22 @@ Simulation bind_simulation(py::module_& module) {
             for (const scenes::FixedBody& body : h.fixed().model().fixed) names.push_back(body.name);
             return names;
           },
-          "Names of what objects touch and nothing moves: \"ground\", if it collides, and the obstacles.")
+          "Names of the solids that forces do not move: \"ground\", if it collides, and the obstacles.")
       .def_property_readonly(
           "warnings", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.warnings(); }); },
-          "What is odd about the scene, as sentences.")
+          "Warnings about the scene and the run, as sentences.")
       .def_property_readonly(
           "integrator", [](const Handle& h) { return h.fixed().integrator().reason; },
-          "How the scene is integrated, and why.")
+          "Integration method of the scene, and the reason for it.")
 
       .def("step", &step, py::arg("count") = 1,
-           "One time step, or `count` of them. Raises Error of kind \"diverged\" when the numbers leave their bounds; "
+           "Takes `count` time steps. Raises Error of kind \"diverged\" when values leave their bounds; "
            "the simulation is then\n"
            "back at the last frame.")
       .def(
           "step_frame", [](Handle& h) { advance_to(h, frame_of(h) + 1); },
           "Steps to the next frame, also past the last one of the scene.")
-      .def("advance_to", &advance_to, py::arg("frame"), "Steps to a frame. False where cancel() ended the call before.")
+      .def("advance_to", &advance_to, py::arg("frame"), "Steps to a frame. Returns False where cancel() ended the call earlier.")
       .def(
           "frames",
           [](Shared h, std::optional<int> last) {
@@ -251,47 +251,47 @@ Simulation bind_simulation(py::module_& module) {
             return Frames{std::move(h), last.value_or(count)};
           },
           py::arg("last") = py::none(),
-          "for frame in simulation.frames(): the present frame, then each one reached, to `last` or the scene's last "
+          "Iterates: yields the present frame, then steps to each following one, up to `last` or the scene's last "
           "one. cancel() ends it.")
       .def(
           "cancel", [](Handle& h) { h.cancelled = true; },
-          "From another thread: ends the stepping call that is running, after the step it is at. Without one nothing "
+          "Called from another thread: ends the running call after its present step. Without one nothing "
           "happens.")
       .def("state", &copy_state, "A copy of the state, for restore() or to save.")
       .def("restore", &restore, py::arg("state"),
-           "Continues from a state of the same scene, with the same bits as the run it is from.")
+           "Continues from a state of the same scene, with the same bits as the original run.")
       .def(
           "adopt",
           [](Handle& h, const SavedState& saved) { h.use([&](scenes::Simulation& s) { s.adopt(saved.state); }); },
           py::arg("state"),
-          "Continues from a state of a scene with other numbers (masses, stiffnesses, friction, loads), which act from "
-          "now on; ledger and\n"
-          "audits begin here. Velocities and angular momenta are those of the state. The objects and their particles "
+          "Continues from a state of a scene with other values (masses, stiffnesses, friction, loads); this scene's values act from "
+          "now on. Ledger and\n"
+          "audits start anew. Velocities and angular momenta are those of the state. The objects and their particles "
           "must be the same.")
       .def(
           "save",
           [](Handle& h, const std::filesystem::path& path) {
             h.use([&](const scenes::Simulation& s) { scenes::save_state(path, s.state(), scenes::origin_of(s.scene())); });
           },
-          py::arg("path"), "Writes a checkpoint file, the same as `supple run` leaves in states/.")
+          py::arg("path"), "Writes a saved-state file, as `supple run` does in states/.")
       .def(
           "load",
           [](Handle& h, const std::filesystem::path& path) {
             h.use([&](scenes::Simulation& s) { s.restore(scenes::load_state(path, scenes::origin_of(s.scene()))); });
           },
           py::arg("path"),
-          "Continues from a checkpoint file. Raises Error of kind \"corrupt\" when it is not exactly what was written, "
-          "or is of another scene.")
+          "Continues from a saved-state file. Raises Error of kind \"corrupt\" when it is damaged "
+          "or belongs to another scene.")
 
       .def(
           "energies", [](Handle& h) { return h.use([](scenes::Simulation& s) { return s.energies(); }); },
           "Energies of the current state.")
       .def(
           "audits", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.audits(); }); },
-          "How well momenta and energy are kept.")
+          "Conservation errors of momenta and energy so far.")
       .def(
           "ledger", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.state().ledger; }); },
-          "Work, heat and impulses that went in and out so far.")
+          "Work, heat and impulses that entered or left the system so far.")
       .def(
           "shape_errors",
           [](Handle& h) {
@@ -315,9 +315,9 @@ Simulation bind_simulation(py::module_& module) {
             }
             return out;
           },
-          "Pairs that pressed harder than half of what they can hold, as dictionaries: bodies a and b, the first time "
-          "[s], energy of\n"
-          "approach and contact at worst [J], and capacity [J].")
+          "Pairs whose energy of approach and contact exceeded half of their capacity, as dictionaries: bodies a and b, the first time "
+          "[s], largest energy of\n"
+          "approach and contact [J], and capacity [J].")
       .def(
           "motion",
           [](Handle& h) {
@@ -339,7 +339,7 @@ Simulation bind_simulation(py::module_& module) {
             }
             return stages;
           },
-          "Work by stage so far: calls, CPU time [s], and how many pairs, primitives, samples ... were looked at, of "
+          "Work by stage so far: calls, CPU time [s], and how many pairs, primitives or samples were visited, of "
           "those present.")
       .def(
           "explain", [](Handle& h) { return h.use([](scenes::Simulation& s) { return scenes::explain(s); }); },

@@ -70,32 +70,32 @@ py::array picture(Handle& handle, const std::optional<std::filesystem::path>& pa
 }  // namespace
 
 void bind_surfaces(py::module_& module, Simulation& simulation) {
-  py::class_<MeshReport>(module, "MeshReport", "What a closed surface must satisfy, measured.")
+  py::class_<MeshReport>(module, "MeshReport", "Measured properties of a mesh: closed, oriented, area, volume.")
       .def_readonly("closed", &MeshReport::closed, "Every edge has exactly two triangles.")
-      .def_readonly("oriented", &MeshReport::oriented, "And they run through it in opposite directions.")
+      .def_readonly("oriented", &MeshReport::oriented, "The two triangles of every edge have consistent orientation.")
       .def_readonly("euler_characteristic", &MeshReport::euler_characteristic, "Vertices - edges + triangles.")
-      .def_readonly("components", &MeshReport::components, "Connected parts.")
-      .def_readonly("area", &MeshReport::area, "[m^2]")
-      .def_readonly("volume", &MeshReport::volume, "[m^3], of a closed and oriented mesh.");
+      .def_readonly("components", &MeshReport::components, "Number of connected parts.")
+      .def_readonly("area", &MeshReport::area, "Area [m^2].")
+      .def_readonly("volume", &MeshReport::volume, "Volume [m^3] of a closed and oriented mesh.");
   py::class_<Mesh, Shared>(module, "Mesh",
-                           "Triangles of a surface, counter-clockwise seen from outside. Arrays are views of it.")
+                           "Triangle mesh of a surface, counter-clockwise seen from outside. Its arrays are views.")
       .def_property_readonly(
-          "position", [](const Shared& m) { return view(m->position, keep(m)); }, "[m], shape (vertices, 3).")
+          "position", [](const Shared& m) { return view(m->position, keep(m)); }, "Vertex positions [m], shape (vertices, 3).")
       .def_property_readonly(
-          "normal", [](const Shared& m) { return view(m->normal, keep(m)); }, "Unit, outward, shape (vertices, 3).")
+          "normal", [](const Shared& m) { return view(m->normal, keep(m)); }, "Unit outward normals, shape (vertices, 3).")
       .def_property_readonly("triangle", &triangles, "Vertex numbers, shape (triangles, 3).")
       .def_property_readonly(
           "columns", &columns,
-          "More about the vertices, {name: array of shape (vertices,)}: of a body that touches \"contact\", > 0 on a "
+          "Further values at the vertices, {name: array of shape (vertices,)}: for a body in contact \"contact\", > 0 on a "
           "contact surface,\n"
-          "and what its look shows, e.g. \"pressure\" [Pa] for objects.NAME.look.colour_by=pressure.")
+          "and the value that its look shows, e.g. \"pressure\" [Pa] for objects.NAME.look.colour_by=pressure.")
       .def(
           "inspect",
           [](const Mesh& m) {
             const py::gil_scoped_release others_run;
             return inspect(m);
           },
-          "Whether it is closed, its area and volume, as a MeshReport.")
+          "Measures the mesh: whether it is closed, its area and volume, as a MeshReport.")
       .def("write", &write_mesh, py::arg("path"), "Writes a .ply or .obj file.")
       .def("__repr__", [](const Mesh& m) {
         return "<supple.Mesh, " + std::to_string(m.vertex_count()) + " vertices, " +
@@ -104,16 +104,16 @@ void bind_surfaces(py::module_& module, Simulation& simulation) {
 
   simulation
       .def("meshes", &meshes,
-           "Surfaces of the current state, {object: Mesh}, deformed by contact; empty of an object without a skeleton. "
+           "Meshes of the current surfaces, {object: Mesh}, deformed by contact; empty for an object without a skeleton. "
            "Where two objects touch,\n"
-           "both have the same vertices.")
+           "both meshes share the vertices of their contact surface.")
       .def_property(
           "cell", [](Handle& h) { return h.use([](const scenes::Simulation& s) { return s.cell(); }); },
           [](Handle& h, double cell) {
             if (!(cell > 0.0)) throw py::value_error("cell: expected a length > 0 [m]");
             h.use([&](scenes::Simulation& s) { s.set_cell(cell); });
           },
-          "Edge of a lattice cell of meshes() [m], of objects that ask for none of their own. May be set.")
+          "Edge of a lattice cell of meshes() [m], for objects without a cell of their own. May be set.")
       .def(
           "set_cells",
           [](Handle& h, int cells) {
@@ -121,7 +121,7 @@ void bind_surfaces(py::module_& module, Simulation& simulation) {
             h.use([&](scenes::Simulation& s) { s.set_cells(cells); });
           },
           py::arg("cells"),
-          "Sets the cell of all objects, by a number of cells along the longest side of all surfaces.")
+          "Sets the cell of all objects by the number of cells along the longest side of all surfaces.")
       .def("field", &field, py::arg("body"), py::arg("points"),
            "The undeformed field of a body at points [m], shape (n, 3): values (> 0 inside), shape (n,), and gradients "
            "[1/m], shape (n, 3).\n"
@@ -129,11 +129,11 @@ void bind_surfaces(py::module_& module, Simulation& simulation) {
       .def(
           "picture", &picture, py::arg("path") = py::none(), py::kw_only(), py::arg("camera") = "",
           py::arg("size") = py::none(), py::arg("threads") = 1,
-          "Draws the current state as `supple run` would: 8-bit sRGB, shape (height, width, 3), rows from top to "
+          "Draws the current state as `supple run` does: 8-bit sRGB, shape (height, width, 3), rows from top to "
           "bottom.\n\n"
-          "path     a PNG file to write, too\ncamera   name of one of the scene's cameras; the first one unless given\n"
-          "size     (width, height) [pixel]; that of output.images unless given\nthreads  of the path tracer; 0: all "
-          "the machine has");
+          "path     PNG file to write as well\ncamera   name of one of the scene's cameras; default: the first one\n"
+          "size     (width, height) [pixel]; default: that of output.images\nthreads  number of threads of the path tracer; 0: all "
+          "of the machine");
 }
 
 }  // namespace supple::python

@@ -1,9 +1,9 @@
 /// @file contact_bench.cpp
-/// Time of contact queries beside their error, one JSON object a line: broad phase, candidates and contact surface with
-/// its estimate, of indexed fields with their samples, no state from another pose. The error is the estimate; beside it
-/// stands that of the force against the closed form (for the plane limited by its stiffness, 1e9).
+/// Time and error of contact queries, one JSON object per line: broad phase, candidates and contact surface with its error
+/// estimate, on indexed fields with their samples, without state from another pose. The error of the force against the closed
+/// form is given too (for the plane it is limited by the plane's stiffness, 1e9).
 ///   contact_bench [FILE.svg]
-/// With a file name contact_rules follows, which draws time against error of all rules of the contact surface there.
+/// With a file name contact_rules runs as well and plots time against error of all rules of the contact surface there.
 #include <unistd.h>
 
 #include <algorithm>
@@ -111,7 +111,7 @@ void measure(const std::string& name, const std::vector<collision::ContactBody>&
 }  // namespace
 
 int main(int argc, char** argv) {
-  supple::benchmarks::answer_usage(argc, argv, "contact_bench [FILE.svg]    the file: a plot of time against error of all rules, by contact_rules", 1);
+  supple::benchmarks::answer_usage(argc, argv, "contact_bench [FILE.svg]    FILE.svg: plot of time against error of all rules, by contact_rules", 1);
   namespace fs = std::filesystem;
   const fs::path plot = argc > 1 ? argv[1] : "";
   if (argc > 1 && plot.extension() != ".svg") {

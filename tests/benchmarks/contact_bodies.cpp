@@ -1,8 +1,8 @@
 /// @file contact_bodies.cpp
-/// Contact of bodies of many primitives, one part each, with obstacles and with each other: what a query and the reactions cost beside the number of
-/// primitives, and how far each error asked for is off. One JSON object a line: the middle and the largest over random poses.
+/// Contact of bodies of many primitives, one per part, with obstacles and with each other: cost of a query and of the reactions by the number of
+/// primitives, and the true error for each given error. One JSON object per line: median and largest over random poses.
 ///   contact_bodies [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--reference RULE]
-/// The reference is a rule at 1e-7, marching unless another one is named.
+/// The reference is a rule at an error of 1e-7, march unless another one is named.
 #include <cstdio>
 #include <string>
 #include <string_view>

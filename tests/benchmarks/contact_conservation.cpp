@@ -1,6 +1,6 @@
 // Conservation in collisions without loss: 2, 10 and 100 free balls over many steps, and how the energy error falls with
-// the step and with the error asked of the contact quadrature. Prints the tables of docs/accuracy_and_speed.md.
-// Words: steps (default 100000), and a number of balls for that row alone.
+// the step and with the given error of the contact quadrature. Prints the tables of docs/accuracy_and_speed.md.
+// Arguments: number of steps (default 100000), and a number of balls for that row alone.
 #include <cstdio>
 #include <ctime>
 #include <string_view>

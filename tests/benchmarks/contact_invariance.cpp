@@ -1,7 +1,7 @@
 /// @file contact_invariance.cpp
-/// What changes when two bodies in contact change places, are turned and moved together, or are a thousandth or a thousand times as
-/// large: the largest relative change of force, area and centre of pressure over many random poses, for each case and error asked for,
-/// one JSON object a line. Nothing should but for round-off, 1e-9.
+/// Invariance of contact when two bodies are swapped, rotated and moved together, or scaled by 1/1000 or 1000: the largest relative
+/// change of force, area and centre of pressure over many random poses, for each case and given error, one JSON object per line.
+/// Expected is round-off only, 1e-9.
 ///   contact_invariance [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED]
 #include <cstdio>
 #include <string>

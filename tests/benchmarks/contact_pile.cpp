@@ -1,8 +1,8 @@
 /// @file contact_pile.cpp
-/// Many balls in a bin, one JSON object a line: CPU time of a step once they have settled, and of the same after they have
-/// fallen asleep; its mean over the quarter of a second in which most of them meet. From 10,000 on the balls begin where they nearly rest, in whole
-/// layers, and ten steps are measured. The time of day of the
-/// fastest step says what threads bring where the machine has nothing else to do: `contact_pile 100 --threads 2`.
+/// Many balls in a bin, one JSON object per line: CPU time of a step once they have settled, and after they have fallen asleep;
+/// mean CPU time of a step over the quarter of a second with most impacts. From 10,000 balls on they start almost at rest, in whole
+/// layers, and ten steps are measured. On an idle machine the wall time of the fastest step shows the gain by threads:
+/// `contact_pile 100 --threads 2`.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -108,7 +108,7 @@ void measure(int count, bool sleeps, int threads) {
 
 int main(int argc, char** argv) {
   using supple::benchmarks::whole_number;
-  constexpr std::string_view kUsage = "contact_pile [BALLS ...] [--threads N]    from 10,000 balls on: as many as fill the last layer";
+  constexpr std::string_view kUsage = "contact_pile [BALLS ...] [--threads N]    from 10,000 balls on the last layer is filled";
   supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--threads", 1}});
   std::vector<int> counts;
   int threads = 1;

@@ -1,13 +1,13 @@
 /// @file contact_poses.cpp
-/// Contact queries in many random poses: sixteen cases (`all` are those that are seldom marched), worst and middle CPU time and error over the poses, one JSON
-/// object a line. A query is broad phase, candidates and contact surface of two bodies, with
-/// no state from another pose; its time is the least in three rounds of all poses. Beside it stands that of splitting the forces to the parts of the
-/// bodies. Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
-/// other cases are measured against the finest rule for the two bodies seen otherwise, which has other nodes; what it
-/// may itself be off by is added to the bounds. Poses whose patch a kink of a field crosses are told apart.
+/// Contact queries in many random poses: sixteen cases (`all`: those that seldom need the rule march), largest and median CPU time and error over the
+/// poses, one JSON object per line. A query is broad phase, candidates and contact surface of two bodies, without state from another pose; its time
+/// is the least of three rounds over all poses. The time of distributing the forces to the parts of the bodies is given too.
+/// Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
+/// other cases are compared with the finest rule for the same bodies in another frame, which has other nodes; the error of that
+/// reference is added to the bounds. Poses whose patch is crossed by a kink of a field are listed separately.
 ///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
-/// --marched: where there is no closed form the reference is marching, which has neither rays nor panels.
-/// --all-rays: bodies that are the same all around an axis get every ray, as others do, and not one that stands for all.
+/// --marched: where there is no closed form the reference is the rule march, which has neither rays nor panels.
+/// --all-rays: bodies of revolution get all rays, as other bodies do, instead of a single one.
 #include <cstdio>
 #include <limits>
 #include <optional>

@@ -3,7 +3,7 @@
 /// the peak, in tetrahedra; each refined step by step, over the same random poses at an overlap of a tenth of the smaller
 /// radius. A query is broad phase, candidates and contact surface. Errors are the largest of force, area (relative) and
 /// centre of pressure (over the root of the area), RMS over the poses, against closed forms or the finest polar rule for
-/// the bodies seen otherwise. Last come patches that are rings. Tables; a file name gets the plot (SVG).
+/// the bodies in another frame. The last case has ring-shaped patches. Prints tables; with a file name also writes the plot (SVG).
 ///   contact_rules [FILE.svg]
 #include <cstdio>
 #include <fstream>

@@ -1,7 +1,7 @@
-// Contact tried hard: stiffness x mass ratio x speed at steps asked of 1/24 s, stacks that grow heavier upward, balls
-// squeezed to half their diameter, a thousand shots. Prints the table of docs/stability.md; a file name
-// writes the map as SVG. `--seed N` repeats the shots of a run. Exit 1 when a run gained energy, let something pass
-// untold, stopped, or did not hold what it can hold.
+// Stability of contact in extreme scenes: stiffness x mass ratio x speed at time_step.size of 1/24 s, stacks that grow heavier
+// upward, balls squeezed to half their diameter, a thousand random shots. Prints the table of docs/stability.md; with a file name
+// also writes the map as SVG. `--seed N` repeats the shots of a run. Exit code 1 when a run gained energy, let a body pass
+// without a warning, stopped, or failed within the capacity of its contacts.
 #include <array>
 #include <cstdio>
 #include <fstream>

@@ -1,7 +1,7 @@
 /// @file contact_thin.cpp
-/// Contact queries of bodies that overlap by a thousandth of their rounding and less, decade by decade of that share; one JSON object a line. Bodies
-/// with flat cores on a plane, against a closed form that is exact to that share; and pairs of boxes, capsules and discs whose surfaces lie on one another
-/// in random poses, against a query for a thousandth of the error; the same of bodies that lean on one another, three times as many.
+/// Contact queries of bodies that overlap by a thousandth of their rounding radius and less, by decades of that ratio; one JSON object per line. Bodies
+/// with flat medial sets on a plane are compared with a closed form that is exact to that ratio; pairs of boxes, capsules and discs with face contact in
+/// random poses with a query at a thousandth of the error; and three times as many bodies that lean on one another.
 ///   contact_thin [POSES] [SEED]
 #include <algorithm>
 #include <cstdio>

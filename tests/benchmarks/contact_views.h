@@ -1,5 +1,5 @@
 /// @file contact_views.h
-/// Contact queries of the same two bodies seen in other ways, of which nothing should change but for round-off.
+/// Contact queries of the same two bodies in other frames and orders; the results should agree up to round-off.
 #pragma once
 
 #include <optional>

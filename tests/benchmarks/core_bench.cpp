@@ -1,6 +1,6 @@
 /// @file core_bench.cpp
-/// Times of oriented particles, one JSON object a line: name, particles, time, size, hash of what was computed, peak
-/// memory. Times are the least of several repeats, CPU time of the process; lines of two threads give wall time.
+/// Times of oriented particles, one JSON object per line: name, particles, time, size, hash of the result, peak
+/// memory. Times are the least of several repeats, CPU time of the process; lines with two threads give wall time.
 #include <sys/resource.h>
 
 #include <array>

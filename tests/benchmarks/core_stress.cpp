@@ -1,5 +1,5 @@
-// How far the time step can be stretched: step x stiffness x compression x mass ratio, on four small systems. Every run
-// ends stable, with more energy than it had, or with the divergence that `find_divergence` names; never with a NaN.
+// Largest usable time steps: step x stiffness x compression x mass ratio, on four small systems. Every run
+// ends stable, with gained energy, or with a divergence that `find_divergence` reports; never with a NaN.
 // Prints the table of docs/stability.md; with a file name, also writes the map as SVG. Exit 1 when a
 // physically valid case at the automatic step is not stable.
 #include <algorithm>

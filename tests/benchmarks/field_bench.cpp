@@ -1,5 +1,5 @@
 /// @file field_bench.cpp
-/// Times of the field, one JSON object a line: name, cpu_ms_min, items_per_s, hash of what was computed.
+/// Times of the field, one JSON object per line: name, cpu_ms_min, items_per_s, hash of the result.
 /// Bodies: a spiral of ten plates, and Wyvill blobs in a deformed ball such that 30 supports overlap inside.
 #include <algorithm>
 #include <array>
@@ -200,12 +200,12 @@ void measure_few(std::string_view filter, std::uint32_t count, ShapeKind shape) 
 
 /// @param argv  beginning of the names to run, e.g. w3/values; all when absent
 int main(int argc, char** argv) {
-  constexpr std::string_view kUsage = "field_bench [PREFIX]    of the names to run, e.g. w3/values";
+  constexpr std::string_view kUsage = "field_bench [PREFIX]    prefix of the names to run, e.g. w3/values";
   supple::benchmarks::answer_usage(argc, argv, kUsage, 1);
   const std::string_view filter = argc > 1 ? argv[1] : "";
   constexpr std::array<std::string_view, 5> kFirst{"few/", "w1/", "w2/", "w3/", "w4/"};
   if (std::none_of(kFirst.begin(), kFirst.end(), [filter](std::string_view first) { return wanted(filter, first); })) {
-    supple::benchmarks::refuse(kUsage, "a prefix of a name, as w3/values", filter);
+    supple::benchmarks::refuse(kUsage, "a prefix of a name, such as w3/values", filter);
   }
   if (wanted(filter, "few/")) {
     for (const std::uint32_t count : {1u, 4u, 16u}) {

@@ -1,15 +1,15 @@
 /// @file mesh_bench.cpp
-/// Surface meshes timed beside their error, one JSON object a line: CPU times of the index and of the mesh, triangles,
+/// Times and errors of surface meshes, one JSON object per line: CPU times of the index and of the mesh, triangles,
 /// memory, a hash, and the distances of vertices and of triangle centroids to the exact surface in cells (RMS; Newton's
 /// method along the analytic gradient, in double precision).
 ///
-///   mesh_bench --bounded BODY CELLS            Hausdorff distances of cubes and tetrahedra to a mesh of a quarter of the cell
+///   mesh_bench --bounded BODY CELLS            Hausdorff distances of cubes and tetrahedra to a mesh with a quarter of the cell
 ///                                              and back, with a bounded error (needs the component supple_cgal)
 ///   mesh_bench [PREFIX [--both]]               e.g. w3/128 or w3/128/cubes; all when absent; --both: errors both ways;
 ///                                              /moved and /grid: update of a mesh, of a grid when 1 % of the primitives moved;
-///                                              /within: the same of meshes to an error of a tenth of a cell, with creases of half a cell;
-///                                              /field: the field stage against its floors; /searched, only by its whole name:
-///                                              cubes and the pieces that they miss
+///                                              /within: the same for meshes to an error of a tenth of a cell, with creases of half a cell;
+///                                              /field: the field stage and its lower bounds; /searched (only by its full name):
+///                                              cubes and the search for the pieces that they miss
 ///   mesh_bench --grid BODY CELLS FILE          the field on every node of the grid as raw float32, for other meshers
 ///   mesh_bench --errors BODY CELLS FILE        errors of a mesh: two int64 counts, float64 points, uint32 triangles
 #include <sys/resource.h>
@@ -563,7 +563,7 @@ int main(int argc, char** argv) {
   using supple::benchmarks::whole_number;
   constexpr std::array<std::string_view, 6> kBodies{"w1", "w2", "w3", "w4", "capsules", "united"};
   constexpr std::string_view kUsage =
-      "mesh_bench [PREFIX [--both]]          of the names to run, e.g. w3/128; --both: errors both ways\n"
+      "mesh_bench [PREFIX [--both]]          prefix of the names to run, e.g. w3/128; --both: errors both ways\n"
       "       mesh_bench --bounded BODY CELLS\n"
       "       mesh_bench --grid BODY CELLS FILE\n"
       "       mesh_bench --errors BODY CELLS FILE";
@@ -629,6 +629,6 @@ int main(int argc, char** argv) {
       }
     }
   }
-  if (!any) supple::benchmarks::refuse(kUsage, "a prefix of a name, as w3/128", filter);
+  if (!any) supple::benchmarks::refuse(kUsage, "a prefix of a name, such as w3/128", filter);
   return 0;
 }

@@ -1,7 +1,7 @@
 /// @file mesh_probes.cpp
-/// Small balls pressed into the faces of mesh solids by a hundredth of their size, in places spread evenly over the area; one JSON object a mesh and error.
-/// Without files: a box, a gear and an anchor of crossing shells. A ball that finds no contact, or a place as far behind a face that is
-/// outside ("hollow") though the mesh is thicker there, shows a surface that is elsewhere.
+/// Small balls are pressed into the faces of mesh solids by a hundredth of their size, at points spread evenly over the area; one JSON object per mesh and
+/// error. Without files: a box, a gear and an anchor of intersecting shells. A ball without contact, or a point at that depth behind a face
+/// that is outside ("hollow") although the mesh is thicker there, shows that the surface is misplaced.
 ///   mesh_probes [PROBES] [FILE.obj|.ply ...]
 #include <algorithm>
 #include <cmath>

@@ -1,12 +1,12 @@
 /// @file partition_bench.cpp
-/// Random balls that overlap, divided by polygonise_partition and delaunay_partition: sets of two, three, four and six, the same on every
-/// run, one JSON object a line. Points where four of balls and outside meet have closed forms; rims are circles between two balls and
-/// outside, and the places nearest to a vertex that Newton's method finds elsewhere.
-///   partition_bench rims [SETS] [CELL]       vertices of rims and corners beside the exact ones, lengths over the cell
-///   partition_bench delaunay [SETS] [SIZE]   how many sets hold the angle
-///   partition_bench moved [BALLS] [CELL] [ERROR]  a pile in which some balls move: PartitionMesher beside polygonise_partition, or, to an
-///                                            error [m] from CELL on, PartitionErrorMesher beside polygonise_partition_within, one thread;
-///                                            share is that of the time, blocks_share that of the blocks visited
+/// Random balls that overlap, divided by polygonise_partition and delaunay_partition: sets of two, three, four and six, the same in every
+/// run, one JSON object per line. Corners, where four regions (balls and outside) meet, have closed forms; the boundary curves between two
+/// balls and outside are circles, or for other points the nearest ones that Newton's method finds.
+///   partition_bench rims [SETS] [CELL]       distances of vertices on boundary curves and corners to the exact ones, over the cell
+///   partition_bench delaunay [SETS] [SIZE]   number of sets that meet the angle
+///   partition_bench moved [BALLS] [CELL] [ERROR]  a pile in which some balls move: PartitionMesher against polygonise_partition, or, for an
+///                                            error [m] from CELL on, PartitionErrorMesher against polygonise_partition_within, one thread;
+///                                            share is the ratio of the times, blocks_share that of the blocks visited
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>

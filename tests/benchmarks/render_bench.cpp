@@ -1,11 +1,11 @@
 /// @file render_bench.cpp
-/// Pictures timed, one JSON object a line: CPU milliseconds by their parts, size of the picture, triangles, hash of the
+/// Times of pictures, one JSON object per line: CPU milliseconds by parts, size of the picture, triangles, hash of the
 /// pixels. The body is a ball of 200,000 triangles whose surface waves, so that every frame uploads new vertices.
 ///
-///   render_bench [gl]                          1280 x 720, soft shadows, 4 samples, PNG included; the first frame apart
-///   render_bench rate [AT_ONCE] [NOISE]        frames a second of the same, several renderers at a time; with a noise by the
+///   render_bench [gl]                          1280 x 720, soft shadows, 4 samples, PNG included; the first frame separately
+///   render_bench rate [AT_ONCE] [NOISE]        frames per second of the same, several renderers at a time; with NOISE by the
 ///                                              path tracer
-///   render_bench path [NOISE] [OUT.png]        640 x 360 by the path tracer, on matt bodies in a studio, no coat
+///   render_bench path [NOISE] [OUT.png]        640 x 360 by the path tracer, matt bodies in a studio
 ///   render_bench studio FOLDER                 the same bodies as PLY files, for other renderers: see peers/
 #include <time.h>
 

@@ -1,6 +1,6 @@
 // A plain kernel for one problem, written by hand: a chain of bodies with equal moments of inertia, held by bond frames
-// and co-planarity, with friction on its bonds, stepped by velocity Verlet. It shares no code with the library and keeps
-// no books; what the library takes beside it is the price of generality.
+// and co-planarity, with friction on its bonds, stepped by velocity Verlet. It shares no code with the library and books no
+// energies; the time that the library needs beyond it is the cost of generality.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 /// @file usage.h
-/// What every benchmark program does with its arguments first.
+/// Arguments and usage texts of the benchmark programs.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ inline void print_usage(std::FILE* to, std::string_view usage) {
   std::fprintf(to, "usage: %.*s\n", static_cast<int>(usage.size()), usage.data());
 }
 
-/// Ends the program with 2, as an argument is not what it takes.
+/// Reports an invalid argument and ends the program with 2.
 [[noreturn]] inline void refuse(std::string_view usage, std::string_view expected, std::string_view found) {
   std::fprintf(stderr, "error: expected %.*s, found '%.*s'\n", static_cast<int>(expected.size()), expected.data(), static_cast<int>(found.size()),
                found.data());
@@ -32,7 +32,7 @@ inline void print_usage(std::FILE* to, std::string_view usage) {
   std::exit(2);
 }
 
-/// The number that an argument is, all of it; another one ends the program with 2.
+/// An argument as a whole number; ends the program with 2 where it is none, or too small.
 template <class T = int>
 T whole_number(std::string_view usage, std::string_view text, T least = 1) {
   T value{};
@@ -43,7 +43,7 @@ T whole_number(std::string_view usage, std::string_view text, T least = 1) {
   return value;
 }
 
-/// As above, of any number > 0.
+/// As above, for any number > 0.
 inline double positive_number(std::string_view usage, std::string_view text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -52,7 +52,7 @@ inline double positive_number(std::string_view usage, std::string_view text) {
   return value;
 }
 
-/// Ends the program with 2 where a word is none that it knows.
+/// Ends the program with 2 where a word is unknown.
 template <class Words>
 void expect_word(std::string_view usage, std::string_view word, const Words& known) {
   if (std::find(std::begin(known), std::end(known), word) != std::end(known)) return;
@@ -61,10 +61,10 @@ void expect_word(std::string_view usage, std::string_view word, const Words& kno
   refuse(usage, expected, word);
 }
 
-/// Ends the program where it is asked for its usage (-h, --help), with 0, or given an option that it does not know, one without
-/// its values, or more arguments than it takes, with 2. Negative numbers are no options.
-/// @param usage  a line for each way to call it   @param most  arguments that it takes, options and their values included
-/// @param options  that it knows
+/// Prints the usage and ends the program: with 0 for -h and --help, with 2 for an unknown option, an option without its values, or
+/// too many arguments. Negative numbers are no options.
+/// @param usage  one line per way to call the program   @param most  largest number of arguments, options and their values included
+/// @param options  the known options
 inline void answer_usage(int argc, char** argv, std::string_view usage, std::size_t most, std::initializer_list<BenchmarkOption> options = {}) {
   const std::span<char*> arguments(argv + 1, static_cast<std::size_t>(std::max(argc - 1, 0)));
   for (const std::string_view argument : arguments) {

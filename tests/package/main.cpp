@@ -1,4 +1,4 @@
-// A stranger's program: reads a scene, steps it, prints where the first particle is and the hash of the state.
+// A minimal external project: reads a scene, steps it, prints the position of the first particle and the hash of the state.
 #include <supple/core/hash.h>
 #include <supple/scenes/read_scene.h>
 #include <supple/scenes/simulation.h>

@@ -1,4 +1,4 @@
-"""A stranger's script: the same as main.cpp, by the installed Python package."""
+"""A minimal external script: the same as main.cpp, with the installed Python package."""
 import sys
 
 import supple

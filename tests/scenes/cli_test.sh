@@ -89,11 +89,11 @@ expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
 expect 6 'time_step.max_substeps' check too_fine.yaml
 expect 0 '' query forces too_fine.yaml
 expect 0 '' explain too_fine.yaml
-grep -qF 'no step can be made' out.txt || { echo 'explain too_fine.yaml: expected why no step can be made'; failures=$((failures + 1)); }
+grep -qF 'no time step is possible' out.txt || { echo 'explain too_fine.yaml: expected why no time step is possible'; failures=$((failures + 1)); }
 printf 'schema: 1\nduration: 5 ms\nframe_rate: 1000\nground: {modulus: 1e9}\ntime_step: {substeps: 1}\nobjects:\n' > passes.yaml
 printf '  - name: ball\n    particles: {at: [0, 0, 0.2], velocity: [0, 0, -600], mass: 0.001}\n' >> passes.yaml
 printf '    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]\n    contact: {modulus: 1e8}\n' >> passes.yaml
-expect 5 "at t = 0.001 s 'ball' and 'ground' go" run passes.yaml --out passes --progress none
+expect 5 "at t = 0.001 s 'ball' and 'ground' overlap more" run passes.yaml --out passes --progress none
 # A state of a scene with another key: the one that differs, and what to add.
 expect 0 '' run good.yaml --out heavy --progress none --simulate-only --set objects.ball.particles.mass=2
 expect 7 'with objects.ball.particles.mass=2 (here 1); its scene is this one with --set objects.ball.particles.mass=2' query forces good.yaml --state heavy/states/good.0002.state

@@ -1,4 +1,4 @@
-"""Hostile and mutated inputs: by the libraries in their thousands (stress_inputs), and some of them by the tool."""
+"""Hostile and mutated inputs: thousands for the libraries (stress_inputs), and some of them for the tool."""
 import json
 import os
 import re

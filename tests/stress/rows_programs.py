@@ -1,4 +1,4 @@
-"""Rows that tests and benchmarks cover: they are called, and counted by what they say."""
+"""Rows that call tests and benchmarks and count by their output."""
 import json
 import pathlib
 import re

@@ -1,5 +1,5 @@
 /// @file tests/stress/scene_mutations.h
-/// Scenes that are almost right: trees of keys and values in which some are exchanged, dropped, doubled, misspelt or driven to extremes.
+/// Almost valid scenes: trees of keys and values in which some are exchanged, dropped, doubled, misspelt or set to extremes.
 #pragma once
 
 #include <cstdint>

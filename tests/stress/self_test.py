@@ -1,4 +1,4 @@
-"""Faults on purpose: every way of finding them must find its own."""
+"""Planted faults: every kind of check must find its own."""
 import stat
 
 import rows_failures

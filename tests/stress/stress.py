@@ -1,4 +1,4 @@
-"""Rows of docs/reliability.md: what must never happen, tried. Called by scripts/stress.sh, which builds what they need."""
+"""Stress tests: the rows of docs/reliability.md. Called by scripts/stress.sh, which builds their programs."""
 import argparse
 import dataclasses
 import datetime
@@ -40,24 +40,24 @@ def tests(*parts):
 ROWS = [
     Row("scenes", "library scenes and golden messages, mutated; read and checked, those that pass run for two frames", 10_000, "scenes", functools.partial(rows_inputs.by_libraries, "scenes")),
     Row("tool", "mutated scenes by the command line: check, then run under a time limit", 500, "scenes", rows_inputs.mutated_by_tool),
-    Row("hostile", "scenes that mean harm, and golden messages: refused in 1 s and 256 MB", 250, "scenes", rows_inputs.hostile),
+    Row("hostile", "hostile scenes and golden messages: refused in 1 s and 256 MB", 250, "scenes", rows_inputs.hostile),
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
     Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7, or simulated again to the same bits", 1_000, "commands", rows_runs.states),
-    Row("frames", "lists of frames as `--frames` takes them", 100_000, "lists", functools.partial(rows_inputs.by_libraries, "frames")),
-    Row("grids", "OpenVDB files altered or cut off: exported again, whole", 200, "files", rows_runs.grids),
-    Row("memory", "an allocation that fails, the n-th: exit 6 with a message, nothing half-written, resumed to the same bits", 1_000, "runs", rows_failures.failing_memory),
+    Row("frames", "lists of frames for `--frames`", 100_000, "lists", functools.partial(rows_inputs.by_libraries, "frames")),
+    Row("grids", "OpenVDB files altered or truncated: exported again, complete", 200, "files", rows_runs.grids),
+    Row("memory", "the n-th allocation fails: exit 6 with a message, no incomplete file, resumed to the same bits", 1_000, "runs", rows_failures.failing_memory),
     Row("io", "EIO, ENOSPC, EINTR or a short count at the n-th call: exit 4 or the same result, resumed to the same bits", 2_000, "runs", rows_failures.failing_io),
     Row("kill", "SIGKILL at random moments, then `--resume`: same bits, no temporary file, no process left", 200, "kills", rows_runs.kill),
     Row("signals", "SIGINT, SIGTERM: exit 130, 143, resumed to the same bits", 100, "signals", rows_runs.signals),
-    Row("races", "two runs in one folder: one does it, the other says why not", 50, "races", rows_runs.races),
-    Row("resume", "resumed from every frame, and once more, in fresh processes", 60, "frames", rows_runs.resume),
+    Row("races", "two runs in one folder: one runs, the other is refused with the reason", 50, "races", rows_runs.races),
+    Row("resume", "resumed twice from every frame, in new processes", 60, "frames", rows_runs.resume),
     Row("threads", "8 scenes by 1, 2, 3, 4, 8, 16 threads: same bits, same files", 48, "runs", rows_runs.threads),
     Row("messages", "golden messages, word for word", 150, "tests", tests(("scenes_tests", "Golden/Message.*:Messages.*")), True),
     Row("determinism", "threads, skips, outputs, restarts, order of objects", 1, "tests", tests(("scenes_tests", "*Determinism*"), ("collision_tests", "*AnyNumberOfThreads*:*AnyThreads*")), True),
-    Row("invariance", "contacts turned, moved, scaled, exchanged", 1, "tests", tests(("collision_tests", "*Invariance*:ContactSurface.TurnsMovesAndScalesWithTheBodies:ContactSurface.GivesTheOpposite*")), True),
+    Row("invariance", "contacts rotated, moved, scaled, exchanged", 1, "tests", tests(("collision_tests", "*Invariance*:ContactSurface.TurnsMovesAndScalesWithTheBodies:ContactSurface.GivesTheOpposite*")), True),
     Row("conservation", "momentum, angular momentum, action and reaction", 1, "tests", tests(("scenes_tests", "FreeBalls.*:FreeCollision.*:SetParticles.KeepsTheAudits"), ("collision_tests", "React.KeepsMomentum*:FreeCollision.*:ContactRules.*KeepMomenta")), True),
-    Row("surfaces", "both deformed surfaces meet on the contact, no force apart from it", 1, "tests", tests(("collision_tests", "DeformedField.*:*NeverGivesOnePointToTwoBodies*:ContactSurface.HasBothPressuresEqualAtEveryPoint:ContactSurface.IsEmpty*"), ("scenes_tests", "FreeCollision.BothDeformed*:Simulation.GivesNoForce*:Meshes.OfTouchingObjects*")), True),
+    Row("surfaces", "both deformed surfaces coincide on the contact surface, no force elsewhere", 1, "tests", tests(("collision_tests", "DeformedField.*:*NeverGivesOnePointToTwoBodies*:ContactSurface.HasBothPressuresEqualAtEveryPoint:ContactSurface.IsEmpty*"), ("scenes_tests", "FreeCollision.BothDeformed*:Simulation.GivesNoForce*:Meshes.OfTouchingObjects*")), True),
     Row("contacts", "random contacts of 13 kinds of pairs: momenta, pressures and deformed surfaces to 1e-10, none where bodies are apart", 2_000, "contacts", rows_programs.contacts),
     Row("gradients", "laws, kernels, shapes and fields against finite differences", 1, "tests", tests(("core_tests", "*AreTheGradient*:*MatchCentralDifferences*"), ("implicit_tests", "*CentralDifferences*"), ("collision_tests", "*Gradient*")), True),
     Row("stability", "step x stiffness x compression x mass ratio, and contact at any stiffness and speed", 1_000, "runs", rows_programs.stability, True),
@@ -107,12 +107,12 @@ def report_line(row, context, outcome, seconds):
 
 HEAD = """# Reliability
 
-A run is killed, the disk fills, a scene is hostile: nothing is lost, nothing half-written is left under a final name, and a message says
-what happened and what to do. `scripts/stress.sh` tries this, a row of the table at a time, and `--report` writes the lines of the rows that
-it ran; the others keep their last line. "Asked" is what a full run tries, "reached" what the last run tried. `scripts/stress.sh --self-test`
-plants faults and expects to find them.
+When a run is killed, the disk fills or a scene is hostile, no saved frame is lost, no incomplete file appears under a final name, and a message
+says what happened and what to do. `scripts/stress.sh` tests this row by row; `--report` updates the lines of the rows that
+it ran. "Planned" is the number of trials of a full run, "made" that of the last run. `scripts/stress.sh --self-test`
+plants faults and checks that they are found.
 
-| row | what is tried | asked | reached | failures | time [s] | when, commit | command |
+| row | test | planned | made | failures | time [s] | date, commit | command |
 |---|---|---|---|---|---|---|---|
 """
 
@@ -128,10 +128,10 @@ def write_report(lines):
 
 
 def main():
-    parser = argparse.ArgumentParser(prog="scripts/stress.sh", description="Tries what must never happen, row by row: " + ", ".join(row.name for row in ROWS) + ".")
+    parser = argparse.ArgumentParser(prog="scripts/stress.sh", description="Runs stress tests, row by row: " + ", ".join(row.name for row in ROWS) + ".")
     parser.add_argument("rows", nargs="*", metavar="ROW", help="all when none is named")
-    parser.add_argument("--seed", type=int, default=1, help="of what is random (default 1)")
-    parser.add_argument("--share", type=float, default=1.0, help="of the full counts, e.g. 0.1")
+    parser.add_argument("--seed", type=int, default=1, help="seed of random numbers (default 1)")
+    parser.add_argument("--share", type=float, default=1.0, help="share of the planned numbers, e.g. 0.1")
     parser.add_argument("--report", action="store_true", help="write the lines of these rows into docs/reliability.md")
     parser.add_argument("--build", default=str(SOURCES / "build/release"), help="build folder (default build/release)")
     parser.add_argument("--self-test", action="store_true", help="plant faults and expect every row that is tried to find them")

@@ -1,6 +1,6 @@
-// Random contacts of all cases of the contact benchmarks: bodies in motion, with friction and damping. Of each: forces and moments of the pair
-// sum to zero, the pressures of both are the same on the contact surface, both deformed surfaces pass through it; and the same bodies moved
-// apart have no contact. Prints one JSON object with the counts, the largest relative errors and every contact beyond the limits; exit 1 when there is one.
+// Random contacts of all cases of the contact benchmarks: bodies in motion, with friction and damping. Checks of each: forces and moments of the pair
+// sum to zero, both pressures agree on the contact surface, both deformed surfaces pass through it; and the same bodies moved
+// apart have no contact. Prints one JSON object with the counts, the largest relative errors and every contact beyond the limits; exit code 1 if there is one.
 //   stress_contacts [CONTACTS] [SEED]
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
-// Inputs that are almost right, tried in their thousands by the libraries, in a process that is watched. Prints one JSON object: what was
-// tried, what was refused, and every fault with the file that shows it. Exit 1 when there is one.
+// Thousands of almost valid inputs for the libraries, in a watched process. Prints one JSON object: numbers of trials and of refused
+// inputs, and every fault with the file that shows it. Exit code 1 when there is a fault.
 //   stress_inputs scenes|files|states|frames --count N --seed S --first N --sources DIR --scratch DIR
-//   stress_inputs scenes ... --write only       leaves the inputs as files and tries none
-//   stress_inputs planted --plant KIND          trials that go wrong on purpose (fuzzers.h)
+//   stress_inputs scenes ... --write only       writes the inputs as files and tries none
+//   stress_inputs planted --plant KIND          trials with planted faults (fuzzers.h)
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-"""What all rows of scripts/stress.sh need: the tool as a process, folders compared file by file, and what a row tells."""
+"""Common code of the rows of scripts/stress.sh: the tool as a process, comparison of folders, and the result of a row."""
 import dataclasses
 import hashlib
 import json
@@ -37,7 +37,7 @@ class Ended:
 
 
 class Context:
-    """Where things are, and how much of them is asked for."""
+    """Paths, and the numbers of trials."""
 
     def __init__(self, sources, build, scratch, seed, share):
         self.sources = pathlib.Path(sources)

@@ -1,5 +1,5 @@
 /// @file tests/stress/watched.h
-/// Trials that may crash, hang or take all memory: they run in a process of their own, which is watched and replaced when it ends early.
+/// Trials that may crash, hang or exhaust memory: they run in a process of their own, which is watched and restarted when it ends early.
 #pragma once
 
 #include <cstdint>

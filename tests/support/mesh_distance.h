@@ -1,5 +1,5 @@
 /// @file tests/support/mesh_distance.h
-/// Distances from points to a triangle mesh: the way back of two-sided errors, by which a missed part of a surface shows.
+/// Distances from points to a triangle mesh: the second half of two-sided errors, which shows missed parts of a surface.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +34,7 @@ inline double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, cons
 /// Triangles in the cubes of a grid.
 class MeshDistance {
  public:
-  /// @param cell  edge of the cubes [m]; best is the size of a triangle
+  /// @param cell  edge of the cubes [m]; the size of a triangle is fastest
   MeshDistance(const Mesh& mesh, double cell) : mesh_(mesh), cell_(cell) {
     Box box;
     for (const Vec3& p : mesh.position) box.include(p);

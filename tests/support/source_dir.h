@@ -5,7 +5,7 @@
 
 namespace supple {
 
-/// The top of the source tree. Alone in a file of its own, so that all others compile alike wherever the tree lies.
+/// Root of the source tree. In a file of its own, so that no other object file depends on the location of the tree.
 std::filesystem::path source_dir();
 
 }  // namespace supple

@@ -7,8 +7,8 @@
 namespace supple {
 
 void ContentVersions::begin_frame() {
-  std::erase_if(content_, [](const auto& entry) { return !entry.second.asked; });
-  for (auto& [hash, content] : content_) content.asked = false;
+  std::erase_if(content_, [](const auto& entry) { return !entry.second.requested; });
+  for (auto& [hash, content] : content_) content.requested = false;
 }
 
 std::uint64_t ContentVersions::of(std::span<const std::uint64_t> words) {
@@ -16,8 +16,8 @@ std::uint64_t ContentVersions::of(std::span<const std::uint64_t> words) {
   const auto [begin, end] = content_.equal_range(hash);
   for (auto at = begin; at != end; ++at) {
     Content& content = at->second;
-    if (content.asked || !std::equal(words.begin(), words.end(), content.words.begin(), content.words.end())) continue;
-    content.asked = true;
+    if (content.requested || !std::equal(words.begin(), words.end(), content.words.begin(), content.words.end())) continue;
+    content.requested = true;
     return content.number;
   }
   content_.emplace(hash, Content{.words = {words.begin(), words.end()}, .number = next_});

@@ -17,7 +17,7 @@ std::size_t character_length(std::string_view text) {
   return length;
 }
 
-/// Names and contents of files may hold anything: what a terminal would obey, and what is no text, is shown by its bytes.
+/// Names and contents of files may contain anything: control characters and invalid text are shown by their bytes.
 std::string printable(std::string_view text) {
   std::string out;
   while (!text.empty()) {

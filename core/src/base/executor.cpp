@@ -98,7 +98,7 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
       shares[k].next.store(k * blocks / count, std::memory_order_relaxed);
       shares[k].end = (k + 1) * blocks / count;
     }
-    // The order of memory, written down: TBB keeps it too, but where the thread sanitizer cannot see. Two of them, so that
+    // Explicit memory order: TBB guarantees it too, but the thread sanitizer cannot see that. Two of them, so that
     // no block seems to come after another.
     std::atomic<bool> begun{false};
     std::atomic<std::size_t> done{0};

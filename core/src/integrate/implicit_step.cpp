@@ -36,7 +36,7 @@ class StepPotential {
     return 0.5 / (h_ * h_) * inertial + potential_energy(set_, pose, interactions_) + buffers_.contact.value(pose);
   }
 
-  /// Leaves the loads of the pair laws in `buffers.laws` and the gradient in `buffers.gradient`.
+  /// Computes the loads of the pair laws in `buffers.laws` and the gradient in `buffers.gradient`.
   void differentiate(const ParticleState& pose) {
     const std::size_t n = set_.size();
     buffers_.laws.reset(n);
@@ -170,8 +170,8 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
   constexpr double kLargestTurn = 0.5;   // [rad] in one correction
   constexpr int kMostHalvings = 30;
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
-  constexpr double kLagged = 1e-3;       // of all normal forces: a change that friction does not follow any more
-  constexpr double kStuck = 1e-3;       // of the stick speed: what a last correction may change of a slip
+  constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
+  constexpr double kStuck = 1e-3;       // of the stick speed: largest change of a slip by the last correction
   report.within_tolerance = false;
   double value = 0.0;
   int lags = 0;
@@ -219,7 +219,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     value = next;
     begin_at_pose();
     if (last) {
-      // Friction is so steep in the slip that what is left of the correction would be felt by the velocities.
+      // Friction is so steep in the slip that the rest of the correction would be visible in the velocities.
       if (!buffers.contact.empty() && potential.refine()) {
         move(buffers.pose, buffers.correction, 1.0, buffers.trial);
         std::swap(buffers.pose, buffers.trial);

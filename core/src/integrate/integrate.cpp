@@ -154,7 +154,7 @@ double half_work(const ParticleSet& set, RotationUpdate rotation, const Loads& e
   return work;
 }
 
-/// Half a step's kick with loads from outside that change in it: their work is their impulse times the mean velocity.
+/// Half a step's kick by external loads that change in it: their work is their impulse times the mean velocity.
 void kick_changing(const ParticleSet& set, const ForceSample& sample, double dt, ParticleState& state, Ledger& ledger) {
   const auto half_of_work = [&] {
     double work = 0.0;
@@ -292,7 +292,7 @@ void advance(const StepProblem& problem, double time, double dt, const StepTarge
   stop_pinned(set, state);
   if (!kick_state.valid) evaluate(forces, state, time, sample);
 
-  // Each kick takes what the loads from outside are in its half of the step, however short they are.
+  // Each kick has the mean of the external loads over its half of the step, for loads of any duration.
   const auto changes = [&](double from, double to) {
     return std::any_of(interactions.external.begin(), interactions.external.end(),
                        [&](const ExternalLoad& load) { return load.changes(from, to); });

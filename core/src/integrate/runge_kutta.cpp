@@ -144,8 +144,8 @@ void combine(const ParticleState& state, double dt, std::span<const double> weig
   }
 }
 
-/// Largest difference of the two methods of a pair, of positions over `length` and of angles in radians; velocities count
-/// by what they move in the step.
+/// Largest difference of the two methods of a pair, of positions over `length` and of angles in radians; velocities enter
+/// by the displacement in the step.
 double local_error(const ParticleSet& set, const ParticleState& state, double dt, std::span<const double> weight,
                    const std::vector<Rates>& stage, double length) {
   double largest2 = 0.0;
@@ -176,7 +176,7 @@ class Stepper {
     for (Rates& rates : buffers_.stage) resize(rates, problem.set.size());
   }
 
-  /// Leaves the state after dt in `buffers.trial`. `first_known`: stage 0 holds the rates at `state` already.
+  /// Computes the state after dt in `buffers.trial`. `first_known`: stage 0 holds the rates at `state` already.
   void attempt(const ParticleState& state, double time, double dt, bool first_known) {
     for (std::size_t s = first_known ? 1 : 0; s < tableau_.c.size(); ++s) {
       if (s == 0) {
@@ -237,7 +237,7 @@ StepReport advance_adaptively(const IntegratorSettings& settings, double time, d
       stepper.accept(step, state, target.ledger);
       stepper.hand_on();
       ++report.substeps;
-      // The end of the step may have cut this one short, which says nothing against the size that was tried.
+      // The end of the step may have shortened this substep, which does not reduce the size to try next.
       h = last && step < h ? std::max(h, step * factor) : step * factor;
       done = last ? dt : done + step;
     } else {

@@ -29,7 +29,7 @@ void sync_folder(const std::filesystem::path& folder) {
   if (descriptor.is_open()) (void)retried([&] { return ::fsync(descriptor.get()); });
 }
 
-/// Gives what was written under `from` the name `to`, on the disk, too. 0 on success, errno otherwise.
+/// Renames `from` to `to`, with fsync of content and folder. 0 on success, errno otherwise.
 int publish(Descriptor& descriptor, const std::filesystem::path& from, const std::filesystem::path& to) {
   int code = retried([&] { return ::fsync(descriptor.get()); }) != 0 ? errno : 0;
   const int closed = descriptor.close();

@@ -53,7 +53,7 @@ std::array<bool, 3> occupy_standard_descriptors() {
   for (int k = STDIN_FILENO; k < kFirstFree; ++k) {
     if (::fcntl(k, F_GETFD) != -1 || errno != EBADF) continue;
     closed[static_cast<std::size_t>(k)] = true;
-    // Those below are open, so this gets number k.
+    // Lower numbers are open, so this gets number k.
     (void)retried([] { return ::open("/dev/null", O_RDONLY); });
   }
   return closed;

@@ -66,7 +66,7 @@ bool starts_like_a_name(std::string_view line) {
   return is_letter(c) || c == '"' || c == '_';
 }
 
-/// Whether a head names columns x, y, z, but in another order. Units may follow ("x [m]", "x_m"); other names say nothing.
+/// Whether a header names columns x, y, z, but in another order. Units may follow ("x [m]", "x_m"); other names have no effect.
 bool swaps_axes(std::string_view head) {
   std::string axes;
   while (!head.empty()) {

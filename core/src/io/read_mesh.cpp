@@ -30,7 +30,7 @@ class Lines {
     constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
     if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
   }
-  /// The next line with those that it goes on in after a backslash at its end.
+  /// The next line, with its continuation lines after a backslash at the end.
   /// @param whole  receives the text of lines that were joined   @return false at the end
   bool next_joined(std::string_view& line, std::string& whole) {
     if (!next(line)) return false;
@@ -92,7 +92,7 @@ bool lies_in(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c, const V
 /// Appends the triangles of a face: a fan, or where corners point inwards, triangles that no other corner lies in, cut off one after another
 /// (Meisters 1975, "Polygons Have Ears").
 void add_face(std::vector<std::uint32_t> corner, const std::string& place, Mesh& mesh) {
-  constexpr std::size_t kMostCorners = 4096;  // as each is looked at for each
+  constexpr std::size_t kMostCorners = 4096;  // as the test is quadratic in the number of corners
   const auto at = [&](std::size_t k) -> const Vec3& { return mesh.position[corner[k]]; };
   Vec3 normal = Vec3::Zero();
   for (std::size_t k = 2; k < corner.size(); ++k) normal += (at(k - 1) - at(0)).cross(at(k) - at(0));

@@ -202,7 +202,7 @@ class Tracks {
   }
 
  private:
-  /// A column that a frame lacks is zero there, so that it has a value a vertex in all of them.
+  /// A column that a frame does not have is zero there, so that it has one value per vertex in all frames.
   void add_columns(int frame, const Mesh& mesh) {
     for (const Mesh::Column& column : mesh.columns) {
       if (std::find(kVelocity.begin(), kVelocity.end(), column.name) != kVelocity.end()) continue;

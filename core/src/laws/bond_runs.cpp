@@ -9,7 +9,7 @@
 namespace supple::core::runs {
 namespace {
 
-/// Bonds by how far apart their particles are, then by their first.
+/// Bonds sorted by the difference of their particle numbers, then by their first particle.
 std::vector<std::uint32_t> sorted_bonds(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second) {
   std::vector<std::uint32_t> order(first.size());
   for (std::uint32_t k = 0; k < order.size(); ++k) order[k] = k;
@@ -35,7 +35,7 @@ std::vector<Batch> batches_of(std::span<const std::uint32_t> first, std::span<co
   return out;
 }
 
-/// Whether lanes are filled well enough to save what other batches spend on transpositions.
+/// Whether the lanes are filled well enough to pay for the transpositions that other batches need.
 bool pays(std::span<const Batch> batches, std::size_t bonds) {
   std::size_t steps = 0;
   for (const Batch& batch : batches) steps += (batch.count + kLanes - 1) / kLanes;
@@ -138,7 +138,7 @@ void stage(const ParticleSet& set, const ParticleState& state, std::size_t begin
     stage_four(i, &state.position[i], &state.orientation[i], &set.normal[i]);
   }
   if (i < end) {
-    // The rows have room for whole steps; what this one leaves beyond the particles is not used.
+    // The rows have room for whole vector steps; lanes beyond the particles are not used.
     std::array<Vec3, kLanes> position, normal;
     std::array<Quat, kLanes> orientation;
     for (std::size_t k = 0; k < kLanes; ++k) {

@@ -10,7 +10,7 @@
 namespace supple::core {
 namespace {
 
-/// One particle of a pair: what it gives way to an impulse.
+/// One particle of a pair: its compliance to an impulse.
 struct Side {
   std::size_t index;
   double inverse_mass;
@@ -38,7 +38,7 @@ Mat3 inverse_inertia(const ParticleSet& set, const ParticleState& state, const S
   return q * set.inertia[side.index].cwiseInverse().asDiagonal() * q.transpose();
 }
 
-/// What relative velocity u turns into impulse over h: -(1 - exp(-h k)) / k u to second order in z = h k, by
+/// Maps relative velocity u to the impulse over h: -(1 - exp(-h k)) / k u to second order in z = h k, by
 /// exp(-z) ~ 1 / (1 + z + z^2 / 2), which tends to 0 with growing z as the exponential does.
 double gain(double h, double k) {
   const double z = h * k;

@@ -97,7 +97,7 @@ Stiffness stiffness(const SwitchedGayBerne& law) {
   // det(G_A + G_B) is least where both are parallel, B at its softest.
   const double eta = whole_power(size_of(e) / (2.0 * e.radii.prod()), e.upsilon);
   const double deepest = eta * e.well.maxCoeff();
-  // What sigma_12 changes by with direction, over d (Kantorovich), and by turning one particle.
+  // Largest change of sigma_12 with direction, over d (Kantorovich), and by rotating one particle.
   const double ratio = e.radii.maxCoeff() / e.radii.minCoeff();
   const double lean = 0.5 * (ratio - 1.0 / ratio);
   const double lever = 0.5 * e.radii.maxCoeff() * (ratio * ratio - 1.0);

@@ -29,7 +29,7 @@ void for_each_pair(const GeometricLaw<Law>& list, const ParticleSet& set, const 
   }
 }
 
-/// Energy that a list counts as zero: that of a pair at the end of its range, so that pairs may come and go.
+/// Energy that a list counts as zero: that of a pair at the end of its range, so that pairs may enter and leave.
 template <class Law>
 double zero_energy(const BondedLaw<Law>&) {
   return 0.0;

@@ -25,7 +25,7 @@ Vec9 stacked(const Vec3& r, const Vec3& turn_a, const Vec3& turn_b) {
   return v;
 }
 
-/// What the second-order motion of a body vector b adds to its particle's rotation block, `gradient` being dU/db.
+/// Contribution of the second-order motion of a body vector b to its particle's rotation block, `gradient` being dU/db.
 Mat3 turning_term(const Vec3& b, const Vec3& gradient) {
   const Mat3 outer = b * gradient.transpose();
   return 0.5 * (outer + outer.transpose()) - b.dot(gradient) * Mat3::Identity();

@@ -26,7 +26,7 @@ double damping_time(const ParticleSet& set, const std::vector<StiffnessDamping>&
 /// K without the rigid motions of the pair: P^T K P with P R = 0. Prestress would make a rotation feel forces.
 Mat12 deformation_stiffness(const Vec3& r, const PairHessian& k) {
   const double d = r.norm();
-  // Rigid motions of the pair about A; rotations are counted as what they move at the distance d.
+  // Rigid motions of the pair about A; rotations are scaled by the distance d.
   Eigen::Matrix<double, 12, 6> rigid = Eigen::Matrix<double, 12, 6>::Zero();
   rigid.block<3, 3>(0, 0).setIdentity();
   rigid.block<3, 3>(6, 0).setIdentity();
@@ -59,7 +59,7 @@ Balanced balance(const Vec3& r, const Vec12& load) {
   return {force_b, torque_a, -torque_a - r.cross(force_b)};
 }
 
-/// M^(1/2) or its inverse for one particle; what is held has no inverse mass.
+/// M^(1/2) or its inverse for one particle; pinned directions have no inverse mass.
 Mat12 mass_root(const ParticleSet& set, const ParticleState& state, std::size_t a, std::size_t b, bool inverse) {
   Mat12 root = Mat12::Zero();
   int at = 0;

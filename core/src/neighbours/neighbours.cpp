@@ -18,7 +18,7 @@ constexpr double kCellSlack = 1.0 + 0x1p-10;
 constexpr double kFarCell = 0x1p40;
 constexpr std::size_t kPointBlock = 1024;
 
-/// The one squared distance: both searches must round alike.
+/// The only squared distance: both searches must round in the same way.
 template <class T>
 T squared_distance(const T& dx, const T& dy, const T& dz) {
   return fma(dx, dx, fma(dy, dy, dz * dz));
@@ -135,7 +135,7 @@ std::uint64_t NeighbourGrid::search(std::span<const Vec3> positions, double rang
     }
     const auto first = pairs.begin() + static_cast<std::ptrdiff_t>(first_pair);
     std::sort(first, pairs.end());
-    // Few buckets, or cells that are not told apart, are visited more than once.
+    // With few buckets, or cells with equal hashes, buckets are visited more than once.
     pairs.erase(std::unique(first, pairs.end()), pairs.end());
   }
   return visited;

@@ -1,4 +1,4 @@
-// AVX2 and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// AVX2 and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include "neighbours/packed_lanes.h"
@@ -85,7 +85,7 @@ HWY_INLINE void store(const Vector& value, std::size_t k, Columns3& c) {
   store(value.z, k, c.z);
 }
 
-/// What is known of a batch, filled by short passes. k = adj(G) r, i = adj(B) r; of the first particle
+/// Values of a batch, filled by short passes. k = adj(G) r, i = adj(B) r; of the first particle
 /// k_turn = G_i k x k, i_turn = B_i i x i and det_turn = twist(G_i, adj(G)).
 struct Ellipsoids {
   Columns3 r, k, k_turn, det_turn, i, i_turn;

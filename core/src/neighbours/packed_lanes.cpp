@@ -1,4 +1,4 @@
-// AVX2 and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// AVX2 and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include "neighbours/packed_lanes.h"
@@ -109,7 +109,7 @@ HWY_INLINE void exp_negative(V (&x)[kChains]) {
   });
 }
 
-/// What is known of a batch. Short passes over some batches fill it: a processor works on several of them at once,
+/// Values of a batch. Short passes over some batches fill them: a processor works on several of them at once,
 /// where one long pass would wait for its own results.
 struct Near {
   alignas(64) double x[kBatch], y[kBatch], z[kBatch];  ///< r
@@ -208,7 +208,7 @@ void SurfaceLoads(const SurfaceNumbers& given, const ListBlock& list, const Row*
   for (std::size_t begin = 0; begin < batches; begin += kNear) {
     const std::uint32_t* HWY_RESTRICT owner = list.owner.data() + begin;
     const std::uint32_t* HWY_RESTRICT neighbour = list.neighbour.data() + kBatch * begin;
-    // Past the last batch stand lengths of earlier ones, or nothing.
+    // After the last batch the memory holds old lengths or zeros.
     for (std::size_t b = 0; b < count; b += kChains / kParts) evaluate_cohesion(law, now + b);
     for (std::size_t b = 0; b < count; ++b) {
       const Vector n = broadcast(normals + owner[b]);
@@ -274,7 +274,7 @@ HWY_INLINE std::uint32_t collect(const CellGrid& grid, std::uint32_t cell, ListB
     } while (k < end[r]);
     count += end[r] - begin[r];
   }
-  // What a vector reads past the end is no neighbour.
+  // Lanes past the end are no neighbours.
   hn::StoreU(hn::Set(f, kNowhere), f, x + count);
   return count;
 }
@@ -315,7 +315,7 @@ HWY_INLINE void search_tile(const CellGrid& grid, std::uint32_t cell, ListBlock&
       hn::StoreU(pack_lanes(hn::LoadU(u, near_index + k), near), u, to);
       to += hn::CountTrue(u, near);
     }
-    // Whole batches: whatever stands after them is overwritten.
+    // Whole batches: values after them are overwritten.
     hn::StoreU(filler, u, to);
     const auto batches = (static_cast<std::uint32_t>(to - list) + kWhole - 1) / kWhole;
     for (std::uint32_t b = 0; b < batches; b += kStep) {

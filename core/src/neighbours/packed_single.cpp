@@ -1,5 +1,5 @@
-// Pair forces in single precision. Two batches at a time; what they do is added to rows of doubles.
-// AVX2 and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// Pair forces in single precision. Two batches at a time; their results are added to rows of doubles.
+// AVX2 and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include "neighbours/packed_lanes.h"
@@ -80,7 +80,7 @@ HWY_INLINE Single own_rows(const float* HWY_RESTRICT rows, const std::uint32_t* 
 #endif
 }
 
-/// r in metres: differences of whole numbers of quanta are exact; where a batch is filled up, out of range.
+/// r in metres: differences of whole numbers of quanta are exact; padding lanes are out of range.
 HWY_INLINE Single separation(const Fixed& fixed, const std::uint32_t* HWY_RESTRICT owner,
                              const std::uint32_t* HWY_RESTRICT j, std::uint32_t filler, std::size_t part) {
   const SD d;
@@ -210,7 +210,7 @@ HWY_INLINE RowsOfTwo load_rows_of(const SingleColumns& c) {
   return rows_of_singles(v);
 }
 
-/// Twice as many batches as this are worked on in short passes; what they leave to each other stays in the first cache.
+/// Twice as many batches as this are processed in short passes; their intermediate values stay in the first cache.
 constexpr std::size_t kNearPairs = 16;
 
 void TwelveSixSingles(const TwelveSixNumbers& given, const ListBlock& list, const Fixed& fixed,
@@ -258,7 +258,7 @@ HWY_INLINE S exp_negative_single(S x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(whole, series), hn::ShiftLeft<23>(hn::BitCast(whole, shifted))));
 }
 
-/// What is known of two batches.
+/// Values of two batches.
 struct NearSingles {
   SingleColumns r, push, turn_i, turn_j;
   SingleColumn d, pull;

@@ -1,4 +1,4 @@
-// What is measured of a state: motion, divergence, deviation from a rest shape.
+// Measures of a state: motion, divergence, deviation from a rest shape.
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>

@@ -75,7 +75,7 @@ void flow(const PairPose& pose, double share, std::size_t frame, LinkState& stat
   turn = (turn * rotation_exp(share * rotation_log(turn.conjugate() * now))).normalized();
 }
 
-/// Takes the pairs out for which `gone` holds; `keep` moves what goes with the others.
+/// Removes the pairs for which `gone` holds; `keep` moves the data that belong to the others.
 void forget_pairs(std::vector<std::uint32_t>& first, std::vector<std::uint32_t>& second, const auto& gone, const auto& keep) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < first.size(); ++k) {

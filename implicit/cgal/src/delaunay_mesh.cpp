@@ -307,9 +307,9 @@ bool seed_denser(const Missing& missing, std::span<const std::uint32_t> part, do
   throw Error(ErrorKind::Limit,
               Fault{.place = "",
                     .key = "mesh.cell",
-                    .expected = "expected cells that resolve the surface, from whose vertices its triangles grow",
-                    .found = std::string("a part that no triangles reach from the vertices of cells of ") + cell.data() + " m",
-                    .hint = "ask for smaller cells"});
+                    .expected = "expected lattice cells that resolve the surface, whose vertices seed its triangles",
+                    .found = std::string("a part without a seed at cells of ") + cell.data() + " m",
+                    .hint = "use smaller cells"});
 }
 
 }  // namespace

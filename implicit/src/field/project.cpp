@@ -41,13 +41,13 @@ double bracketed_root(const FieldView& field, const Vec3& a, const Vec3& along, 
   return t;
 }
 
-Projection project_to_surface(const FieldView& field, const Vec3& start, int max_iterations, Box* asked) {
+Projection project_to_surface(const FieldView& field, const Vec3& start, int max_iterations, Box* evaluated) {
   const double longest = 0.5 * field.feature_size();
   Projection result;
   result.point = start;
   Vec3 gradient;
   double f = field.value(start, gradient);
-  if (asked != nullptr) asked->include(start);
+  if (evaluated != nullptr) evaluated->include(start);
   const auto finish = [&](bool converged) {
     const double norm = gradient.norm();
     result.converged = converged && norm > 0.0;
@@ -66,7 +66,7 @@ Projection project_to_surface(const FieldView& field, const Vec3& start, int max
     const double f_previous = f;
     result.point = previous + step;
     f = field.value(result.point, gradient);
-    if (asked != nullptr) asked->include(result.point);  // a root is sought between this one and the last
+    if (evaluated != nullptr) evaluated->include(result.point);  // a root is sought between this one and the last
     const bool crossed = (f > 0.0) != (f_previous > 0.0);
     if (crossed && std::abs(f) > 0.5 * std::abs(f_previous)) {
       const double t = bracketed_root(field, previous, step, 0.0, f_previous, 1.0, f);

@@ -27,11 +27,11 @@ bool is_smooth(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, c
 }
 
 /// Never below the distance from p to the surface, on which the mesh's vertices lie.
-double distance_by_points(const FieldView& field, const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, const Vec3& p, Box& asked) {
+double distance_by_points(const FieldView& field, const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, const Vec3& p, Box& evaluated) {
   constexpr int kIterations = 50;
   double least = std::numeric_limits<double>::infinity();
   for (const std::uint32_t v : triangle) least = std::min(least, (mesh.position[v] - p).norm());
-  const Projection foot = project_to_surface(field, p, kIterations, &asked);
+  const Projection foot = project_to_surface(field, p, kIterations, &evaluated);
   return foot.converged ? std::min(least, (foot.point - p).norm()) : least;
 }
 
@@ -81,7 +81,7 @@ class Order {
                                  .key = goal.key,
                                  .expected = "expected an error of at most " + three_digits(goal.error) + " m",
                                  .found = three_digits(found) + " m with triangles of " + three_digits(spacing_at(goal.first, level)) + " m" +
-                                          goal.where + ", and so many that reach it do not fit",
+                                          goal.where + ", and a mesh that meets it is too large",
                                  .hint = "allow at least " + three_digits(1.05 * reachable) + " m"});
 }
 
@@ -90,8 +90,8 @@ class Order {
   std::vector<Fault> faults = size.faults();
   for (Fault& fault : faults) {
     fault.key = goal.key;
-    fault.expected += " to begin with";
-    fault.hint = "leave out the error and " + fault.hint;
+    fault.expected += " in the coarsest mesh";
+    fault.hint = "remove the error and " + fault.hint;
   }
   throw Error(ErrorKind::Limit, std::move(faults));
 }
@@ -99,8 +99,8 @@ class Order {
 }  // namespace
 
 void centroid_errors(const FieldView& field, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::span<double> error,
-                     std::span<Box> asked) {
-  SUPPLE_EXPECTS(error.size() == triangles.size() && asked.size() == triangles.size());
+                     std::span<Box> evaluated) {
+  SUPPLE_EXPECTS(error.size() == triangles.size() && evaluated.size() == triangles.size());
   for (std::size_t begin = 0; begin < triangles.size(); begin += kBatch) {
     std::array<Vec3, kBatch> points, gradients;
     std::array<double, kBatch> values;
@@ -114,7 +114,7 @@ void centroid_errors(const FieldView& field, const Mesh& mesh, std::span<const s
       const double slope = gradients[i].norm();
       const auto& t = mesh.triangle[triangles[begin + i]];
       const bool smooth = slope > 0.0 && is_smooth(mesh, t, -gradients[i] / slope);
-      Box& box = asked[begin + i] = Box{points[i], points[i]};
+      Box& box = evaluated[begin + i] = Box{points[i], points[i]};
       error[begin + i] = smooth ? std::abs(values[i]) / slope : distance_by_points(field, mesh, t, points[i], box);
     }
   }
@@ -125,10 +125,10 @@ double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& 
   executor.for_blocks(mesh.triangle_count(), kBatch, [&](std::size_t begin, std::size_t end) {
     std::array<std::uint32_t, kBatch> triangles;
     std::array<double, kBatch> error;
-    std::array<Box, kBatch> asked;
+    std::array<Box, kBatch> evaluated;
     const std::size_t n = end - begin;
     std::iota(triangles.begin(), triangles.end(), static_cast<std::uint32_t>(begin));
-    centroid_errors(field, mesh, std::span(triangles).first(n), std::span(error).first(n), std::span(asked).first(n));
+    centroid_errors(field, mesh, std::span(triangles).first(n), std::span(error).first(n), std::span(evaluated).first(n));
     double& most = largest[begin / kBatch];
     for (std::size_t i = 0; i < n; ++i) most = std::max(most, error[i]);
   });

@@ -20,10 +20,10 @@ struct MarchCounts;
 /// surface that Newton's method leads to, or to the nearest vertex, which is never below the distance.
 [[nodiscard]] double centroid_error(const FieldView& field, const Mesh& mesh, const Executor& executor);
 
-/// centroid_error of some triangles, each by itself. It depends on the triangle, the feature size and the field in `asked` alone.
-/// @param triangles  their numbers, shape [n]   @param error  [m], shape [n]   @param asked  shape [n]
+/// centroid_error of some triangles, each by itself. It depends on the triangle, the feature size and the field in `evaluated` alone.
+/// @param triangles  their numbers, shape [n]   @param error  [m], shape [n]   @param evaluated  shape [n]
 void centroid_errors(const FieldView& field, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::span<double> error,
-                     std::span<Box> asked);
+                     std::span<Box> evaluated);
 
 /// Meshes get finer by levels: from one to the next, triangles get shorter by sqrt(2), and twice as many.
 /// Length of triangles at a level [m]. @param first  at level 0 [m]

@@ -23,11 +23,11 @@ double TriangleErrors::measure(const FieldView& field, const Mesh& mesh, const M
       Found found = known[of_last];
       const auto& t = mesh.triangle[i];
       const Vec3 centre = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0;
-      const Box asked = found.wide != kNone ? known_wide[found.wide] : Box{centre, centre};
-      if (!differs(asked)) {
+      const Box evaluated = found.wide != kNone ? known_wide[found.wide] : Box{centre, centre};
+      if (!differs(evaluated)) {
         if (found.wide != kNone) {
           found.wide = static_cast<std::uint32_t>(wide_.size());
-          wide_.push_back(asked);
+          wide_.push_back(evaluated);
         }
         found_[i] = found;
         continue;
@@ -36,18 +36,18 @@ double TriangleErrors::measure(const FieldView& field, const Mesh& mesh, const M
     fresh.push_back(static_cast<std::uint32_t>(i));
   }
   std::vector<double> error(fresh.size());
-  std::vector<Box> asked(fresh.size());
+  std::vector<Box> evaluated(fresh.size());
   constexpr std::size_t kPerTask = 512;
   executor.for_blocks(fresh.size(), kPerTask, [&](std::size_t begin, std::size_t end) {
     const std::size_t n = end - begin;
-    centroid_errors(field, mesh, std::span(fresh).subspan(begin, n), std::span(error).subspan(begin, n), std::span(asked).subspan(begin, n));
+    centroid_errors(field, mesh, std::span(fresh).subspan(begin, n), std::span(error).subspan(begin, n), std::span(evaluated).subspan(begin, n));
   });
   for (std::size_t j = 0; j < fresh.size(); ++j) {
     Found& found = found_[fresh[j]];
     found.error = error[j];
-    if (asked[j].lower == asked[j].upper) continue;
+    if (evaluated[j].lower == evaluated[j].upper) continue;
     found.wide = static_cast<std::uint32_t>(wide_.size());
-    wide_.push_back(asked[j]);
+    wide_.push_back(evaluated[j]);
   }
   double largest = 0.0;
   for (const Found& found : found_) largest = std::max(largest, found.error);

@@ -196,7 +196,7 @@ std::size_t agree(Welded& mesh, const std::vector<Side>& sides) {
             const Triangle& c = mesh.triangle[n.triangle];
             return s.triangle == t && std::count(c.begin(), c.end(), s.low) + std::count(c.begin(), c.end(), s.high) == 2;
           });
-          refuse("expected a surface with two sides", "one that has only one, as a Klein bottle: it comes back the other way round at " + edge_text(mesh, *edge), "");
+          refuse("expected a surface with two sides", "a one-sided one, like a Klein bottle: its orientation reverses at " + edge_text(mesh, *edge), "");
         }
       }
     }
@@ -216,9 +216,9 @@ void expect_balanced(const Welded& mesh, const std::vector<Side>& sides) {
     const auto ascending = std::count_if(sides.begin() + static_cast<std::ptrdiff_t>(begin), sides.begin() + static_cast<std::ptrdiff_t>(end),
                                          [](const Side& s) { return s.ascending; });
     if (2 * static_cast<std::size_t>(ascending) == end - begin) return;
-    refuse("expected triangles that run around what they enclose all the same way",
-           std::to_string(end - begin) + " triangles, of which " + std::to_string(ascending) + " run one way, at " + edge_text(mesh, sides[begin]),
-           "part the shells that meet there, or turn triangles");
+    refuse("expected triangles that are all oriented the same way around the solid",
+           std::to_string(end - begin) + " triangles, of which " + std::to_string(ascending) + " run along it one way, at " + edge_text(mesh, sides[begin]),
+           "separate the shells that meet there, or reverse triangles");
   });
 }
 

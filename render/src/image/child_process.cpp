@@ -162,8 +162,8 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   (void)failure.write.close();
 
   int code = 0;  // of exec; where that goes well the pipe is closed by it
-  const ssize_t told = io::retried([&] { return ::read(failure.read.get(), &code, sizeof code); });
-  if (told == static_cast<ssize_t>(sizeof code)) fail(code);
+  const ssize_t received = io::retried([&] { return ::read(failure.read.get(), &code, sizeof code); });
+  if (received == static_cast<ssize_t>(sizeof code)) fail(code);
   ProgramEnd end;
   ::fcntl(messages.read.get(), F_SETFL, O_NONBLOCK);
   pollfd wait{.fd = messages.read.get(), .events = POLLIN, .revents = 0};

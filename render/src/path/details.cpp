@@ -120,8 +120,8 @@ void find_details(const CameraMatrices& camera, const TraceSettings& settings, c
       if (here == 0 && !through) continue;
       const auto samples = static_cast<std::uint32_t>(film.samples.at(x, y));
       const Detail detail = (here & kMeet) != 0 || through ? Detail::Surfaces : (here & kInGap) != 0 ? Detail::Gap : Detail::Shadow;
-      const std::uint32_t asked = detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples;
-      const std::uint32_t rays = std::min(most, asked);
+      const std::uint32_t wanted = detail == Detail::Surfaces ? std::max(kSurfacesSamples, kSurfacesTimes * samples) : kLightSamples;
+      const std::uint32_t rays = std::min(most, wanted);
       const bool walks = (here & kInGap) != 0 || through;
       if (rays > samples || detail == Detail::Surfaces)
         found[row].push_back({.x = x, .y = y, .detail = detail, .rays = rays, .walks = walks, .samples = 0});

@@ -39,17 +39,17 @@ double seen_distance(const Camera& camera, std::span<const Item> items) {
 
 LocalView localised(const View& view, std::span<const Item> items) {
   const Camera& camera = view.camera;
-  const double distance = seen_distance(camera, items), asked = (camera.from - camera.look_at).norm();
-  const bool as_asked = distance == asked;
+  const double distance = seen_distance(camera, items), given = (camera.from - camera.look_at).norm();
+  const bool unchanged = distance == given;
   LocalView out{.space = {}, .view = view, .pattern_origin = Vec3::Zero()};
-  out.space = {as_asked ? camera.look_at : Vec3(camera.from + distance / asked * (camera.look_at - camera.from)),
+  out.space = {unchanged ? camera.look_at : Vec3(camera.from + distance / given * (camera.look_at - camera.from)),
                std::exp2(-std::round(std::log2(distance)))};
   const PictureSpace& space = out.space;
   View& local = out.view;
   local.camera.from = space.place(camera.from);
   local.camera.look_at = Vec3::Zero();
   local.camera.aperture = space.per_metre * camera.aperture;
-  local.camera.focus = space.per_metre * (camera.focus > 0.0 ? camera.focus : asked);
+  local.camera.focus = space.per_metre * (camera.focus > 0.0 ? camera.focus : given);
   if (local.ground) {
     local.ground->height = space.per_metre * (view.ground->height - space.origin.z());
     local.ground->paint.size = space.per_metre * view.ground->paint.size;

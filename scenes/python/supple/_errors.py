@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 
 class Fault(NamedTuple):
-    """One thing to mend. Parts that do not apply are empty."""
+    """One thing that the user can correct. Parts that do not apply are empty."""
 
     place: str = ""  #: "file:line:column", a path, or an argument
     key: str = ""  #: dotted key path, e.g. "objects[0].skeleton[0].radius"
@@ -13,10 +13,10 @@ class Fault(NamedTuple):
 
 
 class Error(ValueError):
-    """Something that the user can mend: a faulty scene, a file, a wrong argument, a simulation that diverged.
+    """Something that the user can correct: a faulty scene, a file, a wrong argument, a simulation that diverged.
 
     kind       "usage", "scene", "io", "diverged", "limit", "corrupt" or "internal"
-    exit_code  what the command line tool ends with for this kind
+    exit_code  exit code of the command line tool for this kind
     faults     every fault, as `Fault`
     place, key, expected, found, hint   those of the first fault
     """

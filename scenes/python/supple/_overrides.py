@@ -4,7 +4,7 @@ import os
 
 
 def texts(overrides):
-    """["key=value", ...] from a mapping or from such texts. Values that are no text are written as JSON, which is YAML."""
+    """["key=value", ...] from a mapping or from such strings. Other values than strings are written as JSON, which is valid YAML."""
     if overrides is None:
         return []
     if isinstance(overrides, (str, bytes, os.PathLike)):
@@ -15,7 +15,7 @@ def texts(overrides):
 
 
 def _plain(value):
-    """Of NumPy arrays and scalars."""
+    """NumPy arrays and scalars as Python lists and numbers."""
     if not hasattr(value, "tolist"):
         raise TypeError(f"overrides: expected numbers, texts, lists and mappings, found {value!r}")
     return value.tolist()

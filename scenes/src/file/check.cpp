@@ -10,11 +10,11 @@
 namespace supple::scenes {
 namespace {
 
-/// The sentence that tells why a scene was not built.
+/// The reason why a scene was not built, as a sentence.
 std::string not_built(const SceneCounts& counts, double build) {
   const Count& most = *std::max_element(counts.count.begin(), counts.count.end(), [](const Count& a, const Count& b) { return (rule_of(a.what).drawn ? 0.0 : a.bytes()) < (rule_of(b.what).drawn ? 0.0 : b.bytes()); });
-  return most.key + ": the scene was counted, not built: with " + count_text(most) + ' ' + std::string(rule_of(most.what).name) + " it takes about " +
-         bytes_text(counts.undrawn_bytes()) + " of memory, more than the " + bytes_text(build) + " that a check takes; --memory lets it take more";
+  return most.key + ": only the counts of the scene were checked: with " + count_text(most) + ' ' + std::string(rule_of(most.what).name) + " it needs about " +
+         bytes_text(counts.undrawn_bytes()) + " of memory, more than the limit of " + bytes_text(build) + " of a check; --memory raises the limit";
 }
 
 void build_and_look(const Scene& scene, const SimulationOptions& options, CheckReport& report) {
@@ -52,7 +52,7 @@ CheckReport check_scene(const Scene& scene, SimulationOptions options, double bu
   options.memory = build;
   try {
     build_and_look(scene, options, report);
-  } catch (const OverBudget& over) {  // by what only the model counts
+  } catch (const OverBudget& over) {  // by counts that only the model has
     expect_within(scene, over.counts(), allowed);
     report.warnings = {not_built(over.counts(), build)};
   }

@@ -15,7 +15,7 @@
 namespace supple::scenes {
 namespace {
 
-/// Fewer pairs than this take too little to be looked for.
+/// Fewer pairs than this need too little memory to be counted.
 constexpr double kFewPairs = 1e3;
 
 class SceneCounter {
@@ -65,11 +65,11 @@ class SceneCounter {
     if (!texture || texture->pattern != PatternName::Picture) return;
     const std::filesystem::path path = scene_.source.parent_path() / texture->file;
     std::error_code absent;
-    if (!std::filesystem::is_regular_file(path, absent)) return;  // what is none, as a pipe, is told when it is read
+    if (!std::filesystem::is_regular_file(path, absent)) return;  // other kinds, such as pipes, are reported when they are read
     const auto [width, height] = picture_size(path);
     add(Counted::TexturePixels, key, static_cast<double>(width) * static_cast<double>(height));
   }
-  /// Frames at the same time are made as far as memory allows.
+  /// The number of frames at a time depends on the free memory.
   void count_images() {
     if (!scene_.output.images) return;
     const ImagesDesc& d = *scene_.output.images;

@@ -6,7 +6,7 @@
 /// An archive offers
 ///   archive(key, member, rule, meaning), archive.required(key, member, rule, meaning)
 ///   archive.given(key)                              whether the file names the key
-///   archive.sound(key)                              whether its value is what the file means: false where it, or what stands for it, is faulty
+///   archive.sound(key)                              whether its value is reliable: false where it, or a key that may be its misspelling, is faulty
 ///   archive.check(holds, key, expected, found, hint)  a relation between keys; `key` may be a path below this mapping
 #pragma once
 
@@ -35,10 +35,10 @@ inline constexpr double kMostSubsteps = 1048576.0;
 
 template <class Archive>
 void fields(Archive& archive, TimeStepDesc& d) {
-  archive("size", d.size, above(0.0, kTime).or_auto(), "largest step; a step is always frame / 2^k, k as stability asks for");
+  archive("size", d.size, above(0.0, kTime).or_auto(), "largest time step; a step is the time of a frame over 2^k, with k from the stability limits");
   archive("substeps", d.substeps, between(1.0, kMostSubsteps, kNumber).or_auto(),
-          "exactly so many steps a frame, or to each of `size`, a power of two; where contacts cannot be followed by these the run ends with exit code 5");
-  archive("max_substeps", d.max_substeps, between(1.0, kMostSubsteps, kNumber), "automatic steps finer than this are refused");
+          "exactly this many steps per frame (per `size` if that is given), a power of two; the run ends with exit code 5 where contacts cannot be followed with them");
+  archive("max_substeps", d.max_substeps, between(1.0, kMostSubsteps, kNumber), "most steps per frame; a scene whose automatic steps would be finer is refused");
   if (d.substeps) {
     const int n = *d.substeps;
     archive.check((n & (n - 1)) == 0, "substeps", "expected a power of two", std::to_string(n), "");
@@ -49,16 +49,16 @@ template <class Archive>
 void fields(Archive& archive, IntegratorDesc& d) {
   using enum MethodName;
   archive("method", d.method, {},
-          "auto: symplectic unless stiffness makes backward_euler cheaper by far; `supple explain` says which and why. backward_euler and "
-          "implicit_midpoint solve contact and friction within the step, so that what friction holds stays");
+          "auto: symplectic, or backward_euler where stiffness makes that much cheaper; `supple explain` prints the choice and its reason. backward_euler and "
+          "implicit_midpoint solve contact and friction within the step, so that bodies held by friction stay at rest");
   archive("rotation", d.rotation, Rule{}.only("method", d.method, {Auto, Symplectic}),
-          "of free bodies: about one principal axis after another, or about the axis of the middle attitude");
+          "how free particles rotate. splitting: about one principal axis after another; exponential: once, about the axis at the middle of the step");
   archive("tolerance", d.tolerance,
           between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint}),
-          "local error (adaptive) or last correction (implicit) over the smallest length, or in radians; auto: 1e-6 and 1e-9");
+          "largest local error (adaptive) or last correction (implicit methods), relative to the smallest length, or in radians; auto: 1e-6 (adaptive) or 1e-9 (implicit methods)");
 }
 
-/// Particles that pins, loads and primitives name are there.
+/// Checks that the particles of pins, loads and primitives exist.
 template <class Archive>
 void check_particles(Archive& archive, const ObjectDesc& d) {
   const std::optional<int> count = particle_count(d.particles);
@@ -90,33 +90,33 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
 template <class Archive>
 void fields(Archive& archive, ObjectDesc& d) {
   archive.required("name", d.name, identifier(), "unique; objects are numbered in the order of their names");
-  archive.required("particles", d.particles, {}, "who is there");
-  archive("separate", d.separate, {}, "each particle is a body of its own, which touches the others");
-  archive("kinds", d.kinds, {}, "hinges and types; particles not named are standard, of type 0");
-  archive("hinges_join", d.hinges_join, {}, "whether the interactions act between two hinges");
-  archive("interactions", d.interactions, {}, "what holds them together");
-  archive("skeleton", d.skeleton, {}, "what they look like; without it the object has no surface");
+  archive.required("particles", d.particles, {}, "the particles of the object");
+  archive("separate", d.separate, {}, "each particle is a body of its own that touches the others");
+  archive("kinds", d.kinds, {}, "hinges and types; particles that are not named are standard particles of type 0");
+  archive("hinges_join", d.hinges_join, {}, "whether the interactions also act between two hinges");
+  archive("interactions", d.interactions, {}, "laws that act between the particles");
+  archive("skeleton", d.skeleton, {}, "primitives that the particles carry; the surface is where their field equals iso; absent: no surface");
   archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");
-  archive("blend", d.blend, {}, "how the surfaces of its particles join; absent: as the sum");
-  archive("volume", d.volume, {}, "held by growing and shrinking the kernels (Desbrun & Gascuel 1995), whose work against what presses counts as done from outside; absent: not held");
-  archive("contact", d.contact, {}, "what the surface does on contact; absent or false: it touches nothing");
-  archive("repulsion", d.repulsion, {}, "exponential repulsion from other objects that have it, where contact is off");
+  archive("blend", d.blend, {}, "how the fields of its particles combine; absent: they sum");
+  archive("volume", d.volume, {}, "keeps the volume by scaling the kernels (Desbrun & Gascuel 1995); the work of the kernels against contact counts as external work; absent: the volume is not kept");
+  archive("contact", d.contact, {}, "material of the surface in contact; absent or false: it touches nothing");
+  archive("repulsion", d.repulsion, {}, "exponential repulsion from other objects that have this key, where contact is off");
   archive("medium", d.medium, {}, "drag of a surrounding medium; absent: none");
-  archive("breaking", d.breaking, {}, "when bonded pairs come apart; absent: never. What no bond joins any more is a body of its own");
+  archive("breaking", d.breaking, {}, "when bonded pairs break; absent: never. A piece without bonds to the rest becomes a body of its own");
   archive("yielding", d.yielding, {}, "when bond frames take the present pose as their rest pose; absent: never");
   archive("rayleigh", d.rayleigh, {}, "damping of motion and deformation by alpha M + beta K; absent: none");
-  archive("pins", d.pins, {}, "particles that do not move");
+  archive("pins", d.pins, {}, "particles whose position or orientation is held");
   archive("loads", d.loads, {}, "external forces and torques");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
-  archive("look", d.look, {}, "what else its pictures show");
-  archive("meshing", d.meshing, {}, "cell and error of its own; where objects touch, the smallest of theirs hold for all of them");
-  archive.check(!(d.meshing.cell || d.meshing.error) || !d.skeleton.empty(), "meshing", "expected a skeleton, whose surface it divides", "none",
+  archive("look", d.look, {}, "appearance in pictures");
+  archive("meshing", d.meshing, {}, "lattice cell and error of this object's meshes; where objects touch, the smallest values apply to all of them");
+  archive.check(!(d.meshing.cell || d.meshing.error) || !d.skeleton.empty(), "meshing", "expected a skeleton, whose surface is meshed", "none",
                 "add 'skeleton' or remove 'meshing'");
   archive.check(!d.separate || (d.interactions.empty() && d.kinds.empty()), "separate",
                 "expected no interactions or kinds in an object of separate bodies", "some",
                 "remove them, or 'separate'");
-  archive.check(!d.volume || !d.skeleton.empty(), "volume", "expected a skeleton, whose volume it is", "none", "");
+  archive.check(!d.volume || !d.skeleton.empty(), "volume", "expected a skeleton, whose volume is kept", "none", "");
   archive.check(!d.volume || (!d.breaking && !d.separate), "volume", "expected an object that stays one body",
                 d.breaking ? "'breaking'" : "'separate'", "");
   for (std::size_t k = 0; k < d.skeleton.size(); ++k) {
@@ -134,7 +134,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   check_slopes(archive, d.skeleton, d.iso);
 }
 
-/// Names of objects and obstacles are unique, none is "ground", and pairs name what is there.
+/// Checks that names of objects and obstacles are unique and not "ground", and that the objects of pairs exist.
 template <class Archive>
 void check_names(Archive& archive, const Scene& d) {
   std::map<std::string_view, std::string> index;
@@ -147,7 +147,7 @@ void check_names(Archive& archive, const Scene& d) {
   };
   for (std::size_t i = 0; i < d.objects.size(); ++i) check_unique(d.objects[i].name, "objects[" + std::to_string(i) + ']');
   for (std::size_t i = 0; i < d.obstacles.size(); ++i) check_unique(d.obstacles[i].name, "obstacles[" + std::to_string(i) + ']');
-  // What pairs may name is not known where a name is missing, or the key that lists it is misspelt.
+  // The names for pairs are unknown where a name is missing, or the key that lists it is misspelt.
   const bool unknown = (d.objects.empty() && !archive.sound("objects")) || (d.obstacles.empty() && !archive.sound("obstacles")) ||
                        (!d.ground && !archive.sound("ground"));
   if (index.contains("") || unknown) return;
@@ -205,26 +205,26 @@ void check_cameras(Archive& archive, const Scene& d) {
 template <class Archive>
 void fields(Archive& archive, Scene& d) {
   archive.required("schema", d.schema, between(1.0, 1.0, kNumber), "version of this format");
-  archive("title", d.title, {}, "for people");
-  archive.required("duration", d.duration, above(0.0, kTime), "of the animation; frame n shows t = (n - 1) / frame_rate");
-  archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames a second");
-  archive("gravity", d.gravity, any(kAcceleration), "z is up");
-  archive("planar", d.planar, {}, "particles keep their z, which must be one for all, and turn about z only");
-  archive("time_step", d.time_step, {}, "how finely time is cut; a run of whose energy nine tenths come from nowhere (no start, load or obstacle gave them) ends with exit code 5 and names the fastest object, but for laws with paper_literal, contact.split: contribution, held volumes, and obstacles that are led in steps which the scene fixes, whose energies do not balance");
-  archive("integrator", d.integrator, {}, "how a step is made");
-  archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
-  archive("obstacles", d.obstacles, {}, "solids that stand still or are led along; with the ground they are one solid, whose pressure is the largest of theirs: what is flush counts once, as a contact with the first of them (the ground, then by name), and what shall be one body should overlap, as faces that only meet leave a groove");
-  archive("pairs", d.pairs, {}, "what two objects do that differs from their materials");
+  archive("title", d.title, {}, "free text");
+  archive.required("duration", d.duration, above(0.0, kTime), "length of the animation; frame n shows t = (n - 1) / frame_rate");
+  archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames per second");
+  archive("gravity", d.gravity, any(kAcceleration), "acceleration of gravity; z is up");
+  archive("planar", d.planar, {}, "motion in a plane: particles keep their z, which must be the same for all, and rotate about z only");
+  archive("time_step", d.time_step, {}, "size of the time steps. A run ends with exit code 5 and names the fastest object if nine tenths of its energy come neither from the initial state nor from loads or obstacles. Scenes whose energy does not balance by their own choice are exempt: laws with paper_literal, contact.split: contribution, objects with 'volume', and obstacles with keys in steps that the scene fixes");
+  archive("integrator", d.integrator, {}, "method of time integration");
+  archive.required("objects", d.objects, Rule{}.items(1, 100000), "deformable objects");
+  archive("obstacles", d.obstacles, {}, "solids at rest or moved by keys, which forces do not move. Together with the ground they are one solid whose pressure is the largest of theirs, so flush faces count once, as a contact with the first of them (the ground, then by name). Obstacles that form one solid should overlap: faces that only meet leave a groove");
+  archive("pairs", d.pairs, {}, "contact settings of two objects that replace those of their materials");
   archive("contact", d.contact, {}, "how contact is computed");
-  archive("sleep", d.sleep, {}, "bodies that rest are not moved until something touches them or a load on them changes; absent: never");
-  archive("camera", d.camera, {}, "who looks on");
-  archive("cameras", d.cameras, {}, "several onlookers, instead of 'camera': images NAME.CAMERA.0001.png and a film each");
-  archive("light", d.light, {}, "the sun");
-  archive("lights", d.lights, {}, "rectangles that shine; OpenGL takes the first four");
-  archive("background", d.background, {}, "behind everything, from top to bottom");
-  archive("render", d.render, {}, "how pictures are made");
-  archive("ground", d.ground, {}, "a horizontal plane; absent: none");
-  archive("output", d.output, {}, "what is written");
+  archive("sleep", d.sleep, {}, "bodies at rest are not moved until something touches them or a load on them changes; absent: bodies never sleep");
+  archive("camera", d.camera, {}, "the camera");
+  archive("cameras", d.cameras, {}, "several cameras, instead of 'camera'; each has its own images, NAME.CAMERA.0001.png, and its own film");
+  archive("light", d.light, {}, "sunlight");
+  archive("lights", d.lights, {}, "rectangular area lights; OpenGL uses the first four");
+  archive("background", d.background, {}, "colours of the background, from top to bottom");
+  archive("render", d.render, {}, "how pictures are drawn");
+  archive("ground", d.ground, {}, "a horizontal plane that carries objects; absent: none");
+  archive("output", d.output, {}, "files that a run writes");
   archive.check(d.duration * d.frame_rate <= 1e6, "duration", "expected at most 1000000 frames",
                 number_text(std::floor(d.duration * d.frame_rate)), "");
   const int given = d.time_step.substeps.value_or(1);
@@ -248,8 +248,8 @@ void fields(Archive& archive, Scene& d) {
                 std::string(name_of(d.integrator.method)), "use 'symplectic' or 'rk4'");
   check_names(archive, d);
   const double views = std::floor(d.duration * d.frame_rate) * static_cast<double>(std::max<std::size_t>(d.cameras.size(), 1));
-  archive.check(d.cameras.size() < 2 || views <= 1e6, "cameras", "expected at most 1000000 pictures, one a frame and camera", number_text(views),
-                "ask for fewer cameras or frames");
+  archive.check(d.cameras.size() < 2 || views <= 1e6, "cameras", "expected at most 1000000 pictures, one per frame and camera", number_text(views),
+                "use fewer cameras or frames");
   if (views <= 1e6) check_cameras(archive, d);
 }
 

@@ -1,5 +1,5 @@
 /// @file fields_archive.h
-/// What goes over the field lists of fields.h. An archive meets each member as data, so that the lists are compiled once, for all archives.
+/// Archives over the field lists of fields.h. An archive sees each member as data, so that the lists are compiled once, for all archives.
 #pragma once
 
 #include <concepts>
@@ -20,7 +20,7 @@ enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Choi
 
 class FieldArchive;
 
-/// What can be done with a member without its C++ type; calls that its type has not are null.
+/// Operations on a member without its C++ type; operations that a type does not have are null.
 struct MemberType {
   FieldType type = FieldType::Number;
   bool optional = false;                                    ///< std::optional of what `type` says
@@ -32,7 +32,7 @@ struct MemberType {
   void* (*add)(void* member) = nullptr;                     ///< Mappings: a new one at the end; optional Mapping: a new one in its place
   std::vector<void*> (*all)(void* member) = nullptr;        ///< Mapping, Mappings: every one, none of an empty optional
   void (*fields)(FieldArchive& archive, void* one) = nullptr;  ///< Mapping, Mappings: the members of one of them
-  std::shared_ptr<void> (*make)() = nullptr;                ///< Mapping, Mappings: one of its own, with all defaults
+  std::shared_ptr<void> (*make)() = nullptr;                ///< Mapping, Mappings: a new one with all defaults
 };
 
 struct Member {
@@ -65,7 +65,7 @@ class FieldArchive {
   }
   /// Whether the file names the key.
   [[nodiscard]] virtual bool given(std::string_view /*key*/) const { return false; }
-  /// Whether the value of a key is what the file means: false where it, or what stands for it, is faulty.
+  /// Whether the value of a key is reliable: false where it, or a key that may be its misspelling, is faulty.
   [[nodiscard]] virtual bool sound(std::string_view /*key*/) const { return true; }
   /// A relation between keys; `key` may be a path below this mapping, or "" for the mapping itself.
   virtual void check(bool /*holds*/, const std::string& /*key*/, std::string /*expected*/, std::string /*found*/, std::string /*hint*/) {}

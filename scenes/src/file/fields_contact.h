@@ -1,5 +1,5 @@
 /// @file fields_contact.h
-/// The keys of what touches what, and how; see fields.h.
+/// The keys of contact; see fields.h.
 #pragma once
 
 #include <initializer_list>
@@ -13,10 +13,10 @@ namespace supple::scenes {
 
 template <class Archive>
 void fields(Archive& archive, MaterialDesc& d) {
-  archive("modulus", d.modulus, above(0.0, kPressure), "P0: pressure is P0 (f - iso)");
-  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient; a pair has sqrt(mu_A mu_B)");
-  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "Hunt & Crossley d; 1/d is the largest speed of a bounce");
-  archive("self", d.self, {}, "whether parts of the object that its blending graph does not join touch each other: those that it joins by no way as bodies of their own, groups that others join (the fingers of a hand) by their own fields, without what these add (all that do not blend do so in an object that holds its volume); not those that a bond ties; those that overlap at the start, or that a bond or its blend has left, only once they have been apart; absent: true");
+  archive("modulus", d.modulus, above(0.0, kPressure), "P: the pressure inside is P (f - iso), f the field");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient mu; a pair has sqrt(mu_A mu_B)");
+  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "damping d of Hunt & Crossley 1975; no rebound is faster than 1/d");
+  archive("self", d.self, {}, "contact between parts of the object; absent: true. Parts that no path of the blending graph connects touch as bodies of their own. Groups that are connected through others only (the fingers of a hand) touch by their own fields, without those of the others; in an object with 'volume' all groups that do not blend directly do so. Parts joined by a bond never touch. Parts that overlap at the start, and parts whose bond broke or whose blend faded, touch once they have been apart");
 }
 
 template <class Archive>
@@ -27,11 +27,11 @@ void fields(Archive& archive, RestitutionDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, PairDesc& d) {
-  archive.required("objects", d.objects, identifier().items(2, 2), "two names of objects or obstacles; 'ground' is the ground");
-  archive("collide", d.collide, {}, "whether they can touch");
-  archive("friction", d.friction, between(0.0, 100.0, kNumber), "instead of sqrt(mu_A mu_B)");
-  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "instead of the materials'");
-  archive("restitution", d.restitution, {}, "instead of dissipation");
+  archive.required("objects", d.objects, identifier().items(2, 2), "names of two objects or obstacles; 'ground' stands for the ground");
+  archive("collide", d.collide, {}, "whether the two can touch");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient, instead of sqrt(mu_A mu_B)");
+  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "damping d, instead of that of the materials");
+  archive("restitution", d.restitution, {}, "rebound speed, instead of dissipation");
   archive.check(!(d.dissipation && d.restitution), "restitution", "expected either dissipation or restitution", "both", "");
   if (d.objects.size() == 2) {
     archive.check(d.objects[0] != d.objects[1], "objects", "expected two different objects", '\'' + shown(d.objects[0]) + "' twice", "");
@@ -40,23 +40,23 @@ void fields(Archive& archive, PairDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, StickDesc& d) {
-  archive.required("stiffness", d.stiffness, above(0.0, kStiffness), "force over the distance that touching bodies have slid, up to the Coulomb limit");
-  archive("damping", d.damping, at_least(0.0, kTime), "times stiffness: force over the speed of sliding");
+  archive.required("stiffness", d.stiffness, above(0.0, kStiffness), "force over sliding distance, up to the Coulomb limit");
+  archive("damping", d.damping, at_least(0.0, kTime), "damping over stiffness: the force over sliding speed is stiffness times this");
 }
 
 template <class Archive>
 void fields(Archive& archive, ContactDesc& d) {
   archive("error", d.error, between(1e-10, 0.1, kNumber), "relative error of force, area and centre of pressure");
-  archive("rule", d.rule, {}, "points of the contact surface: along the seeds' rays, in polar rings about the peak, on triangles that are refined, on panels cut at the rim; auto: panels where the pressure has many hills, polar where it fits, else what meets the error");
-  archive("split", d.split, {}, "how forces reach the particles: gradient of the contact energy, or by contribution");
-  archive("core", d.core, {}, "soft: bodies pressed too hard pass one another, which is reported; barrier: deep cores turn back what approaches");
-  archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "below it Coulomb friction fades out; pairs that an explicit time step would turn back, to and fro, have a higher one; implicit methods have one that shows no creep");
-  archive("stick", d.stick, {}, "friction by springs that hold up to the Coulomb limit: what should stay stays; absent: it creeps");
-  archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over its depth; 0: none");
-  archive("bulge_volume", d.bulge_volume, {}, "in place of 'bulge': as high as holds the volume that the contact displaces, to 1e-3 of it; a warning tells where the fields or 'bulge_width' do not let it");
-  archive("bulge_width", d.bulge_width, up_to(1.0, kNumber).or_auto(), "width of the bulge at most, as a share of the other body's feature size; auto: 0.15, with 'bulge_volume' as wide as it takes");
-  archive("bulge_literal", d.bulge_literal, {}, "as published: by distance instead of pressure, of one width; it pops up at first touch and bulges may cross");
-  archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "of the surface samples; auto: a sixth of the smallest feature");
+  archive("rule", d.rule, {}, "quadrature points of the contact surface. samples: along the rays of surface samples; polar: in polar rings about the pressure peak; march: on triangles that are refined; panels: on panels cut at the boundary; auto: panels where the pressure has many maxima, polar where it fits, else the rule that meets 'error'");
+  archive("split", d.split, {}, "how forces reach the particles. energy: by the gradient of the contact energy; contribution: by each primitive's share of the field");
+  archive("core", d.core, {}, "soft: bodies pressed too hard pass through each other, which is reported; barrier: bodies stop approaching where the pressure exceeds half of that in the middle of the weaker one");
+  archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "sliding speed below which Coulomb friction falls to zero. Where an explicit step of friction would reverse the sliding, the pair has a higher one; implicit methods have one so small that no creep shows");
+  archive("stick", d.stick, {}, "friction by springs up to the Coulomb limit, so that bodies held by friction stay at rest; absent: they creep");
+  archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over the depth of the contact; 0: no bulge");
+  archive("bulge_volume", d.bulge_volume, {}, "instead of 'bulge': bulges hold the volume that the contact displaces, to 1e-3 of it; a warning names the contacts where the fields or 'bulge_width' do not allow it");
+  archive("bulge_width", d.bulge_width, up_to(1.0, kNumber).or_auto(), "largest width of the bulge over the feature size of the other body; auto: 0.15, or as wide as 'bulge_volume' needs");
+  archive("bulge_literal", d.bulge_literal, {}, "bulge as published (Gascuel 1993): by distance instead of pressure, of one width; it jumps up at first touch, and bulges may cross");
+  archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "distance between surface samples; auto: a sixth of the smallest feature");
   const bool bulges = archive.given("bulge") || archive.given("bulge_volume");
   for (const char* key : {"bulge_width", "bulge_literal"}) {
     archive.check(bulges || !archive.given(key), key, "expected 'bulge' or 'bulge_volume' beside it", "neither", "add one of the two");
@@ -67,27 +67,27 @@ void fields(Archive& archive, ContactDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, SleepDesc& d) {
-  archive("speed", d.speed, above(0.0, kSpeed), "a body is quiet while its kinetic energy is less than that of its mass at this speed");
-  archive("time", d.time, above(0.0, kTime), "for which all bodies that touch one another must have been quiet to fall asleep together");
+  archive("speed", d.speed, above(0.0, kSpeed), "a body is quiet while its kinetic energy is below that of its mass at this speed");
+  archive("time", d.time, above(0.0, kTime), "how long all bodies that touch one another must be quiet before they fall asleep together");
 }
 
 template <class Archive>
 void fields(Archive& archive, GroundDesc& d) {
   archive("height", d.height, any(kLength), "z of the plane");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
-  archive("texture", d.texture, {}, "by x and y; absent: none");
-  archive("visible", d.visible, {}, "drawn");
-  archive("collides", d.collides, {}, "with every object that has contact");
-  archive("modulus", d.modulus, above(0.0, kPressure), "P of the half-space");
-  archive("slope", d.slope, above(0.0, kSlope), "of its field: pressure is modulus times slope times depth");
+  archive("texture", d.texture, {}, "pattern by x and y; absent: none");
+  archive("visible", d.visible, {}, "whether it is drawn");
+  archive("collides", d.collides, {}, "whether it touches the objects that have contact");
+  archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is P times slope times depth");
+  archive("slope", d.slope, above(0.0, kSlope), "of its field");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
 }
 
 template <class Archive>
 void fields(Archive& archive, ObstacleKeyDesc& d) {
-  archive.required("time", d.time, at_least(0.0, kTime), "when it is there");
-  archive("at", d.at, any(kLength), "as of the obstacle");
-  archive("turn_deg", d.turn, degrees(-36000.0, 36000.0), "of boxes, meshes and implicit ones, about turn_axis");
+  archive.required("time", d.time, at_least(0.0, kTime), "time at which the obstacle is there");
+  archive("at", d.at, any(kLength), "position, as the obstacle's 'at'");
+  archive("turn_deg", d.turn, degrees(-36000.0, 36000.0), "rotation of a box, mesh or implicit obstacle about turn_axis");
 }
 
 template <class Archive>
@@ -95,24 +95,24 @@ void fields(Archive& archive, ObstacleDesc& d) {
   using enum ObstacleName;
   const auto only = [&d](const Rule& rule, std::initializer_list<ObstacleName> shapes) { return rule.only("shape", d.shape, shapes); };
   archive.required("name", d.name, identifier(), "unique, also among the objects");
-  archive("shape", d.shape, {}, "plane, box, heights over x and y, a closed mesh, or primitives as objects have them");
+  archive("shape", d.shape, {}, "plane, box, heights over x and y, closed mesh, or implicit: primitives as objects have them");
   archive("at", d.at, any(kLength), "a point of the plane, the middle of the box, added to heights, meshes and primitives");
   archive("normal", d.normal, only(direction(), {Plane}), "out of the solid");
-  archive("extent", d.extent, only(above(0.0, kLength), {Plane}), "half the edge of the square that is drawn");
+  archive("extent", d.extent, only(above(0.0, kLength), {Plane}), "half the edge of the square that pictures show");
   archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength), {Box}), "along its x, y, z");
   archive("rounding", d.rounding, only(at_least(0.0, kLength), {Box}), "radius of its edges in contact");
-  archive("turn_axis", d.turn_axis, only(direction(), {Box, ObstacleName::Mesh, Implicit}), "with turn_deg");
-  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh, Implicit}), "rotation");
-  archive("keys", d.keys, {}, "places at times; before the first and after the last it stands still; absent: always");
-  archive("between", d.between, {}, "how keys are joined; smooth: at rest wherever it turns back, so that it never goes beyond a key");
-  archive.required("file", d.file, only(file_name(), {Heights, ObstacleName::Mesh}), "CSV of x, y, z [m] on a regular grid, between whose points the ground is smooth and goes no higher or lower than they do; at its borders it ends, with upright sides; a closed mesh as OBJ or PLY [m], exact where it is thin, its edges rounded over less than a hundredth of its longest side elsewhere ('supple check' tells); a shell in another one bounds a cavity if it runs the other way round, shells that overlap are one solid; relative to the scene's folder");
-  archive.required("skeleton", d.skeleton, only({}, {Implicit}), "primitives that sum, about 'at'");
+  archive("turn_axis", d.turn_axis, only(direction(), {Box, ObstacleName::Mesh, Implicit}), "axis of turn_deg");
+  archive("turn_deg", d.turn, only(degrees(-360.0, 360.0), {Box, ObstacleName::Mesh, Implicit}), "rotation about turn_axis");
+  archive("keys", d.keys, {}, "places at times; before the first and after the last the obstacle is at rest; absent: it is always at rest");
+  archive("between", d.between, {}, "interpolation of keys; smooth: the speed is zero where the motion turns back, so the obstacle never passes beyond a key");
+  archive.required("file", d.file, only(file_name(), {Heights, ObstacleName::Mesh}), "relative to the scene's folder. heights: CSV of x, y, z [m] on a regular grid; between the points the surface is smooth and neither higher nor lower than they are; at the border it ends with vertical sides. mesh: a closed mesh as OBJ or PLY [m], exact where it is thin; elsewhere its edges are rounded over less than a hundredth of its longest side ('supple check' prints the radius). A shell inside another one bounds a cavity if it is oriented the other way round; shells that overlap are one solid");
+  archive.required("skeleton", d.skeleton, only({}, {Implicit}), "primitives whose fields sum, with 'at' as origin");
   archive("iso", d.iso, only(inside(0.0, 1.0, kNumber), {Implicit}), "value of the field on its surface");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
-  archive("texture", d.texture, {}, "by the obstacle's own axes from 'at'; absent: none");
-  archive("visible", d.visible, {}, "drawn");
-  archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is modulus times slope times depth, or times what the field of an implicit one is above iso");
+  archive("texture", d.texture, {}, "pattern along the obstacle's own axes, from 'at'; absent: none");
+  archive("visible", d.visible, {}, "whether it is drawn");
+  archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is P times slope times depth; of an implicit obstacle P (f - iso)");
   archive("slope", d.slope, only(above(0.0, kSlope), {Plane, Box, Heights, ObstacleName::Mesh}), "of its field");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
   for (std::size_t k = 0; k < d.keys.size(); ++k) {

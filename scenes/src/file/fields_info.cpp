@@ -33,7 +33,7 @@ std::string number_default(double value, const Rule& rule) {
   return number_text(std::round(value * 180.0 / std::numbers::pi * 1e4) / 1e4);  // for reading, so rounded
 }
 
-/// What a key that is left out stands for.
+/// The value of a key that is left out.
 std::string default_of(const Member& member, const Rule& rule) {
   const MemberType& type = *member.type;
   if (type.optional) return rule.automatic ? "auto" : "";

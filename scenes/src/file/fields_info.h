@@ -1,5 +1,5 @@
 /// @file fields_info.h
-/// The field lists as data: what the reference page, the JSON schema and hints print.
+/// The field lists as data for the reference page, the JSON schema and hints.
 #pragma once
 
 #include <string>
@@ -31,7 +31,7 @@ class InfoArchive final : public FieldArchive {
   void field(const Member& member, const Label& label, const Rule& rule) override;
 };
 
-/// Tells whether a mapping without keys is complete.
+/// Finds whether a mapping without keys is complete.
 class EmptyArchive final : public FieldArchive {
  public:
   bool complete = true;

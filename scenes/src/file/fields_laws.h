@@ -1,5 +1,5 @@
 /// @file fields_laws.h
-/// The keys of what acts between and on particles; see fields.h.
+/// The keys of laws and loads on particles; see fields.h.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ inline bool literal_laws(const ObjectDesc& d) {
   return std::any_of(d.interactions.begin(), d.interactions.end(), [](const InteractionDesc& i) { return i.paper_literal; });
 }
 
-/// What the keys of the cohesion law must say together.
+/// Checks the combination of keys of the cohesion law.
 template <class Archive>
 void check_cohesion(Archive& archive, const InteractionDesc& d) {
   const bool by_maximum = d.maximum_distance || d.maximum_ratio || d.maximum_force || d.scale_force;
@@ -45,7 +45,7 @@ void check_cohesion(Archive& archive, const InteractionDesc& d) {
   }
 }
 
-/// What the keys of the Lennard-Jones law must say together.
+/// Checks the combination of keys of the Lennard-Jones law.
 template <class Archive>
 void check_lennard_jones(Archive& archive, const InteractionDesc& d) {
   archive.check(d.depth || d.scale_force, "", "expected depth or scale_force", "neither", "");
@@ -60,7 +60,7 @@ void check_lennard_jones(Archive& archive, const InteractionDesc& d) {
   archive.check(!d.geometric || d.cut_off, "cut_off", "expected a cut-off for a geometric law", "none", "");
 }
 
-/// What the keys of the Gay-Berne law must say together.
+/// Checks the combination of keys of the Gay-Berne law.
 template <class Archive>
 void check_gay_berne(Archive& archive, const InteractionDesc& d) {
   archive.check(d.depth.has_value(), "depth", "expected an energy > 0 [J]", "nothing", "this key is required");
@@ -79,18 +79,18 @@ template <class Archive>
 void fields(Archive& archive, InteractionDesc& d) {
   using enum LawKind;
   const auto only = [&d](const Rule& rule, std::initializer_list<LawKind> laws) { return rule.only("law", d.law, laws); };
-  archive.required("law", d.law, {}, "what acts between bonded particles");
-  archive("neighbours", d.neighbours, between(1.0, 1000.0, kNumber), "bonds join particles up to this many apart in their order");
+  archive.required("law", d.law, {}, "law that acts between bonded particles");
+  archive("neighbours", d.neighbours, between(1.0, 1000.0, kNumber), "bonds join particles whose numbers differ by at most this");
   archive("within", d.within, above(0.0, kLength),
-          "instead: bonds join particles nearer than this at rest; with geometric: the range of the law");
+          "instead of neighbours: bonds join particles nearer than this at rest; with geometric: range of the law");
   archive("geometric", d.geometric, only({}, {Cohesion, LinearCohesion, LennardJones, GayBerne, Coplanarity, CoNormality, CoCircularity}),
-          "instead of bonds: all pairs of the object in range, found anew each step; gay_berne has no bonds");
+          "acts between all particles of the object in range, found in each step, instead of along bonds; required for gay_berne");
   archive("normalised", d.normalised, only({}, {Coplanarity, CoCircularity}),
-          "weight psi / d^2 instead of psi, so that scale does not matter; strength is then in J");
+          "weight psi / d^2 instead of psi, independent of scale; strength is then in J");
   archive("paper_literal", d.paper_literal, only({}, {FormRadius}),
-          "as printed by Lombardo & Puech 1995, for comparison: it conserves neither energy nor momentum");
-  archive.required("stretch", d.stretch, only(at_least(0.0, kStiffness), {BondFrame}), "k_s");
-  archive.required("rotation", d.rotation, only(at_least(0.0, kTorque), {BondFrame}), "k_theta");
+          "the law as printed by Lombardo & Puech 1995, for comparison; it conserves neither energy nor momentum");
+  archive.required("stretch", d.stretch, only(at_least(0.0, kStiffness), {BondFrame}), "k_s, stiffness against displacement");
+  archive.required("rotation", d.rotation, only(at_least(0.0, kTorque), {BondFrame}), "k_theta, stiffness against rotation");
   archive.required("strength", d.strength, only(at_least(0.0, kBending), {Form, DirectedForm}),
                    "k; beside a law against shear, such as bond_frame, a chain bends like a beam of EI = 2 k / spacing");
   archive.required("strength", d.strength,
@@ -99,26 +99,26 @@ void fields(Archive& archive, InteractionDesc& d) {
   archive("linear", d.linear, only(at_least(0.0, kDamping), {Friction}), "c, against relative velocity");
   archive("angular", d.angular, only(at_least(0.0, kAngularDamping), {Friction}), "c_r, against relative spin");
   archive("rest_distance", d.rest_distance, only(above(0.0, kLength).or_auto(), {Cohesion, LinearCohesion, LennardJones}),
-          "r0; auto: of each bond at rest");
-  archive("maximum_distance", d.maximum_distance, only(above(0.0, kLength), {Cohesion}), "r_m, of the largest attraction");
+          "r0; auto: length of each bond at rest");
+  archive("maximum_distance", d.maximum_distance, only(above(0.0, kLength), {Cohesion}), "r_m, distance of the largest attraction");
   archive("maximum_ratio", d.maximum_ratio, only(above(1.0, kNumber), {Cohesion}),
-          "r_m / r0, instead of maximum_distance: the same curve for every rest distance");
+          "r_m / r0, instead of maximum_distance; gives the same curve for every rest distance");
   archive("maximum_force", d.maximum_force, only(above(0.0, kForce), {Cohesion}), "F_max, the largest attraction");
   archive("scale_force", d.scale_force, only(above(0.0, kForce), {Cohesion, LinearCohesion, DirectedCohesion, LennardJones}),
-          "F0 of the cohesion laws (of cohesion instead of maximum_force); E of lennard_jones, instead of depth");
+          "F0 of the cohesion laws (for cohesion instead of maximum_force); E of lennard_jones (instead of depth)");
   archive("gain", d.gain, only(above(0.0, kPressure), {Cohesion}), "E, instead of maximum_distance and maximum_force");
   archive("alpha", d.alpha, only(above(0.0, kInverseArea), {Cohesion}), "alpha, with gain");
   archive("table_error", d.table_error, only(between(1e-9, 0.1, kNumber), {Cohesion}),
-          "force from a table with at most this error over F_max; absent: no table");
+          "the force comes from a table with at most this error over F_max; absent: no table");
   archive("shape", d.shape, only(above(0.0, kNumber), {LinearCohesion, DirectedCohesion}), "a, how fast the force falls off");
   archive("eta", d.eta, only(at_least(0.0, kNumber), {LinearCohesion}), "stiffness at rest over F0 / r0");
   archive.required("semi_axes", d.semi_axes, only(above(0.0, kLength), {DirectedCohesion, GayBerne}),
-                   "of each particle's ellipsoid, along its own x, y, z; bonded particles rest where theirs touch");
-  archive("depth", d.depth, only(above(0.0, kEnergy), {LennardJones, GayBerne}), "binding energy; of gay_berne epsilon");
+                   "of each particle's ellipsoid, along the particle's x, y, z; bonded particles are at rest where their ellipsoids touch");
+  archive("depth", d.depth, only(above(0.0, kEnergy), {LennardJones, GayBerne}), "binding energy; epsilon of gay_berne");
   archive("sigma", d.sigma, only(above(0.0, kLength), {GayBerne}),
-          "over which the force between surfaces falls off; absent: twice the smallest semi-axis");
+          "distance over which the force between surfaces falls off; absent: twice the smallest semi-axis");
   archive("gamma", d.gamma, only(above(0.0, kNumber), {GayBerne}), "shift of the distance between surfaces, over sigma");
-  archive("wells", d.wells, only(above(0.0, kNumber), {GayBerne}), "depth for approach along the own x, y, z, over depth");
+  archive("wells", d.wells, only(above(0.0, kNumber), {GayBerne}), "depth for approach along the particle's x, y, z, over depth");
   archive("upsilon", d.upsilon, only(between(0.0, core::SwitchedGayBerne::kLargestExponent, kNumber), {GayBerne}),
           "exponent of the shapes' strength");
   archive("mu", d.mu, only(between(1.0, core::SwitchedGayBerne::kLargestExponent, kNumber), {GayBerne}),
@@ -128,9 +128,9 @@ void fields(Archive& archive, InteractionDesc& d) {
   archive("attractive", d.attractive, only(between(1.0, core::LennardJones::kLargestExponent - 1, kNumber), {LennardJones}),
           "m of (r0/d)^m");
   archive("cut_off", d.cut_off, only(above(0.0, kLength), {LennardJones, GayBerne}),
-          "where force and energy become 0; absent: nowhere");
+          "distance at which force and energy become 0; absent: none");
   archive("switch_from", d.switch_from, only(above(0.0, kLength), {LennardJones, GayBerne}),
-          "where the potential begins to be switched off; absent: the force is shifted; of gay_berne 0.9 cut_off");
+          "distance from which the potential is switched off; absent: the force is shifted, or 0.9 cut_off for gay_berne");
   archive("range", d.range,
           only(above(0.0, kLength), {Form, FormRadius, DirectedForm, Coplanarity, CoNormality, CoCircularity}),
           "h of the weight (1 - d^2/h^2)^3; absent: weight 1");
@@ -155,10 +155,10 @@ void fields(Archive& archive, InteractionDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, RepulsionDesc& d) {
-  archive.required("force", d.force, above(0.0, kForce), "at the distance d0");
+  archive.required("force", d.force, above(0.0, kForce), "force at the distance d0");
   archive.required("distance", d.distance, above(0.0, kLength), "d0");
-  archive.required("length", d.length, above(0.0, kLength), "over which the force falls by e");
-  archive("own", d.own, {}, "also between all particles of the object; without it, only between those that kinds keep apart");
+  archive.required("length", d.length, above(0.0, kLength), "distance over which the force falls to 1/e");
+  archive("own", d.own, {}, "also between all particles of the object; false: only between those of different types");
 }
 
 template <class Archive>
@@ -169,23 +169,23 @@ void fields(Archive& archive, MediumDesc& d) {
 
 template <class Archive>
 void fields(Archive& archive, BreakingDesc& d) {
-  archive("stretch", d.stretch, above(0.0, kNumber), "d / d0 - 1 of the pair");
-  archive("energy", d.energy, above(0.0, kEnergy), "of all laws of the pair");
-  archive("force", d.force, above(0.0, kForce), "tension F_c; with couple: F / F_c + (M / M_c)^2 > 1 breaks");
-  archive("couple", d.couple, above(0.0, kTorque), "M_c, on either particle");
+  archive("stretch", d.stretch, above(0.0, kNumber), "largest d / d0 - 1 of a pair");
+  archive("energy", d.energy, above(0.0, kEnergy), "largest energy of all laws of a pair");
+  archive("force", d.force, above(0.0, kForce), "largest tension F_c; with couple the pair breaks where F / F_c + (M / M_c)^2 > 1");
+  archive("couple", d.couple, above(0.0, kTorque), "largest bending moment M_c on either particle");
   archive.check(d.stretch || d.energy || d.force || d.couple, "", "expected stretch, energy, force or couple", "none of them", "");
 }
 
 template <class Archive>
 void fields(Archive& archive, YieldingDesc& d) {
-  archive.required("energy", d.energy, at_least(0.0, kEnergy), "of a bond frame, from which it flows");
-  archive("time", d.time, at_least(0.0, kTime), "in which the rest pose follows to 1/e; 0: at once");
+  archive.required("energy", d.energy, at_least(0.0, kEnergy), "energy of a bond frame at which it yields");
+  archive("time", d.time, at_least(0.0, kTime), "time in which the difference to the rest pose falls to 1/e; 0: at once");
 }
 
 template <class Archive>
 void fields(Archive& archive, RayleighDesc& d) {
-  archive("mass", d.mass, at_least(0.0, kRate), "alpha: drag -alpha M q', as of a medium");
-  archive("stiffness", d.stiffness, at_least(0.0, kTime), "beta: -beta K q' against deformation; a mode gets the ratio beta omega / 2");
+  archive("mass", d.mass, at_least(0.0, kRate), "alpha: force -alpha M q', as of a medium");
+  archive("stiffness", d.stiffness, at_least(0.0, kTime), "beta: force -beta K q'; the damping ratio of a mode is beta omega / 2");
 }
 
 }  // namespace supple::scenes

@@ -1,5 +1,5 @@
 /// @file fields_rules.h
-/// What a key of a scene may hold: quantity, range, and for which kinds it has a meaning. The reader checks by these
+/// Rules for the value of a key: quantity, range, and the kinds for which it has a meaning. The reader checks these
 /// rules; the reference page and the JSON schema print them.
 #pragma once
 

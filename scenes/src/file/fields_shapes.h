@@ -1,5 +1,5 @@
 /// @file fields_shapes.h
-/// The keys of skeletons, kernels, and how surfaces join; see fields.h.
+/// The keys of skeletons, kernels and blending; see fields.h.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +21,14 @@ template <class Archive>
 void fields(Archive& archive, KernelDesc& d) {
   using enum KernelName;
   archive("type", d.type, {}, "wyvill: (1 - d^2/R^2)^3; gascuel: linear down to the thickness, then cubic; murakami: (1 - d^2/R^2)^2; "
-                              "blinn: Gaussian; all others by their papers, all 0 beyond R");
-  archive("radius", d.radius, above(0.0, kLength), "support R; required, except where the shape gives the support itself (its smallest semi-axis or radius; another one then scales gascuel's thickness and slope, and changes no surface of other kernels)");
-  archive.required("thickness", d.thickness, above(0.0, kLength).only("type", d.type, {Gascuel}), "e: distance of the surface");
+                              "blinn: Gaussian; the others as in their papers; all are 0 beyond R");
+  archive("radius", d.radius, above(0.0, kLength), "support R; required, except for shapes that give the support themselves (ellipsoid, superquadric, directed), where it is their smallest semi-axis or radius; another value scales thickness and slope of gascuel there, and changes nothing for other kernels");
+  archive.required("thickness", d.thickness, above(0.0, kLength).only("type", d.type, {Gascuel}), "e: distance from the shape to the surface");
   archive.required("slope", d.slope, above(0.0, kSlope).only("type", d.type, {Gascuel}),
-                   "steepness at the surface; slope (radius - thickness) <= 3 iso");
+                   "slope at the surface; slope (radius - thickness) <= 3 iso");
   archive("sharpness", d.sharpness,
           between(implicit::Kernel::kLeastSharpness, implicit::Kernel::kLargestSharpness, kNumber).only("type", d.type, {Blinn, Cauchy}),
-          "s of exp(-s^2 d^2/R^2) and (1 + s^2 d^2/R^2)^-2, of which the tangent at R is taken off");
+          "s of exp(-s^2 d^2/R^2) (blinn) and (1 + s^2 d^2/R^2)^-2 (cauchy); the tangent at R is subtracted");
   archive("hardness", d.hardness,
           between(implicit::Kernel::kLeastHardness, implicit::Kernel::kLargestHardness, kNumber).only("type", d.type, {BlancSchlick}),
           "p: the slope at R/2 is 2 + 16 p/9, over R");
@@ -38,7 +38,7 @@ void fields(Archive& archive, KernelDesc& d) {
   }
 }
 
-/// Corners span an area and control points a line; polygons are plane and convex.
+/// Checks that corners span an area and control points a line; polygons must be plane and convex.
 template <class Archive>
 void check_points(Archive& archive, const SkeletonDesc& d) {
   using enum ShapeName;
@@ -83,13 +83,13 @@ void fields(Archive& archive, SkeletonDesc& d) {
   const auto only = [&d](const Rule& rule, std::initializer_list<ShapeName> shapes) {
     return rule.only("shape", d.shape, shapes);
   };
-  archive.required("shape", d.shape, {}, "what is thickened by the kernel; flat shapes lie in their x-y plane");
+  archive.required("shape", d.shape, {}, "shape that the kernel thickens; flat shapes lie in their x-y plane");
   archive.required("half_size", d.half_size, only(above(0.0, kLength), {Square}), "half an edge");
   archive.required("half_length", d.half_length, only(above(0.0, kLength), {Segment}), "along x");
   archive.required("half_sizes", d.half_sizes, only(above(0.0, kLength).items(d.shape == Box ? 3 : 2, d.shape == Rectangle ? 2 : 3), {Rectangle, Box}),
                    "along x, y (and z for a box)");
-  archive.required("radius", d.radius, only(above(0.0, kLength), {Disc, Ring, Arc}), "of the disc or circle");
-  archive.required("half_angle_deg", d.half_angle, only(degrees(0.1, 180.0), {Arc}), "the arc goes as far to either side of the x axis");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Disc, Ring, Arc}), "radius of the disc or circle");
+  archive.required("half_angle_deg", d.half_angle, only(degrees(0.1, 180.0), {Arc}), "half the angle of the arc, whose middle is on the x axis");
   archive.required("points", d.points, only(any(kLength).items(3, 3), {Triangle}), "corners");
   archive.required("points", d.points, only(any(kLength).items(3, 32), {Polygon}), "corners of a plane convex polygon, in order");
   archive.required("points", d.points, only(any(kLength).items(2, 4), {Curve}),
@@ -98,19 +98,19 @@ void fields(Archive& archive, SkeletonDesc& d) {
   archive("exponents", d.exponents, only(between(0.2, 1.0, kNumber).items(2, 2), {Superquadric}),
           "e1 (seen from the side) and e2 (seen from above): 1 is round, 0.2 nearly square");
   archive.required("radii", d.radii, only(above(0.0, kLength), {Directed}), "of the support, along x, y, z");
-  archive("radii_behind", d.radii_behind, only(above(0.0, kLength), {Directed}), "along -x, -y, -z; absent: as radii");
+  archive("radii_behind", d.radii_behind, only(above(0.0, kLength), {Directed}), "of the support, along -x, -y, -z; absent: as radii");
   archive("end_radius", d.end_radius, only(above(0.0, kLength), {Segment, Curve}),
-          "support radius at the end, kernel.radius being that at the beginning; absent: the same");
+          "support radius at the end; kernel.radius is that at the beginning; absent: kernel.radius");
   archive("convolve", d.convolve, only({}, {Segment, Triangle, Polygon, Ring, Arc}),
-          "integrate the kernel over the shape, so that shapes that share ends join without a bulge; kernels wyvill, murakami, cauchy");
-  archive("stretch", d.stretch, between(1e-3, 1e3, kNumber), "of shape and support along the primitive's axes");
+          "integrates the kernel over the shape, so that shapes with common ends join without a bulge; for kernels wyvill, murakami and cauchy");
+  archive("stretch", d.stretch, between(1e-3, 1e3, kNumber), "factors of shape and support along the primitive's axes");
   archive("at", d.at, any(kLength), "offset in the particle's frame");
-  archive("turn_axis", d.turn_axis, direction(), "in the particle's frame, with turn_deg");
-  archive("turn_deg", d.turn, degrees(-360.0, 360.0), "rotation in the particle's frame");
+  archive("turn_axis", d.turn_axis, direction(), "axis of turn_deg, in the particle's frame");
+  archive("turn_deg", d.turn, degrees(-360.0, 360.0), "rotation about turn_axis, in the particle's frame");
   archive("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
-          "which particles carry it, from 0, negative from the end; absent: all");
-  archive("volume", d.volume, above(0.0, kVolume), "held by each of its copies, where the object's volume is held by primitive; absent: as the object says");
-  archive.required("kernel", d.kernel, {}, "how the field falls off");
+          "numbers of the particles that carry it: from 0, negative from the end; absent: all");
+  archive("volume", d.volume, above(0.0, kVolume), "target volume of each copy, with volume: {of: primitive}; absent: the object's");
+  archive.required("kernel", d.kernel, {}, "field as a function of the distance to the shape");
   const bool own_scale = d.shape == Ellipsoid || d.shape == Superquadric || d.shape == Directed;
   check_points(archive, d);
   archive.check(!d.convolve || d.end_radius == 0.0, "convolve", "expected no end_radius with convolve", "one", "");
@@ -121,7 +121,7 @@ void fields(Archive& archive, SkeletonDesc& d) {
                 "this key is required");
 }
 
-/// Of the primitives under the key 'skeleton': kernels of a given slope rise to no more than their largest value.
+/// Checks that kernels of a given slope, of the primitives under 'skeleton', do not exceed their largest value.
 template <class Archive>
 void check_slopes(Archive& archive, const std::vector<SkeletonDesc>& skeleton, double iso) {
   for (std::size_t k = 0; k < skeleton.size(); ++k) {
@@ -137,7 +137,7 @@ void check_slopes(Archive& archive, const std::vector<SkeletonDesc>& skeleton, d
 template <class Archive>
 void fields(Archive& archive, BlendGroupDesc& d) {
   archive.required("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
-                   "from 0, negative from the end");
+                   "numbers of the particles: from 0, negative from the end");
 }
 
 template <class Archive>
@@ -145,26 +145,26 @@ void fields(Archive& archive, BlendDesc& d) {
   using enum BlendName;
   const auto only = [&d](const Rule& rule, std::initializer_list<BlendName> rules) { return rule.only("rule", d.rule, rules); };
   archive("rule", d.rule, {},
-          "sum: everything blends; graph: what neighbours or within name blends, the rest meets in a crease; ricci: the n-norm; "
-          "gradient: surfaces blend where they run into each other and not where they are parallel or face each other, "
-          "and the field jumps where the gradient of a group vanishes, as half way between two of its balls");
-  archive("groups", d.groups, {}, "particles of one group sum; particles in none are groups of their own");
+          "sum: all groups blend; graph: the groups that neighbours or within names blend, the others meet in a crease; ricci: the n-norm; "
+          "gradient: surfaces blend where they cross and not where they are parallel or face each other; "
+          "the field jumps where the gradient of a group vanishes, such as half way between two of its balls");
+  archive("groups", d.groups, {}, "particles of one group sum; a particle in no group is a group of its own");
   archive("neighbours", d.neighbours, only(between(1.0, 1000.0, kNumber), {Graph}),
-          "groups blend that hold particles up to this many apart in their order");
-  archive("within", d.within, only(above(0.0, kLength), {Graph}), "or particles nearer than this at rest");
-  archive("exponent", d.exponent, only(between(1.0, 100.0, kNumber), {Ricci}), "n: 1 is the sum, a large one nearly the union");
+          "groups blend whose particles' numbers differ by at most this");
+  archive("within", d.within, only(above(0.0, kLength), {Graph}), "groups also blend whose particles are nearer than this at rest");
+  archive("exponent", d.exponent, only(between(1.0, 100.0, kNumber), {Ricci}), "n: 1 is the sum; a large value is nearly the union");
   archive("opening", d.opening, only(between(0.05, 0.95, kNumber), {Gradient}),
-          "where surfaces cross at right angles: small blends widely, 1 would be the union");
+          "where surfaces cross at right angles: a small value blends widely; 1 would be the union");
   archive("fade", d.fade, only(at_least(0.0, kTime), {Graph}),
-          "how long particles still blend, less and less, after the bond between them broke; pieces part when it has faded");
+          "time in which the blend of two particles fades after their bond broke; the pieces are separate bodies from then on");
 }
 
 template <class Archive>
 void fields(Archive& archive, VolumeDesc& d) {
-  archive("of", d.of, {}, "object: one scale for all its kernels; particle: the part of the body in which the particle's share of the field is the largest, a scale for its own kernels; primitive: the same for every primitive");
-  archive("target", d.target, above(0.0, kVolume).or_auto(), "V0, for kernels of 1/4 to 4 times their size; a run says where it is not reached; auto: the volume at the start");
-  archive("rate", d.rate, up_to(1000.0, kRate), "alpha: kernels grow by alpha (V0 - V) / V0");
-  archive("damping", d.damping, between(0.0, 0.15, kNumber), "beta: against change of the volume");
+  archive("of", d.of, {}, "what keeps its volume. object: the whole, with one scale for all kernels; particle: for every particle the region in which its share of the field is the largest, with one scale for its kernels; primitive: the same for every primitive");
+  archive("target", d.target, above(0.0, kVolume).or_auto(), "V0; kernels are scaled by 1/4 to 4, and a warning reports a target that is not reached; auto: the volume at the start");
+  archive("rate", d.rate, up_to(1000.0, kRate), "alpha: the scale of the kernels grows at the rate alpha (V0 - V) / V0");
+  archive("damping", d.damping, between(0.0, 0.15, kNumber), "beta: damping of changes of the volume");
 }
 
 }  // namespace supple::scenes

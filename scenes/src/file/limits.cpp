@@ -13,17 +13,17 @@ namespace supple::scenes {
 namespace {
 
 /// By Counted. Measured as the growth of the resident memory of `supple check` with their number, on x86-64.
-constexpr std::array<CountRule, 11> kRules{{{"particles", "ask for fewer", 510.0},
-                                           {"primitives", "let fewer particles carry them, or ask for fewer on each", 1250.0},
-                                           {"bonds", "ask for fewer neighbours, or a shorter distance", 680.0},
-                                           {"bonds of friction", "ask for fewer neighbours, or a shorter distance", 40.0},
-                                           {"pairs of neighbours", "ask for a shorter range", 24.0},
-                                           {"laws between objects", "let fewer objects repel each other, or be parts of one object", 1000.0},
-                                           {"bodies", "let particles be parts of one body", 11500.0},
-                                           {"surface samples", "ask for a larger contact.sample_spacing, or for thicker parts", 300.0},
-                                           {"bytes of its file", "ask for a smaller file", 6.0},
-                                           {"pixels of a texture", "ask for a smaller picture", 6.0},
-                                           {"samples of an image", "ask for a smaller image, or for fewer samples of a pixel", 24.0, true}}};
+constexpr std::array<CountRule, 11> kRules{{{"particles", "use fewer", 510.0},
+                                           {"primitives", "use fewer per particle, or on fewer particles", 1250.0},
+                                           {"bonds", "use fewer neighbours, or a shorter distance", 680.0},
+                                           {"bonds of friction", "use fewer neighbours, or a shorter distance", 40.0},
+                                           {"pairs of neighbours", "use a shorter range", 24.0},
+                                           {"laws between objects", "use fewer objects with repulsion, or unite them in one object", 1000.0},
+                                           {"bodies", "unite particles in one body", 11500.0},
+                                           {"surface samples", "use a larger contact.sample_spacing, or thicker parts", 300.0},
+                                           {"bytes of its file", "use a smaller file", 6.0},
+                                           {"pixels of a texture", "use a smaller picture", 6.0},
+                                           {"samples of an image", "use a smaller image, or fewer samples per pixel", 24.0, true}}};
 constexpr std::string_view kUnits = "kMGT";
 
 std::string whole_text(double number) {

@@ -15,7 +15,7 @@
 namespace supple::scenes {
 namespace {
 
-/// One "path=value", followed down the tree; what lies on the way is copied, because aliases may share it.
+/// Follows one "path=value" down the tree; nodes on the path are copied, because aliases may share them.
 class Override {
  public:
   Override(Tree& tree, FaultList& faults, std::uint32_t source, std::string_view path)
@@ -173,9 +173,9 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
                                      .hint = ""});
   };
   if (std::filesystem::is_directory(path, status)) fail("a folder");
-  const std::string name = path.filename().string();  // outputs are named so, also in files that cannot hold any name
+  const std::string name = path.filename().string();  // outputs have this name, also in files that cannot hold any name
   if (std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; })) fail("a name with control characters");
-  std::string text(kLargestText + 1, '\0');  // one more than allowed, so that a larger file is seen as such
+  std::string text(kLargestText + 1, '\0');  // one byte more than allowed, to detect larger files
   const auto size = io::read_start(path, std::as_writable_bytes(std::span(text)));
   if (!size) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
   text.resize(*size);

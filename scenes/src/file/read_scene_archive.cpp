@@ -96,7 +96,7 @@ std::string home_of(std::string_view key, const std::vector<FieldInfo>& list, co
   return "";
 }
 
-/// Whether a key may hold what the scalar says.
+/// Whether a scalar is valid for a key.
 bool takes(const FieldInfo& info, const Node& scalar) {
   const std::string_view text = scalar.text;
   switch (info.type) {
@@ -140,7 +140,7 @@ std::string ReadArchive::mapping_hint(const Node& node, const std::vector<FieldI
 
 void ReadArchive::field(const Member& member, const Label& label, const Rule& rule) {
   if (!rule.when.choices.empty() && faults_.has(path_of(rule.when.selector))) {
-    known_.push_back(label.key);  // the kind is not known, so nothing can be said about its keys
+    known_.push_back(label.key);  // the kind is unknown, so its keys cannot be checked
     return;
   }
   if (!rule.when.applies()) {
@@ -205,7 +205,7 @@ void ReadArchive::read_choices(const Node& node, const std::string& path, const 
   }
   std::vector<std::size_t> taken;
   for (std::size_t i = 0; i < node.items.size(); ++i) {
-    // A word that is refused stands for the first one.
+    // A refused word is replaced by the first one.
     const std::size_t one = read_choice(*node.items[i], path + '[' + std::to_string(i) + ']', type.choices).value_or(0);
     if (std::find(taken.begin(), taken.end(), one) != taken.end()) continue;
     taken.push_back(one);
@@ -268,7 +268,7 @@ bool ReadArchive::finish_unknown() {
   return misspelt;
 }
 
-/// Keys that belong to other values of a selector, unless the selector's own is not known.
+/// Keys that belong to other values of a selector, unless the selector's own value is unknown.
 void ReadArchive::finish_idle() {
   for (const Node::Entry& entry : mapping_.entries) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
@@ -378,7 +378,7 @@ void ReadArchive::read(const Node& node, const std::string& path, Vec3& value, c
   }
   if (faults_.count() != before) return;
   if (rule.direction && !(read_value.norm() > 1e-150 && read_value.norm() < 1e150)) {
-    faults_.add(node.mark, path, "expected a direction", "a vector without one", "");
+    faults_.add(node.mark, path, "expected a direction", "a zero vector", "");
     return;
   }
   value = read_value;

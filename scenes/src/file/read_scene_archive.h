@@ -1,5 +1,5 @@
 /// @file read_scene_archive.h
-/// The archive that reads: one per mapping of the file.
+/// The reading archive: one per mapping of the file.
 #pragma once
 
 #include <optional>
@@ -22,9 +22,9 @@ class ReadArchive final : public FieldArchive {
   [[nodiscard]] bool given(std::string_view key) const override { return mapping_.find(key) != nullptr; }
   [[nodiscard]] bool sound(std::string_view key) const override;
   /// A fault at `key` (a path below this mapping, or "" for the mapping) unless it holds, that key is faulty already, or, where
-  /// it is one of this mapping, another one of them is lost or seems misspelt, which may be what `key` misses.
+  /// it is one of this mapping, another key is lost or seems misspelt, which may be the cause.
   void check(bool holds, const std::string& key, std::string expected, std::string found, std::string hint) override;
-  /// Reports keys that no field took, and relations that do not hold. Call after the fields.
+  /// Reports unknown keys, and relations that do not hold. Call after the fields.
   void finish();
 
  private:
@@ -57,12 +57,12 @@ class ReadArchive final : public FieldArchive {
   void read_mapping(const Node& node, const std::string& path, const Member& member);
   /// The members of one description. @pre node: a Mapping
   void read_members(const Node& node, const std::string& path, const MemberType& type, void* one);
-  /// A fault at what is no mapping.
+  /// A fault at a node that is not a mapping.
   void refuse(const Node& node, const std::string& path, const MemberType& type);
-  /// What to write instead of `node`. @param may_be_empty  {} is complete
+  /// Hint for the text to write instead of `node`. @param may_be_empty  {} is complete
   static std::string mapping_hint(const Node& node, const std::vector<FieldInfo>& keys, bool may_be_empty);
 
-  /// Faults of keys that no field took. @return whether one of them seems misspelt
+  /// Faults of unknown keys. @return whether one of them seems misspelt
   bool finish_unknown();
   void finish_idle();
 

@@ -11,7 +11,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::size_t kMostShown = 20;
-constexpr std::size_t kMostKept = 1000;  // a hostile file may hold a fault per node
+constexpr std::size_t kMostKept = 1000;  // a hostile file may have a fault per node
 
 bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
 

@@ -28,7 +28,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::size_t kMostTold = 6;  // keys in a message
+constexpr std::size_t kMostShown = 6;  // keys in a message
 
 /// Keys that change pictures and files but not the motion, on every level.
 constexpr std::array<std::string_view, 20> kLooks = {
@@ -55,7 +55,7 @@ bool moves(std::string_view mapping, std::string_view key) {
 bool shows(std::string_view mapping, std::string_view key) {
   if (mapping.empty()) return !among(kUnseen, key);
   if (mapping == "output") return among(kSeenOutput, key);
-  return !(mapping == "output.images" && key == "formats");  // each has a fingerprint of its own
+  return !(mapping == "output.images" && key == "formats");  // each has a hash of its own
 }
 
 /// Shortest text that reads back as the same angle [rad].
@@ -71,13 +71,13 @@ std::string degrees_text(double angle) {
   return number_text(degrees);
 }
 
-/// What a file holds, whatever its name. One that cannot be read, or is larger than any that is, is a fault of whoever needs it.
+/// Hash of the content of a file, regardless of its name. A file that cannot be read or is too large is reported where it is used.
 std::string content_text(const std::filesystem::path& path) {
   std::error_code status;
   if (!std::filesystem::is_regular_file(path, status)) return "absent";
   if (std::filesystem::file_size(path, status) > io::kLargestInput) return "too large";
   const io::Descriptor file = io::open_file(path, O_RDONLY);
-  std::string part(std::size_t{1} << 20, '\0');  // what is in memory at once
+  std::string part(std::size_t{1} << 20, '\0');  // bytes in memory at a time
   Hasher hasher;
   for (bool whole = false; !whole;) {
     std::size_t used = 0;
@@ -166,10 +166,10 @@ class NameArchive final : public FieldArchive {
   }
 };
 
-/// What every mapping of a scene is listed with.
+/// Common data of the listing of all mappings.
 struct Listing {
   Taken taken;
-  std::filesystem::path folder;  ///< where files are looked for
+  std::filesystem::path folder;  ///< folder of the files
   SceneKeys keys{};
   std::map<void (*)(FieldArchive&, void*), DefaultArchive> defaults{};  ///< of each type of mapping, by its members
 };
@@ -222,7 +222,7 @@ class KeyArchive final : public FieldArchive {
     for (std::size_t i = 0; i < all.size(); ++i) {
       std::string path = path_of(key);
       if (type.type == FieldType::Mappings) {
-        // The order of pairs says nothing.
+        // The order of pairs has no effect.
         path += mapping_.empty() && key == "pairs" ? pair_name(member.as<std::vector<PairDesc>>()[i]) : item_name(type, all[i], i);
         add(path, std::string(kGiven), kNone);
       } else if (type.optional) {
@@ -244,7 +244,7 @@ class KeyArchive final : public FieldArchive {
   const DefaultArchive& defaults_;
 };
 
-/// Who may touch whom, by what a scene says.
+/// Objects and obstacles that may touch, by the rules of a scene.
 class Touching {
  public:
   explicit Touching(const Scene& scene) : scene_(scene) {
@@ -281,7 +281,7 @@ class Touching {
   std::set<std::string> with_contact_;
 };
 
-/// Leaves out solids that nothing may touch. One that is led along bounds the time step, one of primitives the spacing of samples,
+/// Leaves out solids that nothing may touch. A moving one bounds the time step, one of primitives the spacing of samples,
 /// and one before others is part of their numbers in a state: these stay. @return whether a solid is left that something may touch
 bool leave_out_solids(const Touching& touching, Scene& scene) {
   bool met = scene.ground && scene.ground->collides && touching.meets("ground");
@@ -304,7 +304,7 @@ bool leave_out_solids(const Touching& touching, Scene& scene) {
   return met;
 }
 
-/// Leaves out pairs that say nothing, or of what cannot touch anyway.
+/// Leaves out pairs without keys, and pairs that cannot touch anyway.
 void leave_out_pairs(const Touching& touching, Scene& scene) {
   const auto counts = [&](const std::string& name) {
     const auto is_it = [&](const ObstacleDesc& obstacle) { return obstacle.name == name; };
@@ -420,20 +420,20 @@ KeyDifferences differences(const SceneKeys& here, const SceneKeys& other) {
     const SceneKey *mine = find(here, path), *theirs = find(other, path);
     if (mine != nullptr && theirs != nullptr && mine->value == theirs->value) continue;
     const bool inside = within_another(path, here, other);
-    if (!inside && ++count <= kMostTold) {
-      const auto told = [](const SceneKey* key, const SceneKey* instead) {
+    if (!inside && ++count <= kMostShown) {
+      const auto value_of = [](const SceneKey* key, const SceneKey* instead) {
         if (key != nullptr) return key->value;
         return instead->value == kGiven ? std::string(kNone) : instead->fallback;
       };
-      out.found += (out.found.empty() ? "" : ", ") + path + '=' + told(theirs, mine) + " (here " + told(mine, theirs) + ')';
+      out.found += (out.found.empty() ? "" : ", ") + path + '=' + value_of(theirs, mine) + " (here " + value_of(mine, theirs) + ')';
     }
     if (inside && theirs == nullptr) continue;  // goes with its mapping
     const std::string set = setting(theirs, mine);
     settable = settable && !set.empty();
     out.set += (out.set.empty() ? "" : " ") + set;
   }
-  if (count > kMostTold) out.found += " and " + std::to_string(count - kMostTold) + " more";
-  if (!settable || count > kMostTold) out.set.clear();
+  if (count > kMostShown) out.found += " and " + std::to_string(count - kMostShown) + " more";
+  if (!settable || count > kMostShown) out.set.clear();
   return out;
 }
 

@@ -1,5 +1,5 @@
 /// @file scene_keys.h
-/// The keys of a scene that decide something, each with the value that was read: two scenes say the same where these are equal,
+/// The keys of a scene with an effect, each with the value that was read: two scenes are equivalent where these are equal,
 /// whatever the order, units and defaults written out in their files.
 #pragma once
 
@@ -25,20 +25,20 @@ using SceneKeys = std::vector<SceneKey>;  ///< by path, ascending
 inline constexpr std::string_view kGiven = "given";
 inline constexpr std::string_view kNone = "none";
 
-/// What acts on the motion: neither looks and outputs, nor grounds, obstacles, pairs and rules of contact that touch nothing by what
-/// the scene says. That nothing comes near an obstacle no rule tells, so obstacles count that something may touch.
+/// The keys that act on the motion: neither looks and outputs, nor grounds, obstacles, pairs and rules of contact without effect by
+/// the rules of the scene. An obstacle counts if an object may touch it, even if none comes near.
 /// @param folder  where files that the scene names are
 [[nodiscard]] SceneKeys motion_keys(const Scene& scene, const std::filesystem::path& folder);
-/// What decides a picture of a given state.
+/// The keys that affect a picture of a given state.
 [[nodiscard]] SceneKeys picture_keys(const Scene& scene, const std::filesystem::path& folder);
 
 [[nodiscard]] std::uint64_t hash_of(const SceneKeys& keys);
 /// One line a key, for files.
 [[nodiscard]] std::string text_of(const SceneKeys& keys);
-/// @throws Error{Corrupt} for what is no such text
+/// @throws Error{Corrupt} for another text
 [[nodiscard]] SceneKeys keys_in(std::string_view text);
 
-/// What two scenes differ in, for a message.
+/// Differences of two scenes, for a message.
 struct KeyDifferences {
   std::string found;  ///< "objects.ball.particles.mass=2 (here 1)", of the other scene first; the first few of them
   std::string set;    ///< "--set objects.ball.particles.mass=2", which makes this scene the other one; empty where --set cannot

@@ -13,7 +13,7 @@ std::filesystem::path named_file(const std::filesystem::path& folder, const std:
   std::filesystem::path path = folder / name;
   std::error_code unknown;
   const std::filesystem::file_status status = std::filesystem::status(path, unknown);
-  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) return path;  // what is absent its reader tells
+  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) return path;  // an absent file is reported by its reader
   throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                    .key = {},
                                    .expected = "expected a regular file",

@@ -1,5 +1,5 @@
 /// @file scene_places.h
-/// Where the keys of a scene stand in its file, for faults that only the whole scene shows.
+/// Positions of the keys of a scene in its file, for faults that only the whole scene shows.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +24,7 @@ struct ScenePlaces {
 /// @param key  as in messages and overrides: "objects.ball.skeleton[0].radius"
 [[nodiscard]] std::string place_of(const Scene& scene, std::string_view key);
 
-/// Reads what a key names, so that faults of that file name the key too. @param read  called with nothing
+/// Reads the file that a key names, so that its faults name the key too. @param read  called without arguments
 template <class Read>
 auto read_for(const std::string& key, Read&& read) try {
   return std::forward<Read>(read)();
@@ -36,11 +36,11 @@ auto read_for(const std::string& key, Read&& read) try {
   throw Error(error.kind(), std::move(faults));
 }
 
-/// Where a file lies that a scene in this folder names. @throws Error{Io} where that is a pipe, a device or a folder: reading it may
+/// Path of a file that a scene in this folder names. @throws Error{Io} where that is a pipe, a device or a folder: reading it may
 /// never end
 [[nodiscard]] std::filesystem::path named_file(const std::filesystem::path& folder, const std::string& name);
 
-/// Throws the error again, its faults with the places of their keys.
+/// Throws the error again with the positions of its keys.
 [[noreturn]] void rethrow_with_places(const Scene& scene, const Error& error);
 
 }  // namespace supple::scenes

@@ -24,7 +24,7 @@ constexpr Dimension kNoDimension{};
 constexpr double kInch = 0.0254, kPound = 0.45359237, kPoundForce = kPound * 9.80665;  // by definition
 constexpr double kTurn = 360.0 * kDegree;
 
-/// By what they measure, in the order in which messages and the reference list them.
+/// By quantity, in the order of messages and the reference.
 constexpr std::array kUnits{
     Unit{"m", 1.0, kLength.dimension},       Unit{"km", 1e3, kLength.dimension},     Unit{"dm", 1e-1, kLength.dimension},
     Unit{"cm", 1e-2, kLength.dimension},     Unit{"mm", 1e-3, kLength.dimension},    Unit{"um", 1e-6, kLength.dimension},

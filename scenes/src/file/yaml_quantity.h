@@ -16,7 +16,7 @@ struct Dimension {
   friend bool operator==(const Dimension&, const Dimension&) = default;
 };
 
-/// What a key measures: a noun and the SI unit for messages, and the dimension.
+/// The quantity of a key: a noun and the SI unit for messages, and the dimension.
 struct Quantity {
   std::string_view noun;
   std::string_view unit;  ///< "" for pure numbers
@@ -57,7 +57,7 @@ struct QuantityText {
 struct UnitsOfKind {
   std::string_view noun;                 ///< "length"
   std::vector<std::string_view> units;   ///< "m", "km", ...
-  std::vector<std::string_view> words;   ///< taken for some of these, too: "metres"
+  std::vector<std::string_view> words;   ///< accepted as well: "metres"
 };
 [[nodiscard]] std::vector<UnitsOfKind> known_units();
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* kBulkHint = "keep bulk particles in a CSV file and name it under particles.file";
 
-struct Stop {};  // nothing after this can be trusted; the fault is already listed
+struct Stop {};  // the rest is unreliable; the fault is already listed
 
 /// Length of the UTF-8 character at `at`, or 0 when it is malformed, overlong, a surrogate or beyond U+10FFFF.
 std::size_t character_length(std::string_view text, std::size_t at) {
@@ -42,7 +42,7 @@ std::size_t character_length(std::string_view text, std::size_t at) {
   return 0;
 }
 
-/// What must hold before a tokeniser sees the text.
+/// Checks before a tokeniser sees the text.
 bool fit_to_parse(std::string_view text, std::uint32_t source, FaultList& faults) {
   if (text.size() > kLargestText) {
     faults.add({source, 1, 1}, "", "expected a file of at most 8 MiB", "more", kBulkHint);
@@ -98,7 +98,7 @@ class Builder : public YAML::EventHandler {
     if (expects_key()) stop(at(mark), "expected a key", "an alias", "");
     Node* node = anchors_[anchor];
     const bool open = std::any_of(open_.begin(), open_.end(), [&](const Open& o) { return o.node == node; });
-    if (open) stop(at(mark), "expected an alias to something complete", "one to a node around it", "");
+    if (open) stop(at(mark), "expected an alias to a complete node", "one to a node that contains it", "");
     if (open_.size() + node->height > kDeepest) too_deep(at(mark));
     count(at(mark), node->count);
     place(node);
@@ -158,7 +158,7 @@ class Builder : public YAML::EventHandler {
   [[nodiscard]] bool expects_key() const {
     return !open_.empty() && open_.back().node->kind == Node::Kind::Mapping && !open_.back().has_key;
   }
-  /// Where in the scene the current key stands, for messages.
+  /// Path of the current key in the scene, for messages.
   [[nodiscard]] std::string path() const {
     std::string text;
     for (const Open& open : open_) {
@@ -207,7 +207,7 @@ class Builder : public YAML::EventHandler {
     open_.pop_back();
     place(node);
   }
-  /// Hands a complete node to what is open.
+  /// Passes a complete node to the open one.
   void place(Node* node) {
     if (open_.empty()) {
       root = node;

@@ -1,6 +1,6 @@
 /// @file yaml_tree.h
-/// YAML text as a tree that knows where every key and every value stands. yaml-cpp serves as tokeniser only; duplicate and
-/// merge keys, aliases, several documents, sizes and depths are judged here, because yaml-cpp lets them pass.
+/// YAML text as a tree with the position of every key and value. yaml-cpp serves as tokeniser only; duplicate and
+/// merge keys, aliases, several documents, sizes and depths are checked here, because yaml-cpp accepts them.
 #pragma once
 
 #include <cstddef>
@@ -38,11 +38,11 @@ struct Node {
   [[nodiscard]] const Entry* find(std::string_view key) const;
   /// What an unquoted scalar says as YAML 1.2 spells it: true, True, TRUE, false, False or FALSE; none for anything else.
   [[nodiscard]] std::optional<bool> boolean() const;
-  /// "nothing", "a mapping", "a list of 3", -0.2, 'text': what a message says was found.
+  /// "nothing", "a mapping", "a list of 3", -0.2, 'text': the part of a message after "found".
   [[nodiscard]] std::string described() const;
 };
 
-/// Where a key below a node stands, or the nearest one above it that is given.
+/// Position of a key below a node, or of the nearest given one above it.
 /// @param key  "objects.ball.skeleton[0].radius", "" for the node; items of a list by index or by their `name`
 [[nodiscard]] Mark mark_of(const Node& node, std::string_view key);
 

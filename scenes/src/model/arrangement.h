@@ -1,5 +1,5 @@
 /// @file arrangement.h
-/// Where the particles of an object lie at the start.
+/// Initial positions of the particles of an object.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace supple::scenes {
 
-/// Without particles, and with a fault, where the file that has them cannot be read or has too many.
-/// @param key  of these particles
+/// Returns no particles and adds a fault where their file cannot be read or has too many.
+/// @param key  key of these particles
 [[nodiscard]] core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std::string& key, ModelFaults& faults);
 
 }  // namespace supple::scenes

@@ -9,21 +9,21 @@
 namespace supple::scenes {
 namespace {
 
-/// What must not touch may overlap, and divides nothing there.
-void find_strangers(const Model& model, const std::vector<Body>& bodies, Division& division) {
-  std::vector<std::vector<std::size_t>> stranger(division.body.size());
+/// Bodies that never touch may overlap, and do not divide space there.
+void find_excluded(const Model& model, const std::vector<Body>& bodies, Division& division) {
+  std::vector<std::vector<std::size_t>> excluded(division.body.size());
   bool any = false;
-  for (std::size_t k = 0; k < stranger.size(); ++k) {
+  for (std::size_t k = 0; k < excluded.size(); ++k) {
     const std::uint32_t a = bodies[division.body[k]].object;
-    for (std::size_t j = k + 1; j < stranger.size(); ++j) {
+    for (std::size_t j = k + 1; j < excluded.size(); ++j) {
       const std::uint32_t b = bodies[division.body[j]].object;
       if (a == b || model.rules.allowed(a, b) || !division.claim[k].surface_box().overlaps(division.claim[j].surface_box())) continue;
-      stranger[k].push_back(j);
-      stranger[j].push_back(k);
+      excluded[k].push_back(j);
+      excluded[j].push_back(k);
       any = true;
     }
   }
-  if (any) division.stranger = std::move(stranger);
+  if (any) division.excluded = std::move(excluded);
 }
 
 }  // namespace
@@ -57,7 +57,7 @@ Division division_of(const Model& model, const std::vector<Body>& bodies, std::s
   });
   out.claim.reserve(claim.size());
   for (auto& c : claim) out.claim.push_back(std::move(*c));
-  if (model.rules.allowed) find_strangers(model, bodies, out);
+  if (model.rules.allowed) find_excluded(model, bodies, out);
   return out;
 }
 
@@ -78,7 +78,7 @@ std::vector<std::size_t> Division::others_of(std::size_t k) const {
   std::vector<std::size_t> others;
   for (std::size_t j = 0; j < claim.size(); ++j) {
     if (j == k || !claim[j].surface_box().overlaps(claim[k].surface_box())) continue;
-    if (stranger.empty() || !std::binary_search(stranger[k].begin(), stranger[k].end(), j)) others.push_back(j);
+    if (excluded.empty() || !std::binary_search(excluded[k].begin(), excluded[k].end(), j)) others.push_back(j);
   }
   return others;
 }

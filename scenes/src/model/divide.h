@@ -1,5 +1,5 @@
 /// @file divide.h
-/// Before stages 9 and 11: how bodies that touch share the space.
+/// Before stages 9 and 11: division of space between bodies that touch.
 #pragma once
 
 #include <map>
@@ -16,11 +16,11 @@
 
 namespace supple::scenes {
 
-/// @param placed  all bodies as contact sees them  @param fields, surface  to be kept as long as the result
+/// @param placed  all contact bodies  @param fields, surface  must outlive the result
 [[nodiscard]] Division division_of(const Model& model, const std::vector<Body>& bodies, std::span<const implicit::Field> fields,
                                    std::span<const collision::ContactBody> placed, const collision::ContactSurface& surface, const Executor& executor);
 
-/// Bulges of a division that hold less than they should, by objects. @param time  of them [s]
+/// Bulges of a division that hold too little volume, by objects. @param time  of the state [s]
 [[nodiscard]] std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(const Model& model, const std::vector<Body>& bodies, const Division& division,
                                                                                           double time);
 

@@ -81,7 +81,7 @@ std::string files_text(const fs::path& folder) {
   return text;
 }
 
-/// Of one object; empty where it holds none.
+/// Lines for one object; empty where it has no volume control.
 std::string volumes_text(const ordered_json& object) {
   if (!object.contains("volume")) return {};
   const ordered_json& held = object["volume"];
@@ -91,23 +91,23 @@ std::string volumes_text(const ordered_json& object) {
   constexpr std::size_t kMost = 8;
   const std::size_t n = std::min({targets.size(), volumes.size(), scales.size()});
   for (std::size_t k = 0; k < std::min(n, kMost); ++k) {
-    const std::string what = n == 1 ? "holds" : text_at(held, "of") + ' ' + std::to_string(k) + " holds";
+    const std::string what = n == 1 ? "volume" : "volume of " + text_at(held, "of") + ' ' + std::to_string(k);
     if (!targets[k].is_number() || !scales[k].is_number()) continue;
     if (volumes[k].is_number()) {
-      text += line("    %s %.4g of %.4g m^3, kernels of %.3g times their size", what.c_str(), volumes[k].get<double>(), targets[k].get<double>(),
+      text += line("    %s: %.4g m^3, target %.4g m^3, kernels scaled by %.3g", what.c_str(), volumes[k].get<double>(), targets[k].get<double>(),
                    scales[k].get<double>());
     } else {
-      text += line("    %s %.4g m^3 from the first step on", what.c_str(), targets[k].get<double>());
+      text += line("    %s: target %.4g m^3, from the first step on", what.c_str(), targets[k].get<double>());
     }
   }
-  if (n > kMost) text += line("    %zu more volumes are held", n - kMost);
+  if (n > kMost) text += line("    %zu more volumes", n - kMost);
   return text;
 }
 
-/// Empty where there is nothing to tell.
+/// Empty without entries.
 std::string searches_text(const ordered_json& searches) {
   std::string text;
-  for (const auto& [key, what] : {std::pair{"pieces", "added to meshes"}, {"undecided", "cells where a piece may be missed"}, {"crossings", "pairs of triangles that cross"}}) {
+  for (const auto& [key, what] : {std::pair{"pieces", "added to meshes"}, {"undecided", "undecided cells"}, {"crossings", "pairs of triangles that intersect"}}) {
     if (number_at(searches, key) > 0.0) text += line("  %-34s %8.0f", what, number_at(searches, key));
   }
   if (searches.contains("unsearched")) {
@@ -130,7 +130,7 @@ std::string searches_text(const ordered_json& searches) {
   return text.empty() ? text : "pieces between the nodes of the lattice\n" + text;
 }
 
-/// Empty where there is nothing to tell.
+/// Empty without entries.
 std::string short_bulges_text(const ordered_json& searches) {
   if (!searches.contains("short_bulges")) return {};
   std::string text;
@@ -139,7 +139,7 @@ std::string short_bulges_text(const ordered_json& searches) {
     const std::string what = text_at(bulges, "of") + " around " + text_at(bulges, "around");
     text += line("  %-34s %8.3g at %.6g s", what.c_str(), number_at(bulges, "held"), number_at(bulges, "time_s"));
   }
-  return text.empty() ? text : "shares of what contacts displace that bulges hold, the least\n" + text;
+  return text.empty() ? text : "smallest shares of the displaced volume that bulges hold\n" + text;
 }
 
 struct FrameName {
@@ -203,7 +203,7 @@ std::string describe_run(const fs::path& folder) {
     text += "objects\n";
     for (const auto& [name, object] : report["objects"].items()) {
       const double particles = number_at(object, "particles"), pieces = number_at(object, "pieces");
-      text += line("  %-20s %6.0f particle%s in %.0f piece%s, largest deformation %.3g, in the end %.3g", name.c_str(), particles,
+      text += line("  %-20s %6.0f particle%s in %.0f piece%s, largest deformation %.3g, final %.3g", name.c_str(), particles,
                    particles == 1.0 ? "" : "s", pieces, pieces == 1.0 ? "" : "s", number_at(object, "largest_deformation"),
                    number_at(object, "final_shape_error"));
       text += volumes_text(object);

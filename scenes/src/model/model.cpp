@@ -101,7 +101,7 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
   Vec3 centre = Vec3::Zero();
   for (const Vec3& p : arrangement.position) centre += p;
   centre /= n;  // all masses of an object are equal
-  // The frame of a lone particle is turned to the principal axes of its solid; no laws read it.
+  // The frame of a single particle is turned to the principal axes of its solid; no laws depend on it.
   CarriedSolids solids(d, object.skeleton, n, scene.planar);
   std::vector<Quat> turn(n, Quat::Identity());
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -118,9 +118,9 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     }
     if (!(axes.maxCoeff() > 0.0) && !faults.has(key + ".iso")) {  // without a surface there is no solid
       faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
-                      n > 1 && !d.separate ? "two particles lie at one place, so give it"
-                      : d.skeleton.empty() ? "a single particle without a surface needs it"
-                                           : "the field of its skeleton was nowhere found to reach the iso value");
+                      n > 1 && !d.separate ? "two particles are at the same place: this key is required"
+                      : d.skeleton.empty() ? "a single particle without a surface: this key is required"
+                                           : "no point was found where the field of its skeleton reaches the iso value");
     }
     const Vec3 inertia = principal_moments(d.particles.mass, axes);
     Quat q = arrangement.orientation[i];
@@ -177,7 +177,7 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
   return rule;
 }
 
-/// Components of the blending graph of an object that touches itself become bodies of their own, and so do groups that others join. An object that holds its
+/// Components of the blending graph of an object with self contact become bodies of their own, and so do groups that are connected through others only. An object that keeps its
 /// volume stays one body: all that do not blend are groups of it.
 void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   if (!d.contact->self.value_or(true)) return;
@@ -215,7 +215,7 @@ void confine_to_plane(Model& model, ModelFaults& faults) {
   }
 }
 
-/// Far from the origin numbers cannot tell points of a thin object apart.
+/// Far from the origin rounding makes points of a thin object equal.
 void expect_resolved(const Model& model, ModelFaults& faults) {
   constexpr double kFurthest = 1e8;  // kernel radii, of which round-off is then 1e-8
   std::vector<double> thinnest(model.objects.size(), std::numeric_limits<double>::infinity());
@@ -294,7 +294,7 @@ Model build_model(const Scene& scene, double memory) {
     model.objects.push_back(std::move(object));
   }
   if (model.particles.size() == 0 && faults.none()) faults.add("objects", "expected at least one object with particles", "none", "");
-  faults.raise();  // what follows relies on particles
+  faults.raise();  // the following code needs particles
 
   model.rest = model.initial;
   for (Vec3& velocity : model.rest.velocity) velocity.setZero();

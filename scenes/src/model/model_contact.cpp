@@ -81,7 +81,7 @@ double contact_frequency(const ObjectModel& object, const core::ParticleSet& par
 }
 
 /// The same of the springs of friction: half a dozen at a particle, at arms of its iso radius. Their damping counts as the
-/// frequency at which a step would overshoot as far.
+/// frequency at which a step would overshoot by the same amount.
 double stick_frequency(const ObjectModel& object, const core::ParticleSet& particles, const collision::StickRule& stick) {
   constexpr double kSprings = 6.0;
   double lightest = 0.0;  // inverse mass at the end of such an arm [1/kg]
@@ -207,7 +207,7 @@ void add_pairs(const Scene& scene, Model& model, ModelFaults& faults, std::vecto
       body[side] = body_of(model, d.objects[side]);
       if (body[side] != kNobody) continue;
       known = false;
-      if (d.collide && !*d.collide) continue;  // a ground that collides with nothing
+      if (d.collide && !*d.collide) continue;  // a ground with collides: false
       faults.add(key + ".objects[" + std::to_string(side) + ']',
                  d.objects[side] == "ground" ? "expected a ground that collides" : "expected the name of an object",
                  '\'' + shown(d.objects[side]) + '\'', d.objects[side] == "ground" ? "set ground.collides: true" : "");
@@ -446,8 +446,8 @@ void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, Model
     for (const FixedBody& body : model.fixed) thinnest = std::min(thinnest, body.iso_radius);
     const double spacing = scene.contact.sample_spacing.value_or(2.0 * thinnest / kSamplesAcross);
     if (!rows_fit(object, spacing)) {
-      faults.add("contact.sample_spacing", "expected at most 500000 surface samples in a row", "more on '" + object.name + "', " + short_text(spacing) + " m apart",
-                 "ask for a larger sample_spacing, or for shorter or thicker parts");
+      faults.add("contact.sample_spacing", "expected at most 500000 surface samples in a row", "more on '" + object.name + "', at a spacing of " + short_text(spacing) + " m",
+                 "use a larger sample_spacing, or shorter or thicker parts");
       continue;
     }
     budget.add({.what = Counted::Samples, .key = scene.contact.sample_spacing ? "contact.sample_spacing" : "objects." + object.name + ".skeleton",

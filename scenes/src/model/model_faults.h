@@ -22,7 +22,7 @@ class ModelFaults {
     std::string place = place_of(scene_, key);
     keep(ErrorKind::Scene, {std::move(place), std::move(key), std::move(expected), std::move(found), std::move(hint)});
   }
-  /// As `add`, but only the first of a key.
+  /// As `add`, but only for the first fault of a key.
   void add_once(const std::string& key, std::string expected, std::string found, std::string hint) {
     if (!has(key)) add(key, std::move(expected), std::move(found), std::move(hint));
   }
@@ -30,7 +30,7 @@ class ModelFaults {
     return std::any_of(faults_.begin(), faults_.end(), [&](const Fault& fault) { return fault.key == key; });
   }
   [[nodiscard]] bool none() const { return faults_.empty(); }
-  /// What `read` makes of the file that `key` names; nothing, and its faults, where it cannot be read or is no such file.
+  /// Reads the file that `key` names; returns nothing and adds faults where it cannot be read or has another format.
   template <class Read>
   auto read(const std::string& key, const Read& read) -> std::optional<decltype(read())> try {
     return read();

@@ -22,7 +22,7 @@ double distance_of_maximum(const InteractionDesc& d, double r0) {
   return d.maximum_ratio ? *d.maximum_ratio * r0 : d.maximum_distance.value_or(0.0);
 }
 
-/// Nothing where the attraction is not largest beyond the rest distance r0, or no force is given.
+/// Nothing where the largest attraction is not beyond the rest distance r0, or no force is given.
 std::optional<core::Cohesion> cohesion_of(const InteractionDesc& d, double r0) {
   if (d.gain && d.alpha) return core::Cohesion::from_gain(r0, *d.gain, *d.alpha);
   const double r_m = distance_of_maximum(d, r0);
@@ -59,7 +59,7 @@ class LawBuilder {
     const core::Bonds bonds = complete_bonds(near, model_.particles, object_.hinges_join);
     if (bonds.first.empty()) {
       faults_.add(key, "expected a bond", "none",
-                  !near.first.empty() ? "'kinds' keeps all neighbours apart"
+                  !near.first.empty() ? "'kinds' allows none between neighbours"
                   : d.within ? "no two particles are nearer than " + number_text(*d.within) + " m"
                            : "the object has a single particle");
       return;
@@ -72,7 +72,7 @@ class LawBuilder {
       if (model_.rest.position[bonds.first[b]] == model_.rest.position[bonds.second[b]]) {
         faults_.add(key, "expected bonded particles at different places",
                     "particles " + std::to_string(bonds.first[b] - object_.first) + " and " +
-                        std::to_string(bonds.second[b] - object_.first) + " at one place",
+                        std::to_string(bonds.second[b] - object_.first) + " at the same place",
                     "");
         return;
       }
@@ -311,7 +311,7 @@ class LawBuilder {
 
   void fail_flat(const std::string& key) {
     faults_.add_once(key, "expected normals that differ along every bond for form_radius", "parallel ones",
-                     "use 'law: form', which knows flat shapes");
+                     "use 'law: form', which supports flat shapes");
   }
 
   static constexpr double kGayBerneSwitch = 0.9;  // of the cut-off

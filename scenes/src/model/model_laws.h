@@ -1,5 +1,5 @@
 /// @file model_laws.h
-/// The part of a model that ties particles: pair laws and their bonds.
+/// The laws of a model: pair laws and their bonds.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ namespace supple::scenes {
 void add_laws(const std::vector<InteractionDesc>& interactions, const ObjectModel& object, const std::string& key, Model& model,
               ModelFaults& faults);
 
-/// How far a law without bonds reaches [m]; nothing where its numbers do not fit together. @pre d.geometric
+/// Range of a law without bonds [m]; nothing where its values are inconsistent. @pre d.geometric
 [[nodiscard]] std::optional<double> geometric_range(const InteractionDesc& d);
 
 }  // namespace supple::scenes

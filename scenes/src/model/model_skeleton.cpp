@@ -84,7 +84,7 @@ implicit::Kernel kernel_of(const KernelDesc& d, double radius, double iso) {
   return Kernel::wyvill(radius);
 }
 
-/// Whether moments are principal, as closely as they are known.
+/// Whether moments are principal, within their accuracy.
 bool has_no_products(const Mat3& moments) {
   constexpr double kKnown = 1e-4;
   const double largest = std::max({std::abs(moments(0, 1)), std::abs(moments(0, 2)), std::abs(moments(1, 2))});
@@ -163,8 +163,8 @@ void check_reach(const ObjectDesc& d, const std::string& object, const implicit:
   for (const implicit::Primitive& primitive : skeleton.primitive) sum[d.separate ? primitive.part : 0] += implicit::peak(primitive);
   const double most = *std::max_element(sum.begin(), sum.end());
   if (d.iso < most) return;
-  faults.add(object + ".iso", "expected an iso value in (0, " + short_text(most) + "), which the skeleton may reach", number_text(d.iso),
-             "convolved primitives reach more where they are longer or wider against kernel.radius");
+  faults.add(object + ".iso", "expected an iso value in (0, " + short_text(most) + "), which the field can reach", number_text(d.iso),
+             "the field of a convolved primitive is larger where it is longer or wider relative to kernel.radius");
 }
 
 }  // namespace

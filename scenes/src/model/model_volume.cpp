@@ -42,7 +42,7 @@ std::optional<double> volume_at(const ObjectModel& object, double scale) {
   return implicit::enclosed_volume(field, cell);
 }
 
-/// A lone particle's body does not change its shape: what its kernels reach can be told.
+/// The body of a single particle does not change its shape, so the reachable volumes are known.
 void check_reachable(const ObjectModel& object, const std::string& key, ModelFaults& faults) {
   constexpr double kSlack = 0.01;  // far more than volumes err by
   const double target = object.target.front();
@@ -52,13 +52,13 @@ void check_reachable(const ObjectModel& object, const std::string& key, ModelFau
              "expected a volume " + (least && most ? "from " + short_text(*least) + " to " + short_text(*most)
                                      : least       ? "of at least " + short_text(*least)
                                                    : "of at most " + short_text(*most)) +
-                 " m^3, which kernels of 1/4 to 4 times their size give it",
+                 " m^3, for kernels scaled by 1/4 to 4",
              number_text(target), "change the skeleton's kernels or sizes");
 }
 
 void check_support(double target, double most, const std::string& key, ModelFaults& faults) {
   if (target <= most) return;
-  faults.add_once(key, "expected a volume of at most " + short_text(most) + " m^3, which the supports of kernels of 4 times their size hold",
+  faults.add_once(key, "expected a volume of at most " + short_text(most) + " m^3, the volume of the supports of kernels scaled by 4",
                   number_text(target), "is it in m^3?");
 }
 

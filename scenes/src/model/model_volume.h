@@ -1,4 +1,4 @@
-/// Volumes that an object holds: targets, cells that measure them, and targets that no kernels reach.
+/// Volume control of an object: targets, cells of the measurement, and checks for targets that kernels cannot reach.
 #pragma once
 
 #include "model/model_faults.h"
@@ -6,11 +6,11 @@
 
 namespace supple::scenes {
 
-/// What an object's `volume` asks for. @param given  what the scene says that each primitive holds, or 0 [m^3]
+/// Sets up an object's `volume`. @param given  target volume of each primitive, or 0 [m^3]
 /// @pre the object has its skeleton and iso radius
 void hold_volume(const ObjectDesc& d, const std::string& key, std::uint32_t n, std::vector<double> given, ObjectModel& object, ModelFaults& faults);
 
-/// What a primitive's own `volume` asks for must fit into its support at the largest scale.
+/// Checks that a primitive's own `volume` fits into its support at the largest scale.
 void check_volume(const implicit::Primitive& primitive, double target, const std::string& key, ModelFaults& faults);
 
 }  // namespace supple::scenes

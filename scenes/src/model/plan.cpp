@@ -88,20 +88,20 @@ std::string meshing_of(const Scene& scene, const Model& model) {
   const std::string touching = ", tetrahedra where objects touch";
   switch (d.method) {
     case MeshingName::Tetrahedra: return "tetrahedra";
-    case MeshingName::Delaunay: return "Delaunay refinement by CGAL, and of free surfaces and contacts between shared rims where objects touch";
+    case MeshingName::Delaunay: return "Delaunay refinement by CGAL; where objects touch, of free and contact surfaces between common boundary curves";
     case MeshingName::OpenVdb: return "OpenVDB grid and volumeToMesh" + touching;
-    case MeshingName::Cubes: return std::string(error ? "marching cubes to the error asked for" : "marching cubes") + touching;
+    case MeshingName::Cubes: return std::string(error ? "marching cubes to the given error" : "marching cubes") + touching;
     case MeshingName::Auto: break;
   }
-  if (d.error) return "marching cubes to the error asked for" + touching;
+  if (d.error) return "marching cubes to the given error" + touching;
   const implicit::RouteEstimate routes = routes_of(model);
   const auto time = [](double ms) {
     std::array<char, 32> text{};
     std::snprintf(text.data(), text.size(), "%.2g ms", ms);
     return std::string(text.data());
   };
-  const std::string other = std::isfinite(routes.openvdb_ms) ? "by way of OpenVDB " + time(routes.openvdb_ms) : "cells are too small for OpenVDB";
-  const std::string text = std::string("auto: ") + (routes.prefers_cubes() ? "marching cubes" : "OpenVDB") + " (by counts marching cubes " + time(routes.cubes_ms) + ", " + other + ")";
+  const std::string other = std::isfinite(routes.openvdb_ms) ? "OpenVDB " + time(routes.openvdb_ms) : "cells are too small for OpenVDB";
+  const std::string text = std::string("auto: ") + (routes.prefers_cubes() ? "marching cubes" : "OpenVDB") + " (estimated cost: marching cubes " + time(routes.cubes_ms) + ", " + other + ")";
   const bool graph = std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) {
     return o.skeleton.blend.rule == implicit::BlendRule::Graph;
   });
@@ -110,8 +110,8 @@ std::string meshing_of(const Scene& scene, const Model& model) {
 
 /// Which rule samples the contact surface, and why.
 std::string rule_of_contact(const ContactDesc& d) {
-  if (d.rule != RuleName::Auto) return std::string(name_of(d.rule)) + ": the scene asks for it";
-  return "auto: panels where the pressure has many hills, polar where patches are seen whole from their peak, else samples or march, whichever meets the error, to " + number_text(d.error);
+  if (d.rule != RuleName::Auto) return std::string(name_of(d.rule)) + ": set in the scene";
+  return "auto: panels where the pressure has many maxima, polar where patches are star-shaped about their peak, else samples or march; relative error " + number_text(d.error);
 }
 
 }  // namespace
@@ -225,19 +225,19 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
       const bool refused = explicit_steps > scene.time_step.max_substeps;
       const bool dearer = explicit_steps > kImplicitCost * implicit_steps;
       const bool energies = model.interactions.literal_form.empty();  // implicit methods minimise one
-      // The motion of fluids is what they are simulated for: an implicit step would damp it.
+      // Fluids are simulated for their motion, which an implicit step would damp.
       const bool fluid = !model.interactions.geometric_lennard_jones.empty() || !model.interactions.gay_berne.empty();
       const bool implicit = plan.chosen && energies && !fluid && (refused || dearer);
       plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
-      const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet a frame";
-      const std::string size = longest < frame ? " (time_step.size: none longer than " + number_text(longest) + " s)" : "";
+      const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet per frame";
+      const std::string size = longest < frame ? " (time_step.size: at most " + number_text(longest) + " s)" : "";
       if (fixed) {
-        plan.reason = "symplectic: the scene fixes the step";
+        plan.reason = "symplectic: the scene fixes the time step";
       } else if (!implicit) {
         plan.reason = "symplectic: " + counts + " at the start" + size;
       } else {
-        plan.reason = "backward_euler: in place of " + counts + ", " + number_text(implicit_steps) + size +
-                      (refused ? "; more than time_step.max_substeps" : "; it damps what it does not resolve");
+        plan.reason = "backward_euler: " + number_text(implicit_steps) + " steps per frame instead of " + counts + size +
+                      (refused ? ", which are more than time_step.max_substeps" : "; damps motion that its steps do not resolve");
       }
       break;
     }
@@ -247,7 +247,7 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
     case MethodName::BackwardEuler: plan.settings.method = Integrator::BackwardEuler; break;
     case MethodName::ImplicitMidpoint: plan.settings.method = Integrator::ImplicitMidpoint; break;
   }
-  if (plan.reason.empty()) plan.reason = std::string(name_of(scene.integrator.method)) + ": the scene asks for it";
+  if (plan.reason.empty()) plan.reason = std::string(name_of(scene.integrator.method)) + ": set in the scene";
   const bool implicit = core::is_implicit(plan.settings.method);
   plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? 1e-9 : 1e-6);
   plan.limiting_frequency = !implicit ? all : plan.chosen ? model.contact_frequency : 0.0;
@@ -260,7 +260,7 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
 }
 
 double stick_speed(const Scene& scene, const Model& model) {
-  constexpr double kCreep = 1e-7;  // smallest lengths a second [1/s]
+  constexpr double kCreep = 1e-7;  // smallest lengths per second [1/s]
   return std::min(scene.contact.friction_speed, kCreep * model.smallest_length);
 }
 

@@ -54,7 +54,7 @@ std::vector<double> PointTree::nearest_distances() const {
   return out;
 }
 
-/// Squared distance; what is beyond a plane farther away than the least so far is passed by.
+/// Squared distance; points beyond a plane farther away than the least distance so far are skipped.
 void PointTree::search_nearest(std::size_t own, const Range& range, double& least) const {
   if (range.is_leaf()) {
     for (std::size_t i = range.begin; i < range.end; ++i) {
@@ -81,7 +81,7 @@ void PointTree::set_cone(const Range& range, Node& node) const {
     has_cone = has_cone && radius > 0.0;
     if (has_cone) cos = std::min(cos, node.axis_of_cone.dot(x) / radius);
   }
-  if (!has_cone || !(cos > 0.0)) return;  // wide ones bound nothing that boxes do not
+  if (!has_cone || !(cos > 0.0)) return;  // wide cones give no better bound than boxes
   node.cos = cos;
   node.sin = std::sqrt(std::max(0.0, 1.0 - cos * cos));
 }
@@ -117,7 +117,7 @@ void PointTree::search_farthest(const From& from, const Range& range, double& la
     for (std::size_t i = range.begin; i < range.end; ++i) largest = std::max(largest, (from.at - points_[i]).norm());
     return;
   }
-  // The farther half first: what it holds may leave nothing to look for in the other.
+  // The farther half first: its result may exclude the other.
   Range first = range.lower(), second = range.upper();
   if (reach(from, second) > reach(from, first)) std::swap(first, second);
   search_farthest(from, first, largest);

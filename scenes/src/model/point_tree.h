@@ -17,7 +17,7 @@ class PointTree {
 
   /// Distance of each point to its nearest neighbour, in the order given; infinite for a single one.
   [[nodiscard]] std::vector<double> nearest_distances() const;
-  /// The largest distance of two points; 0 for fewer. Nodes are passed by that cannot hold a point farther away than the largest
+  /// The largest distance of two points; 0 for fewer. Nodes are skipped that cannot hold a point farther away than the largest
   /// distance so far: by their boxes, and by their cones about the middle of all, which are as close as it takes on a sphere, where every
   /// point may have an opposite one.
   [[nodiscard]] double largest_distance() const;
@@ -32,7 +32,7 @@ class PointTree {
     Vec3 axis_of_cone = Vec3::UnitZ();
     double cos = -1.0, sin = 0.0;   ///< of the half angle of the cone that holds all points
   };
-  /// A point that the farthest one from it is looked for.
+  /// The point whose farthest one is searched.
   struct From {
     Vec3 at, direction;  ///< the latter from the middle, a unit vector or zero
     double radius = 0.0;

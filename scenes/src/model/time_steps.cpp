@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint64_t kStepsPerRefinement = 4;
 constexpr int kMostHalvings = 20;      // 2^20 substeps, the most that a scene may allow
-constexpr double kDampedShare = 0.4;  // of the inverse of d v: what a step may take of a speed by damping
+constexpr double kDampedShare = 0.4;  // of the inverse of d v: largest share of a speed that a step may dissipate
 
 int log2_of(int n) {
   int k = 0;
@@ -20,18 +20,18 @@ int log2_of(int n) {
   return k;
 }
 
-/// How to mend what asks for the smallest step.
+/// Hint for the cause of the smallest step.
 std::string what_needs(const core::StepLimits& limits, double damping) {
   const double step = core::stable_step(limits);
   if (step == core::stable_step({.length = limits.length, .speed = limits.speed})) {
-    return "slow down what moves " + number_text(limits.speed) + " m/s past lengths of " + number_text(limits.length) + " m";
+    return "reduce the largest speed, " + number_text(limits.speed) + " m/s past lengths of " + number_text(limits.length) + " m";
   }
-  if (step == core::stable_step({.angular_speed = limits.angular_speed})) return "slow down what turns " + number_text(limits.angular_speed) + " rad/s";
-  if (damping > 2.0) return "lower the dissipation of contact (or ask for a higher restitution)";
+  if (step == core::stable_step({.angular_speed = limits.angular_speed})) return "reduce the largest angular speed, " + number_text(limits.angular_speed) + " rad/s";
+  if (damping > 2.0) return "lower the dissipation of contact (or raise the restitution)";
   return "soften the stiffest interaction or contact, or make the lightest particle heavier";
 }
 
-/// Damping d v p takes at most d v w of its speed in a second, w the contact's frequency: by how much that is faster than w.
+/// Damping d v p dissipates at most d v w of its speed per second, w the contact's frequency: the ratio of that rate to w.
 double damping_of(const Model& model, const core::Speeds& speeds) {
   return std::max(1.0, kDampedShare * model.largest_dissipation * (speeds.linear + model.solid_speed));
 }
@@ -53,13 +53,13 @@ core::StepLimits limits_of(const Scene& scene, const Model& model, const Integra
   return step_limits(scene, model, frequency, speeds);
 }
 
-/// Of the longest steps that the scene lets be taken.
+/// k of the longest steps that the scene allows.
 int least_halvings(const Scene& scene) {
   const TimeStepDesc& desc = scene.time_step;
   return (desc.size ? core::halvings(1.0 / scene.frame_rate, *desc.size) : 0) + (desc.substeps ? log2_of(*desc.substeps) : 0);
 }
 
-/// Of the coarsest step [s] that is stable, none coarser than the scene lets be taken; 0: of those.
+/// k of the coarsest stable step [s], not coarser than the scene allows; 0: the coarsest allowed.
 int halvings_for(const Scene& scene, double step) {
   const double frame_time = 1.0 / scene.frame_rate;
   return std::max(least_halvings(scene), step > 0.0 && step < frame_time ? core::halvings(frame_time, step) : 0);
@@ -79,7 +79,7 @@ int stable_halvings(const Scene& scene, const Model& model, const IntegratorPlan
     throw Error(ErrorKind::Limit,
                 Fault{.place = place_of(scene, "time_step.max_substeps"),
                       .key = "time_step.max_substeps",
-                      .expected = "expected a stable step with at most " + std::to_string(most) + " substeps a frame",
+                      .expected = "expected a stable step with at most " + std::to_string(most) + " substeps per frame",
                       .found = "one of " + number_text(step) + " s (" + (possible ? number_text(std::ldexp(1.0, k)) : "no number of") +
                                " substeps) at frame " + std::to_string(state.frame),
                       .hint = "raise time_step.max_substeps, or " + what_needs(limits, damping)});

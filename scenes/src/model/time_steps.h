@@ -1,4 +1,4 @@
-/// How fine steps must be: a frame interval is cut into 2^k of them.
+/// Choice of the time step: a frame interval has 2^k steps.
 #pragma once
 
 #include "supple/core/interactions.h"
@@ -16,20 +16,20 @@ namespace supple::scenes {
 [[nodiscard]] int first_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                                  const State& state);
 
-/// As `first_halvings`, but refuses nothing: for questions about a state from which no step is made. None is finer than a frame's time over 2^20.
+/// As `first_halvings`, but refuses nothing: for queries of a state from which no step is made. At most 20.
 [[nodiscard]] int wanted_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                                   const State& state);
 
-/// The same for the steps that follow: laws get stiffer where particles come close. Within a frame steps only become finer, as
-/// they stay on its grid.
+/// The same for later steps: laws get stiffer where particles come close. Within a frame steps only become finer, as
+/// they stay on its time grid.
 [[nodiscard]] int next_halvings(const Scene& scene, const Model& model, const IntegratorPlan& integrator, const core::Interactions& laws,
                                 const State& state);
 
-/// What an automatic step would be, whatever the scene says of steps [s]; 0: none is fine enough.
+/// The automatic step, regardless of the keys of the scene [s]; 0: none is fine enough.
 [[nodiscard]] double automatic_step(const Scene& scene, const Model& model, const IntegratorPlan& integrator,
                                     const core::Interactions& laws, const core::ParticleState& particles);
 
-/// Whether a step [s] keeps the bounds of automatic ones as to how stiff contacts are and how they damp.
+/// Whether a step [s] keeps the bounds of automatic steps for stiffness and damping of contacts.
 [[nodiscard]] bool contact_bounds_hold(const Model& model, const core::ParticleState& particles, double step);
 
 }  // namespace supple::scenes

@@ -43,7 +43,7 @@ Vec3 middle_of(const implicit::Primitive& primitive, const Pose& carrier) {
 void add_deep(const StageContext& context, const Frame& frame, std::vector<std::string>& warnings) {
   for (const collision::BodyPair& pair : frame.reaching) {
     if (!begins_deep(context.bodies, frame, pair)) continue;
-    warnings.push_back(names_of(context, pair) + " begin so deep in one another that contact may not part them");
+    warnings.push_back(names_of(context, pair) + " overlap so deeply at the start that contact may not separate them");
   }
 }
 
@@ -54,7 +54,7 @@ void add_passing(const Model& model, std::vector<std::string>& warnings) {
     const std::size_t pairs = object.overlapping.size();
     if (pairs > 0) {
       const collision::BodyPair& one = object.overlapping.front();
-      warnings.push_back(key + "parts that do not blend overlap at the start, and touch once they have been apart: " + std::to_string(pairs) +
+      warnings.push_back(key + "parts that do not blend overlap at the start, and touch only once they have been apart: " + std::to_string(pairs) +
                          (pairs == 1 ? " pair" : " pairs") + ", the first with particles " + std::to_string(one.a) + " and " +
                          std::to_string(one.b));
     }
@@ -75,12 +75,12 @@ void add_without_surface(const StageContext& context, const core::ParticleState&
       most = std::max(most, implicit::FieldView(frame.field[i]).value(middle) + skeleton.iso);
     }
     if (most > skeleton.iso) continue;
-    warnings.push_back('\'' + context.bodies[i].name + "' may have no surface: in the middle of its primitives its field reaches " +
+    warnings.push_back('\'' + context.bodies[i].name + "' may have no surface: at the centres of its primitives its field is at most " +
                        number_text(most) + ", its iso value is " + number_text(skeleton.iso));
   }
 }
 
-/// Whether each body of an object is one ball: no part of it comes off the rest.
+/// Whether each body of an object is one ball, of which no part can be lost.
 bool has_only_balls(const ObjectModel& object) {
   std::vector<std::uint8_t> taken(object.last - object.first, 0);  // by the first particle of a body
   for (const implicit::Primitive& primitive : object.skeleton.primitive) {
@@ -103,8 +103,8 @@ void add_missed(const Model& model, std::vector<std::string>& warnings) {
     }
     if (!(object.cell > thickness && thickness > 0.0)) continue;
     const std::string key = object.own_cell ? "objects." + object.name + ".meshing.cell" : "output.cell";
-    warnings.push_back(key + ": cells of " + number_text(object.cell) + " m may miss '" + object.name + "', or leave it in pieces, as it is " +
-                       short_text(thickness) + " m thick; smaller cells resolve it, or 'output.meshing.error'" + (cubes ? "" : " with method auto"));
+    warnings.push_back(key + ": lattice cells of " + number_text(object.cell) + " m may miss '" + object.name + "' or break it into pieces, as it is " +
+                       short_text(thickness) + " m thick; use smaller cells or 'output.meshing.error'" + (cubes ? "" : " with method auto"));
   }
 }
 
@@ -118,20 +118,20 @@ void add_mended_meshes(const Model& model, std::vector<std::string>& warnings) {
     const std::string key = "obstacles." + body.name + ".file: ";
     if (report.turned > 0) {
       warnings.push_back(key + std::to_string(report.turned) + (report.turned == 1 ? " triangle is" : " triangles are") +
-                         " turned, which ran around the other way than most of those that they share edges with");
+                         " reversed, as most of the triangles that share their edges are oriented the other way");
     }
     if (report.deviation > kMuch * report.size) {
-      warnings.push_back(key + "the surface is off by up to " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) +
+      warnings.push_back(key + "the surface deviates by up to " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) +
                          " % of its size" + (report.crossing > 0 ? ", where triangles cross; unite its shells" : ""));
     }
   }
 }
 
-/// Where the scene says how far apart the samples of contact are [m].
+/// Checks a spacing of contact samples given by the scene [m].
 void add_wide_samples(const Model& model, double spacing, std::vector<std::string>& warnings) {
   const std::string key = "contact.sample_spacing: ";
   if (std::all_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.samples.size() == 0; })) {
-    warnings.push_back(key + "it has no effect, as no contact is looked for by samples: convex bodies need none");
+    warnings.push_back(key + "it has no effect, as no contact is searched by samples: convex bodies need none");
     return;
   }
   double solids = std::numeric_limits<double>::infinity();  // obstacles have no samples: those of the objects must meet them
@@ -164,7 +164,7 @@ bool any_friction(const Model& model) {
   return false;
 }
 
-/// Keys that are given, but change nothing.
+/// Keys that are given but have no effect.
 void add_idle(const Scene& scene, const Model& model, std::vector<std::string>& warnings) {
   const ContactDesc& d = scene.contact;
   const auto idle = [&](bool given, const std::string& key, const char* why) {
@@ -181,17 +181,17 @@ void add_idle(const Scene& scene, const Model& model, std::vector<std::string>& 
   for (std::size_t k = 0; k < scene.pairs.size(); ++k) {
     const PairDesc& pair = scene.pairs[k];
     idle(!pair.collide && !pair.friction && !pair.dissipation && !pair.restitution, "pairs[" + std::to_string(k) + ']',
-         "it says nothing of its two objects");
+         "it has no key beside 'objects'");
   }
   const auto& meshes = scene.output.mesh;
   if (scene.output.meshing.motion && !meshes.empty() && std::all_of(meshes.begin(), meshes.end(), [](MeshName m) { return m == MeshName::Obj; })) {
-    warnings.push_back("output.meshing.motion: OBJ files have no columns, those of ply and usd do");
+    warnings.push_back("output.meshing.motion: it has no effect, as OBJ files have no such columns; ply and usd have");
   }
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
     const ObjectModel& object = model.objects[i];
     const auto& contact = scene.objects[i].contact;
     idle(contact && contact->self.value_or(false) && object.collides && own_contacts(object) == 0,
-         "objects." + object.name + ".contact.self", "it has no parts that could touch each other: they blend, or are bonded");
+         "objects." + object.name + ".contact.self", "no parts of the object can touch each other: they blend or are bonded");
   }
 }
 
@@ -229,35 +229,35 @@ void add_unresolved(const StageContext& context, RuleName only, const collision:
   for (const auto& s : surface.summary) {
     if (s.error_estimate < 1.0 || s.force.norm() > 0.0) continue;
     const std::string text = "contact.rule: " + std::string(name_of(only)) + " does not fit the contact of " + names_of(context, s.bodies) +
-                             ", which has no force where this is so; 'auto' fits all";
+                             ", which has no force then; 'auto' fits all contacts";
     if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
   }
 }
 
-bool misses_error(const collision::ContactSurface::Summary& contact, double asked) {
-  constexpr double kSlack = 1.01;  // rules end a little above what they were asked for
-  return contact.error_estimate > kSlack * asked;
+bool misses_error(const collision::ContactSurface::Summary& contact, double given_error) {
+  constexpr double kSlack = 1.01;  // rules end slightly above the given error
+  return contact.error_estimate > kSlack * given_error;
 }
 
 void UnmetContacts::look(const StageContext& context, const collision::ContactSurface& surface, double time) {
-  const double asked = context.model.contact.error;
+  const double given_error = context.model.contact.error;
   const auto kind = [&](std::uint32_t body) -> const std::string& {
     const bool is_group = body < context.bodies.size() && context.bodies[body].origin.is_group();
     return (is_group ? body_name : object_name)(context.model, context.bodies, body);
   };
   for (const auto& s : surface.summary) {
-    if (!misses_error(s, asked) || s.force.norm() == 0.0) continue;  // without force: the rule asked for does not fit
+    if (!misses_error(s, given_error) || s.force.norm() == 0.0) continue;  // without force: the given rule does not fit
     Worst& worst = worst_[{kind(s.bodies.a), kind(s.bodies.b)}];
     if (worst.times++ == 0) worst.first = time;
     if (s.error_estimate > worst.bound) worst = {s.error_estimate, time, worst.first, worst.times};
   }
 }
 
-void UnmetContacts::add_to(double asked, std::vector<std::string>& warnings) const {
+void UnmetContacts::add_to(double given_error, std::vector<std::string>& warnings) const {
   for (const auto& [pair, worst] : worst_) {
     std::array<char, 160> numbers{};
-    std::snprintf(numbers.data(), numbers.size(), " is not solved to the %.2g asked for: its bound is %.2g at t = %.6g s, and %llu times too large from t = %.6g s on",
-                  asked, worst.bound, worst.time, static_cast<unsigned long long>(worst.times), worst.first);
+    std::snprintf(numbers.data(), numbers.size(), " misses the given %.2g: its largest error estimate is %.2g at t = %.6g s, and %llu are too large from t = %.6g s on",
+                  given_error, worst.bound, worst.time, static_cast<unsigned long long>(worst.times), worst.first);
     warnings.push_back("contact.error: contact of '" + pair.first + "' and '" + pair.second + '\'' + numbers.data());
   }
 }
@@ -270,7 +270,7 @@ void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeSt
     double most = 0.0;
     for (std::size_t k = 0; k < object.target.size(); ++k) {
       const implicit::VolumeState& held = volumes[object.first_volume + k];
-      if (!(object.target[k] > 0.0 && held.volume > 0.0)) continue;  // it holds none, or no step was taken
+      if (!(object.target[k] > 0.0 && held.volume > 0.0)) continue;  // it has no target, or no step was made
       const double off = std::abs(held.volume / object.target[k] - 1.0);
       if (off <= kNear) continue;
       ++missed;
@@ -287,14 +287,14 @@ void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeSt
     } else {
       const std::string what(name_of(object.volume_of));
       text += std::to_string(missed) + " of " + std::to_string(object.target.size()) + " volumes by " + what;
-      text += (missed == 1 ? " is off, most that of " : " are off, most that of ") + what;
+      text += (missed == 1 ? " misses its target, most that of " : " miss their targets, most that of ") + what;
       text += ' ' + std::to_string(worst) + ", which";
     }
-    text += " has " + short_text(held.volume) + " m^3 in place of the " + short_text(object.target[worst]) + " m^3 to hold; its kernels ";
+    text += " has " + short_text(held.volume) + " m^3, its target is " + short_text(object.target[worst]) + " m^3; its kernels ";
     const bool grows = held.volume < object.target[worst];
-    if (grows && held.scale >= implicit::kLargestScale) text += "have 4 times their size, the most they may";
-    else if (!grows && held.scale <= implicit::kLeastScale) text += "have 1/4 of their size, the least they may";
-    else text += std::string("still ") + (grows ? "grow" : "shrink") + ", at " + short_text(held.scale) + " times their size ('rate' lets them be faster)";
+    if (grows && held.scale >= implicit::kLargestScale) text += "are scaled by 4, the largest scale";
+    else if (!grows && held.scale <= implicit::kLeastScale) text += "are scaled by 1/4, the smallest scale";
+    else text += std::string("still ") + (grows ? "grow" : "shrink") + ", scaled by " + short_text(held.scale) + " ('rate' sets how fast)";
     warnings.push_back(std::move(text));
   }
 }
@@ -307,35 +307,35 @@ void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector
            warning.starts_with(bulging);
   });
   std::string text;
-  const auto add = [&](bool told, const char* what, std::uint64_t count) {
-    if (told) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
+  const auto add = [&](bool shown, const char* what, std::uint64_t count) {
+    if (shown) text += (text.empty() ? key : "; ") + what + ": " + std::to_string(count);
   };
   const std::uint64_t bulges = all.not_searched(Unsearched::Bulges);
-  const bool asked = meshing.search.value_or(false) && all.pieces + all.undecided + bulges > 0;
-  add(asked || all.pieces > 0, "pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames", all.pieces);
-  add(asked || all.undecided > 0, "cells where a piece may be missed", all.undecided);
-  add(asked || bulges > 0, "meshes of bodies that bulge, which are not searched", bulges);
+  const bool requested = meshing.search.value_or(false) && all.pieces + all.undecided + bulges > 0;
+  add(requested || all.pieces > 0, "pieces of surfaces between the nodes of the lattice, found and added to the meshes of all frames", all.pieces);
+  add(requested || all.undecided > 0, "undecided cells, where a piece may be missing", all.undecided);
+  add(requested || bulges > 0, "meshes of bodies that bulge, which are not searched", bulges);
   for (const auto& [why, what] : {std::pair{Unsearched::Undecided, "meshes that auto does not search, as cells along blends by gradients or tight bends would stay undecided"},
-                                  std::pair{Unsearched::Cost, "meshes that auto does not search, as that would take far longer than to make them"}}) {
+                                  std::pair{Unsearched::Cost, "meshes that auto does not search, as that would cost far more than meshing"}}) {
     add(all.not_searched(why) > 0, what, all.not_searched(why));
   }
   if (!text.empty()) warnings.push_back(std::move(text));
   if (all.crossings > 0) {
-    warnings.push_back(crossing + "pairs of triangles that pass through each other where bodies touch: " + std::to_string(all.crossings) +
-                       "; a smaller distance may part them");
+    warnings.push_back(crossing + "pairs of triangles that intersect where bodies touch: " + std::to_string(all.crossings) +
+                       "; a smaller distance may separate them");
   }
   if (!all.blunt.empty()) {
     std::string cells;
     for (const auto& [object, count] : all.blunt) cells += (cells.empty() ? "" : ", ") + std::to_string(count) + " of '" + object + '\'';
-    warnings.push_back(blunt + ", as triangles with vertices on it would cross, in the meshes of all frames: " + cells + "; smaller cells resolve more of it");
+    warnings.push_back(blunt + ", as triangles with vertices on it would intersect, in the meshes of all frames: " + cells + "; smaller cells resolve more of it");
   }
   for (const auto& [object, around] : all.short_bulges) {
     for (const auto& [body, lacking] : around) {
       std::array<char, 160> numbers{};
-      std::snprintf(numbers.data(), numbers.size(), " holds %.3g of what the contact displaces at t = %.6g s, and %llu in all frames hold too little",
+      std::snprintf(numbers.data(), numbers.size(), " holds %.3g of the displaced volume at t = %.6g s, and %llu in all frames hold too little",
                     lacking.held, lacking.time, static_cast<unsigned long long>(lacking.count));
       warnings.push_back(bulging + "the bulge of '" + object + "' around '" + body + '\'' + numbers.data() +
-                         "; 'bulge_width' and how far the fields reach beyond the surfaces limit its height");
+                         "; 'bulge_width' and the reach of the fields beyond the surfaces limit its height");
     }
   }
 }

@@ -1,4 +1,4 @@
-/// What a user may want to know of a scene that runs all the same, as sentences.
+/// Warnings about valid scenes, as sentences.
 #pragma once
 
 #include <map>
@@ -10,31 +10,31 @@
 
 namespace supple::scenes {
 
-/// Whether bodies are so deep in one another that contact need not push them out: the middle of a primitive lies in the other.
+/// Whether bodies overlap so deeply that contact may not separate them: the centre of a primitive lies in the other body.
 /// @param frame  of the contacts at the start
 [[nodiscard]] bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair);
 
-/// What is odd about the start: bodies deep in one another, parts of an object that pass through each other, objects without a
-/// surface, cells and samples of contact that miss objects, meshes of obstacles that had to be mended, and keys
+/// Warnings about the initial state: bodies deep in one another, parts of an object that pass through each other, objects without a
+/// surface, cells and samples of contact that miss objects, meshes of obstacles that are modified, and keys
 /// without an effect.
 /// @param frame  of the contacts at the start
 [[nodiscard]] std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles,
                                                       Frame& frame);
 
-/// Adds, once each, contacts that the only rule allowed does not fit: they push nobody.
+/// Adds, once each, contacts that the given rule does not fit, which have no force.
 void add_unresolved(const StageContext& context, RuleName only, const collision::ContactSurface& surface,
                     std::vector<std::string>& warnings);
 
-/// Whether a contact's bound of the error is above what was asked by more than rules end at.
-[[nodiscard]] bool misses_error(const collision::ContactSurface::Summary& contact, double asked);
+/// Whether the error estimate of a contact exceeds the given error by more than the tolerance of the rules.
+[[nodiscard]] bool misses_error(const collision::ContactSurface::Summary& contact, double given_error);
 
-/// Contacts whose bound of the error is larger than asked, by the objects that touch. Starts anew after a restart.
+/// Contacts whose error estimate exceeds the given error, by objects. Starts empty after a restart.
 class UnmetContacts {
  public:
   /// At the end of a step. @param time  [s]
   void look(const StageContext& context, const collision::ContactSurface& surface, double time);
-  /// One sentence for each two objects.
-  void add_to(double asked, std::vector<std::string>& warnings) const;
+  /// One sentence per pair of objects.
+  void add_to(double given_error, std::vector<std::string>& warnings) const;
 
  private:
   struct Worst {
@@ -44,13 +44,13 @@ class UnmetContacts {
   std::map<std::pair<std::string, std::string>, Worst> worst_;
 };
 
-/// Held volumes that the last step did not find within 0.5 % of their targets, one sentence an object: the one that is off most, and whether its kernels
-/// may change no further or still do. @param volumes  State::volumes
+/// Volumes that differ from their targets by more than 0.5 % after the last step, one sentence per object: the largest difference, and whether its kernels
+/// are at a limit or still change. @param volumes  State::volumes
 void add_missed_volumes(const Model& model, const std::vector<implicit::VolumeState>& volumes, std::vector<std::string>& warnings);
 
-/// What searches for missed pieces of meshes found in all frames, in one sentence that takes the place of the last; none for none.
-/// Another one counts triangles that cross, others tell of bulges that hold too little.
-/// Other meshers than those that are searched are left to the report: the scene asks for them.
+/// Results of the searches for missed pieces of meshes in all frames, in one sentence that replaces the earlier one; none for none.
+/// Further sentences count intersecting triangles and name bulges that hold too little volume.
+/// Meshes by other methods are counted in the report only, as the scene chooses the method.
 void set_missed(const MeshingDesc& meshing, const SearchCounts& all, std::vector<std::string>& warnings);
 
 }  // namespace supple::scenes

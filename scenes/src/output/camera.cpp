@@ -32,7 +32,7 @@ Row interpolate(const std::vector<CameraKeyDesc>& keys, double time) {
          (3 * t2 - 2 * t3) * row_of(keys[k + 1]) + (t3 - t2) * width * slope(k + 1);
 }
 
-/// How far before `middle` in the direction `back` the middle `share` of a picture holds a box.
+/// Distance before `middle` in the direction `back` at which the middle `share` of a picture holds a box.
 double distance_to_see(const Box& box, const Vec3& middle, const Vec3& back, const CameraDesc& desc, double aspect, double share) {
   Vec3 right = desc.up.cross(back);
   if (!(right.norm() > 1e-9 * desc.up.norm())) right = back.unitOrthogonal();

@@ -1,4 +1,4 @@
-/// Where the cameras of a scene are at a time.
+/// Positions of the cameras of a scene in time.
 #pragma once
 
 #include <span>
@@ -12,19 +12,19 @@ namespace supple::scenes {
 /// `cameras`, or the one `camera`.
 [[nodiscard]] std::span<const CameraDesc> cameras_of(const Scene& scene);
 
-/// The same, with places for those that the scene leaves open: so that the middle four fifths of the picture hold the box; an empty one
-/// leaves them at the origin. @param seen  surfaces at the start [m]
+/// The same, with positions for cameras without one: the box fills the middle four fifths of the picture; an empty box
+/// leaves them at the origin. @param seen  bounding box of the initial surfaces [m]
 [[nodiscard]] std::vector<CameraDesc> placed_cameras(const Scene& scene, const Box& seen);
 
-/// Whether a camera has yet to be placed.
+/// Whether a camera has no position yet.
 [[nodiscard]] bool is_open(const CameraDesc& desc);
 
 /// Keys are joined by cubic Hermite curves whose slopes are those of the chord over each key (Catmull & Rom 1974, uneven
-/// times) and 0 at the ends; the turntable turns at an even rate. @pre keys, or a place
+/// times) and 0 at the ends; the turntable turns at a constant rate. @pre the camera has keys or a position
 [[nodiscard]] render::Camera camera_at(const CameraDesc& desc, double time, double duration);
 
 /// Whether anything of a box, or of the shadow it throws, may be in the picture. Conservative: false only where the box and
-/// all places in its shadow lie outside one side of the pyramid of view, or behind the camera.
+/// all points in its shadow lie outside one side of the view frustum, or behind the camera.
 /// @param aspect    width over height
 /// @param softness  angular radius of the sun [rad]
 [[nodiscard]] bool may_show(const render::Camera& camera, double aspect, const Vec3& light, double softness, const Box& box);

@@ -162,8 +162,8 @@ void DrawingCrew::join() {
   if (failure_) std::rethrow_exception(failure_);
 }
 
-/// Clocks count the CPU time of the process, so each saw the work of all: what they booked is scaled by one factor, so that
-/// it adds up to what was taken.
+/// Clocks count the CPU time of the process, so each member measured the work of all: the times are scaled by one factor so that
+/// they add up to the total.
 void DrawingCrew::book() {
   double seen = cpu_seconds(leader_.simulation.profile()) - cpu_seconds(profile_before_);
   for (const Member& member : members_) seen += cpu_seconds(member.profile);

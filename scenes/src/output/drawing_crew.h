@@ -17,14 +17,14 @@ namespace supple::scenes {
 
 /// Memory of this process [byte].
 [[nodiscard]] double resident_bytes();
-/// How many frames to have in work at once when each needs `share` bytes; one where clocks are to be exact.
+/// Number of frames to draw at the same time when each needs `share` bytes; one where times are measured exactly.
 [[nodiscard]] int crew_size(const RunOptions& options, std::size_t frames, double share);
 
-/// Each member has a simulation and a renderer of its own, so that no byte depends on the others. The thread that made the
-/// crew is a member too: it may go on simulating first, and joins with its own.
+/// Each member has its own simulation and renderer, so that no byte depends on the others. The thread that made the
+/// crew is a member too: it may simulate first, and joins with its own.
 class DrawingCrew {
  public:
-  /// Of the thread that makes the crew, with what it has booked so far.
+  /// Member of the thread that makes the crew, with its profile so far.
   struct Leader {
     Simulation& simulation;
     FrameWriter& writer;
@@ -45,25 +45,25 @@ class DrawingCrew {
   DrawingCrew(const DrawingCrew&) = delete;
   DrawingCrew& operator=(const DrawingCrew&) = delete;
 
-  /// States up to this frame are there. @return false where the crew has given up
+  /// States up to this frame are saved. @return false where the crew has stopped
   [[nodiscard]] bool saved(int frame);
   /// Reports that `frame` is being simulated, unless frames before it are still being drawn.
   void simulating(int frame);
-  /// No more states come: draws with the others what is left, and books the work of all.
-  /// @throws what the first of the frames that failed threw
+  /// After the last state: helps to draw the remaining frames, and adds up the work of all.
+  /// @throws the exception of the first frame that failed
   void join();
-  /// The same, but frames that nobody has begun stay undrawn.
+  /// The same, but frames that are not in work stay undrawn.
   void leave();
 
  private:
   struct Member;
   void begin(Member& member);
   void work(Simulation& simulation, FrameWriter& writer);
-  /// The next frame to draw; 0: none. Waits where states are still to come.
+  /// The next frame to draw; 0: none. Waits for states that are not saved yet.
   [[nodiscard]] int next_frame();
   void done();
   void fail(int frame);
-  /// @param leave  whether frames that nobody has begun stay undrawn
+  /// @param leave  whether frames that are not in work stay undrawn
   void dismiss(bool leave);
   void book();
   [[nodiscard]] bool interrupted() const { return options_.interrupt != nullptr && options_.interrupt->load() != 0; }
@@ -86,14 +86,14 @@ class DrawingCrew {
   PictureTimes pictures_before_;
   double cpu_before_;
 
-  std::mutex opening_;  // libraries of contexts are opened one after the other
-  std::mutex mutex_;    // of all below
+  std::mutex opening_;  // context libraries are opened one at a time
+  std::mutex mutex_;    // guards all members below
   std::condition_variable change_;
   std::vector<Member> members_;
   std::size_t next_ = 0;
   int at_work_ = 0;
   int saved_;
-  bool complete_ = false;  // no more states come
+  bool complete_ = false;  // all states are saved
   std::exception_ptr failure_;
   int failed_ = std::numeric_limits<int>::max();
 };

@@ -6,7 +6,7 @@
 
 namespace supple::scenes {
 
-/// Holds a folder for one process; a second run of the same folder is told so.
+/// Locks a folder for one process; a second run in the same folder is refused.
 class FolderLock {
  public:
   /// @throws Error{Io}

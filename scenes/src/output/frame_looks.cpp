@@ -71,7 +71,7 @@ FrameLooks look_at_frames(const fs::path& folder, const std::string& name, int l
   return out;
 }
 
-std::string told(const FrameLooks& looks, const std::string& name) {
+std::string describe_looks(const FrameLooks& looks, const std::string& name) {
   const std::vector<int>& frames = looks.others.empty() ? looks.absent : looks.others;
   if (frames.empty()) return {};
   const std::string has = frames_text(frames) + " of " + name + (frames.size() == 1 ? " has " : " have ");

@@ -1,6 +1,6 @@
 /// @file frame_looks.h
-/// Which look the frames of a run have: a film and a contact sheet show frames of one look. The look is all that decides a picture
-/// beside the state: the scene's keys that pictures show, the context and the build of the program.
+/// The look of the frames of a run: a film and a contact sheet show frames of a single look. The look is everything besides the state
+/// that a picture depends on: the scene's keys for pictures, the context and the build of the program.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace supple::scenes {
 
-/// Width and height of a PNG, by its head; zeros of what is none.
+/// Width and height of a PNG, from its header; zeros for another file.
 using PictureSize = std::pair<int, int>;
 [[nodiscard]] PictureSize picture_size(const std::filesystem::path& path);
 
@@ -21,7 +21,7 @@ using PictureSize = std::pair<int, int>;
 
 /// Frames 1 .. last by the look of their PNGs, ascending.
 struct FrameLooks {
-  std::string look;          ///< that most have; of the first of those that as many have
+  std::string look;          ///< the most frequent one; among equals that of the first frame
   std::vector<int> most;     ///< with this look
   std::vector<int> others;   ///< with another one
   std::vector<int> absent;   ///< without a picture
@@ -30,17 +30,17 @@ struct FrameLooks {
 [[nodiscard]] FrameLooks look_at_frames(const std::filesystem::path& folder, const std::string& name, int last);
 
 /// "frame 8 of k has another look than the others"; empty where all are there in one look.
-[[nodiscard]] std::string told(const FrameLooks& looks, const std::string& name);
+[[nodiscard]] std::string describe_looks(const FrameLooks& looks, const std::string& name);
 
-/// The note of a film of frames 1 .. last with this look.
+/// The comment in a film file of frames 1 .. last with this look.
 [[nodiscard]] std::string film_note_of(const std::string& look, int last);
-/// Removes NAME.mp4 if a run made it and it is not of these frames and this look.
+/// Removes NAME.mp4 if a run made it from other frames or with another look.
 /// @param last  0: any number of frames   @return whether there was such a film
 bool remove_stale_film(const std::filesystem::path& folder, const std::string& name, const std::string& look, int last);
-/// Removes NAME_sheet.png if a run made it of another look.
+/// Removes NAME_sheet.png if a run made it with another look.
 void remove_stale_sheet(const std::filesystem::path& folder, const std::string& name, const std::string& look);
 
-/// NAME_sheet.png: twelve frames spread over those with the look that most have, 3 rows of 4. Empty when there are none.
+/// NAME_sheet.png: twelve frames spread over those with the most frequent look, 3 rows of 4. Empty when there are none.
 std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, const FrameLooks& looks);
 
 }  // namespace supple::scenes

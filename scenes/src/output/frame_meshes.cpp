@@ -30,16 +30,16 @@ namespace {
 struct DivisionGroup {
   std::vector<std::size_t> member;      ///< of Division::body, ascending
   const ObjectModel* finest = nullptr;  ///< whose cell it is
-  const ObjectModel* strictest = nullptr;  ///< whose error it is; null: none is asked for
+  const ObjectModel* strictest = nullptr;  ///< the object that gives the error; null: none is given
 };
 
-/// An error of 0: none is asked for.
+/// Error 0: none is given.
 std::pair<double, double> cell_and_error(const DivisionGroup& group) {
   return {group.finest->cell, group.strictest != nullptr ? *group.strictest->mesh_error : 0.0};
 }
 
-/// Of bodies that touch, directly or by way of others, the smallest cell and error hold for all of them. What has the same
-/// of both is divided in one go, whether it touches or not.
+/// For bodies that touch, directly or through others, the smallest cell and error apply to all of them. Bodies with the same
+/// cell and error are meshed together, whether they touch or not.
 std::vector<DivisionGroup> groups_of(const Model& model, const std::vector<Body>& bodies, const Division& division) {
   const std::vector<std::uint32_t>& all = division.body;
   std::vector<std::size_t> root(all.size());
@@ -77,7 +77,7 @@ implicit::DelaunayOptions delaunay_options(const StageContext& context, const im
   return {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell, .interrupt = context.interrupt};
 }
 
-/// Numbers of the claims of a division, by what they depend on. Meshers of lattices that the last frame did not use are left out.
+/// Version numbers of the claims of a division, by their inputs. Meshers of lattices that the last frame did not use are removed.
 std::vector<std::uint64_t> versions_of(const StageContext& context, const Division& division, Frame& frame) {
   DivisionMeshers& dividing = frame.dividing;
   std::erase_if(dividing.mesher, [](const auto& on) { return !on.used; });
@@ -109,7 +109,7 @@ DivisionMeshers::OnLattice& mesher_of(const DivisionGroup& group, DivisionMesher
   return *on;
 }
 
-/// The claims of some bodies, and what may keep their meshes: those of all that share a lattice.
+/// The claims of some bodies, and the mesher of their lattice.
 struct Claims {
   std::vector<implicit::FieldView> view;
   std::vector<std::uint64_t> version;
@@ -126,7 +126,7 @@ std::pair<implicit::Lattice, implicit::PartitionError> to_error(const DivisionGr
           {.largest = *group.strictest->mesh_error, .cell_is_stated = stated}};
 }
 
-/// The meshes of bodies that touch, within the bounds that the scene asks for.
+/// The meshes of bodies that touch, within the bounds of the scene.
 std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Claims& claims, const implicit::Lattice& lattice,
                          implicit::PolygoniseCounts& counts, SearchCounts& missed) {
   const std::vector<implicit::FieldView>& views = claims.view;
@@ -147,7 +147,7 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
                                   : implicit::polygonise_partition_within(views, coarsest, error, executor, &counts);
 }
 
-/// The cell fits a thin surface, for which the scene asks by its iso value or its skeleton.
+/// The cell follows from a thin surface, given by the object's iso value or its skeleton.
 void name_thin_surface(const Model& model, Fault& fault) {
   const ObjectModel& thin = model.objects[*model.thinnest];
   fault.key = "objects." + thin.name + (thin.skeleton.iso > ObjectDesc{}.iso ? ".iso" : ".skeleton");
@@ -185,7 +185,7 @@ std::vector<std::array<std::size_t, 2>> pairs_within(const Division& division, c
   return pairs;
 }
 
-/// Why the bodies of a group are not searched: bulges are no part of their fields, nor is what they leave to bodies that they pass through.
+/// Why the bodies of a group are not searched: bulges are not part of their fields, and neither is the region they lose to bodies that they pass through.
 std::optional<Unsearched> why_unsearched(const StageContext& context, const Division& division, const DivisionGroup& group,
                                          const Frame& frame, double cell) {
   const MeshingDesc& d = context.model.meshing;
@@ -202,7 +202,7 @@ std::optional<Unsearched> why_unsearched(const StageContext& context, const Divi
   return why_left_out(implicit::estimate_search(bodies, pairs_within(division, group), cell), 1);
 }
 
-/// Adds what the lattice misses of bodies that touch.
+/// Adds pieces that the lattice misses of bodies that touch.
 void search_between(const StageContext& context, const Division& division, const DivisionGroup& group, const implicit::Lattice& lattice,
                     Frame& frame, std::span<Mesh> meshes) {
   if (search_is_off(context.model.meshing)) return;
@@ -278,7 +278,7 @@ void mesh_divided(const StageContext& context, const Division& division, StagePr
   }
 }
 
-/// The surface of a body that touches no other, by way of another mesher than marching cubes.
+/// The surface of a body that touches no other, by a mesher other than marching cubes.
 /// @pre method is not cubes
 Mesh mesh_otherwise(const StageContext& context, std::size_t i, const implicit::Lattice& lattice, StageProfile& profile, Frame& frame) {
   const MeshingDesc& d = context.model.meshing;
@@ -301,7 +301,7 @@ Mesh mesh_otherwise(const StageContext& context, std::size_t i, const implicit::
   return implicit::mesh_of(implicit::make_surface_grid(field, {.lattice = lattice}, context.executor), field, context.executor);
 }
 
-/// Adds what the lattice misses of a body that touches no other. @param bodies  that its object has
+/// Adds pieces that the lattice misses of a body that touches no other. @param bodies  number of bodies of its object
 void search_alone(const StageContext& context, std::size_t i, double cell, std::size_t bodies, Frame& frame, Mesh& mesh) {
   const MeshingDesc& d = context.model.meshing;
   if (search_is_off(d)) return;
@@ -329,7 +329,7 @@ implicit::MarchOptions march_options(const ObjectModel& object, bool skip) {
 
 bool takes_creases(const MeshingDesc& d, const implicit::Field& field) { return d.method == MeshingName::Auto && implicit::has_creases(field); }
 
-/// The surface of a body that touches no other. @param bodies  that its object has
+/// The surface of a body that touches no other. @param bodies  number of bodies of its object
 Mesh mesh_alone(const StageContext& context, std::size_t i, std::size_t bodies, KeptBudget& budget, StageProfile& profile, Frame& frame) {
   const Model& model = context.model;
   const MeshingDesc& d = model.meshing;
@@ -365,7 +365,7 @@ void expect_size_alone(const MeshingDesc& d, const ObjectModel& object, const im
   }
 }
 
-/// @throws Error{Limit} as mesh_alone would for the error asked for, as far as meshes tell that take about a second
+/// @throws Error{Limit} as mesh_alone would for the given error, as far as meshes of about a second of work show
 /// @param bodies  that share some ten seconds
 void expect_error_alone(const MeshingDesc& d, const ObjectModel& object, const implicit::Field& field, std::size_t bodies, const Executor& executor) {
   constexpr std::uint64_t kTrianglesASecond = 200'000, kSeconds = 10;
@@ -384,7 +384,7 @@ void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std:
   words.add(body < moving);
   if (body < moving) {
     implicit::add_content(bodies[body].skeleton, frame.placed[body], words);
-  } else {  // what is fixed is the same but for its place
+  } else {  // fixed bodies change by their position only
     words.add(body - moving);
     words.add(frame.led[body - moving].pose);
   }
@@ -502,7 +502,7 @@ Error with_keys_of(const Model& model, const Error& failure, const ObjectModel* 
       const std::string own = "objects." + cell->name + ".meshing.cell";
       fault.found += " on '" + cell->name + '\'';
       fault.key = cell->own_cell ? own : "output.cell";
-      if (!cell->own_cell) fault.hint += ", of it alone by " + own;
+      if (!cell->own_cell) fault.hint += ", for this object alone in " + own;
     }
     if (fault.key == "mesh.size") fault.key = "output.meshing.size";
     if (fault.key == "mesh.angle") fault.key = "output.meshing.angle_deg";

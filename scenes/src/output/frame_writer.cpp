@@ -36,7 +36,7 @@ render::ContextKind context_kind(const std::string& name) {
                                       .hint = {}});
 }
 
-/// Of the file that a frame has in this format; none where all frames share one.
+/// Extension of the file of a frame in this format; none where all frames share one file.
 std::string extension_of(TableName format) { return format == TableName::Csv ? ".csv" : ".vtp"; }
 std::string extension_of(MeshName format) {
   switch (format) {
@@ -120,7 +120,7 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
   if (meshes != nullptr) {
     write_searches(options_.folder, name_, frame, simulation.searches());
   } else if (grids) {
-    (void)simulation.division();  // finds bulges that hold too little
+    (void)simulation.division();  // finds bulges that hold too little volume
     write_short_bulges(options_.folder, name_, frame, simulation.searches());
   }
   if (animation_) add_to_animation(simulation, *meshes);
@@ -298,7 +298,7 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
 fs::path FrameWriter::make_film(const std::string& name, int last) {
   const FrameLooks looks = look_at_frames(options_.folder, name, last);
   write_contact_sheet(options_.folder, name, looks);
-  const std::string why_not = told(looks, name);
+  const std::string why_not = describe_looks(looks, name);
   if (outputs_.film && why_not.empty()) {
     const fs::path film = options_.folder / (name + ".mp4");
     const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);
@@ -309,7 +309,7 @@ fs::path FrameWriter::make_film(const std::string& name, int last) {
   if (remove_stale_film(options_.folder, name, look, last)) removed_films_.insert(name);
   const bool removed = removed_films_.contains(name);
   if (outputs_.film) {
-    warnings_.push_back("no film: " + why_not + (removed ? "; the earlier " + name + ".mp4, which shows others, is removed" : ""));
+    warnings_.push_back("no film: " + why_not + (removed ? "; an earlier " + name + ".mp4 of other pictures is removed" : ""));
   } else if (removed) {
     warnings_.push_back(name + ".mp4 is removed: it shows other pictures than frames/ holds");
   } else if (!looks.others.empty()) {

@@ -1,4 +1,4 @@
-/// What a run leaves behind, frame by frame.
+/// Writes the outputs of a run, frame by frame.
 #pragma once
 
 #include <chrono>
@@ -17,7 +17,7 @@
 
 namespace supple::scenes {
 
-/// Tells RunOptions::progress where a run is.
+/// Reports the progress of a run to RunOptions::progress.
 class Reporter {
  public:
   Reporter(const RunOptions& options, int frame_count);
@@ -30,7 +30,7 @@ class Reporter {
   std::optional<double> first_;  ///< share that was done at the first report
 };
 
-/// Stems of the pictures of a scene, one a camera.
+/// Stems of the pictures of a scene, one per camera.
 [[nodiscard]] std::vector<std::string> image_names(const Scene& scene);
 
 class FrameWriter {
@@ -38,22 +38,22 @@ class FrameWriter {
   /// Makes the folders. @throws Error{Io}
   FrameWriter(const Scene& scene, const Model& model, const RunOptions& options, OutputRequest outputs);
 
-  /// Everything asked for of the present frame. Samples are carried on from the frames seen before, so all must be.
+  /// Writes all requested outputs of the present frame. Samples follow from all earlier frames, so every frame must be passed.
   void write(Simulation& simulation, Reporter& report, double done);
-  /// Films, contact sheets and lists over all frames 1 .. last that are there. Returns the film, if there is one.
+  /// Writes films, contact sheets and lists over all existing frames 1 .. last. Returns the film, if there is one.
   std::filesystem::path finish(Simulation& simulation, Reporter& report, int last);
 
-  /// Whether frames have files of their own or share one.
+  /// Whether frames have separate files or share one.
   [[nodiscard]] bool writes_frames() const;
-  /// Whether frames must come one after the other, to one writer.
+  /// Whether frames must be written in order, by one writer.
   [[nodiscard]] bool needs_order() const { return samples_ || animation_; }
-  /// Whether a frame that was written before must be seen again: for a file over all frames or for samples, or because a file of its
-  /// own is absent or its picture one of another scene or state.
+  /// Whether an earlier frame must be processed again: for a file over all frames or for samples, or because one of its own
+  /// files is absent or its picture shows another scene or state.
   [[nodiscard]] bool renews(int frame, std::uint64_t state_hash) const;
-  /// Writes again what `renews` found.
+  /// Writes the files again that `renews` found.
   void renew(Simulation& simulation, Reporter& report, double done);
   [[nodiscard]] int pictures_drawn() const { return pictures_drawn_; }
-  /// CPU time of pictures by their parts [s].
+  /// CPU time of pictures by parts [s].
   [[nodiscard]] PictureTimes picture_times() const;
   void add_warnings(std::vector<std::string>& warnings) const;
 
@@ -77,7 +77,7 @@ class FrameWriter {
   const RunOptions& options_;
   OutputRequest outputs_;
   std::string name_;
-  std::vector<std::string> image_names_;  // one a camera
+  std::vector<std::string> image_names_;  // one per camera
   std::vector<ImageName> image_formats_;
   std::unique_ptr<ScenePictures> pictures_;
   std::unique_ptr<io::UsdAnimation> animation_;

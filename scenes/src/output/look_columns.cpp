@@ -8,7 +8,7 @@
 namespace supple::scenes {
 namespace {
 
-/// d / d0 - 1 of the bonded pairs of each particle of a body, in the mean.
+/// Mean of d / d0 - 1 of the bonded pairs of each particle of a body.
 std::vector<double> mean_stretch(const Model& model, const Body& body, const core::ParticleState& particles,
                                  const core::Interactions& laws) {
   std::vector<double> sum(particles.size(), 0.0), count(particles.size(), 0.0);

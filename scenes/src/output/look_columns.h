@@ -1,4 +1,4 @@
-/// Columns of a body's mesh that its look asks for: rest coordinates for textures, stretch of bonds, speed.
+/// Columns of a body's mesh that its look needs: rest coordinates for textures, stretch of bonds, speed.
 #pragma once
 
 #include "supple/collision/contact_surface.h"
@@ -19,7 +19,7 @@ struct LookedAt {
 void add_look_columns(const Model& model, const LookedAt& now, const Executor& executor, Mesh& mesh);
 
 /// Adds the column "pressure" [Pa]: min(p_A, p_B) where the body's surface is pressed in by another one, 0 elsewhere.
-/// @param bodies  as contact sees them   @param surface  where they touch
+/// @param bodies  contact bodies   @param surface  their contact surfaces
 void add_pressure(std::span<const collision::ContactBody> bodies, const collision::ContactSurface& surface, std::uint32_t body,
                   const Executor& executor, Mesh& mesh);
 

@@ -1,5 +1,5 @@
 /// @file memory_budget.h
-/// What a scene takes, and what only its model shows of it.
+/// Memory of a scene, including counts that only its model shows.
 #pragma once
 
 #include <utility>

@@ -8,9 +8,9 @@
 
 namespace supple::scenes {
 
-/// Looks at all but Delaunay's meshes and, of bodies that touch no other, those within a given error, which choose their cells as they go.
-/// Of an error where bodies touch as much is told as follows from meshes that take about a second.
-/// @param shown  which surfaces a mesh is wanted of, by their boxes; empty: all
+/// Checks all meshes except Delaunay meshes and, for bodies that touch no other, those with a given error, whose cells are not known in advance.
+/// For an error where bodies touch, it checks as much as meshes of about a second of work show.
+/// @param shown  selects surfaces to mesh, by their bounding boxes; empty: all
 /// @throws Error{Limit} as Simulation::meshes
 void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Box&)>& shown, const Executor& executor);
 

@@ -36,7 +36,7 @@ std::string stem_of_frame(const Part& part, const fs::path& file) {
 
 template <class Use>
 void for_each_file(const fs::path& folder, const Use& use) {
-  if (!fs::is_directory(folder)) return;  // throws where that cannot be told
+  if (!fs::is_directory(folder)) return;  // throws where the kind of the file is unknown
   for (const auto& entry : fs::directory_iterator(folder)) use(entry.path());
 }
 

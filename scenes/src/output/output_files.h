@@ -1,4 +1,4 @@
-/// Stage 11: files of one frame, each complete when it has its name.
+/// Stage 11: files of one frame; a file gets its name when it is complete.
 #pragma once
 
 #include <filesystem>
@@ -15,17 +15,17 @@ namespace supple::scenes {
 [[nodiscard]] std::filesystem::path state_path(const std::filesystem::path& folder, const std::string& name, int frame);
 [[nodiscard]] std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame);
 
-/// Names of the scenes whose states lie in the folder.
+/// Names of the scenes whose states are in the folder.
 [[nodiscard]] std::set<std::string> saved_scenes(const std::filesystem::path& folder);
 
-/// Removes what an earlier run of this scene left in the folder (states, frames, tables, film, result), and nothing that a run
+/// Removes files of an earlier run of this scene from the folder (states, frames, tables, film, result), and nothing that a run
 /// does not write.
 void remove_outputs(const std::filesystem::path& folder, const std::string& name);
 
-/// Removes files of an interrupted run of this scene that never got their names, and folders in which its films were made.
+/// Removes temporary files of an interrupted run of this scene, and folders in which its films were made.
 void remove_temporaries(const std::filesystem::path& folder, const std::string& name);
 
-/// Books process CPU time of a scope on a stage.
+/// Adds the process CPU time of a scope to a stage.
 class StageClock {
  public:
   explicit StageClock(StageProfile& profile);

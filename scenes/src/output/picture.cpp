@@ -13,7 +13,7 @@
 namespace supple::scenes {
 namespace {
 
-/// What is drawn of an obstacle.
+/// Mesh of an obstacle for pictures.
 Mesh obstacle_mesh(const ObstacleDesc& d, const FixedBody& body) {
   constexpr int kFiner = 4;  // facets along a cell of the heights
   if (const auto* box = std::get_if<implicit::SolidBox>(&body.solid)) return box->mesh();
@@ -108,7 +108,7 @@ struct Quantity {
   const char* title;
 };
 
-/// The column behind `colour_by`, and what its scale bar says.
+/// The column of `colour_by`, and the label of its scale bar.
 Quantity quantity_of(ColourByName by) {
   switch (by) {
     case ColourByName::Pressure: return {"pressure", "pressure [Pa]"};
@@ -172,7 +172,7 @@ void check_pictures(const Scene& scene) {
   if (scene.ground) check(scene.ground->texture, "ground.");
   if (!faults.empty()) throw Error(ErrorKind::Io, std::move(faults));
   if (scene.render.renderer == RendererName::Path && !render::has_path_tracer()) {
-    static_cast<void>(render::make_renderer({.kind = render::RendererKind::Path}));  // says what is absent
+    static_cast<void>(render::make_renderer({.kind = render::RendererKind::Path}));  // throws for absent files
   }
 }
 
@@ -239,8 +239,8 @@ void ScenePictures::warn_inside(Simulation& simulation, std::size_t camera) {
   for (std::size_t i = 0; i < surface_count(bodies); ++i) {
     if (bodies[i].skeleton.primitive.empty() || !(implicit::FieldView(simulation.fields()[i]).value(view_.camera.from) > 0.0)) continue;
     const std::string& name = cameras_of(scene_)[camera].name;
-    const std::string text = "camera" + (name.empty() ? "" : " '" + name + "'") + " stands inside of '" +
-                             scene_.objects[bodies[i].object].name + "', which it does not see";
+    const std::string text = "camera" + (name.empty() ? "" : " '" + name + "'") + " is inside '" +
+                             scene_.objects[bodies[i].object].name + "', which is therefore invisible";
     if (std::find(warnings_.begin(), warnings_.end(), text) == warnings_.end()) warnings_.push_back(text);
   }
 }

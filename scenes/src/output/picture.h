@@ -1,4 +1,4 @@
-/// Stage 10: what a scene's pictures show, drawn by a renderer.
+/// Stage 10: draws the pictures of a scene.
 #pragma once
 
 #include <deque>
@@ -16,10 +16,10 @@
 
 namespace supple::scenes {
 
-/// What is drawn of each obstacle at a time, with its velocity where it is led along; empty where it is not visible.
+/// Mesh of each obstacle at a time, with its velocity where it moves; empty where it is not visible.
 [[nodiscard]] std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double time);
 
-/// Whether a surface in a box may show in a picture of that time; empty where all may (light between surfaces needs everything).
+/// Whether a surface in a box may be visible in a picture of that time; empty where all may be (light between surfaces needs everything).
 [[nodiscard]] std::function<bool(const Box&)> shown_by_cameras(const Scene& scene, const Model& model, double time);
 
 class ScenePictures {
@@ -27,16 +27,16 @@ class ScenePictures {
   /// @throws Error{Io} when a texture cannot be read or no context can be made
   ScenePictures(const Scene& scene, const Model& model, render::ContextKind context, int threads);
 
-  /// For pictures alone: leaves out of the meshes what no camera sees (OpenGL; light between surfaces needs everything), and
+  /// For pictures only: omits meshes that no camera sees (OpenGL; light between surfaces needs everything), and
   /// chooses their cells by `render.pixel_error`. Call before the first `draw` of a state.
   void limit_meshes(Simulation& simulation) const;
 
-  /// Objects inside of which a camera stood, as sentences; each once.
+  /// Warnings about objects that contained a camera, as sentences; each once.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
-  /// The simulation's current state as the camera of this number sees it, and its light unless `linear` is null.
+  /// Draws the current state from the camera of this number, and its linear light unless `linear` is null.
   [[nodiscard]] render::Image draw(Simulation& simulation, std::size_t camera, render::LinearImage* linear);
-  /// Depth, normals, velocities and numbers behind the picture that was drawn last, and what its items are called.
+  /// Depth, normals, velocities and object numbers of the picture drawn last, and the names of its items.
   [[nodiscard]] render::Layers layers();
   [[nodiscard]] const std::vector<std::string>& item_names() const { return item_names_; }
   [[nodiscard]] render::RenderTimes times() const { return renderer_->times(); }
@@ -56,7 +56,7 @@ class ScenePictures {
   std::vector<render::ScaleBar> bars_;
   std::unique_ptr<render::Renderer> renderer_;
   render::RenderSettings settings_;
-  std::unique_ptr<render::LayerRenderer> layer_renderer_;  ///< made when layers are first asked for
+  std::unique_ptr<render::LayerRenderer> layer_renderer_;  ///< made when layers are first requested
   std::vector<render::Item> items_;
   std::vector<std::string> item_names_;
   double cell_ = 0.0;        ///< of the scene

@@ -9,7 +9,7 @@
 namespace supple::scenes {
 namespace {
 
-/// Whether an object (the program or a library) holds an address.
+/// Whether an object (the program or a library) contains an address.
 bool holds(const dl_phdr_info& object, ElfW(Addr) address) {
   for (int i = 0; i < object.dlpi_phnum; ++i) {
     const auto& segment = object.dlpi_phdr[i];
@@ -19,7 +19,7 @@ bool holds(const dl_phdr_info& object, ElfW(Addr) address) {
   return false;
 }
 
-/// Looks for the note NT_GNU_BUILD_ID in the notes of the object that holds this function: the tool, or the Python module.
+/// Finds the note NT_GNU_BUILD_ID of the object that contains this function: the tool, or the Python module.
 int find_build_id(dl_phdr_info* object, std::size_t /*size*/, void* result) {
   if (!holds(*object, reinterpret_cast<ElfW(Addr)>(&find_build_id))) return 0;
   for (int i = 0; i < object->dlpi_phnum; ++i) {

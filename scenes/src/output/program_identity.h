@@ -1,4 +1,4 @@
-/// Which build of the program runs: files of another build may differ in a bit.
+/// Identity of the running build: files of another build may differ in the last bit.
 #pragma once
 
 #include <string>

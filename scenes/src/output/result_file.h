@@ -1,11 +1,11 @@
-/// result.json: what came out of a run, for people and programs.
+/// result.json: the report of a run.
 #pragma once
 
 #include "supple/scenes/run.h"
 
 namespace supple::scenes {
 
-/// What a command took [s].
+/// Times of a command [s].
 struct TimeTaken {
   double wall = 0.0;
   double cpu = 0.0;  ///< of all threads

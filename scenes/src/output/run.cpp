@@ -71,7 +71,7 @@ std::string outcome_of(ErrorKind kind) {
   return "internal";
 }
 
-/// That the frames asked for are some of the scene's. @throws Error{Usage}
+/// Checks that the requested frames exist in the scene. @throws Error{Usage}
 void check_frames(const Scene& scene, const std::set<int>& frames) {
   if (frames.empty() || (*frames.begin() <= scene.frame_count() && *frames.rbegin() >= 1)) return;
   throw Error(ErrorKind::Usage, Fault{.place = "--frames",
@@ -81,7 +81,7 @@ void check_frames(const Scene& scene, const std::set<int>& frames) {
                                       .hint = "frame n shows t = (n - 1) / frame_rate"});
 }
 
-/// What pictures need and a scene only names is looked for before hours of work, and before anything is removed.
+/// Checks files and programs for pictures before hours of work, and before anything is removed.
 /// @throws Error
 void check_needs(const Scene& scene, const RunOptions& options, const OutputRequest& outputs) {
   if (!outputs.images) return;
@@ -94,13 +94,13 @@ void check_needs(const Scene& scene, const RunOptions& options, const OutputRequ
 
 constexpr int kSignalExit = 128;
 constexpr int kMostFrames = 1'000'001;  // of a scene
-constexpr std::size_t kMostOverloads = 10;  // that are told; the report has all
-constexpr double kMuchEnergy = 0.05;        // energy_error that implicit steps which nobody asked for are blamed for
+constexpr std::size_t kMostOverloads = 10;  // overloads in warnings; the report has all
+constexpr double kMuchEnergy = 0.05;        // energy_error above which a warning blames an automatically chosen implicit method
 constexpr const char* kResultFile = "result.json";
 
 std::string overload_text(const RunRecord::Overload& o) {
   std::array<char, 160> numbers{};
-  std::snprintf(numbers.data(), numbers.size(), " overloaded from t = %.6g s: energy of approach and contact %.4g J, more than half of what they can hold, %.4g J",
+  std::snprintf(numbers.data(), numbers.size(), " overloaded from t = %.6g s: energy of approach and contact %.4g J, more than half of their capacity, %.4g J",
                 o.time, o.energy, o.capacity);
   return o.a + " and " + o.b + numbers.data();
 }
@@ -121,7 +121,7 @@ class TimeLimit {
   [[nodiscard]] bool passed(RunResult& result) const {
     if (!(seconds_ > 0.0) || seconds_since(begin_) < seconds_) return false;
     result.reason = "time limit: expected an end within " + short_text(seconds_) + " s, found frame " + std::to_string(result.frames) +
-                    " saved; --resume goes on from it";
+                    " saved; --resume continues from it";
     result.exit_code = static_cast<int>(ErrorKind::Limit);
     return true;
   }
@@ -178,17 +178,17 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
     const IntegratorPlan& plan = simulation->integrator();
     const double error = simulation->audits().energy_error;
     if (plan.chosen && plan.settings.method == core::Integrator::BackwardEuler && error > kMuchEnergy) {
-      result.warnings.push_back("integrator.method: auto took backward_euler, which damps what its steps do not resolve: the balance of energy is off by " +
-                                std::to_string(std::lround(100.0 * error)) + " %; implicit_midpoint keeps it");
+      result.warnings.push_back("integrator.method: auto chose backward_euler, which damps motion that its steps do not resolve: the energy balance is off by " +
+                                std::to_string(std::lround(100.0 * error)) + " %; implicit_midpoint conserves energy");
     }
   }
-  // Where nothing was done, the report of an earlier run stays.
+  // A report of an earlier run stays if nothing was done.
   const bool refused = result.exit_code != 0 && result.frames == 0 && fs::exists(result.report);
   if (!refused) write_result_file(scene, result, simulation ? &*simulation : nullptr, {seconds_since(begin), process_cpu_seconds() - cpu_before});
   return result;
 }
 
-/// Those from `first` to `last` that are asked for.
+/// The requested frames from `first` to `last`.
 std::vector<int> frames_to_draw(const RunOptions& options, int first, int last) {
   std::vector<int> frames;
   for (int frame = first; frame <= last; ++frame) {
@@ -206,7 +206,7 @@ void save_frame(const fs::path& folder, const Simulation& simulation) {
   save_state(state_path(folder, scene_name(simulation.scene()), simulation.frame()), simulation.state(), origin_of(simulation.scene()));
 }
 
-/// What a run that goes on works with.
+/// Data of a resumed run.
 struct Resuming {
   const Scene& scene;
   const RunOptions& options;
@@ -217,7 +217,7 @@ struct Resuming {
   const std::function<bool()>& stopped;  ///< by a signal or by the time limit
 };
 
-/// Makes the state of a frame from the one before it, which is there, and saves it. @return false where the run was stopped first
+/// Makes the state of a frame from that of the previous one and saves it. @return false where the run was stopped first
 bool simulate_again(const Resuming& run, int frame, double done) {
   Simulation& simulation = run.simulation;
   run.report("simulate", frame, done);
@@ -228,7 +228,7 @@ bool simulate_again(const Resuming& run, int frame, double done) {
   return true;
 }
 
-/// Frames `first` to `last` of those saved: what they lack is written, and a state that is lost or damaged is simulated again.
+/// Frames `first` to `last` of the saved ones: absent outputs are written, and a lost or damaged state is simulated again.
 /// @return false where the run was stopped first
 bool take_up(const Resuming& run, int first, int last, UnusableFrames& unusable) {
   for (int frame = first; frame <= last; ++frame) {
@@ -255,8 +255,8 @@ bool resume(const Resuming& run) {
   if (first > 1 && !usable_frame(run.options.folder, run.scene, first, unusable)) first = 1;
   unusable = {};
   const bool whole = take_up(run, first, saved->last, unusable);
-  const std::vector<std::string> told = unusable.told();
-  run.result.warnings.insert(run.result.warnings.end(), told.begin(), told.end());
+  const std::vector<std::string> sentences = unusable.sentences();
+  run.result.warnings.insert(run.result.warnings.end(), sentences.begin(), sentences.end());
   return whole;
 }
 
@@ -427,7 +427,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
       result.frames = simulation->frame();
     };
     if (result.frames == 0) {
-      // Frames that are asked for may lie far behind.
+      // Requested frames may be far back.
       if (!options.frames.empty() && !options.frames.contains(1)) expect_output_sizes(*simulation, outputs);
       writer.write(*simulation, report, 1.0 / last_frame);
       save();
@@ -461,7 +461,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
       }
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::Diverged) throw;
-      diverged = std::current_exception();  // what came before is still drawn
+      diverged = std::current_exception();  // earlier frames are still drawn
     }
     if (crew) {
       limit.passed(result) ? crew->leave() : crew->join();

@@ -29,7 +29,7 @@ State load_frame(const fs::path& folder, const Scene& scene, int frame) {
                                      .key = {},
                                      .expected = "expected the saved state of frame " + std::to_string(frame),
                                      .found = "none",
-                                     .hint = "`supple run --resume` makes it from the last one before it"});
+                                     .hint = "`supple run --resume` computes it from the last one before it"});
   }
   return load_state(path, origin_of(scene), {.frame = frame, .otherwise = kOtherwise});
 }
@@ -48,14 +48,14 @@ std::optional<State> usable_frame(const fs::path& folder, const Scene& scene, in
   }
 }
 
-std::vector<std::string> UnusableFrames::told() const {
-  std::vector<std::string> sentences;
+std::vector<std::string> UnusableFrames::sentences() const {
+  std::vector<std::string> text;
   for (const auto& [frames, why] : {std::pair{&lost, "lost"}, {&damaged, "damaged"}}) {
     if (frames->empty()) continue;
     const bool one = frames->size() == 1;
-    sentences.push_back(frames_text(*frames) + (one ? " is simulated again: its saved state is " : " are simulated again: their saved states are ") + why);
+    text.push_back(frames_text(*frames) + (one ? " is simulated again: its saved state is " : " are simulated again: their saved states are ") + why);
   }
-  return sentences;
+  return text;
 }
 
 std::string frames_text(const std::vector<int>& frames) {

@@ -1,5 +1,5 @@
 /// @file saved_frames.h
-/// The states that a run leaves, one a frame, and frames in words.
+/// Saved states of a run, one per frame, and frame numbers as text.
 #pragma once
 
 #include <filesystem>
@@ -11,26 +11,26 @@
 
 namespace supple::scenes {
 
-/// The first and the last frame up to `frame_count` whose states are there; nothing where none is.
+/// The first and the last frame up to `frame_count` whose states exist; nothing where none does.
 struct SavedRange {
   int first = 1;
   int last = 1;
 };
 [[nodiscard]] std::optional<SavedRange> saved_range(const std::filesystem::path& folder, const std::string& name, int frame_count);
 
-/// The state of a frame, to look at. @throws as load_state; Error{Io} where it is absent
+/// The state of a frame, for reading. @throws as load_state; Error{Io} where it is absent
 [[nodiscard]] State load_frame(const std::filesystem::path& folder, const Scene& scene, int frame);
 
-/// Frames whose states a run cannot go on with, and why.
+/// Frames whose states are unusable for a run, and why.
 struct UnusableFrames {
   std::vector<int> lost;
   std::vector<int> damaged;
   /// "frame 12 is simulated again: its saved state is lost"
-  [[nodiscard]] std::vector<std::string> told() const;
+  [[nodiscard]] std::vector<std::string> sentences() const;
 };
 
-/// The state of a frame, to go on from; nothing where it is absent or damaged, which is booked.
-/// @throws as load_state where it is whole and not of this frame, scene or build
+/// The state of a frame, to continue from; nothing where it is absent or damaged, which is recorded.
+/// @throws as load_state where it is complete but of another frame, scene or build
 [[nodiscard]] std::optional<State> usable_frame(const std::filesystem::path& folder, const Scene& scene, int frame, UnusableFrames& unusable);
 
 /// "frame 8", "frames 3, 5-9". @param frames  ascending

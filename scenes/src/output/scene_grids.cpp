@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The claim of a body that others divide, and those that may take of it.
+/// The claim of a body that others divide, and those that may reduce it.
 struct Claims {
   collision::ClaimField own;
   std::vector<collision::ClaimField> others;
@@ -33,7 +33,7 @@ implicit::GridContent content_of(const GriddingDesc& gridding) {
   return gridding.content == GridContentName::Field ? implicit::GridContent::Field : implicit::GridContent::SignedDistance;
 }
 
-/// What fields and claims of a frame are, each by a number.
+/// Version numbers of the fields and claims of a frame.
 class BodyVersions {
  public:
   BodyVersions(Simulation& simulation, const Division& division, ContentVersions& versions)
@@ -110,7 +110,7 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
     const auto at = static_cast<std::size_t>(place - division.body.begin());
     const double modulus = division.placed[i].material.modulus;
     if (gridding.of != GriddedName::Objects) {
-      // With its bulges, but without what others take: that is in the union.
+      // With its bulges, but without the reduction by others: that is in the union.
       const implicit::FieldView whole =
           apart ? implicit::FieldView(fields[i]) : bulging.emplace_back(division.claim[at], std::vector<collision::ClaimField>{}, modulus);
       united.push_back({distance ? implicit::FieldView(depth.emplace_back(whole)) : whole, apart ? versions.field(i) : versions.claim(at),

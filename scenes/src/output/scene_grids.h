@@ -13,9 +13,9 @@
 
 namespace supple::scenes {
 
-/// Writes the grids of frame after frame and keeps what nothing changed: leaves that no primitive reaches that moved, of bodies that touch
-/// no other; whole grids of bodies that touch, where neither they nor what they touch changed; of the grid of all bodies, leaves
-/// that no changed one reaches. What is kept holds for any state.
+/// Writes the grids of successive frames and keeps unchanged data: for bodies that touch no other, OpenVDB leaves that no moved primitive
+/// reaches; for bodies that touch, whole grids where neither they nor their partners changed; for the grid of all bodies, leaves
+/// that no changed body reaches. The kept data are valid for any state.
 class SceneGrids {
  public:
   /// FOLDER/grids/NAME.0012.vdb @throws Error{Limit} with the scene's key

@@ -1,5 +1,5 @@
 /// @file search_choice.h
-/// Which meshes are searched for the pieces that their lattice misses.
+/// Selects the meshes that are searched for pieces between the nodes of their lattice.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@
 
 namespace supple::scenes {
 
-/// A search that takes so many times as long as the mesh is still made unasked, by counts.
+/// Largest estimated cost of an automatic search over that of meshing.
 inline constexpr double kSearchTimesMesh = 2.0;
-/// And one that takes no longer, of all bodies of an object [ms]: little beside drawing or saving a frame.
+/// An automatic search of this cost is always made [ms], for all bodies of an object: little relative to drawing or saving a frame.
 inline constexpr double kShortSearch = 10.0;
 
-/// Whether the scene wants no search at all.
+/// Whether the scene switches searches off.
 [[nodiscard]] inline bool search_is_off(const MeshingDesc& d) { return d.search && !*d.search; }
 
-/// Why `search: auto` leaves out a mesh, if it does. @param bodies  of so many alike this is one
+/// Why `search: auto` does not search a mesh; none: it does. @param bodies  number of equal bodies
 [[nodiscard]] inline std::optional<Unsearched> why_left_out(const implicit::SearchEstimate& estimate, std::size_t bodies) {
   if (!estimate.decides) return Unsearched::Undecided;
   const bool affordable = estimate.search_ms <= kSearchTimesMesh * estimate.mesh_ms ||

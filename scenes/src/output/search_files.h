@@ -1,5 +1,5 @@
 /// @file search_files.h
-/// What searches of meshes tell, a file a frame, so that it counts for the run whoever made the frame and when.
+/// Results of the searches of meshes, one file per frame, so that the report of a run counts all frames, whenever they were made.
 #pragma once
 
 #include <filesystem>
@@ -15,13 +15,13 @@ namespace supple::scenes {
 /// {"pieces": 1, "undecided": 0, "unsearched": {"ball": {"cost": 2}}, "blunt": {"ball": 3}}
 [[nodiscard]] nlohmann::ordered_json json_of(const SearchCounts& counts);
 
-/// searches/NAME.0012.json, which is absent where there is nothing to tell. @throws Error{Io}
+/// Writes searches/NAME.0012.json, or removes it where there is nothing to report. @throws Error{Io}
 void write_searches(const std::filesystem::path& folder, const std::string& name, int frame, const SearchCounts& counts);
 
-/// The same of a frame of which no meshes are made: what the file says of meshes stays.
+/// The same for a frame without meshes: the counts of meshes in the file stay.
 void write_short_bulges(const std::filesystem::path& folder, const std::string& name, int frame, const SearchCounts& counts);
 
-/// Of frames 1 to `last` that are among `frames`, or of all where that is empty. What is absent or none of ours counts as nothing.
+/// Sum over frames 1 to `last` that are among `frames`, or all where that is empty. Absent and foreign files count as empty.
 [[nodiscard]] SearchCounts read_searches(const std::filesystem::path& folder, const std::string& name, const std::set<int>& frames, int last);
 
 }  // namespace supple::scenes

@@ -74,7 +74,7 @@ double unaccounted_energy(double energy, const State& state) {
 std::optional<double> find_created_energy(const Energies& now, double before, const State& state) {
   constexpr double kNearlyAll = 0.9;
   const double created = unaccounted_energy(now.total(), state) - before;
-  // Energies of pair laws may be below 0: what leaves such a well has that much, and comes from below.
+  // Energies of pair laws may be negative: a pair that leaves a well gains that much.
   const double well = std::max(0.0, -(now.interaction + now.contact));
   const double all = std::max(state.record.largest_energy, now.total()) + 2.0 * well;
   return created > kNearlyAll * all ? std::optional(created) : std::nullopt;

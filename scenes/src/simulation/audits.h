@@ -1,4 +1,4 @@
-/// What a run reports about itself: motion and energy against frame 1 and against what the ledger booked.
+/// Audits of a run: motion and energy compared with frame 1 and the ledger.
 #pragma once
 
 #include <optional>
@@ -14,12 +14,12 @@ namespace supple::scenes {
 /// Keeps the largest deviations so far in state.record, which begins with its first call. @param energy  kinetic + pair + contact, now [J]
 void book_audits(const Model& model, const std::vector<Body>& bodies, double energy, const collision::ContactSurface& surface, State& state);
 
-/// What is there beyond the energy at the start, external work and what damping has taken [J]
+/// Energy beyond the initial energy plus external work minus dissipation [J]
 [[nodiscard]] double unaccounted_energy(double energy, const State& state);
-/// Energy from nowhere, where it is nearly all that there is. @param before  what was unaccounted for where stepping began [J]
+/// Energy without a source, where it is nearly all energy. @param before  unexplained energy when stepping began [J]
 [[nodiscard]] std::optional<double> find_created_energy(const Energies& now, double before, const State& state);
 
-/// Those deviations over their scales.
+/// These deviations over their scales.
 [[nodiscard]] Audits audits_of(const RunRecord& record);
 
 }  // namespace supple::scenes

@@ -107,7 +107,7 @@ void add_particle(const core::ParticleSet& set, std::uint32_t i, Body& body) {
 /// Pairs of groups of an object that may break.
 class GroupTies {
  public:
-  /// @param led_by  the first particle of the group of each node, or kElsewhere   @param parted  links as bodies see them
+  /// @param led_by  the first particle of the group of each node, or kElsewhere   @param parted  links for the division into bodies
   GroupTies(const Model& model, const ObjectModel& object, std::span<const std::uint32_t> led_by, const core::LinkState& parted)
       : object_(object), led_by_(led_by) {
     for (const implicit::BlendEdge& e : object.skeleton.blend.edge) add(led_by[e.a], led_by[e.b], once_);
@@ -121,7 +121,7 @@ class GroupTies {
     }
     std::sort(bonds_.begin(), bonds_.end());
   }
-  /// Those within a body that blend, or have a bond between them, as it is now.
+  /// Pairs within a body that blend, or have a bond between them, at present.
   [[nodiscard]] std::vector<collision::BodyPair> within(const Body& body) const {
     std::vector<collision::BodyPair> pairs;
     const implicit::Blend& blend = body.skeleton.blend;
@@ -207,7 +207,7 @@ void add_groups(const Model& model, const ObjectModel& object, const core::LinkS
   std::map<std::string, int> named;
   for (Body& group : own) {
     const int number = ++named[group.name];
-    if (number > 1) group.name += '.' + std::to_string(number);  // what broke has several of the same group
+    if (number > 1) group.name += '.' + std::to_string(number);  // broken objects have several with the same group
   }
   std::move(own.begin(), own.end(), std::back_inserter(groups));
 }

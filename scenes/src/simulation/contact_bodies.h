@@ -24,7 +24,7 @@ void for_awake(const StageContext& context, const Use& use) {
   }
 }
 
-/// The same from several threads; bodies share nothing there.
+/// The same from several threads; bodies share no data there.
 template <class Use>
 void for_awake_at_once(const StageContext& context, const Use& use) {
   const std::size_t count = context.awake != nullptr ? context.awake->size() : context.bodies.size();

@@ -1,4 +1,4 @@
-/// What damping and friction of each pair took so far.
+/// Work dissipated by damping and friction of each pair so far.
 #pragma once
 
 #include <span>
@@ -9,16 +9,16 @@
 
 namespace supple::scenes {
 
-/// Adds a step's work, by the trapezoidal rule. @param pairs  that touch at its end   @param power  of each then, by `react` [W]; empty: none touches
+/// Adds the work of a step, by the trapezoidal rule. @param pairs  in contact at its end   @param power  of each, by `react` [W]; empty: no contact
 void book_pair_work(std::span<const collision::ContactSurface::Summary> pairs, std::span<const double> power, double step, RunRecord& record);
 
-/// Bodies of other numbers take over the work of those that have their names; that of others is forgotten.
+/// Renumbers the bodies: entries keep their body names; entries of bodies that no longer exist are removed.
 void rename_pair_work(const Model& model, const std::vector<Body>& before, const std::vector<Body>& now, RunRecord& record);
 
-/// Of all pairs [J].
+/// Work of all pairs [J].
 [[nodiscard]] double all_pair_work(const RunRecord& record);
 
-/// Of a pair [J]; 0 of one that took nothing.
+/// Work of a pair [J]; 0 without dissipation.
 [[nodiscard]] double pair_work(const RunRecord& record, const collision::BodyPair& bodies);
 
 }  // namespace supple::scenes

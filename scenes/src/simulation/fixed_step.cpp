@@ -14,7 +14,7 @@
 namespace supple::scenes {
 namespace {
 
-constexpr double kWorthALook = 1.0;  // iso radius of the thinner body: how far a pair moves that is looked at
+constexpr double kWorthALook = 1.0;  // iso radius of the thinner body: shorter motions of a pair are not checked
 constexpr double kLookEvery = 0.5;   // of the same
 constexpr double kSurely = 1.25;     // energies whose ratio is less may be the same
 
@@ -43,7 +43,7 @@ core::ParticleState on_the_way(const TakenStep& step, double share) {
   return now;
 }
 
-/// How one body moves in a step.
+/// Motion of one body in a step.
 struct Way {
   Box begin, end;               // of its supports
   Vec3 drift = Vec3::Zero();    // of its middle [m]
@@ -60,14 +60,14 @@ struct Way {
 
 Vec3 moved(const TakenStep& step, std::uint32_t particle) { return step.after.position[particle] - step.before.position[particle]; }
 
-/// How far a particle's rotation takes what it carries within a box around that, at most [m].
+/// Largest displacement of points within a box by a particle's rotation [m].
 double swung(const TakenStep& step, std::uint32_t particle, const Box& carried) {
   const Vec3& centre = step.after.position[particle];
   const double arm = (carried.upper - centre).cwiseAbs().cwiseMax((carried.lower - centre).cwiseAbs()).norm();
   return 2.0 * (step.after.orientation[particle] * step.before.orientation[particle].conjugate()).vec().norm() * arm;
 }
 
-/// Whether two bodies may have gone farther past each other than is looked at. @param frame  where they are after the step
+/// Whether two bodies may have moved relative to each other by more than the unchecked distance. @param frame  after the step
 bool any_moved_far(const StageContext& context, const TakenStep& step, const Frame& frame) {
   double length = std::numeric_limits<double>::infinity();
   for (const ObjectModel& object : context.model.objects) {
@@ -93,7 +93,7 @@ void measure_way(const Body& body, const TakenStep& step, std::span<const Box> s
   }
 }
 
-/// Whether a fixed body is led along within a step.
+/// Whether a fixed body moves within a step.
 bool led_within(const StageContext& context, const TakenStep& step, std::size_t fixed) {
   return moves(context.model.fixed[fixed].motion, step.end - step.size, step.end);
 }
@@ -119,7 +119,7 @@ std::vector<Way> ways_of(const StageContext& context, const TakenStep& step, Fra
   return ways;
 }
 
-/// A pair that moves far past each other, and when its boxes overlap.
+/// A pair with a large relative motion, and the times at which its boxes overlap.
 struct FastPair {
   collision::BodyPair bodies;
   std::vector<double> looks;  // shares of the step, ascending
@@ -166,7 +166,7 @@ std::vector<FastPair> fast_pairs(const StageContext& context, const TakenStep& s
   return fast;
 }
 
-/// Kinetic energy of the motion of two bodies against each other [J]; without bound where one is led.
+/// Kinetic energy of the relative motion of two bodies [J]; infinite where one is moved by keys.
 double energy_of_motion(const StageContext& context, const TakenStep& step, const collision::BodyPair& pair) {
   const core::ParticleSet& set = context.model.particles;
   double mass = 0.0;
@@ -213,8 +213,8 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
   for (std::size_t k = 0; k < fast.size(); ++k) {
     const double energy = energy_of(trial, fast[k].bodies), motion = energy_of_motion(context, step, fast[k].bodies);
     if (energy - at_ends[k] > kSurely * motion) {
-      return TooCoarse{fast[k].bodies, " go deeper into each other within one than they can: their contact gains " +
-                                           short_text(energy - at_ends[k]) + " J, their motion has " + short_text(motion) + " J"};
+      return TooCoarse{fast[k].bodies, " overlap more within one step than their motion allows: their contact gains " +
+                                           short_text(energy - at_ends[k]) + " J, their kinetic energy is " + short_text(motion) + " J"};
     }
     at_ends[k] = std::max(at_ends[k], energy);
   }
@@ -225,7 +225,7 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
     for (std::size_t k = 0; k < fast.size(); ++k) {
       const double energy = energy_of(trial, fast[k].bodies);
       if (!(energy > kSurely * at_ends[k]) || !std::binary_search(fast[k].looks.begin(), fast[k].looks.end(), share)) continue;
-      return TooCoarse{fast[k].bodies, " go past each other within one: their contact holds " + short_text(energy) +
+      return TooCoarse{fast[k].bodies, " pass each other within one step: their contact holds " + short_text(energy) +
                                            " J on the way and at most " + short_text(at_ends[k]) + " J at its ends"};
     }
   }
@@ -237,7 +237,7 @@ std::optional<TooCoarse> find_unstable_contact(const StageContext& context, cons
                                                Frame& trial) {
   std::vector<collision::PartMobility> mobility;
   find_mobility(context, step.after, seen, mobility);
-  // What half a step's push makes of the kinetic energy of a pair that holds `energy`, beyond what there is [J].
+  // Energy [J] that the push of half a step gives to a pair beyond its contact energy `energy` and its kinetic energy.
   const auto gain = [&](const Summary& s, double energy) {
     const double inverse_mass = collision::approach_inverse_mass(seen.bodies, mobility, s);
     if (!(inverse_mass > 0.0)) return 0.0;
@@ -248,7 +248,7 @@ std::optional<TooCoarse> find_unstable_contact(const StageContext& context, cons
     const double most = std::max(push * push, turned * turned - speed * speed);
     return 0.5 * most / inverse_mass - energy;
   };
-  // Lenses and paraboloids of pressure hold a sixth of this; a twelfth is on the safe side.
+  // Contacts with lens-shaped and paraboloidal pressure have a sixth of this; a twelfth is on the safe side.
   const auto least_energy = [](const Summary& s) { return s.largest_pressure * s.area * s.largest_overlap / 12.0; };
   const auto& all = seen.surface.summary;
   const auto suspicious = [&](const Summary& s) { return s.force.norm() > 0.0 && gain(s, least_energy(s)) > 0.0; };
@@ -259,7 +259,7 @@ std::optional<TooCoarse> find_unstable_contact(const StageContext& context, cons
     if (!suspicious(s)) continue;
     const double energy = energy_of(trial, s.bodies);
     if (!(gain(s, energy) > 0.0)) continue;
-    return TooCoarse{s.bodies, " are pushed apart too hard within one: half of it gives them " + short_text(gain(s, 0.0)) +
+    return TooCoarse{s.bodies, " are pushed apart too hard within one step: half of it gives them " + short_text(gain(s, 0.0)) +
                                    " J, their contact holds " + short_text(energy) + " J"};
   }
   return std::nullopt;

@@ -26,7 +26,7 @@ void place(const StageContext& context, const core::ParticleState& particles, st
   frame.indexed[i] = 0;
 }
 
-/// A solid that is led along, at its place; its field.
+/// A moving solid at its position, and its field.
 implicit::FieldView lead(const FixedBody& body, double time, LedSolid& led) {
   const SolidPlace place = place_at(body.motion, time);
   led.pose = place.pose;
@@ -50,7 +50,7 @@ implicit::FieldView lead(const FixedBody& body, double time, LedSolid& led) {
       led.solid);
 }
 
-/// Fixed bodies, after the others: all of them when `first_time`, then those that are led along.
+/// Fixed bodies, after the others: all of them when `first_time`, then the moving ones.
 void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& frame) {
   const std::size_t first = frame.reach.size() - model.fixed.size();
   for (std::size_t k = 0; k < model.fixed.size(); ++k) {
@@ -123,7 +123,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
 void StageProfile::scale() {
   cpu_s = apart_s + first_s;
   if (timed > 1) cpu_s += later_s * static_cast<double>(calls - 1) / static_cast<double>(timed - 1);
-  cpu_s = std::max(cpu_s, 0.0);  // of next to nothing, without what the clock took
+  cpu_s = std::max(cpu_s, 0.0);  // for very short times, without the duration of the clock reading
 }
 
 StageTimer::StageTimer(StageProfile& profile, bool timed) : profile_(profile), timed_(timed || profile.calls == 0) {

@@ -19,8 +19,8 @@ std::vector<double> primitive_volumes(const Body& body, const core::ParticleStat
   return implicit::part_volumes(field, cell, poses.size());
 }
 
-/// Volumes of a body that its object holds [m^3]: its own, or those of its particles or primitives. Cells are as fine as the smallest
-/// kernels ask for.
+/// Controlled volumes of a body [m^3]: its own, or those of its particles or primitives. Cells are as fine as the smallest
+/// kernels need.
 std::vector<double> volumes_of(const StageContext& context, const core::ParticleState& particles, std::size_t body,
                                const std::vector<implicit::VolumeState>& volumes, Frame& frame) {
   const ObjectModel& object = context.model.objects[context.bodies[body].object];

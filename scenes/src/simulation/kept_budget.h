@@ -1,5 +1,5 @@
 /// @file kept_budget.h
-/// Meshers of many bodies share what they may keep of meshes to an error.
+/// Meshers of many bodies share a limit of kept data for meshes to an error.
 #pragma once
 
 #include <algorithm>
@@ -7,17 +7,17 @@
 
 namespace supple::scenes {
 
-/// Who comes first keeps what it holds; who finds too little left makes its meshes anew. No bit of a mesh depends on that.
+/// Meshers are served in order; one for which too little is left makes its meshes from scratch. No bit of a mesh depends on that.
 class KeptBudget {
  public:
-  /// @param most  of all meshers together [byte]
+  /// @param most  limit for all meshers together [byte]
   explicit KeptBudget(std::uint64_t most) : most_(most) {}
-  /// Counts what a mesher holds. @pre each once, before any is used
+  /// Counts the data that a mesher holds. @pre each once, before any is used
   template <class Mesher>
   void add(const Mesher& mesher) {
     kept_ += mesher.kept_to_error();
   }
-  /// Calls make(mesher), which may keep what the others leave. @return its result
+  /// Calls make(mesher), which may keep what remains of the limit. @return its result
   template <class Mesher, class Make>
   decltype(auto) use(Mesher& mesher, const Make& make) {
     kept_ -= mesher.kept_to_error();

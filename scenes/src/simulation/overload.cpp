@@ -8,9 +8,9 @@
 namespace supple::scenes {
 namespace {
 
-constexpr int kCoarseCells = 12;  // of energies that only tell whether to look closer
+constexpr int kCoarseCells = 12;  // of energies that only trigger a closer check
 
-/// Bodies that are alike hold alike: particles of one object that are bodies of their own count as one kind.
+/// Equal bodies have equal capacities: particles of one object that are separate bodies count as one kind.
 std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
   constexpr std::uint32_t kAlike = 0x80000000;
   if (body >= context.bodies.size() || !context.model.objects[context.bodies[body].object].separate) return body;
@@ -125,7 +125,7 @@ void OverloadWatch::look(const StageContext& context, const Frame& frame, double
 void OverloadWatch::look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record) {
   for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
     if (s.reason != collision::RuleReason::Within) continue;
-    // What lies wholly within holds all that it can: the energy is the capacity.
+    // A pair with one body entirely inside the other has reached its capacity.
     note(context, s.bodies, {.a = {}, .b = {}, .time = time, .energy = s.energy, .capacity = s.energy}, record);
   }
 }

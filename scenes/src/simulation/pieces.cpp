@@ -95,7 +95,7 @@ GroupNumbers groups_of(const ObjectModel& object, const std::vector<Body>& bodie
   return all;
 }
 
-/// Bodies of one object that meet once they have been apart, but for those that have been.
+/// Pairs of one object of kind OnceApart that have not been apart yet.
 std::vector<collision::BodyPair> pairs_to_part(const Model& model, const std::vector<Body>& bodies, const ApartPairs& apart) {
   std::vector<collision::BodyPair> pairs;
   const auto add = [&](std::uint32_t i, std::uint32_t j) {

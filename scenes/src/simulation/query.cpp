@@ -35,14 +35,14 @@ std::string body_name(const Simulation& simulation, std::uint32_t body) {
 /// Why the rule was taken.
 std::string reason_text(collision::RuleReason reason) {
   switch (reason) {
-    case collision::RuleReason::Asked: return "the scene asks for it";
-    case collision::RuleReason::Fits: return "smooth patches, each seen whole from its peak";
-    case collision::RuleReason::NoGraph: return "a patch that is no graph over a disc";
+    case collision::RuleReason::Asked: return "set in the scene";
+    case collision::RuleReason::Fits: return "smooth patches, each star-shaped about its peak";
+    case collision::RuleReason::NoGraph: return "a patch that is not a graph over a disc";
     case collision::RuleReason::ThirdBody: return "a third body presses on the patch";
-    case collision::RuleReason::Unmet: return "its bound is smaller than that of polar rings, which is larger than asked";
-    case collision::RuleReason::ManyHills: return "a patch, or patches, of many hills: panels serve them all at once";
-    case collision::RuleReason::Within: return "one lies in the other, which presses as hard all over or harder: energy, but no surface and no force";
-    case collision::RuleReason::NoSkeleton: return "no polar patch, and no skeleton to send rays from";
+    case collision::RuleReason::Unmet: return "its error estimate is smaller than that of polar, which exceeds the given error";
+    case collision::RuleReason::ManyHills: return "the pressure has many maxima, which panels cover all at once";
+    case collision::RuleReason::Within: return "one body lies inside the other, whose pressure is nowhere smaller: energy, but no contact surface and no force";
+    case collision::RuleReason::NoSkeleton: return "polar does not fit, and there is no skeleton to trace rays from";
   }
   return "";
 }
@@ -55,7 +55,7 @@ ordered_json loads_json(const core::Loads& loads) {
   return particles;
 }
 
-/// What lies wholly within holds all that it can.
+/// A pair with one body entirely inside the other has reached its capacity.
 double capacity_of(Simulation& simulation, const collision::ContactSurface::Summary& s) {
   if (s.reason == collision::RuleReason::Within) return s.energy;
   return s.force.norm() > 0.0 ? contact_capacity(simulation, s.bodies.a, s.bodies.b) : 0.0;
@@ -92,7 +92,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
   ordered_json json;
   json["time_s"] = simulation.time();
   json["cpu_us"] = 1e6 * cpu_s;
-  const double asked = simulation.model().contact.error;
+  const double given_error = simulation.model().contact.error;
   ordered_json pairs = ordered_json::array();
   for (std::size_t k = 0; k < surface.summary.size(); ++k) {
     const auto& s = surface.summary[k];
@@ -110,8 +110,8 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},
                          {"error_bound", s.error_estimate},
-                         {"error_asked", asked},
-                         {"error_met", !misses_error(s, asked)},
+                         {"error_asked", given_error},
+                         {"error_met", !misses_error(s, given_error)},
                          {"patches", s.patches},
                          {"points", s.points},
                          {"evaluations", s.evaluations}};
@@ -179,7 +179,7 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     if (meshes[i].position.empty()) continue;
     const MeshReport report = inspect(meshes[i]);
-    // Where an error is asked for and no cell stated, the error chooses cells.
+    // Where an error is given and no cell, the error sets the cells.
     const ObjectModel& o = model.objects[i];
     const bool on_cells = !o.mesh_error || o.cell_is_stated;
     objects.push_back({{"name", o.name},
@@ -218,14 +218,14 @@ std::string cells_text(const Model& model) {
   for (const ObjectModel& o : model.objects) {
     if (o.cell > 0.0) text += (text.empty() ? "" : ", ") + o.name + ' ' + short_text(o.cell) + " m";
   }
-  return text + "; of objects that touch the smallest holds for all of them";
+  return text + "; objects that touch use the smallest of theirs";
 }
 
-/// Whether the mesh of an object that touches no other is searched for what its lattice misses, and why.
+/// Whether the mesh of an object that touches no other is searched for missed pieces, and why.
 std::string search_text(const Simulation& simulation, std::size_t object) {
   const MeshingDesc& d = simulation.model().meshing;
-  if (d.search) return "searched: the scene asks for it";
-  if (d.method != MeshingName::Auto && d.method != MeshingName::Cubes) return "not searched: only marching cubes are";
+  if (d.search) return "searched: set in the scene";
+  if (d.method != MeshingName::Auto && d.method != MeshingName::Cubes) return "not searched: only meshes by marching cubes are";
   const ObjectModel& model = simulation.model().objects[object];
   const core::ParticleState& particles = simulation.state().particles;
   const std::span<const Body> surfaces = std::span(simulation.bodies()).first(surface_count(simulation.bodies()));
@@ -246,27 +246,27 @@ std::string search_text(const Simulation& simulation, std::size_t object) {
     by_grid = by_grid || (d.method == MeshingName::Auto && !model.mesh_error &&
                           !implicit::estimate_routes(body.skeleton, placed.support, model.cell).prefers_cubes());
   }
-  if (by_grid) return "not searched: made by way of OpenVDB";
+  if (by_grid) return "not searched: meshed by OpenVDB";
   if (why == Unsearched::Undecided) return "not searched: cells along blends by gradients or tight bends would stay undecided";
-  const std::string times = "by counts " + short_text(std::round(100.0 * sum.search_ms / std::max(sum.mesh_ms, 1e-9)) / 100.0) +
-                            " times as long as its mesh";
-  return why ? "not searched: " + times + "; output.meshing.search: true does it" : "searched: " + times;
+  const std::string cost = "estimated search cost: " + short_text(std::round(100.0 * sum.search_ms / std::max(sum.mesh_ms, 1e-9)) / 100.0) +
+                           " x meshing";
+  return why ? "not searched, " + cost + "; output.meshing.search: true searches it" : "searched, " + cost;
 }
 
-/// One line an object that gets a mesh.
+/// One line per object with a mesh.
 std::string searches_text(const Simulation& simulation) {
   const Model& model = simulation.model();
   const OutputRequest outputs = requested_outputs(simulation.scene());
   if (!outputs.images && !outputs.meshes) return "";
-  if (search_is_off(model.meshing)) return "pieces between the nodes of the lattice are not looked for: the scene asks for none\n";
+  if (search_is_off(model.meshing)) return "search for pieces between the nodes of the lattice: switched off in the scene\n";
   std::string text;
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    if (!model.objects[i].skeleton.primitive.empty()) text += "  " + model.objects[i].name + " is " + search_text(simulation, i) + '\n';
+    if (!model.objects[i].skeleton.primitive.empty()) text += "  " + model.objects[i].name + ": " + search_text(simulation, i) + '\n';
   }
   if (text.empty()) return text;
   const bool bulges = model.bulge.attenuation > 0.0 || model.bulge.keep_volume;
-  return "pieces between the nodes of the lattice, where nothing touches (what does is " +
-         std::string(bulges ? "not searched, as it bulges" : "searched together, by counts of each frame") + ")\n" + text;
+  return "search for pieces between the nodes of the lattice (objects that touch are " +
+         std::string(bulges ? "not searched, as they bulge" : "searched together, by the estimated cost in each frame") + ")\n" + text;
 }
 
 /// Which parts of an object touch each other, in a sentence; empty: it is one body.
@@ -275,7 +275,7 @@ std::string self_contact_text(const ObjectModel& object) {
   const auto add_exceptions = [&](bool of_groups) {
     const auto except = [&](const std::vector<collision::BodyPair>& pairs, const char* which) {
       const auto count = std::count_if(pairs.begin(), pairs.end(), [&](const collision::BodyPair& pair) { return object.are_groups(pair) == of_groups; });
-      if (count > 0) text += "; not " + std::to_string(count) + (count == 1 ? " pair " : " pairs ") + which;
+      if (count > 0) text += "; except " + std::to_string(count) + (count == 1 ? " pair " : " pairs ") + which;
     };
     except(object.bonded, "with a bond");
     except(object.overlapping, "that overlap at the start, until they have been apart");
@@ -287,7 +287,7 @@ std::string self_contact_text(const ObjectModel& object) {
     add_exceptions(false);
   }
   if (!object.group.empty()) {
-    text += (text.empty() ? "" : "; ") + std::to_string(object.group.size()) + " groups touch those that they do not blend with, by their own fields";
+    text += (text.empty() ? "" : "; ") + std::to_string(object.group.size()) + " groups touch the groups that they do not blend with, by their own fields";
     add_exceptions(true);
   }
   return text;
@@ -307,7 +307,7 @@ std::string explain(Simulation& simulation) {
     out += row + "\n";
   };
   const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
-  line("%zu object%s, %zu particle%s, %d frames at %g a second", model.objects.size(), plural(model.objects.size()),
+  line("%zu object%s, %zu particle%s, %d frames at %g per second", model.objects.size(), plural(model.objects.size()),
        model.particles.size(), plural(model.particles.size()), scene.frame_count(), scene.frame_rate);
   for (const ObjectModel& o : model.objects) {
     const std::size_t primitives = o.skeleton.primitive.size();
@@ -318,9 +318,9 @@ std::string explain(Simulation& simulation) {
   try {
     simulation.expect_steps();
   } catch (const Error& refused) {
-    line("no step can be made: %s", refused.what());
+    line("no time step is possible: %s", refused.what());
   }
-  line("time step %g s (%d a frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
+  line("time step %g s (%d per frame)%s", simulation.time_step(), 1 << simulation.state().halvings,
        scene.time_step.substeps ? ", fixed by the scene"
                                 : scene.time_step.size ? ", by time_step.size and the stability limits at frame 1"
                                                        : ", by the stability limits at frame 1");
@@ -335,12 +335,12 @@ std::string explain(Simulation& simulation) {
   if (!plan.on(Stage::SolveContactSurface)) return out;
   const std::vector<collision::ContactSurface::Summary>& pairs = simulation.contacts().summary;
   constexpr std::size_t kMostShown = 10;
-  const double asked = model.contact.error;
+  const double given_error = model.contact.error;
   line("\n%zu contact%s at frame %d", pairs.size(), plural(pairs.size()), simulation.frame());
   for (std::size_t k = 0; k < std::min(pairs.size(), kMostShown); ++k) {
     const auto& s = pairs[k];
-    const std::string missed = misses_error(s, asked) ? ", above the " + short_text(asked) + " asked for" : "";
-    line("  %s, %s: %s (%s), %llu points, error at most %.1e%s", body_name(simulation, s.bodies.a).c_str(),
+    const std::string missed = misses_error(s, given_error) ? ", above the given " + short_text(given_error) : "";
+    line("  %s, %s: %s (%s), %llu points, error estimate %.1e%s", body_name(simulation, s.bodies.a).c_str(),
          body_name(simulation, s.bodies.b).c_str(), rule_name(s.rule), reason_text(s.reason).c_str(),
          static_cast<unsigned long long>(s.points), s.error_estimate, missed.c_str());
   }
@@ -355,7 +355,7 @@ std::string describe_mesh_obstacles(const Model& model) {
     if (solid == nullptr) continue;
     const implicit::MeshSolid::Report& report = solid->report();
     text += "  obstacle " + body.name + ": surface of " + std::to_string(solid->mesh().triangle_count()) + " triangles, ";
-    text += "off by at most " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) + " % of its size";
+    text += "deviates by at most " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) + " % of its size";
     if (report.crossing > 0) text += ", as " + std::to_string(report.crossing) + " triangles of its file cross or touch others";
     text += '\n';
   }

@@ -20,7 +20,7 @@ double spacing_of(const SamplingDesc& sampling, double cell) {
   return cell > 0.0 ? kCellsApart * cell : 1.0;  // without a surface there is no cell, and nothing to sample
 }
 
-/// Cells become what the scene says of samples, or the object whose features ask for smaller ones.
+/// Replaces `lattice.cell` in faults by the key of the scene, or the object whose features need smaller cells.
 [[noreturn]] void refuse(const Scene& scene, const Error& error, const std::string& object, bool by_feature) {
   std::vector<Fault> faults = error.faults();
   for (Fault& fault : faults) {
@@ -28,7 +28,7 @@ double spacing_of(const SamplingDesc& sampling, double cell) {
     if (by_feature) {
       fault.key = "output.samples";
       fault.found += ", half the size of the smallest features of '" + object + "'";
-      fault.hint = "make these larger, or what they are parts of smaller";
+      fault.hint = "make these features larger, or the object smaller";
       continue;
     }
     fault.hint += ", which are a sixth of the spacing";

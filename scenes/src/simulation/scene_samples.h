@@ -10,14 +10,14 @@
 
 namespace supple::scenes {
 
-/// What it holds follows from the states of the frames it was shown, so it is no part of State: outputs of a run that was
-/// resumed, or of saved states, show it the earlier frames again.
+/// Its content follows from the states of the frames passed to it, so it is not part of State: outputs of a run that was
+/// resumed, or of saved states, pass the earlier frames again.
 class SceneSamples {
  public:
   /// @param cell  lattice cell of the scene's meshes [m]
   SceneSamples(const SamplingDesc& sampling, double cell);
 
-  /// Samples of the present frame. A body that broke since the last frame begins anew in its pieces.
+  /// Updates the samples to the present frame. The pieces of a body that broke since the last frame get new samples.
   void follow(Simulation& simulation, const Executor& executor);
 
   /// @throws Error{Limit} as follow() would for the size of a body

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint64_t kTimedEvery = 61;  // see StageProfile::cpu_s
 
-/// What was measured of the stages that a step calls, and two readings of the clock for each time [s].
+/// Measured times of the stages of a step, each with two readings of the clock [s].
 double measured_inside(const Profile& profile) {
   double sum = 0.0;
   for (std::size_t s = 0; s < static_cast<std::size_t>(Stage::Integrate); ++s) {
@@ -124,7 +124,7 @@ void Simulation::Impl::make_step() {
   }
   if (bodies.size() != model.objects.size() && note_apart(context(), state.particles, pulled, state.apart)) divide_anew();
   wake_loaded();
-  // Velocity Verlet sees to it by itself; an adaptive integrator chooses steps of its own inside this one.
+  // Velocity Verlet observes this by itself; an adaptive integrator chooses steps of its own inside this one.
   const core::Integrator method = integrator.settings.method;
   const bool whole = method != core::Integrator::Symplectic && method != core::Integrator::Adaptive;
   awake_laws.load_span = whole ? std::array{time(), time() + dt()} : std::array<double, 2>{};
@@ -198,7 +198,7 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
   }
 }
 
-/// Contact as a part of an implicit step; nothing to find where the method is explicit or nothing touches.
+/// Contact as a part of an implicit step; null where the method is explicit or nothing touches.
 core::ImplicitContact Simulation::Impl::implicit_contact() {
   core::ImplicitContact contact{.find = {}, .stick_speed = model.reaction.friction_speed};
   if (!core::is_implicit(integrator.settings.method)) return contact;
@@ -251,7 +251,7 @@ void Simulation::Impl::book_work(const core::StepReport& report) {
                                 std::to_string(integrator.settings.tolerance),
                     .found = "more in steps of " + std::to_string(dt() / integrator.settings.max_substeps) +
                              " s at frame " + std::to_string(state.frame),
-                    .hint = "raise integrator.tolerance or time_step.max_substeps, or soften what is stiff"});
+                    .hint = "raise integrator.tolerance or time_step.max_substeps, or soften stiff interactions and contacts"});
 }
 
 Simulation::Simulation(Scene scene, SimulationOptions options)

@@ -23,7 +23,7 @@ void Simulation::Impl::form_bodies() {
   renew_pulled();
 }
 
-/// Components and groups of one object that overlap at the start would be driven apart: they meet once they have been apart.
+/// Components and groups of one object that overlap at the start would be pushed apart: they touch once they have been apart.
 void Simulation::Impl::leave_overlapping() {
   if (std::all_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.component.empty() && o.group.empty(); })) return;
   pull_contacts();
@@ -33,13 +33,13 @@ void Simulation::Impl::leave_overlapping() {
   drop_results();
 }
 
-/// The laws that are left, and what is made from them.
+/// The remaining laws, and data derived from them.
 void Simulation::Impl::form_laws() {
   laws = core::intact(model.interactions, model.links, state.links);
   form_awake();
 }
 
-/// What moves and acts while some bodies rest.
+/// Particles and laws while some bodies rest.
 void Simulation::Impl::form_awake() {
   awake.clear();
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
@@ -93,8 +93,8 @@ void Simulation::Impl::divide_anew() {
   frame.pairs_present.reset();
 }
 
-/// Between two steps: breaks and yields links. Seeds of the new pieces begin anew, and so do the forces. What their surfaces held that is
-/// no longer there goes with the links.
+/// Between two steps: breaks and yields links. New pieces get new seeds and forces. The energy of surfaces that no longer
+/// exist is booked with the links.
 void Simulation::Impl::update_links() {
   if (model.links.size() == 0) return;
   const bool fades = age_broken_links(model, dt(), state);
@@ -110,7 +110,7 @@ void Simulation::Impl::update_links() {
   state.links.released += lost;
 }
 
-/// After a step: kernels grow and shrink, with the particles where they are. What that adds to the energy of contact is work done from outside.
+/// After a step: scales kernels, with the particles at rest. The change of the contact energy is external work.
 void Simulation::Impl::hold_volumes() {
   std::vector<implicit::VolumeState> next = state.volumes;
   if (!control_volumes(context(), state.particles, dt(), pulled, next)) return;
@@ -166,7 +166,7 @@ void Simulation::Impl::wake_touched() {
   }
 }
 
-/// After a step: islands that have been quiet for long enough stop, and what they had is booked as held and dissipated.
+/// After a step: islands that have been quiet for long enough stop, and their energy is booked as held and dissipated.
 void Simulation::Impl::lay_to_sleep() {
   if (!scene.sleep || awake.empty()) return;
   std::vector<collision::BodyPair> joined = tied;
@@ -175,7 +175,7 @@ void Simulation::Impl::lay_to_sleep() {
   }
   std::vector<collision::BodyMotion> motion = motions_of(bodies, awake, particles, state.particles, laws, time());
   for (const std::uint32_t i : awake) {
-    // What still grows or shrinks does not rest.
+    // Bodies whose kernels still change do not rest.
     if (model.objects[bodies[i].object].holds_volume) motion[i].energy = std::numeric_limits<double>::infinity();
   }
   const std::vector<std::uint32_t> slept =

@@ -11,7 +11,7 @@
 namespace supple::scenes {
 namespace {
 
-/// `now` with what changes of it. @throws Error{Usage} naming the array, and the row where one is at fault
+/// `now` with the changes applied. @throws Error{Usage} naming the array, and the row of the fault
 core::ParticleState changed_particles(const ParticleChange& change, const core::ParticleSet& set, const core::ParticleState& now) {
   const auto fail = [](const std::string& array, std::string expected, std::string found) {
     throw Error(ErrorKind::Usage, Fault{.place = array, .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = {}});
@@ -84,7 +84,7 @@ void Simulation::Impl::adopt(State other) {
   other.kick = {};
   other.ledger = {};
   other.record = {};
-  // Distances of samples go on from where they are, if there are as many.
+  // Distances of samples continue from their present values, if the number is the same.
   const std::vector<Body> parted = make_bodies(model, other.links, other.broken_for);
   other.samples.resize(parted.size());
   for (std::size_t i = 0; i < parted.size(); ++i) {

@@ -13,18 +13,18 @@
 
 namespace supple::scenes {
 
-/// At the start of a frame: steps that the scene fixes may be far beyond those known to be stable, which the run says once.
+/// At the start of a frame: warns once if steps fixed by the scene are far beyond those known to be stable.
 void Simulation::Impl::note_coarse_steps() {
-  constexpr double kProven = 5.0;  // automatic steps have margins of five to seven to what their bounds prove
+  constexpr double kProven = 5.0;  // automatic steps have margins of five to seven over the proven bounds
   if (!fixes_step(scene) || coarse_noted) return;
   const double step = automatic_step(scene, model, integrator, laws, state.particles);
   if (dt() <= kProven * step) return;
   coarse_noted = true;
-  warnings.push_back("time_step.substeps: steps of " + short_text(dt()) + " s may be too coarse, automatic ones would be of " +
+  warnings.push_back("time_step.substeps: steps of " + short_text(dt()) + " s may be too coarse, automatic steps would be " +
                      short_text(step) + " s (at frame " + std::to_string(state.frame) + "); see energy_error");
 }
 
-/// After a step that the scene fixes: what contact it missed, or made energy by. @throws Error{Diverged}
+/// After a fixed step: checks for contact that it missed, or that created energy. @throws Error{Diverged}
 void Simulation::Impl::check_fixed_step() {
   if (!fixes_step(scene) || awake.empty() || !contact_on()) return;
   Profile unused{};
@@ -38,7 +38,7 @@ void Simulation::Impl::check_fixed_step() {
 /// Where pairs are pushed by forces of the present state. @throws Error{Diverged}
 void Simulation::Impl::check_fixed_push() {
   const core::Integrator method = integrator.settings.method;
-  // The adaptive method takes as many steps within one as contacts ask for; implicit steps hold any.
+  // The adaptive method makes as many substeps as contacts need; implicit steps are stable.
   if (method == core::Integrator::Adaptive || core::is_implicit(method) || !contact_on() || contact_bounds_hold(model, step_begin, dt())) return;
   Profile unused{};
   const StageContext quiet = quiet_context(unused);
@@ -49,7 +49,7 @@ void Simulation::Impl::check_fixed_push() {
   if (found) throw_too_coarse(*found);
 }
 
-/// The contacts of the present state: the last step's of velocity Verlet, of other methods they are found anew.
+/// The contacts of the present state: from the last step of velocity Verlet; for other methods they are computed again.
 const Frame& Simulation::Impl::seen_contacts(const StageContext& quiet) {
   if (integrator.settings.method == core::Integrator::Symplectic && state.kick.valid) return frame;
   std::vector<implicit::SampleState> trial = state.samples;
@@ -57,7 +57,7 @@ const Frame& Simulation::Impl::seen_contacts(const StageContext& quiet) {
   return pulled;
 }
 
-/// At the end of a step: pairs that press harder than they can hold are noted, and turned back by hard cores.
+/// At the end of a step: overloaded pairs are recorded, and pushed back with contact.core: barrier.
 void Simulation::Impl::watch_pressing() {
   if (!contact_on()) return;
   add_unresolved(context(), scene.contact.rule, frame.surface, warnings);
@@ -72,7 +72,7 @@ void Simulation::Impl::watch_pressing() {
   if (barrier && hold_cores(context(), frame, state.particles, state.ledger, state.record)) state.kick.valid = false;
 }
 
-/// Whether all that acts has an energy, whose changes are booked: volumes that are held are pumped up, some rules that may be asked for follow from none, and
+/// Whether all loads have an energy whose changes are booked: volume control adds energy, some selectable rules have none, and
 /// obstacles may jump within steps that the scene fixes.
 bool Simulation::Impl::energies_balance() const {
   const bool pumped = std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.holds_volume; });
@@ -80,9 +80,9 @@ bool Simulation::Impl::energies_balance() const {
   return !pumped && !jumps && model.interactions.literal_form.empty() && model.reaction.split == collision::SplitRule::Energy;
 }
 
-/// At a frame: a run whose energy comes from nowhere shows nothing of the scene any more. @throws Error{Diverged}
+/// At a frame: a run whose energy has no source is useless. @throws Error{Diverged}
 void Simulation::Impl::check_energy() {
-  constexpr double kNoMotion = 1e-10;  // of the speed that is believed to be possible: a millionth of the size of everything in a frame
+  constexpr double kNoMotion = 1e-10;  // of the largest plausible speed: a millionth of the total size per frame
   if (!energies_balance()) return;
   const Energies now = energies();
   const std::optional<double> created = find_created_energy(now, created_before.value_or(0.0), state);
@@ -110,10 +110,10 @@ void Simulation::Impl::check_energy() {
                     Fault{.place = scene.source.string(),
                           .key = {},
                           .expected = "diverged at step " + std::to_string(state.steps) + " (t = " + short_text(time()) + " s): '" + fastest->name +
-                                      "' moves at up to " + short_text(speed) + " m/s, where all the energy that the run was given, " + short_text(given) +
-                                      " J, could move it at " + short_text(std::sqrt(2.0 * given / own_mass)) + " m/s",
-                          .found = short_text(*created) + " J from nowhere",
-                          .hint = fixes_step(scene) ? "the scene fixes its own time step; let time_step.substeps be auto"
+                                      "' moves at up to " + short_text(speed) + " m/s; all the energy that was put into the run, " + short_text(given) +
+                                      " J, could give it " + short_text(std::sqrt(2.0 * given / own_mass)) + " m/s",
+                          .found = short_text(*created) + " J without a source",
+                          .hint = fixes_step(scene) ? "the scene fixes the time step; set time_step.substeps to auto"
                                                     : "check stiffness, mass and strength of the objects concerned"});
   drop_results();
   if (last_frame.record.valid) take(last_frame);
@@ -127,11 +127,11 @@ void Simulation::Impl::throw_too_coarse(const TooCoarse& found) {
   const Error error(ErrorKind::Diverged,
                     Fault{.place = place_of(scene, "time_step.substeps"),
                           .key = "time_step.substeps",
-                          .expected = "expected steps that contacts can be followed by: at t = " + short_text(time()) + " s '" +
+                          .expected = "expected steps fine enough to follow contacts: at t = " + short_text(time()) + " s '" +
                                       body_name(model, bodies, found.bodies.a) + "' and '" +
                                       body_name(model, bodies, found.bodies.b) + '\'' + found.how,
-                          .found = "steps of " + short_text(dt()) + " s, automatic ones would be of " + short_text(needed) + " s",
-                          .hint = "let substeps be auto" +
+                          .found = "steps of " + short_text(dt()) + " s, automatic steps would be " + short_text(needed) + " s",
+                          .hint = "set substeps to auto" +
                                   (refused ? ", and max_substeps at least " + number_text(substeps) : std::string())});
   if (last_frame.record.valid) take(last_frame);
   throw error;
@@ -150,9 +150,9 @@ void Simulation::Impl::throw_diverged(const core::Divergence& divergence, std::u
                     .key = {},
                     .expected = "diverged at step " + std::to_string(step_number) + " (t = " + std::to_string(at) +
                                 " s): " + divergence.cause + " of " + particle,
-                    .found = std::to_string(divergence.value) + ", believable up to " + std::to_string(divergence.limit),
+                    .found = std::to_string(divergence.value) + ", plausible up to " + std::to_string(divergence.limit),
                     .hint = fixes_step(scene)
-                                ? "the scene fixes its own time step; let time_step.substeps be auto"
+                                ? "the scene fixes the time step; set time_step.substeps to auto"
                                 : "check stiffness, mass and strength of the objects concerned"});
 }
 

@@ -1,5 +1,5 @@
 /// @file simulation_impl.h
-/// What a simulation holds, and its steps.
+/// Implementation of Simulation: data and steps.
 #pragma once
 
 #include <array>
@@ -31,9 +31,9 @@ struct Simulation::Impl {
   State state;
   State last_frame;
   core::ParticleState step_begin;  ///< of the last step, where the scene fixes it
-  // What State::links and State::apart leave of the model.
+  // The model after State::links and State::apart.
   core::Interactions laws;
-  // What State::sleep leaves of these: particles that rest are pinned, and nothing is computed between them.
+  // The same after State::sleep: resting particles are pinned, and laws between them are skipped.
   core::ParticleSet particles;
   core::Interactions awake_laws;
   std::vector<std::uint32_t> awake;          ///< bodies, ascending
@@ -47,7 +47,7 @@ struct Simulation::Impl {
   core::IntegratorWorkspace integrator_workspace;
   core::StepReport work;  ///< of all steps of this object
 
-  // Results pulled at the current state; their own frame, so that pulling cannot disturb stepping.
+  // Results at the current state; in a frame of their own, so that reading them cannot disturb stepping.
   Frame pulled;
   core::ForceSample pulled_sample;
   bool pulled_contacts = false;
@@ -83,7 +83,7 @@ struct Simulation::Impl {
   [[nodiscard]] double time() const { return (state.frame - 1) * frame_time() + state.substep * dt(); }
   [[nodiscard]] bool contact_on() const { return !options.skip || plan.on(Stage::FindContacts); }
 
-  // Which bodies there are, which laws act between them, and which rest: simulation_bodies.cpp.
+  // Bodies, laws between them, and sleep: simulation_bodies.cpp.
   void form_bodies();
   void leave_overlapping();
   void form_laws();
@@ -97,12 +97,12 @@ struct Simulation::Impl {
   void wake_touched();
   void lay_to_sleep();
 
-  // States handed in: simulation_changes.cpp.
+  // Restored and changed states: simulation_changes.cpp.
   void take(State other);
   void adopt(State other);
   void set_particles(const ParticleChange& change);
 
-  // What a step finds out about itself: simulation_checks.cpp.
+  // Checks after a step: simulation_checks.cpp.
   void note_coarse_steps();
   void check_fixed_step();
   void check_fixed_push();
@@ -112,14 +112,14 @@ struct Simulation::Impl {
   void check_energy();
   [[noreturn]] void throw_too_coarse(const TooCoarse& found);
   [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const;
-  /// For looks that are no part of a step.
+  /// For evaluations that are not part of a step.
   StageContext quiet_context(Profile& unused) {
     StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
     quiet.time = time();
     return quiet;
   }
 
-  // What is pulled at the present state: simulation_results.cpp.
+  // Results at the present state: simulation_results.cpp.
   void place_cameras();
   void renew_pulled();
   void drop_results();

@@ -13,7 +13,7 @@
 
 namespace supple::scenes {
 
-/// Cameras that the scene leaves open see what is there now, and the ground below it.
+/// Cameras without a position see the present surfaces, and the ground below them.
 void Simulation::Impl::place_cameras() {
   const std::span<const CameraDesc> cameras = cameras_of(scene);
   Box seen;
@@ -33,7 +33,7 @@ void Simulation::Impl::place_cameras() {
   model.cameras = placed_cameras(scene, seen);
 }
 
-/// Nothing is pulled; meshers keep what they know, which holds for any state.
+/// Results are dropped; meshers keep their data, which are valid for any state.
 void Simulation::Impl::renew_pulled() {
   DivisionMeshers dividing = std::move(pulled.dividing);
   division.reset();

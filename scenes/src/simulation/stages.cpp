@@ -23,8 +23,8 @@ std::uint64_t count_never(const StageContext& context, const ObjectModel& object
   return never;
 }
 
-/// Pairs that may ever touch. The particles of a `separate` object are alike to the rules, and so are components that do not break
-/// but for the pairs listed, so the first stands for all. Groups are looked at one by one.
+/// Pairs that may ever touch. The particles of a `separate` object have the same rules, and so have components that do not break
+/// except for the listed pairs, so the first one represents all. Groups are checked one by one.
 std::uint64_t count_present_pairs(const StageContext& context) {
   struct Kind {
     std::uint32_t first = 0;
@@ -32,7 +32,7 @@ std::uint64_t count_present_pairs(const StageContext& context) {
   };
   const std::vector<Body>& bodies = context.bodies;
   std::vector<Kind> kinds;
-  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of those whose bodies are alike
+  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of objects with equal bodies
   const auto count = static_cast<std::uint32_t>(bodies.size() + context.model.fixed.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     if (i < bodies.size()) {
@@ -119,7 +119,7 @@ void flag_reached(const StageContext& context, Frame& frame) {
   std::sort(frame.reached.begin(), frame.reached.end());
 }
 
-/// Where the surfaces of a pair may meet, and the parts that reach there: the only ones that are sampled, unless both bodies are
+/// Where the surfaces of a pair may meet, and the parts in reach: the only ones that are sampled, unless both bodies are
 /// convex, which need no samples to find each other. A rule on State alone, so it decides which kept distances move on.
 void flag_sampled(const StageContext& context, Frame& frame) {
   for (const std::uint32_t i : frame.reached) {
@@ -132,7 +132,7 @@ void flag_sampled(const StageContext& context, Frame& frame) {
   for (const collision::BodyPair& pair : frame.pairs) {
     const auto reaches = [&](std::size_t i) { return i >= context.bodies.size() || frame.near[i] != 0; };
     if ((frame.convex[pair.a] != 0 && frame.convex[pair.b] != 0) || !reaches(pair.a) || !reaches(pair.b)) continue;
-    // Samples look as far as they lie apart, which blends and slopes widen.
+    // Samples search as far as their spacing, which blends and slopes widen.
     const double margin = 2.0 * std::max(spacing_of(pair.a), spacing_of(pair.b));
     const Box shared = frame.surface_box[pair.a].intersection(frame.surface_box[pair.b]).inflated(margin);
     for (const std::uint32_t i : {pair.a, pair.b}) {

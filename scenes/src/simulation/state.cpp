@@ -104,7 +104,7 @@ Fault fault_of(const std::filesystem::path& path, std::string expected, std::str
 
 [[noreturn]] void damaged(const std::filesystem::path& path, std::string found) {
   throw DamagedState(ErrorKind::Corrupt, fault_of(path, "expected a complete saved state", std::move(found),
-                                                  "`supple run --resume` goes on from the last good one before it"));
+                                                  "`supple run --resume` continues from the last good one before it"));
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
@@ -117,7 +117,7 @@ std::string either(const std::string& one, const std::string& other) { return on
 [[noreturn]] void refuse_scene(const std::filesystem::path& path, const StateOrigin& origin, const std::string& keys, const std::string& otherwise) {
   const KeyDifferences differ = origin.keys && !keys.empty() ? differences(keys_in(*origin.keys), keys_in(keys)) : KeyDifferences{};
   refuse(path, "expected a state of this scene", differ.found.empty() ? "one of another scene" : "one of a scene with " + differ.found,
-         either(differ.set.empty() ? "use the scene file and the --set that it was made with" : "its scene is this one with " + differ.set, otherwise));
+         either(differ.set.empty() ? "use the scene file and the --set that wrote it" : "its scene is this one with " + differ.set, otherwise));
 }
 
 void check_wanted(const std::filesystem::path& path, const State& state, const std::string& program, const StateWanted& wanted) {
@@ -125,11 +125,11 @@ void check_wanted(const std::filesystem::path& path, const State& state, const s
     const std::string frame = std::to_string(state.frame);
     refuse(path, "expected the state of frame " + std::to_string(*wanted.frame),
            state.substep == 0 ? "that of frame " + frame : "one between frames " + frame + " and " + std::to_string(state.frame + 1),
-           "give the file its own name, or remove it: `supple run --resume` makes it anew");
+           "give the file its own name, or remove it: `supple run --resume` computes it again");
   }
   if (wanted.same_program && program != program_identity()) {
-    refuse(path, "expected a state of this build of supple", "one of another build, whose steps may differ in a bit",
-           "go on with that build, or use --overwrite to run the scene again");
+    refuse(path, "expected a state of this build of supple", "one of another build, whose results may differ in the last bit",
+           "continue with that build, or use --overwrite to run the scene again");
   }
 }
 

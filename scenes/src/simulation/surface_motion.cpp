@@ -14,7 +14,7 @@ namespace {
 /// 1e-10 of itself.
 constexpr double kStride = 1e-5;
 
-/// A body whose field may change by more than that its parts are carried rigidly.
+/// A body whose field changes by more than rigid motion of its parts.
 class ChangingBody {
  public:
   ChangingBody(const Model& model, const State& state, const Body& body, std::span<const implicit::PartMotion> parts)
@@ -40,7 +40,7 @@ class ChangingBody {
     return length / speed;
   }
 
-  /// The field in a time from now [s], as far as that follows from how it changes now.
+  /// The field at a time from now [s], extrapolated from its present rate of change.
   void place_in(double time, std::span<const Pose> now, implicit::Field& field) const {
     std::vector<Body> then(1);
     then.front().object = body_.object;

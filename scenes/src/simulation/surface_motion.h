@@ -1,4 +1,4 @@
-/// How the surfaces of a frame move.
+/// Velocities of the surfaces of a frame.
 #pragma once
 
 #include "simulation/frame.h"

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Hydroelastic contact of Drake beside the contact query of supple: force error against CPU time.
+"""Hydroelastic contact of Drake and the contact query of supple: force error against CPU time.
 
     python3 -m venv venv && venv/bin/pip install drake
     venv/bin/python tests/benchmarks/peers/contact_drake.py build/release/bin/contact_rules
 
 Two compliant spheres (R = 0.1 m, E = 1 MPa, overlap 0.1 R) and one on a rigid plane, polygon contact surfaces, at several
 resolution hints. All programs run on one thread, one after the other; times are CPU time, the least of several. The closed
-forms: F = pi E d^2 (1 - 2 d / 3 R) on the plane, the same with d = R - D / 2 between equal spheres. contact_poses, which stands
-beside contact_rules, then asks for errors in a thousand poses, with every ray followed and with one that stands for all.
+forms: F = pi E d^2 (1 - 2 d / 3 R) on the plane, the same with d = R - D / 2 between equal spheres. contact_poses, which is
+in the folder of contact_rules, then gives errors in a thousand poses, with all rays and with a single one.
 """
 import subprocess
 import sys

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Gay-Berne ellipsoids, LAMMPS beside core_bench: 8,000 of axes 1, 1.5 and 2, density 0.22, cut-off 4, T 2.4, time
+"""Gay-Berne ellipsoids by LAMMPS and core_bench: 8,000 of axes 1, 1.5 and 2, density 0.22, cut-off 4, T 2.4, time
 step 0.002.
 
-Both start from the state that LAMMPS reaches from a lattice in 200 steps; what is timed is the CPU time of one thread
+Both start from the state that LAMMPS reaches from a lattice in 200 steps; the time is the CPU time of one thread
 for whole steps, neighbour lists included, both rebuilt when a particle has moved half the skin. Runs alternate and the
 fastest of each counts.
 
     python3 tests/benchmarks/peers/gay_berne.py --bench build/release/bin/core_bench --venv DIR
 
-DIR is made where it does not exist, with LAMMPS and an MPI library from the package index.
+If DIR does not exist, it is created, with LAMMPS and an MPI library from the package index.
 """
 import argparse
 import pathlib

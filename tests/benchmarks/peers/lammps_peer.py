@@ -1,4 +1,4 @@
-"""What the scripts beside LAMMPS share: its environment, its CPU time, the states it hands over."""
+"""Common code of the comparisons with LAMMPS: its environment, its CPU time, the states that it exports."""
 import array
 import json
 import os

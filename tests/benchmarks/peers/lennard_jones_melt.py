@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""The standard Lennard-Jones melt side by side: LAMMPS (pair styles lj/cut/opt and lj/cut/omp) and core_bench, one core each.
+"""The standard Lennard-Jones melt by LAMMPS (pair styles lj/cut/opt and lj/cut/omp) and core_bench, one core each.
 
 32,000 atoms, fcc of density 0.8442, T 3, cut-off 2.5, skin 0.3, time step 0.005, 100 steps. Both start from the positions
-and velocities that LAMMPS makes, and take turns; times are CPU times of the steps, set-up left out. LAMMPS is run as its
-own benchmark does it (a new list every 20 steps, unchecked) and with checked lists, which is what ours are.
+and velocities that LAMMPS makes, and runs alternate; times are CPU times of the steps, without set-up. LAMMPS is run as in its
+own benchmark (a new list every 20 steps, unchecked) and with checked lists, as in supple.
 
     python3 tests/benchmarks/peers/lennard_jones_melt.py --bench build/release/bin/core_bench --venv DIR
 
-DIR is made where it does not exist, with LAMMPS and an MPI library from the package index.
+If DIR does not exist, it is created, with LAMMPS and an MPI library from the package index.
 """
 import argparse
 import pathlib

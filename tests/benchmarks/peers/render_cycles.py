@@ -4,11 +4,11 @@
     python3 render_cycles.py path/to/render_bench [SAMPLES OF THE REFERENCE] [--work FOLDER] [--most SAMPLES]
 
 Meshes, camera, sky, sun and matt colours are those of render_mitsuba.py, and so is the tone curve to 8 bits, applied to
-scene-linear EXR files; PSNR and FLIP are of the 8 bits. The reference is Cycles' own (1024 samples a pixel, not denoised, other
-seeds), kept in the work folder for the next time: the pictures of two renderers differ in systematic ways too, so each is measured
-against its own kind. The pictures of render_bench are compared with that reference as well, to show that the scene is the same.
-CPU seconds are of a scene that Cycles keeps, the least of two renderings below 16 samples; what the first one takes
-more (meshes handed over, hierarchies) is printed apart, and files and the start of the program are not part of either.
+scene-linear EXR files; PSNR and FLIP compare the 8-bit pictures. The reference is by Cycles itself (1024 samples per pixel, not denoised, other
+seeds) and is kept in the work folder: the pictures of two renderers also differ systematically, so each is compared
+with its own reference. The pictures of render_bench are compared with that of Cycles as well, to show that the scene is the same.
+CPU seconds are those of a scene that Cycles has loaded, the least of two renderings below 16 samples; the additional time of the first
+rendering (transfer of meshes, hierarchies) is printed separately; files and the start of the program are not included.
 """
 import json
 import pathlib

@@ -1,11 +1,11 @@
-"""Time against PSNR and FLIP beside Mitsuba 3, on the studio of render_bench at 640 x 360.
+"""Time against PSNR and FLIP of Mitsuba 3 and render_bench, on the studio of render_bench at 640 x 360.
 
     pip install mitsuba numpy flip-evaluator pillow
     python3 render_mitsuba.py path/to/render_bench [SAMPLES OF THE REFERENCE] [--work FOLDER]
 
-The reference is Mitsuba's (scalar variant, 1024 samples a pixel, multi-jittered: independent ones leave a noise of FLIP .02
-themselves), kept in the work folder for the next time. Both go through the same tone curve to 8 bits; PSNR and
-FLIP are of those. CPU seconds are of the whole picture, hierarchies included, files and start of the programs not.
+The reference is by Mitsuba (scalar variant, 1024 samples per pixel, multi-jittered: independent samples leave a noise of FLIP .02)
+and is kept in the work folder. Both pictures pass the same tone curve to 8 bits; PSNR and
+FLIP compare these. CPU seconds are those of the whole picture, hierarchies included, without files and the start of the programs.
 """
 import json
 import pathlib

@@ -1,4 +1,4 @@
-"""The studio of render_bench as other renderers are given it, its tone curve to 8 bits, and how pictures are compared."""
+"""The studio of render_bench for other renderers, its tone curve to 8 bits, and the comparison of pictures."""
 import flip_evaluator
 import numpy as np
 

@@ -2,7 +2,7 @@
 
     pip install vtk numpy; python3 render_vtk.py
 
-Prints the least CPU milliseconds of a frame, as render_bench does.
+Prints the least CPU milliseconds per frame, as render_bench does.
 """
 import json
 import os

@@ -1,6 +1,6 @@
 /// @file surface_mesh_openvdb.cpp
 /// OpenVDB's volumeToMesh on a grid of mesh_bench: surface_mesh_openvdb GRID OUT. The tree gets the leaves in which F
-/// changes sign and their neighbours; filling it is part of the time. Prints the least CPU time of several runs in ms.
+/// changes sign, and their neighbours; filling it is part of the time. Prints the least CPU time of several runs [ms].
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tools/VolumeToMesh.h>

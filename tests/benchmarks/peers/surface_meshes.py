@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Surface meshes side by side: ours, VTK's flying edges and OpenVDB's volumeToMesh, on the bodies of mesh_bench.
+"""Surface meshes by supple, VTK's flying edges and OpenVDB's volumeToMesh, on the bodies of mesh_bench.
 
 All get the same body on the same lattice. VTK and OpenVDB need the field on nodes first; they get it from the fast field
 stage of `mesh_bench --grid` (single precision, vector loops, the same candidate search), whose time is added to theirs:
-for VTK values wherever a support reaches, for OpenVDB only the 8^3 leaves that bounds leave; and once more ("splatted") with what
-users of these libraries have, each blob added to the nodes that it reaches. Times are CPU times of one
-thread, the least of several runs; programs take turns. Errors of all meshes come from mesh_bench, both
+for VTK values wherever a support reaches, for OpenVDB only the 8^3 leaves that bounds do not exclude; and once more ("splatted") with the
+usual method of these libraries, which adds each blob to the nodes in its support. Times are CPU times of one
+thread, the least of several runs; programs alternate. Errors of all meshes come from mesh_bench, both
 ways: from the mesh to the exact surface, and back.
 
     python3 tests/benchmarks/peers/surface_meshes.py --bench build/release/bin/mesh_bench --work DIR w2/128 w3/128
 
-DIR is made where it does not exist: a virtual environment with VTK from the package index, and the OpenVDB program,
+If DIR does not exist, it is created: a virtual environment with VTK from the package index, and the OpenVDB program,
 compiled from surface_mesh_openvdb.cpp against the distribution's library.
 """
 import argparse

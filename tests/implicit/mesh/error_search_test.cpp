@@ -164,10 +164,10 @@ TEST(ErrorSearch, TellsTheSizesOfMeshesInTermsOfErrors) {
     }
     return {};
   };
-  EXPECT_EQ(refused_at(0, false), "mesh.error: expected few to begin with, found many; leave out the error and use cells of at least 2 m");
+  EXPECT_EQ(refused_at(0, false), "mesh.error: expected few in the coarsest mesh, found many; remove the error and use cells of at least 2 m");
   EXPECT_EQ(refused_at(0, true), "lattice.cell: expected few, found many; use cells of at least 2 m");
-  EXPECT_EQ(refused_at(2, false), "mesh.error: expected an error of at most 0.01 m, found 0.125 m with triangles of 1 m, and so many that reach "
-                                  "it do not fit; allow at least 0.131 m");
+  EXPECT_EQ(refused_at(2, false), "mesh.error: expected an error of at most 0.01 m, found 0.125 m with triangles of 1 m, and a mesh that "
+                                  "meets it is too large; allow at least 0.131 m");
   EXPECT_THROW(make_within({.error = 1.0, .first = 1.0}, [](int) -> LevelTry { throw Error(ErrorKind::Internal, {.key = "a"}); }), Error);
 }
 

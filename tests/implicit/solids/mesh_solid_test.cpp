@@ -190,7 +190,7 @@ TEST(MeshSolid, RefusesASurfaceWithOneSide) {
     }
   }
   ASSERT_TRUE(inspect(bottle).closed);
-  expect_refused(bottle, "expected a surface with two sides, found one that has only one, as a Klein bottle: it comes back the other way round at the edge");
+  expect_refused(bottle, "expected a surface with two sides, found a one-sided one, like a Klein bottle: its orientation reverses at the edge");
 }
 
 }  // namespace

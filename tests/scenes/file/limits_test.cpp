@@ -124,7 +124,7 @@ TEST(Check, CountsWhatItDoesNotBuild) {
   EXPECT_FALSE(counted_only.built);
   EXPECT_EQ(counted_only.particles, 999999U);
   ASSERT_EQ(counted_only.warnings.size(), 1U);
-  EXPECT_EQ(counted_only.warnings[0].rfind("objects.a.skeleton: the scene was counted, not built: with 999999 primitives", 0), 0U) << counted_only.warnings[0];
+  EXPECT_EQ(counted_only.warnings[0].rfind("objects.a.skeleton: only the counts of the scene were checked: with 999999 primitives", 0), 0U) << counted_only.warnings[0];
   const Scene small = scene_of("    particles: {arrange: line, count: 10, spacing: 0.2}\n");
   EXPECT_TRUE(check_scene(small, {}).built);
   EXPECT_FALSE(check_scene(small, {}, 1e3).built);

@@ -302,7 +302,7 @@ TEST_F(HostileText, AliasBomb) {
   }
   expect_refused(text, "200000 nodes");
 }
-TEST_F(HostileText, Cycle) { expect_refused("objects: &a [*a]\n", "around it"); }
+TEST_F(HostileText, Cycle) { expect_refused("objects: &a [*a]\n", "that contains it"); }
 TEST_F(HostileText, DeepNesting) {
   std::string block;
   for (int i = 0; i < 100; ++i) block += std::string(static_cast<std::size_t>(i), ' ') + "a:\n";

@@ -111,18 +111,18 @@ TEST(FixedStep, LetsNothingPassUnseenAtAnyPhase) {
 TEST(FixedStep, ThatMissesAContactEndsTheRunAndSaysWhichWhenAndWhatWouldDo) {
   Simulation simulation = make(shot(0.2, 600.0, "substeps: 1"));
   const std::string error = end_of(simulation, 4);
-  for (const char* words : {"test.yaml:4:23: time_step.substeps: expected steps that contacts can be followed by: at t = 0.001 s 'ball' and 'plate' go past each other within one",
-                            "at most 0 J at its ends, found steps of 0.001 s, automatic ones would be of 1.95313e-06 s; let substeps be auto"}) {
+  for (const char* words : {"test.yaml:4:23: time_step.substeps: expected steps fine enough to follow contacts: at t = 0.001 s 'ball' and 'plate' pass each other within one step",
+                            "at most 0 J at its ends, found steps of 0.001 s, automatic steps would be 1.95313e-06 s; set substeps to auto"}) {
     EXPECT_TRUE(holds(error, words)) << error;
   }
   EXPECT_EQ(simulation.frame(), 1);
   EXPECT_DOUBLE_EQ(height_of(simulation), 0.2);
   ASSERT_EQ(simulation.warnings().size(), 1u);
-  EXPECT_TRUE(holds(simulation.warnings()[0], "time_step.substeps: steps of 0.001 s may be too coarse, automatic ones would be of 1.95313e-06 s (at frame 1)"))
+  EXPECT_TRUE(holds(simulation.warnings()[0], "time_step.substeps: steps of 0.001 s may be too coarse, automatic steps would be 1.95313e-06 s (at frame 1)"))
       << simulation.warnings()[0];
   // And how many steps that takes, where automatic ones are not allowed as many.
   Simulation few = make(shot(0.2, 600.0, "substeps: 1, max_substeps: 64"));
-  EXPECT_TRUE(holds(end_of(few, 4), "let substeps be auto, and max_substeps at least 512"));
+  EXPECT_TRUE(holds(end_of(few, 4), "set substeps to auto, and max_substeps at least 512"));
 }
 
 TEST(FixedStep, ThatBodiesExplodeByEndsTheRun) {
@@ -130,11 +130,11 @@ TEST(FixedStep, ThatBodiesExplodeByEndsTheRun) {
     for (const char* core : {"soft", "barrier"}) {
       Simulation simulation = make(shot(0.2, 600.0, "substeps: " + std::to_string(substeps), "contact: {core: " + std::string(core) + "}"));
       const std::string error = end_of(simulation, 4);
-      EXPECT_TRUE(holds(error, "'ball' and 'plate' go deeper into each other within one than they can")) << error;
+      EXPECT_TRUE(holds(error, "'ball' and 'plate' overlap more within one step than their motion allows")) << error;
     }
   }
   Simulation slow = make(shot(0.2, 20.0, "substeps: 1"));
-  EXPECT_TRUE(holds(end_of(slow, 40), "are pushed apart too hard within one"));
+  EXPECT_TRUE(holds(end_of(slow, 40), "are pushed apart too hard within one step"));
   Simulation fine = make(shot(0.2, 20.0, "substeps: 64"));
   EXPECT_EQ(end_of(fine, 20), "");
   EXPECT_LT(fine.audits().energy_error, 1e-2);
@@ -222,10 +222,10 @@ TEST(FixedStep, IsNamedByExplain) {
     Simulation simulation = make(shot(0.2, 600.0, time_step));
     return explain(simulation);
   };
-  EXPECT_TRUE(holds(explained("substeps: 4"), "(4 a frame), fixed by the scene"));
-  EXPECT_TRUE(holds(explained("substeps: 4"), "symplectic: the scene fixes the step"));
-  EXPECT_TRUE(holds(explained("size: 0.1 ms"), "(512 a frame), by time_step.size and the stability limits at frame 1"));
-  EXPECT_TRUE(holds(explained("size: 0.1 ms"), "symplectic: 512 steps of velocity Verlet a frame at the start (time_step.size: none longer than 1e-04 s)"))
+  EXPECT_TRUE(holds(explained("substeps: 4"), "(4 per frame), fixed by the scene"));
+  EXPECT_TRUE(holds(explained("substeps: 4"), "symplectic: the scene fixes the time step"));
+  EXPECT_TRUE(holds(explained("size: 0.1 ms"), "(512 per frame), by time_step.size and the stability limits at frame 1"));
+  EXPECT_TRUE(holds(explained("size: 0.1 ms"), "symplectic: 512 steps of velocity Verlet per frame at the start (time_step.size: at most 1e-04 s)"))
       << explained("size: 0.1 ms");
 }
 
@@ -244,8 +244,8 @@ TEST(CreatedEnergy, EndsTheRunAndSaysWhoMovesHowFast) {
   Simulation simulation = make(stiff_bar("substeps: 2"));
   const std::string error = end_of(simulation, 21);
   // The load of 1 N over 20 ms gives 20 mN s, and with it 0.0017 J.
-  for (const char* words : {"test.yaml: diverged at step ", "'bar' moves at up to ", " m/s, where all the energy that the run was given, 0.00170", " J from nowhere",
-                            "the scene fixes its own time step; let time_step.substeps be auto"}) {
+  for (const char* words : {"test.yaml: diverged at step ", "'bar' moves at up to ", " m/s; all the energy that was put into the run, 0.00170", " J without a source",
+                            "the scene fixes the time step; set time_step.substeps to auto"}) {
     EXPECT_TRUE(holds(error, words)) << error;
   }
   EXPECT_LT(simulation.frame(), 21);

@@ -192,7 +192,7 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   EXPECT_TRUE(warnings_of("objects:\n  - {name: a, particles: {at: [0, 0, 0.2]}, skeleton: [{shape: point, " + ball).empty());
   const auto sunk = warnings_of("objects:\n  - {name: a, particles: {at: [0, 0, -0.1]}, skeleton: [{shape: point, " + ball);
   ASSERT_EQ(sunk.size(), 1u);
-  EXPECT_NE(sunk[0].find("'a' and 'ground' begin so deep"), std::string::npos) << sunk[0];
+  EXPECT_NE(sunk[0].find("'a' and 'ground' overlap so deeply"), std::string::npos) << sunk[0];
   const std::string small = "objects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: [{shape: point, " + ball;
   EXPECT_TRUE(warnings_of("output: {cell: 5}\n" + small).empty());  // is searched
   EXPECT_EQ(warnings_of("output: {cell: 5, meshing: {method: tetrahedra}}\n" + small).size(), 1u);
@@ -204,8 +204,8 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
     return warnings_of("output: {" + output + "}\nobjects:\n  - {name: a, particles: {at: [0, 0, 1]}, skeleton: "
                        "[{shape: segment, half_length: 0.4, kernel: {radius: 9 mm}}]}\n");
   };
-  const std::string lost = "output.cell: cells of 0.015 m may miss 'a', or leave it in pieces, as it is 0.00817564 m thick; "
-                           "smaller cells resolve it, or 'output.meshing.error'";
+  const std::string lost = "output.cell: lattice cells of 0.015 m may miss 'a' or break it into pieces, as it is 0.00817564 m thick; "
+                           "use smaller cells or 'output.meshing.error'";
   EXPECT_EQ(rod("cell: 15 mm"), std::vector<std::string>{lost});
   EXPECT_EQ(rod("cell: 15 mm, meshing: {search: true}"), std::vector<std::string>{lost});
   EXPECT_EQ(rod("cell: 15 mm, meshing: {method: openvdb}"), std::vector<std::string>{lost + " with method auto"});
@@ -265,17 +265,17 @@ TEST(Warnings, TellOfKeysThatChangeNothing) {
   expect(warnings_of("contact: {bulge_volume: true, bulge_width: 0.2}\n"), {});
 
   expect(warnings_of(rough + "pairs: [{objects: [a, ground], collide: true}, {objects: [b, a]}]\n"),
-         {"pairs[1]: it has no effect, as it says nothing of its two objects"});
+         {"pairs[1]: it has no effect, as it has no key beside 'objects'"});
 
   const std::string line = "arrange: line, count: 3, spacing: 0.1";
-  const std::vector<std::string> whole{"objects.a.contact.self: it has no effect, as it has no parts that could touch each other: they blend, or are bonded"};
+  const std::vector<std::string> whole{"objects.a.contact.self: it has no effect, as no parts of the object can touch each other: they blend or are bonded"};
   expect(warnings_of("", "self: true"), whole);
   expect(warnings_of("", "self: true", line), whole);
   expect(warnings_of("", "self: false", line), {});
   expect(warnings_of("", "", line), {});
 
   const std::string motion = "output: {meshing: {motion: true}, mesh: ";
-  expect(warnings_of(motion + "obj}\n"), {"output.meshing.motion: OBJ files have no columns, those of ply and usd do"});
+  expect(warnings_of(motion + "obj}\n"), {"output.meshing.motion: it has no effect, as OBJ files have no such columns; ply and usd have"});
   expect(warnings_of(motion + "[obj, ply]}\n"), {});
 }
 
@@ -291,7 +291,7 @@ TEST(Warnings, TellOfContactsThatAreNotSolvedAsWellAsAsked) {
   EXPECT_TRUE(warnings_of("auto").empty());
   const auto sampled = warnings_of("samples");
   ASSERT_EQ(sampled.size(), 1u);  // once, for all steps
-  EXPECT_NE(sampled[0].find("contact.error: contact of 'hoop' and 'ground' is not solved to the 0.001 asked for: its bound is 0."), std::string::npos) << sampled[0];
+  EXPECT_NE(sampled[0].find("contact.error: contact of 'hoop' and 'ground' misses the given 0.001: its largest error estimate is 0."), std::string::npos) << sampled[0];
 }
 
 TEST(Warnings, LookForRingsArcsAndCurvesWhereTheyAre) {

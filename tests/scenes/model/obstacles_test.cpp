@@ -309,7 +309,7 @@ TEST(Obstacles, OfMeshesAreToldWhereTheyAreMended) {
   std::ofstream(folder / "turned.obj") << text;
   Simulation turned = make(ball_over("obstacles: [{name: floor, shape: mesh, file: turned.obj, modulus: 1e6}]"), folder);
   ASSERT_EQ(turned.warnings().size(), 1u);
-  EXPECT_EQ(turned.warnings()[0], "obstacles.floor.file: 2 triangles are turned, which ran around the other way than most of those that they share edges with");
+  EXPECT_EQ(turned.warnings()[0], "obstacles.floor.file: 2 triangles are reversed, as most of the triangles that share their edges are oriented the other way");
   EXPECT_NEAR(rest_height(std::move(turned)), rest_height(make(ball_over("ground: {height: 0, modulus: 1e6}"))), 1e-7);
 }
 

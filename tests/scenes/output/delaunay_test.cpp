@@ -99,8 +99,8 @@ output: {mesh: ply, cell: 0.015, meshing: {method: delaunay}}
   } catch (const Error& error) {
     const Fault& fault = error.faults().front();
     EXPECT_EQ(fault.key, "output.cell");
-    EXPECT_EQ(fault.found, "a part that no triangles reach from the vertices of cells of 0.015 m on 'sheet'");
-    EXPECT_EQ(fault.hint, "ask for smaller cells, of it alone by objects.sheet.meshing.cell");
+    EXPECT_EQ(fault.found, "a part without a seed at cells of 0.015 m on 'sheet'");
+    EXPECT_EQ(fault.hint, "use smaller cells, for this object alone in objects.sheet.meshing.cell");
   }
 }
 
@@ -132,9 +132,9 @@ TEST(DelaunayScene, RefusesATinyDistanceAloneAndInContact) {
       EXPECT_EQ(error.kind(), ErrorKind::Limit);
       const Fault& fault = error.faults().front();
       EXPECT_EQ(fault.key, "output.meshing.distance");
-      EXPECT_EQ(fault.expected, "expected bounds of triangles that 2000000 vertices reach");
+      EXPECT_EQ(fault.expected, "expected bounds of triangles that need at most 2000000 vertices");
       EXPECT_TRUE(fault.found.starts_with("at least ")) << fault.found;
-      EXPECT_TRUE(fault.hint.starts_with("ask for a distance of at least ")) << fault.hint;
+      EXPECT_TRUE(fault.hint.starts_with("use a distance of at least ")) << fault.hint;
     }
   }
 }
@@ -187,7 +187,7 @@ TEST(DelaunayScene, TellsOfTrianglesThatCrossInAllFrames) {
   std::vector<std::string> warnings;
   for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_EQ(warnings[0], "output.meshing.distance: pairs of triangles that pass through each other where bodies touch: 3; a smaller distance may part them");
+  EXPECT_EQ(warnings[0], "output.meshing.distance: pairs of triangles that intersect where bodies touch: 3; a smaller distance may separate them");
   set_missed(MeshingDesc{}, {}, warnings);
   EXPECT_TRUE(warnings.empty());
 }

@@ -57,7 +57,7 @@ TEST_F(LooksOfFrames, OfTwoKindsMakeNoFilmAndRemoveTheEarlierOne) {
   EXPECT_TRUE(mixed.film.empty());
   EXPECT_FALSE(fs::exists(film()));
   EXPECT_EQ(mixed.warnings,
-            Sets{"no film: frame 4 of drops has another look than the others; the earlier drops.mp4, which shows others, is removed"});
+            Sets{"no film: frame 4 of drops has another look than the others; an earlier drops.mp4 of other pictures is removed"});
   // The sheet is of the four that have one.
   EXPECT_EQ(render::read_png(sheet()).width, 4 * 96 + 5 * 4);
   EXPECT_EQ(render::read_png(sheet()).height, 64 + 2 * 4);
@@ -89,7 +89,7 @@ TEST_F(LooksOfFrames, DrawnAgainInAnotherSizeLeaveTheSheetOfTheOthersAndNoFilm) 
   EXPECT_EQ(drawn.pictures_drawn, 2);
   EXPECT_TRUE(drawn.film.empty());
   EXPECT_EQ(drawn.warnings,
-            Sets{"no film: frames 1-2 of drops have another size than the others; the earlier drops.mp4, which shows others, is removed"});
+            Sets{"no film: frames 1-2 of drops have another size than the others; an earlier drops.mp4 of other pictures is removed"});
   EXPECT_EQ(render::read_png(folder_ / "frames/drops.0001.png").width, 48);
   EXPECT_EQ(render::read_png(sheet()).width, 3 * 96 + 4 * 4);  // of three frames, 4 pixels between
   EXPECT_FALSE(render_run(scene(kSmall), options()).film.empty());
@@ -144,7 +144,7 @@ TEST_F(LooksOfFrames, OfALongerRunMakeALongerFilm) {
   RunOptions on = options({5});
   on.resume = true;
   const RunResult gap = run_scene(scene(), on);
-  EXPECT_EQ(gap.warnings, Sets{"no film: frame 4 of drops has no picture; the earlier drops.mp4, which shows others, is removed"});
+  EXPECT_EQ(gap.warnings, Sets{"no film: frame 4 of drops has no picture; an earlier drops.mp4 of other pictures is removed"});
   on.frames = {};
   EXPECT_EQ(run_scene(scene(), on).film, film());
   EXPECT_NE(bytes_of(film()), of_three);

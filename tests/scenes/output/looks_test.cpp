@@ -214,7 +214,7 @@ TEST_F(Looks, ACameraInsideAnObjectIsAWarning) {
   const RunResult done = run_scene(scene_with("", "camera: {from: [0, 0.05, 0], look_at: [3, 0, 0]}\noutput: {images: {size: [32, 32]}}\n"),
                                    {.folder = folder_, .frames = {1}, .threads = 1});
   ASSERT_EQ(done.warnings.size(), 1u);
-  EXPECT_NE(done.warnings[0].find("inside of 'chain'"), std::string::npos) << done.warnings[0];
+  EXPECT_NE(done.warnings[0].find("inside 'chain'"), std::string::npos) << done.warnings[0];
 }
 
 TEST_F(Looks, ChangeNoBitOfTheMotion) {

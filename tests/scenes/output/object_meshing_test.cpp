@@ -61,7 +61,7 @@ TEST(ObjectMeshing, SmallestCellHoldsForObjectsThatTouch) {
   EXPECT_TRUE(same(wished[0], coarse[0]) && same(wished[1], coarse[1]));
 }
 
-constexpr const char* kFoundOne = "output.meshing.search: pieces of surfaces between the nodes of the lattice that were added to the meshes of all frames: 1";
+constexpr const char* kFoundOne = "output.meshing.search: pieces of surfaces between the nodes of the lattice, found and added to the meshes of all frames: 1";
 
 TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodesUnlessItIsOff) {
   const auto make = [](const std::string& search, const std::string& at) {
@@ -79,7 +79,7 @@ TEST(ObjectMeshing, SearchFindsAnObjectBetweenTheNodesUnlessItIsOff) {
   EXPECT_NE(plain.warnings()[0].find("cells of 0.9 m may miss 'coin'"), std::string::npos) << plain.warnings()[0];
   ASSERT_EQ(searched.warnings().size(), 1u);
   EXPECT_EQ(searched.warnings()[0],
-            std::string(kFoundOne) + "; cells where a piece may be missed: 0; meshes of bodies that bulge, which are not searched: 0");
+            std::string(kFoundOne) + "; undecided cells, where a piece may be missing: 0; meshes of bodies that bulge, which are not searched: 0");
   ASSERT_EQ(automatic.warnings().size(), 1u);
   EXPECT_EQ(automatic.warnings()[0], kFoundOne);
   EXPECT_EQ(automatic.searches().pieces, 1u);
@@ -103,7 +103,7 @@ TEST(ObjectMeshing, SearchFindsACoinInAHouseUnlessItIsOff) {
   EXPECT_EQ(with[1].triangle_count(), without[1].triangle_count() + with[0].triangle_count());
   EXPECT_TRUE(same(with[2], without[2]));
   ASSERT_FALSE(searched.warnings().empty());
-  EXPECT_NE(searched.warnings().back().find("all frames: 1; cells where a piece may be missed: 0;"), std::string::npos) << searched.warnings().back();
+  EXPECT_NE(searched.warnings().back().find("all frames: 1; undecided cells, where a piece may be missing: 0;"), std::string::npos) << searched.warnings().back();
   (void)bulging.meshes();
   EXPECT_NE(bulging.warnings().back().find("are not searched: 2"), std::string::npos) << bulging.warnings().back();
   Simulation automatic = make("");
@@ -133,10 +133,10 @@ TEST(ObjectMeshing, SearchIsLeftOutWhereItsSkeletonSaysThatItDecidesNothing) {
     ASSERT_EQ(automatic.warnings().size(), 1u);
     EXPECT_EQ(automatic.warnings()[0], "output.meshing.search: meshes that auto does not search, as cells along blends by gradients or tight bends "
                                        "would stay undecided: 1");
-    EXPECT_NE(explain(automatic).find("thing is not searched: cells along blends by gradients or tight bends would stay undecided"),
+    EXPECT_NE(explain(automatic).find("thing: not searched: cells along blends by gradients or tight bends would stay undecided"),
               std::string::npos) << explain(automatic);
     EXPECT_TRUE(off.warnings().empty());
-    EXPECT_NE(explain(off).find("pieces between the nodes of the lattice are not looked for: the scene asks for none"), std::string::npos);
+    EXPECT_NE(explain(off).find("search for pieces between the nodes of the lattice: switched off in the scene"), std::string::npos);
   }
 }
 
@@ -150,11 +150,11 @@ TEST(ObjectMeshing, SearchIsLeftOutWhereItWouldTakeFarLongerThanTheMesh) {
   EXPECT_EQ(coarse.searches().not_searched(Unsearched::Cost), 1u);
   EXPECT_EQ(coarse.searches().unsearched.at("thing"), (SearchCounts::Meshes{0, 0, 1, 0}));
   ASSERT_EQ(coarse.warnings().size(), 1u);
-  EXPECT_EQ(coarse.warnings()[0], "output.meshing.search: meshes that auto does not search, as that would take far longer than to make them: 1");
-  EXPECT_NE(explain(coarse).find(" times as long as its mesh; output.meshing.search: true does it"), std::string::npos) << explain(coarse);
+  EXPECT_EQ(coarse.warnings()[0], "output.meshing.search: meshes that auto does not search, as that would cost far more than meshing: 1");
+  EXPECT_NE(explain(coarse).find(" x meshing; output.meshing.search: true searches it"), std::string::npos) << explain(coarse);
   (void)fine.meshes();
   EXPECT_TRUE(fine.searches().empty() && fine.warnings().empty());
-  EXPECT_NE(explain(fine).find("thing is searched: by counts "), std::string::npos) << explain(fine);
+  EXPECT_NE(explain(fine).find("thing: searched, estimated search cost: "), std::string::npos) << explain(fine);
   // The scene asks for another mesher, which needs no warning.
   (void)other.meshes();
   EXPECT_EQ(other.searches().not_searched(Unsearched::Mesher), 1u);
@@ -247,7 +247,7 @@ TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreCounted) {
   std::vector<std::string> warnings;
   for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_EQ(warnings[0], "output.meshing.method: cells whose crease is cut off, as triangles with vertices on it would cross, in the meshes of all frames: 7 of 'pair'; "
+  EXPECT_EQ(warnings[0], "output.meshing.method: cells whose crease is cut off, as triangles with vertices on it would intersect, in the meshes of all frames: 7 of 'pair'; "
                          "smaller cells resolve more of it");
   set_missed(MeshingDesc{}, {}, warnings);
   EXPECT_TRUE(warnings.empty());
@@ -279,7 +279,7 @@ TEST(ObjectMeshing, BulgesHoldTheVolumeOfEachBodyOrAWarningTells) {
   EXPECT_LT(narrow, whole - 0.5 * (whole - cut));
   ASSERT_EQ(told.size(), 2u);
   EXPECT_TRUE(told[0].starts_with("contact.bulge_volume: the bulge of 'high' around 'low' holds 0.")) << told[0];
-  EXPECT_TRUE(told[0].ends_with(" of what the contact displaces at t = 0 s, and 1 in all frames hold too little; 'bulge_width' and how far the fields reach beyond the surfaces "
+  EXPECT_TRUE(told[0].ends_with(" of the displaced volume at t = 0 s, and 1 in all frames hold too little; 'bulge_width' and the reach of the fields beyond the surfaces "
                                 "limit its height"))
       << told[0];
   const ShortBulges& low = lacking.at("low").at("high");
@@ -302,7 +302,7 @@ TEST(ObjectMeshing, BulgesThatHoldTooLittleAreToldOnceForAllFrames) {
   std::vector<std::string> warnings;
   for (int i = 0; i < 2; ++i) set_missed(MeshingDesc{}, all, warnings);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(warnings[0].starts_with("contact.bulge_volume: the bulge of 'ball' around 'ground' holds 0.5 of what the contact displaces at t = 0.2 s, and 6 in all frames"));
+  EXPECT_TRUE(warnings[0].starts_with("contact.bulge_volume: the bulge of 'ball' around 'ground' holds 0.5 of the displaced volume at t = 0.2 s, and 6 in all frames"));
   set_missed(MeshingDesc{}, {}, warnings);
   EXPECT_TRUE(warnings.empty());
   // Grids alone say nothing of meshes that were made before.
@@ -348,7 +348,7 @@ TEST(ObjectMeshing, ChangesNoBitOfTheMotionAndIsExplained) {
   EXPECT_NE(plain.picture_hash, own.picture_hash);
   Simulation simulation(own);
   const std::string text = explain(simulation);
-  EXPECT_NE(text.find("surface lattice cell coin 0.05 m, house 0.1 m, tower 0.1 m; of objects that touch the smallest holds for all of them"),
+  EXPECT_NE(text.find("surface lattice cell coin 0.05 m, house 0.1 m, tower 0.1 m; objects that touch use the smallest of theirs"),
             std::string::npos) << text;
 }
 

@@ -78,7 +78,7 @@ integrator: {method: )" + integrator + "}", "pendulum.yaml", ".");
   };
   const std::vector<std::string> warnings = warnings_of("auto");
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_EQ(warnings[0].find("integrator.method: auto took backward_euler"), 0u) << warnings[0];
+  EXPECT_EQ(warnings[0].find("integrator.method: auto chose backward_euler"), 0u) << warnings[0];
   EXPECT_TRUE(warnings_of("backward_euler").empty());
   EXPECT_TRUE(warnings_of("implicit_midpoint").empty());
 }
@@ -144,10 +144,10 @@ objects:
   EXPECT_EQ(pair.at("volume_m3").size(), 2u);
   EXPECT_EQ(pair.at("scale").size(), 2u);
   ASSERT_EQ(run.warnings.size(), 1u);
-  EXPECT_TRUE(run.warnings[0].starts_with("objects.pair.volume: 2 of 2 volumes by particle are off, most that of particle ")) << run.warnings[0];
+  EXPECT_TRUE(run.warnings[0].starts_with("objects.pair.volume: 2 of 2 volumes by particle miss their targets, most that of particle ")) << run.warnings[0];
   const std::string text = describe_run(folder_);
-  EXPECT_NE(text.find("    holds 0.05 of 0.05 m^3, kernels of 1.01 times their size"), std::string::npos) << text;
-  EXPECT_NE(text.find("    particle 1 holds "), std::string::npos) << text;
+  EXPECT_NE(text.find("    volume: 0.05 m^3, target 0.05 m^3, kernels scaled by 1.01"), std::string::npos) << text;
+  EXPECT_NE(text.find("    volume of particle 1: "), std::string::npos) << text;
 }
 
 TEST_F(Run, HasTheSameStateWithAndWithoutOutputs) {
@@ -610,8 +610,8 @@ output: )";
        "ball.yaml:9:44: output.sampling.density: expected at most 1000000000 lattice nodes around the body, found about 8.24e+20 with cells of "
        "2.13e-07 m for a density of 1e+12 [1/m^2]; use cells of at least 0.0021 m, which are a sixth of the spacing, 1.28 / sqrt(density)"},
       {"{mesh: ply, meshing: {error: 1e-12}}",
-       "ball.yaml:9:38: output.meshing.error: expected an error of at most 1e-12 m, found 0.000155 m with triangles of 0.0156 m, and so many "
-       "that reach it do not fit; allow at least 1.27e-06 m"},
+       "ball.yaml:9:38: output.meshing.error: expected an error of at most 1e-12 m, found 0.000155 m with triangles of 0.0156 m, and a mesh "
+       "that meets it is too large; allow at least 1.27e-06 m"},
       {"{mesh: ply, cell: 1 mm, meshing: {error: 1 mm}}",
        "ball.yaml:9:27: output.cell: expected at most 1000000000 lattice nodes around the body, found about 8.04e+09 with cells of 0.001 m; "
        "use cells of at least 0.0021 m"}};
@@ -642,7 +642,7 @@ output: {samples: csv, sampling: {spacing: 1}}
   EXPECT_EQ(refused.outcome, "limit");
   EXPECT_EQ(refused.reason,
             "foil.yaml:9:19: output.samples: expected a surface in at most 1000000 blocks of 8^3 cells, found about 3.26e+08 with cells of 0.0005 m, "
-            "half the size of the smallest features of 'foil'; make these larger, or what they are parts of smaller");
+            "half the size of the smallest features of 'foil'; make these features larger, or the object smaller");
 }
 
 TEST_F(Run, RefusesThinSurfacesAndOwnCellsByTheirKeys) {

@@ -65,7 +65,7 @@ class SavedStates : public testing::Test {
 TEST_F(SavedStates, OfAnotherFrameAreRefused) {
   copy(2, 5);
   const std::string last = state(5).string() + ": expected the state of frame 5, found that of frame 2; give the file its own name, or remove it: "
-                                               "`supple run --resume` makes it anew";
+                                               "`supple run --resume` computes it again";
   expect_refused(run_scene(scene(), options(true)), last);
   expect_refused(export_run(scene(kUsd), options()), last);
   expect_refused(render_run(scene(kPictures), options()), last);
@@ -105,7 +105,7 @@ TEST_F(SavedStates, OfAnotherSceneAreRefusedByTheKeysThatDiffer) {
   const RunResult result = render_run(other, options());
   EXPECT_EQ(result.exit_code, 7);
   EXPECT_NE(result.reason.find("objects.ball=none (here given), objects.left=given (here none), objects.right=given (here none); use the scene file "
-                               "and the --set that it was made with"),
+                               "and the --set that wrote it"),
             std::string::npos)
       << result.reason;
 }
@@ -124,7 +124,7 @@ TEST_F(SavedStates, OfAnotherBuildAreLookedAtButNotGoneOnFrom) {
   }
   EXPECT_EQ(render_run(scene(kPictures), options()).pictures_drawn, 5);
   expect_refused(run_scene(scene(), options(true)),
-                 state(1).string() + ": expected a state of this build of supple, found one of another build, whose steps may differ in a bit; go on "
+                 state(1).string() + ": expected a state of this build of supple, found one of another build, whose results may differ in the last bit; continue "
                                      "with that build, or use --overwrite to run the scene again");
 }
 
@@ -168,12 +168,12 @@ TEST_F(SavedStates, ThatAreLostAreNamedByWhoOnlyLooksAtThem) {
   fs::remove(state(3));
   RunResult result = render_run(scene(kPictures), options());
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_EQ(result.reason, state(3).string() + ": expected the saved state of frame 3, found none; `supple run --resume` makes it from the last one before it");
+  EXPECT_EQ(result.reason, state(3).string() + ": expected the saved state of frame 3, found none; `supple run --resume` computes it from the last one before it");
   damage(2);
   result = render_run(scene(kPictures), options());
   EXPECT_EQ(result.exit_code, 7);
   EXPECT_EQ(result.reason, state(2).string() + ": expected a complete saved state, found content that does not match its checksum; `supple run --resume` "
-                                               "goes on from the last good one before it");
+                                               "continues from the last good one before it");
 }
 
 TEST_F(SavedStates, GoOnInAFolderOfAnotherName) {

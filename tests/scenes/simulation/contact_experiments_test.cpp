@@ -273,7 +273,7 @@ TEST(ContactKeys, EachOfTheRulesHasItsOwnPointsAndTheSameForce) {
     points.push_back(s.points);
     const std::string text = explain(simulation);
     EXPECT_NE(text.find(std::string("find_contacts leaves a pair; ") + name), std::string::npos) << text;
-    const std::string taken = rule == collision::ContactRule::Polar ? "polar (smooth patches" : name + std::string(" (the scene asks for it");
+    const std::string taken = rule == collision::ContactRule::Polar ? "polar (smooth patches" : name + std::string(" (set in the scene");
     EXPECT_NE(text.find("ball, dumbbell: " + taken), std::string::npos) << text;
   }
 }

@@ -253,8 +253,8 @@ TEST(HeldVolume, SaysThatItStillMoves) {
   // 2 % a step from a ball of 0.0490621 m^3, which was measured before the last of the two or more steps.
   const implicit::VolumeState& held = simulation.state().volumes[0];
   EXPECT_EQ(only_warning(simulation), "objects.lone.volume: 'lone' has " + short_text(held.volume) +
-                                          " m^3 in place of the 0.3 m^3 to hold; its kernels still grow, at " + short_text(held.scale) +
-                                          " times their size ('rate' lets them be faster)");
+                                          " m^3, its target is 0.3 m^3; its kernels still grow, scaled by " + short_text(held.scale) +
+                                          " ('rate' sets how fast)");
   run(simulation, 49);
   EXPECT_EQ(simulation.warnings(), std::vector<std::string>{});
 }
@@ -275,14 +275,14 @@ objects:
   run(large, 120);
   EXPECT_EQ(large.state().volumes[0].scale, 4.0);
   EXPECT_EQ(only_warning(large), "objects.pair.volume: 'pair' has " + short_text(large.state().volumes[0].volume) +
-                                     " m^3 in place of the 1 m^3 to hold; its kernels have 4 times their size, the most they may");
+                                     " m^3, its target is 1 m^3; its kernels are scaled by 4, the largest scale");
   Simulation small(parse_scene(text + "target: 1e-6, of: particle}\n", "test.yaml", "."));
   run(small, 120);
   const std::vector<implicit::VolumeState>& held = small.state().volumes;
   const std::size_t worst = held[1].volume > held[0].volume ? 1 : 0;  // alike but for rounding
-  EXPECT_EQ(only_warning(small), "objects.pair.volume: 2 of 2 volumes by particle are off, most that of particle " + std::to_string(worst) + ", which has " +
+  EXPECT_EQ(only_warning(small), "objects.pair.volume: 2 of 2 volumes by particle miss their targets, most that of particle " + std::to_string(worst) + ", which has " +
                                      short_text(held[worst].volume) +
-                                     " m^3 in place of the 1e-06 m^3 to hold; its kernels have 1/4 of their size, the least they may");
+                                     " m^3, its target is 1e-06 m^3; its kernels are scaled by 1/4, the smallest scale");
 }
 
 /// A ball on the ground, a fifth of whose volume is yet to come.

@@ -54,9 +54,9 @@ TEST(Query, IsAnsweredWhereNoStepIsFineEnough) {
 
 TEST(Explain, SaysWhyNoStepCanBeMade) {
   Simulation refused(stiff_ball("16"), {.questions = true}), allowed(stiff_ball("1048576"));
-  EXPECT_NE(explain(refused).find("no step can be made: stiff.yaml:5:27: time_step.max_substeps: expected a stable step with at most 16 substeps"),
+  EXPECT_NE(explain(refused).find("no time step is possible: stiff.yaml:5:27: time_step.max_substeps: expected a stable step with at most 16 substeps"),
             std::string::npos) << explain(refused);
-  EXPECT_EQ(explain(allowed).find("no step can be made"), std::string::npos) << explain(allowed);
+  EXPECT_EQ(explain(allowed).find("no time step is possible"), std::string::npos) << explain(allowed);
 }
 
 TEST(Query, SaysWhereTheErrorIsAboveWhatWasAsked) {
@@ -74,7 +74,7 @@ TEST(Query, SaysWhereTheErrorIsAboveWhatWasAsked) {
     EXPECT_EQ(pair.at("error_met").get<bool>(), met);
     EXPECT_EQ(pair.at("error_bound").get<double>() > 1.01e-3, !met) << pair;
     const std::string text = explain(simulation);
-    EXPECT_EQ(text.find(", above the 0.001 asked for") == std::string::npos, met) << text;
+    EXPECT_EQ(text.find(", above the given 0.001") == std::string::npos, met) << text;
   }
 }
 

@@ -137,7 +137,7 @@ TEST(SelfContact, OfPartsThatOverlapAtTheStartBeginsOnceTheyHaveBeenApart) {
                                              "until: 0.4}, {particle: 0, force: [2, 0, 0], from: 0.4, until: 0.7}, {particle: 1, force: [-2, 0, 0], from: 0.4, until: 0.7}]"));
   ASSERT_EQ(simulation.warnings().size(), 1u);
   EXPECT_EQ(simulation.warnings()[0],
-            "objects.row.contact: parts that do not blend overlap at the start, and touch once they have been apart: 1 pair, the first "
+            "objects.row.contact: parts that do not blend overlap at the start, and touch only once they have been apart: 1 pair, the first "
             "with particles 0 and 1");
   const std::vector<Vec3> start = simulation.state().particles.position;
   run(simulation, 4);
@@ -234,10 +234,10 @@ TEST(SelfContact, IsExplained) {
   EXPECT_NE(explain(free).find("3 parts that do not blend are bodies that touch each other\n"), std::string::npos) << explain(free);
   EXPECT_NE(explain(free).find("find_contacts            collision  3 bodies may touch\n"), std::string::npos) << explain(free);
   Simulation mixed = make(row(4, "0.2", "interactions: [{law: bond_frame, stretch: 5, rotation: 0.1}]"));
-  EXPECT_NE(explain(mixed).find("4 parts that do not blend are bodies that touch each other; not 3 pairs with a bond\n"), std::string::npos)
+  EXPECT_NE(explain(mixed).find("4 parts that do not blend are bodies that touch each other; except 3 pairs with a bond\n"), std::string::npos)
       << explain(mixed);
   Simulation overlapping = make(row(3, "0.2", "loads: []"));
-  EXPECT_NE(explain(overlapping).find("; not 2 pairs that overlap at the start, until they have been apart\n"), std::string::npos)
+  EXPECT_NE(explain(overlapping).find("; except 2 pairs that overlap at the start, until they have been apart\n"), std::string::npos)
       << explain(overlapping);
 }
 
@@ -344,7 +344,7 @@ TEST(GroupContact, OfThoseThatOverlapAtTheStartBeginsOnceTheyHaveBeenApart) {
   Simulation simulation = close("loads: [{particle: 0, force: [-1, 0, 0], until: 0.2}, {particle: 2, force: [1, 0, 0], until: 0.2}, "
                                 "{particle: 0, force: [2, 0, 0], from: 0.2, until: 0.5}, {particle: 2, force: [-2, 0, 0], from: 0.2, until: 0.5}]");
   ASSERT_EQ(simulation.warnings().size(), 1u);
-  EXPECT_NE(simulation.warnings()[0].find("touch once they have been apart: 1 pair, the first with particles 0 and 2"), std::string::npos)
+  EXPECT_NE(simulation.warnings()[0].find("touch only once they have been apart: 1 pair, the first with particles 0 and 2"), std::string::npos)
       << simulation.warnings()[0];
   EXPECT_EQ(simulation.energies().contact, 0.0);
   double nearest = 1.0;
@@ -390,7 +390,7 @@ TEST(GroupContact, IsWithinComponents) {
   for (const Body& body : rows.bodies()) names.push_back(body.name);
   EXPECT_EQ(names, (std::vector<std::string>{"rows.1", "rows.2", "rows.group1", "rows.group3", "rows.group4", "rows.group6"}));
   EXPECT_EQ(surface_count(rows.bodies()), 2u);
-  EXPECT_NE(explain(rows).find("2 parts that do not blend are bodies that touch each other; 4 groups touch those that they do not blend with, by their own fields\n"),
+  EXPECT_NE(explain(rows).find("2 parts that do not blend are bodies that touch each other; 4 groups touch the groups that they do not blend with, by their own fields\n"),
             std::string::npos)
       << explain(rows);
   while (rows.frame() < 13 && rows.contacts().summary.empty()) rows.step();

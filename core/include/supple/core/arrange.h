@@ -17,7 +17,7 @@ struct Arrangement {
   [[nodiscard]] std::size_t size() const noexcept { return position.size(); }
 };
 
-/// Which way the normals point at rest; the normal is always the body's z axis.
+/// Direction of the normals at rest; the normal is always the body's z axis.
 enum class NormalDirection : std::uint8_t {
   Radial,  ///< along the principal normal of the curve, away from its centre (spiral, ring), in the plane
   Axis,    ///< along the axis of the arrangement (+z)
@@ -33,9 +33,9 @@ enum class NormalDirection : std::uint8_t {
 [[nodiscard]] Arrangement arrange_line(int count, double spacing);
 /// Grid, `columns` along x, `rows` along y and `layers` along z, centred; normals +z.
 [[nodiscard]] Arrangement arrange_grid(int columns, int rows, double spacing, int layers = 1);
-/// Moves every particle by a vector of a ball of radius `distance`, by its index alone: the same in every run.
+/// Moves every particle by a random vector in a ball of radius `distance`, which depends on its index only: the same in every run.
 void disorder(Arrangement& arrangement, double distance);
-/// A closed shell: the icosahedron, each edge cut in `frequency` and its faces in triangles, projected to the sphere about
+/// A closed shell: the icosahedron, each edge divided into `frequency` parts and its faces into triangles, projected to the sphere about
 /// the origin; 10 frequency^2 + 2 particles, normals outward, the first and the twelfth opposite. @pre frequency <= 300
 [[nodiscard]] Arrangement arrange_geodesic(int frequency, double radius);
 /// One particle at the origin, normal +z.
@@ -44,21 +44,21 @@ void disorder(Arrangement& arrangement, double distance);
 /// Moves an arrangement: x -> pose x.
 void place(Arrangement& arrangement, const Pose& pose);
 
-/// Bonds between particles that are at most `steps` apart in their order (chains), A < B, sorted.
+/// Bonds between particles whose numbers differ by at most `steps` (chains), A < B, sorted.
 struct Bonds {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> second;
 };
 [[nodiscard]] Bonds bonds_along(std::uint32_t begin, std::uint32_t end, int steps);
-/// How many bonds `bonds_along` makes of `particles`.
+/// Number of bonds that `bonds_along` makes of `particles`.
 [[nodiscard]] std::uint64_t count_bonds_along(std::uint64_t particles, int steps);
 /// Bonds between particles of [begin, end) nearer than `distance` [m], sorted.
 [[nodiscard]] Bonds bonds_within(std::span<const Vec3> position, std::uint32_t begin, std::uint32_t end, double distance);
 
-/// How many bonds `bonds_within` makes of all particles, without making any.
+/// Number of bonds that `bonds_within` makes of all particles, without making them.
 struct BondCount {
   std::uint64_t number = 0;
-  bool estimated = false;  ///< there are so many that one particle of several stands for all
+  bool estimated = false;  ///< extrapolated from a part of the particles, as there are so many
 };
 [[nodiscard]] BondCount count_bonds_within(std::span<const Vec3> position, double distance);
 

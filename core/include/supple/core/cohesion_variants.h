@@ -30,7 +30,7 @@ struct LinearCohesion {
 
 /// Cohesion between ellipsoids that turn with the particles: U = W(d / r0) with r0 = rho_A(r/d) + rho_B(-r/d), where
 /// rho(u) = |D Q^T u| is the distance of an ellipsoid's tangent plane of outward normal u from its centre and W is the
-/// energy of `Cohesion` with rest distance 1. Torques turn the particles so that the distance suits them.
+/// energy of `Cohesion` with rest distance 1. Torques turn the particles towards the orientation of least energy.
 struct DirectedCohesion {
   double scale = 0.0;                 ///< F0 r0 [J], > 0
   double a = 4.0;                     ///< [1], > 0
@@ -71,7 +71,7 @@ class CohesionTable {
     double t;
   };
   [[nodiscard]] Place place_of(double s) const;
-  [[nodiscard]] double integral(const Place& place) const;  ///< of f / F0 from the begin of the table
+  [[nodiscard]] double integral(const Place& place) const;  ///< of f / F0 from the beginning of the table
 
   Cohesion law_;                ///< in units F0 = r0 = 1
   double end_ = 0.0;

@@ -1,7 +1,7 @@
 /// @file supple/core/compliant_contact.h
 /// Contact as a part of an implicit step. The contact surface is given by quadrature points at a predicted pose; at each of
-/// them the pressure is linear in how far the two bodies approach there, and both bodies move there as the weighted mean of
-/// their particles. The step then minimises, beside inertia and pair laws,
+/// them the pressure is linear in the approach of the two bodies, and each body moves there as the weighted mean of
+/// its particles. In addition to inertia and pair laws the step minimises
 ///   sum_q l_n(u_q . n) + sum_q l_t(v_q),
 /// u_q the displacement of body A relative to B within the step, v_q their relative velocity along the surface at its end:
 ///   l_n' = w [p + g (u - u_p) . n]_+ (1 + d u . n / h)_+     pressure, and damping (Hunt & Crossley 1975); increases, so l_n is convex,
@@ -18,7 +18,7 @@
 
 namespace supple::core {
 
-/// Which body of a pair has no particles: an obstacle.
+/// Index of a body without particles: an obstacle.
 enum class ObstacleSide : std::uint8_t { None, A, B };
 
 /// The contacts of all pairs of bodies at one pose; one array per attribute.
@@ -39,7 +39,7 @@ struct ContactPoints {
   std::vector<double> slope;      ///< g [Pa/m], >= 0
   std::vector<Vec3> obstacle_velocity;  ///< of the obstacle at the point [m/s]; zero where there is none
 
-  /// Row q holds the particles that move with the bodies at point q, [offset[q], offset[q + 1]). Shares of A are positive and sum to 1,
+  /// Row q, [offset[q], offset[q + 1]), lists the particles that move the bodies at point q. Shares of A are positive and sum to 1,
   /// those of B are negative and sum to -1.
   std::vector<std::uint32_t> offset;
   std::vector<std::uint32_t> particle;
@@ -54,19 +54,20 @@ struct ContactPoints {
   void clear();
 };
 
-/// What a step did to a pair.
+/// Load of a pair in a step.
 struct ContactPairLoad {
   Vec3 force = Vec3::Zero();  ///< on A [N]; B gets the opposite
   double dissipated = 0.0;    ///< by damping and friction in the step [J], >= 0
   double stick_speed = 0.0;   ///< below which friction faded out [m/s]
 };
 
-/// Fills in the contacts at a pose and a time.
+/// Computes the contacts at a pose and a time.
 using ContactModel = std::function<void(const ParticleState& pose, double time, ContactPoints& out)>;
 
 struct ImplicitContact {
   ContactModel find;
-  /// Below which friction fades out [m/s]: what holds creeps at most so fast, or at `slow_slip` of the pair's relative speed if that is more.
+  /// Speed below which friction falls to zero [m/s]: bodies below the Coulomb limit creep at most at this speed, or at `slow_slip` times the pair's
+  /// relative speed if that is more.
   double stick_speed = 1e-8;
   double slow_slip = 1e-3;  ///< that share of the pair's relative speed [1]
   std::vector<ContactPairLoad> load{};  ///< of the last step, by ContactPoints::pair

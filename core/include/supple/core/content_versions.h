@@ -1,5 +1,5 @@
 /// @file supple/core/content_versions.h
-/// Numbers by which to see, from frame to frame, that something is bit for bit what it was.
+/// Version numbers that show, from frame to frame, whether a content is unchanged to the bit.
 #pragma once
 
 #include <bit>
@@ -14,7 +14,7 @@
 
 namespace supple {
 
-/// All bits of something, one after the other. What holds arrays adds their lengths.
+/// All bits of a content, one after the other. Types with arrays add their lengths.
 class ContentWords {
  public:
   void add(std::unsigned_integral auto word) { words_.push_back(word); }
@@ -46,20 +46,20 @@ class ContentWords {
   std::vector<std::uint64_t> words_;
 };
 
-/// Numbers contents: equal numbers, of any frames, mean equal words; what was asked for in the frame before has the same number again.
+/// Numbers contents: equal numbers, of any frames, mean equal words; a content requested in the previous frame keeps its number.
 /// No two numbers of a frame are equal.
 class ContentVersions {
  public:
-  /// What was not asked for since the last call is forgotten.
+  /// Starts a frame: contents not requested since the last call are forgotten.
   void begin_frame();
-  /// The number of a content. Where one comes twice in a frame it has two numbers, in the order of asking.
+  /// The number of a content. A content that occurs twice in a frame has two numbers, in the order of requests.
   [[nodiscard]] std::uint64_t of(std::span<const std::uint64_t> words);
 
  private:
   struct Content {
     std::vector<std::uint64_t> words;
     std::uint64_t number = 0;
-    bool asked = true;  ///< in this frame
+    bool requested = true;  ///< in this frame
   };
   std::multimap<std::uint64_t, Content> content_;  ///< by hash
   std::uint64_t next_ = 0;

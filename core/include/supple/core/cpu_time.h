@@ -14,7 +14,7 @@ namespace supple {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// What one reading of that clock takes: the median of several, measured once [s]. So much is left out of short times between two.
+/// Duration of one reading of that clock: the median of several, measured once [s]. It is subtracted from short intervals.
 [[nodiscard]] inline double process_cpu_clock_cost() {
   static const double cost = [] {
     std::array<double, 64> taken{};

@@ -11,7 +11,7 @@ namespace supple::core {
 /// The form interaction with a shape operator in place of one curvature: U = k psi(d) / d^2 |S r + n_A - n_B|^2, S the
 /// mean of S_A and S_B, which turn with their particles. For outward normals dn = S dx on the rest surface, so that
 /// S = I / R on a sphere and t . S t is the curvature along a unit tangent t (Euler). With S = kappa I this is `Form`.
-/// A tangential S leaves shifts along the normals free: add co-circularity.
+/// A tangential S leaves displacements along the normals free: combine it with co-circularity.
 struct DirectedForm {
   double strength = 0.0;       ///< k [J m^2]
   Mat3 shape_a = Mat3::Zero(); ///< S_A in the body axes of A [1/m], symmetric

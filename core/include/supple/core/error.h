@@ -1,6 +1,6 @@
 /// @file supple/core/error.h
-/// The three lanes of failure. What a user can mend throws `Error`; what a caller broke is SUPPLE_EXPECTS, which
-/// throws `ContractViolation`; what the numbers did is returned in a report and is no exception.
+/// The three kinds of failure. A fault that the user can correct throws `Error`; a broken precondition fails SUPPLE_EXPECTS, which
+/// throws `ContractViolation`; a numerical outcome is returned in a report and is no exception.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@ namespace supple {
 
 /// Why a run stopped; the value is the exit code of the command line.
 enum class ErrorKind : std::uint8_t {
-  Internal = 1,  ///< a fault of ours
+  Internal = 1,  ///< an error of the program
   Usage = 2,     ///< a wrong argument
-  Scene = 3,     ///< the scene file asks for something that cannot be
+  Scene = 3,     ///< the scene file is invalid
   Io = 4,        ///< a file cannot be read or written
-  Diverged = 5,  ///< the numbers left their bounds
+  Diverged = 5,  ///< values left their bounds
   Limit = 6,     ///< memory, size or step limits
-  Corrupt = 7,   ///< a checkpoint or cache is not what was written
+  Corrupt = 7,   ///< a saved state or cache is damaged or belongs elsewhere
 };
 
-/// One thing a user can mend: where, what was expected, what was found, and a hint.
+/// One thing that the user can correct: place, what was expected, what was found, and a hint.
 struct Fault {
   std::string place{};     ///< "file:line:column", a path, or an argument; may be empty
   std::string key{};       ///< dotted key path, e.g. objects[0].skeleton[0].radius; may be empty
@@ -30,11 +30,11 @@ struct Fault {
   std::string found{};     ///< e.g. "-0.2"; may be empty
   std::string hint{};      ///< e.g. "did you mean 'radius'?"; may be empty
 
-  /// place: key: expected, found FOUND; HINT   (empty parts left out, control characters and what is no UTF-8 as \xNN)
+  /// place: key: expected, found FOUND; HINT   (without empty parts; control characters and invalid UTF-8 as \xNN)
   [[nodiscard]] std::string message() const;
 };
 
-/// Thrown for everything a user can mend. Holds one fault or several of the same kind.
+/// Thrown for everything that the user can correct. Holds one fault or several of the same kind.
 class Error : public std::runtime_error {
  public:
   Error(ErrorKind kind, Fault fault);

@@ -1,5 +1,5 @@
 /// @file supple/core/executor.h
-/// Threads, passed in and never global. Work is cut into blocks whose size is a constant of the algorithm, so a result
+/// Threads, passed in and never global. Work is divided into blocks whose size is a constant of the algorithm, so a result
 /// cannot depend on the number of threads (docs/determinism.md).
 #pragma once
 
@@ -11,7 +11,7 @@ namespace supple {
 
 class Executor {
  public:
-  /// @param threads  number of threads, >= 1; 0 means all the machine has
+  /// @param threads  number of threads, >= 1; 0: all of the machine
   explicit Executor(int threads = 1);
   ~Executor();
   Executor(const Executor&) = delete;

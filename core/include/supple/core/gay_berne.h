@@ -1,7 +1,7 @@
 /// @file supple/core/gay_berne.h
 /// The Gay-Berne pair law of equal ellipsoids (Gay & Berne 1981, in the form for three unequal axes of Everaers &
 /// Ejtehadi 2003, and of LAMMPS' pair_style gayberne): a Lennard-Jones potential of the distance between surfaces,
-/// stronger or weaker by the directions of approach.
+/// with a strength that depends on the directions of approach.
 #pragma once
 
 #include <span>
@@ -43,7 +43,7 @@ struct SwitchedGayBerne {
 
 /// @pre d > 0
 [[nodiscard]] PairLoad evaluate(const SwitchedGayBerne& law, const PairPose& pose);
-/// Of the deepest wells, at gaps down to a tenth below that of rest.
+/// Bound for the deepest wells, at gaps down to a tenth below the rest gap.
 [[nodiscard]] Stiffness stiffness(const SwitchedGayBerne& law);
 
 /// Adds forces and torques between all particles of a list, cut off at its range without a shift.

@@ -1,5 +1,5 @@
 /// @file supple/core/hash.h
-/// 64-bit hashes (xxh3) of states and results, and the byte streams that checkpoints are made of.
+/// 64-bit hashes (xxh3) of states and results, and the byte streams of saved states.
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ class Hasher {
 /// Hash of raw bytes (xxh3, 64 bits).
 [[nodiscard]] std::uint64_t hash_bytes(std::span<const std::byte> bytes);
 
-/// Little-endian byte stream that State is saved to. Every array carries its length.
+/// Little-endian byte stream of a saved State. Every array is preceded by its length.
 class StateWriter {
  public:
   void write(std::uint64_t value);
@@ -58,7 +58,7 @@ class StateWriter {
   std::vector<std::byte> bytes_;
 };
 
-/// Reads what StateWriter wrote, in the same order. @throws Error{Corrupt} when the stream is shorter than it says.
+/// Reads the stream of a StateWriter, in the same order. @throws Error{Corrupt} when the stream is shorter than its lengths.
 class StateReader {
  public:
   explicit StateReader(std::span<const std::byte> bytes) : bytes_(bytes) {}

@@ -23,17 +23,17 @@ struct ImplicitContact;
 /// Free rotation over dt: orientation and world angular momentum, by the axis splitting R3 R2 R1 R2 R3.
 void rotate_free(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt);
 
-/// The same by the midpoint rule on the rotation group: one exponential of the angular velocity at the middle attitude,
+/// The same by the midpoint rule on the rotation group: one exponential of the angular velocity at the midpoint attitude,
 /// which is found by iteration. Second order and reversible; equal to `rotate_free` for equal principal moments.
 void rotate_free_exponential(Quat& orientation, const Vec3& angular_momentum, const Vec3& inertia, double dt);
 
-/// How a free body turns within a step.
+/// How a free body rotates within a step.
 enum class RotationUpdate : std::uint8_t { Splitting, Exponential };
 
-/// What a step did that a State must remember; part of State.
+/// Work, heat and impulses of all steps so far; part of State.
 struct Ledger {
   double external_work = 0.0;       ///< work of external loads and gravity [J]
-  double dissipated = 0.0;          ///< energy taken by friction, medium damping and contact dissipation [J], >= 0
+  double dissipated = 0.0;          ///< energy dissipated by friction, medium damping and contact [J], >= 0
   Vec3 external_impulse = Vec3::Zero();          ///< of external loads, gravity, medium damping, fixed bodies [N s]
   Vec3 external_angular_impulse = Vec3::Zero();  ///< of the same about the world origin [N m s]
   Vec3 pin_impulse = Vec3::Zero();               ///< of the pins [N s]
@@ -43,34 +43,34 @@ struct Ledger {
   void hash(Hasher& hasher) const;
 };
 
-/// Loads of one force evaluation, split by what the ledger books apart.
+/// Loads of one force evaluation, separated as in the ledger.
 struct ForceSample {
   Loads internal;   ///< pair laws and contact
   Loads external;   ///< gravity and external loads
-  Vec3 force_on_fixed = Vec3::Zero();   ///< what contact does to fixed bodies [N]: the moving ones lose its impulse
+  Vec3 force_on_fixed = Vec3::Zero();   ///< contact force on fixed bodies [N], whose impulse the moving ones lose
   Vec3 moment_on_fixed = Vec3::Zero();  ///< about the world origin [N m]
-  double power_of_fixed = 0.0;          ///< what fixed bodies that are led along do to the others [W]
-  double dissipated_at_fixed = 0.0;     ///< what damping and friction take of it [W]
-  Loads dissipative;  ///< the part of `internal` that takes energy (contact damping, friction); empty: there is none
+  double power_of_fixed = 0.0;          ///< power of moving obstacles on the other bodies [W]
+  double dissipated_at_fixed = 0.0;     ///< its part that damping and friction dissipate [W]
+  Loads dissipative;  ///< the dissipative part of `internal` (contact damping, friction); empty: none
 
   /// Zero loads on n particles, none dissipative.
   void reset(std::size_t n);
 };
 
-/// The ordered stages 1 to 7 as one call: loads at a state and a time. Velocities are those of the half step.
+/// Stages 1 to 7 as one call: loads at a state and a time. Velocities are those of the half step.
 using ForceModel = std::function<void(const ParticleState& state, double time, ForceSample& out)>;
 
-/// What the next step reuses; part of State.
+/// Data that the next step reuses; part of State.
 struct KickState {
   ForceSample sample;      ///< the force of the next kick
   bool valid = false;      ///< whether there is one
-  double next_step = 0.0;  ///< what an adaptive integrator tries next [s]; 0: it has not chosen yet
+  double next_step = 0.0;  ///< next trial step of an adaptive integrator [s]; 0: not chosen yet
   void save(StateWriter& out) const;
   void load(StateReader& in);
   void hash(Hasher& hasher) const;
 };
 
-/// What moves and what acts on it.
+/// Particles and everything that acts on them.
 struct StepProblem {
   const ParticleSet& set;
   const Interactions& interactions;
@@ -100,12 +100,12 @@ struct Motion {
   Vec3 angular_momentum = Vec3::Zero();
   double momentum_scale = 0.0;          ///< sum m |v| [N s]
   /// Sum of (|x - c| + k) m |v| + |L| [N m s]: c is the centre of mass, k the root mean square distance of a particle's own mass
-  /// from its centre, 2 k^2 = tr I / m. Without k a single particle that does not turn would have none.
+  /// from its centre, 2 k^2 = tr I / m. Without k the scale of a single particle that does not rotate would be zero.
   double angular_momentum_scale = 0.0;
 };
 [[nodiscard]] Motion measure_motion(const ParticleSet& set, const ParticleState& state);
 
-/// Why a state cannot be continued.
+/// The reason why a state cannot be continued.
 struct Divergence {
   bool found = false;
   std::uint32_t particle = 0;
@@ -113,7 +113,7 @@ struct Divergence {
   double value = 0.0;
   double limit = 0.0;
 };
-/// @param length, speed  what is still believable in this scene [m], [m/s]
+/// @param length, speed  largest plausible values in this scene [m], [m/s]
 [[nodiscard]] Divergence find_divergence(const ParticleSet& set, const ParticleState& state, double length, double speed);
 
 /// Deviation of a set of points from its rest shape after the best rigid fit (Kabsch): RMS and largest distance [m].
@@ -123,7 +123,7 @@ struct ShapeError {
 };
 [[nodiscard]] ShapeError shape_error(std::span<const Vec3> rest, std::span<const Vec3> now);
 
-/// How much points shake between two times [m]: O^2 = sum_i |dx_i - mean dx|^2 = sum |dx_i|^2 - |sum dx_i|^2 / N, which
+/// Oscillation of points between two times [m]: O^2 = sum_i |dx_i - mean dx|^2 = sum |dx_i|^2 - |sum dx_i|^2 / N, which
 /// a common translation leaves at 0 (Lombardo & Puech 1995, sec. 3, with the 1/N that a printed formula lacks).
 [[nodiscard]] double oscillation(std::span<const Vec3> before, std::span<const Vec3> after);
 

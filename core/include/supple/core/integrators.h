@@ -1,7 +1,7 @@
 /// @file supple/core/integrators.h
-/// The integrators by name, behind one `advance`. What each one is good for:
+/// The integrators by name, called through one `advance`. Properties:
 ///
-/// | method           | order | limit omega dt | keeps                                                               |
+/// | method           | order | limit omega dt | conserves                                                              |
 /// |------------------|-------|----------------|---------------------------------------------------------------------|
 /// | Symplectic       | 2     | 2              | momentum, angular momentum; energy without drift                    |
 /// | RungeKutta4      | 4     | 2.83           | momentum; angular momentum and energy to its order                  |
@@ -14,11 +14,11 @@
 ///
 /// Backward Euler takes the pose that minimises the incremental potential (e.g. Martin et al. 2011, eq. 4)
 ///   Pi = 1/(2 h^2) sum_i (m |x - x~|^2 + delta^T I delta) + U(x, q),   delta = log(q~^-1 q) in body axes,
-/// with x~, q~ the free flight over h under the loads outside U; implicit midpoint takes it with h = dt/2 as its middle
-/// and continues by the mirrored half step. The minimum is sought by Newton's method with the Hessians of the pair laws
-/// and a line search. Contact is a part of the potential (compliant_contact.h): it is found once a step, at the pose that free
-/// flight under the external loads leads to, and is linear about it. Other loads that are not in `Interactions` are frozen over the
-/// step: at its start in backward Euler, at the middle of free flight in the midpoint rule.
+/// with x~, q~ the free motion over h under the loads outside U; implicit midpoint uses it with h = dt/2 as its midpoint
+/// and continues by the mirrored half step. The minimum is computed by Newton's method with the Hessians of the pair laws
+/// and a line search. Contact is a part of the potential (compliant_contact.h): it is found once per step, at the pose that free
+/// motion under the external loads leads to, and is linear about it. Other loads that are not in `Interactions` are constant over the
+/// step: taken at its start in backward Euler, in the middle of the free motion in the midpoint rule.
 #pragma once
 
 #include <memory>
@@ -38,24 +38,24 @@ enum class Integrator : std::uint8_t { Symplectic, RungeKutta4, Adaptive, Backwa
 struct IntegratorSettings {
   Integrator method = Integrator::Symplectic;
   RotationUpdate rotation = RotationUpdate::Splitting;  ///< of `Symplectic`
-  /// Adaptive: largest local error of a substep. Implicit methods: Newton's method ends with the first step that is not
+  /// Adaptive: largest local error of a substep. Implicit methods: Newton's method ends with the first correction that is not
   /// larger. Of positions over `length` and of angles in radians [1].
   double tolerance = 1e-6;
-  double length = 1.0;        ///< what errors of position are relative to [m]
+  double length = 1.0;        ///< length that errors of position are relative to [m]
   double first_step = 0.0;    ///< Adaptive: first substep tried [s]; 0: the whole step
-  int max_substeps = 4096;    ///< Adaptive: a substep of dt / max_substeps is taken whatever its error
+  int max_substeps = 4096;    ///< Adaptive: a substep of dt / max_substeps is accepted with any error
   int max_iterations = 50;    ///< of Newton's method
   int direct_unknowns = 12000;  ///< larger systems are solved by conjugate gradients instead of a Cholesky factor
 };
 
-/// What a step needed; the caller decides what is too much.
+/// Work of a step; the caller decides on limits.
 struct StepReport {
   std::int64_t substeps = 0;           ///< accepted
-  std::int64_t rejected = 0;           ///< tried and taken back
+  std::int64_t rejected = 0;           ///< trial substeps that were discarded
   std::int64_t force_evaluations = 0;  ///< calls of the force model
-  bool within_tolerance = true;  ///< false: a substep at the smallest size, or Newton's method, left a larger error
+  bool within_tolerance = true;  ///< false: a substep of the smallest size, or Newton's method, ended with a larger error
   std::int64_t newton_iterations = 0;
-  std::int64_t gradient_iterations = 0;  ///< of conjugate gradients, all together
+  std::int64_t gradient_iterations = 0;  ///< of conjugate gradients, in total
   double last_correction = 0.0;  ///< size of the last Newton step, as `tolerance` measures it [1]
 };
 
@@ -73,7 +73,7 @@ class IntegratorWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What a step works with. `pairs` is the workspace of `StepProblem::interactions`; the implicit methods use it.
+/// Tools of a step. `pairs` is the workspace of `StepProblem::interactions`; the implicit methods use it.
 struct StepTools {
   const Executor& executor;
   InteractionWorkspace& pairs;
@@ -81,8 +81,8 @@ struct StepTools {
 };
 
 /// One step of size dt by the chosen method. Books work, dissipation and impulses to the ledger by the quadrature of the
-/// method. The substep that `Adaptive` would try next is kept in `kick`, so that a run continues with the same bits.
-/// Momentum is exact in every method: velocities change by the loads alone, not by what Newton's method left.
+/// method. The next trial substep of `Adaptive` is kept in `kick`, so that a run continues with the same bits.
+/// Momentum is exact in every method: velocities change by the loads alone, not by the residual of Newton's method.
 /// Deterministic: substeps and iterations follow from the state alone. The explicit methods allocate nothing after the
 /// first step.
 StepReport advance(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt, const StepTarget& target,

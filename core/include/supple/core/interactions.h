@@ -1,5 +1,5 @@
 /// @file supple/core/interactions.h
-/// Everything that acts on the particles of a scene apart from contact: bonded and geometric pair laws, friction
+/// Everything that acts on the particles of a scene except contact: bonded and geometric pair laws, friction
 /// between particles, medium damping, external loads, gravity. Built once from a scene, then const.
 #pragma once
 
@@ -22,13 +22,13 @@ namespace supple::core {
 /// A law on a fixed list of pairs; index k is the same bond in `first`, `second` and `law`.
 template <class Law>
 struct BondedLaw {
-  std::string name;                    ///< as users read it: "spiral/bond_frame"
+  std::string name;                    ///< name for users: "spiral/bond_frame"
   std::vector<std::uint32_t> first;    ///< particle A, shape [bonds]
   std::vector<std::uint32_t> second;   ///< particle B, A < B, shape [bonds]
   std::vector<Law> law;                ///< shape [bonds]
 };
 
-/// Which pairs a geometric law takes, by the kinds of the particles.
+/// The pairs of a geometric law, by the kinds of the particles.
 enum class PairKinds : std::uint8_t {
   Any,
   Incomplete,            ///< those that do not interact completely, two hinges among them
@@ -96,10 +96,10 @@ struct ExternalLoad {
   double end = 0.0;             ///< [s], the first time without load; may be infinite
   double ramp = 0.0;            ///< rise and fall time inside the window [s]
   [[nodiscard]] double factor(double time) const;  ///< in [0, 1]
-  /// Mean of the factor over [from, to], from < to: a step that is given it holds the whole impulse, however short the load.
+  /// Mean of the factor over [from, to], from < to: a step with this mean gets the whole impulse of a load of any duration.
   [[nodiscard]] double mean(double from, double to) const;
-  /// Whether the factor changes in [from, to]; a change at either end counts, and one that rounding puts just before `from`: of
-  /// steps that follow each other, the one that ends as the load begins and the one that first feels it both say so.
+  /// Whether the factor changes in [from, to]; a change at either end counts, also one that rounding puts just before `from`: of
+  /// successive steps, the one that ends as the load begins and the one after it both return true.
   [[nodiscard]] bool changes(double from, double to) const;
 };
 
@@ -118,7 +118,7 @@ struct Interactions {
   std::vector<BondedLaw<DirectedCohesion>> directed_cohesion;
   std::vector<BondedLaw<TabulatedCohesion>> tabulated_cohesion;
   std::vector<BondedLaw<DirectedForm>> directed_form;
-  std::vector<BondedLaw<LiteralForm>> literal_form;  ///< counted with energy 0: it has none
+  std::vector<BondedLaw<LiteralForm>> literal_form;  ///< has no energy and counts as 0
   std::vector<GeometricLaw<Cohesion>> geometric_cohesion;
   std::vector<GeometricLaw<LinearCohesion>> geometric_linear_cohesion;
   std::vector<GeometricLaw<TabulatedCohesion>> geometric_tabulated_cohesion;
@@ -140,7 +140,7 @@ struct Interactions {
   [[nodiscard]] std::size_t law_count() const;
 };
 
-/// Every two particles that a bonded law ties, once: A < B, ascending. What a picture of the bonds shows.
+/// Every two particles with a bonded law between them, once: A < B, ascending. Pictures of bonds show these.
 [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> bonded_pairs(const Interactions& interactions);
 
 /// Energy [J], forces and torques of one law, for `query forces` and for audits.

@@ -1,5 +1,5 @@
 /// @file supple/core/interrupt.h
-/// Long calls that end when somebody else says so.
+/// Interruption of long calls.
 #pragma once
 
 #include <atomic>
@@ -7,7 +7,7 @@
 
 namespace supple {
 
-/// Thrown out of a call that was told to end: what it was making is lost, and nothing else.
+/// Thrown by a call that is interrupted: only its unfinished result is lost.
 class Interrupted : public std::exception {
  public:
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }

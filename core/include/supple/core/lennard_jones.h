@@ -20,7 +20,7 @@ struct LennardJones {
 
   static constexpr int kLargestExponent = 63;
 
-  /// Lombardo & Puech 1995, footnote 2, with the exponents put right: f = E ((r0/d)^(2n+1) - (r0/d)^(n+1)), so that
+  /// Lombardo & Puech 1995, footnote 2, with corrected exponents: f = E ((r0/d)^(2n+1) - (r0/d)^(n+1)), so that
   /// f(r0) = 0 and the short-ranged term repels. Stiffness n E / r0, binding energy E r0 / (2 n).
   /// @param gain E [N]
   [[nodiscard]] static LennardJones from_gain(double r0, double gain, int n);
@@ -34,7 +34,7 @@ struct LennardJones {
 
 /// @pre d > 0, 0 < m < n <= kLargestExponent
 [[nodiscard]] PairLoad evaluate(const LennardJones& law, const PairPose& pose);
-/// The steepest slope within r0/10 of rest.
+/// Bound by the steepest slope within r0/10 of rest.
 [[nodiscard]] Stiffness stiffness(const LennardJones& law);
 
 }  // namespace supple::core

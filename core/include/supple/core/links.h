@@ -1,6 +1,6 @@
 /// @file supple/core/links.h
-/// Breaking and plastic flow. A link is a pair of bonded particles with all laws between them; it breaks as a whole.
-/// What happened is a LinkState; `intact` gives the laws that are left, so everything else works on plain Interactions.
+/// Breaking and plastic flow. A link is a pair of bonded particles with all laws between them, which break together.
+/// LinkState records what broke or yielded; `intact` gives the remaining laws, so that all other code works on plain Interactions.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ struct YieldRule {
   double time = 0.0;                                        ///< [s]; 0: at once
 };
 
-/// Which rule one object has.
+/// The rule of one object.
 struct LinkRule {
   std::uint32_t object = 0;
   BreakRule breaking;
@@ -46,7 +46,7 @@ struct Links {
   std::vector<double> rest_distance;   ///< d0 [m], shape [links]
   std::vector<std::uint32_t> rule;     ///< into `rules`, shape [links]
   std::vector<LinkRule> rules;
-  std::vector<BondFrame> frame;            ///< the bond frames that may yield, as the scene has them, shape [frames]
+  std::vector<BondFrame> frame;            ///< bond frames that may yield, in their initial form, shape [frames]
   std::vector<std::uint32_t> frame_link;   ///< their link
   std::vector<std::uint32_t> frame_list;   ///< where they are: Interactions::bond_frame[list].law[bond]
   std::vector<std::uint32_t> frame_bond;
@@ -58,8 +58,8 @@ struct LinkState {
   std::vector<std::uint8_t> broken;   ///< shape [links]
   std::vector<Vec3> rest_a, rest_b;   ///< of the bond frames that may yield, shape [frames]
   std::vector<Quat> turn;             ///< Q_A0* Q_B0 of the same, shape [frames]
-  double released = 0.0;              ///< energy that went with broken links [J]
-  double flowed = 0.0;                ///< energy that went into plastic flow [J]
+  double released = 0.0;              ///< energy of broken links [J]
+  double flowed = 0.0;                ///< energy dissipated by plastic flow [J]
   void save(StateWriter& out) const;
   void load(StateReader& in);
   void hash(Hasher& hasher) const;
@@ -68,32 +68,31 @@ struct LinkState {
 /// @pre bonds of the objects with a rule join particles of one object
 [[nodiscard]] Links make_links(const ParticleSet& set, const ParticleState& rest, const Interactions& interactions,
                                std::span<const LinkRule> rules);
-/// Nothing broken, rest data as the scene has them.
+/// Nothing broken, rest data of the scene.
 [[nodiscard]] LinkState unbroken(const Links& links);
 
-/// What `update_links` changed.
+/// Changes by `update_links`.
 struct LinkChange {
   std::uint32_t broke = 0;
   std::uint32_t yielded = 0;
   [[nodiscard]] bool any() const noexcept { return broke + yielded > 0; }
 };
 
-/// Particles and what acts between them now.
+/// Particles and the present interactions between them.
 struct LinkedParticles {
   const ParticleSet& set;
   const ParticleState& state;
   const Interactions& present;  ///< what `intact` gives for the present state of the links; after a change it must be made again
 };
 
-/// Between two steps: breaks and yields what must, `dt` after the last call. The energy that goes is booked as
-/// dissipated.
+/// Between two steps: breaks and yields links by their rules, `dt` after the last call. Their energy is booked as dissipated.
 LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger);
 
 /// The interactions without the bonds (and friction) of broken links, with the present rest data.
 [[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);
 
-/// The interactions without what acts between particles that rest alone: their bonds and friction, and geometric laws of
-/// objects all of whose particles do. Loads from outside stay. @param resting  1: rests, shape [particles]
+/// The interactions without laws between resting particles: their bonds and friction, and geometric laws of
+/// objects whose particles all rest. External loads stay. @param resting  1: rests, shape [particles]
 [[nodiscard]] Interactions without_resting(const ParticleSet& set, const Interactions& interactions,
                                            std::span<const std::uint8_t> resting);
 

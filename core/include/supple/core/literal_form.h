@@ -15,7 +15,7 @@ struct BondedLaw;
 
 /// Each particle X of a pair with the other Y, r' = x_Y - x_X, and its own radius R_X, gets
 ///   F_X = 2 k [r' + R_X (n_X - n_Y)] psi(d),   tau_X = +2 k R_X [n_X x (r' - R_X n_Y)] psi(d).
-/// This is no energy, and momentum is not conserved. What is repeated from the paper (docs/notation.md):
+/// This law has no energy, and momentum is not conserved. Repeated from the paper (docs/notation.md):
 ///  - the sign of the torque, which turns n_X away from its rest direction;
 ///  - psi multiplied after differentiation, so that the slope of psi is missing;
 ///  - a radius for each particle: where R_A and R_B differ the two forces do not cancel,
@@ -27,7 +27,7 @@ struct LiteralForm {
   Weight weight;
 };
 
-/// What it does to each particle; here the forces are not opposite.
+/// Loads on each particle; the forces are not opposite.
 struct LiteralFormLoad {
   Vec3 force_a = Vec3::Zero();   ///< [N]
   Vec3 force_b = Vec3::Zero();   ///< [N]

@@ -1,6 +1,6 @@
 /// @file supple/core/math.h
-/// Transcendental functions with the same bits on every CPU: the C library picks variants by CPU, so code that decides
-/// State calls these instead. Built from correctly rounded operations and explicit fma alone. sqrt is IEEE and is used
+/// Transcendental functions with the same bits on every CPU: the C library chooses variants by CPU, so code that affects
+/// State calls these instead. They use correctly rounded operations and explicit fma only. sqrt is IEEE and is used
 /// directly. Errors are bounded in units in the last place (ulp) and tested against extended precision.
 #pragma once
 

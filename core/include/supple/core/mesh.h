@@ -1,5 +1,5 @@
 /// @file supple/core/mesh.h
-/// A triangle mesh as plain arrays, with named per-vertex columns for whatever a stage wants to carry along.
+/// A triangle mesh as plain arrays, with named per-vertex columns for further data.
 #pragma once
 
 #include <array>
@@ -28,16 +28,16 @@ struct Mesh {
   void clear();
 };
 
-/// Puts `other` beside `mesh`. A column that only one of them has is 0 for the vertices of the other.
+/// Appends `other` to `mesh`. A column that only one of them has is 0 for the vertices of the other.
 void append(Mesh& mesh, const Mesh& other);
 
 /// Adds a flat face with four vertices of its own, counter-clockwise from outside.
 void add_quadrangle(Mesh& mesh, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 
-/// What a closed surface must satisfy, measured.
+/// Measured properties of a surface mesh.
 struct MeshReport {
   bool closed = false;              ///< every edge has exactly two triangles
-  bool oriented = false;            ///< and they run through it in opposite directions
+  bool oriented = false;            ///< the two triangles of every edge have consistent orientation
   long euler_characteristic = 0;    ///< V - E + F
   std::size_t components = 0;       ///< connected components
   double area = 0.0;                ///< [m^2]

@@ -1,5 +1,5 @@
 /// @file supple/core/nearest_word.h
-/// What a misspelt word may have meant.
+/// Suggestions for misspelt words.
 #pragma once
 
 #include <span>

@@ -1,6 +1,6 @@
 /// @file supple/core/neighbour_list.h
 /// Neighbour lists with a skin (Verlet 1967) for many particles: every particle has the particles nearer than
-/// range + skin, packed for vector units, and keeps them until one has moved by half the skin. In open space or in a
+/// range + skin, packed for vector units; the list is kept until a particle has moved by half the skin. In open space or in a
 /// periodic box.
 #pragma once
 
@@ -19,7 +19,7 @@
 
 namespace supple::core {
 
-/// A box that repeats in all three directions. Positions may lie anywhere: a particle stands for all its images.
+/// A box that repeats in all three directions. Positions may be anywhere: a particle represents all its images.
 struct PeriodicBox {
   Vec3 origin = Vec3::Zero();  ///< [m]
   Vec3 length = Vec3::Zero();  ///< [m], > 0
@@ -29,7 +29,7 @@ struct PeriodicBox {
 };
 
 /// The list and its order are a function of the reference positions alone, which are State: sums over the list are
-/// associated by its order, so that a run goes on with the same bits only from the same reference positions. The same
+/// added in its order, so that a run continues with the same bits only from the same reference positions. The same
 /// bits for every number of threads and every vector width.
 class NeighbourList {
  public:
@@ -44,13 +44,13 @@ class NeighbourList {
   [[nodiscard]] const std::optional<PeriodicBox>& box() const;
 
   /// Takes new positions. Where a particle is farther than skin / 2 from its reference position these become the
-  /// reference positions and the list is built anew. @return whether it was
+  /// reference positions and the list is rebuilt. @return whether it was
   /// @pre positions are finite and less than 1e12 (range + skin) apart
   bool update(std::span<const Vec3> positions, const Executor& executor);
 
   /// All pairs of the list (i < j), sorted: those nearer than the range, and some up to range + skin.
   [[nodiscard]] std::vector<IndexPair> pairs() const;
-  /// Entries of the list: each pair once, and what fills the last batch of a particle.
+  /// Entries of the list: each pair once, and padding of the last batch of a particle.
   [[nodiscard]] std::size_t entries() const;
   [[nodiscard]] std::size_t bytes() const;  ///< memory of the list and its buffers
 
@@ -89,7 +89,7 @@ struct SurfaceLaws {
 /// angular momentum, is only as exact as single precision, about 1e-7 of the forces times their distances.
 enum class Precision : std::uint8_t { Double, SingleForces };
 
-/// Adds what a law does between all particles of a list, at the positions of its last update.
+/// Adds the loads of a law between all particles of a list, at the positions of its last update.
 /// @param normals  unit, world axes, shape [particles]
 void accumulate_geometric(NeighbourList& list, const TwelveSix& law, const Executor& executor, Loads& loads,
                           Precision precision = Precision::Double);

@@ -10,7 +10,7 @@
 
 namespace supple::core {
 
-/// What a pair law sees.
+/// Input of a pair law.
 struct PairPose {
   Vec3 r = Vec3::Zero();              ///< x_B - x_A [m]
   Quat orientation_a = Quat::Identity();
@@ -29,7 +29,7 @@ struct PairPose {
           .normal_b = state.orientation[b] * set.normal[b]};
 }
 
-/// What it answers; the force on A is -force_b.
+/// Output of a pair law; the force on A is -force_b.
 struct PairLoad {
   double energy = 0.0;                ///< [J]
   Vec3 force_b = Vec3::Zero();        ///< [N]
@@ -73,7 +73,7 @@ struct Cohesion {
   [[nodiscard]] double influence_radius(double epsilon) const;  ///< r_c: |f| = epsilon F_max there, r_c > r_m [m]
 };
 
-/// Form (shape memory), Lombardo & Puech 1995 sec. 4 in its consistent, normalised form with one curvature a pair:
+/// Form (shape memory), Lombardo & Puech 1995 sec. 4 in its consistent, normalised form with one curvature per pair:
 /// U = k psi(d) / d^2 |kappa r + n_A - n_B|^2. For a circular arc U = k psi (kappa' - kappa)^2 exactly.
 struct Form {
   double strength = 0.0;   ///< k [J m^2]

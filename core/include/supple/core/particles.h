@@ -11,7 +11,7 @@
 
 namespace supple::core {
 
-/// What does not change while particles move; index i is the same particle in every array. Part of a Scene.
+/// Constant properties of particles; index i is the same particle in every array. Part of a Scene.
 struct ParticleSet {
   std::vector<double> mass;            ///< [kg], > 0, shape [n]
   std::vector<Vec3> inertia;           ///< principal moments in body axes [kg m^2], > 0, shape [n]
@@ -25,10 +25,10 @@ struct ParticleSet {
 
 inline constexpr std::uint8_t kPinPosition = 1;     ///< position held
 inline constexpr std::uint8_t kPinOrientation = 2;  ///< orientation held
-/// Moves in its plane z = const and turns about z only. @pre a principal axis is along z, or all moments are equal
+/// Moves in its plane z = const and rotates about z only. @pre a principal axis is along z, or all moments are equal
 inline constexpr std::uint8_t kPlanar = 4;
 
-/// Lombardo & Puech 1995, sec. 5: a hinge joins what is around it, standard particles of different types repel.
+/// Lombardo & Puech 1995, sec. 5: a hinge interacts with particles of all types, standard particles of different types repel.
 inline constexpr std::uint32_t kHinge = 0xffffffff;
 
 /// Whether two particles of one object have all laws between them; if not, they only repel. The paper leaves two hinges
@@ -50,7 +50,7 @@ inline constexpr std::uint32_t kHinge = 0xffffffff;
   return (pinned & kPlanar) != 0 ? Vec3(0.0, 0.0, v.z()) : v;
 }
 
-/// What moves. Angular velocity is derived: omega = Q I^-1 Q^T L. Part of State.
+/// State of motion. Angular velocity is derived: omega = Q I^-1 Q^T L. Part of State.
 struct ParticleState {
   std::vector<Vec3> position;          ///< [m], shape [n]
   std::vector<Quat> orientation;       ///< body to world, unit length, shape [n]

@@ -1,5 +1,5 @@
 /// @file supple/core/parts.h
-/// Some particles as the parts of a body: what the field and contact modules take and return.
+/// Particles as the parts of a body, for the field and contact modules.
 #pragma once
 
 #include <cstdint>

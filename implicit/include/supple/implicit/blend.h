@@ -1,7 +1,7 @@
 /// @file supple/implicit/blend.h
 /// How the parts of one body combine where their supports overlap. A node is a group of parts whose primitives are summed;
 /// the rule joins the nodes' sums f_k into one potential F + c. Every rule is continuous, homogeneous of degree one in the
-/// f_k, at least their maximum and, but for Ricci's, at most their sum.
+/// f_k, at least their maximum and, except for Ricci's, at most their sum.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ enum class BlendRule : std::uint8_t {
   /// with a crease; two nodes give max + w min (blending graph of Opalach & Maddock 1993, made continuous)
   Graph,
   Ricci,     ///< (sum f_k^n)^(1/n), between sum and union (Ricci 1973)
-  /// max over pairs of the arc operator, opened by the angle between the gradients: where surfaces run into each other
+  /// max over pairs of the arc operator, opened by the angle between the gradients: where surfaces cross
   /// they blend, where they are parallel or face each other they unite (after Gourmel et al. 2013). Where a gradient vanishes, as
-  /// half way between two blobs of a node, the angle has no limit and the field jumps
+  /// half way between two blobs of a node, the angle is undefined and the field jumps
   Gradient,
 };
 
@@ -56,7 +56,7 @@ struct Opening {
 [[nodiscard]] Opening opening_of(double opening, double cosine) noexcept;
 
 /// Weight of a bond that broke `age` ago and fades within `time`, both [s]: from 1 to 0 as 1 - s^2 (3 - 2 s), s = age / time,
-/// so that a surface parts without a jump in place or speed.
+/// so that a surface separates without a jump in position or velocity.
 [[nodiscard]] double fading(double age, double time) noexcept;
 
 }  // namespace supple::implicit

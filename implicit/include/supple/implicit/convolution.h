@@ -1,7 +1,7 @@
 /// @file supple/implicit/convolution.h
 /// Kernels integrated over segments, triangles and arcs, in closed form (Bloomenthal & Shoemake 1991; for Cauchy's kernel
 /// after McCormack & Sherstyuk 1998, but over edges, by Green's theorem, and with the integrand clipped to the support).
-/// Integrals add up: a shape that is cut in pieces has the same field, without bulges at the joints.
+/// Integrals are additive: a shape that is divided into pieces has the same field, without bulges at the joints.
 #pragma once
 
 #include <span>
@@ -31,7 +31,7 @@ struct Convolution {
 [[nodiscard]] double convolve_line(const Kernel& kernel, double distance) noexcept;
 [[nodiscard]] double convolve_plane(const Kernel& kernel, double distance) noexcept;
 
-/// What f of a primitive alone does not exceed, and reaches unless the primitive is convolved.
+/// Largest value of f of a single primitive; an upper bound if the primitive is convolved.
 [[nodiscard]] double peak(const Primitive& primitive) noexcept;
 
 }  // namespace supple::implicit

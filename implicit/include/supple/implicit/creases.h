@@ -18,22 +18,22 @@ namespace supple::implicit {
 /// The surface of march_cubes with vertices on its creases. F is the largest of the fields
 /// F_k = f_k + sum over j of w_kj min(f_j, f_k) - c of its nodes; a cell whose vertices belong to two or three of them gets a
 /// vertex where their fields vanish together, and edges that cross the crease are turned onto it (Kobbelt et al. 2001).
-/// Where that point lies more than a cell beyond its cell, or a triangle would turn over, the cell stays as it was, and edges that cross
-/// the crease are cut there. Where that would turn triangles over, as in valleys that are steep for the cells, those around are made anew.
-/// Where triangles would cross then, as where cells bridge a valley with an opening below about 16 degrees several cells above its ground, or
-/// where creases meet, that is taken back, step by step, in the limit to the triangles of march_cubes: closed, oriented, and nothing crosses
-/// by more than rounding. The cells whose crease stays cut off for that are counted. A vertex on a crease has the mean of the normals of
-/// its sides. With options.error, cells get smaller by sqrt(2) until it is met, from those on that march_cubes would begin with.
+/// Where that point lies more than a cell beyond its cell, or a triangle would be inverted, the cell is unchanged, and edges that cross
+/// the crease are split there. Where that would invert triangles, as in valleys that are steep for the cells, the triangles around are rebuilt.
+/// Where triangles would intersect then, as where cells bridge a valley with an opening below about 16 degrees several cells above its ground, or
+/// where creases meet, these changes are undone step by step, in the limit down to the triangles of march_cubes: closed, oriented, and without
+/// intersections beyond rounding. The cells whose crease stays cut off for this reason are counted. A vertex on a crease has the mean of the
+/// normals of its sides. With options.error, cells get smaller by sqrt(2) until it is met, starting from the first cells of march_cubes.
 /// @pre the rule of the field's blend is Graph, options.refinements is 0   @throws Error{Limit} as CubeMesher::make
 [[nodiscard]] Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor,
                                  MarchCounts* counts = nullptr);
 
-/// Meshes one body with creases again and again: what moved primitives do not reach is kept as by CubeMesher, and so are the nodes that
-/// its vertices belong to and the points of its creases. With options.error all meshes that are tried are kept so, and errors of their
-/// triangles. The result, and what is tried and refused, is that of march_creases, bit by bit.
+/// Meshes one body with creases repeatedly: data out of reach of moved primitives are kept as by CubeMesher, also the nodes of
+/// its vertices and the points of its creases. With options.error the data of all trial meshes are kept, with the errors of their
+/// triangles. Results, trial meshes and refusals are those of march_creases, bit by bit.
 class CreaseMesher {
  public:
-  /// @param most_kept  of all meshes that were tried with options.error [byte]; where they need more, the coarsest are made anew
+  /// @param most_kept  limit of kept data of all trial meshes with options.error [byte]; beyond it the coarsest are rebuilt
   explicit CreaseMesher(std::uint64_t most_kept = kMostKeptToError);
   ~CreaseMesher();
   CreaseMesher(CreaseMesher&&) noexcept;

@@ -1,7 +1,7 @@
 /// @file supple/implicit/even_samples.h
-/// Samples of a surface at an even spacing, each riding on the part that holds it: they stay themselves while the body moves
-/// and deforms, some are added where the surface stretches and taken away where it shrinks (after Witkin & Heckbert 1994;
-/// instead of their repulsion the spacing is kept by distances alone, as in Poisson-disc sampling).
+/// Samples of a surface at an even spacing, each moving with a part: they keep their identity while the body moves
+/// and deforms; samples are added where the surface stretches and removed where it shrinks (after Witkin & Heckbert 1994;
+/// instead of their repulsion the spacing is kept by distances, as in Poisson-disc sampling).
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,11 @@ namespace supple::implicit {
 /// The samples of one body; index s is the same sample in every array, and samples are in the order of their ids.
 struct EvenSampleSet {
   std::vector<std::uint64_t> id;
-  std::vector<std::uint32_t> part;   ///< with the largest share of the field there
-  std::vector<Vec3> local;           ///< place in the part's frame [m]
+  std::vector<std::uint32_t> part;   ///< the part with the largest share of the field there
+  std::vector<Vec3> local;           ///< position in the part's frame [m]
   std::vector<Vec3> point;           ///< on F = 0 [m]
   std::vector<Vec3> normal;          ///< unit, outward
-  std::vector<double> area;          ///< of the surface nearer to it than to the others of its side [m^2]
+  std::vector<double> area;          ///< of the surface region closer to it than to the other samples of its side [m^2]
   std::size_t components = 0;        ///< of the surface they were last fitted to
   long euler_characteristic = 0;     ///< of that surface
   [[nodiscard]] std::size_t size() const noexcept { return id.size(); }
@@ -33,21 +33,21 @@ struct EvenSampleCounts {
   bool remade = false;  ///< the surface has another number of parts or holes than at the last call
 };
 
-/// Fits the samples of any number of bodies to their surfaces, again and again.
+/// Fits the samples of any number of bodies to their surfaces, repeatedly.
 class EvenSampler {
  public:
-  /// @param spacing  d [m]: no two samples are nearer than d/2, and no point of the surface that the lattice of cell() sees
+  /// @param spacing  d [m]: no two samples are nearer than d/2, and no point of the surface on the lattice of cell()
   /// is farther than d from all of them; samples whose normals are more than a right angle apart, as on the two sides of a
   /// sheet, do not count for each other   @pre d > 0
   explicit EvenSampler(double spacing);
 
-  /// Brings the samples of a body to its surface as it is now; an empty set is filled. Kept samples are carried by their
-  /// parts and projected onto the surface. After a change of topology all are made anew. New samples get ids that this
-  /// sampler has given to no other. Areas add up to that of the lattice's mesh.
+  /// Moves the samples of a body to its present surface; an empty set is filled. Kept samples are carried by their
+  /// parts and projected onto the surface. After a change of topology all are new. New samples get ids that this
+  /// sampler has not used before. Areas sum to that of the lattice's mesh.
   /// @param parts  world poses, shape [part_count]
   EvenSampleCounts update(const Field& field, std::span<const Pose> parts, const Executor& executor, EvenSampleSet& set);
-  /// Cells of the lattice on which the surface of a field is looked for [m]: d/6, or half its feature size where that is less, so
-  /// that thin sheets and small balls are seen, whatever the spacing.
+  /// Cells of the lattice on which the surface of a field is found [m]: d/6, or half its feature size where that is less, so
+  /// that thin sheets and small balls are found for any spacing.
   [[nodiscard]] double cell(const Field& field) const;
   [[nodiscard]] bool is_cell_of_feature(const Field& field) const;
   /// @throws Error{Limit} as update() would of this field
@@ -59,7 +59,7 @@ class EvenSampler {
   std::uint64_t next_id_ = 0;
 };
 
-/// The spacing at which a large smooth surface gets about this many samples a square metre: 1.28 / sqrt(density).
+/// The spacing at which a large smooth surface gets about this many samples per square metre: 1.28 / sqrt(density).
 [[nodiscard]] double even_spacing(double density);
 
 }  // namespace supple::implicit

@@ -11,7 +11,7 @@
 
 namespace supple::implicit {
 
-/// Work of the evaluations since the last reset, for `--profile`; approximate under threads is not allowed: counted per
+/// Work of the evaluations since the last reset, for `--profile`; exact with threads: counted per
 /// call and summed by the caller.
 struct FieldCounts {
   std::uint64_t points = 0;
@@ -36,15 +36,15 @@ class Field {
   [[nodiscard]] double feature_size() const;
   /// For bodies with `has_convex_core`.
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
-  /// Whether it is known that all {F >= c} are convex: `has_convex_levels`.
+  /// Whether all {F >= c} are known to be convex: `has_convex_levels`.
   [[nodiscard]] bool convex() const noexcept;
 
-  /// Bounds of F on a box, never wider than `bound` and on small boxes with overlapping primitives far narrower: value and
+  /// Bounds of F on a box, never wider than `bound` and much narrower on small boxes with overlapping primitives: value and
   /// gradient at the centre and bounds of the second derivatives leave an error of second order in the box. Costs about
   /// twice as much.
   [[nodiscard]] Interval tight_bound(const Box& box) const;
-  /// The same, and what |grad F| is at least [1/m]: above 0 only on boxes so small that the gradient hardly turns. Where a
-  /// blend has creases, all of Clarke's generalised gradient is meant: F has no extremum in a box where it is above 0.
+  /// The same, and a lower bound of |grad F| [1/m]: above 0 only on boxes so small that the gradient hardly rotates. Where a
+  /// blend has creases it bounds Clarke's generalised gradient: F has no extremum in a box where it is above 0.
   struct BoxBounds {
     Interval value{};
     double least_slope = 0.0;
@@ -57,15 +57,15 @@ class Field {
   [[nodiscard]] Mat3 hessian(const Vec3& point) const;
 
   [[nodiscard]] std::size_t primitive_count() const;
-  /// What evaluating these points as one batch visits against what is present.
+  /// Numbers of primitives visited and present when these points are evaluated as one batch.
   [[nodiscard]] FieldCounts count(std::span<const Vec3> points) const;
   /// Off: every primitive is evaluated at every point. Changes no bit of any value; on by default.
   void set_culling(bool on);
 
   struct Index;
-  /// What the loops of this module read, the hierarchy included; private to it.
+  /// Data for the loops of this module, the hierarchy included; private to it.
   [[nodiscard]] const Index& index() const;
-  /// The same without the hierarchy, which is built when it is first asked for.
+  /// The same without the hierarchy, which is built on first use.
   [[nodiscard]] const Index& packed() const noexcept { return *index_; }
 
  private:
@@ -76,7 +76,7 @@ class Field {
 /// Stage 3. Rebuilds `field` for the placed primitives; capacity is reused.
 void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& field);
 
-/// The clear reference: sums `potential` of every primitive, no index, no batch;
+/// Reference implementation: sums `potential` of every primitive, without index or batches;
 /// of other rules than the sum the gradient is a central difference over 1e-6 m.
 [[nodiscard]] double evaluate_reference(const Skeleton& skeleton, const PlacedSkeleton& placed, const Vec3& point,
                                         Vec3* gradient = nullptr);

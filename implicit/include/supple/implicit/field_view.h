@@ -23,31 +23,31 @@ struct FieldParts {
   std::vector<std::uint32_t> part;    ///< index of the part within its body
   std::vector<double> value;          ///< f_k [1]
   std::vector<Vec3> gradient;         ///< grad f_k [1/m]
-  /// What F rises by where a part turns, beyond -grad f_k . (omega x r) of one that is carried [1/rad]: blends by gradients see its own
-  /// gradient turn. Empty: nothing.
+  /// Derivative of F by the rotation of a part, beyond -grad f_k . (omega x r) of rigid motion [1/rad]: in blends by gradients the part's own
+  /// gradient rotates. Empty: zero.
   std::vector<Vec3> by_turn{};
 };
 
-/// A convex body as seen from a place: its core is a convex set, around which all its level sets lie at equal distances.
+/// The medial set of a convex body seen from a point: a convex set around which all level sets of the body lie at equal distances.
 struct CorePoint {
-  Vec3 point = Vec3::Zero();  ///< of the core, nearest to the place [m]
-  double radius = 0.0;        ///< from the core to the surface [m]
-  bool round = false;         ///< the field is the same all around the line from any place to its `point`: balls, half-spaces
+  Vec3 point = Vec3::Zero();  ///< of the medial set, nearest to the point [m]
+  double radius = 0.0;        ///< from the medial set to the surface [m]
+  bool round = false;         ///< the field is symmetric about the line from any point to its `point`: balls, half-spaces
 };
 
-/// A field of a convex body may say so; what it says is exact.
+/// Optional operation of fields of convex bodies; its result is exact.
 template <class T>
 concept HasCore = requires(const T& field, const Vec3& place) {
   { field.core_point(place) } -> std::same_as<std::optional<CorePoint>>;
 };
 
-/// A field may say whether it is known that all {F >= c} are convex; those with a core are.
+/// Optional operation: whether all {F >= c} are known to be convex; those with a medial set are.
 template <class T>
 concept SaysWhetherConvex = requires(const T& field) {
   { field.convex() } -> std::same_as<bool>;
 };
 
-/// What a type must offer to be seen through a FieldView.
+/// Operations that a type must have to be used through a FieldView.
 template <class T>
 concept ScalarField = requires(const T& field, std::span<const Vec3> points, std::span<double> values,
                                std::span<Vec3> gradients, const Box& box, FieldParts& parts) {
@@ -60,7 +60,7 @@ concept ScalarField = requires(const T& field, std::span<const Vec3> points, std
   { field.feature_size() } -> std::convertible_to<double>;
 };
 
-/// Non-owning view of any ScalarField; one indirect call a batch. The viewed object must outlive it.
+/// Non-owning view of any ScalarField; one indirect call per batch. The viewed object must outlive it.
 class FieldView {
  public:
   FieldView() = default;
@@ -90,10 +90,10 @@ class FieldView {
   /// A length [m] below which F has no features: iterations limit their steps to half of it.
   [[nodiscard]] double feature_size() const { return table_->feature_size(self_); }
 
-  /// The nearest point of the core of a convex body; none where the field does not know its body to be convex.
+  /// The nearest point of the medial set of a convex body; none where the body is not known to be convex.
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const { return table_->core_point(self_, place); }
 
-  /// Whether it is known that all {F >= c} are convex.
+  /// Whether all {F >= c} are known to be convex.
   [[nodiscard]] bool convex() const { return table_->convex(self_); }
 
   [[nodiscard]] double value(const Vec3& p) const {
@@ -106,7 +106,7 @@ class FieldView {
     evaluate({&p, 1}, {&v, 1}, {&gradient, 1});
     return v;
   }
-  /// The viewed object if it is a Field, else null: some loops are faster when they see the primitives.
+  /// The viewed object if it is a Field, else null: some loops are faster with access to the primitives.
   [[nodiscard]] const Field* as_field() const noexcept { return self_ != nullptr ? table_->as_field(self_) : nullptr; }
   explicit operator bool() const noexcept { return self_ != nullptr; }
 

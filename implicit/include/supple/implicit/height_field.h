@@ -1,5 +1,5 @@
 /// @file supple/implicit/height_field.h
-/// Terrain for bodies to meet: a solid under heights on a regular grid.
+/// Terrain: a solid under heights on a regular grid.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ using Vec2 = Eigen::Vector2d;
 /// Bicubic Hermite function through values at the points (i, j) of a unit grid, C^1, that stays within the corners' values in every cell and is
 /// exact for a + b u + c v + d u v. Slopes at the points are central differences, parabolas through three points at the borders, limited to
 /// 3/2 of the smaller one-sided difference, and 0 where these change sign (Fritsch & Carlson 1980; limits as of van Leer 1977); mixed
-/// derivatives are limited alike. All Bezier points of a cell then lie within its corners.
+/// derivatives are limited in the same way. All Bezier points of a cell then lie within the values of its corners.
 class LimitedBicubic {
  public:
   /// @param values  row after row, shape [rows][columns]   @pre columns, rows >= 2
@@ -49,7 +49,7 @@ class LimitedBicubic {
 };
 
 /// Ground of varying height with upright sides, {z <= h(x, y)} over the rectangle of a regular grid and nothing beyond it. F is -slope times a
-/// distance: of the sides, of the rims beyond them, and over the ground (z - h) w, w the cosine of its slope, interpolated as h is. So F is the
+/// distance: to the sides, to the edges beyond them, and over the ground (z - h) w, w the cosine of its slope, interpolated as h is. So F is the
 /// signed distance exactly where h is a plane, and else to first order near the points of the grid. Where the ground and a side are equally near,
 /// the gradient jumps.
 class HeightField {

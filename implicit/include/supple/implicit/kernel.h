@@ -6,7 +6,7 @@
 
 namespace supple::implicit {
 
-/// With rho = d/R and u = rho^2; all but Gascuel's are 1 at d = 0. rho_c is where f = 0.5, so where the surface of a lone
+/// With rho = d/R and u = rho^2; all but Gascuel's are 1 at d = 0. rho_c is where f = 0.5, so where the surface of a single
 /// point lies at that iso value.
 enum class KernelKind : std::uint8_t {
   Wyvill,        ///< (1 - u)^3; C^2; rho_c = 0.454202019
@@ -33,7 +33,7 @@ struct Kernel {
   double slope = 0.0;      ///< Gascuel: -f'(e) = -f'(d <= e) [1/m], > 0; needs slope (R - e) <= 3 iso
   double iso = 0.5;        ///< the iso value c that Gascuel's kernel is scaled to: f(e) = c
   double shape = 0.0;      ///< Blinn, Cauchy: sharpness s [1]; BlancSchlick: hardness p [1]
-  /// Blinn, Cauchy: f = gain (g(u) - floor (1 + tilt (1 - u))) with g convex in u: its tangent at the support is taken off,
+  /// Blinn, Cauchy: f = gain (g(u) - floor (1 + tilt (1 - u))) with g convex in u: its tangent at the support is subtracted,
   /// so that value and slope vanish there, and f(0) = 1.
   double floor = 0.0;
   double tilt = 0.0;
@@ -65,7 +65,7 @@ struct Kernel {
 [[nodiscard]] KernelSample evaluate(const Kernel& kernel, double q) noexcept;
 /// Second derivative d2f/dq2 [1/m^4].
 [[nodiscard]] double second_slope(const Kernel& kernel, double q) noexcept;
-/// f at d = 0 [1]: what an iso value must stay below.
+/// f at d = 0 [1]: upper limit of iso values.
 [[nodiscard]] double peak(const Kernel& kernel) noexcept;
 /// max over d of |df/dd| [1/m] (Wyvill: 96 / (25 sqrt 5) / R).
 [[nodiscard]] double lipschitz(const Kernel& kernel) noexcept;

@@ -1,6 +1,6 @@
 /// @file supple/implicit/kinks.h
 /// Where derivatives of a field jump: between the regions of a shape whose nearest point is on a face, an edge or a corner,
-/// and where a kernel goes over to another formula or ends. Quadrature rules part their intervals there.
+/// and where a kernel changes its formula or ends. Quadrature rules split their intervals there.
 #pragma once
 
 #include <cstdint>
@@ -29,12 +29,12 @@ struct Kink {
   /// s [m], a signed distance to first order where `to_local` does not stretch, and its gradient [1].
   [[nodiscard]] double value(const Vec3& x, Vec3& gradient) const noexcept;
   [[nodiscard]] double value(const Vec3& x) const noexcept;
-  /// What s changes by at most within a distance of x [m].
+  /// Largest change of s within a distance of x [m].
   [[nodiscard]] double change(const Vec3& x, double distance) const noexcept;
 };
 
 /// Appends the kinks of the primitives whose supports may meet the box; some of them may not meet the box, or the body.
-/// @return whether these are all: not so for curves, superquadrics and convolved primitives, for arcs, rings and tapered segments beside
+/// @return whether these are all kinks: false for curves, superquadrics and convolved primitives, for arcs, rings and tapered segments beside
 ///         others or of kernels of several formulas, for arcs and rings whose axis may meet the box, and not for fields that combine their
 ///         parts by another rule than the sum
 bool kinks_of(const Field& field, const Box& box, std::vector<Kink>& out);

@@ -19,22 +19,22 @@ namespace supple::implicit {
 struct MarchCounts {
   std::uint64_t blocks = 0;         ///< blocks of 16^3 cells within reach of the body
   std::uint64_t tiles = 0;          ///< tiles of 4^3 nodes that hold values
-  std::uint64_t tiles_sampled = 0;  ///< places of tiles that were looked at in this call
+  std::uint64_t tiles_sampled = 0;  ///< positions of tiles that were processed in this call
   std::uint64_t nodes = 0;          ///< values held
   std::uint64_t kernel_values = 0;  ///< terms of the sums on nodes that this call took, in single precision
   std::uint64_t bytes = 0;          ///< held besides the mesh
   bool single_precision = false;    ///< the body is nothing but Wyvill points
   double cell = 0.0;                ///< edge of a cell that was used [m]
   int refinements = 0;
-  double error = 0.0;               ///< when one was asked for: the largest found [m]
-  std::uint64_t straight_edges = 0;  ///< of refined meshes: edges whose middles stay on them, as triangles would cross
-  std::uint64_t blunt_cells = 0;    ///< of march_creases: cells whose crease stays cut off, as triangles would cross
+  double error = 0.0;               ///< with options.error: the largest found [m]
+  std::uint64_t straight_edges = 0;  ///< of refined meshes: edges whose midpoints stay on them, as triangles would intersect
+  std::uint64_t blunt_cells = 0;    ///< of march_creases: cells whose crease stays cut off, as triangles would intersect
 };
 
-/// Lattice nodes in the box of a body that may be asked for.
+/// Largest number of lattice nodes in the bounding box of a body.
 inline constexpr std::uint64_t kMarchNodes = 1'000'000'000;
 inline constexpr int kMostRefinements = 4;
-/// What a mesher of a body keeps at most of the meshes that it tried to reach an error [byte], unless it is told otherwise. If the last alone needs more,
+/// Default limit of the data that a mesher keeps of trial meshes for an error [byte]. If the last one alone needs more,
 /// nothing is kept.
 inline constexpr std::uint64_t kMostKeptToError = std::uint64_t{1} << 30;
 
@@ -44,43 +44,43 @@ struct MarchOptions {
   /// Largest distance of a triangle's centroid to the surface [m]; 0: as lattice and refinements give. Otherwise both are
   /// chosen, with cells of at most half the field's feature size and, if that is stated, lattice.cell; see `make`.
   double error = 0.0;
-  /// Refined triangles are not looked at for crossings: half to four fifths of the time, for a mesh that may cross itself where the surface turns
+  /// Refined triangles are not checked for intersections: half to four fifths of the time, for a mesh that may intersect itself where the surface bends
   /// within a cell.
   bool may_cross = false;
-  /// Sums of Wyvill points end where they are sure to be inside, unless the surface is next to them; what failed to mend creases is not tried again. Changes no bit.
+  /// Sums of Wyvill points end where nodes are proved to be inside, unless the surface is next to them; failed repairs of creases are not repeated. Changes no bit.
   bool skip = true;
 };
 
-/// Meshes one body again and again. Memory is kept from call to call, and so is all of an unrefined mesh that no moved
-/// primitive reaches; the result is what a fresh mesher gives, bit by bit. Primitives are compared by their numbers with those
-/// of the last call. All is made anew when half of them moved or another lattice, iso value or blend is given. Refined meshes keep the
-/// vertices that such primitives do not reach. With options.error all meshes that are tried are kept, and errors of their triangles: meshes,
-/// what is tried and what is refused are those of a fresh mesher. Fields that are no Field are sampled anew in each call.
+/// Meshes one body repeatedly. Memory is kept from call to call, and so are all parts of an unrefined mesh that no moved
+/// primitive reaches; the result is that of a new mesher, bit by bit. Primitives are compared with those of the same number
+/// in the last call. Everything is rebuilt when half of them moved or another lattice, iso value or blend is given. Refined meshes keep the
+/// vertices that moved primitives do not reach. With options.error all trial meshes are kept, with the errors of their triangles: results,
+/// trial meshes and refusals are those of a new mesher. Fields other than Field are sampled again in each call.
 class CubeMesher {
  public:
-  /// @param most_kept  of all meshes that were tried with options.error [byte]; where they need more, the coarsest are made anew
+  /// @param most_kept  limit of kept data of all trial meshes with options.error [byte]; beyond it the coarsest are rebuilt
   explicit CubeMesher(std::uint64_t most_kept = kMostKeptToError);
   ~CubeMesher();
   CubeMesher(CubeMesher&&) noexcept;
   CubeMesher& operator=(CubeMesher&&) noexcept;
 
   /// The closed surface F = 0, outward oriented, with the normals of the field; valid until the next call.
-  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges; where triangles would then cross, as
-  /// at a neck about to close, they stay in the middle of the edge that they cut.
-  /// With options.error, a body of separate balls is found whole: half a support is a cell that no ball of its surface passes
-  /// through. Triangles get shorter by sqrt(2) until the error is met, first by refinements, twice at most, then by smaller cells.
+  /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges; where triangles would then intersect, as
+  /// at a neck about to close, they stay in the middle of the edge that they split.
+  /// With options.error, a body of separate balls is found completely: half a support is a cell that no ball of its surface passes
+  /// through. Triangles get shorter by sqrt(2) until the error is met, first by at most two refinements, then by smaller cells.
   /// Distances are |F| / |grad F|, or by Newton's method where the surface turns within a triangle.
   /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes; with options.error,
-  /// as soon as no mesh within kMarchNodes nodes and 8 GB is to be expected to reach it.
+  /// as soon as no mesh within kMarchNodes nodes and 8 GB can be expected to meet it.
   const Mesh& make(const FieldView& field, const MarchOptions& options, const Executor& executor,
                    MarchCounts* counts = nullptr);
-  /// The next call keeps nothing but memory.
+  /// Drops all kept data except allocated memory.
   void forget();
-  /// From the next call on, as the constructor's. Changes no bit of a mesh. [byte]
+  /// Sets the constructor's limit from the next call on [byte]. Changes no bit of a mesh.
   void keep_at_most(std::uint64_t most_kept);
-  /// What is kept of meshes that were tried [byte], the last one among them.
+  /// Kept data of trial meshes, the last one included [byte].
   [[nodiscard]] std::uint64_t kept_to_error() const;
-  /// Makes no mesh of about most_triangles or more. @throws Error{Limit} as make, as far as that follows from coarser ones @pre options.error > 0
+  /// Checks without meshes of about most_triangles or more. @throws Error{Limit} as make, as far as that follows from coarser meshes @pre options.error > 0
   void expect_error(const FieldView& field, const MarchOptions& options, const Executor& executor, std::uint64_t most_triangles);
 
  private:

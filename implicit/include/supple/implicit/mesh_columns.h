@@ -1,6 +1,6 @@
 /// @file supple/implicit/mesh_columns.h
-/// What the parts (particles) of a body know, spread over its surface as columns of the mesh: weighted by each part's
-/// share of the field, and where no part reaches (in a bulge) taken from the nearest one.
+/// Values of the parts (particles) of a body as columns of its surface mesh: weighted by each part's
+/// share of the field; where no part reaches (in a bulge) taken from the nearest part.
 #pragma once
 
 #include <span>
@@ -13,19 +13,19 @@
 
 namespace supple::implicit {
 
-/// Where a part is and where it was at rest.
+/// Present pose and rest pose of a part.
 struct PartPlace {
   Pose now;
   Pose rest;
 };
 
-/// Adds the columns "rest_x", "rest_y", "rest_z" [m]: where each vertex was at rest, if every part had carried it along
-/// rigidly, from `origin`. Of a body that moves rigidly they are exact, so what they colour sticks to it.
+/// Adds the columns "rest_x", "rest_y", "rest_z" [m]: the rest position of each vertex, if every part carried it
+/// rigidly, from `origin`. Of a body that moves rigidly they are exact, so textures stick to it.
 /// @param parts  by the field's part index
 void add_rest_coordinates(const FieldView& field, std::span<const PartPlace> parts, const Vec3& origin,
                           const Executor& executor, Mesh& mesh);
 
-/// Adds a column `name` of one number a part. @param places of the parts [m]  @param values  shape of places
+/// Adds a column `name` of one value per part. @param places  of the parts [m]  @param values  shape of places
 void add_part_values(const FieldView& field, std::span<const Vec3> places, std::span<const double> values,
                      const std::string& name, const Executor& executor, Mesh& mesh);
 

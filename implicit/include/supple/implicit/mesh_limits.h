@@ -1,6 +1,6 @@
 /// @file supple/implicit/mesh_limits.h
-/// Whether meshes and grids would be refused for their size, by what refuses them, before anything is sampled but where an error is asked
-/// for. Where the box of a surface holds few enough blocks nothing else is looked at.
+/// Checks whether meshes and grids would be refused for their size, by the same limits, before anything is sampled (except where an error
+/// is given). Where the bounding box of a surface has few enough blocks nothing else is checked.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace supple::implicit {
 void expect_marchable(const FieldView& field, const Lattice& lattice, const Executor& executor);
 /// @throws Error{Limit} as polygonise_partition and, for one field, polygonise
 void expect_divisible(std::span<const FieldView> fields, const Lattice& lattice, const Executor& executor);
-/// @throws Error{Limit} as polygonise_partition_within, as far as that follows from meshes of about most_blocks at most. These are made.
+/// @throws Error{Limit} as polygonise_partition_within, as far as that follows from meshes of at most about most_blocks, which are made.
 void expect_divisible_within(std::span<const FieldView> fields, const Lattice& coarsest, const PartitionError& error, const Executor& executor,
                              std::uint64_t most_blocks);
 /// @throws Error{Limit} as make_surface_grid

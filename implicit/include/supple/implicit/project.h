@@ -17,17 +17,17 @@ struct Projection {
 
 /// Newton along the gradient, x <- x - F grad F / |grad F|^2, each step at most half the feature size; a bracketed root
 /// between the last two points when a step changed the sign of F without halving it. Fails (converged = false) where
-/// the gradient vanishes. The result depends on the feature size and on values in `asked` alone.
-/// @param asked  grows by a box of the points at which the field was asked
-[[nodiscard]] Projection project_to_surface(const FieldView& field, const Vec3& start, int max_iterations = 50, Box* asked = nullptr);
+/// the gradient vanishes. The result depends on the feature size and on values in `evaluated` alone.
+/// @param evaluated  grows by a box of the points at which the field was asked
+[[nodiscard]] Projection project_to_surface(const FieldView& field, const Vec3& start, int max_iterations = 50, Box* evaluated = nullptr);
 
 /// Root of F on the segment a + t (b - a), t in [0, 1], F(a) and F(b) of opposite sign: bracketed Newton.
 /// @pre F(a) F(b) <= 0
 [[nodiscard]] Vec3 root_on_segment(const FieldView& field, const Vec3& a, const Vec3& b);
 
-/// First point of F = 0 on the ray origin + t direction, t in [0, t_max]. Stretches of the ray are passed only where bounds of F, of |grad F|
+/// First point of F = 0 on the ray origin + t direction, t in [0, t_max]. Intervals of the ray are skipped only where bounds of F, of |grad F|
 /// (segment tracing, Galin et al. 2020) or of F' along the ray exclude a root, so neither thin nor grazed surfaces are missed. A ray that
-/// passes too near for any bound counts as meeting: sums of kernels of distances within the rounding of F, other Fields and views within
+/// passes too close for any bound counts as a hit: sums of kernels of distances within the rounding of F, other Fields and views within
 /// 1e-8 features, or their rounding. Where F jumps (blends by gradients, where the gradient of a node vanishes), and along views that do
 /// not bound their slope (there 1e-3 features), only a change of sign counts.
 /// @pre direction is a unit vector

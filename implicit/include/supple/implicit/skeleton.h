@@ -15,8 +15,8 @@
 
 namespace supple::implicit {
 
-/// Each shape in its own frame, with the meaning of `size` and `control`. q is the squared distance that the kernel sees:
-/// that to the nearest point of the shape, unless it says otherwise. R is the kernel's radius.
+/// Each shape in its own frame, with the meaning of `size` and `control`. q is the squared distance for the kernel:
+/// that to the nearest point of the shape, unless stated otherwise. R is the kernel's radius.
 enum class ShapeKind : std::uint8_t {
   Point,         ///< q = |y|^2
   Segment,       ///< from -size.x to +size.x along x; `taper`
@@ -36,7 +36,7 @@ enum class ShapeKind : std::uint8_t {
 };
 
 struct Primitive {
-  std::uint32_t part = 0;  ///< which part of the body carries it
+  std::uint32_t part = 0;  ///< the part of the body that carries it
   ShapeKind shape = ShapeKind::Point;
   Vec3 size = Vec3::Zero();  ///< [m], by shape
   Pose offset;               ///< primitive frame -> part frame
@@ -61,10 +61,10 @@ struct ShapeSample {
   Vec3 gradient = Vec3::Zero();  ///< grad q [m]
 };
 [[nodiscard]] ShapeSample evaluate(const Primitive& primitive, const Vec3& y) noexcept;
-/// Second derivatives of q [1] where they exist; they jump where the foot point goes to another piece of the shape.
+/// Second derivatives of q [1] where they exist; they jump where the foot point changes to another piece of the shape.
 [[nodiscard]] Mat3 second_derivative(const Primitive& primitive, const Vec3& y) noexcept;
 
-/// f of a primitive alone in its own frame.
+/// f of a single primitive in its own frame.
 struct Potential {
   double value = 0.0;            ///< [1]
   Vec3 gradient = Vec3::Zero();  ///< [1/m]
@@ -87,7 +87,7 @@ struct Skeleton {
   std::vector<Primitive> primitive;
   std::uint32_t part_count = 0;
   double iso = 0.5;  ///< c: the body is {sum f >= c}
-  Blend blend;       ///< how the parts combine, if not as a sum
+  Blend blend;       ///< combination of the parts, if not a sum
 };
 
 /// Whether the body is convex by construction: one primitive, offsets of a convex shape.
@@ -102,16 +102,16 @@ struct PlacedSkeleton {
   std::vector<Box> support;    ///< box of {f_k > 0} [m], shape [primitives]
   // Of more than 64 unstretched points with Wyvill's kernel and nothing else, which need no rotation; else empty.
   std::vector<double> radius;       ///< R [m]
-  std::vector<std::uint32_t> part;  ///< that carries it
+  std::vector<std::uint32_t> part;  ///< the part that carries it
 };
 
-/// Box of {f > 0} of a primitive placed in the world, wider than the round-off of f: what lies outside is exactly zero.
+/// Box of {f > 0} of a primitive placed in the world, enlarged by the round-off of f: outside it f is exactly zero.
 [[nodiscard]] Box placed_support(const Primitive& primitive, const Vec3& position, const Mat3& rotation) noexcept;
 
 /// Stage 2. @param parts  world poses of the body's parts, shape [part_count]
 void place_skeleton(const Skeleton& skeleton, std::span<const Pose> parts, PlacedSkeleton& out);
 
-/// All that a field of them depends on, bit by bit.
+/// Everything that a field of them depends on, to the bit.
 void add_content(const Skeleton& skeleton, const PlacedSkeleton& placed, ContentWords& words);
 
 }  // namespace supple::implicit

@@ -1,6 +1,6 @@
 /// @file supple/implicit/solids.h
-/// Solids that do not give way: walls, blocks and terrain for bodies to meet. Each is a ScalarField of one part whose value is
-/// `slope` times a depth, so that with a modulus P its pressure rises by P slope a metre. HalfSpace is in field.h, terrain in height_field.h.
+/// Rigid solids: walls, blocks and terrain. Each is a ScalarField of one part whose value is
+/// `slope` times a depth, so that with a modulus P its pressure rises by P slope per metre. HalfSpace is in field.h, terrain in height_field.h.
 #pragma once
 
 #include <cstdint>
@@ -28,9 +28,9 @@ class SolidBox {
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
   [[nodiscard]] std::optional<CorePoint> core_point(const Vec3& place) const;
-  /// Its surface with sharp edges, one quadrangle a face.
+  /// Its surface with sharp edges, one quadrangle per face.
   [[nodiscard]] Mesh mesh() const;
-  /// The same box elsewhere.
+  /// The same box at another pose.
   [[nodiscard]] SolidBox placed(const Pose& pose) const { return {pose, half_, rounding_, slope_}; }
 
  private:

@@ -22,7 +22,7 @@ enum class GridContent : std::uint8_t {
   SignedDistance,  ///< first-order distance -F/|grad F| [m], < 0 inside, clamped to the band; grid class level set
 };
 
-/// Smallest cell of a grid [m]: OpenVDB takes a transform as singular whose determinant is below 3e-15.
+/// Smallest cell of a grid [m]: OpenVDB treats a transform as singular if its determinant is below 3e-15.
 inline constexpr double kLeastGridCell = 1.45e-5;
 
 struct GridOptions {
@@ -57,16 +57,16 @@ class SurfaceGrid {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Samples the band {|F| <= half_width cell |grad F|}: only leaves that bounds cannot exclude are evaluated.
-/// @throws Error{Limit} before allocating when the band could exceed max_voxels, naming the cell size that would fit, and for cells below
+/// Samples the band {|F| <= half_width cell |grad F|}: only leaves that bounds do not exclude are evaluated.
+/// @throws Error{Limit} before allocating when the narrow band could exceed max_voxels, naming a sufficient cell size, and for cells below
 /// kLeastGridCell.
 [[nodiscard]] SurfaceGrid make_surface_grid(const FieldView& field, const GridOptions& options,
                                             const Executor& executor);
 
 struct GridCounts {
-  std::uint64_t leaves_looked_at = 0;  ///< leaves of 8^3 voxels that bounds or values were asked for in this call
+  std::uint64_t leaves_looked_at = 0;  ///< leaves of 8^3 voxels whose bounds or values were evaluated in this call
   std::uint64_t leaves_sampled = 0;    ///< of these, evaluated
-  bool whole = false;                  ///< everything was made anew
+  bool whole = false;                  ///< everything was rebuilt
 };
 
 /// Makes the grid of one body again and again: only leaves are touched that the support of a primitive that moved, or was
@@ -93,10 +93,10 @@ class GridUpdater {
 /// first order, whatever the kernels of the fields that are compared.
 class DepthField {
  public:
-  /// @param field  what it looks at must outlive this
+  /// @param field  the viewed object must outlive this
   explicit DepthField(FieldView field) : field_(field) {}
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
-  /// Gradients are unit vectors along grad F, or 0 where that is: values are infinite there, or 0 on the surface.
+  /// Gradients are unit vectors along grad F, or 0 where grad F is 0: values are infinite there, or 0 on the surface.
   void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
   void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { field_.evaluate_parts(points, parts); }
   [[nodiscard]] Interval bound(const Box& box) const;
@@ -129,9 +129,9 @@ class UnitedField {
 
 /// A body of a union.
 struct UnitedBody {
-  FieldView view;             ///< for GridContent::SignedDistance its depth, of slope 1 (DepthField); must outlive the call
-  std::uint64_t version = 0;  ///< no two the same: equal ones, of any calls, mean that the view is the same bit for bit (core/content_versions.h)
-  const Field* field = nullptr;  ///< that it is, or is the depth of, if of one: then leaves stay that none of its moved primitives reaches
+  FieldView view;             ///< for GridContent::SignedDistance its DepthField, of slope 1; must outlive the call
+  std::uint64_t version = 0;  ///< unique: equal versions, of any calls, mean that the view is unchanged to the bit (core/content_versions.h)
+  const Field* field = nullptr;  ///< the Field behind the view, if any: then leaves out of reach of its moved primitives are kept
 };
 
 /// Makes the grid of several bodies as one again and again: only leaves are touched that a body may reach which is no longer, or was
@@ -154,9 +154,9 @@ class UnionUpdater {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles cut in two, its vertices projected
-/// onto the surface of the field along its gradients, with its normals. Vertices stay that Newton's steps do not bring there within half a
-/// cell, or whose triangles would turn over or cross others, and all of a closed piece that would be pressed flat.
+/// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles divided, its vertices projected
+/// onto the surface of the field along its gradients, with its normals. Vertices keep their position that Newton's steps do not bring there within half a
+/// cell, or whose triangles would be inverted or intersect others, and all of a closed piece that would be flattened.
 /// @param field  that the grid was made from
 [[nodiscard]] Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor);
 

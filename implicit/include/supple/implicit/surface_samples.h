@@ -1,6 +1,6 @@
 /// @file supple/implicit/surface_samples.h
 /// Surface samples kept on particles (Desbrun & Gascuel 1995): each primitive sends seeds along directions fixed in its
-/// part's frame; a seed keeps its distance rho along its ray from one step to the next and is re-projected.
+/// part's frame; a seed keeps its distance rho along its ray from one step to the next and is projected again.
 /// A seed is valid while its own primitive contributes most at its point (ties go to the lower primitive), so the
 /// territories partition the surface.
 #pragma once
@@ -18,30 +18,30 @@ namespace supple::implicit {
 
 /// The seeds of one body, const in a Scene; index s is the same seed in every array.
 struct SampleLayout {
-  std::vector<std::uint32_t> primitive;  ///< which primitive sends it
+  std::vector<std::uint32_t> primitive;  ///< the primitive that sends it
   std::vector<std::uint32_t> part;       ///< the part that carries that primitive
   std::vector<Vec3> foot;                ///< start on the skeleton, part frame [m]
   std::vector<Vec3> direction;           ///< unit, part frame
   std::vector<double> reach;             ///< longest rho to search: the kernel's support along the ray [m]
   /// Coefficients (a, b, c) of the area a + b rho + c rho^2 swept across the ray: a face [m^2] has (a, 0, 0), an edge
-  /// [m] (0, b, 0), a corner or centre [sr] (0, 0, c), a disc's rim (0, b, c). On the surface: that area / (u . n).
+  /// [m] (0, b, 0), a corner or centre [sr] (0, 0, c), a disc's edge (0, b, c). On the surface: that area / (u . n).
   std::vector<Vec3> spread;
   [[nodiscard]] std::size_t size() const noexcept { return part.size(); }
   void clear() noexcept;
 };
 
-/// Seeds whose spacing on the surface of the lone primitive is at most `spacing` [m] (each stands for at most
+/// Seeds whose spacing on the surface of the single primitive is at most `spacing` [m] (each represents at most
 /// spacing^2), spread evenly and symmetrically: sphere-like around points and ellipsoids, faces plus rounded borders
-/// around plates, boxes, discs and segments. At least 32 a primitive. @pre spacing > 0
+/// around plates, boxes, discs and segments. At least 32 per primitive. @pre spacing > 0
 [[nodiscard]] SampleLayout make_sample_layout(const Skeleton& skeleton, double spacing);
 
 /// The same seeds, but only those whose rays meet a box; replaces the content of `out`, keeps its capacity.
 /// @param parts  world poses, shape [part_count]   @param near  world [m]
-/// @return how many seeds were looked at: those of points, plates, boxes, ellipsoids only around the box
+/// @return number of seeds that were tested: for points, plates, boxes and ellipsoids only those around the box
 std::size_t make_sample_layout(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box& near,
                                SampleLayout& out);
 
-/// What survives a step: rho per seed [m]; NaN-free; negative = no root was found. Part of State.
+/// The data that survive a step: rho per seed [m]; NaN-free; negative = no root was found. Part of State.
 struct SampleState {
   std::vector<double> distance;
   void save(StateWriter& out) const;

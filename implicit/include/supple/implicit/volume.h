@@ -1,5 +1,5 @@
 /// @file supple/implicit/volume.h
-/// A body's volume held near a target by growing and shrinking its kernels (Desbrun & Gascuel 1995): a proportional-derivative
+/// A body's volume kept near a target by scaling its kernels (Desbrun & Gascuel 1995): a proportional-derivative
 /// controller on the measured volume. The paper shifts a kernel, f(d - epsilon); here its lengths are
 /// multiplied by a scale, which keeps it smooth at the skeleton and compact.
 #pragma once
@@ -13,11 +13,11 @@
 
 namespace supple::implicit {
 
-/// Volume of {F >= 0} by cubic cells [m^3]: whole ones where bounds show it, the others by the part of them on the inner side of
-/// the plane that touches the surface at the foot of their middle, less what the curvature adds. Exact for planes; relative to
+/// Volume of {F >= 0} by cubic cells [m^3]: full cells where bounds prove it, the others by their part on the inner side of
+/// the tangent plane at the foot point of their centre, with a correction for curvature. Exact for planes; relative to
 /// the volume it errs by about a third of (cell / radius of curvature)^4, the same for every kernel; second order at creases.
 /// Changes smoothly while the surface moves.
-/// @param cell  [m], > 0; where the support ends nearer to the surface than a cell, nothing is known of the cells beyond
+/// @param cell  [m], > 0; where the support ends closer to the surface than a cell, the cells beyond are unknown
 /// @pre the surface box is bounded
 [[nodiscard]] double enclosed_volume(const FieldView& field, double cell);
 

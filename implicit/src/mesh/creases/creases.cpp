@@ -133,7 +133,7 @@ double CreaseMarcher::error(const Executor& executor) {
   const double feature = field_->feature_size();
   const bool other = std::exchange(feature_, feature) != feature;
   if (measured_ && !other) return error_;
-  const auto differs = [this](const Box& asked) { return marcher_.memory.view.differs_at(asked); };
+  const auto differs = [this](const Box& evaluated) { return marcher_.memory.view.differs_at(evaluated); };
   error_ = errors_.measure(*field_, mesh_, last_mesh_, !comparable_ || other, differs, executor);
   measured_ = true;
   return error_;

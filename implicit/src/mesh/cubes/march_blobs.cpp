@@ -110,7 +110,7 @@ class BlobSampler final : public Sampler {
     work.near_block = nullptr;
   }
 
-  void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals, Box& asked) const override {
+  void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals, Box& evaluated) const override {
     if (points.empty()) return;
     // Points may lie this far beyond the tile's cells; leaves and blocks are cut to it too.
     constexpr int kAround = 1;
@@ -132,7 +132,7 @@ class BlobSampler final : public Sampler {
     const Cells base = block.base();
     const auto corner = corner_of(tile);
     for (const int end : {-kAround, kTile + kAround}) {
-      asked.include(lattice::node_position(lattice_, base[0] + corner[0] + end, base[1] + corner[1] + end, base[2] + corner[2] + end));
+      evaluated.include(lattice::node_position(lattice_, base[0] + corner[0] + end, base[1] + corner[1] + end, base[2] + corner[2] + end));
     }
   }
 

@@ -63,9 +63,9 @@ struct ViewMemory {
   /// Whether values next to the surface, as far as a leaf, may be different in a box.
   [[nodiscard]] bool differs(const Box& box) const { return all || changed.meets(box, lattice); }
   /// Whether values anywhere in a box may be different.
-  [[nodiscard]] bool differs_at(const Box& asked) const {
-    if (all || !changed.covers(asked, lattice)) return true;
-    return changed.meets(asked, lattice) && may_meet(changes.reaches(), asked);
+  [[nodiscard]] bool differs_at(const Box& evaluated) const {
+    if (all || !changed.covers(evaluated, lattice)) return true;
+    return changed.meets(evaluated, lattice) && may_meet(changes.reaches(), evaluated);
   }
   /// Sees what is different in a field that is to be sampled, and `leaf` as it was.
   void compare(const FieldView& field, const Lattice& now);

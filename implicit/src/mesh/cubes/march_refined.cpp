@@ -103,12 +103,12 @@ void RefinedMarcher::find_changes() {
   }
 }
 
-bool RefinedMarcher::differs(const Box& asked) const {
-  if (asked.empty()) return false;
+bool RefinedMarcher::differs(const Box& evaluated) const {
+  if (evaluated.empty()) return false;
   if (all_differs_) return true;
-  if (!marcher_.sampler->single_precision()) return marcher_.memory.view.differs_at(asked);
+  if (!marcher_.sampler->single_precision()) return marcher_.memory.view.differs_at(evaluated);
   const Lattice& lattice = marcher_.lattice;
-  return !blob_changes_.covers(asked, lattice) || (blob_changes_.meets(asked, lattice) && may_meet(blob_reaches_, asked));
+  return !blob_changes_.covers(evaluated, lattice) || (blob_changes_.meets(evaluated, lattice) && may_meet(blob_reaches_, evaluated));
 }
 
 bool RefinedMarcher::is_same(const TileTriangles& tile, int step) {
@@ -183,7 +183,7 @@ void RefinedMarcher::cut(int step, bool may_cross, const Executor& executor, Cut
     for (std::size_t i = begin; i < end; ++i) {
       TileVertices& added = to.added[i];
       const TileVertices* known = last.made && last_tile_[i] != kNone ? &last.added[last_tile_[i]] : nullptr;
-      if (known != nullptr && (!is_same(tiles_[i], step - 1) || differs(known->asked))) known = nullptr;
+      if (known != nullptr && (!is_same(tiles_[i], step - 1) || differs(known->evaluated))) known = nullptr;
       points.clear();
       for_triangles(tiles_[i], step - 1, [&](std::size_t n) {
         const auto& t = triangle[n];
@@ -209,7 +209,7 @@ void RefinedMarcher::cut(int step, bool may_cross, const Executor& executor, Cut
       });
       const auto first = static_cast<std::ptrdiff_t>(added.first);
       if (known != nullptr) {  // vertices that stay keep their order, and so do the edges between them
-        added.asked = known->asked;
+        added.evaluated = known->evaluated;
         std::copy_n(last.mesh.position.begin() + known->first, added.count, mesh.position.begin() + first);
         std::copy_n(last.mesh.normal.begin() + known->first, added.count, mesh.normal.begin() + first);
         std::fill_n(to.same.begin() + first, added.count, std::uint8_t{1});
@@ -221,8 +221,8 @@ void RefinedMarcher::cut(int step, bool may_cross, const Executor& executor, Cut
         continue;
       }
       normals.resize(points.size());
-      added.asked = Box{};
-      marcher_.sampler->project(*tiles_[i].block, tiles_[i].tile, points, normals, added.asked);
+      added.evaluated = Box{};
+      marcher_.sampler->project(*tiles_[i].block, tiles_[i].tile, points, normals, added.evaluated);
       std::copy(points.begin(), points.end(), mesh.position.begin() + first);
       std::copy(normals.begin(), normals.end(), mesh.normal.begin() + first);
     }
@@ -249,13 +249,13 @@ double RefinedMarcher::error(int refinements, const Executor& executor) {
   executor.for_blocks(tiles_.size(), kTilesPerTask, [&](std::size_t begin, std::size_t end) {
     thread_local std::vector<std::uint32_t> triangle, tile;
     thread_local std::vector<double> error;
-    thread_local std::vector<Box> asked;
+    thread_local std::vector<Box> evaluated;
     triangle.clear();
     tile.clear();
     for (std::size_t i = begin; i < end; ++i) {
       if (last.measured && last_tile_[i] != kNone) {
         const TileError& known = last.error[last_tile_[i]];
-        if (is_same(tiles_[i], refinements) && !differs(known.asked)) {
+        if (is_same(tiles_[i], refinements) && !differs(known.evaluated)) {
           step.error[i] = known;
           continue;
         }
@@ -267,12 +267,12 @@ double RefinedMarcher::error(int refinements, const Executor& executor) {
       });
     }
     error.resize(triangle.size());
-    asked.resize(triangle.size());
-    centroid_errors(field_, mesh, triangle, error, asked);
+    evaluated.resize(triangle.size());
+    centroid_errors(field_, mesh, triangle, error, evaluated);
     for (std::size_t j = 0; j < triangle.size(); ++j) {
       TileError& of = step.error[tile[j]];
       of.error = std::max(of.error, error[j]);
-      of.asked = of.asked.united(asked[j]);
+      of.evaluated = of.evaluated.united(evaluated[j]);
     }
   });
   step.measured = true;

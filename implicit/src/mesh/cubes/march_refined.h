@@ -51,11 +51,11 @@ class RefinedMarcher {
   /// The vertices that cutting the triangles of a tile adds, and where the field was asked for them.
   struct TileVertices {
     std::uint32_t first = 0, count = 0;
-    Box asked;
+    Box evaluated;
   };
   struct TileError {
     double error = 0.0;  ///< [m]
-    Box asked;
+    Box evaluated;
   };
   /// After so many cuts.
   struct Step {
@@ -71,7 +71,7 @@ class RefinedMarcher {
   void find_changes();
   void cut(int step, bool may_cross, const Executor& executor, CutScratch& scratch);
   [[nodiscard]] Mesh& mesh_of(int step) { return step == 0 ? marcher_.mesh : now_[static_cast<std::size_t>(step)].mesh; }
-  [[nodiscard]] bool differs(const Box& asked) const;
+  [[nodiscard]] bool differs(const Box& evaluated) const;
   /// Calls use(triangle number) for the triangles of a tile after so many cuts.
   template <class Use>
   static void for_triangles(const TileTriangles& tile, int step, const Use& use) {

@@ -35,8 +35,8 @@ class Sampler {
                      std::vector<EdgePoint>& points) const = 0;
   /// Called on a thread before it projects points.
   virtual void begin_projection() const {}
-  /// Moves points near a tile to the surface. @param asked  grows by a box: where they come depends on the field in it, and its feature size
-  virtual void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals, Box& asked) const = 0;
+  /// Moves points near a tile to the surface. @param evaluated  grows by a box: where they come depends on the field in it, and its feature size
+  virtual void project(const Block& block, unsigned tile, std::span<Vec3> points, std::span<Vec3> normals, Box& evaluated) const = 0;
   /// Blocks that the table of any mesher has for this field at most, whatever is kept. @param table  that was laid out
   [[nodiscard]] virtual std::uint64_t most_blocks(const BlockTable& table) const = 0;
   [[nodiscard]] virtual bool single_precision() const = 0;

@@ -88,10 +88,10 @@ class ViewSampler final : public Sampler {
     });
   }
 
-  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals, Box& asked) const override {
+  void project(const Block&, unsigned, std::span<Vec3> points, std::span<Vec3> normals, Box& evaluated) const override {
     constexpr int kIterations = 50;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Projection found = project_to_surface(field_, points[i], kIterations, &asked);
+      const Projection found = project_to_surface(field_, points[i], kIterations, &evaluated);
       if (!found.converged) {  // left where it is, in the middle between two vertices
         Vec3 gradient;
         (void)field_.value(points[i], gradient);

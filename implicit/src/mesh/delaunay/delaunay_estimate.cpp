@@ -25,7 +25,7 @@ double bend(const Mesh& mesh, const std::array<std::uint32_t, 3>& t, const Vec3&
 }
 
 Fault fault_of(const DelaunayOptions& options) {
-  return {.place = "", .key = "", .expected = "expected bounds of triangles that " + std::to_string(options.most_vertices) + " vertices reach",
+  return {.place = "", .key = "", .expected = "expected bounds of triangles that need at most " + std::to_string(options.most_vertices) + " vertices",
           .found = "", .hint = ""};
 }
 
@@ -41,7 +41,7 @@ bool blame(const DelaunayEstimate& estimate, const DelaunayOptions& options, Fau
     wanted += (wanted.empty() ? "" : " and ");
     wanted += "a distance of at least " + lattice::three_digits(1.05 * options.distance * estimate.by_distance / most) + " m";
   }
-  fault.hint = "ask for " + wanted;
+  fault.hint = "use " + wanted;
   return !wanted.empty();
 }
 
@@ -83,8 +83,8 @@ void refuse_more_vertices(const DelaunayEstimate& estimate, const DelaunayOption
   fault.found = "more";
   if (!blame(estimate, options, fault)) {
     fault.key = "mesh.angle";
-    fault.found += ", where size and distance alone ask for less than " + lattice::three_digits(kEnough * estimate.vertices);
-    fault.hint = "ask for a smaller angle, or a larger size or distance: edges of the surface hold no angle";
+    fault.found += ", where size and distance alone need less than " + lattice::three_digits(kEnough * estimate.vertices);
+    fault.hint = "use a smaller angle, or a larger size or distance: at edges of the surface no angle is guaranteed";
   }
   throw Error(ErrorKind::Limit, fault);
 }

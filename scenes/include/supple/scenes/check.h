@@ -13,15 +13,15 @@ struct CheckReport {
   std::size_t objects = 0;
   std::size_t particles = 0;
   int frames = 0;
-  bool built = false;                  ///< false: the scene is so large that its counts alone were looked at
+  bool built = false;                  ///< false: the scene is so large that only its counts were checked
   std::vector<std::string> warnings;
-  std::string mesh_obstacles;          ///< a line for each: how far its surface is from its triangles; empty unless built
+  std::string mesh_obstacles;          ///< one line each: largest distance of its surface from its triangles; empty unless built
 };
 
-/// Looks for faults of a scene that was read: counts what it takes, builds it, looks for the files of its pictures, at the sizes of its
-/// outputs and at its first time step. Where it takes more than a check builds, counts and files are all that is looked at, which a warning says.
-/// @param options  `memory`: that a run may take [byte]; `questions` is set
-/// @param build    memory that may be taken to look at all of the scene [byte]
+/// Checks a scene that was read: estimates its memory, builds it, checks that the files of its pictures exist, the sizes of its
+/// outputs, and its first time step. A scene that needs more memory than `build` is not built; only counts and files are checked, which a warning says.
+/// @param options  `memory`: limit of memory for a run [byte]; `questions` is set
+/// @param build    limit of memory for the whole check [byte]
 /// @throws Error naming all faults found, OverBudget where a run would be refused for its memory
 [[nodiscard]] CheckReport check_scene(const Scene& scene, SimulationOptions options, double build = kCheckMemory);
 

@@ -1,5 +1,5 @@
 /// @file supple/scenes/looks.h
-/// What of a scene decides pictures alone: materials, cameras, lights. A run with other values of these continues.
+/// Keys that affect only pictures: materials, cameras, lights. A run can be resumed with other values of these.
 #pragma once
 
 #include <optional>
@@ -15,9 +15,9 @@ enum class PatternName : std::uint8_t { Checker, Stripes, Picture };
 /// objects[].look.texture, obstacles[].texture, ground.texture
 struct TextureDesc {
   PatternName pattern = PatternName::Checker;
-  Vec3 colour = Vec3(0.95, 0.95, 0.93);  ///< checker, stripes: the second one, sRGB
+  Vec3 colour = Vec3(0.95, 0.95, 0.93);  ///< checker, stripes: the second colour, sRGB
   double size = 0.1;                  ///< [m]
-  Vec3 axis = Vec3::UnitX();          ///< stripes: across them
+  Vec3 axis = Vec3::UnitX();          ///< stripes: direction across them
   std::string file;                   ///< picture: PNG beside the scene
 };
 
@@ -27,12 +27,12 @@ enum class MapName : std::uint8_t { Viridis, Magma, Coolwarm, Turbo, Grey };
 /// objects[].look
 struct LookDesc {
   double metallic = 0.0;
-  double reflectance = 0.04;          ///< head on, of what is no metal
+  double reflectance = 0.04;          ///< of non-metals at normal incidence
   double opacity = 1.0;
   std::optional<TextureDesc> texture;
   ColourByName colour_by = ColourByName::Colour;
   MapName map = MapName::Viridis;
-  Vec3 range = Vec3(0, 1, 0);         ///< of values: the two ends of the map, in the value's SI unit
+  Vec3 range = Vec3(0, 1, 0);         ///< values at the two ends of the map, in SI units
   bool scale_bar = true;
   bool surface = true;
   bool wireframe = false;
@@ -50,14 +50,14 @@ struct CameraKeyDesc {
 
 /// camera, cameras[]
 struct CameraDesc {
-  std::string name;                   ///< empty: the only one
-  std::optional<Vec3> from;           ///< absent: where all that is there at the start is seen (`Model::cameras`)
-  std::optional<Vec3> look_at;        ///< absent: the middle of that
+  std::string name;                   ///< empty: the only camera
+  std::optional<Vec3> from;           ///< absent: a place from which the initial scene is in view (`Model::cameras`)
+  std::optional<Vec3> look_at;        ///< absent: the middle of the initial scene
   Vec3 up = Vec3::UnitZ();
   double field_of_view = 0.61;        ///< vertical [rad] (key field_of_view_deg)
   double aperture = 0.0;              ///< radius of the lens [m]
-  std::optional<double> focus;        ///< distance that is sharp [m]; absent: that of look_at
-  double turntable = 0.0;             ///< about the vertical through look_at, during the scene [rad] (key turntable_deg)
+  std::optional<double> focus;        ///< distance that is sharp [m]; absent: distance of look_at
+  double turntable = 0.0;             ///< rotation about 'up' through look_at during the scene [rad] (key turntable_deg)
   std::vector<CameraKeyDesc> keys;    ///< by time; instead of from, look_at and field_of_view
 };
 
@@ -78,14 +78,14 @@ struct AreaLightDesc {
 
 enum class RendererName : std::uint8_t { Gl, Path };
 
-/// render: how pictures are made
+/// render: how pictures are drawn
 struct RenderDesc {
   RendererName renderer = RendererName::Gl;
   std::optional<double> pixel_error;  ///< largest distance of meshes to surfaces [pixel]; absent: by output.cell
   double noise = 0.1;                 ///< path: standard error of a pixel over its brightness, before the filter
-  int most_samples = 256;             ///< path: a pixel, a power of two
+  int most_samples = 256;             ///< path: per pixel, a power of two
   bool denoise = true;                ///< path
-  bool exact_surface = true;          ///< path: rays meet the field, not the triangles
+  bool exact_surface = true;          ///< path: rays intersect the field, not the triangles
   double shutter = 0.0;               ///< path: exposure over the time between frames
 };
 

@@ -1,6 +1,6 @@
 /// @file supple/scenes/mesh_search.h
-/// What is not as it should be in meshes: pieces that they miss (implicit/missed_pieces.h), by what searches found, which were not searched,
-/// triangles that cross, creases that are cut off so that none do, and bulges that hold less than they should.
+/// Defects of meshes: missed pieces (implicit/missed_pieces.h) found by searches, meshes that were not searched, intersecting triangles,
+/// creases that are cut off to avoid these, and bulges that hold too little volume.
 #pragma once
 
 #include <array>
@@ -14,18 +14,18 @@ namespace supple::scenes {
 
 /// Why a mesh is not searched.
 enum class Unsearched : std::uint8_t {
-  Bulges,      ///< contact deforms the body by what is no part of its field, or it passes through another one
+  Bulges,      ///< contact deforms the body by bulges, which are not part of its field, or the body passes through another one
   Undecided,   ///< cells along its blends or bends would stay undecided
-  Cost,        ///< it would take far longer than the mesh
-  Mesher,      ///< another one than marching cubes made it
+  Cost,        ///< the search would cost far more than meshing
+  Mesher,      ///< the mesh is not made by marching cubes
 };
 inline constexpr std::array<std::string_view, 4> kUnsearchedNames{"bulges", "undecided", "cost", "mesher"};
 
-/// Bulges that hold less than their contacts displace though they should (collision::BulgeVolume), of one object around another.
+/// Bulges of one object around another that hold less volume than their contacts displace (collision::BulgeVolume).
 struct ShortBulges {
-  std::uint64_t count = 0;  ///< of contacts
-  double held = 1.0;        ///< the least share of what a contact displaces [1]
-  double time = 0.0;        ///< of that one [s]
+  std::uint64_t count = 0;  ///< number of contacts
+  double held = 1.0;        ///< smallest share of the displaced volume [1]
+  double time = 0.0;        ///< of that contact [s]
   void add(const ShortBulges& other) {
     count += other.count;
     if (!(other.held < held)) return;
@@ -34,14 +34,14 @@ struct ShortBulges {
   }
 };
 
-/// Of the meshes of one state, or of several; bulges of its grids, too.
+/// Counts over the meshes of one or several states; also bulges of grids.
 struct SearchCounts {
   using Meshes = std::array<std::uint64_t, kUnsearchedNames.size()>;  ///< by reason
   std::uint64_t pieces = 0;     ///< found and added
-  std::uint64_t undecided = 0;  ///< cells where one may be missed
-  std::uint64_t crossings = 0;  ///< pairs of triangles of method delaunay that pass through each other
+  std::uint64_t undecided = 0;  ///< cells where a piece may be missing
+  std::uint64_t crossings = 0;  ///< pairs of intersecting triangles of method delaunay
   std::map<std::string, Meshes> unsearched;  ///< by object, where there are any
-  std::map<std::string, std::uint64_t> blunt;  ///< by object, where there are any: cells whose crease stays cut off, as triangles would cross
+  std::map<std::string, std::uint64_t> blunt;  ///< by object, where there are any: cells whose crease stays cut off, as triangles would intersect
 
   std::map<std::string, std::map<std::string, ShortBulges>> short_bulges;  ///< by the object that bulges and the one it bulges around, where there are any
 

@@ -1,4 +1,4 @@
-/// Outputs that would be refused for their size, found before a step is made.
+/// Finds outputs that would be refused for their size, before a step is made.
 #pragma once
 
 #include "supple/scenes/plan.h"
@@ -6,8 +6,8 @@
 
 namespace supple::scenes {
 
-/// Of the present state: meshes, also those that pictures need, grids of bodies that touch no other, and samples. Makes none of them but, to
-/// an error, coarse meshes of bodies that touch, and looks at other fields only where the box of a surface is too large to be surely allowed.
+/// Checks the present state: meshes, also those of pictures, grids of bodies that touch no other, and samples. Makes none of them except
+/// coarse meshes of bodies that touch, where an error is given; evaluates other fields only where the bounding box of a surface may be too large.
 /// @throws Error{Limit} as the output would, naming the key and the cell that would fit
 void expect_output_sizes(Simulation& simulation, const OutputRequest& outputs);
 

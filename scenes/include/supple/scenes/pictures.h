@@ -11,14 +11,14 @@ namespace supple::scenes {
 
 struct PictureOptions {
   std::string camera{};        ///< name; empty: the first one
-  int width = 0, height = 0;   ///< [pixel]; 0: as output.images says
+  int width = 0, height = 0;   ///< [pixel]; 0: size of output.images
   render::ContextKind context = render::ContextKind::Auto;
-  int threads = 1;             ///< of the path tracer; 0: all the machine has
+  int threads = 1;             ///< of the path tracer; 0: all of the machine
 };
 
-/// The current state as a camera of the scene sees it. Meshes that are asked for later are of all bodies, in the cells of before.
-/// Makes a renderer of its own, which takes a tenth of a second or so.
-/// @throws Error{Usage} for a camera that the scene has not, or a size that is no size; Error{Io} when a texture cannot be read or no
+/// Draws the current state from a camera of the scene. Later calls of `meshes` are not affected.
+/// Makes a renderer of its own, which takes about a tenth of a second.
+/// @throws Error{Usage} for an unknown camera or an invalid size; Error{Io} when a texture cannot be read or no
 /// OpenGL context can be made
 [[nodiscard]] render::Image draw_picture(Simulation& simulation, const PictureOptions& options = {});
 

@@ -54,7 +54,7 @@ struct StageInfo {
 [[nodiscard]] std::span<const StageInfo> stage_table();
 [[nodiscard]] const StageInfo& info(Stage stage);
 
-/// What a run is asked to leave behind.
+/// The outputs that a run writes.
 struct OutputRequest {
   bool images = false;
   bool film = false;
@@ -64,7 +64,7 @@ struct OutputRequest {
   bool particles = false;
   bool samples = false;
 };
-/// What the scene's `output` asks for.
+/// The outputs that the scene's `output` requests.
 [[nodiscard]] OutputRequest requested_outputs(const Scene& scene);
 
 struct PlannedStage {
@@ -78,29 +78,29 @@ struct StepPlan {
   [[nodiscard]] bool on(Stage stage) const;
 };
 
-/// How a scene is integrated, and why.
+/// The integration method of a scene, and the reason for it.
 struct IntegratorPlan {
   core::IntegratorSettings settings;
   double pair_frequency = 0.0;  ///< largest of the pair laws about rest [rad/s]
-  bool chosen = false;          ///< by the cost model: `integrator.method` is auto and the scene does not fix the step
+  bool chosen = false;          ///< chosen by the cost model: `integrator.method` is auto and the scene does not fix the step
   std::string reason;
-  /// Frequency that limits the step [rad/s]. The adaptive method finds its own; implicit methods need none, but one that `auto` took resolves contact.
+  /// Frequency that limits the step [rad/s]. The adaptive method finds its own; implicit methods need none, but one chosen by `auto` resolves contact.
   double limiting_frequency = 0.0;
 };
 
-/// `auto` takes velocity Verlet unless a frame needs more of its steps than `time_step.max_substeps`, or more by
-/// kImplicitCost than backward Euler does at the limits that remain to it: a count of steps, never a clock.
+/// `auto` chooses velocity Verlet unless a frame needs more of its steps than `time_step.max_substeps`, or more by
+/// kImplicitCost than of backward Euler at its own limits: a count of steps, never a clock.
 [[nodiscard]] IntegratorPlan plan_integrator(const Scene& scene, const Model& model);
 
-/// Of implicit methods: the speed below which friction fades out [m/s]. What friction holds creeps no faster, so it is far below what a
-/// scene shows.
+/// Of implicit methods: the speed below which friction falls to zero [m/s]. Bodies held by friction creep no faster, so it is far below the
+/// visible.
 [[nodiscard]] double stick_speed(const Scene& scene, const Model& model);
 
-/// What a step of backward Euler costs in steps of velocity Verlet, about: three corrections, each with the Hessian of
+/// Approximate cost of a step of backward Euler in steps of velocity Verlet: three corrections, each with the Hessian of
 /// every pair and a Cholesky factor, are worth 110 for a chain of 10 particles and 2300 for a shell of 1000.
 inline constexpr int kImplicitCost = 1024;
 
-/// The limits of a step for particles of these speeds [m/s], [rad/s]; gravity adds what it gives in a frame.
+/// The limits of a step for particles of these speeds [m/s], [rad/s]; gravity adds its speed of one frame.
 [[nodiscard]] core::StepLimits step_limits(const Scene& scene, const Model& model, double frequency,
                                            const core::Speeds& speeds);
 

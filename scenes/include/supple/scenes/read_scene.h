@@ -17,7 +17,7 @@ namespace supple::scenes {
 /// UTF-8 and octal-looking integers are faults.
 [[nodiscard]] Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides = {});
 
-/// The same from text; `name` stands for the file in messages, `folder` is where sidecar files are looked for.
+/// The same from text; `name` stands for the file in messages, files that the scene names are read from `folder`.
 [[nodiscard]] Scene parse_scene(const std::string& text, const std::string& name,
                                 const std::filesystem::path& folder, std::span<const std::string> overrides = {});
 

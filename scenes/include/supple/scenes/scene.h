@@ -16,11 +16,11 @@
 
 namespace supple::scenes {
 
-/// Time that the frame grid decides (`auto`) or that the scene fixes.
+/// time_step: automatic, or fixed by the scene
 struct TimeStepDesc {
   std::optional<double> size;        ///< [s]; absent: auto
-  std::optional<int> substeps;       ///< exactly so many steps a frame, or to each of `size`, a power of two; absent: auto
-  int max_substeps = 4096;           ///< refuse to go finer than this
+  std::optional<int> substeps;       ///< exactly this many steps per frame (per `size` if that is given), a power of two; absent: auto
+  int max_substeps = 4096;           ///< a scene whose automatic steps would be finer is refused
 };
 
 enum class MethodName : std::uint8_t { Auto, Symplectic, Rk4, Adaptive, BackwardEuler, ImplicitMidpoint };
@@ -46,20 +46,20 @@ struct ParticlesDesc {
   double outer_radius = 0.0;          ///< spiral [m]
   double turns = 1.0;                 ///< spiral
   double spacing = 0.0;               ///< line, grid [m]
-  double disorder = 0.0;              ///< each particle is moved at random by up to this [m]
+  double disorder = 0.0;              ///< each particle is moved at random by at most this [m]
   int columns = 1;                    ///< grid
   int rows = 1;                       ///< grid
   int layers = 1;                     ///< grid, along z
   std::string file;                   ///< CSV of x, y, z beside the scene
   NormalKind normal = NormalKind::Axis;
-  Vec3 at = Vec3::Zero();             ///< where the arrangement's origin goes [m]
-  Vec3 axis = Vec3::UnitZ();          ///< where its z axis goes
-  double angle = 0.0;                 ///< turn about its own axis, first [rad] (key angle_deg)
+  Vec3 at = Vec3::Zero();             ///< position of the arrangement's origin [m]
+  Vec3 axis = Vec3::UnitZ();          ///< direction of its z axis
+  double angle = 0.0;                 ///< rotation about its own z axis, before the others [rad] (key angle_deg)
   Vec3 velocity = Vec3::Zero();       ///< initial [m/s]
   Vec3 spin = Vec3::Zero();           ///< initial, rigid, about the centre of mass [rad/s]
   double mass = 1.0;                  ///< of one particle [kg]
-  std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance; of single particles, the moments of their solid
-  Vec3 inertia_axes = Vec3::Zero();   ///< instead: semi-axes of a solid ellipsoid in the particle's frame [m]; zero: absent
+  std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance; single particles have the moments of their solid
+  Vec3 inertia_axes = Vec3::Zero();   ///< instead of inertia_radius: semi-axes of a solid ellipsoid in the particle's frame [m]; zero: absent
 };
 
 enum class LawKind : std::uint8_t {
@@ -70,11 +70,11 @@ enum class LawKind : std::uint8_t {
 /// objects[].interactions[]
 struct InteractionDesc {
   LawKind law = LawKind::BondFrame;
-  int neighbours = 1;                 ///< bonds between particles up to this many apart in their order
-  std::optional<double> within;       ///< instead: bonds between particles nearer than this at rest [m]
-  bool geometric = false;             ///< instead of bonds: all particles in range, found anew each step
+  int neighbours = 1;                 ///< bonds between particles whose numbers differ by at most this
+  std::optional<double> within;       ///< instead of neighbours: bonds between particles nearer than this at rest [m]
+  bool geometric = false;             ///< instead of bonds: all particles in range, found in each step
   bool normalised = false;            ///< coplanarity, co_circularity: psi / d^2 instead of psi
-  bool paper_literal = false;         ///< form_radius as printed, which is no energy
+  bool paper_literal = false;         ///< form_radius as printed, which has no energy
   double stretch = 0.0;               ///< bond_frame k_s [N/m]
   double rotation = 0.0;              ///< bond_frame k_theta [N m]
   double strength = 0.0;              ///< form, directed_form [J m^2]; form_radius, coplanarity, co_circularity [N/m];
@@ -136,7 +136,7 @@ struct SkeletonDesc {
   Vec3 radii = Vec3::Zero();          ///< directed: of the support, along +x, +y, +z [m]
   Vec3 radii_behind = Vec3::Zero();   ///< directed: along -x, -y, -z [m]; zero: as radii
   double end_radius = 0.0;            ///< segment, curve: support radius at the end [m]; zero: as kernel.radius
-  Vec3 stretch = Vec3::Ones();        ///< of shape and support along the primitive's axes
+  Vec3 stretch = Vec3::Ones();        ///< factors of shape and support along the primitive's axes
   Vec3 at = Vec3::Zero();             ///< offset in the particle's frame [m]
   Vec3 turn_axis = Vec3::UnitZ();     ///< with turn: rotation in the particle's frame
   double turn = 0.0;                  ///< [rad] (key turn_deg)
@@ -151,22 +151,22 @@ struct MaterialDesc {
   double modulus = 1e4;               ///< P0 [Pa]
   double friction = 0.0;
   double dissipation = 0.0;           ///< d [s/m]
-  std::optional<bool> self;           ///< absent: where the object does not hold its volume
+  std::optional<bool> self;           ///< absent: true
 };
 
-/// objects[].kinds[]: hinges join what is around them, standard particles of different types only repel
+/// objects[].kinds[]: hinges interact with particles of all types, standard particles of different types only repel
 struct KindDesc {
   bool hinge = false;
   int type = 0;                       ///< of standard particles
   std::vector<int> particles;         ///< negative counts from the end
 };
 
-/// objects[].repulsion: exponential repulsion against other objects that have it, where contact is off
+/// objects[].repulsion: exponential repulsion from other objects that have it, where contact is off
 struct RepulsionDesc {
   double force = 0.0;                 ///< [N]
   double distance = 0.0;              ///< d0 [m]
   double length = 0.0;                ///< lambda [m]
-  bool own = false;                   ///< also between all particles of the object
+  bool own = false;                   ///< also between all particles of the object itself
 };
 
 /// objects[].medium
@@ -183,7 +183,7 @@ struct BreakingDesc {
   std::optional<double> couple;       ///< [N m]
 };
 
-/// objects[].yielding: bond frames above an energy take over the present pose as their rest pose
+/// objects[].yielding: bond frames above an energy take the present pose as their rest pose
 struct YieldingDesc {
   double energy = 0.0;                ///< [J]
   double time = 0.0;                  ///< [s]
@@ -219,28 +219,28 @@ struct BlendGroupDesc {
   std::vector<int> particles;         ///< negative counts from the end
 };
 
-/// objects[].blend: how the surfaces of particles join
+/// objects[].blend: how the fields of particles combine
 struct BlendDesc {
   BlendName rule = BlendName::Graph;
   std::vector<BlendGroupDesc> groups;   ///< particles of one group sum; the others are groups of their own
-  std::optional<int> neighbours;        ///< graph: groups blend whose particles are at most so far apart in their order
-  std::optional<double> within;         ///< graph: or nearer than this at rest [m]
+  std::optional<int> neighbours;        ///< graph: groups blend whose particles' numbers differ by at most this
+  std::optional<double> within;         ///< graph: groups also blend whose particles are nearer than this at rest [m]
   double exponent = 4.0;                ///< ricci
   double opening = 0.3;                 ///< gradient
-  double fade = 0.0;                    ///< graph: how long the blend of a broken bond fades [s]
+  double fade = 0.0;                    ///< graph: time in which the blend of a broken bond fades [s]
 };
 
 enum class VolumeOfName : std::uint8_t { Object, Particle, Primitive };
 
-/// objects[].volume: kernels grow and shrink so that the object, or each of its particles or primitives, keeps its volume
+/// objects[].volume: kernels are scaled so that the object, or each of its particles or primitives, keeps its volume
 struct VolumeDesc {
   VolumeOfName of = VolumeOfName::Object;
-  std::optional<double> target;       ///< [m^3]; absent: that of the start
+  std::optional<double> target;       ///< [m^3]; absent: the initial volume
   double rate = 2.0;                  ///< alpha [1/s]
   double damping = 0.05;              ///< beta
 };
 
-/// objects[].meshing: instead of what `output` says of all
+/// objects[].meshing: replaces the values of `output`
 struct ObjectMeshingDesc {
   std::optional<double> cell;               ///< lattice cell [m]; absent: as output.cell
   std::optional<double> error;              ///< largest distance of a triangle's centroid to the surface [m]; absent: as output.meshing.error
@@ -251,12 +251,12 @@ struct ObjectDesc {
   ParticlesDesc particles;
   bool separate = false;                    ///< each particle is a body of its own
   std::vector<KindDesc> kinds;              ///< particles not named are standard, of type 0
-  bool hinges_join = false;                 ///< two hinges have all laws between them
+  bool hinges_join = false;                 ///< laws also act between two hinges
   std::vector<InteractionDesc> interactions;
   std::vector<SkeletonDesc> skeleton;
   double iso = 0.5;
   std::optional<BlendDesc> blend;           ///< absent: everything sums
-  std::optional<VolumeDesc> volume;         ///< absent: not held
+  std::optional<VolumeDesc> volume;         ///< absent: the volume is not kept
   std::optional<MaterialDesc> contact;      ///< absent: the object touches nothing
   std::optional<RepulsionDesc> repulsion;
   std::optional<MediumDesc> medium;
@@ -276,7 +276,7 @@ struct RestitutionDesc {
   double at_speed = 0.0;              ///< [m/s]
 };
 
-/// pairs[]: what two objects do that differs from their materials
+/// pairs[]: contact settings of two objects that replace those of their materials
 struct PairDesc {
   std::vector<std::string> objects;   ///< two names of objects, obstacles or "ground"
   std::optional<bool> collide;
@@ -289,7 +289,7 @@ enum class SplitName : std::uint8_t { Energy, Contribution };
 enum class RuleName : std::uint8_t { Auto, Samples, Polar, March, Panels };
 enum class CoreName : std::uint8_t { Soft, Barrier };
 
-/// contact.stick: friction that holds
+/// contact.stick: friction by springs
 struct StickDesc {
   double stiffness = 0.0;             ///< of a pair's spring [N/m]
   double damping = 0.0;               ///< [s]
@@ -304,13 +304,13 @@ struct ContactDesc {
   double friction_speed = 1e-3;       ///< [m/s]
   std::optional<StickDesc> stick;     ///< absent: friction is viscous below `friction_speed`
   double bulge = 0.0;                 ///< attenuation alpha of the propagation zone, e.g. 0.4; 0: off
-  bool bulge_volume = false;          ///< bulges that hold what the contact displaces
-  std::optional<double> bulge_width;  ///< share of the other body's feature size; absent: 0.15, or as wide as volumes need
-  bool bulge_literal = false;         ///< the published term, with its defects
+  bool bulge_volume = false;          ///< bulges that hold the displaced volume
+  std::optional<double> bulge_width;  ///< over the other body's feature size; absent: 0.15, or as wide as bulge_volume needs
+  bool bulge_literal = false;         ///< the term as published
   std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of the object's smallest feature
 };
 
-/// sleep: bodies that rest are not moved
+/// sleep: bodies at rest are not moved
 struct SleepDesc {
   double speed = 0.01;                ///< [m/s]
   double time = 0.5;                  ///< [s]
@@ -334,17 +334,17 @@ enum class LeadName : std::uint8_t { Smooth, Linear };
 /// obstacles[].keys[]
 struct ObstacleKeyDesc {
   double time = 0.0;                  ///< [s]
-  Vec3 at = Vec3::Zero();             ///< as of the obstacle [m]
+  Vec3 at = Vec3::Zero();             ///< position, as ObstacleDesc::at [m]
   double turn = 0.0;                  ///< box, mesh [rad] (key turn_deg)
 };
 
-/// obstacles[]: solids that stand still or are led along, and touch every object that has contact
+/// obstacles[]: solids at rest or moved by keys, which touch every object that has contact
 struct ObstacleDesc {
   std::string name;
   ObstacleName shape = ObstacleName::Box;
   Vec3 at = Vec3::Zero();             ///< a point of the plane; the middle of the box; added to heights and meshes [m]
   Vec3 normal = Vec3::UnitZ();        ///< plane: outward
-  double extent = 2.0;                ///< plane: half the edge of the square that is drawn [m]
+  double extent = 2.0;                ///< plane: half the edge of the square that pictures show [m]
   Vec3 half_sizes = Vec3::Zero();     ///< box [m]
   double rounding = 0.0;              ///< box: radius of its edges [m]
   Vec3 turn_axis = Vec3::UnitZ();     ///< box, mesh, implicit, with turn
@@ -384,23 +384,23 @@ struct MeshingDesc {
   double angle = 0.5235987755982988;       ///< Delaunay: least angle of a triangle [rad]
   std::optional<double> size;              ///< Delaunay: largest radius of a surface ball [m]; absent: two cells
   std::optional<double> distance;          ///< Delaunay: from circumcentre to surface [m]; absent: a tenth of the size
-  std::optional<bool> search;              ///< Auto, Cubes: for closed pieces between the nodes of the lattice; absent: where it costs little beside the mesh
+  std::optional<bool> search;              ///< Auto, Cubes: search for closed pieces between the nodes of the lattice; absent: where it costs little relative to meshing
   bool motion = false;                     ///< columns of velocity and owner
 };
 
 struct GriddingDesc {
-  GriddedName of = GriddedName::Objects;                 ///< one grid an object, one of all, or both
+  GriddedName of = GriddedName::Objects;                 ///< one grid per object, one of all, or both
   GridContentName content = GridContentName::Distance;
-  double half_width = 3.0;                               ///< of the band [cells]
+  double half_width = 3.0;                               ///< of the narrow band [cells]
 };
 
 struct SamplingDesc {
   std::optional<double> spacing;      ///< [m]; absent: by density, or four cells
-  std::optional<double> density;      ///< instead: samples a square metre [1/m^2]
+  std::optional<double> density;      ///< instead of spacing: samples per square metre [1/m^2]
 };
 
 struct FilmDesc {
-  std::optional<double> frame_rate;   ///< that it is shown at [1/s]; absent: the scene's, so that it runs as fast as what it shows
+  std::optional<double> frame_rate;   ///< of the film [1/s]; absent: the scene's, so that the film plays in real time
 };
 
 struct OutputDesc {
@@ -434,7 +434,7 @@ struct Scene {
   ContactDesc contact;
   std::optional<SleepDesc> sleep;     ///< absent: nothing sleeps
   CameraDesc camera;
-  std::vector<CameraDesc> cameras;    ///< instead of camera: an image sequence and a film each
+  std::vector<CameraDesc> cameras;    ///< instead of camera: each has an image sequence and a film
   LightDesc light;
   std::vector<AreaLightDesc> lights;
   BackgroundDesc background;
@@ -442,10 +442,10 @@ struct Scene {
   std::optional<GroundDesc> ground;
   OutputDesc output;
   std::filesystem::path source;       ///< the file it was read from; not a key
-  std::shared_ptr<const ScenePlaces> places;  ///< where its keys stand in that file, for messages; not a key
-  std::uint64_t content_hash = 0;     ///< of all keys that act on the motion, and of files they name: what saved states belong to; not a key
+  std::shared_ptr<const ScenePlaces> places;  ///< lines and columns of its keys in that file, for messages; not a key
+  std::uint64_t content_hash = 0;     ///< of all keys that act on the motion, and of files they name; identifies the scene of saved states; not a key
   std::shared_ptr<const std::string> motion_keys;  ///< these keys with their values, for messages; not a key
-  std::uint64_t picture_hash = 0;     ///< of all keys that decide a picture of a state, and of files they name; not a key
+  std::uint64_t picture_hash = 0;     ///< of all keys that affect a picture of a state, and of files they name; not a key
 
   /// Frame n shows t = (n - 1) / frame_rate; frame 1 is the initial state.
   [[nodiscard]] int frame_count() const;

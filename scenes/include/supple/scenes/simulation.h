@@ -1,5 +1,5 @@
 /// @file supple/scenes/simulation.h
-/// A scene in motion. Results are pulled: asking for meshes, contacts or audits never changes a later state.
+/// The simulation of a scene. Results are computed on request; reading meshes, contacts or audits never changes a later state.
 ///
 ///     #include <supple/scenes/read_scene.h>
 ///     #include <supple/scenes/simulation.h>
@@ -30,27 +30,27 @@
 namespace supple::scenes {
 
 struct SimulationOptions {
-  int threads = 1;             ///< 0: all the machine has; the result does not depend on it
+  int threads = 1;             ///< 0: all of the machine; the result does not depend on it
   bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
-  bool profile = false;        ///< time every step, not every 61st
-  implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
-  const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps go on
-  double memory = kDefaultMemory;  ///< that the scene may take, by what is counted before it is built [byte]
-  bool questions = false;      ///< about states only: a start that needs finer steps than time_step.max_substeps is refused by the first step, not before
+  bool profile = false;        ///< measure the time of every step, not of every 61st
+  implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes with it are refused
+  const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps continue
+  double memory = kDefaultMemory;  ///< limit of memory for the scene, by the counts made before it is built [byte]
+  bool questions = false;      ///< for queries of states: an initial state that needs finer steps than time_step.max_substeps is refused by the first step, not earlier
 };
 
 /// Work of one stage so far.
 struct StageProfile {
   std::uint64_t calls = 0;     ///< of `advance`: steps
-  double cpu_s = 0.0;          ///< of this stage alone. Unless profiling, measured in the first and every 61st step (a prime, so that what comes
-                               ///< back every 2^k steps is met as often as it is there) and scaled by calls; where several frames are in work at
-                               ///< the same time, shared out so that all stages add up to what was taken
-  double first_s = 0.0;        ///< measured of the first call: what that sets up is not scaled
+  double cpu_s = 0.0;          ///< of this stage alone. Unless profiling, measured in the first and every 61st step (a prime, so that events
+                               ///< of period 2^k steps are sampled in proportion) and scaled by calls; where several frames are in work at
+                               ///< the same time, divided so that the stages add up to the total
+  double first_s = 0.0;        ///< measured of the first call: its set-up is not scaled
   double later_s = 0.0;        ///< measured of later calls
-  double apart_s = 0.0;        ///< measured of what calls do now and then, always, and not scaled
+  double apart_s = 0.0;        ///< of occasional work, always measured and not scaled
   std::uint64_t timed = 0;     ///< calls that were measured
-  std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... looked at
-  std::uint64_t present = 0;   ///< of so many
+  std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... that were processed
+  std::uint64_t present = 0;   ///< their total number
   /// Brings `cpu_s` up to date with the others.
   void scale();
 };
@@ -64,18 +64,18 @@ struct Energies {
   [[nodiscard]] double total() const { return kinetic + interaction + contact; }
 };
 
-/// Relative errors since frame 1, the largest seen; what result.json calls `audits`.
+/// Relative errors since frame 1, the largest so far; `audits` in result.json.
 struct Audits {
   double momentum_error = 0.0;          ///< over the largest sum of m |v| [1]
   double angular_momentum_error = 0.0;  ///< over the largest sum of |x - c| m |v| + |L| [1]
   double energy_error = 0.0;            ///< over the largest kinetic + interaction + contact energy [1]
-  double energy_returned = 0.0;         ///< what damping and friction gave back, over the same [1]
+  double energy_returned = 0.0;         ///< energy that damping and friction returned, over the largest energy [1]
   double contact_residual = 0.0;        ///< |p_A - p_B| / max(P_A, P_B) on contact samples, the largest [1]
   double largest_overlap = 0.0;         ///< of the undeformed fields [m]
   double largest_overlap_share = 0.0;   ///< over the thickness of the thinner body [1]
 };
 
-/// What an experiment changes of the particles between two steps; what is absent stays. Shape [particles] each.
+/// Changes of the particles between two steps; absent arrays stay as they are. Each has the shape [particles].
 struct ParticleChange {
   std::optional<std::vector<Vec3>> position{};          ///< [m]
   std::optional<std::vector<Quat>> orientation{};       ///< body to world, of any length > 0
@@ -86,7 +86,7 @@ struct ParticleChange {
 
 class Simulation {
  public:
-  /// @throws OverBudget when the scene takes more than options.memory; Error{Scene} when the model cannot be built; unless `options.questions`, Error{Limit} as `expect_steps`
+  /// @throws OverBudget when the scene needs more than options.memory; Error{Scene} when the model cannot be built; unless `options.questions`, Error{Limit} as `expect_steps`
   explicit Simulation(Scene scene, SimulationOptions options = {});
   ~Simulation();
   Simulation(Simulation&&) noexcept;
@@ -94,82 +94,82 @@ class Simulation {
 
   [[nodiscard]] const Scene& scene() const;
   [[nodiscard]] const Model& model() const;
-  /// The arrays of its particles stay where they are in memory for the life of this object, whatever steps, so that they can be
+  /// The arrays of its particles keep their addresses for the life of this object, so that they can be
   /// viewed.
   [[nodiscard]] const State& state() const;
-  [[nodiscard]] const std::vector<Body>& bodies() const;         ///< objects, or the pieces they broke into
-  [[nodiscard]] const core::Interactions& laws() const;          ///< those that nothing has broken
+  [[nodiscard]] const std::vector<Body>& bodies() const;         ///< objects, or the pieces that they broke into
+  [[nodiscard]] const core::Interactions& laws() const;          ///< the laws without broken bonds
   [[nodiscard]] int frame() const;              ///< the last frame reached; 1 at the start
   [[nodiscard]] double time() const;            ///< [s]
   [[nodiscard]] double time_step() const;       ///< of the current frame interval [s]
   [[nodiscard]] std::uint64_t state_hash() const;
   [[nodiscard]] const IntegratorPlan& integrator() const;
-  /// What the steps of this object needed so far: sums, the largest last correction, and whether all met the tolerance.
+  /// Work of the steps of this object so far: sums, the largest last correction, and whether all steps met the tolerance.
   [[nodiscard]] const core::StepReport& integration() const;
 
   /// @throws Error{Limit} when a step from here would have to be finer than time_step.max_substeps allows
   void expect_steps() const;
-  /// One time step, frame time / 2^halvings; one that ends a frame books its audits. @throws Error{Diverged} naming particle, cause and value; the state is then
-  /// that of the last frame. Nothing ends at the scene's last frame, of which `scene().duration` tells runs and turntables only:
-  /// later steps are those of a scene that lasts longer, to the bit.
+  /// One time step, frame time / 2^halvings; a step that ends a frame updates the audits. @throws Error{Diverged} naming particle, cause and value; the state is then
+  /// that of the last frame. Steps do not stop at the scene's last frame; `scene().duration` matters for runs and turntables only:
+  /// later steps equal those of a longer scene, to the bit.
   void step();
   /// Steps to the next frame, also past the last one of the scene.
   void step_frame();
-  /// Steps to a frame. @param go_on  asked after every step but the last: false ends the steps there; empty: nothing does
-  /// @return whether the frame is reached; true without a step where it has been already
+  /// Steps to a frame. @param go_on  called after every step but the last: false ends the steps there; may be empty
+  /// @return whether the frame is reached; true without a step where it was reached before
   bool advance_to(int frame, const std::function<bool()>& go_on = {});
   /// Continues from a saved state. @pre it belongs to this scene
   void restore(State state);
-  /// Continues from a state of a scene with other numbers: masses, stiffnesses, friction, loads, looks. They act from now on: forces
-  /// and seeds of contacts are found anew, all bodies are awake, and ledger and audits begin here. Velocities and angular momenta are
-  /// those of the state; the frame stays, so that times do where the frame rate is the same.
+  /// Continues from a state of a scene with other values of masses, stiffnesses, friction, loads or looks. They act from now on: forces
+  /// and seeds of contacts are computed again, all bodies are awake, and ledger and audits start anew. Velocities and angular momenta are
+  /// those of the state; the frame number stays, and with the same frame rate the time does.
   /// @throws Error{Usage} for a state with another number of particles, breakable bonds or held volumes
   void adopt(State state);
-  /// Places and moves particles, as an experiment does between two steps; what pins hold keeps no velocity. What this changes of
-  /// momentum, angular momentum and energy is booked as given from outside, so that the audits hold. Forces are found anew, and
-  /// islands wake whose particles are changed.
+  /// Sets positions and velocities of particles between two steps; pinned particles get no velocity. The change of
+  /// momentum, angular momentum and energy is booked in the ledger as external, so that the audits stay valid. Forces are computed again, and
+  /// islands of changed particles wake.
   /// @throws Error{Usage} for arrays of another shape, values that are not finite, orientations of length 0, and both angular arrays
   void set_particles(const ParticleChange& change);
 
-  /// Surfaces of the current state, one an object in the order of the scene (empty without skeleton); deformed by
-  /// contact, with the column "contact" (implicit/polygonise.h) and those that looks show: "pressure" [Pa], "speed" [m/s],
+  /// Meshes of the current surfaces, one per object in the order of the scene (empty without skeleton); deformed by
+  /// contact, with the column "contact" (implicit/polygonise.h) and those that looks need: "pressure" [Pa], "speed" [m/s],
   /// "stretch" [1], "rest_x" ... [m]. Kept until the next step.
   [[nodiscard]] const std::vector<Mesh>& meshes();
   /// Contacts of the current state between `bodies()`, the ground being the last. Kept until the next step.
   [[nodiscard]] const collision::ContactSurface& contacts();
-  /// Bodies as contact sees them, the fixed ones last; valid until the next step.
+  /// Bodies of the contact stage, the fixed ones last; valid until the next step.
   [[nodiscard]] std::span<const collision::ContactBody> contact_bodies();
   /// Total force on body A of each contact, damping and friction included [N], shape [contacts().summary].
   [[nodiscard]] const std::vector<Vec3>& contact_forces();
-  /// What damping and friction take of each contact [W], shape [contacts().summary].
+  /// Power dissipated by damping and friction of each contact [W], shape [contacts().summary].
   [[nodiscard]] const std::vector<double>& contact_powers();
   /// Loads of contact on all particles at the current state.
   [[nodiscard]] const core::Loads& contact_loads();
   /// Fields of the bodies at the current state; valid until the next step.
   [[nodiscard]] const std::vector<implicit::Field>& fields();
-  /// Who takes which space where bodies touch, the surfaces of `meshes`: claims of deformed fields, bulges included. Kept until the next step.
+  /// Division of space between bodies that touch, the basis of `meshes`: claims of deformed fields, bulges included. Kept until the next step.
   [[nodiscard]] const Division& division();
-  /// All that the field of one of `contact_bodies` depends on at the current state, bit by bit.
+  /// Everything that the field of one of `contact_bodies` depends on in the current state, to the bit.
   void add_field_content(std::uint32_t body, ContentWords& words);
 
-  /// Edge of a lattice cell of `meshes` [m], of objects that ask for none of their own.
+  /// Edge of a lattice cell of `meshes` [m], for objects without one of their own.
   [[nodiscard]] double cell() const;
-  /// The same for all objects, by a number of cells along the longest side of all surfaces.
+  /// Sets the cell of all objects, by the number of cells along the longest side of all surfaces.
   void set_cells(int cells);
-  /// For objects that ask for none of their own.
+  /// For objects without a cell of their own.
   void set_cell(double cell);
-  /// From now on `meshes` leaves out (as empty ones) bodies that touch nothing and whose surface lies in a box for which
-  /// this is false. An empty function: all are made.
+  /// From now on `meshes` are empty for bodies that touch nothing and whose surface lies in a box for which
+  /// `shown` is false. An empty function: all are made.
   void set_shown(std::function<bool(const Box&)> shown);
 
   [[nodiscard]] Energies energies();
   [[nodiscard]] Audits audits() const;
-  /// What is odd about the start of the scene, contacts that were not solved as well as asked so far, held volumes that are off at the present state, and
-  /// what searches of all meshes so far tell, as sentences.
+  /// Warnings as sentences: about the initial state, contacts that missed the given error so far, volumes off their targets in the present state, and
+  /// results of the searches of all meshes so far.
   [[nodiscard]] std::vector<std::string> warnings() const;
-  /// What searches found for all meshes made of the present state, and which were not searched.
+  /// Results of the searches of all meshes made of the present state, and numbers of meshes that were not searched.
   [[nodiscard]] const SearchCounts& searches() const;
-  /// Work by stage; `advance` is all of a step but the stages before it.
+  /// Work by stage; `advance` is all of a step except the stages before it.
   [[nodiscard]] Profile profile() const;
   /// Where a stage outside the simulation (render, export) books its work.
   [[nodiscard]] StageProfile& profile(Stage stage);

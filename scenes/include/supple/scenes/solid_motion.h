@@ -1,5 +1,5 @@
 /// @file supple/scenes/solid_motion.h
-/// How an obstacle is led along: keyed places joined in time.
+/// Motion of an obstacle: interpolation of keyed positions in time.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@ namespace supple::scenes {
 struct SolidMotion {
   std::vector<ObstacleKeyDesc> keys;   ///< rising in time
   LeadName between = LeadName::Smooth;
-  Vec3 axis = Vec3::UnitZ();           ///< that it turns about, of unit length
+  Vec3 axis = Vec3::UnitZ();           ///< of rotation, unit length
 };
 
 struct SolidPlace {
@@ -22,14 +22,14 @@ struct SolidPlace {
 };
 
 /// Smooth: monotone cubic pieces (Fritsch & Butland 1984), continuous in velocity, at rest at the first and the last key and
-/// wherever a coordinate turns back. Linear: an even velocity from key to key. Beyond the keys it stands still.
+/// wherever a coordinate turns back. Linear: constant velocity from key to key. Beyond the keys it is at rest.
 /// @pre motion.keys is not empty
 [[nodiscard]] SolidPlace place_at(const SolidMotion& motion, double time);
 
-/// Whether it is led along at any time in [from, to].
+/// Whether it moves at any time in [from, to].
 [[nodiscard]] bool moves(const SolidMotion& motion, double from, double to);
 
-/// Bound of the speed of a point of a solid within `radius` of its place [m/s].
+/// Bound of the speed of points of a solid within `radius` of its position [m/s].
 [[nodiscard]] double largest_speed(const SolidMotion& motion, double radius);
 
 }  // namespace supple::scenes

@@ -1,5 +1,5 @@
 /// @file supple/scenes/state.h
-/// Exactly what must be kept to continue a run with the same bits; a checkpoint is this struct in a file.
+/// Exactly what is needed to continue a run with the same bits; a saved state is this struct in a file.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@
 
 namespace supple::scenes {
 
-/// What result.json reports about a run so far; kept over restarts, not part of the hash.
+/// Results of a run so far for result.json; kept over restarts, not part of the hash.
 struct RunRecord {
   struct ObjectRecord {
     double largest_deformation = 0.0;  ///< RMS after the best rigid fit over the rest diameter; 0 of separate bodies [1]
@@ -35,12 +35,12 @@ struct RunRecord {
   double angular_momentum_error = 0.0; ///< [N m s]
   double energy_error = 0.0;           ///< largest |E - E0 - W + D| [J]
   double most_dissipated = 0.0;        ///< largest D at a frame so far [J]
-  double energy_returned = 0.0;        ///< by how much D fell below that at worst [J]; what damps never gives back
+  double energy_returned = 0.0;        ///< largest fall of D below that [J]; dissipation never returns energy
   double contact_residual = 0.0;       ///< largest |p_A - p_B| / max(P_A, P_B) on a contact sample [1]
   double largest_overlap = 0.0;        ///< thickness of the overlap of undeformed fields [m]
   double largest_overlap_share = 0.0;  ///< the same over twice the smaller iso radius [1]
   std::vector<ObjectRecord> objects;
-  /// A pair that pressed harder than half of what it holds: when first, and how hard at worst.
+  /// A pair whose energy exceeded half of its capacity: the first time and the largest energy.
   struct Overload {
     std::string a, b;                  ///< names of the bodies
     double time = 0.0;                 ///< [s]
@@ -48,13 +48,13 @@ struct RunRecord {
     double capacity = 0.0;             ///< largest contact energy of the pair [J]
   };
   std::vector<Overload> overloads;
-  /// What damping and friction of a pair took since the start: the integral of its power over the steps, springs of friction included.
+  /// Work dissipated by damping and friction of a pair since the start: the integral of the power over the steps, springs of friction included.
   struct PairWork {
     collision::BodyPair bodies;
     double work = 0.0;                 ///< [J]
     double power = 0.0;                ///< at the end of the last step [W]
   };
-  std::vector<PairWork> pair_work;     ///< of all pairs that took any, sorted by bodies
+  std::vector<PairWork> pair_work;     ///< of all pairs with dissipation, sorted by bodies
   std::uint64_t core_impulses = 0;     ///< pairs that hard cores turned back
   bool valid = false;
 };
@@ -67,41 +67,41 @@ struct State {
   core::ParticleState particles;
   core::KickState kick;
   core::Ledger ledger;
-  core::LinkState links;               ///< what broke and yielded
-  std::vector<double> broken_for;      ///< since when each link is broken, up to its object's `fade` [s], shape [links]
-  std::vector<implicit::VolumeState> volumes;  ///< by object, or by its particles or primitives where these hold theirs
-  ApartPairs apart;                    ///< pieces of one object that touch each other by now
+  core::LinkState links;               ///< broken and yielded bonds
+  std::vector<double> broken_for;      ///< time since each link broke, up to its object's `fade` [s], shape [links]
+  std::vector<implicit::VolumeState> volumes;  ///< by object, or by its particles or primitives
+  ApartPairs apart;                    ///< pieces of one object that can touch each other now
   std::vector<implicit::SampleState> samples;  ///< by body
-  collision::SleepState sleep;         ///< which bodies rest; empty where the scene has no `sleep`
+  collision::SleepState sleep;         ///< sleeping bodies; empty where the scene has no `sleep`
   collision::StickState sticks;        ///< springs of friction; empty where the scene has no `contact.stick`
   RunRecord record;
 
   [[nodiscard]] std::uint64_t hash() const;    ///< of everything but the record
 };
 
-/// Which scene a state belongs to.
+/// The scene that a state belongs to.
 struct StateOrigin {
   std::uint64_t scene = 0;                   ///< Scene::content_hash
   std::shared_ptr<const std::string> keys{}; ///< Scene::motion_keys, so that a message can name those that differ; may be empty
 };
 [[nodiscard]] StateOrigin origin_of(const Scene& scene);
 
-/// What a saved state must be besides whole and of the scene.
+/// Requirements of a saved state besides being complete and of the scene.
 struct StateWanted {
-  std::optional<int> frame{};  ///< the state at this frame, as `supple run` leaves one; absent: any
-  bool same_program = false;   ///< saved by this build of the program, whose steps give the same bits
+  std::optional<int> frame{};  ///< the state at this frame, as written by `supple run`; absent: any
+  bool same_program = false;   ///< saved by this build of the program, whose results have the same bits
   std::string otherwise{};     ///< what else to do about a state of another scene: "or ..."
 };
 
-/// A file that is not what was written under its name: it was cut off, or a byte of it changed.
+/// A damaged file: it is truncated, or a byte of it changed.
 class DamagedState : public Error {
  public:
   using Error::Error;
 };
 
-/// Checkpoints: versioned, little-endian, with a hash over the content, the scene, its keys and the build of the program.
+/// Saved states: versioned, little-endian, with a hash over the content, the scene, its keys and the build of the program.
 void save_state(const std::filesystem::path& path, const State& state, const StateOrigin& origin);
-/// @throws DamagedState; Error{Corrupt} when the state is whole and not what is wanted; Error{Io}
+/// @throws DamagedState; Error{Corrupt} when the state is complete but does not meet the requirements; Error{Io}
 [[nodiscard]] State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted = {});
 
 }  // namespace supple::scenes

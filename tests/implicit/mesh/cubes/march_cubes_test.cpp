@@ -754,7 +754,7 @@ TEST(MarchCubes, RefusesABillionNodesBeforeTakingMemory) {
   expect_message([&] { (void)march_cubes(body.field, {.lattice = lattice_of(1e-12)}, Executor(1)); }, ErrorKind::Limit,
                  {"lattice.cell", "node numbers", "use cells of at least"});
   expect_message([&] { (void)march_cubes(body.field, {.lattice = lattice_of(0.0), .error = 1e-12}, Executor(1)); },
-                 ErrorKind::Limit, {"mesh.error", "1e-12 m", " m with triangles of 0.0", "reach it do not fit; allow at least"});
+                 ErrorKind::Limit, {"mesh.error", "1e-12 m", " m with triangles of 0.0", "meets it is too large; allow at least"});
   EXPECT_THROW((void)march_cubes(body.field, {.lattice = lattice_of(0.0)}, Executor(1)), ContractViolation);
   EXPECT_THROW((void)march_cubes(body.field, {.lattice = lattice_of(0.1), .refinements = 5}, Executor(1)),
                ContractViolation);

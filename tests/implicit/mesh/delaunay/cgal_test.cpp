@@ -190,11 +190,11 @@ TEST(DelaunayMesh, RefusesBoundsThatTakeTooManyVerticesBeforeItBegins) {
     bound = key == "size" ? 1e-6 : 1e-9;
     const Fault fault = fault_of(body.field, options);
     EXPECT_EQ(fault.key, "mesh." + key);
-    EXPECT_EQ(fault.expected, "expected bounds of triangles that 2000 vertices reach");
+    EXPECT_EQ(fault.expected, "expected bounds of triangles that need at most 2000 vertices");
     EXPECT_TRUE(fault.found.starts_with("at least ")) << fault.found;
     EXPECT_TRUE(fault.found.ends_with(" by the area and curvature of the surface")) << fault.found;
     EXPECT_GT(std::stod(fault.found.substr(9)), 1e9);
-    const std::string lead = "ask for a " + key + " of at least ";
+    const std::string lead = "use a " + key + " of at least ";
     ASSERT_TRUE(fault.hint.starts_with(lead) && fault.hint.ends_with(" m")) << fault.hint;
     bound = std::stod(fault.hint.substr(lead.size()));
     const std::size_t found = delaunay_mesh(body.field, options).vertex_count();
@@ -214,7 +214,7 @@ TEST(DelaunayMesh, NamesWhatTookTooManyVerticesWhereItStops) {
   const Fault fault = fault_of(body.field, options);
   EXPECT_EQ(fault.key, "mesh.distance");
   EXPECT_EQ(fault.found, "more");
-  EXPECT_TRUE(fault.hint.starts_with("ask for a distance of at least 0.00")) << fault.hint;
+  EXPECT_TRUE(fault.hint.starts_with("use a distance of at least 0.00")) << fault.hint;
   // What two balls share has an edge, where triangles become small.
   const FunctionField a = sphere({-0.4, 0.01, 0.02}, 0.5), b = sphere({0.4, 0.01, 0.02}, 0.5);
   const FunctionField lens{.function =

@@ -330,7 +330,7 @@ TEST(DelaunayPartition, RefusesBoundsThatTakeTooManyVertices) {
   const Fault more = fault_of(options_of(0.2, 1e-3), 2200);
   EXPECT_EQ(more.key, "mesh.distance");
   EXPECT_EQ(more.found, "more");
-  EXPECT_TRUE(more.hint.starts_with("ask for a distance of at least 0.00")) << more.hint;
+  EXPECT_TRUE(more.hint.starts_with("use a distance of at least 0.00")) << more.hint;
 }
 
 // By evaluations of the fields, not by a clock: of a batch none comes after the first that is refused.

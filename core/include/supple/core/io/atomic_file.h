@@ -1,5 +1,5 @@
 /// @file supple/core/io/atomic_file.h
-/// Files that exist are complete: content goes to a temporary name beside the target and is renamed when it is whole.
+/// Files that exist are complete: content goes to a temporary name beside the target and is renamed when it is complete.
 #pragma once
 
 #include <cstddef>
@@ -15,11 +15,11 @@
 namespace supple::io {
 
 /// Writes `bytes` under `path` by temporary file, fsync and rename.
-/// @throws Error{Io} naming the path and the system's reason; nothing is left under either name then.
+/// @throws Error{Io} naming the path and the system's reason; no file remains under either name then.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_atomically(const std::filesystem::path& path, std::string_view text);
 
-/// A file that grows piece by piece and gets its name when it is whole. What was not committed leaves nothing behind.
+/// A file that is written in parts and gets its name when it is complete. Without commit no file remains.
 class AtomicFile {
  public:
   /// @throws Error{Io}
@@ -30,7 +30,7 @@ class AtomicFile {
 
   void append(std::span<const std::byte> bytes);  ///< @throws Error{Io}
   void append(std::string_view text);
-  /// Fsync and rename. @throws Error{Io}; nothing is left under either name then. @pre not called before
+  /// Fsync and rename. @throws Error{Io}; no file remains under either name then. @pre not called before
   void commit();
 
  private:
@@ -42,19 +42,19 @@ class AtomicFile {
   Descriptor descriptor_;
 };
 
-/// The largest file that scenes take points, meshes or pictures from [byte].
+/// Largest file of points, meshes or pictures that scenes read [byte].
 inline constexpr std::size_t kLargestInput = std::size_t{1} << 29;
 
-/// A hidden name beside `path` that this process has not given before: .NAME.PROCESS.COUNT.tmp
+/// A hidden name beside `path` that this process has not used before: .NAME.PROCESS.COUNT.tmp
 [[nodiscard]] std::filesystem::path temporary_name(const std::filesystem::path& path);
 
-/// Gives a file that another program wrote its final name, after fsync. @throws Error{Io}; it keeps its first name then.
+/// Renames a file that another program wrote to its final name, after fsync. @throws Error{Io}; it keeps its first name then.
 void rename_whole(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// The whole file. @throws Error{Io} when it cannot be read, Error{Limit} when it is larger than `limit` bytes.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit);
 
-/// Fills `bytes` with the start of a file. @return how many there are; none, with errno, where it cannot be read
+/// Fills `bytes` with the start of a file. @return number of bytes; none, with errno, where it cannot be read
 [[nodiscard]] std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes);
 
 /// Creates the folder (and its parents) and checks that files can be made in it. @throws Error{Io} otherwise.

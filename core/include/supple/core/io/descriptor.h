@@ -1,6 +1,6 @@
 /// @file supple/core/io/descriptor.h
-/// Descriptors of the operating system. A call that a signal breaks off is made again. Those that are opened here are closed
-/// on exec and never 0, 1 or 2: what a library prints to standard error must not land in a file of ours.
+/// File descriptors of the operating system. Calls interrupted by a signal are repeated. Descriptors opened here are closed
+/// on exec and never 0, 1 or 2: text that a library prints to standard error must not get into an output file.
 #pragma once
 
 #include <sys/types.h>
@@ -14,7 +14,7 @@
 
 namespace supple::io {
 
-/// Makes a call of the system, which gives -1 and errno on failure, again for as long as signals break it off.
+/// Calls a system function, which returns -1 and errno on failure, again as long as signals interrupt it.
 template <class Call>
 auto retried(const Call& call) {
   for (;;) {
@@ -23,7 +23,7 @@ auto retried(const Call& call) {
   }
 }
 
-/// Owns a descriptor, or none (-1). Closed on every way out.
+/// Owns a descriptor, or none (-1). The destructor closes it.
 class Descriptor {
  public:
   Descriptor() = default;
@@ -37,7 +37,7 @@ class Descriptor {
 
   [[nodiscard]] int get() const { return value_; }
   [[nodiscard]] bool is_open() const { return value_ >= 0; }
-  /// 0 on success, errno otherwise. Linux closes it in both cases, also where a signal breaks the call off.
+  /// 0 on success, errno otherwise. Linux closes it in both cases, also where a signal interrupts the call.
   int close();
 
  private:
@@ -55,8 +55,8 @@ class Descriptor {
 /// 0 on success, errno otherwise, EIO where the file ends before.
 [[nodiscard]] int read_all_at(int descriptor, std::span<std::byte> bytes, off_t offset);
 
-/// For the start of a program: what is closed of standard input, output and error is opened on /dev/null, so that no file gets
-/// its number; output and error for reading only, so that what is printed there fails as before.
+/// For the start of a program: closed ones of standard input, output and error are opened on /dev/null, so that no file gets
+/// their numbers; output and error for reading only, so that printing fails as on a closed descriptor.
 /// @return which of the three were closed
 std::array<bool, 3> occupy_standard_descriptors();
 

@@ -8,8 +8,8 @@
 
 namespace supple::io {
 
-/// Positions and faces alone; faces with more corners are cut into triangles, convex ones into fans. The extension decides, .obj or .ply.
-/// @throws Error{Io} when absent, Error{Scene} naming the place where the file is not what it should be.
+/// Reads positions and faces; faces with more corners are divided into triangles, convex ones into fans. The extension, .obj or .ply, selects the format.
+/// @throws Error{Io} when absent, Error{Scene} naming the place of the fault in the file.
 [[nodiscard]] Mesh read_mesh(const std::filesystem::path& path);
 
 }  // namespace supple::io

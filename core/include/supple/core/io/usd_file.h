@@ -11,7 +11,7 @@
 
 namespace supple::io {
 
-/// A mesh of the animation, the same thing in every frame.
+/// A mesh of the animation, the same object in every frame.
 struct UsdObject {
   std::string name;                          ///< becomes a USD name: letters, digits and '_'
   Vec3 colour = Vec3(0.8, 0.8, 0.8);         ///< sRGB in [0, 1]
@@ -27,10 +27,10 @@ struct UsdCamera {
   double aspect = 16.0 / 9.0;                ///< width over height
 };
 
-/// Collects frame after frame in unnamed files beside the target; the target appears when it is whole. Units are metres,
+/// Collects frames in unnamed files beside the target; the target appears when it is complete. Units are metres,
 /// z is up, time code n is frame n. Each object is a Mesh with points, normals, counts and indices, a preview material,
 /// `velocities` [m/s] where the columns velocity_x, velocity_y, velocity_z are present, and the other columns as primvars.
-/// What does not change is written once.
+/// Unchanged arrays are written once.
 class UsdAnimation {
  public:
   /// @throws Error{Io}
@@ -40,7 +40,7 @@ class UsdAnimation {
   UsdAnimation& operator=(const UsdAnimation&) = delete;
 
   /// @param meshes   by object, with one normal a vertex; an empty one is not there in this frame
-  /// @param cameras  the same ones in every frame
+  /// @param cameras  the same cameras in every frame
   /// @pre frames ascend  @throws Error{Io}
   void add_frame(int frame, std::span<const Mesh* const> meshes, std::span<const UsdCamera> cameras = {});
   /// @throws Error{Io}

@@ -1,5 +1,5 @@
 /// @file supple/core/io/vtk_files.h
-/// Points with data as VTK XML files (.vtp), and the list of a sequence of them with times (.pvd): what ParaView opens.
+/// Points with data as VTK XML files (.vtp), and the list of a sequence of them with times (.pvd), for ParaView.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct PointSet {
   std::vector<std::array<std::uint32_t, 2>> line;      ///< lines between points, by index
   std::vector<PointData> data;
 
-  /// Adds an array of zeros, one tuple a point.
+  /// Adds an array of zeros, one tuple per point.
   std::vector<double>& add(std::string name, std::vector<std::string> component = {});
 };
 
