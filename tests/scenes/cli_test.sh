@@ -210,6 +210,15 @@ expect 0 '' run film.yaml --out film_KILL --resume --progress none
 [[ -s film_KILL/film.mp4 ]] || fault 'no film after --resume'
 [[ -z $(find film_KILL -name '*.tmp') ]] || fault "temporary files of a dead run are left: $(find film_KILL -name '*.tmp')"
 
+# Scenes to begin with.
+for template in ball balls chain jelly sheet; do
+  expect 0 '' new "new_$template" --template "$template"
+  expect 0 '' check "new_$template.yaml"
+done
+expect 4 'expected a new file, found one that exists' new new_ball
+expect 2 "did you mean 'jelly'" new other --template jely
+expect 2 'expected a name of letters' new 'a;b'
+
 grep -q '"outcome": "diverged"' diverged/result.json || { echo 'no outcome for the diverged run'; failures=$((failures + 1)); }
 expect 3 '' run nan.yaml --out invalid --progress none
 grep -q '"outcome": "invalid"' invalid/result.json || { echo 'no outcome for the invalid scene'; failures=$((failures + 1)); }
