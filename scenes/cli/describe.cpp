@@ -119,7 +119,7 @@ std::string zsh_completion(const CLI::App& app) {
 }
 
 std::string man_page(const CLI::App& app, const std::string& version) {
-  std::string out = ".TH SUPPLE 1 \"\" \"supple " + version + "\"\n.SH NAME\nsupple \\- " + roff(app.get_description()) +
+  std::string out = ".TH SUPPLE 1 \"\" \"supple " + version + "\"\n.SH NAME\nsupple \\- simulate and draw deformable bodies" +
                     "\n.SH SYNOPSIS\n.B supple\n.I COMMAND\n[options]\n.SH COMMANDS\n";
   for (const CLI::App* command : commands_of(app)) {
     out += ".SS supple " + roff(command->get_name()) + '\n' + roff(command->get_description()) + ".\n";
