@@ -29,7 +29,7 @@ objects:
     contact: {modulus: 10 kPa, friction: 0.4, dissipation: 0.2}
     colour: [0.85, 0.35, 0.15]
 
-camera: {from: [2, -3, 1.2], look_at: [0.3, 0, 0.4], field_of_view_deg: 32}
+camera: {from: [1.6, -2.4, 1], look_at: [0.3, 0, 0.45], field_of_view_deg: 34}
 ground: {height: 0, friction: 0.4}
 output: {images: {size: [640, 480]}, film: true}
 )"},
@@ -50,7 +50,7 @@ objects:
     skeleton: [{shape: point, kernel: {type: wyvill, radius: "${0.12 + 0.02*i}"}}]
     colour: ["${0.9 - 0.12*i}", 0.4, "${0.2 + 0.12*i}"]
 
-camera: {from: [1.2, -2.6, 1.2], look_at: [0, 0, 0.35], field_of_view_deg: 34}
+camera: {from: [0.8, -2.0, 0.9], look_at: [0, 0, 0.35], field_of_view_deg: 36}
 ground: {height: 0, friction: 0.4}
 output: {images: {size: [640, 480]}, film: true}
 )"},
@@ -63,7 +63,7 @@ gravity: [0, 0, -9.81]
 
 objects:
   - name: chain
-    particles: {arrange: line, count: 12, spacing: 8 cm, axis: [1, 0, 0], at: [0, 0, 1.2], mass: 0.02}
+    particles: {arrange: line, count: 12, spacing: 8 cm, at: [0.44, 0, 1.3], mass: 0.02}
     interactions:
       - {law: bond_frame, within: 0.09, stretch: 400, rotation: 0.02}
       - {law: friction, within: 0.09, linear: 0.05, angular: 0.0002}
@@ -71,7 +71,7 @@ objects:
     skeleton: [{shape: point, kernel: {type: wyvill, radius: 9 cm}}]
     colour: [0.25, 0.5, 0.75]
 
-camera: {from: [0.4, -3.2, 0.9], look_at: [0.2, 0, 0.75], field_of_view_deg: 34}
+camera: {from: [0.4, -3.6, 1], look_at: [0, 0, 0.75], field_of_view_deg: 34}
 ground: {height: 0}
 output: {images: {size: [640, 480]}, film: true}
 )"},
@@ -96,7 +96,7 @@ objects:
 obstacles:
   - {name: step, shape: box, at: [-0.15, 0, 0.1], half_sizes: [0.2, 0.4, 0.1], rounding: 1 cm, friction: 0.4}
 
-camera: {from: [1.3, -1.5, 0.8], look_at: [0.05, 0, 0.18], field_of_view_deg: 32}
+camera: {from: [1.7, -2, 1], look_at: [0.2, 0, 0.15], field_of_view_deg: 32}
 ground: {height: 0, friction: 0.4}
 output: {images: {size: [640, 480]}, film: true}
 )"},
