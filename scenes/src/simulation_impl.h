@@ -12,6 +12,7 @@
 
 #include "fixed_step.h"
 #include "frame.h"
+#include "friction_watch.h"
 #include "overload.h"
 #include "time_steps.h"
 #include "warnings.h"
@@ -42,6 +43,7 @@ struct Simulation::Impl {
   collision::ContactRules rules;
   Frame frame;
   OverloadWatch watch;
+  FrictionWatch friction;
   core::InteractionWorkspace workspace;
   IntegratorPlan integrator;
   core::IntegratorWorkspace integrator_workspace;
