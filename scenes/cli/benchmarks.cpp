@@ -24,7 +24,7 @@ struct Group {
   bool names = false;  ///< what follows the group in a name is for the program
 };
 
-constexpr std::array<Group, 14> kGroups{{
+constexpr std::array<Group, 15> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
     {"core/integrators", "integrator_bench", "time against error of every integrator; a file name after it: plot (SVG)"},
     {"core/stability", "core_stress", "how far steps can be stretched; a file name after it: map (SVG)"},
@@ -38,6 +38,7 @@ constexpr std::array<Group, 14> kGroups{{
     {"collision/stability", "contact_stress", "contact tried hard; after it: --seed N, file name of a map (SVG)"},
     {"collision/pile", "contact_pile", "steps of settled balls and of 100,000; after it: numbers of balls"},
     {"collision/conservation", "contact_conservation", "momenta and energy of free balls; after it: steps"},
+    {"scenes", "scene_bench", "whole scenes at an accuracy: CPU time, errors against a reference (jelly, pile_rests, slide ...); after it: --accuracy A", true},
     {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a stated noise)", true},
 }};
 

@@ -49,13 +49,14 @@ template <class Archive>
 void fields(Archive& archive, IntegratorDesc& d) {
   using enum MethodName;
   archive("method", d.method, {},
-          "auto: symplectic unless stiffness makes backward_euler cheaper by far; `supple explain` says which and why. backward_euler and "
-          "implicit_midpoint solve contact and friction within the step, so that what friction holds stays");
+          "auto: symplectic unless stiffness makes backward_euler cheaper by far, with `accuracy` whichever of symplectic and implicit reaches it in fewer "
+          "steps, weighted with what one costs; `supple explain` says which and why. backward_euler and implicit_midpoint solve contact and friction within "
+          "the step, so that what friction holds stays. implicit: implicit_midpoint in steps that resolve contact; backward_euler where the scene fixes steps that do not");
   archive("rotation", d.rotation, Rule{}.only("method", d.method, {Auto, Symplectic}),
           "of free bodies: about one principal axis after another, or about the axis of the middle attitude");
   archive("tolerance", d.tolerance,
-          between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint}),
-          "local error (adaptive) or last correction (implicit) over the smallest length, or in radians; auto: 1e-6 and 1e-9");
+          between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint, Implicit}),
+          "local error (adaptive) or last correction (implicit) over the smallest length, or in radians; auto: 1e-6 and 1e-9, with `accuracy` a thousandth of it for implicit methods");
 }
 
 /// Particles that pins, loads and primitives name are there.
@@ -210,6 +211,8 @@ void fields(Archive& archive, Scene& d) {
   archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames a second");
   archive("gravity", d.gravity, any(kAcceleration), "z is up");
   archive("planar", d.planar, {}, "particles keep their z, which must be one for all, and turn about z only");
+  archive("accuracy", d.accuracy, between(1e-5, 1e-2, kNumber),
+          "error of positions over the size of the bodies, until a scene is chaotic: sets time step, integrator, error of contact, meshes and noise together, as `supple explain` prints; other keys override what it sets; absent: every stage has its own default");
   archive("time_step", d.time_step, {}, "how finely time is cut; a run of whose energy nine tenths come from nowhere (no start, load or obstacle gave them) ends with exit code 5 and names the fastest object, but for laws with paper_literal, contact.split: contribution, held volumes, and obstacles that are led in steps which the scene fixes, whose energies do not balance");
   archive("integrator", d.integrator, {}, "how a step is made");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "who is there");
@@ -241,7 +244,8 @@ void fields(Archive& archive, Scene& d) {
                   "objects[" + std::to_string(i) + "].particles.inertia_axes", "expected three equal ones in a planar scene",
                   "different ones", "a planar particle turns about z only: use inertia_radius");
   }
-  const bool implicit = d.integrator.method == MethodName::BackwardEuler || d.integrator.method == MethodName::ImplicitMidpoint;
+  const bool implicit = d.integrator.method == MethodName::BackwardEuler || d.integrator.method == MethodName::ImplicitMidpoint ||
+                        d.integrator.method == MethodName::Implicit;
   const bool literal = std::any_of(d.objects.begin(), d.objects.end(), [](const ObjectDesc& o) { return literal_laws(o); });
   archive.check(!(implicit && literal), "integrator.method",
                 "expected an explicit method beside a law with paper_literal, which has no energy",

@@ -11,6 +11,7 @@
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
 namespace {
@@ -110,6 +111,14 @@ class Override {
   std::string_view rest_;
 };
 
+/// What `accuracy` sets, before the keys that override it are read. One that is faulty sets nothing; reading it says so.
+void read_accuracy(const Node& root, Scene& scene) {
+  const Node::Entry* entry = root.find("accuracy");
+  if (entry == nullptr || entry->value->kind != Node::Kind::Scalar) return;
+  const QuantityText accuracy = read_quantity(entry->value->text, kNumber);
+  if (accuracy.ok && accuracy.value > 0.0) set_by_accuracy(accuracy.value, scene);
+}
+
 }  // namespace
 
 int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
@@ -144,6 +153,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   if (root->kind != Node::Kind::Mapping) {
     faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");
   } else {
+    read_accuracy(*root, scene);
     ReadArchive archive(faults, *root, "");
     scene_members(archive, scene);
     archive.finish();

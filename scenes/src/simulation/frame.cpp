@@ -510,7 +510,7 @@ void linearise_reactions(const StageContext& context, Frame& frame, core::Contac
   StageTimer timer(profile, context.timed);
   std::vector<std::span<const std::uint32_t>> particles(frame.bodies.size());
   for (std::size_t i = 0; i < context.bodies.size(); ++i) particles[i] = context.bodies[i].particle;
-  collision::linearise_contacts(frame.bodies, context.rules, frame.surface, particles, frame.linearise, out);
+  collision::linearise_contacts(frame.bodies, context.rules, frame.surface, context.model.reaction.split, particles, frame.linearise, out);
   profile.visited += frame.surface.point.size();
   profile.present += frame.surface.point.size();
 }

@@ -70,6 +70,9 @@ struct ObjectModel {
   bool own_error = false;                 ///< likewise
 };
 
+/// Size that errors of an object are compared with: its rest diameter with what its surface adds; of `separate` ones that of one body [m].
+[[nodiscard]] double size_of(const ObjectModel& object);
+
 /// A solid that nothing moves, and that touches every object that has contact. Without keys it stands where it is; with
 /// keys they lead it, and `solid` is where its place is the origin.
 struct FixedBody {

@@ -12,10 +12,12 @@
 #include <atomic>
 #include <functional>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "supple/core/content_versions.h"
@@ -36,6 +38,7 @@ struct SimulationOptions {
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes that ask for it are refused
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps go on
   double memory = kDefaultMemory;  ///< that the scene may take, by what is counted before it is built [byte]
+  int finer = 0;               ///< steps are halved so often more than else; negative: less often, as far as a frame is cut at all
   bool questions = false;      ///< about states only: a start that needs finer steps than time_step.max_substeps is refused by the first step, not before
 };
 
@@ -104,6 +107,8 @@ class Simulation {
   [[nodiscard]] double time_step() const;       ///< of the current frame interval [s]
   [[nodiscard]] std::uint64_t state_hash() const;
   [[nodiscard]] const IntegratorPlan& integrator() const;
+  /// Below which speed friction faded out between two objects or obstacles, by their names: the largest at frames (explicit methods) or steps [m/s].
+  [[nodiscard]] const std::map<std::pair<std::string, std::string>, double>& friction_speeds() const;
   /// What the steps of this object needed so far: sums, the largest last correction, and whether all met the tolerance.
   [[nodiscard]] const core::StepReport& integration() const;
 
