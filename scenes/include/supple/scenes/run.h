@@ -12,6 +12,7 @@
 
 #include "supple/core/error.h"
 #include "supple/render/renderer.h"
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
@@ -78,6 +79,7 @@ struct RunResult {
   std::vector<std::string> warnings;
   SearchCounts searches;    ///< counts of the meshes of all frames, kept ones included
   PictureTimes pictures;
+  StageErrors errors;       ///< of what `run_scene` simulated
 };
 
 /// Checks the requirements of pictures, as runs that draw do before they begin: the files of textures, and the path tracer.
