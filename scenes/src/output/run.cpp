@@ -141,6 +141,7 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   const auto begin = Clock::now();
   const double cpu_before = process_cpu_seconds();
   try {
+    const InterruptScope scope(options.interrupt);
     body(result);
     const bool limited = result.exit_code == static_cast<int>(ErrorKind::Limit);
     result.outcome = result.exit_code == 0 ? "done" : limited ? outcome_of(ErrorKind::Limit) : "interrupted";

@@ -10,6 +10,7 @@
 #include "simulation/pieces.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::scenes {
 namespace {
@@ -91,7 +92,13 @@ void Simulation::Impl::step() {
   timed = options.profile || steps_made % kTimedEvery == 0;
   const std::uint64_t calls = p.calls;
   const double inside = timed ? measured_inside(profile) : 0.0, begin = timed ? process_cpu_seconds() : 0.0;
-  make_step();
+  try {
+    make_step();
+  } catch (const Interrupted&) {  // in the middle of the step
+    drop_results();
+    if (last_frame.record.valid) take(last_frame);
+    throw;
+  }
   ++steps_made;
   const double end = timed ? process_cpu_seconds() : 0.0;
   const double taken = timed ? end - begin - process_cpu_clock_cost() - (measured_inside(profile) - inside) : 0.0;

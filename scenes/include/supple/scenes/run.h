@@ -44,7 +44,7 @@ struct RunOptions {
   double scene_memory = kDefaultMemory;         ///< that the scene may take, by what is counted before it is built [byte]
   double time_limit = 0.0;                      ///< stop between two steps after this long [s]; 0: never. Leaves ErrorKind::Limit
   std::function<void(const Progress&)> progress{}; ///< never twice at the same time, but from several threads; may be empty
-  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step, or in a Delaunay mesh (the signal's number)
+  const std::atomic<int>* interrupt = nullptr;  ///< non-zero (the signal's number): the run ends soon, in whatever it does; frames that were saved stay
 };
 
 inline constexpr const char* kOutOfMemory =
