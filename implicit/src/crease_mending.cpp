@@ -15,7 +15,7 @@ using Triangle = TriangleSteps::Triangle;
 constexpr int kGrowths = 4;
 constexpr std::size_t kMostTaken = 60;  // triangles of a hole
 
-/// A polygon on one side of the crease, seen along a direction.
+/// A polygon on one side of the crease, projected along a direction.
 class Ears {
  public:
   /// @param joined  whether an edge between two vertices is there already
@@ -219,7 +219,7 @@ class Mending {
     return false;
   }
 
-  /// Whether a triangle is no longer there or lies beside a hole that was filled in this pass.
+  /// Whether a triangle is gone or lies beside a hole that was filled in this pass.
   [[nodiscard]] bool touches_filled(std::uint32_t triangle) const {
     const Triangle& t = triangle_[triangle];
     return touched_[t[0]] || touched_[t[1]] || touched_[t[2]];

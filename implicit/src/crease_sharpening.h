@@ -1,5 +1,5 @@
 /// @file crease_sharpening.h
-/// A mesh of marching cubes is put onto the creases of its field.
+/// Puts a mesh of marching cubes onto the creases of its field.
 #pragma once
 
 #include <cstdint>

@@ -16,13 +16,13 @@ namespace {
 constexpr double kNodes = 512.0;  ///< of a leaf
 /// Of a primitive at a node: a value in single or double precision, a value with its gradient in double precision [ns].
 constexpr double kSingleValue = 0.1, kValue = 0.7, kGradient = 1.1;
-/// Of a leaf besides: bounds, roots and triangles of about 45 vertices; bounds, the tree, and volumeToMesh [ns].
+/// Further costs of a leaf: bounds, roots and triangles of about 45 vertices; bounds, the tree, and volumeToMesh [ns].
 constexpr double kCubesLeaf = 3500.0, kGridLeaf = 10000.0;
-/// Of a primitive, to find it near a leaf [ns].
+/// Cost of a primitive, to find it near a leaf [ns].
 constexpr double kPrimitive = 200.0;
-/// Vertices of a leaf by way of a grid, and how often each is evaluated: twice and a half on their way onto the surface, once for normals.
+/// Vertices of a leaf through a grid, and evaluations of each: 2.5 for projection onto the surface, one for the normal.
 constexpr double kGridVertices = 45.0, kLooksAtVertex = 3.5;
-/// Leaves of the band, three cells wide on each side, for one that holds surface.
+/// Leaves of the narrow band, three cells wide on each side, per leaf with surface.
 constexpr double kBandLeaves = 1.8;
 
 bool is_blobs(const Skeleton& skeleton) {
@@ -77,7 +77,7 @@ bool decides(const Skeleton& skeleton) {
   });
 }
 
-/// Whether eight cubes are looked at side by side: EighthBounds::know.
+/// Whether eight cubes are processed side by side: EighthBounds::know.
 bool goes_by_eighths(const Skeleton& skeleton) {
   return skeleton.blend.rule == BlendRule::Sum && std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(), [](const Primitive& p) {
     if (p.convolved || (p.kernel.kind != KernelKind::Wyvill && p.kernel.kind != KernelKind::Gascuel)) return false;
@@ -93,7 +93,7 @@ bool goes_by_eighths(const Skeleton& skeleton) {
   });
 }
 
-/// Supports that hold the middle of one of them, on average over some.
+/// Supports that contain the centre of one of them, averaged over some.
 double local_overlap(std::span<const Box> supports) {
   constexpr std::size_t kLooks = 8;
   const std::size_t looks = std::min(supports.size(), kLooks);
@@ -116,10 +116,10 @@ constexpr SearchWork kEighthSearch{.lattice = 0.1, .alone = 12.0, .overlapping =
 constexpr SearchWork kSumSearch{.lattice = 0.2, .alone = 130.0, .overlapping = 85.0};
 /// Of a primitive smaller than a cell, about a thousand cubes [ms].
 constexpr double kLeastHalved = 1.0;
-/// What nearest points on other shapes than points cost beside theirs.
+/// Cost of nearest points on other shapes relative to points.
 constexpr double kOtherShapes = 2.5;
-/// Of tetrahedra: of a leaf, and of the rim of a contact [ms].
-constexpr double kDividedLeaf = 0.04, kRim = 0.8;
+/// Cost of tetrahedra: of a leaf, and of the boundary curve of a contact [ms].
+constexpr double kDividedLeaf = 0.04, kBoundary = 0.8;
 /// Of two bodies that touch, for some hundred cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
 /// there, of balls and of shapes with edges.
 constexpr double kContact = 0.2, kMoreBalls = 1.0, kMoreShapes = 170.0;
@@ -194,7 +194,7 @@ SearchEstimate estimate_search(std::span<const DividingBody> bodies, std::span<c
   }
   for (const auto& [a, b] : pairs) {
     all.search_ms += kContact + std::max(more_ms[a], more_ms[b]);
-    all.mesh_ms += kRim;
+    all.mesh_ms += kBoundary;
   }
   return all;
 }

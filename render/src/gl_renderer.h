@@ -17,7 +17,7 @@
 
 namespace supple::render {
 
-// Texture units: one for each map, for the whole life of the context.
+// Texture units: one for each map, for the lifetime of the context.
 enum Unit : int {
   kShadowDepth, kShadowCompare, kHeights, kGroundOcclusion, kGeometry, kDepths, kOcclusion, kBlurred, kMaterials,
   kPaints, kPicture, kColourMaps, kAreaDepth, kAreaCompare, kGroundPicture, kUploads
@@ -39,7 +39,7 @@ class GlRenderer final : public Renderer {
 
  private:
   struct Programs;
-  /// What only pictures with painted items need, made with the first of them.
+  /// Programs and textures for painted items, made with the first of them.
   struct Painting {
     Painting(const Gl& gl, const Target& geometry, int samples);
     Program geometry;
@@ -48,7 +48,7 @@ class GlRenderer final : public Renderer {
     GLuint maps = 0;
   };
   struct LightPrograms;
-  /// What is needed to draw the lit picture once more.
+  /// Data for drawing the lit picture again.
   struct Shot {
     CameraMatrices camera;
     std::optional<MapFit> shadow;

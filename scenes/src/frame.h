@@ -148,7 +148,7 @@ void place_contact_bodies(const StageContext& context, const core::ParticleState
 [[nodiscard]] std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, double until,
                                                       Frame& frame);
 
-/// Stages 2 to 6: from particles to the contact surface, with its energy if asked for. Warm starts are read from and written to `samples`.
+/// Stages 2 to 6: from particles to the contact surface, with its energy if requested. Warm starts are read from and written to `samples`.
 void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
                           std::vector<implicit::SampleState>& samples, Frame& frame, bool energy);
 

@@ -229,7 +229,7 @@ std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& 
   return parts;
 }
 
-/// The surfaces of the bodies of a group: all at once, but for those that pass through another one.
+/// The surfaces of the bodies of a group: all together, except those that pass through another one.
 void mesh_group(const StageContext& context, const Division& division, std::span<const std::uint64_t> version, const DivisionGroup& group,
                 StageProfile& profile, Frame& frame, std::vector<Mesh>& surfaces) {
   const double cell = group.finest->cell;

@@ -19,7 +19,7 @@ constexpr int kRun = 16;                     // pixels that are passed over at o
 constexpr std::uint8_t kMeet = 1, kInGap = 2, kEnds = 4;
 constexpr std::array<std::pair<int, int>, 4> kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
 
-/// What tells details, of eight pixels each.
+/// Measures of detail, of eight pixels each.
 class Signs {
  public:
   /// @param pixel  size of a pixel at unit distance

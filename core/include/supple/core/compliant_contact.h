@@ -58,7 +58,7 @@ using ContactModel = std::function<void(const ParticleState& pose, double time, 
 
 struct ImplicitContact {
   ContactModel find;
-  /// Speed below which friction falls to zero [m/s]: bodies below the Coulomb limit creep at most at this speed, or at a thousandth of the pair's relative speed if that is more.
+  /// Speed below which friction falls to zero [m/s]: bodies below the Coulomb limit creep at most at this speed or a thousandth of their relative speed.
   double stick_speed = 1e-8;
   std::vector<ContactPairLoad> load{};  ///< of the last step, by ContactPoints::pair
 };
