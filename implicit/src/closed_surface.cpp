@@ -251,7 +251,7 @@ struct Flat {
   }
 };
 
-/// Whether the edges of s come to the face or to the edges of t. Faces that lie in one plane do not touch: what bounds them does.
+/// Whether the edges of s come within `reach` of the face or the edges of t. Faces in one plane do not count; their neighbours do.
 /// @param shared  a corner that both have by their mesh: edges of s that end there are left out; null: none
 bool touches(const Flat& s, const Flat& t, double reach, const Vec3* shared) {
   std::array<double, 3> height;

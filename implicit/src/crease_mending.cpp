@@ -156,8 +156,8 @@ class Mending {
     return any;
   }
 
-  /// An attempt depends on the triangles at the vertices of its hole when the pass began. Holes that were filled there since let it fail, too,
-  /// and it is made again in the next pass.
+  /// An attempt depends on the triangles at the vertices of its hole when the pass began. If holes were filled there since,
+  /// the attempt also fails and is repeated in the next pass.
   [[nodiscard]] bool fails_again(std::span<const std::uint32_t> vertices) const {
     return std::none_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return touched_before_[v]; });
   }

@@ -88,8 +88,8 @@ std::vector<std::array<std::uint32_t, 2>> find_crossings(const PatchComplex& com
   return found;
 }
 
-/// Refines where triangles cross, nearer and nearer to the surface. @return false as refine_patches
-/// @throws Error{Limit} when most_vertices do not reach the bounds without a thought of crossings
+/// Refines where triangles cross, in steps that bring vertices nearer to the surface. @return false as refine_patches
+/// @throws Error{Limit} when most_vertices do not suffice for the bounds, crossings left aside
 bool refine_apart(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex,
                   DelaunayReport& report) {
   constexpr int kTries = 4;

@@ -13,7 +13,7 @@
 namespace supple::implicit {
 
 /// The side of the surface is that of the nearest place, by the mean of the normals about it, weighted by angles (Baerentzen & Aanaes 2005, "Signed
-/// Distance Computation Using the Angle Weighted Pseudonormal"), or tells by winding number where triangles cross.
+/// Distance Computation Using the Angle Weighted Pseudonormal"), or decides by winding number where triangles cross.
 class ExactDistance {
  public:
   explicit ExactDistance(ClosedSurface surface);

@@ -47,7 +47,7 @@ struct GradientBounds : Field::BoxBounds {
   double scale = 0.0;        ///< of round-off of the sum [1]
   double round_off = 0.0;    ///< of values, where the hull is known [1]
   double slack = 0.0;        ///< and of slopes [1/m]
-  bool stepwise = false;     ///< add_slopes and add_curvature know more bounds
+  bool stepwise = false;     ///< add_slopes and add_curvature provide more bounds
 };
 
 [[nodiscard]] GradientBounds bounds_with_gradient(const Field& field, const Box& box);

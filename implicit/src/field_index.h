@@ -15,7 +15,7 @@
 
 namespace supple::implicit {
 
-/// Shapes as the evaluation tells them apart. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
+/// Shapes as the evaluation distinguishes them. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
 /// the vector from the foot point is v = y - clamp(y, -half, half) and q = |v|^2. For an ellipsoid half = 0 and
 /// A = R D^-1 Q^T, otherwise A = S^-1 Q^T with the stretch S. The common pairs of shape and kernel have loops of their own.
 enum class PackedKind : std::uint32_t {

@@ -173,7 +173,7 @@ HWY_INLINE KernelLanes<V> any_kernel(D d, const PackedPrimitive& p, const Packed
   return out;
 }
 
-/// What `measure` says of each point: a value, returned, and a vector, in place of the point.
+/// What `measure` returns at each point: a value, returned, and a vector, in place of the point.
 template <class D, class Measure, class V = hn::Vec<D>>
 HWY_INLINE V point_by_point(D d, const Measure& measure, V& x, V& y, V& z) {
   constexpr std::size_t kLanes = hn::MaxLanes(D());

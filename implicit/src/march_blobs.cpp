@@ -16,7 +16,7 @@ using blobs::Cells;
 
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// Those of `tiles`, inside and without values, of which more than the sign is needed: a cell that they own has a node outside, or an
+/// Selects those of `tiles`, inside and without values, of which more than the sign is needed: a cell that they own has a node outside, or an
 /// edge that starts at one, in the tile below along an axis, ends in them.
 Bits next_to_outside(const BlockTable& table, const Block& block, Bits tiles) {
   const BlocksAbove above = blocks_above(table, block);
@@ -480,7 +480,7 @@ class BlobSampler final : public Sampler {
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
-  /// @param sampled  blocks that were, in this call: only next to them can an outside node be new
+  /// @param sampled  blocks sampled in this call: only next to them can an outside node be new
   void evaluate_needed(const Executor& executor, std::span<const std::uint32_t> sampled, BlockTable& table) const {
     std::vector<std::uint8_t> near(table.block.size());
     for (const std::uint32_t b : sampled) {

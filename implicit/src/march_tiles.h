@@ -117,7 +117,7 @@ struct alignas(64) Block {
   Bits outside = kAll;        ///< tiles with nodes outside
   Bits changed = 0;           ///< sampled anew in this call: what moved may reach their nodes or those next to them
   Bits flipped = 0;           ///< those that hold values and did not before, or the other way round
-  Bits early = 0;             ///< those inside by partial sums, whose values nobody needs yet
+  Bits early = 0;             ///< those inside by partial sums, whose values are not needed yet
   Bits needed = 0;            ///< of these, those next to a node outside
   std::uint8_t decided = 0;   ///< leaves on which bounds show one sign
   std::vector<Bits> inside_nodes;  ///< of the tiles that hold values, by place: F > 0

@@ -35,7 +35,7 @@ constexpr auto kPlaces = [] {
 constexpr auto kTilePlace = kPlaces<blobs::kTile>, kNodePlace = kPlaces<1>;
 
 /// Vertices on the edges of a block's cells: those of the block by their order, then those that its upper neighbours own. What a
-/// cell asks for is small enough to stay in the nearest cache.
+/// cell requires is small enough to stay in the nearest cache.
 class LocalVertices {
  public:
   using Number = std::uint16_t;

@@ -216,8 +216,8 @@ class ViewSampler final : public Sampler {
     }
   }
 
-  /// F at the upper end of an edge that the surface crosses: as a tile holds it or, if none does, would hold it, so that it does not matter
-  /// to a root which tiles bounds left. @param held  0 if none does or the value is no other  @param lower  F at the lower end
+  /// F at the upper end of an edge that the surface crosses: as a tile stores it or, if none does, would store it, so that roots do not
+  /// depend on which tiles the bounds kept. @param held  0 if none does or the value is no other  @param lower  F at the lower end
   [[nodiscard]] double upper_value(double held, double lower, const Vec3& end) const {
     if (held != 0.0) return held;
     const double exact = field_.value(end), rounded = static_cast<double>(static_cast<float>(exact));

@@ -106,22 +106,22 @@ double local_overlap(std::span<const Box> supports) {
   return looks > 0 ? static_cast<double>(held) / static_cast<double>(looks) : 0.0;
 }
 
-/// Of a search, in the time that marching cubes take: for cubes of the lattice, and for halving those near the surface until their edges
-/// are some part of the length on which gradients turn. Bounds of overlapping primitives add up where their gradients cancel.
+/// Cost of a search relative to marching cubes: for cubes of the lattice, and for halving those near the surface until their edges
+/// are a given fraction of the length on which gradients turn. Bounds of overlapping primitives add up where their gradients cancel.
 struct SearchWork {
   double lattice = 0.0, alone = 0.0, overlapping = 0.0;
 };
 constexpr SearchWork kBlobSearch{.lattice = 0.5, .alone = 0.0, .overlapping = 5.0};
 constexpr SearchWork kEighthSearch{.lattice = 0.1, .alone = 12.0, .overlapping = 8.0};
 constexpr SearchWork kSumSearch{.lattice = 0.2, .alone = 130.0, .overlapping = 85.0};
-/// Of a primitive smaller than a cell, about a thousand cubes [ms].
+/// Search cost of a primitive smaller than a cell, about a thousand cubes [ms].
 constexpr double kLeastHalved = 1.0;
 /// Cost of nearest points on other shapes relative to points.
 constexpr double kOtherShapes = 2.5;
 /// Cost of tetrahedra: of a leaf, and of the boundary curve of a contact [ms].
 constexpr double kDividedLeaf = 0.04, kBoundary = 0.8;
-/// Of two bodies that touch, for some hundred cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
-/// there, of balls and of shapes with edges.
+/// Search cost of a contact of two bodies, for some hundred cubes where gap or overlap is thinner than a cell [ms]; and of each further
+/// primitive that overlaps there, for balls and for shapes with edges.
 constexpr double kContact = 0.2, kMoreBalls = 1.0, kMoreShapes = 170.0;
 
 /// CPU time of marching cubes [ms].

@@ -287,8 +287,8 @@ class BlockSearch {
 
 enum class Flood { Closed, Joined, Known, Several, TooLarge };
 
-/// The nodes of one label that hang together with a seed: those of a body along edges, those outside across faces of cells too, as in
-/// march_cases.h. Ends at a node of the coarse lattice or of another part.
+/// The nodes of one label that are connected to a seed: those of a body along edges, those outside across faces of cells too, as in
+/// march_cases.h. Stops at a node of the coarse lattice or of another part.
 /// @param beyond  the label around them; Several where there are more  @param end  the node of the coarse lattice
 Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels,
     NodeSet& part, Label& beyond, Node& end) {

@@ -1,7 +1,8 @@
 // Interfaces between labels are made once, as triangles between two labels, and given to both bodies. A tetrahedron with
 // two labels is cut as for one body. With three or four labels, its faces are divided around their face points and the
 // interfaces are the cones over those segments from an interior point: faces of a subdivision of the tetrahedron, so
-// they cannot intersect. So are those of one with two labels in which these meet with two others.
+// they cannot intersect. A tetrahedron with two labels in which these interfaces meet two others is divided in
+// the same way.
 
 #include "polygonise_partition.h"
 

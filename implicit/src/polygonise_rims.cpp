@@ -17,7 +17,7 @@ class BoundaryCutter {
  public:
   BoundaryCutter(const BoundaryFacets& facets, const BoundaryCrossings& crossings) : facets_(facets), crossings_(crossings), pieces_(facets, crossings) {}
 
-  /// Where vertices of one triangle do not tell how it is cut, covered vertices get one place: what the third label has between its sheets
+  /// Where vertices of one triangle do not decide how it is cut, covered vertices get one place: what the third label has between its sheets
   /// is closed at that vertex.
   void uncover_mixed() {
     std::vector<std::uint32_t> mixed;
@@ -32,7 +32,7 @@ class BoundaryCutter {
     } while (!mixed.empty());
   }
 
-  /// The same where points on the edges of a facet do not tell how it is cut, where sheets on either side of a third label would cross
+  /// As above where points on the edges of a facet do not decide how it is cut, where sheets on either side of a third label would cross
   /// within a tetrahedron, and, when there are none, where more than two of a body would meet in an edge. @return whether there were any
   bool uncover_tangles() {
     std::vector<std::uint32_t> tangled;

@@ -44,8 +44,8 @@ Verdict look_at_depths(std::span<const UnitedBody> bodies, const GridOptions& op
   return left.size() == none ? Verdict::Outside : Verdict::Keep;
 }
 
-/// Of fields: those that may be the largest somewhere in a box. A field that is constant there, as all are beyond their supports, may be
-/// so too, at any distance; the first of equal ones stands for them.
+/// Selects the fields that may be the largest somewhere in a box. A field that is constant there, as all are beyond their supports, may
+/// be the largest at any distance; the first of equal fields represents them.
 Verdict look_at_fields(std::span<const UnitedBody> bodies, double width, const Box& box, std::span<const std::uint32_t> candidates,
                        std::vector<std::uint32_t>& left) {
   thread_local std::vector<Interval> value;

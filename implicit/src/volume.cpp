@@ -138,7 +138,7 @@ class CutBlock {
   std::vector<std::size_t> open_;
 };
 
-/// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may hold some of the body;
+/// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may contain a part of the body;
 /// the middles of the cells are set in both, the shares in the second.
 template <class Whole, class Cut>
 void for_blocks_of(const FieldView& field, double cell, const Whole& whole, const Cut& cut) {

@@ -24,7 +24,7 @@ enum Unit : int {
 };
 inline constexpr int kHeightMapSize = 256;
 inline constexpr int kGroundOcclusionSize = 96;
-// Materials lie in double rows of this many items; the shader knows it as 4095 and 12.
+// Materials lie in double rows of this many items; the shader uses the constants 4095 and 12.
 inline constexpr std::size_t kMaterialRow = 4096;
 inline constexpr std::size_t kAreaLights = 4;
 inline constexpr int kAreaMapSize = 1024;  // of each of the four, two by two

@@ -12,7 +12,7 @@ namespace supple::render::shaders {
 /// Features that the lighting of a picture needs. Branches cost time even where none is taken, so each choice has programs of its own.
 struct Lighting {
   int samples = 1;            ///< of the geometry buffer
-  bool painted = false;       ///< albedos of the geometry buffer where a material says so
+  bool painted = false;       ///< albedos of the geometry buffer where a material requires it
   bool area_lights = false;
   bool ground_paint = false;
   bool scene_linear = false;  ///< radiance times cover, and cover, instead of the display's colours

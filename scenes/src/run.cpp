@@ -117,7 +117,7 @@ class TimeLimit {
  public:
   /// @param seconds  0: none
   explicit TimeLimit(double seconds) : seconds_(seconds) {}
-  /// Whether it has passed; the result says so then.
+  /// Whether it has passed; the result then reports it.
   [[nodiscard]] bool passed(RunResult& result) const {
     if (!(seconds_ > 0.0) || seconds_since(begin_) < seconds_) return false;
     result.reason = "time limit: expected an end within " + short_text(seconds_) + " s, found frame " + std::to_string(result.frames) +

@@ -112,7 +112,7 @@ Primitive segment(double half_length, double radius) {
   return primitive;
 }
 
-/// Closed, with the parts of marching cubes, and all of them: within the distance asked for, twice for the cubes' own.
+/// Closed, with the parts of marching cubes, and all of them: within the given distance, twice for the cubes' own.
 void expect_whole(const Body& body, const DelaunayOptions& options, const std::string& what) {
   DelaunayReport report;
   const Mesh mesh = delaunay_mesh(body.field, options, &report);

@@ -350,7 +350,7 @@ TEST(CreasesNeverCross, TakesBackWhatCrossesStepByStep) {
   EXPECT_EQ(steps.numbers(), (std::vector<std::uint32_t>{0, 1, 2, d}));
 }
 
-// Where steps are taken back, the error is that of what is left: asked for less, finer cells follow.
+// Where steps are taken back, the error is that of the remaining mesh; a smaller given error leads to finer cells.
 TEST(CreasesNeverCross, ToAnErrorEither) {
   constexpr double kDegrees = 8.0, kCell = 0.125;
   const double apart = 1.0 / std::tan(kDegrees * std::numbers::pi / 180.0), ball = std::hypot(1.0, apart);

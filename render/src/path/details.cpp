@@ -40,7 +40,7 @@ class Signs {
     }
     return meet;
   }
-  /// By the mean nearness of what the pixels around see light from: one path a pixel knows little.
+  /// By the mean nearness of what the pixels around see light from: one path per pixel is too noisy.
   [[nodiscard]] LaneMask are_gaps(std::ptrdiff_t at) const {
     const Lanes size = pixel_ * (film_.position.load(at) - Vec3Lanes(eye_)).norm();
     return both(film_.cover.load(at) > 0.0F, tent_sum<2>(film_.nearness, at) * size > kGap * tent_sum<2>(film_.cover, at));

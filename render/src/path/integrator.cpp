@@ -102,8 +102,8 @@ class Tile {
 
   /// @return mean over all pixels of their squared standard error over (luminance + 0.1) squared
   float estimate_errors() {
-    // One path a pixel knows nothing of its noise, which is at most what pixels differ by; a few know little, as where light is
-    // even but for rare dark paths: they count as if one of them were such a path.
+    // One path per pixel says nothing about its noise, which is at most the difference between pixels; a few say little where light
+    // is even except for rare dark paths: they count as if one of them were such a path.
     LightSum<Lanes> paths;
     for_rows([&](std::size_t, const Row& row) {
       const Sums<Lanes>& sum = row.sums;

@@ -67,7 +67,7 @@ struct FilmSource {
 /// Encodes pictures to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg program, in a temporary folder beside `film` that
 /// goes with it, and renames it when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names another program or its
 /// path. Odd sizes are stretched to even ones. A film there that already holds the same pictures at the
-/// same rate and note (it says so in its comment) is kept. ffmpeg never outlives the call, also where the process is killed.
+/// same rate and note (stored in its comment) is kept. ffmpeg never outlives the call, also where the process is killed.
 /// @param interrupt  ends ffmpeg when set by another thread or a signal; null: never
 /// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line),
 ///   Interrupted; no new film is left then
