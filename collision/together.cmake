@@ -1,12 +1,12 @@
 supple_together(
-  "src/apex.cpp src/approach.cpp src/bodies.cpp src/body_order.cpp src/bulge.cpp src/bulge_volume.cpp
-   src/contact_surface.cpp src/cores.cpp src/flat_cells.cpp"
-  "src/cross_kinks.cpp src/find_peak.cpp src/linearise.cpp src/march_feet.cpp"
-  "src/deformed_field.cpp src/find_contacts.cpp src/pair_pressure.cpp src/polar_cover.cpp src/symmetry.cpp"
-  "src/imprint.cpp src/pair_solver.cpp src/quadrature.cpp"
-  "src/march_kinks.cpp src/march_pieces.cpp src/mild_rule.cpp src/polar_patches.cpp"
-  "src/march_rule.cpp src/react.cpp"
-  "src/middle_rule.cpp src/sleep.cpp src/smooth_bound.cpp src/touch_kinks.cpp"
-  "src/polar_columns.cpp src/rim_corners.cpp src/squeezed_region.cpp"
-  "src/polar_rule.cpp src/stick.cpp src/third_bodies.cpp"
-  "src/sample_rule.cpp src/sigma_mesh.cpp")
+  "src/surface/apex.cpp src/pairs/approach.cpp src/pairs/bodies.cpp src/pairs/body_order.cpp src/deform/bulge.cpp src/deform/bulge_volume.cpp
+   src/surface/contact_surface.cpp src/pairs/cores.cpp src/surface/flat_cells.cpp"
+  "src/surface/cross_kinks.cpp src/surface/find_peak.cpp src/response/linearise.cpp src/surface/march_feet.cpp"
+  "src/deform/deformed_field.cpp src/pairs/find_contacts.cpp src/surface/pair_pressure.cpp src/surface/polar_cover.cpp src/surface/symmetry.cpp"
+  "src/surface/imprint.cpp src/surface/pair_solver.cpp src/surface/quadrature.cpp"
+  "src/surface/march_kinks.cpp src/surface/march_pieces.cpp src/surface/mild_rule.cpp src/surface/polar_patches.cpp"
+  "src/surface/march_rule.cpp src/response/react.cpp"
+  "src/surface/middle_rule.cpp src/pairs/sleep.cpp src/surface/smooth_bound.cpp src/surface/touch_kinks.cpp"
+  "src/surface/polar_columns.cpp src/surface/rim_corners.cpp src/surface/squeezed_region.cpp"
+  "src/surface/polar_rule.cpp src/response/stick.cpp src/surface/third_bodies.cpp"
+  "src/surface/sample_rule.cpp src/surface/sigma_mesh.cpp")

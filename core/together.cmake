@@ -1,11 +1,11 @@
 supple_together(
-  "src/arrange.cpp src/audits.cpp src/bond_runs.cpp src/cohesion.cpp src/cohesion_table.cpp src/cohesion_variants.cpp
-   src/content_versions.cpp src/directed_form.cpp src/error.cpp src/executor.cpp src/integrators.cpp"
-  "src/contact_term.cpp src/gay_berne.cpp src/gay_berne_hessian.cpp src/hash.cpp src/integrate.cpp
-   src/nearest_word.cpp"
-  "src/damping.cpp src/interaction_reports.cpp src/links.cpp src/math.cpp src/neighbours.cpp"
-  "src/implicit_step.cpp src/interactions.cpp src/lennard_jones.cpp src/literal_form.cpp src/mesh.cpp"
-  "src/neighbour_list.cpp src/pair_laws.cpp src/particles.cpp src/parts.cpp src/rotation.cpp src/step_hessian.cpp
-   src/stiffness_damping.cpp"
-  "src/pair_hessian.cpp src/io/vtk_files.cpp"
-  "src/runge_kutta.cpp src/io/atomic_file.cpp src/io/descriptor.cpp src/io/open_temporaries.cpp")
+  "src/particles/arrange.cpp src/particles/audits.cpp src/laws/bond_runs.cpp src/laws/cohesion.cpp src/laws/cohesion_table.cpp src/laws/cohesion_variants.cpp
+   src/base/content_versions.cpp src/laws/directed_form.cpp src/base/error.cpp src/base/executor.cpp src/integrate/integrators.cpp"
+  "src/integrate/contact_term.cpp src/laws/gay_berne.cpp src/laws/gay_berne_hessian.cpp src/base/hash.cpp src/integrate/integrate.cpp
+   src/base/nearest_word.cpp"
+  "src/laws/damping.cpp src/laws/interaction_reports.cpp src/particles/links.cpp src/base/math.cpp src/neighbours/neighbours.cpp"
+  "src/integrate/implicit_step.cpp src/laws/interactions.cpp src/laws/lennard_jones.cpp src/laws/literal_form.cpp src/base/mesh.cpp"
+  "src/neighbours/neighbour_list.cpp src/laws/pair_laws.cpp src/particles/particles.cpp src/particles/parts.cpp src/integrate/rotation.cpp src/integrate/step_hessian.cpp
+   src/laws/stiffness_damping.cpp"
+  "src/laws/pair_hessian.cpp src/io/vtk_files.cpp"
+  "src/integrate/runge_kutta.cpp src/io/atomic_file.cpp src/io/descriptor.cpp src/io/open_temporaries.cpp")

@@ -1,23 +1,23 @@
 supple_together(
-  "src/blend.cpp src/blob_grid.cpp src/claim_bounds.cpp src/convolution.cpp src/crease_points.cpp
-   src/delaunay_estimate.cpp"
-  "src/closed_surface.cpp src/crease_nodes.cpp src/creases.cpp src/even_samples.cpp src/half_space.cpp
-   src/march_cubes.cpp"
-  "src/crease_crossings.cpp src/eighth_bounds.cpp src/error_search.cpp src/exact_distance.cpp src/field_index.cpp
-   src/mesh_solid.cpp"
-  "src/crease_mending.cpp src/field.cpp src/field_bounds.cpp src/march_leaves.cpp"
-  "src/crease_sharpening.cpp src/field_blend.cpp src/field_changes.cpp src/march_assemble.cpp src/mesh_columns.cpp
-   src/mesh_motion.cpp src/patch_flips.cpp"
-  "src/cut_crossings.cpp src/field_ray.cpp src/march_blobs.cpp src/rim_islands.cpp"
-  "src/delaunay_partition.cpp src/field_box_bounds.cpp src/kinks.cpp src/march_sampling.cpp src/same_triangles.cpp
-   src/triangle_steps.cpp"
-  "src/height_field.cpp src/intersect.cpp src/march_moves.cpp src/march_refined.cpp src/patch_surface.cpp"
-  "src/kernel.cpp src/march_view.cpp src/mesh_distance.cpp src/mesh_routes.cpp src/triangle_errors.cpp"
-  "src/march_triangles.cpp src/missed_blobs.cpp src/patch_coarsen.cpp src/polygonise_within.cpp src/project.cpp"
-  "src/missed_pieces.cpp src/sample_layout.cpp src/united_field.cpp"
-  "src/partition_keep.cpp src/polygonise_junctions.cpp src/polygonise_rims.cpp src/rim_facets.cpp src/rim_pieces.cpp"
-  "src/patch_complex.cpp src/shape_curvature.cpp src/skeleton.cpp src/surface_blocks.cpp"
-  "src/patch_refine.cpp src/shapes.cpp src/solids.cpp src/triangle_tree.cpp"
-  "src/polygonise_roots.cpp src/surface_samples.cpp src/volume.cpp"
-  "src/polygonise_vertices.cpp src/rim_crossings.cpp src/triangle_crossings.cpp"
-  "src/surface_grid.cpp src/grid_leaves.cpp src/grid_updater.cpp src/union_updater.cpp")
+  "src/field/blend.cpp src/mesh/blob_grid.cpp src/bounds/claim_bounds.cpp src/skeleton/convolution.cpp src/mesh/creases/crease_points.cpp
+   src/mesh/delaunay/delaunay_estimate.cpp"
+  "src/solids/closed_surface.cpp src/mesh/creases/crease_nodes.cpp src/mesh/creases/creases.cpp src/samples/even_samples.cpp src/solids/half_space.cpp
+   src/mesh/cubes/march_cubes.cpp"
+  "src/mesh/creases/crease_crossings.cpp src/bounds/eighth_bounds.cpp src/mesh/error_search.cpp src/solids/exact_distance.cpp src/field/field_index.cpp
+   src/solids/mesh_solid.cpp"
+  "src/mesh/creases/crease_mending.cpp src/field/field.cpp src/bounds/field_bounds.cpp src/mesh/cubes/march_leaves.cpp"
+  "src/mesh/creases/crease_sharpening.cpp src/field/field_blend.cpp src/field/field_changes.cpp src/mesh/cubes/march_assemble.cpp src/mesh/mesh_columns.cpp
+   src/mesh/mesh_motion.cpp src/mesh/delaunay/patch_flips.cpp"
+  "src/mesh/cut_crossings.cpp src/field/field_ray.cpp src/mesh/cubes/march_blobs.cpp src/mesh/partition/rim_islands.cpp"
+  "src/mesh/delaunay/delaunay_partition.cpp src/bounds/field_box_bounds.cpp src/field/kinks.cpp src/mesh/cubes/march_sampling.cpp src/mesh/same_triangles.cpp
+   src/mesh/triangle_steps.cpp"
+  "src/solids/height_field.cpp src/field/intersect.cpp src/mesh/cubes/march_moves.cpp src/mesh/cubes/march_refined.cpp src/mesh/delaunay/patch_surface.cpp"
+  "src/skeleton/kernel.cpp src/mesh/cubes/march_view.cpp src/solids/mesh_distance.cpp src/mesh/mesh_routes.cpp src/mesh/triangle_errors.cpp"
+  "src/mesh/cubes/march_triangles.cpp src/mesh/missed/missed_blobs.cpp src/mesh/delaunay/patch_coarsen.cpp src/mesh/partition/polygonise_within.cpp src/field/project.cpp"
+  "src/mesh/missed/missed_pieces.cpp src/samples/sample_layout.cpp src/solids/united_field.cpp"
+  "src/mesh/partition/partition_keep.cpp src/mesh/partition/polygonise_junctions.cpp src/mesh/partition/polygonise_rims.cpp src/mesh/partition/rim_facets.cpp src/mesh/partition/rim_pieces.cpp"
+  "src/mesh/delaunay/patch_complex.cpp src/bounds/shape_curvature.cpp src/skeleton/skeleton.cpp src/mesh/surface_blocks.cpp"
+  "src/mesh/delaunay/patch_refine.cpp src/skeleton/shapes.cpp src/solids/solids.cpp src/solids/triangle_tree.cpp"
+  "src/mesh/partition/polygonise_roots.cpp src/samples/surface_samples.cpp src/field/volume.cpp"
+  "src/mesh/partition/polygonise_vertices.cpp src/mesh/partition/rim_crossings.cpp src/mesh/triangle_crossings.cpp"
+  "src/grid/surface_grid.cpp src/grid/grid_leaves.cpp src/grid/grid_updater.cpp src/grid/union_updater.cpp")

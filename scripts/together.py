@@ -19,7 +19,7 @@ LARGEST_GROUP = 50_000  # characters
 ALONE = re.compile(r"HWY_TARGET_INCLUDE|^using namespace |SUPPLE_VERSION|<GL/osmesa.h>|<EGL/egl.h>|<openvdb/", re.MULTILINE)
 # Fixed groups: they use the same namespaces, or have compile options of their own.
 GIVEN = {
-    "implicit": [["src/surface_grid.cpp", "src/grid_leaves.cpp", "src/grid_updater.cpp", "src/union_updater.cpp"]],
+    "implicit": [["src/grid/surface_grid.cpp", "src/grid/grid_leaves.cpp", "src/grid/grid_updater.cpp", "src/grid/union_updater.cpp"]],
     "render": [["src/path/integrator.cpp", "src/path/details.cpp", "src/path/tracer.cpp", "src/path/paint.cpp"],
                ["src/path/geometry.cpp", "src/path/denoise.cpp"]],
 }
@@ -73,7 +73,7 @@ class File:
 
 def sources(module: str) -> list:
     folder = ROOT / module / "src"
-    files = sorted(folder.glob("*.cpp")) + sorted(folder.glob("io/*.cpp"))
+    files = sorted(f for f in folder.rglob("*.cpp") if f.parent.name != "path")  # compiled by options of its own
     return [str(f.relative_to(ROOT / module)) for f in files]
 
 

@@ -19,9 +19,11 @@
 #include <vector>
 
 #include "benchmarks.h"
+#include "describe.h"
 #include "last_resort.h"
 #include "print.h"
 #include "progress_bar.h"
+#include "templates.h"
 #include "usage.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -76,6 +78,7 @@ struct Arguments {
   std::string state;
   std::string query;
   std::string group;
+  std::string from;
   std::string other;
   std::string camera;
   std::string meshes;
@@ -432,6 +435,17 @@ int parse_and_call(int argc, char** argv, bool silent) {
   reference_verb->add_flag("--schema", a.json, "print a JSON Schema for editors instead");
   reference_verb->footer("Example: supple reference --schema > supple.schema.json");
 
+  CLI::App* describe_verb = app.add_subcommand("describe", "print completions for a shell, or a page for man");
+  describe_verb->add_option("form", a.query, "bash, zsh or man")->required()->check(CLI::IsMember({"bash", "zsh", "man"}));
+  describe_verb->footer("Example: source <(supple describe bash)");
+
+  CLI::App* new_verb = app.add_subcommand("new", "write a small scene to begin with");
+  new_verb->add_option("name", a.scene, "name of the scene; the file is NAME.yaml")->required();
+  new_verb->add_option("--template", a.from, "what to begin with")->default_val("ball");
+  std::string known = "Templates:\n";
+  for (const tool::Template& one : tool::templates()) known += "  " + std::string(one.name) + ": " + std::string(one.meaning) + '\n';
+  new_verb->footer(known + "\nExample: supple new my_scene --template jelly && supple run my_scene.yaml");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {
@@ -453,6 +467,15 @@ int parse_and_call(int argc, char** argv, bool silent) {
   if (check_verb->parsed()) return check(a);
   if (explain_verb->parsed()) return explain(a);
   if (bench_verb->parsed()) return bench(a);
+  if (describe_verb->parsed()) {
+    std::cout << (a.query == "bash" ? tool::bash_completion(app) : a.query == "zsh" ? tool::zsh_completion(app) : tool::man_page(app, SUPPLE_VERSION));
+    return 0;
+  }
+  if (new_verb->parsed()) {
+    const std::string path = tool::write_new_scene(a.scene, a.from);
+    print(std::cout, "%s is a scene to begin with. Next: supple run %s\n", path.c_str(), path.c_str());
+    return 0;
+  }
   if (reference_verb->parsed()) {
     std::cout << (a.json ? scenes::scene_json_schema() : scenes::scene_reference());
     return 0;

@@ -25,16 +25,16 @@
 #include <vector>
 
 #include "benchmarks/field_bodies.h"
-#include "blob_grid.h"
-#include "field_index.h"
-#include "march_sampling.h"
-#include "support/mesh_distance.h"
+#include "field/field_index.h"
+#include "mesh/blob_grid.h"
+#include "mesh/cubes/march_sampling.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/creases.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/missed_pieces.h"
 #include "supple/implicit/polygonise.h"
 #include "supple/implicit/surface_grid.h"
+#include "support/mesh_distance.h"
 #ifdef SUPPLE_HAS_CGAL
 #include "supple/cgal/surface_meshes.h"
 #endif

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "implicit/analytic_fields.h"
-#include "patch_complex.h"
+#include "mesh/delaunay/patch_complex.h"
 #include "supple/core/content_versions.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/delaunay.h"

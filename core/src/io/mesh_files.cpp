@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include "number_text.h"
+#include "io/number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 

@@ -15,7 +15,7 @@
 #include <system_error>
 #include <vector>
 
-#include "number_text.h"
+#include "io/number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/descriptor.h"

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <utility>
 
-#include "number_text.h"
+#include "io/number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"

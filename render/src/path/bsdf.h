@@ -3,7 +3,7 @@
 /// axes whose z is the normal, and point away from the surface.
 #pragma once
 
-#include "sampling.h"
+#include "path/sampling.h"
 
 namespace supple::render::path {
 

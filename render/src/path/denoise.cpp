@@ -1,4 +1,4 @@
-#include "denoise.h"
+#include "path/denoise.h"
 
 #include <cmath>
 #include <span>

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "integrator.h"
+#include "path/integrator.h"
 
 namespace supple::render::path {
 

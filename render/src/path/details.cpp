@@ -1,4 +1,4 @@
-#include "details.h"
+#include "path/details.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 /// Pixels with detail that a filter cannot restore.
 #pragma once
 
-#include "integrator.h"
+#include "path/integrator.h"
 
 namespace supple::render::path {
 

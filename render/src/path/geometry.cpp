@@ -1,4 +1,4 @@
-#include "geometry.h"
+#include "path/geometry.h"
 
 #include <array>
 #include <cstring>
@@ -6,9 +6,9 @@
 #include <tuple>
 #include <type_traits>
 
-#include "../draw_list.h"
-#include "../lighting.h"
-#include "paint.h"
+#include "path/paint.h"
+#include "picture/draw_list.h"
+#include "picture/lighting.h"
 #include "supple/core/error.h"
 #include "supple/core/executor.h"
 

@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "../picture_space.h"
-#include "bsdf.h"
+#include "path/bsdf.h"
+#include "picture/picture_space.h"
 #include "supple/render/view.h"
 
 namespace supple::render::path {

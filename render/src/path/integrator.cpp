@@ -1,9 +1,9 @@
-#include "integrator.h"
+#include "path/integrator.h"
 
 #include <algorithm>
 #include <array>
 
-#include "details.h"
+#include "path/details.h"
 
 namespace supple::render::path {
 namespace {

@@ -8,9 +8,9 @@
 #include <optional>
 #include <vector>
 
+#include "path/plane.h"
+#include "path/tracer.h"
 #include "supple/core/executor.h"
-#include "plane.h"
-#include "tracer.h"
 
 namespace supple::render::path {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "sampling.h"
+#include "path/sampling.h"
 
 namespace supple::render::path {
 

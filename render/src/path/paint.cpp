@@ -1,7 +1,7 @@
-#include "paint.h"
+#include "path/paint.h"
 
-#include "../draw_list.h"
-#include "../lighting.h"
+#include "picture/draw_list.h"
+#include "picture/lighting.h"
 
 namespace supple::render::path {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "bsdf.h"
+#include "path/bsdf.h"
 #include "supple/render/view.h"
 
 namespace supple::render::path {

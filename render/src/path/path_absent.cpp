@@ -1,4 +1,4 @@
-#include "path_renderer.h"
+#include "path/path_renderer.h"
 #include "supple/core/error.h"
 
 namespace supple::render {

@@ -1,16 +1,16 @@
-#include "path_renderer.h"
+#include "path/path_renderer.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "../draw_list.h"
-#include "../lighting.h"
-#include "../process_time.h"
-#include "../srgb.h"
-#include "denoise.h"
-#include "integrator.h"
+#include "image/process_time.h"
+#include "image/srgb.h"
+#include "path/denoise.h"
+#include "path/integrator.h"
+#include "picture/draw_list.h"
+#include "picture/lighting.h"
 #include "supple/core/error.h"
 
 namespace supple::render {

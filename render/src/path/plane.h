@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "lanes.h"
+#include "path/lanes.h"
 
 namespace supple::render::path {
 

@@ -1,4 +1,4 @@
-#include "tracer.h"
+#include "path/tracer.h"
 
 #include <array>
 

@@ -4,10 +4,10 @@
 
 #include <optional>
 
-#include "../draw_list.h"
-#include "geometry.h"
-#include "lights.h"
-#include "paint.h"
+#include "path/geometry.h"
+#include "path/lights.h"
+#include "path/paint.h"
+#include "picture/draw_list.h"
 
 namespace supple::render::path {
 

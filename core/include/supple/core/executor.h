@@ -32,9 +32,4 @@ class Executor {
   std::unique_ptr<Impl> impl_;
 };
 
-inline constexpr std::size_t kReduceBlock = 256;
-
-/// Sum of map(i) for i in [0, n), grouped by kReduceBlock alone: the same bits for every thread count.
-[[nodiscard]] double ordered_sum(const Executor& executor, std::size_t n, const std::function<double(std::size_t)>& map);
-
 }  // namespace supple

@@ -42,7 +42,6 @@ class SurfaceGrid {
   SurfaceGrid& operator=(SurfaceGrid&&) noexcept;
 
   [[nodiscard]] std::uint64_t active_voxels() const;
-  [[nodiscard]] std::uint64_t memory_bytes() const;
   [[nodiscard]] std::uint64_t hash() const;         ///< over active voxels in lattice order
   [[nodiscard]] double value(std::int32_t i, std::int32_t j, std::int32_t k) const;  ///< stored value at a node
   [[nodiscard]] double interpolate(const Vec3& world) const;                          ///< trilinear

@@ -1,0 +1,35 @@
+/// @file apex.h
+/// Columns through the space that a convex body loses to others, from one place of it.
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "surface/pair_pressure.h"
+
+namespace supple::collision {
+
+/// Where the columns of a body meet. Let w(x) be the way out of the apex times the integral of a density from x along it to where the body ends, each part
+/// by how much the way has widened there: its divergence is minus the density, beside a source at the apex, and on the surface of a convex body w is 0. So
+/// the integral over all that the body loses is the flux of w through Sigma (Gauss), whatever the shape of Sigma and however many bodies take their part;
+/// where the apex is lost, too, the integral over the whole body comes to that.
+struct Apex {
+  Vec3 at = Vec3::Zero();  ///< the place; of parallel columns their way [unit]
+  bool parallel = false;   ///< it is infinitely far
+  bool lost = false;       ///< to the other body of the pair
+
+  [[nodiscard]] Vec3 way(const Vec3& x) const { return parallel ? at : Vec3((x - at).normalized()); }
+  [[nodiscard]] double distance(const Vec3& x) const { return parallel ? std::numeric_limits<double>::infinity() : (x - at).norm(); }
+};
+
+/// @param thirds  that take space from the pair, too: then the apex is the middle of the body, for all its pairs
+/// @param from  a place of Sigma   @param outward  its normal out of the body
+/// @return none of bodies that are not known to be convex
+[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const ContactBody* const> thirds, const Vec3& from, const Vec3& outward);
+
+/// Points through all of a convex body as seen from the apex, and the volumes that they stand for; as many as `error` of the integral of the pressure asks.
+void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error, std::vector<Vec3>& point, std::vector<double>& volume);
+
+}  // namespace supple::collision

@@ -1,0 +1,142 @@
+#include "supple/collision/contact_surface.h"
+
+#include <algorithm>
+#include <array>
+
+#include "supple/core/error.h"
+#include "surface/pair_solver.h"
+
+namespace supple::collision {
+namespace {
+
+/// Numbers of pairs, points and points of squeezed regions.
+struct Extent {
+  std::size_t pairs = 0, points = 0, volumes = 0;
+  void operator+=(const Extent& other) {
+    pairs += other.pairs;
+    points += other.points;
+    volumes += other.volumes;
+  }
+};
+
+/// What a surface needs of one pair. @param parted  whether A, B have several parts, whose forces need the regions
+Extent extent_of(const PairResult& result, const std::array<bool, 2>& parted) {
+  if (result.summary.rule == ContactRule::None && result.summary.error_estimate == 0.0 && !(result.summary.energy > 0.0)) return {};
+  Extent extent{1, result.points.point.size(), 0};
+  for (std::size_t i = 0; i < result.points.volume_side.size() && (parted[0] || parted[1]); ++i) {
+    extent.volumes += parted[result.points.volume_side[i]] ? 1 : 0;
+  }
+  return extent;
+}
+
+/// @param keep  never fewer entries than there are: what lies beyond is not written again when they are wanted
+void resize(ContactSurface& out, const Extent& size, bool keep) {
+  const auto to = [keep](std::size_t n, auto&... arrays) { (arrays.resize(keep ? std::max(n, arrays.size()) : n), ...); };
+  to(size.pairs, out.summary);
+  to(size.points, out.pair, out.point, out.normal, out.area, out.pressure);
+  to(size.volumes, out.volume_pair, out.volume_side, out.volume_point, out.volume_weight);
+}
+
+/// Copies one pair that touches to its place.
+void put(const PairResult& result, const std::array<bool, 2>& parted, const Extent& begin, ContactSurface& out) {
+  const auto at = [](auto& to, std::size_t place) { return to.begin() + static_cast<std::ptrdiff_t>(place); };
+  const auto index = static_cast<std::uint32_t>(begin.pairs);
+  const PatchPoints& points = result.points;
+  out.summary[index] = result.summary;
+  std::fill_n(at(out.pair, begin.points), points.point.size(), index);
+  std::copy(points.point.begin(), points.point.end(), at(out.point, begin.points));
+  std::copy(points.normal.begin(), points.normal.end(), at(out.normal, begin.points));
+  std::copy(points.area.begin(), points.area.end(), at(out.area, begin.points));
+  std::copy(points.pressure.begin(), points.pressure.end(), at(out.pressure, begin.points));
+  std::size_t place = begin.volumes;
+  for (std::size_t i = 0; i < points.volume_side.size() && (parted[0] || parted[1]); ++i) {
+    if (!parted[points.volume_side[i]]) continue;
+    out.volume_pair[place] = index;
+    out.volume_side[place] = points.volume_side[i];
+    out.volume_point[place] = points.volume_point[i];
+    out.volume_weight[place++] = points.volume_weight[i];
+  }
+}
+
+}  // namespace
+
+void ContactSurface::clear() {
+  pair.clear();
+  point.clear();
+  normal.clear();
+  area.clear();
+  pressure.clear();
+  volume_pair.clear();
+  volume_side.clear();
+  volume_point.clear();
+  volume_weight.clear();
+  summary.clear();
+}
+
+void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCandidates& candidates,
+                           const ContactSettings& settings, const Executor& executor, ContactSurface& out) {
+  SUPPLE_EXPECTS(settings.error >= 1e-10 && settings.error <= 0.1);
+  SUPPLE_EXPECTS(candidates.offset.size() == candidates.pair.size() + 1);
+  if (candidates.pair.empty()) return out.clear();
+  thread_local std::vector<PairResult> results;
+  thread_local std::vector<Extent> begins;  // of blocks
+  thread_local Partners partners;
+  thread_local std::vector<Box> boxes;
+  boxes.resize(bodies.size());
+  partners.build(bodies.size(), candidates.pair);
+  // In portions, so that what pairs leave behind is joined while it is still near, and buffers stay small.
+  constexpr std::size_t kPortion = 512, kBlock = 4;
+  const std::size_t pairs = candidates.pair.size();
+  if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
+  begins.resize(kPortion / kBlock);
+  struct Job {
+    std::span<const ContactBody> bodies;
+    const ContactCandidates& candidates;
+    const ContactSettings& settings;
+    const Partners& partners;
+    std::span<Box> boxes;
+    std::vector<PairResult>& results;
+    std::vector<Extent>& begins;
+    ContactSurface& out;
+    std::size_t first;
+    [[nodiscard]] std::array<bool, 2> parted(std::size_t k) const {
+      const BodyPair& pair = candidates.pair[first + k];
+      return {bodies[pair.a].pose.size() > 1, bodies[pair.b].pose.size() > 1};
+    }
+  } job{bodies, candidates, settings, partners, boxes, results, begins, out, 0};
+  constexpr std::size_t kBodies = 64;
+  executor.for_blocks(bodies.size(), kBodies, [&job](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) job.boxes[i] = job.bodies[i].field ? job.bodies[i].field.surface_box() : Box{};
+  });
+  Extent size;
+  for (; job.first < pairs; job.first += kPortion) {
+    const std::size_t count = std::min(kPortion, pairs - job.first);
+    executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
+      thread_local PairSolver solver;
+      Extent block;
+      for (std::size_t k = begin; k < end; ++k) {
+        solver.solve(job.bodies, job.candidates, job.partners, job.boxes, job.first + k, job.settings, job.results[k]);
+        block += extent_of(job.results[k], job.parted(k));
+      }
+      job.begins[begin / kBlock] = block;
+    });
+    for (std::size_t block = 0; block * kBlock < count; ++block) {
+      const Extent extent = begins[block];
+      begins[block] = size;
+      size += extent;
+    }
+    resize(out, size, true);
+    executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
+      Extent at = job.begins[begin / kBlock];
+      for (std::size_t k = begin; k < end; ++k) {
+        const std::array<bool, 2> parted = job.parted(k);
+        const Extent extent = extent_of(job.results[k], parted);
+        if (extent.pairs > 0) put(job.results[k], parted, at, job.out);
+        at += extent;
+      }
+    });
+  }
+  resize(out, size, false);
+}
+
+}  // namespace supple::collision

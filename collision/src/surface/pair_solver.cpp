@@ -1,0 +1,503 @@
+#include "surface/pair_solver.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "pairs/body_order.h"
+#include "pairs/boxes.h"
+#include "pairs/cores.h"
+#include "surface/symmetry.h"
+
+namespace supple::collision {
+namespace {
+
+/// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
+bool clear_of(const ContactBody& body, const Box& box) {
+  const std::optional<implicit::CorePoint> core = body.field.core_point(box.centre());
+  return core && (core->point - box.centre()).norm() > core->radius + 0.5 * box.extent().norm();
+}
+
+/// Of balls and half-spaces.
+std::optional<CommonAxis> axis_of(const ContactBody& a, const ContactBody& b, const Vec3& near) {
+  std::optional<implicit::CorePoint> on_a = a.field.core_point(near);
+  if (!on_a || !on_a->round) return std::nullopt;
+  const std::optional<implicit::CorePoint> on_b = b.field.core_point(on_a->point);
+  if (!on_b || !on_b->round) return std::nullopt;
+  on_a = a.field.core_point(on_b->point);
+  const Vec3 along = on_b->point - on_a->point;
+  const double length = along.norm();
+  if (!(length > 0.0)) return std::nullopt;
+  return CommonAxis{on_a->point, along / length};
+}
+
+/// Whether a bound is as good as asked, or as round-off lets it be.
+bool meets(const PairResult& result, double error) {
+  constexpr double kRound = 1e-7, kSlack = 1.01, kOfRounding = 5.0;  // marching has two of these at least
+  return result.rounding > kLostInRounding || result.summary.error_estimate <= std::max({kSlack * error, kRound, kOfRounding * result.rounding});
+}
+
+}  // namespace
+
+void Partners::build(std::size_t bodies, std::span<const BodyPair> pairs) {
+  offset.assign(bodies + 1, 0);
+  for (const BodyPair& p : pairs) {
+    ++offset[p.a + 1];
+    ++offset[p.b + 1];
+  }
+  for (std::size_t i = 0; i < bodies; ++i) offset[i + 1] += offset[i];
+  partner.resize(2 * pairs.size());
+  // Filled from the back, so that offset[i] ends as the begin of i.
+  for (std::size_t k = pairs.size(); k-- > 0;) {
+    partner[--offset[pairs[k].a + 1]] = pairs[k].b;
+    partner[--offset[pairs[k].b + 1]] = pairs[k].a;
+  }
+  for (std::size_t i = 0; i < bodies; ++i) offset[i] = offset[i + 1];
+  offset[bodies] = static_cast<std::uint32_t>(partner.size());
+}
+
+/// Partners of either body whose surfaces may reach the overlap; of teams of obstacles the first ones, and not that of the pair.
+void PairSolver::find_thirds(const Job& job, const BodyPair& pair, const Partners& partners) {
+  third_.clear();
+  third_bodies_.clear();
+  const auto add = [&](std::uint32_t c) {
+    if (c == pair.a || c == pair.b || !overlap_at_once(job.boxes[c], job.overlap)) return;
+    const Team* const team = teams_.of(c);
+    if (team != nullptr && team == team_) return;
+    const std::uint32_t first = team != nullptr ? team->member.front() : c;
+    const auto place = std::lower_bound(third_.begin(), third_.end(), first);
+    if (place == third_.end() || *place != first) third_.insert(place, first);
+  };
+  for (const std::uint32_t c : partners.of(pair.a)) add(c);
+  for (const std::uint32_t c : partners.of(pair.b)) add(c);
+  const auto meets = [&partners](std::uint32_t body, std::uint32_t c) {
+    const std::span<const std::uint32_t> all = partners.of(body);
+    return std::binary_search(all.begin(), all.end(), c);
+  };
+  thirds_.set(job.bodies, job.a, job.b, pair, third_, teams_, meets);
+}
+
+/// The team of the pair's obstacle, if it has one. @return whether the pair has its contact
+bool PairSolver::join_team(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners, const BodyPair& pair) {
+  teams_.clear();
+  team_ = nullptr;
+  if (bodies[pair.a].fixed == bodies[pair.b].fixed) return true;
+  const std::uint32_t obstacle = bodies[pair.a].fixed ? pair.a : pair.b, body = pair.a + pair.b - obstacle;
+  teams_.find(bodies, body, partners.of(body));
+  team_ = teams_.of(obstacle);
+  if (team_ == nullptr) return true;
+  if (team_->member.front() != obstacle) return false;
+  team_seeds_.clear();
+  for (const std::uint32_t c : team_->member) {
+    const BodyPair other{std::min(body, c), std::max(body, c)};
+    const auto k = static_cast<std::size_t>(std::lower_bound(candidates.pair.begin(), candidates.pair.end(), other) - candidates.pair.begin());
+    const auto seeds = std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
+    team_seeds_.insert(team_seeds_.end(), seeds.begin(), seeds.end());
+  }
+  const Box own = bodies[body].field.surface_box(), all = team_->field.surface_box();
+  team_overlap_ = {own.lower.cwiseMax(all.lower), own.upper.cwiseMin(all.upper)};
+  return true;
+}
+
+/// How third bodies press on the patches, and whether nearly as much as the pair does. Those near are kept.
+PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& out) {
+  Box patch;
+  rim_.clear();
+  for (const PolarCover& cover : patches_.covers()) {
+    rim_.insert(rim_.end(), cover.rim.begin(), cover.rim.end());
+    patch.include(cover.frame.origin);
+  }
+  for (const Vec3& x : rim_) patch.include(x);
+  for (const Vec3& x : out.points.point) patch.include(x);
+  const double largest = out.summary.largest_pressure, margin = 0.05 * largest, at_rim = kAtRim * job.settings().error * largest;
+  const std::size_t points = out.points.point.size();
+  taken_.assign(points + rim_.size(), 0);
+  value_.resize(taken_.size());
+  bool press = false;
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    const ContactBody& third = thirds_.all()[t];
+    if (!(teams_.of(third_[t]) != nullptr || job.boxes[third_[t]].overlaps(patch)) || clear_of(third, patch) || third.field.bound(patch).upper <= 0.0) continue;
+    third_bodies_.push_back(&third);
+    third.field.evaluate(out.points.point, std::span(value_).first(points));
+    third.field.evaluate(rim_, std::span(value_).subspan(points));
+    for (std::size_t i = 0; i < value_.size(); ++i) {
+      // Beyond the outermost nodes the pressure of the pair falls to zero.
+      const double p = third.material.modulus * value_[i], own = i < points ? out.points.pressure[i] : 0.0;
+      press = press || p > (i < points ? own - margin : at_rim);
+      if (p > (i < points ? own : -at_rim)) taken_[i] = 1;
+    }
+    for (const PolarCover& cover : patches_.covers()) press = press || imprint_.find(job.polar.pressure, cover, third, margin).has_value();
+  }
+  if (!press) return Pressing::None;
+  return std::find(taken_.begin(), taken_.end(), 0) == taken_.end() ? Pressing::All : Pressing::Some;
+}
+
+/// The third bodies that reach the overlap.
+void PairSolver::take_all_thirds(const Job& job) {
+  third_bodies_.clear();
+  for (const ContactBody& third : thirds_.all()) {
+    if (third.field.bound(job.overlap).upper > 0.0) third_bodies_.push_back(&third);
+  }
+}
+
+/// After a rule that did not fit.
+void PairSolver::begin_anew(const Job& job, PairResult& out) {
+  out.clear();
+  take_all_thirds(job);
+}
+
+/// Polar patches from where `find_patches` begins. @return false where the rule does not fit
+bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out) {
+  if (!patches_.solve(job, out)) return false;
+  // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed. Obstacles without samples of their own
+  // may be thin, and have a field only near them.
+  const auto shown_by_seeds = [&](int side) { return job.pressure.body(side).skeleton != nullptr || job.pressure.field(side).convex(); };
+  if (!patches_.empty() || (!convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
+  std::optional<Between> between;
+  if (convex) between = between_cores(job.pressure.body(0), job.pressure.body(1), overlap, kManySteps);
+  if (between && between->apart) return true;
+  patches_.start_from(overlap, job.pressure);
+  if (!patches_.solve(job, out)) return false;
+  if (!patches_.empty() || !between || !between->overlap) return true;
+  patches_.start_from(between->middle, job.pressure);
+  return patches_.solve(job, out);
+}
+
+/// The same, at another error where the one asked for is not met. @return false where the rule does not fit
+bool PairSolver::polar(const Job& job, PairResult& out) {
+  constexpr double kFiner = 0.1, kCoarse = 1e-3;
+  if (!rings(job.polar, job.overlap, job.convex, out)) {
+    // Where rings are lost at a fine error, coarse ones are better than nothing: other rules may not find so thin an overlap.
+    if (!job.convex || job.settings().error >= kCoarse) return false;
+    out.clear();
+    PolarJob coarse = job.polar;
+    coarse.settings.error = kCoarse;
+    return rings(coarse, job.overlap, job.convex, out);
+  }
+  if (patches_.empty() || meets(out, job.settings().error)) return true;
+  // Rims and rounding may add a little to what panels are held to, and several patches are off by more than each of them: finer ones cost far
+  // less than another rule.
+  out.clear();
+  PolarJob finer = job.polar;
+  finer.settings.error *= kFiner;
+  if (rings(finer, job.overlap, job.convex, out) && meets(out, job.settings().error)) return true;
+  out.clear();
+  return rings(job.polar, job.overlap, job.convex, out);
+}
+
+/// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit
+bool PairSolver::polar_cut(const Job& job, PairResult& out) {
+  out.clear();
+  PolarJob cut = job.polar;
+  cut.third = third_bodies_;
+  if (!patches_.solve(cut, out)) return false;
+  if (out.points.point.empty()) return true;  // all of it lies in a third body
+  out.summary.rule = ContactRule::Polar;
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  return true;
+}
+
+/// A rule that sees all patches at once, with the bodies in the order that they tell themselves: lattices and rays are the same then, whichever of
+/// them is named first.
+template <class Rule, class Solve>
+bool PairSolver::solve_in_order(const Job& job, Rule& rule, ContactRule name, const Solve& solve, PairResult& out) {
+  begin_anew(job, out);
+  const Vec3 reference = job.overlap.centre();
+  const bool reversed = !leads(job.a, job.b);
+  Regions regions = job.polar.regions;
+  if (reversed) {
+    job.polar.pressure.reverse();
+    std::swap(regions[0], regions[1]);
+  }
+  const bool fits = solve(regions, reference);
+  if (reversed) job.polar.pressure.reverse();
+  if (!fits) return false;
+  PatchSums sums = rule.sums();
+  if (reversed) {
+    sums.reverse();
+    out.points.reverse();
+  }
+  out.add(sums, reference);
+  out.summary.rule = name;
+  out.summary.error_estimate = rule.estimate();
+  out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  out.summary.largest_overlap = rule.thickness();
+  out.summary.patches = std::max(1u, static_cast<std::uint32_t>(patches_.covers().size()));
+  return true;
+}
+
+/// @param few  no more than pays where marching would meet the error, too
+bool PairSolver::samples(const Job& job, bool few, PairResult& out) {
+  // The spacing of the kept samples, or what they would have.
+  constexpr double kAcrossFeature = 3.0;
+  // Rays where this rule alone is asked for, and where it stands in for another; evaluations in which marching is done at a coarse error.
+  constexpr std::size_t kMostRays = 1u << 17, kRays = 1u << 15, kAsMarching = 300'000, kAny = std::numeric_limits<std::size_t>::max();
+  const ContactSettings& settings = job.settings();
+  PairPressure& pressure = job.polar.pressure;
+  const double first = job.polar.spacing > 0.0 ? job.polar.spacing : pressure.feature_size() / kAcrossFeature;
+  const SampleRuleSolver::Limits limits{settings.error, settings.max_refinement, settings.only == ContactRule::Samples ? kMostRays : kRays,
+                                        few ? kAsMarching : kAny};
+  return solve_in_order(job, samples_, ContactRule::Samples, [&](const Regions& regions, const Vec3& reference) {
+    return samples_.solve(pressure, third_bodies_, job.overlap, first, limits, regions, reference, out.points);
+  }, out);
+}
+
+bool PairSolver::march(const Job& job, PairResult& out) {
+  const ContactSettings& settings = job.settings();
+  PairPressure& pressure = job.polar.pressure;
+  return solve_in_order(job, march_, ContactRule::March, [&](const Regions& regions, const Vec3& reference) {
+    const bool alone = settings.symmetry && third_bodies_.empty();
+    const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(pressure.body(0), pressure.body(1), job.overlap) : std::nullopt;
+    return march_.solve(pressure, third_bodies_, job.overlap, {settings.error, settings.max_refinement}, regions, axis, reference, out.points);
+  }, out);
+}
+
+/// What the solution by panels gives to `solve_in_order`.
+struct PanelRule {
+  PanelOutcome outcome;
+  [[nodiscard]] const PatchSums& sums() const { return outcome.sums; }
+  [[nodiscard]] double estimate() const { return outcome.estimate; }
+  [[nodiscard]] double thickness() const { return outcome.thickness; }
+};
+
+bool PairSolver::panels(const Job& job, PairResult& out) {
+  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return false;
+  const BodyPair pair = out.summary.bodies;
+  PairPressure& pressure = job.polar.pressure;
+  std::vector<Vec3> starts(job.seeds.begin(), job.seeds.end());
+  if (starts.empty()) {
+    finder_.start_from_scan(pressure, job.overlap, starts_);
+    for (const StartPoint& inside : starts_.inside) starts.push_back(inside.at);
+  }
+  PanelRule rule;
+  return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
+    third_levels_.clear();
+    for (std::size_t t = 0; t < third_.size(); ++t) {
+      const ContactBody& third = thirds_.all()[t];
+      if (third.field.bound(job.overlap).upper > 0.0) third_levels_.push_back({&third, third_[t] > pair.b});
+    }
+    const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
+    for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;
+    return fits;
+  }, out);
+}
+
+/// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.
+/// @param have  `out` holds a result already   @return whether it holds one
+bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
+  // Few samples meet a coarse error with fewer evaluations than marching begins with; finer ones they meet late or never.
+  constexpr double kCoarse = 1e-2, kFinestSampled = 1e-3;
+  const ContactSettings& settings = job.settings();
+  const auto set_aside = [&] {
+    std::swap(kept_, out);
+    out.summary.bodies = kept_.summary.bodies;
+  };
+  enum class Try { FewSamples, March, Samples };
+  for (const Try rule : {Try::FewSamples, Try::March, Try::Samples}) {
+    const bool marched = rule == Try::March, few = rule == Try::FewSamples;
+    if (few ? settings.only != ContactRule::None || settings.error < kCoarse
+            : settings.only != ContactRule::None && settings.only != (marched ? ContactRule::March : ContactRule::Samples)) continue;
+    if (have && (meets(out, settings.error) || (!marched && out.summary.error_estimate <= kFinestSampled))) continue;
+    if (have) set_aside();
+    const bool fits = marched ? march(job, out) : samples(job, few, out);
+    if (have && (!fits || kept_.summary.error_estimate <= out.summary.error_estimate)) set_aside();
+    have = have || fits;
+  }
+  return have;
+}
+
+/// Whether polar patches would be many, or crossed by many kinks, so that panels cost less.
+bool PairSolver::suits_panels(const Job& job) const {
+  constexpr std::size_t kFewHills = 3, kManyPrimitives = 16;
+  constexpr double kWide = 2.0;     // overlaps, in features of the bodies
+  constexpr double kFinest = 1e-4;  // error: below, panels may miss slivers of that size between their nodes
+  if (job.settings().error < kFinest) return false;
+  const auto many = [](const ContactBody& body) { return body.skeleton != nullptr && body.skeleton->primitive.size() >= kManyPrimitives; };
+  if (!many(job.a) && !many(job.b)) return false;
+  return patches_.hills() > kFewHills || job.polar.extent > kWide * job.polar.pressure.feature_size();
+}
+
+void PairSolver::choose(const Job& job, PairResult& out) {
+  const ContactRule only = job.settings().only;
+  const bool any = only == ContactRule::None;
+  if (only == ContactRule::Panels) {
+    if (!panels(job, out)) {
+      begin_anew(job, out);
+      if (patches_.any_touches(job.polar.pressure, job.polar.extent, job.convex)) out.summary.error_estimate = 1.0;
+    }
+    out.summary.reason = RuleReason::Asked;
+    return;
+  }
+  if (any && suits_panels(job)) {
+    if (panels(job, out) && meets(out, job.settings().error)) {
+      out.summary.reason = RuleReason::ManyHills;
+      return;
+    }
+    begin_anew(job, out);
+    third_bodies_.clear();
+  }
+  bool fits = (any || only == ContactRule::Polar) && polar(job, out);
+  // Bodies that overlap where rings find no Sigma lie in each other, or one is so thin that Sigma is far from where rings begin.
+  const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && job.overlap.lower.allFinite() && job.overlap.upper.allFinite() &&
+                             (patches_.knows_overlap(job.polar.pressure) || may_lie_within(job, 0) || may_lie_within(job, 1)) &&
+                             march_.may_meet(job.polar.pressure, job.overlap);
+  fits = fits && !may_be_missed;
+  RuleReason reason = !any ? RuleReason::Asked : fits ? RuleReason::Fits : RuleReason::NoGraph;
+  if (fits && !patches_.empty()) {
+    out.summary.rule = ContactRule::Polar;
+    const Pressing pressing = third_.empty() ? Pressing::None : thirds_press(job, out);
+    if (pressing == Pressing::All) {
+      out.clear();
+      return;
+    }
+    if (pressing == Pressing::Some) {
+      // The squeezed regions of bodies with several parts are not cut that exactly.
+      fits = !job.parted() && polar_cut(job, out);
+      if (!fits && any) reason = RuleReason::ThirdBody;
+    }
+  }
+  if (!fits && only == ContactRule::Polar) {
+    begin_anew(job, out);
+    out.summary.error_estimate = 1.0;
+  } else if (!fits || (any && !patches_.empty() && !meets(out, job.settings().error))) {
+    const bool polar_fits = fits;
+    fits = stand_in(job, polar_fits, out);
+    if (polar_fits && out.summary.rule != ContactRule::Polar) reason = RuleReason::Unmet;
+    if (any && !polar_fits && out.summary.rule == ContactRule::March && job.a.skeleton == nullptr && job.b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
+    if (!fits) {
+      begin_anew(job, out);
+      if (may_be_missed) out.summary.error_estimate = 1.0;
+      if (only == ContactRule::Samples && patches_.any_touches(job.polar.pressure, job.polar.extent, job.convex)) out.summary.error_estimate = 1.0;
+    }
+  }
+  out.summary.reason = reason;
+}
+
+/// Of squeezed regions that are filled as they are. Forces and moments are the sums on Sigma: how regions share them out among the parts of a body need
+/// not be better.
+double PairSolver::region_error(const ContactSettings& settings) {
+  constexpr double kFinest = 1e-4, kToShare = 1e-2;
+  return std::max(settings.error, settings.energy ? kFinest : kToShare);
+}
+
+/// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
+void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
+  constexpr double kPoor = 1e-3;
+  const double error = region_error(job.settings());
+  PatchPoints& points = out.points;
+  const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
+  for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || points.unsure[side]);
+  if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
+  take_all_thirds(job);
+  const auto peak = static_cast<std::size_t>(std::max_element(points.pressure.begin(), points.pressure.end()) - points.pressure.begin());
+  for (const int side : {0, 1}) {
+    if (!points.unsure[side]) continue;
+    points.drop_region(side);
+    region_.fill({job.polar.pressure, side, third_bodies_, error}, job.overlap, points.normal[peak], points);
+  }
+}
+
+/// Whether a body may lie in another with all of it. It would press less there everywhere: where its first primitive that has pressure sits, or on its
+/// first sample.
+bool PairSolver::may_lie_within(const Job& job, int side) {
+  const ContactBody& inner = side == 0 ? job.a : job.b;
+  const auto presses_less = [&](const Vec3& place) -> std::optional<bool> {  // none: it has no pressure there
+    std::array<double, 2> at{};
+    job.polar.pressure.evaluate(side, {&place, 1}, {at.data(), 1});
+    if (!(at[0] > 0.0)) return std::nullopt;
+    job.polar.pressure.evaluate(1 - side, {&place, 1}, {&at[1], 1});
+    return at[0] < at[1];
+  };
+  if (inner.skeleton == nullptr) return presses_less(inner.field.surface_box().centre()).value_or(false);
+  for (const implicit::Primitive& p : inner.skeleton->primitive) {
+    if (const std::optional<bool> less = presses_less(inner.pose[p.part].to_world(p.offset.position))) return *less;
+  }
+  if (inner.samples == nullptr) return false;
+  const auto valid = std::find(inner.samples->valid.begin(), inner.samples->valid.end(), 1);
+  if (valid == inner.samples->valid.end()) return false;
+  const Vec3& on_surface = inner.samples->point[static_cast<std::size_t>(valid - inner.samples->valid.begin())];
+  return (side == 0 ? job.b : job.a).field.value(on_surface) > 0.0;
+}
+
+/// One body in the other without Sigma, if it is so: the energy that it took to get there. What presses no more than rounding is no Sigma.
+/// @param equal  both press alike everywhere
+void PairSolver::fill_within(const Job& job, bool equal, PairResult& out) {
+  PairPressure& pressure = job.polar.pressure;
+  if (out.summary.largest_pressure > std::numeric_limits<double>::epsilon() * pressure.largest_modulus()) return;
+  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return;
+  const int leading = leads(job.a, job.b) ? 0 : 1;
+  for (const int side : {leading, 1 - leading}) {
+    if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || may_lie_within(job, side))) continue;
+    const double unsure = job.settings().only == ContactRule::None ? out.summary.error_estimate : 0.0;
+    begin_anew(job, out);
+    out.summary.error_estimate = unsure;
+    region_.fill({pressure, side, third_bodies_, region_error(job.settings()), equal}, job.overlap, Vec3::UnitZ(), out.points);
+    out.summary.reason = RuleReason::Within;
+    return;
+  }
+}
+
+/// Where patches are looked for first.
+void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
+  if (job.convex) {
+    patches_.start_from(seeds.front(), job.polar.pressure);
+  } else if (seeds.empty()) {
+    patches_.start_from(job.overlap, job.polar.pressure);
+  } else {
+    patches_.start_from(seeds, job.polar.spacing, job.polar.pressure);
+  }
+}
+
+void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
+                       std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out) {
+  const BodyPair pair = candidates.pair[k];
+  out.summary.bodies = pair;
+  out.clear();
+  patches_.forget();
+  if (!join_team(bodies, candidates, partners, pair)) return;
+  const bool several = team_ != nullptr;
+  const ContactBody& a = several && bodies[pair.a].fixed ? team_->body : bodies[pair.a];
+  const ContactBody& b = several && bodies[pair.b].fixed ? team_->body : bodies[pair.b];
+  PairPressure pressure(a, b);
+
+  const Box& overlap = several ? team_overlap_ : candidates.overlap[k];
+  const std::span<const Vec3> seeds =
+      several ? std::span<const Vec3>(team_seeds_) : std::span(candidates.seed).subspan(candidates.offset[k], candidates.offset[k + 1] - candidates.offset[k]);
+  const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
+  const bool convex = !several && candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
+  const double diagonal = overlap.extent().norm();
+  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
+  // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
+  extent = std::max(extent, convex ? pressure.feature_size() : 2.0 * spacing);
+  if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
+  if (!std::isfinite(extent)) return;  // two half-spaces
+
+  const Region least = settings.energy ? Region::Sums : Region::None;
+  Job job{bodies, boxes, overlap, seeds, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
+  find_thirds(job, pair, partners);
+  job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
+  if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
+  job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
+  const bool equal = coincide(a, b);
+  if (!equal) {
+    find_patches(job, seeds);
+    choose(job, out);
+    fill_unsure_regions(job, out);
+  }
+  fill_within(job, equal, out);
+
+  ContactSurface::Summary& summary = out.summary;
+  summary.load = out.load;
+  if (out.load > 0.0) summary.centre_of_pressure = out.first / out.load;
+  summary.energy = out.points.energy[0] + out.points.energy[1];
+  summary.displaced_a = out.points.displaced[0];
+  summary.displaced_b = out.points.displaced[1];
+  summary.residual = out.points.residual / pressure.largest_modulus();
+  summary.points = out.points.point.size();
+  summary.evaluations = pressure.evaluations();
+}
+
+}  // namespace supple::collision

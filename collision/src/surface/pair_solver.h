@@ -1,0 +1,98 @@
+/// @file pair_solver.h
+/// The contact surface of one pair: which rule fits, the polar one first.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "supple/collision/find_contacts.h"
+#include "surface/imprint.h"
+#include "surface/march_rule.h"
+#include "surface/pair_result.h"
+#include "surface/panel_rule.h"
+#include "surface/polar_patches.h"
+#include "surface/sample_rule.h"
+#include "surface/squeezed_region.h"
+#include "surface/third_bodies.h"
+
+namespace supple::collision {
+
+/// Bodies by pair, to find third ones: the partners of body i are partner[offset[i] .. offset[i + 1]), rising.
+struct Partners {
+  std::vector<std::uint32_t> offset, partner;
+
+  void build(std::size_t bodies, std::span<const BodyPair> pairs);
+  [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t i) const {
+    return std::span(partner).subspan(offset[i], offset[i + 1] - offset[i]);
+  }
+};
+
+/// The solver of one thread; its buffers are reused.
+class PairSolver {
+ public:
+  /// @param boxes  of the bodies' surfaces   @param k  of the candidate pairs
+  void solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
+             std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out);
+
+ private:
+  /// A pair as the rules need it.
+  struct Job {
+    std::span<const ContactBody> bodies;
+    std::span<const Box> boxes;
+    const Box& overlap;
+    std::span<const Vec3> seeds;
+    const ContactBody &a, &b;
+    PolarJob polar;
+    bool convex;
+    [[nodiscard]] const ContactSettings& settings() const { return polar.settings; }
+    [[nodiscard]] bool parted() const { return a.pose.size() > 1 || b.pose.size() > 1; }
+  };
+
+  bool join_team(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners, const BodyPair& pair);
+  void find_thirds(const Job& job, const BodyPair& pair, const Partners& partners);
+  /// Of third bodies on the patches of a pair: nowhere near as hard, or harder on some of them, or all over.
+  enum class Pressing : std::uint8_t { None, Some, All };
+  Pressing thirds_press(const Job& job, const PairResult& out);
+  void find_patches(const Job& job, std::span<const Vec3> seeds);
+  bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
+  bool polar(const Job& job, PairResult& out);
+  bool polar_cut(const Job& job, PairResult& out);
+  bool samples(const Job& job, bool few, PairResult& out);
+  bool march(const Job& job, PairResult& out);
+  bool panels(const Job& job, PairResult& out);
+  bool stand_in(const Job& job, bool have, PairResult& out);
+  [[nodiscard]] bool suits_panels(const Job& job) const;
+  void choose(const Job& job, PairResult& out);
+  void take_all_thirds(const Job& job);
+  void begin_anew(const Job& job, PairResult& out);
+  static double region_error(const ContactSettings& settings);
+  void fill_unsure_regions(const Job& job, PairResult& out);
+  static bool may_lie_within(const Job& job, int side);
+  void fill_within(const Job& job, bool equal, PairResult& out);
+  template <class Rule, class Solve>
+  bool solve_in_order(const Job& job, Rule& rule, ContactRule name, const Solve& solve, PairResult& out);
+
+  PolarPatches patches_;
+  ImprintFinder imprint_;
+  SampleRuleSolver samples_;
+  MarchRuleSolver march_;
+  PanelRoom panel_room_;
+  PeakFinder finder_;
+  StartPoints starts_;
+  std::vector<ThirdLevel> third_levels_;
+  SqueezedRegion region_;
+  Teams teams_;                  ///< of the body of the pair
+  const Team* team_ = nullptr;   ///< of the pair's obstacle
+  Box team_overlap_;
+  std::vector<Vec3> team_seeds_;
+  std::vector<std::uint32_t> third_;
+  ThirdBodies thirds_;  ///< in the same order
+  std::vector<const ContactBody*> third_bodies_;
+  std::vector<double> value_;
+  std::vector<Vec3> rim_;
+  std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
+  PairResult kept_;  ///< what another rule has left
+};
+
+}  // namespace supple::collision

@@ -1,0 +1,370 @@
+#include "integrate/implicit_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrate/step.h"
+#include "laws/damping.h"
+#include "laws/pair_hessians.h"
+
+namespace supple::core {
+namespace {
+
+void turn(Quat& q, const Vec3& rotation) {
+  q = rotation_exp(rotation) * q;
+  q.coeffs() *= 1.5 - 0.5 * q.squaredNorm();
+}
+
+/// The incremental potential about one state, over one step h.
+class StepPotential {
+ public:
+  StepPotential(const ParticleSet& set, const Interactions& interactions, const Executor& executor, double h,
+                InteractionWorkspace& pairs, ImplicitBuffers& buffers)
+      : set_(set), interactions_(interactions), executor_(executor), h_(h), pairs_(pairs), buffers_(buffers) {}
+
+  [[nodiscard]] double value(const ParticleState& pose) const {
+    double inertial = 0.0;
+    for (std::size_t i = 0; i < set_.size(); ++i) {
+      if (!holds_position(set_, i)) {
+        inertial += set_.mass[i] * (pose.position[i] - buffers_.flight.position[i]).squaredNorm();
+      }
+      if (!holds_orientation(set_, i)) {
+        const Vec3 delta = turned(pose, i);
+        inertial += delta.dot(set_.inertia[i].cwiseProduct(delta));
+      }
+    }
+    return 0.5 / (h_ * h_) * inertial + potential_energy(set_, pose, interactions_) + buffers_.contact.value(pose);
+  }
+
+  /// Computes the loads of the pair laws in `buffers.laws` and the gradient in `buffers.gradient`.
+  void differentiate(const ParticleState& pose) {
+    const std::size_t n = set_.size();
+    buffers_.laws.reset(n);
+    buffers_.unused.reset(n);
+    accumulate_interactions(set_, pose, interactions_, 0.0, executor_, pairs_, buffers_.laws, buffers_.unused);
+    buffers_.gradient.setZero(static_cast<Eigen::Index>(6 * n));
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto row = static_cast<Eigen::Index>(6 * i);
+      if (!holds_position(set_, i)) {
+        const Vec3 inertial = set_.mass[i] / (h_ * h_) * (pose.position[i] - buffers_.flight.position[i]);
+        buffers_.gradient.segment<3>(row) = free_translation(set_.pinned[i], inertial - buffers_.laws.force[i]);
+      }
+      if (!holds_orientation(set_, i)) {
+        const Vec3 delta = turned(pose, i);
+        const Vec3 inertial =
+            inverse_right_jacobian(delta).transpose() * (1.0 / (h_ * h_) * set_.inertia[i].cwiseProduct(delta));
+        buffers_.gradient.segment<3>(row + 3) =
+            free_rotation(set_.pinned[i], pose.orientation[i] * inertial - buffers_.laws.torque[i]);
+      }
+    }
+    if (buffers_.contact.empty()) return;
+    buffers_.contact.add_gradient(pose, buffers_.gradient);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto row = static_cast<Eigen::Index>(6 * i);
+      buffers_.gradient.segment<3>(row) = free_translation(set_.pinned[i], buffers_.gradient.segment<3>(row));
+      buffers_.gradient.segment<3>(row + 3) = free_rotation(set_.pinned[i], buffers_.gradient.segment<3>(row + 3));
+    }
+  }
+
+  /// The same with the factor of the last `solve`. @return false: it has none
+  bool refine() {
+    if (!factorised_) return false;
+    buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
+    return true;
+  }
+
+  /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
+  void solve(const IntegratorSettings& settings, const ParticleState& pose, FrictionHessian friction, StepReport& report) {
+    const bool direct = 6 * set_.size() <= static_cast<std::size_t>(settings.direct_unknowns);
+    factorised_ = false;
+    if (direct) {
+      assemble(pose, HessianKind::Exact, friction);
+      factorised_ = buffers_.solver.factorise(buffers_.hessian);
+      if (factorised_) {
+        buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
+        return;
+      }
+    }
+    assemble(pose, HessianKind::PositiveSemiDefinite, friction);
+    factorised_ = direct && buffers_.solver.factorise(buffers_.hessian);
+    if (factorised_) {
+      buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
+      return;
+    }
+    report.gradient_iterations +=
+        StepSolver::solve_iteratively(buffers_.hessian, -buffers_.gradient, buffers_.correction);
+  }
+
+  /// Rotation from free flight, body axes.
+  [[nodiscard]] Vec3 turned(const ParticleState& pose, std::size_t i) const {
+    return rotation_log(buffers_.flight.orientation[i].conjugate() * pose.orientation[i]);
+  }
+
+ private:
+  void assemble(const ParticleState& pose, HessianKind kind, FrictionHessian friction) {
+    buffers_.bonded.clear();
+    buffers_.blocks.clear();
+    for_each_hessian(set_, pose, interactions_, kind, [this](std::uint32_t a, std::uint32_t b, const PairHessian& h) {
+      buffers_.bonded.emplace_back(a, b);
+      buffers_.blocks.push_back(h);
+    });
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& coupled = buffers_.contact.coupled();
+    if (!buffers_.contact.empty()) buffers_.bonded.insert(buffers_.bonded.end(), coupled.begin(), coupled.end());
+    buffers_.hessian.begin(set_.pinned, buffers_.bonded);
+    for (std::size_t i = 0; i < set_.size(); ++i) {
+      const Mat3 jacobian = inverse_right_jacobian(turned(pose, i)) * pose.orientation[i].conjugate().toRotationMatrix();
+      Mat6 h = Mat6::Zero();
+      h.topLeftCorner<3, 3>() = set_.mass[i] / (h_ * h_) * Mat3::Identity();
+      h.bottomRightCorner<3, 3>() =
+          jacobian.transpose() * (1.0 / (h_ * h_) * set_.inertia[i]).asDiagonal() * jacobian;
+      buffers_.hessian.add_particle(static_cast<std::uint32_t>(i), h);
+    }
+    for (std::size_t k = 0; k < buffers_.blocks.size(); ++k) buffers_.hessian.add_pair(k, buffers_.blocks[k]);
+    buffers_.contact.add_hessian(pose, buffers_.blocks.size(), friction, buffers_.hessian);
+  }
+
+  const ParticleSet& set_;
+  const Interactions& interactions_;
+  const Executor& executor_;
+  double h_;
+  InteractionWorkspace& pairs_;
+  ImplicitBuffers& buffers_;
+  bool factorised_ = false;  ///< the matrix of the last `solve`
+};
+
+/// Size of a correction: positions over `length`, angles in radians.
+double size_of(const Eigen::VectorXd& correction, double length) {
+  double largest2 = 0.0;
+  for (Eigen::Index row = 0; row < correction.size(); row += 6) {
+    const double size2 = std::max(correction.segment<3>(row).squaredNorm() / (length * length),
+                                  correction.segment<3>(row + 3).squaredNorm());
+    if (!(size2 <= largest2)) largest2 = size2;
+    if (!std::isfinite(largest2)) break;
+  }
+  return std::sqrt(largest2);
+}
+
+double largest_angle(const Eigen::VectorXd& correction) {
+  double largest2 = 0.0;
+  for (Eigen::Index row = 3; row < correction.size(); row += 6) {
+    largest2 = std::max(largest2, correction.segment<3>(row).squaredNorm());
+  }
+  return std::sqrt(largest2);
+}
+
+void move(const ParticleState& pose, const Eigen::VectorXd& correction, double share, ParticleState& out) {
+  for (std::size_t i = 0; i < pose.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(6 * i);
+    out.position[i] = pose.position[i] + share * correction.segment<3>(row);
+    out.orientation[i] = pose.orientation[i];
+    const Vec3 rotation = share * correction.segment<3>(row + 3);
+    if (rotation != Vec3::Zero()) turn(out.orientation[i], rotation);
+  }
+}
+
+/// Newton's method from `buffers.pose`, which ends at the minimum; `buffers.laws` are the loads there.
+void minimise(const IntegratorSettings& settings, StepPotential& potential, ImplicitBuffers& buffers,
+              StepReport& report) {
+  constexpr double kDescent = 1e-4;      // Armijo's share of the descent that the gradient promises
+  constexpr double kRoundOff = 1e-14;    // of the potential
+  constexpr double kLargestTurn = 0.5;   // [rad] in one correction
+  constexpr int kMostHalvings = 30;
+  constexpr int kMostLags = 8;           // times that friction follows the normal forces
+  constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
+  constexpr double kStuck = 1e-3;       // of the stick speed: largest change of a slip by the last correction
+  report.within_tolerance = false;
+  double value = 0.0;
+  int lags = 0;
+  FrictionHessian friction = FrictionHessian::Majorant;
+  const auto begin_at_pose = [&] {
+    if (lags < kMostLags && buffers.contact.lag_friction(buffers.pose) > kLagged) {
+      ++lags;
+    } else {
+      lags = kMostLags;
+    }
+    potential.differentiate(buffers.pose);
+  };
+  begin_at_pose();
+  for (int iteration = 0; iteration < settings.max_iterations; ++iteration) {
+    if (iteration == 0 || !buffers.contact.empty()) value = potential.value(buffers.pose);
+    if ((buffers.gradient.array() == 0.0).all()) {
+      report.last_correction = 0.0;
+      report.within_tolerance = true;
+      return;
+    }
+    potential.solve(settings, buffers.pose, friction, report);
+    ++report.newton_iterations;
+    report.last_correction = size_of(buffers.correction, settings.length);
+    if (!std::isfinite(report.last_correction)) return;
+
+    // A correction within the tolerance is the last one. Its gain may be less than the potential's rounding errors.
+    const bool newton = friction == FrictionHessian::Exact || buffers.contact.empty();  // what a majorant leaves is no square of its correction
+    const bool last = newton && report.last_correction <= settings.tolerance && buffers.contact.stick_ratio(buffers.correction) <= kStuck;
+    const double slope = buffers.gradient.dot(buffers.correction);
+    const double angle = largest_angle(buffers.correction);
+    double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
+    bool found = false;
+    double next = value;
+    for (int halving = 0; halving < kMostHalvings; ++halving) {
+      move(buffers.pose, buffers.correction, share, buffers.trial);
+      if (!last) next = potential.value(buffers.trial);
+      found = last || next <= value + kDescent * share * slope + kRoundOff * std::abs(value);
+      if (found) break;
+      share *= 0.5;
+    }
+    if (!found) return;
+    // Newton's corrections that run into the kinks of friction are cut short.
+    friction = share < 1.0 && angle <= kLargestTurn ? FrictionHessian::Majorant : FrictionHessian::Exact;
+    std::swap(buffers.pose, buffers.trial);
+    value = next;
+    begin_at_pose();
+    if (last) {
+      // Friction is so steep in the slip that the rest of the correction would be visible in the velocities.
+      if (!buffers.contact.empty() && potential.refine()) {
+        move(buffers.pose, buffers.correction, 1.0, buffers.trial);
+        std::swap(buffers.pose, buffers.trial);
+        potential.differentiate(buffers.pose);
+      }
+      report.within_tolerance = true;
+      return;
+    }
+  }
+}
+
+/// Free flight from `state` over h under frozen loads, to `out`.
+void fly(const ParticleSet& set, const ParticleState& state, const Loads& frozen, double h, ParticleState& out) {
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    out.velocity[i] = state.velocity[i];
+    out.angular_momentum[i] = state.angular_momentum[i];
+    out.position[i] = state.position[i];
+    out.orientation[i] = state.orientation[i];
+    if (!holds_position(set, i)) {
+      out.position[i] += h * (state.velocity[i] + h / set.mass[i] * free_translation(set.pinned[i], frozen.force[i]));
+    }
+    const Vec3 momentum = state.angular_momentum[i] + h * free_rotation(set.pinned[i], frozen.torque[i]);
+    if (!holds_orientation(set, i) && momentum != Vec3::Zero()) {
+      rotate_free(out.orientation[i], momentum, set.inertia[i], h);
+    }
+  }
+}
+
+/// Loads outside the pair laws, at the pose of `at` and the time `time`; external loads are kept in `buffers.sample`.
+void freeze(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time,
+            const ParticleState& at, const Executor& executor, InteractionWorkspace& pairs, ImplicitBuffers& buffers) {
+  const std::size_t n = set.size();
+  evaluate(forces, at, time, buffers.sample);
+  buffers.laws.reset(n);
+  buffers.unused.reset(n);
+  accumulate_interactions(set, at, interactions, time, executor, pairs, buffers.laws, buffers.unused);
+  buffers.frozen.reset(n);
+  const ForceSample& sample = buffers.sample;
+  for (std::size_t i = 0; i < n; ++i) {
+    buffers.frozen.force[i] = sample.internal.force[i] - buffers.laws.force[i] + sample.external.force[i];
+    buffers.frozen.torque[i] = sample.internal.torque[i] - buffers.laws.torque[i] + sample.external.torque[i];
+  }
+}
+
+/// Momenta after dt under the loads at `buffers.pose`; books impulses and, by the way from `start` to `state`, works.
+void finish(const ParticleSet& set, const ParticleState& start, double dt, const ImplicitBuffers& buffers,
+            ParticleState& state, Ledger& ledger) {
+  const ForceSample& sample = buffers.sample;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    const Vec3& external = sample.external.force[i];
+    const Vec3& external_torque = sample.external.torque[i];
+    ledger.external_impulse += dt * external;
+    ledger.external_angular_impulse += dt * (buffers.pose.position[i].cross(external) + external_torque);
+    state.position[i] = buffers.pose.position[i];  // where the loads act
+    apply_impulse(set, i, dt * (buffers.laws.force[i] + buffers.frozen.force[i]),
+                  dt * (buffers.laws.torque[i] + buffers.frozen.torque[i]), state, ledger);
+  }
+  for (std::size_t i = 0; i < sample.dissipative.force.size(); ++i) {
+    const Quat& q = buffers.pose.orientation[i];
+    const Vec3 momentum = 0.5 * (start.angular_momentum[i] + state.angular_momentum[i]);
+    const Vec3 spin = q * (q.conjugate() * momentum).cwiseQuotient(set.inertia[i]);
+    ledger.dissipated -= dt * (0.5 * sample.dissipative.force[i].dot(start.velocity[i] + state.velocity[i]) +
+                               sample.dissipative.torque[i].dot(spin));
+  }
+  ledger.external_impulse -= dt * sample.force_on_fixed;
+  ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
+  ledger.external_work += dt * sample.power_of_fixed;
+  ledger.dissipated += dt * sample.dissipated_at_fixed;
+}
+
+void book_external_work(const ParticleSet& set, const ParticleState& start, const ParticleState& state,
+                        const Loads& external, Ledger& ledger) {
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    ledger.external_work += external.force[i].dot(state.position[i] - start.position[i]);
+    if (external.torque[i] != Vec3::Zero()) {
+      ledger.external_work +=
+          external.torque[i].dot(rotation_log(state.orientation[i] * start.orientation[i].conjugate()));
+    }
+  }
+}
+
+}  // namespace
+
+StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                            const StepTarget& target, const StepTools& tools, ImplicitBuffers& buffers) {
+  const ParticleSet& set = problem.set;
+  const Interactions& interactions = problem.interactions;
+  ParticleState& state = target.state;
+  Ledger& ledger = target.ledger;
+  const bool midpoint = settings.method == Integrator::ImplicitMidpoint;
+  const double h = midpoint ? 0.5 * dt : dt;
+  const std::size_t n = set.size();
+  for (ParticleState* s : {&buffers.flight, &buffers.pose, &buffers.trial}) s->resize(n);
+  target.kick.valid = false;
+  StepReport report{.substeps = 1, .force_evaluations = 1};
+
+  stop_pinned(set, state);
+  apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+  apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Forward, state, ledger);
+  apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
+
+  if (midpoint) {
+    buffers.frozen.reset(n);
+    fly(set, state, buffers.frozen, h, buffers.pose);
+    freeze(set, interactions, problem.forces, time + h, buffers.pose, tools.executor, tools.pairs, buffers);
+  } else {
+    freeze(set, interactions, problem.forces, time + h, state, tools.executor, tools.pairs, buffers);
+  }
+  fly(set, state, buffers.frozen, h, buffers.flight);
+
+  buffers.points.clear();
+  if (problem.contact != nullptr) problem.contact->find(buffers.flight, time + h, buffers.points);
+  // The start is kept: `state` changes before the contacts are booked.
+  buffers.start = state;
+  buffers.contact.begin(set, buffers.points, buffers.start, buffers.flight, {.h = h, .end_factor = midpoint ? 2.0 : 1.0},
+                        problem.contact != nullptr ? SlowSlip{problem.contact->stick_speed, problem.contact->slow_slip} : SlowSlip{});
+
+  StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
+  // Stiff bonds make free flight a bad first guess: the pose before the step may be a better one.
+  buffers.pose = potential.value(buffers.flight) <= potential.value(state) ? buffers.flight : state;
+  minimise(settings, potential, buffers, report);
+
+  const ParticleState& start = buffers.start;
+  if (problem.contact != nullptr) buffers.contact.finish(buffers.pose, dt, buffers.laws, ledger, problem.contact->load);
+  finish(set, start, dt, buffers, state, ledger);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (midpoint && !holds_position(set, i)) {
+      state.position[i] = Vec3(2.0 * buffers.pose.position[i] - start.position[i]);
+    }
+    if (holds_orientation(set, i)) continue;
+    state.orientation[i] = buffers.pose.orientation[i];
+    if (midpoint) {
+      // The mirror of the first half: the same turn back, then free flight with the new momentum.
+      const Vec3 back = -(buffers.pose.orientation[i] * potential.turned(buffers.pose, i));
+      turn(state.orientation[i], back);
+      const Vec3 momentum = state.angular_momentum[i] - h * free_rotation(set.pinned[i], buffers.frozen.torque[i]);
+      if (momentum != Vec3::Zero()) rotate_free(state.orientation[i], momentum, set.inertia[i], h);
+    }
+  }
+  book_external_work(set, start, state, buffers.sample.external, ledger);
+
+  apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
+  apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);
+  apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+  return report;
+}
+
+}  // namespace supple::core

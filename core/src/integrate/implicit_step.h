@@ -1,0 +1,35 @@
+// Backward Euler and the implicit midpoint rule.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "integrate/contact_term.h"
+#include "integrate/step_hessian.h"
+#include "supple/core/integrators.h"
+
+namespace supple::core {
+
+struct ImplicitBuffers {
+  ForceSample sample;
+  Loads laws;       ///< of the pair laws; at the end of contact, too
+  Loads unused;     ///< external loads that the pair laws come with
+  Loads frozen;     ///< all loads outside the pair laws
+  ParticleState flight;  ///< after free flight under the frozen loads
+  ParticleState start;   ///< after the first half of the damping
+  ParticleState pose;
+  ParticleState trial;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> bonded;
+  std::vector<PairHessian> blocks;
+  ContactPoints points;
+  ContactTerm contact;
+  StepHessian hessian;
+  StepSolver solver;
+  Eigen::VectorXd gradient;
+  Eigen::VectorXd correction;
+};
+
+StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                            const StepTarget& target, const StepTools& tools, ImplicitBuffers& buffers);
+
+}  // namespace supple::core

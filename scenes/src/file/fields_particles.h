@@ -1,0 +1,107 @@
+/// @file fields_particles.h
+/// The keys of the particles of an object; see fields.h.
+#pragma once
+
+#include <algorithm>
+#include <initializer_list>
+#include <optional>
+#include <string>
+
+#include "file/fields_rules.h"
+#include "file/read_scene_faults.h"
+
+namespace supple::scenes {
+
+inline constexpr double kMostCount = 1e6;
+
+template <class Archive>
+void fields(Archive& archive, ParticlesDesc& d) {
+  using enum ArrangeKind;
+  const auto only = [&d](const Rule& rule, std::initializer_list<ArrangeKind> kinds) {
+    return rule.only("arrange", d.arrange, kinds);
+  };
+  archive("arrange", d.arrange, {}, "arrangement of the particles; line, ring, grid and spiral lie in the x-y plane");
+  archive.required("count", d.count, only(between(1.0, kMostCount, kNumber), {Line, Ring, Spiral}), "number of particles");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Ring, Geodesic}), "radius of the circle or sphere");
+  archive.required("frequency", d.frequency, only(between(1.0, 300.0, kNumber), {Geodesic}),
+                   "parts of each edge of an icosahedron; 10 frequency^2 + 2 particles");
+  archive.required("inner_radius", d.inner_radius, only(at_least(0.0, kLength), {Spiral}), "where the spiral begins");
+  archive.required("outer_radius", d.outer_radius, only(above(0.0, kLength), {Spiral}), "where the spiral ends");
+  archive("turns", d.turns, only(up_to(1000.0, kNumber), {Spiral}), "number of turns");
+  archive.required("spacing", d.spacing, only(above(0.0, kLength), {Line, Grid}), "distance between neighbours");
+  archive.required("columns", d.columns, only(between(1.0, 1e4, kNumber), {Grid}), "number along x");
+  archive.required("rows", d.rows, only(between(1.0, 1e4, kNumber), {Grid}), "number along y");
+  archive("layers", d.layers, only(between(1.0, 1e4, kNumber), {Grid}), "number along z");
+  archive.required("file", d.file, only(file_name(), {File}), "CSV of x, y, z [m], relative to the scene's folder");
+  archive("normal", d.normal, only({}, {Ring, Spiral}), "direction of the particle normals: along the axis, or outward from the curve");
+  archive("disorder", d.disorder, at_least(0.0, kLength), "each particle is moved at random by at most this, the same in every run");
+  archive("at", d.at, any(kLength), "position of the origin of the arrangement");
+  archive("axis", d.axis, direction(), "direction of the z axis of the arrangement");
+  archive("angle_deg", d.angle, degrees(-360.0, 360.0), "rotation of the arrangement about its own z axis, before the others");
+  archive("velocity", d.velocity, any(kSpeed), "initial velocity");
+  archive("spin", d.spin, any(kSpin), "initial angular velocity of the whole about its centre of mass");
+  archive("mass", d.mass, above(0.0, kMass), "mass of one particle");
+  archive("inertia_radius", d.inertia_radius, above(0.0, kLength).or_auto(),
+          "a in the moment of inertia 2/5 m a^2; auto: half the distance to the nearest neighbour. Single particles, and those of an object with `separate`, have the moments of the solid that each carries instead, and their frames are turned to its principal axes");
+  archive("inertia_axes", d.inertia_axes, at_least(0.0, kLength),
+          "instead of inertia_radius: semi-axes of a solid ellipsoid in each particle's frame; zero: not given");
+  if (archive.given("inertia_axes")) {
+    archive.check(d.inertia_axes.minCoeff() > 0.0, "inertia_axes", "expected three lengths > 0 [m]", "a zero", "");
+    archive.check(!d.inertia_radius, "inertia_axes", "expected either inertia_radius or inertia_axes", "both", "");
+  }
+  if (d.arrange == Spiral) {
+    archive.check(d.count >= 2, "count", "expected a whole number >= 2 for a spiral", std::to_string(d.count), "");
+    archive.check(d.inner_radius < d.outer_radius, "outer_radius",
+                  "expected more than inner_radius = " + number_text(d.inner_radius) + " [m]", number_text(d.outer_radius),
+                  "");
+  }
+  if (d.arrange == Grid) {
+    const double all = double(d.columns) * d.rows * d.layers;
+    archive.check(all <= kMostCount, d.layers > 1 ? "layers" : "rows", "expected at most 1000000 particles", number_text(all), "");
+  }
+}
+
+template <class Archive>
+void fields(Archive& archive, KindDesc& d) {
+  archive("hinge", d.hinge, {}, "a hinge has interactions with particles of all types");
+  archive("type", d.type, between(0.0, kMostCount, kNumber), "of standard particles; particles of different types have repulsion only");
+  archive.required("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount},
+                   "numbers of the particles: from 0, negative from the end");
+  archive.check(!(d.hinge && archive.given("type")), "type", "expected either hinge or type", "both", "");
+}
+
+template <class Archive>
+void fields(Archive& archive, PinDesc& d) {
+  archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "number of the particle: from 0, negative from the end");
+  archive("position", d.position, {}, "whether the position is held");
+  archive("orientation", d.orientation, {}, "whether the orientation is held");
+}
+
+template <class Archive>
+void fields(Archive& archive, LoadDesc& d) {
+  archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "number of the particle: from 0, negative from the end");
+  archive("force", d.force, any(kForce), "in world axes");
+  archive("torque", d.torque, any(kTorque), "in world axes");
+  archive("from", d.from, at_least(0.0, kTime), "time at which the load begins");
+  archive("until", d.until, above(0.0, kTime), "time at which the load ends; absent: never");
+  archive("ramp", d.ramp, at_least(0.0, kTime), "time of the linear rise from 'from' and of the linear fall to 'until'");
+  archive.check(d.until > d.from, "until", "expected more than from = " + number_text(d.from) + " [s]", number_text(d.until), "");
+}
+
+/// Number of particles; none when a file has them.
+[[nodiscard]] inline std::optional<int> particle_count(const ParticlesDesc& d) {
+  switch (d.arrange) {
+    case ArrangeKind::Single: return 1;
+    case ArrangeKind::Line:
+    case ArrangeKind::Ring:
+    case ArrangeKind::Spiral: return d.count;
+    case ArrangeKind::Grid:
+      if (double(d.columns) * d.rows * d.layers > kMostCount) break;
+      return d.columns * d.rows * d.layers;
+    case ArrangeKind::Geodesic: return 10 * d.frequency * d.frequency + 2;
+    case ArrangeKind::File: break;
+  }
+  return std::nullopt;
+}
+
+}  // namespace supple::scenes

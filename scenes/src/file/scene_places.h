@@ -1,0 +1,46 @@
+/// @file scene_places.h
+/// Positions of the keys of a scene in its file, for faults that only the whole scene shows.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "file/yaml_tree.h"
+#include "supple/core/error.h"
+#include "supple/scenes/scene.h"
+
+namespace supple::scenes {
+
+struct ScenePlaces {
+  SourceTexts texts;
+  Tree tree;
+  const Node* root = nullptr;
+};
+
+/// "file:line:column" of a key, or of the nearest one above it that is given; the file alone of a scene that was not read.
+/// @param key  as in messages and overrides: "objects.ball.skeleton[0].radius"
+[[nodiscard]] std::string place_of(const Scene& scene, std::string_view key);
+
+/// Reads the file that a key names, so that its faults name the key too. @param read  called without arguments
+template <class Read>
+auto read_for(const std::string& key, Read&& read) try {
+  return std::forward<Read>(read)();
+} catch (const Error& error) {
+  std::vector<Fault> faults = error.faults();
+  for (Fault& fault : faults) {
+    if (fault.key.empty()) fault.key = key;
+  }
+  throw Error(error.kind(), std::move(faults));
+}
+
+/// Path of a file that a scene in this folder names. @throws Error{Io} where that is a pipe, a device or a folder: reading it may
+/// never end
+[[nodiscard]] std::filesystem::path named_file(const std::filesystem::path& folder, const std::string& name);
+
+/// Throws the error again with the positions of its keys.
+[[noreturn]] void rethrow_with_places(const Scene& scene, const Error& error);
+
+}  // namespace supple::scenes

@@ -1,0 +1,373 @@
+#include "supple/scenes/model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "model/arrangement.h"
+#include "model/model_contact.h"
+#include "model/model_faults.h"
+#include "model/model_laws.h"
+#include "model/model_skeleton.h"
+#include "model/model_volume.h"
+#include "model/point_tree.h"
+#include "supple/core/error.h"
+
+namespace supple::scenes {
+namespace {
+
+constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
+
+constexpr double kBelievable = 1e4;     // ways of a particle over the size of everything, and over that in a frame
+
+/// Which particles are hinges, and the types of the others.
+void set_kinds(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model, ModelFaults& faults) {
+  const std::uint32_t n = object.last - object.first;
+  for (std::size_t k = 0; k < d.kinds.size(); ++k) {
+    for (std::size_t j = 0; j < d.kinds[k].particles.size(); ++j) {
+      const std::string place = key + ".kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']';
+      if (const auto index = particle_index(d.kinds[k].particles[j], n, place, faults)) {
+        model.particles.kind[object.first + *index] =
+            d.kinds[k].hinge ? core::kHinge : static_cast<std::uint32_t>(d.kinds[k].type);
+      }
+    }
+  }
+}
+
+/// Principal moments of a solid ellipsoid of these semi-axes, m/5 (b^2 + c^2, ...).
+Vec3 principal_moments(double mass, const Vec3& axes) {
+  const Vec3 squares = axes.cwiseAbs2();
+  return 0.2 * mass * (Vec3::Constant(squares.sum()) - squares);
+}
+
+/// Of a ball around the primitive's origin that holds its support.
+double largest_radius(const implicit::Primitive& p) {
+  const bool plain = p.shape <= implicit::ShapeKind::Ellipsoid && p.taper == 1.0 && p.stretch == Vec3::Ones();
+  if (plain) return p.size.norm() + p.kernel.radius;
+  const Box box = implicit::support_box(p);
+  return box.lower.cwiseAbs().cwiseMax(box.upper).norm();
+}
+
+/// The solids that single particles carry; particles with the same entries of the skeleton share one.
+class CarriedSolids {
+ public:
+  CarriedSolids(const ObjectDesc& d, const implicit::Skeleton& skeleton, std::uint32_t n, bool planar) : skeleton_(skeleton), planar_(planar), entries_(n) {
+    for (std::uint32_t k = 0; k < d.skeleton.size(); ++k) {
+      for (const int given : d.skeleton[k].particles) {
+        const std::int64_t index = given < 0 ? std::int64_t{given} + n : given;
+        if (index >= 0 && index < n) entries_[static_cast<std::size_t>(index)].push_back(k);
+      }
+    }
+  }
+  const CarriedSolid& of(std::uint32_t particle) {
+    const auto [place, fresh] = solids_.try_emplace(entries_[particle]);  // entries without a list belong to all
+    if (fresh) place->second = carried_solid(skeleton_, particle, planar_);
+    return place->second;
+  }
+
+ private:
+  const implicit::Skeleton& skeleton_;
+  bool planar_;
+  std::vector<std::vector<std::uint32_t>> entries_;
+  std::map<std::vector<std::uint32_t>, CarriedSolid> solids_;
+};
+
+/// Particles of one object.
+void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
+                   ModelFaults& faults) {
+  const core::Arrangement arrangement = arrange(scene, d.particles, key + ".particles", faults);
+  const auto n = static_cast<std::uint32_t>(arrangement.size());
+  object.first = static_cast<std::uint32_t>(model.particles.size());
+  object.last = object.first + n;
+  if (n == 0) {
+    faults.add_once(key + ".particles.file", "expected at least one particle", "none", "");
+    return;
+  }
+  std::vector<double> volume;
+  object.skeleton = build_skeleton(d, key, n, volume, faults);
+  if (d.blend) {
+    object.skeleton.blend = blend_of(*d.blend, key + ".blend", arrangement.position, faults);
+    object.fade = d.blend->fade;
+  }
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    const double iso = iso_radius(primitive, d.iso);
+    object.iso_radius = object.iso_radius == 0.0 ? iso : std::min(object.iso_radius, iso);
+  }
+
+  if (d.volume && !object.skeleton.primitive.empty()) hold_volume(d, key, n, std::move(volume), object, faults);
+
+  const PointTree tree(arrangement.position);
+  const std::vector<double> nearest = tree.nearest_distances();
+  Vec3 centre = Vec3::Zero();
+  for (const Vec3& p : arrangement.position) centre += p;
+  centre /= n;  // all masses of an object are equal
+  // The frame of a single particle is turned to the principal axes of its solid; no laws depend on it.
+  CarriedSolids solids(d, object.skeleton, n, scene.planar);
+  std::vector<Quat> turn(n, Quat::Identity());
+  for (std::uint32_t i = 0; i < n; ++i) {
+    Vec3 axes = d.particles.inertia_axes;
+    if (d.particles.inertia_radius) {
+      axes.setConstant(*d.particles.inertia_radius);
+    } else if (axes.isZero() && (n == 1 || d.separate)) {
+      const CarriedSolid& lone = solids.of(i);
+      axes = lone.axes;
+      if (scene.planar) axes.setConstant(std::sqrt(0.5 * (axes.x() * axes.x() + axes.y() * axes.y())));  // it turns about z alone
+      turn[i] = lone.turn;
+    } else if (axes.isZero()) {
+      axes.setConstant(0.5 * nearest[i]);
+    }
+    if (!(axes.maxCoeff() > 0.0) && !faults.has(key + ".iso")) {  // without a surface there is no solid
+      faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
+                      n > 1 && !d.separate ? "two particles are at the same place: this key is required"
+                      : d.skeleton.empty() ? "a single particle without a surface: this key is required"
+                                           : "no point was found where the field of its skeleton reaches the iso value");
+    }
+    const Vec3 inertia = principal_moments(d.particles.mass, axes);
+    Quat q = arrangement.orientation[i];
+    if (turn[i].w() != 1.0) q = (q * turn[i]).normalized();
+    model.particles.mass.push_back(d.particles.mass);
+    model.particles.inertia.push_back(inertia);
+    model.particles.normal.push_back(turn[i].conjugate() * Vec3::UnitZ());
+    model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
+    model.particles.pinned.push_back(0);
+    model.particles.kind.push_back(0);
+    model.initial.position.push_back(arrangement.position[i]);
+    model.initial.orientation.push_back(q);
+    model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
+    model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
+    if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
+    // Bodies that only meet by their surfaces may begin anywhere; what begins in one place has no distance to resolve.
+    const bool only_touches = d.separate && object.iso_radius > 0.0;
+    const double alone = n == 1 ? 0.5 * object.rest_diameter : object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff();
+    model.smallest_length = std::min({model.smallest_length, nearest[i] > 0.0 && std::isfinite(nearest[i]) && !only_touches ? nearest[i] : alone});
+  }
+  turn_primitives(turn, object.skeleton);
+  if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);
+  if (n > 1) object.rest_diameter = tree.largest_distance();
+}
+
+void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model,
+                        ModelFaults& faults) {
+  const std::uint32_t n = object.last - object.first;
+  for (std::size_t k = 0; k < d.pins.size(); ++k) {
+    const auto index = particle_index(d.pins[k].particle, n, key + ".pins[" + std::to_string(k) + "].particle", faults);
+    if (!index) continue;
+    std::uint8_t& pinned = model.particles.pinned[object.first + *index];
+    if (d.pins[k].position) pinned |= core::kPinPosition;
+    if (d.pins[k].orientation) pinned |= core::kPinOrientation;
+  }
+  for (std::size_t k = 0; k < d.loads.size(); ++k) {
+    const LoadDesc& load = d.loads[k];
+    const auto index = particle_index(load.particle, n, key + ".loads[" + std::to_string(k) + "].particle", faults);
+    if (!index) continue;
+    model.interactions.external.push_back(
+        {object.first + *index, load.force, load.torque, load.from, load.until, load.ramp});
+  }
+}
+
+core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
+  core::LinkRule rule{.object = object, .breaking = {}, .yield = {}};
+  if (d.breaking) {
+    rule.breaking.stretch = d.breaking->stretch.value_or(rule.breaking.stretch);
+    rule.breaking.energy = d.breaking->energy.value_or(rule.breaking.energy);
+    rule.breaking.force = d.breaking->force.value_or(rule.breaking.force);
+    rule.breaking.couple = d.breaking->couple.value_or(rule.breaking.couple);
+  }
+  if (d.yielding) rule.yield = {d.yielding->energy, d.yielding->time};
+  return rule;
+}
+
+/// Components of the blending graph of an object with self contact become bodies, and so do groups that are connected through others only. An object that keeps its
+/// volume stays one body: all that do not blend are groups of it.
+void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
+  if (!d.contact->self.value_or(true)) return;
+  BlendComponents components = blend_components(object.skeleton.blend, object.last - object.first);
+  const bool several = std::any_of(components.first.begin(), components.first.end(), [](std::uint32_t first) { return first != 0; });
+  const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
+  std::vector<std::uint8_t> solid(node.size(), 0);  // nodes that have primitives; there are no more than particles
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    if (!node.empty()) solid[node[primitive.part]] = 1;
+  }
+  if (d.volume ? several : object.fade > 0.0 && object.skeleton.blend.rule == implicit::BlendRule::Graph) {  // any two groups may not blend, then or later
+    std::vector<std::uint8_t> seen(node.size(), 0);
+    components.group.clear();
+    for (std::uint32_t i = 0; i < node.size(); ++i) {
+      if (seen[node[i]]++ == 0) components.group.push_back(i);
+    }
+  }
+  std::erase_if(components.group, [&](std::uint32_t first) { return solid[node[first]] == 0; });
+  if (several && !d.volume) object.component = std::move(components.first);
+  object.group = std::move(components.group);
+}
+
+/// All particles move in one plane z = const.
+void confine_to_plane(Model& model, ModelFaults& faults) {
+  const double z = model.initial.position.front().z();
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    const double other = model.initial.position[i].z();
+    if (other != z) {
+      const std::string& name = model.objects[model.particles.object[i]].name;
+      faults.add_once("objects." + name + ".particles", "expected all particles at one z in a planar scene",
+                      "z = " + number_text(other) + " m beside z = " + number_text(z) + " m",
+                      "choose 'at' and 'axis' so that they lie in one horizontal plane, or remove 'planar'");
+    }
+    model.particles.pinned[i] |= core::kPlanar;
+  }
+}
+
+/// Far from the origin rounding makes points of a thin object equal.
+void expect_resolved(const Model& model, ModelFaults& faults) {
+  constexpr double kFurthest = 1e8;  // kernel radii, of which round-off is then 1e-8
+  std::vector<double> thinnest(model.objects.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < thinnest.size(); ++k) {
+    for (const implicit::Primitive& p : model.objects[k].skeleton.primitive) thinnest[k] = std::min(thinnest[k], p.kernel.radius);
+  }
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    const ObjectModel& object = model.objects[model.particles.object[i]];
+    const double radius = thinnest[model.particles.object[i]];
+    const double away = model.initial.position[i].norm();
+    if (away <= kFurthest * radius) continue;
+    faults.add_once("objects." + object.name + ".particles", "expected positions within 1e8 kernel radii of the origin",
+                    short_text(away) + " m away with a radius of " + short_text(radius) + " m", "move the scene nearer to the origin");
+  }
+}
+
+/// Pinned particles begin at rest, or the pin would take their momentum in the first step.
+void stop_pinned(Model& model) {
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    const std::uint8_t pinned = model.particles.pinned[i];
+    model.initial.velocity[i] = core::free_translation(pinned, model.initial.velocity[i]);
+    model.initial.angular_momentum[i] = core::free_rotation(pinned, model.initial.angular_momentum[i]);
+  }
+}
+
+/// Limits of what is no divergence: where particles start and how fast, free flight, also under the loads, and far more than
+/// the size of the objects on top.
+void set_believable(const Scene& scene, const Box& everything, Model& model) {
+  double size = everything.extent().norm();
+  if (!(size > 0.0)) size = model.smallest_length;
+  double start = 0.0, speed = 0.0;
+  for (std::size_t i = 0; i < model.particles.size(); ++i) {
+    start = std::max(start, model.initial.position[i].norm());
+    speed = std::max(speed, model.initial.velocity[i].norm());
+  }
+  for (const FixedBody& body : model.fixed) {
+    for (const ObstacleKeyDesc& key : body.motion.keys) start = std::max(start, key.at.norm());
+  }
+  std::vector<double> pushed(model.particles.size(), 0.0);
+  for (const core::ExternalLoad& load : model.interactions.external) pushed[load.particle] += load.force.norm();
+  double acceleration = 0.0;
+  for (std::size_t i = 0; i < pushed.size(); ++i) acceleration = std::max(acceleration, pushed[i] / model.particles.mass[i]);
+  model.believable = {.size = kBelievable * size + start,
+                      .speed = std::max(speed, model.solid_speed),
+                      .margin = kBelievable * size * scene.frame_rate,
+                      .acceleration = scene.gravity.norm() + acceleration};
+}
+
+}  // namespace
+
+Model build_model(const Scene& scene, double memory) {
+  SUPPLE_EXPECTS(scene.duration > 0.0 && scene.frame_rate > 0.0);  // scenes need not come from a file
+  SceneCounts counts = count_scene(scene, memory);
+  std::erase_if(counts.count, [](const Count& count) { return rule_of(count.what).drawn; });
+  MemoryBudget budget(scene, std::move(counts), memory);
+  Model model;
+  ModelFaults faults(scene);
+  model.smallest_length = std::numeric_limits<double>::infinity();
+  for (const ObjectDesc& d : scene.objects) {
+    const std::string key = "objects." + d.name;
+    SUPPLE_EXPECTS(d.particles.mass > 0.0);
+    ObjectModel object;
+    object.name = d.name;
+    add_particles(scene, d, key, object, model, faults);
+    if (object.first == object.last) continue;
+    if (d.contact) {
+      object.material = {d.contact->modulus, d.contact->friction, d.contact->dissipation};
+      object.collides = !object.skeleton.primitive.empty();
+      object.breaks = d.breaking.has_value();
+    }
+    object.separate = d.separate;
+    if (object.collides && !object.separate) divide_by_blend(d, object);
+    set_kinds(d, key, object, model, faults);
+    object.hinges_join = d.hinges_join;
+    add_pins_and_loads(d, key, object, model, faults);
+    model.objects.push_back(std::move(object));
+  }
+  if (model.particles.size() == 0 && faults.none()) faults.add("objects", "expected at least one object with particles", "none", "");
+  faults.raise();  // the following code needs particles
+
+  model.rest = model.initial;
+  for (Vec3& velocity : model.rest.velocity) velocity.setZero();
+  for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
+  if (scene.planar) confine_to_plane(model, faults);
+  stop_pinned(model);
+  expect_resolved(model, faults);
+
+  model.interactions.gravity = scene.gravity;
+  std::vector<core::LinkRule> link_rules;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const ObjectDesc& d = scene.objects[i];
+    add_laws(d.interactions, model.objects[i], "objects." + d.name, model, faults);
+    if (d.breaking || d.yielding) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
+    if (d.rayleigh) {
+      const auto object = static_cast<std::uint32_t>(i);
+      if (d.rayleigh->mass > 0.0) model.interactions.medium.push_back({object, d.rayleigh->mass, d.rayleigh->mass});
+      if (d.rayleigh->stiffness > 0.0) model.interactions.stiffness_damping.push_back({object, d.rayleigh->stiffness});
+    }
+    if (d.medium) {
+      model.interactions.medium.push_back({static_cast<std::uint32_t>(i), d.medium->linear, d.medium->angular});
+    }
+  }
+  build_contact(scene, budget, model, faults);
+  faults.raise();
+  model.links = core::make_links(model.particles, model.rest, model.interactions, link_rules);
+
+  double cell = std::numeric_limits<double>::infinity();
+  double least_own = cell;
+  Box everything;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    ObjectModel& object = model.objects[i];
+    const ObjectMeshingDesc& meshing = scene.objects[i].meshing;
+    object.own_cell = meshing.cell.has_value();
+    object.cell_is_stated = object.own_cell || scene.output.cell;
+    object.own_error = meshing.error.has_value();
+    object.mesh_error = meshing.error ? meshing.error : scene.output.meshing.error;
+    if (meshing.cell) least_own = std::min(least_own, *meshing.cell);
+    double fitting = std::numeric_limits<double>::infinity();
+    double reach = object.iso_radius;
+    for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+      const double thickness = 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive));
+      fitting = std::min(fitting, thickness / kCellsAcross);
+      reach = std::max(reach, primitive.offset.position.norm() + largest_radius(primitive));
+    }
+    Box own;
+    for (std::uint32_t p = object.first; p < object.last; ++p) {
+      own = own.united(Box{model.rest.position[p], model.rest.position[p]}.inflated(reach));
+    }
+    const bool thin = !object.skeleton.primitive.empty() && fitting < own.extent().maxCoeff() / kCellsAlong;
+    if (!object.skeleton.primitive.empty() && !thin) fitting = own.extent().maxCoeff() / kCellsAlong;
+    if (!object.own_cell && fitting < cell) {
+      cell = fitting;
+      model.thinnest.reset();
+      if (thin && !scene.output.cell) model.thinnest = static_cast<std::uint32_t>(i);
+    }
+    everything = everything.united(own);
+  }
+  model.meshing = scene.output.meshing;
+  if (scene.output.images) {
+    const auto& formats = scene.output.images->formats;
+    if (std::find(formats.begin(), formats.end(), ImageName::Exr) != formats.end()) model.meshing.motion = true;
+  }
+  if (scene.render.shutter > 0.0) model.meshing.motion = true;
+  if (!std::isfinite(cell)) cell = least_own;
+  if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    ObjectModel& object = model.objects[i];
+    object.look = scene.objects[i].look;
+    if (!object.skeleton.primitive.empty()) object.cell = scene.objects[i].meshing.cell.value_or(model.cell);
+  }
+  set_believable(scene, everything, model);
+  return model;
+}
+
+}  // namespace supple::scenes

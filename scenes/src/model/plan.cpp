@@ -1,0 +1,279 @@
+#include "supple/scenes/plan.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "file/fields_rules.h"
+#include "file/read_scene_faults.h"
+#include "model/model_contact.h"
+#include "supple/implicit/mesh_routes.h"
+
+namespace supple::scenes {
+namespace {
+
+using namespace data;
+
+constexpr std::array<StageInfo, kStageCount> kTable{{
+    {Stage::Interact, "accumulate_interactions", "core", kState, kForces},
+    {Stage::PlaceSkeleton, "place_skeleton", "implicit", kState, kSkeleton},
+    {Stage::IndexField, "index_field", "implicit", kSkeleton, kField},
+    {Stage::SampleSurface, "sample_surface", "implicit", kState | kField, kSamples | kState},
+    {Stage::FindContacts, "find_contacts", "collision", kSamples | kField, kPairs},
+    {Stage::SolveContactSurface, "solve_contact_surface", "collision", kPairs | kField, kContacts},
+    {Stage::React, "react", "collision", kContacts | kField | kState, kForces},
+    {Stage::Integrate, "advance", "core", kState | kForces, kState},
+    {Stage::Polygonise, "polygonise", "implicit", kField, kMesh},
+    {Stage::Render, "render", "render", kMesh, kImage},
+    {Stage::Export, "export", "core", kState, 0},
+}};
+
+std::string count(std::size_t n, const char* one, const char* many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+std::string list(std::initializer_list<std::pair<bool, const char*>> items) {
+  std::string text;
+  for (const auto& [on, name] : items) {
+    if (!on) continue;
+    if (!text.empty()) text += ", ";
+    text += name;
+  }
+  return text;
+}
+
+/// Objects and fixed bodies that may touch another one; several for an object that may touch itself.
+std::size_t contact_body_count(const Model& model) {
+  const auto n = static_cast<std::uint32_t>(model.objects.size());
+  const auto count = static_cast<std::uint32_t>(n + model.fixed.size());
+  const auto collides = [&](std::uint32_t i) { return i >= n || model.objects[i].collides; };
+  std::size_t bodies = 0;
+  for (std::uint32_t a = 0; a < count; ++a) {
+    if (!collides(a)) continue;
+    bool partner = false;
+    for (std::uint32_t b = 0; b < count && !partner; ++b) {
+      partner = b != a && collides(b) && !(a >= n && b >= n) &&
+                (!model.rules.allowed || model.rules.allowed(std::min(a, b), std::max(a, b)));
+    }
+    bodies += std::max<std::size_t>(a < n ? own_contacts(model.objects[a]) : 0, partner ? 1 : 0);
+  }
+  return bodies;
+}
+
+/// Estimates of the ways to a mesh, all objects together, where the particles begin.
+implicit::RouteEstimate routes_of(const Model& model) {
+  implicit::RouteEstimate sum;
+  for (const ObjectModel& object : model.objects) {
+    if (object.skeleton.primitive.empty()) continue;
+    std::vector<Pose> poses;
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      poses.push_back({model.initial.position[i], model.initial.orientation[i]});
+    }
+    implicit::PlacedSkeleton placed;
+    implicit::place_skeleton(object.skeleton, poses, placed);
+    const implicit::RouteEstimate one = implicit::estimate_routes(object.skeleton, placed.support, object.cell);
+    sum.leaves += one.leaves;
+    sum.cubes_ms += one.cubes_ms;
+    sum.openvdb_ms += one.openvdb_ms;
+  }
+  return sum;
+}
+
+/// Which mesher is taken, and why.
+std::string meshing_of(const Scene& scene, const Model& model) {
+  const MeshingDesc& d = scene.output.meshing;
+  const bool error = d.error || std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) { return o.own_error; });
+  const std::string touching = ", tetrahedra where objects touch";
+  switch (d.method) {
+    case MeshingName::Tetrahedra: return "tetrahedra";
+    case MeshingName::Delaunay: return "Delaunay refinement by CGAL; where objects touch, of free and contact surfaces between common boundary curves";
+    case MeshingName::OpenVdb: return "OpenVDB grid and volumeToMesh" + touching;
+    case MeshingName::Cubes: return std::string(error ? "marching cubes to the given error" : "marching cubes") + touching;
+    case MeshingName::Auto: break;
+  }
+  if (d.error) return "marching cubes to the given error" + touching;
+  const implicit::RouteEstimate routes = routes_of(model);
+  const auto time = [](double ms) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.2g ms", ms);
+    return std::string(text.data());
+  };
+  const std::string other = std::isfinite(routes.openvdb_ms) ? "OpenVDB " + time(routes.openvdb_ms) : "cells are too small for OpenVDB";
+  const std::string text = std::string("auto: ") + (routes.prefers_cubes() ? "marching cubes" : "OpenVDB") + " (estimated cost: marching cubes " + time(routes.cubes_ms) + ", " + other + ")";
+  const bool graph = std::any_of(model.objects.begin(), model.objects.end(), [](const ObjectModel& o) {
+    return o.skeleton.blend.rule == implicit::BlendRule::Graph;
+  });
+  return text + (graph ? ", vertices on creases" : "") + touching;
+}
+
+/// Which rule samples the contact surface, and why.
+std::string rule_of_contact(const ContactDesc& d) {
+  if (d.rule != RuleName::Auto) return std::string(name_of(d.rule)) + ": set in the scene";
+  return "auto: panels where the pressure has many maxima, polar where patches are star-shaped about their peak, else samples or march; relative error " + number_text(d.error);
+}
+
+}  // namespace
+
+std::span<const StageInfo> stage_table() { return kTable; }
+
+const StageInfo& info(Stage stage) { return kTable[static_cast<std::size_t>(stage)]; }
+
+OutputRequest requested_outputs(const Scene& scene) {
+  const OutputDesc& o = scene.output;
+  return {.images = o.images.has_value(),
+          .film = o.film.has_value(),
+          .meshes = !o.mesh.empty(),
+          .grids = !o.grid.empty(),
+          .contacts = !o.contacts.empty(),
+          .particles = !o.particles.empty(),
+          .samples = !o.samples.empty()};
+}
+
+bool StepPlan::on(Stage stage) const { return stages[static_cast<std::size_t>(stage)].on; }
+
+StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& outputs) {
+  StepPlan plan;
+  const auto add = [&](Stage stage, bool on, std::string reason) {
+    plan.stages.push_back({stage, on, std::move(reason)});
+  };
+
+  const std::size_t laws = model.interactions.law_count();
+  const std::size_t loads = model.interactions.external.size();
+  const bool gravity = !scene.gravity.isZero();
+  const bool driven = laws > 0 || loads > 0 || gravity;
+  add(Stage::Interact, driven,
+      driven ? count(laws, "interaction law", "interaction laws") + ", " + count(loads, "external load", "external loads") +
+                   (gravity ? ", gravity" : "")
+             : "no interaction, load or gravity acts on a particle");
+
+  const std::size_t bodies = contact_body_count(model);
+  const bool contact = bodies >= 2;
+  const bool surfaces = std::any_of(model.objects.begin(), model.objects.end(),
+                                    [](const ObjectModel& o) { return !o.skeleton.primitive.empty(); });
+  const bool mesh_wanted = outputs.images || outputs.meshes;
+  const bool field = surfaces && (contact || mesh_wanted || outputs.grids || outputs.samples);
+  std::string field_reason;
+  if (!surfaces) {
+    field_reason = "no object has a skeleton";
+  } else if (field) {
+    field_reason = "needed by " + list({{contact, "contact"}, {outputs.images, "images"}, {outputs.meshes, "mesh files"},
+                                        {outputs.grids, "grid files"}, {outputs.samples, "sample tables"}}) +
+                   (contact ? "" : " (at output frames only)");
+  } else {
+    field_reason = "no contact is possible and no image, mesh, grid or sample is requested";
+  }
+  add(Stage::PlaceSkeleton, field, field_reason);
+  add(Stage::IndexField, field, field_reason);
+
+  const std::string contact_reason =
+      contact ? count(bodies, "body", "bodies") + " may touch"
+              : (bodies == 0 && model.objects.size() < 2 ? "a single object has nothing to touch"
+                                                         : "fewer than two bodies may touch");
+  add(Stage::SampleSurface, contact, contact ? contact_reason + "; only parts near another body are sampled" : contact_reason);
+  add(Stage::FindContacts, contact, contact_reason);
+  add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair; " + rule_of_contact(scene.contact) : contact_reason);
+  add(Stage::React, contact, contact ? "runs when a contact surface was found" : contact_reason);
+  add(Stage::Integrate, true, plan_integrator(scene, model).reason);
+
+  const bool mesh = mesh_wanted && surfaces;
+  add(Stage::Polygonise, mesh,
+      mesh ? "needed by " + list({{outputs.images, "images"}, {outputs.meshes, "mesh files"}}) + "; " + meshing_of(scene, model)
+           : (surfaces ? "no image or mesh file is requested" : "no object has a skeleton"));
+  add(Stage::Render, outputs.images, outputs.images ? "images are requested" : "no image is requested");
+  const bool files = outputs.images || outputs.film || outputs.meshes || outputs.grids || outputs.contacts || outputs.particles ||
+                     outputs.samples;
+  add(Stage::Export, files,
+      files ? list({{outputs.images, "images"}, {outputs.film, "film"}, {outputs.meshes, "mesh files"},
+                    {outputs.grids, "grid files"}, {outputs.contacts, "contact tables"},
+                    {outputs.particles, "particle tables"}, {outputs.samples, "sample tables"}})
+            : "no output file is requested");
+  return plan;
+}
+
+core::StepLimits step_limits(const Scene& scene, const Model& model, double frequency, const core::Speeds& speeds) {
+  return {.frequency = frequency,
+          .length = model.smallest_length,
+          .speed = std::max(speeds.linear, model.solid_speed) + scene.gravity.norm() / scene.frame_rate,
+          .angular_speed = speeds.angular};
+}
+
+IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
+  using core::Integrator;
+  const double frame = 1.0 / scene.frame_rate, longest = std::min(frame, scene.time_step.size.value_or(frame));
+  const core::Speeds speeds = core::largest_speeds(model.particles, model.initial);
+  IntegratorPlan plan;
+  plan.pair_frequency = core::largest_frequency(model.particles, model.rest, model.interactions);
+  const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
+  const auto steps_a_frame = [&](double frequency) {
+    const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
+    if (!(step > 0.0)) return std::numeric_limits<double>::infinity();
+    return std::ldexp(1.0, core::halvings(frame, std::min(step, longest)));
+  };
+  const double explicit_steps = steps_a_frame(all);
+  const double implicit_steps = steps_a_frame(model.contact_frequency);
+  const bool fixed = scene.time_step.substeps.has_value();
+
+  plan.settings.rotation = scene.integrator.rotation == RotationName::Splitting ? core::RotationUpdate::Splitting
+                                                                               : core::RotationUpdate::Exponential;
+  plan.settings.length = model.smallest_length;
+  plan.settings.max_substeps = scene.time_step.max_substeps;
+  switch (scene.integrator.method) {
+    case MethodName::Auto: {
+      plan.chosen = !fixed;
+      const bool refused = explicit_steps > scene.time_step.max_substeps;
+      const bool dearer = explicit_steps > kImplicitCost * implicit_steps;
+      const bool energies = model.interactions.literal_form.empty();  // implicit methods minimise one
+      // Fluids are simulated for their motion, which an implicit step would damp.
+      const bool fluid = !model.interactions.geometric_lennard_jones.empty() || !model.interactions.gay_berne.empty();
+      const bool implicit = plan.chosen && energies && !fluid && (refused || dearer);
+      plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
+      const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet per frame";
+      const std::string size = longest < frame ? " (time_step.size: at most " + number_text(longest) + " s)" : "";
+      if (fixed) {
+        plan.reason = "symplectic: the scene fixes the time step";
+      } else if (!implicit) {
+        plan.reason = "symplectic: " + counts + " at the start" + size;
+      } else {
+        plan.reason = "backward_euler: " + number_text(implicit_steps) + " steps per frame instead of " + counts + size +
+                      (refused ? ", which are more than time_step.max_substeps" : "; damps motion that its steps do not resolve");
+      }
+      break;
+    }
+    case MethodName::Symplectic: plan.settings.method = Integrator::Symplectic; break;
+    case MethodName::Rk4: plan.settings.method = Integrator::RungeKutta4; break;
+    case MethodName::Adaptive: plan.settings.method = Integrator::Adaptive; break;
+    case MethodName::BackwardEuler: plan.settings.method = Integrator::BackwardEuler; break;
+    case MethodName::ImplicitMidpoint: plan.settings.method = Integrator::ImplicitMidpoint; break;
+  }
+  if (plan.reason.empty()) plan.reason = std::string(name_of(scene.integrator.method)) + ": set in the scene";
+  const bool implicit = core::is_implicit(plan.settings.method);
+  plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? 1e-9 : 1e-6);
+  plan.limiting_frequency = !implicit ? all : plan.chosen ? model.contact_frequency : 0.0;
+  if (plan.settings.method == Integrator::Adaptive) {
+    plan.limiting_frequency = 0.0;
+    plan.settings.first_step = core::stable_step({.frequency = all});
+    if (!std::isfinite(plan.settings.first_step)) plan.settings.first_step = 0.0;
+  }
+  return plan;
+}
+
+double stick_speed(const Scene& scene, const Model& model) {
+  constexpr double kCreep = 1e-7;  // smallest lengths per second [1/s]
+  return std::min(scene.contact.friction_speed, kCreep * model.smallest_length);
+}
+
+bool well_formed(const StepPlan& plan) {
+  if (plan.stages.size() != static_cast<std::size_t>(kStageCount)) return false;
+  // Empty meshes and zero forces exist before any stage runs; everything else must have been written.
+  DataMask available = kState | kForces | kMesh;
+  for (const PlannedStage& planned : plan.stages) {
+    if (!planned.on) continue;
+    if ((info(planned.stage).reads & ~available) != 0) return false;
+    available |= info(planned.stage).writes;
+  }
+  return true;
+}
+
+}  // namespace supple::scenes

@@ -1,0 +1,44 @@
+/// The times of stages add up to what steps take.
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "scenes/run_scenes.h"
+#include "supple/core/cpu_time.h"
+
+namespace supple::scenes {
+namespace {
+
+/// CPU time of the stages of a spiral that is hit, over that of the process.
+double share_of_stages(bool profile, const std::string& duration, double& advance) {
+  const std::vector<std::string> quiet{"output={}", "duration=" + duration};
+  Simulation simulation(library_scene("figures/ball_hits_spiral", quiet), {.profile = profile});
+  const double begin = process_cpu_seconds();
+  run(simulation, simulation.scene().frame_count());
+  const double whole = process_cpu_seconds() - begin;
+  EXPECT_GT(simulation.state().steps, 1000u);
+  const Profile stages = simulation.profile();
+  advance = stages[static_cast<std::size_t>(Stage::Integrate)].cpu_s;
+  return std::accumulate(stages.begin(), stages.end(), 0.0, [](double sum, const StageProfile& s) { return sum + s.cpu_s; }) / whole;
+}
+
+// All of a step belongs to a stage; the loop around it and the clocks do not.
+TEST(StageTimes, AddUpToTheWholeWhereEveryStepIsMeasured) {
+  double advance = 0.0;
+  const double share = share_of_stages(true, "0.5 s", advance);
+  EXPECT_GT(share, 0.85);
+  EXPECT_LT(share, 1.01);
+  EXPECT_GT(advance, 0.0);
+}
+
+// One step in 61 stands for the others. A quarter allows for one that other programs on the machine make take a hundred times as long.
+TEST(StageTimes, AddUpToTheWholeWithinAQuarterWhereSomeStepsStandForAll) {
+  double advance = 0.0;
+  EXPECT_NEAR(share_of_stages(false, "3 s", advance), 1.0, 0.25);
+  EXPECT_GT(advance, 0.0);
+}
+
+}  // namespace
+}  // namespace supple::scenes
