@@ -435,13 +435,13 @@ int parse_and_call(int argc, char** argv, bool silent) {
   reference_verb->add_flag("--schema", a.json, "print a JSON Schema for editors instead");
   reference_verb->footer("Example: supple reference --schema > supple.schema.json");
 
-  CLI::App* describe_verb = app.add_subcommand("describe", "print completions for a shell, or a page for man");
+  CLI::App* describe_verb = app.add_subcommand("describe", "print completions for a shell, or a manual page");
   describe_verb->add_option("form", a.query, "bash, zsh or man")->required()->check(CLI::IsMember({"bash", "zsh", "man"}));
   describe_verb->footer("Example: source <(supple describe bash)");
 
-  CLI::App* new_verb = app.add_subcommand("new", "write a small scene to begin with");
+  CLI::App* new_verb = app.add_subcommand("new", "write a small scene from a template");
   new_verb->add_option("name", a.scene, "name of the scene; the file is NAME.yaml")->required();
-  new_verb->add_option("--template", a.from, "what to begin with")->default_val("ball");
+  new_verb->add_option("--template", a.from, "template of the scene")->default_val("ball");
   std::string known = "Templates:\n";
   for (const tool::Template& one : tool::templates()) known += "  " + std::string(one.name) + ": " + std::string(one.meaning) + '\n';
   new_verb->footer(known + "\nExample: supple new my_scene --template jelly && supple run my_scene.yaml");
@@ -473,7 +473,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   }
   if (new_verb->parsed()) {
     const std::string path = tool::write_new_scene(a.scene, a.from);
-    print(std::cout, "%s is a scene to begin with. Next: supple run %s\n", path.c_str(), path.c_str());
+    print(std::cout, "Wrote %s. Next: supple run %s\n", path.c_str(), path.c_str());
     return 0;
   }
   if (reference_verb->parsed()) {

@@ -127,7 +127,7 @@ Json value_schema(const FieldInfo& info) {
     case FieldType::Mappings: {
       Json item = mapping_schema(info.children);
       item["properties"]["repeat"] = {{"anyOf", Json::array({number_schema({.low = 0.0}, true), {{"type", "object"}}})},
-                                      {"description", "how often the item stands here: a count with the index i, or indices with their counts"}};
+                                      {"description", "copies of the item: a count, with the index i, or a mapping of indices to counts"}};
       return list_schema(std::move(item), info.rule, 0, kAny);
     }
   }
