@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple {
 namespace {
@@ -73,8 +74,11 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
   if (n == 0) return;
   const std::size_t blocks = (n - 1) / block + 1;
   FirstFailure failure;
+  const std::atomic<int>* const interrupt = interrupt_of_scope();
   const auto run_block = [&](std::size_t index) {
     try {
+      const InterruptScope scope(interrupt);
+      heed_scope();
       const std::size_t begin = index * block;
       body(begin, n - begin < block ? n : begin + block);
     } catch (...) {

@@ -197,8 +197,8 @@ Vec3 ContactTerm::displacement(std::size_t q) const {
   return u;
 }
 
-Vec3 ContactTerm::end_slip(std::size_t q, const Vec3& u) const {
-  const Vec3 v = rule_.end_factor / rule_.h * u - (rule_.end_factor - 1.0) * start_velocity_[q];
+Vec3 ContactTerm::slip(std::size_t q, const Vec3& u) const {
+  const Vec3 v = rule_.slip_factor / rule_.h * u - (rule_.slip_factor - 1.0) * start_velocity_[q];
   const Vec3& n = points_->normal[q];
   return v - v.dot(n) * n;
 }
@@ -230,7 +230,7 @@ Vec3 ContactTerm::gradient_of(std::size_t q, const Vec3& u) const {
   Vec3 gradient = normal_force(q, u.dot(n)) * n;
   const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
   if (!(most > 0.0)) return gradient;
-  const Vec3 v = end_slip(q, u);
+  const Vec3 v = slip(q, u);
   const double slow = stick_speed_[pair_of_[q]], y = v.norm() / slow;
   gradient += (most / slow * (y < 1.0 ? 2.0 - y : 1.0 / y)) * v;
   return gradient;
@@ -241,9 +241,9 @@ Mat3 ContactTerm::hessian_of(std::size_t q, const Vec3& u, FrictionHessian frict
   Mat3 hessian = normal_stiffness(q, u.dot(n)) * n * n.transpose();
   const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
   if (!(most > 0.0)) return hessian;
-  const Vec3 v = end_slip(q, u);
+  const Vec3 v = slip(q, u);
   const double speed = v.norm(), slow = stick_speed_[pair_of_[q]], y = speed / slow;
-  const double scale = most * rule_.end_factor / (rule_.h * slow);
+  const double scale = most * rule_.slip_factor / (rule_.h * slow);
   const double across = y < 1.0 ? 2.0 - y : 1.0 / y, along = y < 1.0 ? 2.0 - 2.0 * y : 0.0;
   hessian += scale * across * (Mat3::Identity() - n * n.transpose());
   if (speed > 0.0 && friction == FrictionHessian::Exact) hessian -= scale * (across - along) / (speed * speed) * v * v.transpose();
@@ -281,7 +281,7 @@ double ContactTerm::value(const ParticleState& pose) {
     const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
     if (!(most > 0.0)) continue;
     const double slow = stick_speed_[pair_of_[q]];
-    sum += most * slow * rule_.h / rule_.end_factor * mollified(end_slip(q, u).norm() / slow);
+    sum += most * slow * rule_.h / rule_.slip_factor * mollified(slip(q, u).norm() / slow);
   }
   for (std::size_t k = 0; k < points_->pair.size(); ++k) {
     for (std::uint32_t s = points_->pair[k].split_begin; s < points_->pair[k].split_end; ++s) {
@@ -380,7 +380,7 @@ double ContactTerm::stick_ratio(const Eigen::VectorXd& correction) const {
     const double slow = stick_speed_[pair_of_[q]];
     largest2 = std::max(largest2, (u - u.dot(p.normal[q]) * p.normal[q]).squaredNorm() / (slow * slow));
   }
-  return std::sqrt(largest2) * rule_.end_factor / rule_.h;
+  return std::sqrt(largest2) * rule_.slip_factor / rule_.h;
 }
 
 void ContactTerm::finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger, std::vector<ContactPairLoad>& pairs) {

@@ -14,10 +14,12 @@
 namespace supple::core {
 
 /// How an implicit rule sees a step: the pose it solves for lies h after the start, and velocities at the end of the step are
-/// `end_factor` u / h - (end_factor - 1) v, u the displacement until that pose and v the velocity at the start.
+/// `end_factor` u / h - (end_factor - 1) v, u the displacement until that pose and v the velocity at the start. Friction acts against the
+/// velocity of which `slip_factor` says the same.
 struct StepRule {
   double h = 0.0;           ///< [s]
   double end_factor = 1.0;  ///< 1: backward Euler; 2: implicit midpoint
+  double slip_factor = 1.0; ///< 1: at the pose that is solved for
 };
 
 /// Which slips count as sticking: slower ones than `speed` [m/s], or than this share of the pair's relative speed [1].
@@ -65,7 +67,7 @@ class ContactTerm {
   void scale_splits();
   void place(const ParticleState& pose);
   [[nodiscard]] Vec3 displacement(std::size_t q) const;
-  [[nodiscard]] Vec3 end_slip(std::size_t q, const Vec3& u) const;
+  [[nodiscard]] Vec3 slip(std::size_t q, const Vec3& u) const;
   [[nodiscard]] double normal_force(std::size_t q, double approach) const;
   [[nodiscard]] double normal_potential(std::size_t q, double approach) const;
   [[nodiscard]] double normal_stiffness(std::size_t q, double approach) const;

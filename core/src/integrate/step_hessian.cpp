@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "supple/core/interrupt.h"
+
 namespace supple::core {
 namespace {
 
@@ -40,6 +42,7 @@ class BlockJacobi {
   }
   template <class Right>
   [[nodiscard]] Eigen::VectorXd solve(const Right& right) const {
+    heed_scope();  // once an iteration
     Eigen::VectorXd out(right.size());
     for (std::size_t b = 0; b < inverse_.size(); ++b) {
       const auto row = static_cast<Eigen::Index>(6 * b);

@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kBoxesPerTask = 32;
 constexpr std::size_t kMostCubes = 8192;  // of a level that is refined at once
+constexpr std::size_t kSamples = 8, kSampled = 128;  // of a level with more, and the cubes of each
+constexpr double kSpreads = 6.0, kFarTooMany = 1.25;  // below their mean, samples leave no doubt; of the limit
 constexpr double kLargestNode = 1 << 30;
 
 /// A cube of 2^level blocks, in units of its own size, with its candidates.
@@ -126,7 +128,10 @@ class Refinement {
       }
       if (count > kMostCubes) {
         // By all halves, as a band about the surface fills more of them the smaller they are.
-        if (expected_ == 0.0) expected_ = blocks_in(8 * std::uint64_t{count}, size - 1);
+        if (expected_ == 0.0) {
+          expected_ = blocks_in(8 * std::uint64_t{count}, size - 1);
+          expect_not_far_too_many(level, size);
+        }
         for (std::size_t first = 0; first < count; first += kMostCubes) {
           LevelPart part;
           part.append(level, first, std::min(first + kMostCubes, count));
@@ -142,6 +147,40 @@ class Refinement {
   LevelPart& found() { return found_; }
 
  private:
+  /// Refuses at once what is far too much, by samples of a level whose cubes were looked at; their spread tells how good they are.
+  void expect_not_far_too_many(const LevelPart& level, int size) const {
+    const std::size_t stride = odd(level.cube.size() / kSampled + 1);
+    double sum = 0.0, squares = 0.0;
+    for (std::size_t k = 0; k < kSamples; ++k) {
+      const double blocks = static_cast<double>(stride) * sampled_blocks(every(level, k * stride / kSamples, stride), size, k);
+      sum += blocks;
+      squares += blocks * blocks;
+    }
+    constexpr auto n = static_cast<double>(kSamples);
+    const double mean = sum / n, spread = std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1.0));
+    if (mean - kSpreads * spread > kFarTooMany * static_cast<double>(options_.limit)) refuse(mean);
+  }
+  /// About how many blocks are left of cubes of 2^size blocks that were looked at: levels of many are thinned out.
+  double sampled_blocks(LevelPart level, int size, std::size_t sample) const {
+    double share = 1.0;
+    while (size > 0) {
+      if (level.cube.size() > 8 * kSampled) {
+        const std::size_t stride = odd(level.cube.size() / kSampled);
+        level = every(level, sample * stride / kSamples, stride);
+        share *= static_cast<double>(stride);
+      }
+      halve(level, --size, range_);
+      level = look(level, size, range_, lattice_, executor_, options_, decide_);
+    }
+    return share * static_cast<double>(level.cube.size());
+  }
+  /// Cubes come in eights, which even strides would see one of.
+  static std::size_t odd(std::size_t number) { return number | 1; }
+  static LevelPart every(const LevelPart& level, std::size_t first, std::size_t stride) {
+    LevelPart part;
+    for (std::size_t i = first; i < level.cube.size(); i += stride) part.append(level, i, i + 1);
+    return part;
+  }
   /// A surface in n boxes of 2^size blocks lies in about 4^size n blocks.
   static double blocks_in(std::uint64_t boxes, int size) { return std::ldexp(static_cast<double>(boxes), 2 * size); }
   [[noreturn]] void refuse(double least) const { refuse_blocks(std::max(least, expected_), lattice_, options_); }

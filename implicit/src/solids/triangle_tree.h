@@ -48,7 +48,7 @@ class TriangleTree {
   using Lanes = float __attribute__((vector_size(kWide * sizeof(float))));
   using Stack = std::array<std::uint32_t, 128>;  // seven a level, and each level has an eighth of the last
 
-  /// Boxes relative to `origin_`, in single precision and outwards by more than that loses.
+  /// Boxes relative to `origin_`, over `unit_`, in single precision and outwards by more than that loses.
   struct Node {
     std::array<Lanes, 3> lower, upper;
     std::array<std::uint32_t, kWide> child;  // a node, or kLeaf with a leaf; kNone
@@ -65,7 +65,7 @@ class TriangleTree {
     std::array<double, 3> inverse_square;  // of the lengths of the edges
     std::uint32_t triangle;
   };
-  /// Up to eight faces in single precision, relative to `origin_`: selects those that may be nearest.
+  /// Up to eight faces in single precision, relative to `origin_` and over `unit_`: selects those that may be nearest.
   struct Leaf {
     std::array<std::array<Lanes, 3>, 3> corner, along, inward;  // by corner or edge, then by axis
     std::array<Lanes, 3> inverse_square, normal;
@@ -79,7 +79,8 @@ class TriangleTree {
 
   std::size_t count_ = 0;
   Vec3 origin_ = Vec3::Zero();
-  double pad_ = 0.0;                               // more than single precision loses of a place in the mesh [m]
+  double unit_ = 1.0;                              // the power of two below the size, so that squares of single precision hold meshes of any size [m]
+  double pad_ = 0.0;                               // more than single precision loses of a place in the mesh, over `unit_`
   std::uint32_t root_ = kNone;
   std::vector<Node> node_;
   std::vector<Leaf> leaf_;
@@ -93,7 +94,7 @@ void TriangleTree::each_near(const Box& box, const Use& use) const {
   if (root_ == kNone) return;
   Stack stack;
   stack[0] = root_;
-  const Box local{box.lower - origin_, box.upper - origin_};
+  const Box local{(box.lower - origin_) / unit_, (box.upper - origin_) / unit_};
   for (std::size_t n = 1; n > 0;) {
     const Node& node = node_[stack[--n]];
     for (std::size_t c = 0; c < kWide; ++c) {

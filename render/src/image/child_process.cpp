@@ -4,6 +4,7 @@
 #include <linux/close_range.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -46,11 +47,11 @@ struct Start {
   pid_t parent;
   int null, messages, failure;
   const sigset_t* signals;
+  int life, own_life;  ///< read and write end of a pipe that nobody writes into: it ends with us
 };
 
 /// Comes back where that fails, with errno.
 int exec(const Start& start) {
-  ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != start.parent) return ESRCH;  // the parent ended before the signal was set up
   if (::dup2(start.null, STDIN_FILENO) < 0 || ::dup2(start.null, STDOUT_FILENO) < 0 || ::dup2(start.messages, STDERR_FILENO) < 0) return errno;
@@ -65,6 +66,48 @@ int exec(const Start& start) {
   const int code = exec(start);
   (void)!::write(start.failure, &code, sizeof code);
   ::_exit(kNotStarted);
+}
+
+/// Ends as another process did.
+[[noreturn]] void end_like(int status) {
+  if (WIFEXITED(status)) ::_exit(WEXITSTATUS(status));
+  const int number = WTERMSIG(status);
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  ::signal(number, SIG_DFL);
+  sigset_t one;
+  ::sigemptyset(&one);
+  ::sigaddset(&one, number);
+  ::sigprocmask(SIG_UNBLOCK, &one, nullptr);
+  ::raise(number);
+  ::_exit(kNotStarted);
+}
+
+/// The system kills what we start when we end, but not what that starts. A process between us and the program leads the group of all of them: it ends as the
+/// program does, or kills the group when we are gone. Nothing that it calls may allocate, either.
+[[noreturn]] void keep(Start start) {
+  ::setpgid(0, 0);
+  const pid_t parent = start.parent;
+  start.parent = ::getpid();
+  const pid_t program = ::fork();
+  if (program == 0) become(start);
+  if (program < 0) {
+    const int code = errno;
+    (void)!::write(start.failure, &code, sizeof code);
+    ::_exit(kNotStarted);
+  }
+  // Locks and pipes of ours are not held for longer than we live; standard streams neither.
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) (void)::dup2(start.null, stream);
+  for (const int used : {start.own_life, start.messages, start.failure}) ::close(used);
+  ::syscall(SYS_close_range, STDERR_FILENO + 1, static_cast<unsigned>(start.life) - 1, 0);
+  ::syscall(SYS_close_range, static_cast<unsigned>(start.life) + 1, ~0U, 0);
+  pollfd life{.fd = start.life, .events = POLLIN, .revents = 0};
+  for (;;) {
+    int status = 0;
+    if (::waitpid(program, &status, WNOHANG) == program) end_like(status);
+    const bool gone = ::poll(&life, 1, kSlice_ms) > 0 || ::getppid() != parent;
+    if (gone) ::kill(0, SIGKILL);
+  }
 }
 
 /// A program that was started; killed with its group and waited for on every way out.
@@ -117,7 +160,7 @@ pid_t start_child(Start start) {
   start.signals = &blocked.before();
   const pid_t process = ::fork();
   if (process < 0) fail(errno);
-  if (process == 0) become(start);
+  if (process == 0) keep(start);
   return process;
 }
 
@@ -157,7 +200,8 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   const io::Descriptor null = io::open_file("/dev/null", O_RDWR);
   if (!null.is_open()) fail(errno);
   Pipe messages = make_pipe(), failure = make_pipe();
-  Child child(start_child({program.c_str(), argv.data(), ::getpid(), null.get(), messages.write.get(), failure.write.get(), nullptr}));
+  const Pipe life = make_pipe();
+  Child child(start_child({program.c_str(), argv.data(), ::getpid(), null.get(), messages.write.get(), failure.write.get(), nullptr, life.read.get(), life.write.get()}));
   (void)messages.write.close();
   (void)failure.write.close();
 

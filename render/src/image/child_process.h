@@ -20,7 +20,7 @@ struct ProgramEnd {
 
 /// Runs a program without a shell to its end. Its input is empty, its output goes nowhere, and of our descriptors it gets none.
 /// It leads a process group of its own: what a terminal sends to ours does not reach it.
-/// The system kills it when the calling thread ends, as all do when this process is killed.
+/// It is killed with all of its group, what it has started included, when this process ends, however that ends.
 /// @param words      its arguments, the first one its name
 /// @param interrupt  kills it and its group when set by another thread or a signal; null: never
 /// @throws std::system_error when it cannot be started, Interrupted when it was killed for `interrupt`

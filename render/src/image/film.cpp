@@ -120,9 +120,10 @@ std::string facts_of(const std::filesystem::path& film) {
     const std::string_view kind(reinterpret_cast<const char*>(&head[4]), 4);
     if (kind == "mdat") return {};  // the facts come first in films of `encode_film`
     std::string box(size - head.size(), '\0');
-    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) return {};
+    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) break;
     if (kind == "moov") return box;
   }
+  if (in.bad()) throw std::filesystem::filesystem_error("cannot be read", film, std::make_error_code(std::errc::io_error));
   return {};
 }
 

@@ -13,6 +13,7 @@
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
 namespace {
@@ -146,6 +147,14 @@ Node* expand(Node* root, std::span<const Setting> settings, Tree& tree, FaultLis
   return root;
 }
 
+/// What `accuracy` sets, before the keys that override it are read. One that is faulty sets nothing; reading it says so.
+void read_accuracy(const Node& root, Scene& scene) {
+  const Node::Entry* entry = root.find("accuracy");
+  if (entry == nullptr || entry->value->kind != Node::Kind::Scalar) return;
+  const QuantityText accuracy = read_quantity(entry->value->text, kNumber);
+  if (accuracy.ok && accuracy.value > 0.0) set_by_accuracy(accuracy.value, scene);
+}
+
 }  // namespace
 
 int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
@@ -187,6 +196,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   if (!mapping) {
     faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");
   } else {
+    read_accuracy(*root, scene);
     ReadArchive archive(faults, *root, "");
     scene_members(archive, scene);
     archive.finish();

@@ -10,6 +10,7 @@
 #include "output/saved_frames.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/executor.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::scenes {
 namespace {
@@ -110,6 +111,7 @@ void DrawingCrew::fail(int frame) {
 
 void DrawingCrew::begin(Member& member) {
   try {
+    const InterruptScope scope(options_.interrupt);
     std::unique_lock lock(opening_);
     Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt, options_.scene_memory});
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);

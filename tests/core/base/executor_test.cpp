@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "support/allocations.h"
 
 namespace {
@@ -46,6 +47,29 @@ TEST_P(Executors, RethrowTheFirstFailureInBlockOrderAfterAllBlocksEnded) {
     EXPECT_STREQ(error.what(), "17");
   }
   EXPECT_EQ(blocks, 100);
+}
+
+TEST_P(Executors, EndSoonInAScopeThatIsInterrupted) {
+  const Executor executor(GetParam());
+  std::atomic<int> interrupt{0}, blocks{0}, nested{0};
+  const InterruptScope scope(&interrupt);
+  executor.for_blocks(100, 1, [&](std::size_t, std::size_t) { ++blocks; });
+  EXPECT_EQ(blocks, 100);
+  EXPECT_THROW(executor.for_blocks(100000, 1,
+                                   [&](std::size_t, std::size_t) {
+                                     if (++blocks == 110) interrupt = 2;
+                                     heed_scope();  // also on the threads of the executor
+                                     ++nested;
+                                   }),
+               Interrupted);
+  EXPECT_GE(blocks, 110);
+  EXPECT_LE(blocks, 110 + GetParam());
+  EXPECT_LE(nested, 10 + GetParam());
+  {
+    const InterruptScope none(nullptr);
+    executor.for_blocks(10, 1, [&](std::size_t, std::size_t) { heed_scope(); });
+  }
+  EXPECT_THROW(heed_scope(), Interrupted);
 }
 
 TEST_P(Executors, RunLibraryCodeInside) {

@@ -294,7 +294,7 @@ TEST(ImplicitContact, HasTheGradientAndTheHessianOfItsPotential) {
     ContactTerm term;
     const ParticleState predicted = moved(0.01);
     const double end_factor = trial % 2 == 0 ? 1.0 : 2.0;
-    term.begin(two.p.set, two.points, two.p.state, predicted, {.h = 0.01, .end_factor = end_factor}, {.speed = 0.5});
+    term.begin(two.p.set, two.points, two.p.state, predicted, {.h = 0.01, .end_factor = end_factor, .slip_factor = trial % 2 == 0 ? 1.0 : 1.1}, {.speed = 0.5});
     term.lag_friction(predicted);
     const ParticleState pose = moved(0.003);
     const auto nudged = [&](Eigen::Index row, double by) {

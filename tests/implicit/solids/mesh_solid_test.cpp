@@ -47,9 +47,9 @@ TEST(MeshSolid, IsNearTheExactDistance) {
 }
 
 TEST(MeshSolid, IsTheSameInAnyUnitOfLength) {
-  // Powers of two near 1e-18, 1e-9 and 1e18: nothing is rounded otherwise.
+  // Powers of two near 1e-50, 1e-18, 1e-9, 1e18 and 1e50: nothing is rounded otherwise.
   const MeshSolid solid(octahedral_sphere(1.0, 3), {.slope = 1.0});
-  for (const int power : {-60, -30, 60}) {
+  for (const int power : {-166, -60, -30, 60, 166}) {
     const double scale = std::ldexp(1.0, power);
     const MeshSolid scaled(octahedral_sphere(scale, 3), {.slope = 1.0});
     for (const Vec3& u : places({Vec3::Constant(-1.02), Vec3::Constant(1.02)}, 40)) {

@@ -238,7 +238,7 @@ TEST(ImplicitContact, GivesTheSameBitsForAnyThreadsAndAfterARestart) {
 }
 
 TEST(ImplicitContact, KeepsTheEnergyOfABodyOfSeveralPartsToTheOrderOfTheMethod) {
-  // A soft bar bounces slantwise. Were its elastic force shared by contributions, energy would change by 1e-2 whatever the step.
+  // A soft bar bounces slantwise. Were its elastic force shared by contributions, energy would change by a quarter whatever the step.
   const auto error = [](int substeps) {
     Simulation bar = make(R"(
 schema: 1

@@ -3,7 +3,7 @@
 /// them the pressure is linear in the approach of the two bodies, and each body moves there as the weighted mean of
 /// its particles. In addition to inertia and pair laws the step minimises
 ///   sum_q l_n(u_q . n) + sum_q l_t(v_q),
-/// u_q the displacement of body A relative to B within the step, v_q their relative velocity along the surface at its end:
+/// u_q the displacement of body A relative to B within the step, v_q their relative velocity along the surface (backward Euler: at its end; implicit midpoint: just after its middle):
 ///   l_n' = w [p + g (u - u_p) . n]_+ (1 + d u . n / h)_+     pressure, and damping (Hunt & Crossley 1975); increases, so l_n is convex,
 ///   l_t' = mu N f1(|v_q|) v_q / |v_q|                        Coulomb friction, N the normal force of the last iterate (Li et al. 2020),
 /// with weight w, pressure p and approach u_p . n at the predicted pose, and the slope g of the pressure in the approach: for parallel
