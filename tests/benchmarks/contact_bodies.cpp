@@ -38,7 +38,7 @@ struct Parts {
   void index() {
     implicit::place_skeleton(skeleton, pose, placed);
     implicit::index_field(skeleton, placed, field);
-    implicit::sample_surface(skeleton, layout, pose, field, {}, {}, Executor(1), kept, samples);
+    implicit::sample_surface({skeleton, layout, pose, field}, {}, Executor(1), kept, samples);
   }
   [[nodiscard]] collision::ContactBody body() const {
     collision::ContactBody b;
@@ -102,7 +102,7 @@ struct Query {
       const double start = cpu_microseconds();
       solve_contact_surface(bodies, candidates, {.error = error, .energy = energy, .only = rule}, executor, surface);
       const double solved = cpu_microseconds();
-      react(bodies, {}, surface, {}, executor, loads);
+      react({bodies, {}, surface}, executor, {loads});
       cpu_us = std::min(cpu_us, solved - start);
       forces_us = std::min(forces_us, cpu_microseconds() - solved);
     }

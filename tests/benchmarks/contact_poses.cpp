@@ -67,7 +67,7 @@ struct Query {
     for (int i = 0; i < repeats; ++i) {
       constexpr int kInARow = 4;
       const double start = cpu_microseconds();
-      for (int n = 0; n < kInARow; ++n) react(bodies, {}, surface, {}, executor, loads);
+      for (int n = 0; n < kInARow; ++n) react({bodies, {}, surface}, executor, {loads});
       least = std::min(least, (cpu_microseconds() - start) / kInARow);
     }
     return least;

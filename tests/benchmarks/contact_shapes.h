@@ -111,7 +111,7 @@ class Rigid {
     implicit::place_skeleton(skeleton_, poses_, placed_);
     implicit::index_field(skeleton_, placed_, field_);
     implicit::SampleState kept;
-    implicit::sample_surface(skeleton_, layout_, poses_, field_, {}, {}, Executor(1), kept, rest_);
+    implicit::sample_surface({skeleton_, layout_, poses_, field_}, {}, Executor(1), kept, rest_);
   }
   /// @param pose  on the stage
   void put(const Pose& pose) {

@@ -295,7 +295,7 @@ void bench_ellipsoids(Ellipsoids all, int steps, int repeats) {
     builds = 0;
     const double begin = seconds(CLOCK_PROCESS_CPUTIME_ID);
     for (int k = 0; k < steps; ++k) {
-      advance(all.set, {}, forces, 0.002 * k, 0.002, all.state, kick, ledger);
+      advance({all.set, {}, forces}, 0.002 * k, 0.002, {all.state, kick, ledger});
     }
     best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - begin) / steps);
     if (repeat + 1 == repeats) {
@@ -453,7 +453,7 @@ class Spiral {
     kick_.valid = false;
     ledger_ = {};
     for (int k = 0; k < kSpiralSteps; ++k) {
-      advance(rest_.set, all_, forces, kSpiralStep * k, kSpiralStep, state, kick_, ledger_);
+      advance({rest_.set, all_, forces}, kSpiralStep * k, kSpiralStep, {state, kick_, ledger_});
     }
   }
   [[nodiscard]] std::size_t bonds() const { return all_.bond_frame[0].first.size(); }

@@ -136,7 +136,7 @@ Run run(System s, double mass_ratio, double compression, double factor) {
       }
       dt = factor * stable_step(limits);
     }
-    advance(s.p.set, s.laws, forces, time, dt, s.p.state, kick, ledger);
+    advance({s.p.set, s.laws, forces}, time, dt, {s.p.state, kick, ledger});
     time += dt;
     const Divergence divergence = find_divergence(s.p.set, s.p.state, 1e4, 1e6 * frequency);
     if (divergence.found) {

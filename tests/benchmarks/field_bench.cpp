@@ -155,11 +155,11 @@ void measure_body(std::string_view filter, const std::string& name, Body& body, 
   SampleState state;
   SurfaceSamples samples;
   const Executor executor(1);
-  sample_surface(body.skeleton, layout, body.parts, field, {}, {}, executor, state, samples);
+  sample_surface({body.skeleton, layout, body.parts, field}, {}, executor, state, samples);
   const SampleState warm = state;
   measure(filter, name + "/samples", [&](Hasher& hasher) {
     state.distance = warm.distance;
-    sample_surface(body.skeleton, layout, body.parts, field, {}, {}, executor, state, samples);
+    sample_surface({body.skeleton, layout, body.parts, field}, {}, executor, state, samples);
     hasher.add(samples.area);
     return layout.size();
   });

@@ -213,7 +213,7 @@ class Stage {
       loads[i].force.assign(bodies_[i].pose.size(), Vec3::Zero());
       loads[i].torque.assign(bodies_[i].pose.size(), Vec3::Zero());
     }
-    const ReactionReport result = collision::react(bodies_, rules, surface, settings, Executor(threads), loads);
+    const ReactionReport result = collision::react({bodies_, rules, surface, settings}, Executor(threads), {loads});
     if (report != nullptr) *report = result;
     return loads;
   }

@@ -125,7 +125,7 @@ TEST(FreeSpiral, KeepsItsEnergyOverAMillionSteps) {
   const auto mean_energy = [&](int steps) {
     double sum = 0.0;
     for (int k = 0; k < steps; ++k) {
-      advance(p.set, interactions, forces, 0.0, dt, p.state, kick, ledger);
+      advance({p.set, interactions, forces}, 0.0, dt, {p.state, kick, ledger});
       if (k % 10 == 0) {
         sum += measure_motion(p.set, p.state).kinetic_energy + potential_energy(p.set, p.state, interactions);
       }

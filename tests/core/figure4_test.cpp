@@ -69,7 +69,7 @@ struct Triangle {
         out.internal.force[b] += push;
       }
     };
-    advance(p.set, interactions, model, time, dt, p.state, kick, ledger);
+    advance({p.set, interactions, model}, time, dt, {p.state, kick, ledger});
     time += dt;
     largest_side = std::max(largest_side, side());
   }

@@ -210,6 +210,26 @@ expect 0 '' run film.yaml --out film_KILL --resume --progress none
 [[ -s film_KILL/film.mp4 ]] || fault 'no film after --resume'
 [[ -z $(find film_KILL -name '*.tmp') ]] || fault "temporary files of a dead run are left: $(find film_KILL -name '*.tmp')"
 
+# Completions and the page for man name every command and option.
+"$supple" describe bash > completion.sh && bash -n completion.sh || fault 'completion for bash is no bash'
+for word in run render export info compare check explain query bench reference new; do
+  completed=$(bash -c "source completion.sh; COMP_WORDS=(supple ${word:0:2}); COMP_CWORD=1; _supple; echo \"\${COMPREPLY[*]}\"")
+  [[ " $completed " == *" $word "* ]] || fault "'supple ${word:0:2}' is completed to '$completed'"
+done
+completed=$(bash -c 'source completion.sh; COMP_WORDS=(supple run --over); COMP_CWORD=2; _supple; echo "${COMPREPLY[*]}"')
+[[ $completed == --overwrite ]] || fault "'supple run --over' is completed to '$completed'"
+"$supple" describe man > supple.1 && grep -q 'overwrite' supple.1 || fault 'no page for man'
+expect 2 '' describe fish
+
+# Templates of scenes.
+for template in ball balls chain jelly sheet; do
+  expect 0 '' new "new_$template" --template "$template"
+  expect 0 '' check "new_$template.yaml"
+done
+expect 4 'expected a new file, found one that exists' new new_ball
+expect 2 "did you mean 'jelly'" new other --template jely
+expect 2 'expected a name of letters' new 'a;b'
+
 grep -q '"outcome": "diverged"' diverged/result.json || { echo 'no outcome for the diverged run'; failures=$((failures + 1)); }
 expect 3 '' run nan.yaml --out invalid --progress none
 grep -q '"outcome": "invalid"' invalid/result.json || { echo 'no outcome for the invalid scene'; failures=$((failures + 1)); }

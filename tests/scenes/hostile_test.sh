@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Scenes that ask for far too much: `supple check` answers each as NAME.txt says, in little time and memory.
+# Scenes that ask for far too much: `supple check` answers each as NAME.txt says, in a second and 256 MB.
 #   hostile_test.sh SUPPLE FOLDER [--write]
 # NAME.txt: the exit code, then the first line of the answer. --write replaces these files.
 set -u
@@ -9,26 +9,46 @@ write=${3:-}
 cd "$folder" || exit 1
 failures=0
 
-most_seconds=10      # of CPU; the answer takes one, on a machine that others use, too
+most_seconds=1.0     # of processor time beyond what the program takes to start; times SUPPLE_TEST_SLOWNESS, for sanitizers
 most_kilobytes=262144  # resident
+slowness=${SUPPLE_TEST_SLOWNESS:-1}
+nm -D "$supple" 2> /dev/null | grep -q -e __asan_init -e __tsan_init && slowness=20
 
-for scene in *.yaml; do
-  name=${scene%.yaml}
-  # wait4 of the child alone tells its peak: `times` of the shell would be of all.
-  answer=$(python3 - "$supple" "$scene" "$most_seconds" <<'PROGRAM'
+most=$(awk "BEGIN {print $most_seconds * $slowness}")
+
+# measure ARGUMENTS...: kilobytes, seconds, exit code, first line of the answer. The quickest of three where one is late: others may use the machine, too.
+measure() {
+  python3 - "$supple" "$most" "$start_up" "$@" <<'PROGRAM'
 import resource, subprocess, sys
-program, scene, seconds = sys.argv[1], sys.argv[2], int(sys.argv[3])
-limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-done = subprocess.run([program, "check", scene], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=limit)
-usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+program, most, start_up = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+guard = int(10 * most) + 10
+limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (guard, guard))
+best = None
+for _ in range(3):
+    # wait4 of the child alone tells its peak: `times` of the shell would be of all.
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([program, *sys.argv[4:]], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=limit)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    best = seconds if best is None else min(best, seconds)
+    if best - start_up <= most:
+        break
 lines = done.stdout.decode(errors="replace").splitlines() or [""]
-print(usage.ru_maxrss)
+print(after.ru_maxrss)
+print(f"{best - start_up:.2f}")
 print(done.returncode)
 print(lines[0])
 PROGRAM
-)
+}
+
+start_up=0
+start_up=$(measure --version | sed -n 2p)
+for scene in *.yaml; do
+  name=${scene%.yaml}
+  answer=$(measure check "$scene")
   kilobytes=$(sed -n 1p <<< "$answer")
-  found=$(sed -n '2,3p' <<< "$answer")
+  seconds=$(sed -n 2p <<< "$answer")
+  found=$(sed -n '3,4p' <<< "$answer")
   if [[ $write == --write ]]; then
     printf '%s\n' "$found" > "$name.txt"
   fi
@@ -36,10 +56,14 @@ PROGRAM
     printf '%s: expected\n%s\nfound\n%s\n' "$scene" "$(cat "$name.txt" 2> /dev/null)" "$found"
     failures=$((failures + 1))
   fi
+  if awk "BEGIN {exit !($seconds > $most)}"; then
+    echo "$scene: expected an answer after $most s of processor time beyond the start of the program, found $seconds s"
+    failures=$((failures + 1))
+  fi
   if (( kilobytes > most_kilobytes )); then
     echo "$scene: expected at most $most_kilobytes kB of memory, found $kilobytes"
     failures=$((failures + 1))
   fi
-  [[ $write == --write ]] && echo "$scene: $kilobytes kB, $found"
+  [[ $write == --write ]] && echo "$scene: $seconds s, $kilobytes kB, $found"
 done
 exit $((failures > 0))

@@ -7,6 +7,9 @@ TINY = ("contacts/two_balls", ["duration=0.05", "output.images.size=[32,24]", "o
                                "output.particles=vtk", "output.contacts=csv", "output.cell=0.05"])
 # Without pictures: what a graphics driver does without memory is its own.
 NO_PICTURES = (TINY[0], [word for word in TINY[1] if not word.startswith("output.images")] + ["output.images=false"])
+# Pictures by the path tracer, which is ours, and grids by OpenVDB.
+TRACED = (TINY[0], [word for word in TINY[1] if not word.startswith(("output.mesh", "output.particles", "output.contacts"))]
+          + ["render.renderer=path", "render.most_samples=4", "output.grid=vdb"])
 KINDS = ("eio", "enospc", "short", "eintr")
 
 
@@ -64,20 +67,22 @@ def before_main(context, library):
 
 def failing_memory(context, asked):
     outcome = Outcome()
-    base = context.folder("memory")
-    run = SmallRun(context, *NO_PICTURES, base / "reference")
     library = str(context.build / "lib/liballoc_failure.so")
-    out, count = base / "out", base / "calls"
-    ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_COUNT": str(count)})
-    if ended.code != 0 or not count.exists():
-        raise RuntimeError(f"the run that counts allocations ended with {ended.code}: {ended.err}")
-    total = int(count.read_text())
     early = before_main(context, library)
-    for number in spread(total, asked, early + 1):
-        shutil.rmtree(out, ignore_errors=True)
-        ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_AT": str(number)})
-        outcome.faults += judge(run, out, ended, f"allocation {number}", False)
-        outcome.reached += 1
-    outcome.faults += [f"still running: {text}" for text in orphans(out)]
-    outcome.note = f"a run makes {total} allocations, the first {early} before main"
+    totals = []
+    for k, settings in enumerate((NO_PICTURES, TRACED)):
+        base = context.folder(f"memory_{k}")
+        run = SmallRun(context, *settings, base / "reference")
+        out, count = base / "out", base / "calls"
+        ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_COUNT": str(count)})
+        if ended.code != 0 or not count.exists():
+            raise RuntimeError(f"the run that counts allocations ended with {ended.code}: {ended.err}")
+        totals.append(int(count.read_text()))
+        for number in spread(totals[-1], (asked + 1 - k) // 2, early + 1):
+            shutil.rmtree(out, ignore_errors=True)
+            ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_AT": str(number)})
+            outcome.faults += judge(run, out, ended, f"{('tables and meshes', 'traced pictures and grids')[k]}, allocation {number}", False)
+            outcome.reached += 1
+        outcome.faults += [f"still running: {text}" for text in orphans(out)]
+    outcome.note = f"runs with tables and meshes and with traced pictures and grids make {totals[0]} and {totals[1]} allocations, the first {early} before main"
     return outcome

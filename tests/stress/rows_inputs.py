@@ -91,6 +91,13 @@ def hostile_texts():
     for name, file in {"traversal": "../../../../etc/passwd", "absolute": "/etc/passwd", "device": "/dev/zero", "link": "link.csv", "pipe": "pipe.csv", "endless": "zero.csv",
                        "folder": ".", "nul": "\"p.csv\\0x\""}.items():
         texts["file_" + name] = particles(f"{{arrange: file, file: {file}, mass: 1}}")
+    # Numbers that are none, or not of this world, in every place that takes one.
+    wrong = {"negative": "-1", "large": "1e300", "small": "1e-300", "nan": ".nan", "infinite": "-.inf", "word": "x", "list": "[1, 2]", "map": "{a: 1}"}
+    places = {"duration": ("duration: 0.1", "duration: "), "mass": ("mass: 1", "mass: "), "radius": ("radius: 0.1", "radius: "),
+              "modulus": ("contact: {}", "contact: {modulus: ", "}"), "frame_rate": ("schema: 1", "schema: 1\nframe_rate: "),
+              "gravity": ("objects:", "gravity: ", "\nobjects:"), "count": ("mass: 1", "arrange: line, spacing: 0.1, mass: 1, count: "), "cell": ("objects:", "output: {mesh: ply, cell: ", "}\nobjects:")}
+    for place, (old, new, *end) in places.items():
+        texts |= {f"{place}_{name}": (HEAD + BALL).replace(old, new + value + "".join(end), 1) for name, value in wrong.items()}
     return texts
 
 

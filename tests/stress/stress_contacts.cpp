@@ -59,7 +59,7 @@ void judge_momenta(const std::array<ContactBody, 2>& bodies, const collision::Co
     loads[i].force.assign(bodies[i].pose.size(), Vec3::Zero());
     loads[i].torque.assign(bodies[i].pose.size(), Vec3::Zero());
   }
-  collision::react(bodies, {}, surface, {}, Executor(1), loads);
+  collision::react({bodies, {}, surface}, Executor(1), {loads});
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
   double size = 0.0, moment_size = 0.0;
   for (std::size_t i = 0; i < 2; ++i) {

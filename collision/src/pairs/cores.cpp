@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "pairs/body_order.h"
 
@@ -36,6 +37,48 @@ std::optional<Between> between_cores(const ContactBody& one, const ContactBody& 
   const double extent = overlap.extent().norm(), turn = std::isfinite(extent) ? moved / distance * extent : 0.0;
   const double middle = 0.5 * (std::min(on_a->radius, distance) + std::max(distance - on_b->radius, 0.0));
   return Between{on_a->point + (middle / distance) * across, settled && distance > (1.0 + kMargin) * radii + turn, distance < (1.0 - kMargin) * radii};
+}
+
+std::optional<int> softer_of_nested_balls(const ContactBody& one, const ContactBody& other) {
+  constexpr double kSameCentre = 1e-12, kInnermost = 1e-3;  // of the radius
+  constexpr double kHardly = 1e-6;                          // of the largest pressure
+  constexpr int kMostLooks = 4096;
+  const std::optional<implicit::CorePoint> core = one.field.core_point(first_place(one));
+  if (!core || !core->round) return std::nullopt;
+  const std::optional<implicit::CorePoint> other_core = other.field.core_point(core->point);
+  if (!other_core || !other_core->round) return std::nullopt;
+  const double radius = std::min(core->radius, other_core->radius);
+  const Box box = one.field.surface_box(), other_box = other.field.surface_box();
+  // Half-spaces are round, too, and end nowhere.
+  if (!(box.extent().allFinite() && other_box.extent().allFinite() && (other_core->point - core->point).norm() <= kSameCentre * radius)) return std::nullopt;
+  const double end = box.intersection(other_box).upper.x() - core->point.x();
+  if (!(end > 0.0)) return std::nullopt;
+
+  const auto pressure = [&](const ContactBody& body, double from, double to) {
+    const Interval value = body.field.bound({core->point + from * Vec3::UnitX(), core->point + to * Vec3::UnitX()});
+    return Interval{body.material.modulus * value.lower, body.material.modulus * value.upper};
+  };
+  const double largest = std::min(pressure(one, 0.0, end).upper, pressure(other, 0.0, end).upper);
+  int looks = 0;
+  std::optional<int> softer;  // as far as it is known
+  std::vector<Interval> open{{0.0, end}};
+  while (!open.empty()) {
+    const Interval range = open.back();
+    open.pop_back();
+    const Interval p = pressure(one, range.lower, range.upper), q = pressure(other, range.lower, range.upper);
+    if (std::min(p.upper, q.upper) <= kHardly * largest || range.upper <= kInnermost * radius) continue;
+    if (p.lower > q.upper || p.upper < q.lower) {
+      const int here = p.lower > q.upper ? 1 : 0;
+      if (softer.value_or(here) != here) return std::nullopt;
+      softer = here;
+      continue;
+    }
+    if (++looks > kMostLooks) return std::nullopt;
+    const double middle = 0.5 * (range.lower + range.upper);
+    open.push_back({range.lower, middle});
+    open.push_back({middle, range.upper});
+  }
+  return softer;
 }
 
 }  // namespace supple::collision

@@ -22,4 +22,8 @@ inline constexpr int kFewSteps = 32, kManySteps = 512;
 /// @return none where the cores meet, or a body has none
 [[nodiscard]] std::optional<Between> between_cores(const ContactBody& one, const ContactBody& other, const Box& overlap, int steps = kFewSteps);
 
+/// Of two balls about one centre that press differently wherever both press, so that no Sigma lies between them and neither pushes the other: the side (0: `one`)
+/// that presses less. Proved by bounds of their fields along a ray, but for what hardly presses or lies within a thousandth of the radius; none where it is not so.
+[[nodiscard]] std::optional<int> softer_of_nested_balls(const ContactBody& one, const ContactBody& other);
+
 }  // namespace supple::collision

@@ -63,23 +63,6 @@ bool allowed(std::span<const ContactBody> bodies, const ContactRules& rules, std
   return !(bodies[a].fixed && bodies[b].fixed) && (!rules.allowed || rules.allowed(a, b));
 }
 
-}  // namespace
-
-std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules) {
-  const auto pairs_of = [](std::uint64_t n) { return n == 0 ? 0 : n * (n - 1) / 2; };
-  if (!rules.allowed) {
-    const auto fixed = std::count_if(bodies.begin(), bodies.end(), [](const ContactBody& b) { return b.fixed; });
-    return pairs_of(bodies.size()) - pairs_of(static_cast<std::uint64_t>(fixed));
-  }
-  std::uint64_t count = 0;
-  for (std::uint32_t a = 0; a < bodies.size(); ++a) {
-    for (std::uint32_t b = a + 1; b < bodies.size(); ++b) count += allowed(bodies, rules, a, b) ? 1 : 0;
-  }
-  return count;
-}
-
-namespace {
-
 /// Whether samples tell where the surface of a body is near others.
 bool is_sampled(const ContactBody& body) {
   return body.samples != nullptr && !body.samples->point.empty() &&
@@ -245,14 +228,12 @@ void OverlapList::find(std::span<const Box> boxes, const Executor& executor, std
   out.resize(count);
 }
 
-std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules, const Executor& executor,
-                                  std::uint64_t* present) {
+std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules, const Executor& executor) {
   std::vector<Box> box;
   box.reserve(bodies.size());
   for (const ContactBody& body : bodies) box.push_back(body.field ? body.field.surface_box() : Box{});
   std::vector<BodyPair> pairs = overlapping_boxes(box, executor);
   std::erase_if(pairs, [&](const BodyPair& pair) { return !allowed(bodies, rules, pair.a, pair.b); });
-  if (present != nullptr) *present = count_allowed(bodies, rules);
   return pairs;
 }
 

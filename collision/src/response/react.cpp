@@ -12,6 +12,23 @@ namespace {
 struct Range {
   std::size_t begin, end;
 };
+
+/// Sigma of a pair, and the elastic load on it.
+struct PairLoads {
+  std::span<const Vec3> x, normal;
+  std::span<const double> area, pressure;
+  std::span<const double> load;                         ///< p dA [N]
+  Vec3 centre = Vec3::Zero();                           ///< of pressure
+  Vec3 push = Vec3::Zero(), twist = Vec3::Zero();       ///< integrals of p N dA and of (x - centre) x p N dA
+};
+
+/// Columns of the squeezed regions of a pair.
+struct Squeezed {
+  std::span<const Vec3> point;
+  std::span<const double> weight;
+  std::span<const std::uint8_t> side;  ///< 0: in A, 1: in B
+};
+
 Range advance_range(const std::vector<std::uint32_t>& pair, std::size_t begin, std::uint32_t k) {
   std::size_t end = begin;
   while (end < pair.size() && pair[end] == k) ++end;
@@ -80,23 +97,23 @@ class Side {
     });
   }
 
-  /// Elastic force, on A -integral p N dA: the gradient of the contact energy, corrected to `total` and `moment`
-  /// (about `centre`) by the mean contributions, weighted with p dA.
-  void add_by_energy(std::span<const Vec3> volume_points, std::span<const double> volume_weights,
-                     std::span<const std::uint8_t> volume_sides, std::uint8_t side, std::span<const double> load,
-                     const Vec3& centre, const Vec3& total, const Vec3& moment) {
+  /// Elastic force, on A -integral p N dA: the gradient of the contact energy, corrected to the force and moment of Sigma by
+  /// the mean contributions, weighted with p dA.
+  void add_by_energy(const Squeezed& volume, const PairLoads& on) {
+    const Vec3 centre = on.centre, total = sign() * on.push, moment = sign() * on.twist;
     if (single()) return add_whole(total, moment, centre);
     const std::size_t parts = body_->pose.size();
     elastic_force_.assign(parts, Vec3::Zero());
     elastic_torque_.assign(parts, Vec3::Zero());
-    if (!share_out(load)) return;
+    if (!share_out(on.load)) return;
 
+    const std::uint8_t side = sign() < 0.0 ? 0 : 1;
     own_point_.clear();
     own_weight_.clear();
-    for (std::size_t i = 0; i < volume_points.size(); ++i) {
-      if (volume_sides[i] != side) continue;
-      own_point_.push_back(volume_points[i]);
-      own_weight_.push_back(volume_weights[i] * body_->material.modulus);
+    for (std::size_t i = 0; i < volume.point.size(); ++i) {
+      if (volume.side[i] != side) continue;
+      own_point_.push_back(volume.point[i]);
+      own_weight_.push_back(volume.weight[i] * body_->material.modulus);
     }
     body_->field.evaluate_parts(own_point_, volume_rows_);
     for (std::size_t i = 0; i < own_point_.size(); ++i) {
@@ -193,17 +210,15 @@ Vec3 velocity_of(const ContactBody& body, std::size_t part, const Vec3& x) {
   return v;
 }
 
-/// @param push  integral of p N dA   @param x, area, pressure  of Sigma
-SpringLoad hold_by_spring(const StickSpring& spring, const ContactBody& a, const ContactBody& b, const ReactionSettings& settings,
-                          double friction, const Vec3& push, const Vec3& centre, std::span<const Vec3> x,
-                          std::span<const double> area, std::span<const double> pressure) {
-  const double most = friction * push.norm();
-  if (!(most > 0.0)) return {centre, Vec3::Zero(), Vec3::Zero()};
-  const Vec3 normal = push.normalized();
+SpringLoad hold_by_spring(const StickSpring& spring, const ContactBody& a, const ContactBody& b, const StickRule& rule,
+                          double friction, const PairLoads& on) {
+  const double most = friction * on.push.norm();
+  if (!(most > 0.0)) return {on.centre, Vec3::Zero(), Vec3::Zero()};
+  const Vec3 normal = on.push.normalized();
   const StickTrial trial = stretch(spring, a, b, normal);
   Vec3 slide = velocity_of(a, spring.part[0], trial.point) - velocity_of(b, spring.part[1], trial.point);
   slide -= slide.dot(normal) * normal;
-  Vec3 force = -settings.stick.stiffness * (trial.displacement + settings.stick.damping * slide);
+  Vec3 force = -rule.stiffness * (trial.displacement + rule.damping * slide);
   const double size = force.norm();
   if (size > most) force *= most / size;
 
@@ -212,9 +227,9 @@ SpringLoad hold_by_spring(const StickSpring& spring, const ContactBody& a, const
   };
   const double spin = (spin_of(a, spring.part[0]) - spin_of(b, spring.part[1])).dot(normal);
   const double arm = spring.arm;
-  const double most_couple = most * arms_of(x, area, pressure, centre, normal).mean;
+  const double most_couple = most * arms_of(on.x, on.area, on.pressure, on.centre, normal).mean;
   const double couple =
-      std::clamp(-settings.stick.stiffness * arm * (trial.twist + settings.stick.damping * arm * spin), -most_couple, most_couple);
+      std::clamp(-rule.stiffness * arm * (trial.twist + rule.damping * arm * spin), -most_couple, most_couple);
   return {trial.point, force, couple * normal, -force.dot(slide) - couple * spin};
 }
 
@@ -242,11 +257,11 @@ using ContactCount = std::vector<std::uint32_t>;
 /// Speed below which friction fades out. Slower bodies lose at most kTaken times their slip within a step: 1 stops them, at 2
 /// they would go on to and fro.
 double regularisation_of(const ReactionSettings& settings, const ContactCount& contacts, const BodyPair& pair, double friction,
-                         std::span<const double> load, const Vec3& centre, Side (&sides)[2]) {
+                         const PairLoads& on, Side (&sides)[2]) {
   if (contacts.empty()) return settings.friction_speed;
   double total = 0.0;
-  for (const double l : load) total += l;
-  const double yield = contacts[pair.a] * sides[0].yield(load, centre) + contacts[pair.b] * sides[1].yield(load, centre);
+  for (const double l : on.load) total += l;
+  const double yield = contacts[pair.a] * sides[0].yield(on.load, on.centre) + contacts[pair.b] * sides[1].yield(on.load, on.centre);
   constexpr double kTaken = 1.6, kMollifierSlope = 2.0;
   return std::max(settings.friction_speed, kMollifierSlope / kTaken * friction * total * settings.step * yield);
 }
@@ -270,52 +285,60 @@ class Slip {
   Vec3 drift_ = Vec3::Zero(), spin_ = Vec3::Zero();
 };
 
-/// The reaction of pair k, whose points and squeezed regions are the given ranges of the surface.
-void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
-                const ReactionSettings& settings, const StickState* sticks, const ContactCount& contacts, std::uint32_t k,
-                const Range& points, const Range& volume, PairReaction& out) {
+/// A pair of the surface, with its points and its columns of the squeezed regions there.
+struct PairOfSurface {
+  std::uint32_t pair = 0;
+  Range points, volume;
+};
+
+/// The elastic loads of Sigma: both bodies take them from the same sums, so that they cancel exactly.
+PairLoads loads_of(const ContactSurface& surface, const PairOfSurface& which, std::vector<double>& load) {
+  const auto& [begin, end] = which.points;
+  const std::size_t n = end - begin;
+  load.resize(n);
+  PairLoads on{.x = std::span(surface.point).subspan(begin, n),
+               .normal = std::span(surface.normal).subspan(begin, n),
+               .area = std::span(surface.area).subspan(begin, n),
+               .pressure = std::span(surface.pressure).subspan(begin, n),
+               .load = load,
+               .centre = surface.summary[which.pair].centre_of_pressure};
+  for (std::size_t i = 0; i < n; ++i) {
+    load[i] = on.area[i] * on.pressure[i];
+    const Vec3 f = load[i] * on.normal[i];
+    on.push += f;
+    on.twist += (on.x[i] - on.centre).cross(f);
+  }
+  return on;
+}
+
+void add_elastic(SplitRule rule, const ContactSurface& surface, const Range& volume, const PairLoads& on, Side& side) {
+  if (rule == SplitRule::Energy) {
+    const std::size_t n = volume.end - volume.begin;
+    side.add_by_energy({std::span(surface.volume_point).subspan(volume.begin, n),
+                        std::span(surface.volume_weight).subspan(volume.begin, n),
+                        std::span(surface.volume_side).subspan(volume.begin, n)},
+                       on);
+  } else if (side.single()) {
+    side.add_whole(side.sign() * on.push, side.sign() * on.twist, on.centre);
+  } else {
+    for (std::size_t i = 0; i < on.x.size(); ++i) side.add_by_contribution(i, on.x[i], side.sign() * on.load[i] * on.normal[i]);
+  }
+}
+
+void react_pair(const ReactionInputs& in, const ContactCount& contacts, const PairOfSurface& which, PairReaction& out) {
+  const auto& [bodies, rules, surface, settings, sticks] = in;
+  const auto& [k, points, volume] = which;
   thread_local Side sides[2];
   thread_local std::vector<double> load_buffer;
-  const ContactSurface::Summary& summary = surface.summary[k];
   const std::size_t n = points.end - points.begin;
   out.touches = n > 0;
   out.power = 0.0;
   if (!out.touches) return;
-  const BodyPair pair = summary.bodies;
+  const BodyPair pair = surface.summary[k].bodies;
   const std::uint32_t body_of[2] = {pair.a, pair.b};
-  const std::span<const Vec3> x = std::span(surface.point).subspan(points.begin, n);
-  const std::span<const Vec3> normal = std::span(surface.normal).subspan(points.begin, n);
-  for (const int s : {0, 1}) sides[s].begin(bodies[body_of[s]], s, x);
-
-  // The elastic force of Sigma: both bodies take it from the same sums, so that they cancel exactly.
-  load_buffer.resize(n);
-  const std::span<double> load = load_buffer;
-  const std::span<const double> area = std::span(surface.area).subspan(points.begin, n);
-  const std::span<const double> pressure = std::span(surface.pressure).subspan(points.begin, n);
-  const Vec3 centre = summary.centre_of_pressure;
-  Vec3 push = Vec3::Zero(), twist = Vec3::Zero();  // integral of p N dA and of (x - centre) x p N dA
-  for (std::size_t i = 0; i < n; ++i) {
-    load[i] = area[i] * pressure[i];
-    const Vec3 f = load[i] * normal[i];
-    push += f;
-    twist += (x[i] - centre).cross(f);
-  }
-  const std::size_t volumes = volume.end - volume.begin;
-  for (Side& side : sides) {
-    if (settings.split == SplitRule::Energy) {
-      side.add_by_energy(std::span(surface.volume_point).subspan(volume.begin, volumes),
-                         std::span(surface.volume_weight).subspan(volume.begin, volumes),
-                         std::span(surface.volume_side).subspan(volume.begin, volumes),
-                         side.sign() < 0.0 ? std::uint8_t{0} : std::uint8_t{1}, load, centre, side.sign() * push,
-                         side.sign() * twist);
-    } else {
-      if (side.single()) {
-        side.add_whole(side.sign() * push, side.sign() * twist, centre);
-        continue;
-      }
-      for (std::size_t i = 0; i < n; ++i) side.add_by_contribution(i, x[i], side.sign() * load[i] * normal[i]);
-    }
-  }
+  const PairLoads on = loads_of(surface, which, load_buffer);
+  for (const int s : {0, 1}) sides[s].begin(bodies[body_of[s]], s, on.x);
+  for (Side& side : sides) add_elastic(settings.split, surface, volume, on, side);
   for (const int s : {0, 1}) sides[s].move_to(out.elastic[s]);
 
   const PairMaterial material = material_of(bodies, rules, pair);
@@ -324,41 +347,42 @@ void react_pair(std::span<const ContactBody> bodies, const ContactRules& rules, 
   const bool rubs = material.friction > 0.0 && !springs;
   if (rubs || material.dissipation > 0.0) {
     const Slip slip(sides);
-    const double slow = rubs ? regularisation_of(settings, contacts, pair, material.friction, load, centre, sides) : 0.0;
+    const double slow = rubs ? regularisation_of(settings, contacts, pair, material.friction, on, sides) : 0.0;
     double power = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
-      const Vec3 v = slip.at(i, x[i]);
-      const double approach = v.dot(normal[i]);
-      const Vec3 slide = v - approach * normal[i];
+      const Vec3& x = on.x[i];
+      const Vec3& normal = on.normal[i];
+      const Vec3 v = slip.at(i, x);
+      const double approach = v.dot(normal);
+      const Vec3 slide = v - approach * normal;
       const double speed = slide.norm();
       const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
-      Vec3 f = -load[i] * (factor - 1.0) * normal[i];
+      Vec3 f = -on.load[i] * (factor - 1.0) * normal;
       if (speed > 0.0 && rubs) {
         const double grip = friction_mollifier(speed, slow) / speed;
-        f -= (material.friction * load[i] * factor * grip) * slide;
+        f -= (material.friction * on.load[i] * factor * grip) * slide;
       }
-      if (!sides[0].single()) sides[0].add_by_contribution(i, x[i], f);
-      if (!sides[1].single()) sides[1].add_by_contribution(i, x[i], -f);
+      if (!sides[0].single()) sides[0].add_by_contribution(i, x, f);
+      if (!sides[1].single()) sides[1].add_by_contribution(i, x, -f);
       power -= f.dot(v);
       dissipative += f;
-      dissipative_twist += (x[i] - centre).cross(f);
+      dissipative_twist += (x - on.centre).cross(f);
     }
     out.power = power;
   }
   const StickSpring* spring = springs && sticks != nullptr && material.friction > 0.0 ? sticks->find(pair) : nullptr;
   if (spring != nullptr) {
-    const SpringLoad hold = hold_by_spring(*spring, bodies[pair.a], bodies[pair.b], settings, material.friction, push, centre, x,
-                                           area, pressure);
+    const SpringLoad hold = hold_by_spring(*spring, bodies[pair.a], bodies[pair.b], settings.stick, material.friction, on);
     for (const int s : {0, 1}) sides[s].add_to_part(spring->part[s], hold.point, -sides[s].sign() * hold.force, -sides[s].sign() * hold.couple);
     out.power += hold.power;
     spring_force = hold.force;
   }
   for (const int s : {0, 1}) {
     const double sign = -sides[s].sign();
-    if (sides[s].single()) sides[s].add_whole(sign * dissipative, sign * dissipative_twist, centre);
+    if (sides[s].single()) sides[s].add_whole(sign * dissipative, sign * dissipative_twist, on.centre);
     sides[s].move_to(out.dissipative[s]);
   }
-  out.traction = dissipative + spring_force - push;
+  out.traction = dissipative + spring_force - on.push;
 }
 
 void add_loads(std::span<const PartLoad> from, PartLoads& to) {
@@ -405,16 +429,16 @@ struct Reactions {
 
 }  // namespace
 
-ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
-                     const ReactionSettings& settings, const Executor& executor, std::span<PartLoads> loads,
-                     std::vector<Vec3>* traction_force, std::span<PartLoads> dissipative_loads,
-                     std::vector<double>* pair_power, const StickState* sticks) {
-  SUPPLE_EXPECTS(loads.size() == bodies.size());
-  SUPPLE_EXPECTS(dissipative_loads.empty() || dissipative_loads.size() == bodies.size());
+ReactionReport react(const ReactionInputs& in, const Executor& executor, const ReactionOutputs& out) {
+  const std::span<const ContactBody> bodies = in.bodies;
+  const ContactSurface& surface = in.surface;
+  const ReactionSettings& settings = in.settings;
+  SUPPLE_EXPECTS(out.loads.size() == bodies.size());
+  SUPPLE_EXPECTS(out.dissipative.empty() || out.dissipative.size() == bodies.size());
   SUPPLE_EXPECTS(settings.friction_speed > 0.0);
   const std::size_t pairs = surface.summary.size();
-  if (traction_force != nullptr) traction_force->assign(pairs, Vec3::Zero());
-  if (pair_power != nullptr) pair_power->assign(pairs, 0.0);
+  if (out.traction_force != nullptr) out.traction_force->assign(pairs, Vec3::Zero());
+  if (out.pair_power != nullptr) out.pair_power->assign(pairs, 0.0);
   thread_local Reactions kept;
   Reactions& all = kept;  // of the calling thread, whoever fills it
   all.begin(bodies, surface.summary);
@@ -441,10 +465,10 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
         points = advance_range(surface.pair, points.end, k);
         volume = advance_range(surface.volume_pair, volume.end, k);
         PairReaction& reaction = all.pair[k];
-        react_pair(bodies, rules, surface, settings, sticks, all.contacts, k, points, volume, reaction);
+        react_pair(in, all.contacts, {k, points, volume}, reaction);
         if (!reaction.touches) continue;
-        if (pair_power != nullptr) (*pair_power)[k] = reaction.power;
-        if (traction_force != nullptr) (*traction_force)[k] = reaction.traction;
+        if (out.pair_power != nullptr) (*out.pair_power)[k] = reaction.power;
+        if (out.traction_force != nullptr) (*out.traction_force)[k] = reaction.traction;
       }
     });
   }
@@ -456,9 +480,9 @@ ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& ru
         const PairReaction& reaction = all.pair[k];
         if (!reaction.touches) continue;
         const std::size_t s = surface.summary[k].bodies.a == i ? 0 : 1;
-        add_loads(reaction.elastic[s], loads[i]);
-        add_loads(reaction.dissipative[s], loads[i]);
-        if (!dissipative_loads.empty()) add_loads(reaction.dissipative[s], dissipative_loads[i]);
+        add_loads(reaction.elastic[s], out.loads[i]);
+        add_loads(reaction.dissipative[s], out.loads[i]);
+        if (!out.dissipative.empty()) add_loads(reaction.dissipative[s], out.dissipative[i]);
       }
     }
   });

@@ -423,14 +423,14 @@ bool PairSolver::may_lie_within(const Job& job, int side) {
 }
 
 /// One body in the other without Sigma, if it is so: the energy that it took to get there. What presses no more than rounding is no Sigma.
-/// @param equal  both press alike everywhere
-void PairSolver::fill_within(const Job& job, bool equal, PairResult& out) {
+/// @param equal  both press alike everywhere   @param softer  the side that is known to press less everywhere
+void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> softer, PairResult& out) {
   PairPressure& pressure = job.polar.pressure;
   if (out.summary.largest_pressure > std::numeric_limits<double>::epsilon() * pressure.largest_modulus()) return;
   if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return;
   const int leading = leads(job.a, job.b) ? 0 : 1;
   for (const int side : {leading, 1 - leading}) {
-    if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || may_lie_within(job, side))) continue;
+    if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || (softer ? *softer == side : may_lie_within(job, side)))) continue;
     const double unsure = job.settings().only == ContactRule::None ? out.summary.error_estimate : 0.0;
     begin_anew(job, out);
     out.summary.error_estimate = unsure;
@@ -482,12 +482,13 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
   job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
   const bool equal = coincide(a, b);
-  if (!equal) {
+  const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
+  if (!equal && !softer) {
     find_patches(job, seeds);
     choose(job, out);
     fill_unsure_regions(job, out);
   }
-  fill_within(job, equal, out);
+  fill_within(job, equal, softer, out);
 
   ContactSurface::Summary& summary = out.summary;
   summary.load = out.load;

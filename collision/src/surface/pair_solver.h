@@ -69,7 +69,7 @@ class PairSolver {
   static double region_error(const ContactSettings& settings);
   void fill_unsure_regions(const Job& job, PairResult& out);
   static bool may_lie_within(const Job& job, int side);
-  void fill_within(const Job& job, bool equal, PairResult& out);
+  void fill_within(const Job& job, bool equal, std::optional<int> softer, PairResult& out);
   template <class Rule, class Solve>
   bool solve_in_order(const Job& job, Rule& rule, ContactRule name, const Solve& solve, PairResult& out);
 

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple {
 namespace {
@@ -73,8 +74,11 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
   if (n == 0) return;
   const std::size_t blocks = (n - 1) / block + 1;
   FirstFailure failure;
+  const std::atomic<int>* const interrupt = interrupt_of_scope();
   const auto run_block = [&](std::size_t index) {
     try {
+      const InterruptScope scope(interrupt);
+      heed_scope();
       const std::size_t begin = index * block;
       body(begin, n - begin < block ? n : begin + block);
     } catch (...) {
@@ -123,26 +127,5 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
 }
 
 void Executor::run(const std::function<void()>& body) const { impl_->arena.execute([&] { body(); }); }
-
-double ordered_sum(const Executor& executor, std::size_t n, const std::function<double(std::size_t)>& map) {
-  const auto block_sum = [&map](std::size_t begin, std::size_t end) {
-    double sum = 0.0;
-    for (std::size_t i = begin; i < end; ++i) sum += map(i);
-    return sum;
-  };
-  if (n <= kReduceBlock) return block_sum(0, n);
-
-  // The buffer is taken out of its slot while in use, so that a nested call finds the slot empty, not our sums.
-  thread_local std::vector<double> kept;
-  std::vector<double> partial = std::move(kept);
-  partial.assign((n - 1) / kReduceBlock + 1, 0.0);
-  executor.for_blocks(n, kReduceBlock, [&](std::size_t begin, std::size_t end) {
-    partial[begin / kReduceBlock] = block_sum(begin, end);
-  });
-  double sum = 0.0;
-  for (const double value : partial) sum += value;
-  kept = std::move(partial);
-  return sum;
-}
 
 }  // namespace supple

@@ -12,10 +12,6 @@
 namespace supple::core {
 namespace {
 
-/// Of how fast the bodies of a pair pass each other: a slower slip may be a part of sticking. Its error is this share of the motion, and kinks
-/// that are wider than a correction cost no iterations.
-constexpr double kSlowSlip = 1e-3;
-
 constexpr double kNoEnd = -std::numeric_limits<double>::infinity();
 
 /// Approach from which a point presses [m]: where its pressure or its damping factor reaches zero.
@@ -64,31 +60,42 @@ void ContactPoints::clear() {
   offset.clear();
   particle.clear();
   share.clear();
+  split_particle.clear();
+  split_force.clear();
+  split_torque.clear();
 }
 
-void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, const ParticleState& start, const ParticleState& predicted,
-                        const StepRule& rule, double stick_speed) {
-  SUPPLE_EXPECTS(points.point.empty() || points.offset.size() == points.point.size() + 1);
-  SUPPLE_EXPECTS(stick_speed > 0.0);
-  points_ = &points;
-  start_ = &start;
-  rule_ = rule;
+void ContactTerm::find_touched() {
+  const ContactPoints& points = *points_;
   touched_ = points.particle;
+  touched_.insert(touched_.end(), points.split_particle.begin(), points.split_particle.end());
   std::sort(touched_.begin(), touched_.end());
   touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
-  const std::size_t entries = points.particle.size(), count = points.point.size();
-  entry_.resize(entries);
-  arm_.resize(entries);
-  for (std::size_t e = 0; e < entries; ++e) {
-    const auto at = std::lower_bound(touched_.begin(), touched_.end(), points.particle[e]);
-    entry_[e] = static_cast<std::uint32_t>(at - touched_.begin());
-  }
-  start_velocity_.assign(count, Vec3::Zero());
-  offset_pressure_.resize(count);
-  pair_of_.resize(count);
+  const auto entry_of = [&](std::uint32_t particle) {
+    return static_cast<std::uint32_t>(std::lower_bound(touched_.begin(), touched_.end(), particle) - touched_.begin());
+  };
+  entry_.resize(points.particle.size());
+  std::transform(points.particle.begin(), points.particle.end(), entry_.begin(), entry_of);
+  split_entry_.resize(points.split_particle.size());
+  std::transform(points.split_particle.begin(), points.split_particle.end(), split_entry_.begin(), entry_of);
+  pair_of_.resize(points.point.size());
   for (std::uint32_t p = 0; p < points.pair.size(); ++p) {
     std::fill(pair_of_.begin() + points.pair[p].begin, pair_of_.begin() + points.pair[p].end, p);
   }
+}
+
+void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, const ParticleState& start, const ParticleState& predicted,
+                        const StepRule& rule, const SlowSlip& slow) {
+  SUPPLE_EXPECTS(points.point.empty() || points.offset.size() == points.point.size() + 1);
+  SUPPLE_EXPECTS(slow.speed > 0.0);
+  points_ = &points;
+  start_ = &start;
+  rule_ = rule;
+  find_touched();
+  const std::size_t count = points.point.size();
+  arm_.resize(points.particle.size());
+  start_velocity_.assign(count, Vec3::Zero());
+  offset_pressure_.resize(count);
   std::vector<Vec3> spin(touched_.size());
   for (std::size_t t = 0; t < touched_.size(); ++t) spin[t] = angular_velocity(set, start, touched_[t]);
   place(predicted);
@@ -102,7 +109,17 @@ void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, con
     }
     offset_pressure_[q] = points.pressure[q] - points.slope[q] * displacement(q).dot(points.normal[q]);
   }
-  stick_speed_.assign(points.pair.size(), stick_speed);
+  split_place_.resize(points.split_particle.size());
+  for (std::size_t s = 0; s < split_place_.size(); ++s) split_place_[s] = predicted.position[points.split_particle[s]];
+  split_scale_.assign(points.pair.size(), 0.0);
+  find_stick_speeds(slow);
+  find_coupled();
+  lagged_.assign(count, 0.0);
+}
+
+void ContactTerm::find_stick_speeds(const SlowSlip& slow) {
+  const ContactPoints& points = *points_;
+  stick_speed_.assign(points.pair.size(), slow.speed);
   for (std::size_t p = 0; p < points.pair.size(); ++p) {
     double square = 0.0, all = 0.0;
     for (std::uint32_t q = points.pair[p].begin; q < points.pair[p].end; ++q) {
@@ -110,10 +127,21 @@ void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, con
       square += load * start_velocity_[q].squaredNorm();
       all += load;
     }
-    if (all > 0.0) stick_speed_[p] = std::max(stick_speed, kSlowSlip * std::sqrt(square / all));
+    if (all > 0.0) stick_speed_[p] = std::max(slow.speed, slow.share * std::sqrt(square / all));
   }
-  find_coupled();
-  lagged_.assign(count, 0.0);
+}
+
+void ContactTerm::scale_splits() {
+  const ContactPoints& p = *points_;
+  if (p.split_particle.empty()) return;
+  for (std::size_t k = 0; k < p.pair.size(); ++k) {
+    double now = 0.0, predicted = 0.0;
+    for (std::uint32_t q = p.pair[k].begin; q < p.pair[k].end; ++q) {
+      now += p.weight[q] * std::max(offset_pressure_[q] + p.slope[q] * displacement(q).dot(p.normal[q]), 0.0);
+      predicted += p.weight[q] * p.pressure[q];
+    }
+    split_scale_[k] = predicted > 0.0 ? now / predicted : 0.0;
+  }
 }
 
 void ContactTerm::find_coupled() {
@@ -169,8 +197,8 @@ Vec3 ContactTerm::displacement(std::size_t q) const {
   return u;
 }
 
-Vec3 ContactTerm::end_slip(std::size_t q, const Vec3& u) const {
-  const Vec3 v = rule_.end_factor / rule_.h * u - (rule_.end_factor - 1.0) * start_velocity_[q];
+Vec3 ContactTerm::slip(std::size_t q, const Vec3& u) const {
+  const Vec3 v = rule_.slip_factor / rule_.h * u - (rule_.slip_factor - 1.0) * start_velocity_[q];
   const Vec3& n = points_->normal[q];
   return v - v.dot(n) * n;
 }
@@ -202,23 +230,23 @@ Vec3 ContactTerm::gradient_of(std::size_t q, const Vec3& u) const {
   Vec3 gradient = normal_force(q, u.dot(n)) * n;
   const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
   if (!(most > 0.0)) return gradient;
-  const Vec3 v = end_slip(q, u);
+  const Vec3 v = slip(q, u);
   const double slow = stick_speed_[pair_of_[q]], y = v.norm() / slow;
   gradient += (most / slow * (y < 1.0 ? 2.0 - y : 1.0 / y)) * v;
   return gradient;
 }
 
-Mat3 ContactTerm::hessian_of(std::size_t q, const Vec3& u) const {
+Mat3 ContactTerm::hessian_of(std::size_t q, const Vec3& u, FrictionHessian friction) const {
   const Vec3& n = points_->normal[q];
   Mat3 hessian = normal_stiffness(q, u.dot(n)) * n * n.transpose();
   const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
   if (!(most > 0.0)) return hessian;
-  const Vec3 v = end_slip(q, u);
+  const Vec3 v = slip(q, u);
   const double speed = v.norm(), slow = stick_speed_[pair_of_[q]], y = speed / slow;
-  const double scale = most * rule_.end_factor / (rule_.h * slow);
+  const double scale = most * rule_.slip_factor / (rule_.h * slow);
   const double across = y < 1.0 ? 2.0 - y : 1.0 / y, along = y < 1.0 ? 2.0 - 2.0 * y : 0.0;
   hessian += scale * across * (Mat3::Identity() - n * n.transpose());
-  if (speed > 0.0) hessian -= scale * (across - along) / (speed * speed) * v * v.transpose();
+  if (speed > 0.0 && friction == FrictionHessian::Exact) hessian -= scale * (across - along) / (speed * speed) * v * v.transpose();
   return hessian;
 }
 
@@ -239,6 +267,7 @@ double ContactTerm::lag_friction(const ParticleState& pose) {
     all += force;
     lagged_[q] = force;
   }
+  scale_splits();
   return all > 0.0 ? change / all : 0.0;
 }
 
@@ -252,7 +281,13 @@ double ContactTerm::value(const ParticleState& pose) {
     const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
     if (!(most > 0.0)) continue;
     const double slow = stick_speed_[pair_of_[q]];
-    sum += most * slow * rule_.h / rule_.end_factor * mollified(end_slip(q, u).norm() / slow);
+    sum += most * slow * rule_.h / rule_.slip_factor * mollified(slip(q, u).norm() / slow);
+  }
+  for (std::size_t k = 0; k < points_->pair.size(); ++k) {
+    for (std::uint32_t s = points_->pair[k].split_begin; s < points_->pair[k].split_end; ++s) {
+      const std::uint32_t t = split_entry_[s];
+      sum -= split_scale_[k] * (points_->split_force[s].dot(moved_[t]) + points_->split_torque[s].dot(turned_[t]));
+    }
   }
   return sum;
 }
@@ -269,6 +304,12 @@ void ContactTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
       torque[entry_[e]] += p.share[e] * arm_[e].cross(f);
     }
   }
+  for (std::size_t k = 0; k < p.pair.size(); ++k) {
+    for (std::uint32_t s = p.pair[k].split_begin; s < p.pair[k].split_end; ++s) {
+      force[split_entry_[s]] -= split_scale_[k] * p.split_force[s];
+      torque[split_entry_[s]] -= split_scale_[k] * p.split_torque[s];
+    }
+  }
   for (std::size_t t = 0; t < touched_.size(); ++t) {
     const auto row = static_cast<Eigen::Index>(6) * touched_[t];
     gradient.segment<3>(row) += force[t];
@@ -277,7 +318,7 @@ void ContactTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
   }
 }
 
-void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian) {
+void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair, FrictionHessian friction, StepHessian& hessian) {
   if (empty()) return;
   place(pose);
   diagonal_.assign(touched_.size(), Mat6::Zero());
@@ -286,7 +327,7 @@ void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair,
   const Vec3 origin = p.point.front();  // near all arms, so that nothing cancels
   std::size_t block = 0;
   for (std::size_t q = 0; q < p.point.size(); ++q) {
-    const Mat3 k = hessian_of(q, displacement(q));
+    const Mat3 k = hessian_of(q, displacement(q), friction);
     const Mat3 cross = cross_matrix(p.point[q] - origin);
     Mat6 about_origin;
     about_origin.topLeftCorner<3, 3>() = k;
@@ -307,7 +348,7 @@ void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair,
   }
   // Twists about `origin` from the displacement and the rotation of each particle.
   std::vector<Mat6> map(touched_.size());
-  std::vector<Vec3> centre(touched_.size());
+  std::vector<Vec3> centre(touched_.size(), origin);
   for (std::size_t q = 0; q < p.point.size(); ++q) {
     for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) centre[entry_[e]] = p.point[q] - arm_[e];
   }
@@ -339,7 +380,7 @@ double ContactTerm::stick_ratio(const Eigen::VectorXd& correction) const {
     const double slow = stick_speed_[pair_of_[q]];
     largest2 = std::max(largest2, (u - u.dot(p.normal[q]) * p.normal[q]).squaredNorm() / (slow * slow));
   }
-  return std::sqrt(largest2) * rule_.end_factor / rule_.h;
+  return std::sqrt(largest2) * rule_.slip_factor / rule_.h;
 }
 
 void ContactTerm::finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger, std::vector<ContactPairLoad>& pairs) {
@@ -369,6 +410,16 @@ void ContactTerm::finish(const ParticleState& pose, double dt, Loads& loads, Led
     ledger.external_impulse += dt * on_moving;
     ledger.external_angular_impulse += dt * p.point[q].cross(on_moving);
     ledger.external_work += dt * on_moving.dot(p.obstacle_velocity[q]);
+  }
+  for (std::size_t k = 0; k < p.pair.size(); ++k) {
+    pairs[k].stick_speed = stick_speed_[k];
+    for (std::uint32_t s = p.pair[k].split_begin; s < p.pair[k].split_end; ++s) {
+      const std::uint32_t i = p.split_particle[s];
+      // About the place where the moments sum to zero.
+      const Vec3 f = split_scale_[k] * p.split_force[s];
+      loads.force[i] += f;
+      loads.torque[i] += split_scale_[k] * p.split_torque[s] + (split_place_[s] - pose.position[i]).cross(f);
+    }
   }
 }
 

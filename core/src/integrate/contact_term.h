@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
@@ -13,18 +14,30 @@
 namespace supple::core {
 
 /// How an implicit rule sees a step: the pose it solves for lies h after the start, and velocities at the end of the step are
-/// `end_factor` u / h - (end_factor - 1) v, u the displacement until that pose and v the velocity at the start.
+/// `end_factor` u / h - (end_factor - 1) v, u the displacement until that pose and v the velocity at the start. Friction acts against the
+/// velocity of which `slip_factor` says the same.
 struct StepRule {
   double h = 0.0;           ///< [s]
   double end_factor = 1.0;  ///< 1: backward Euler; 2: implicit midpoint
+  double slip_factor = 1.0; ///< 1: at the pose that is solved for
 };
+
+/// Which slips count as sticking: slower ones than `speed` [m/s], or than this share of the pair's relative speed [1].
+struct SlowSlip {
+  double speed = 1.0;
+  double share = 1e-3;
+};
+
+/// How friction enters the matrix. Both have the gradient of the potential; the majorant (of the weights of iteratively reweighted least squares) bounds it from
+/// above, so that its corrections need no line search, and Newton's own is the faster one near the minimum.
+enum class FrictionHessian : std::uint8_t { Exact, Majorant };
 
 /// The contact points of one step. Order of calls: `begin`; then `lag_friction` and the others at any poses; `finish`.
 class ContactTerm {
  public:
   /// @param predicted  the pose of `points`  @param start  at the begin of the step
   void begin(const ParticleSet& set, const ContactPoints& points, const ParticleState& start, const ParticleState& predicted,
-             const StepRule& rule, double stick_speed);
+             const StepRule& rule, const SlowSlip& slow);
   [[nodiscard]] bool empty() const { return points_ == nullptr || points_->point.empty(); }
   /// Pairs of particles that touch the same points, first < second.
   [[nodiscard]] const std::vector<std::pair<std::uint32_t, std::uint32_t>>& coupled() const { return coupled_; }
@@ -35,7 +48,7 @@ class ContactTerm {
   /// Adds the gradient in (displacement, rotation) of each particle, the rotation applied from the left, world axes.
   void add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient);
   /// Adds the positive semi-definite Hessian at the pose. @param first_pair  index of `coupled()[0]` in the list of the matrix
-  void add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian);
+  void add_hessian(const ParticleState& pose, std::size_t first_pair, FrictionHessian friction, StepHessian& hessian);
   /// Largest displacement of a point of a sliding or sticking pair by a correction, over what sticks within a step [1].
   [[nodiscard]] double stick_ratio(const Eigen::VectorXd& correction) const;
 
@@ -47,15 +60,19 @@ class ContactTerm {
     Vec3 force = Vec3::Zero();       ///< on A, of pressure alone, without damping [N]
     Vec3 dissipative = Vec3::Zero();  ///< on A [N]
   };
+  void find_touched();
+  void find_stick_speeds(const SlowSlip& slow);
   void find_coupled();
+  /// Sums of pressures, without damping, over those at the predicted pose, by pair.
+  void scale_splits();
   void place(const ParticleState& pose);
   [[nodiscard]] Vec3 displacement(std::size_t q) const;
-  [[nodiscard]] Vec3 end_slip(std::size_t q, const Vec3& u) const;
+  [[nodiscard]] Vec3 slip(std::size_t q, const Vec3& u) const;
   [[nodiscard]] double normal_force(std::size_t q, double approach) const;
   [[nodiscard]] double normal_potential(std::size_t q, double approach) const;
   [[nodiscard]] double normal_stiffness(std::size_t q, double approach) const;
   [[nodiscard]] Vec3 gradient_of(std::size_t q, const Vec3& u) const;
-  [[nodiscard]] Mat3 hessian_of(std::size_t q, const Vec3& u) const;
+  [[nodiscard]] Mat3 hessian_of(std::size_t q, const Vec3& u, FrictionHessian friction) const;
   [[nodiscard]] Traction traction_of(std::size_t q, const Vec3& u) const;
 
   const ContactPoints* points_ = nullptr;
@@ -68,6 +85,9 @@ class ContactTerm {
   std::vector<double> offset_pressure_;  // p - g u_p . n [Pa], by point
   std::vector<Vec3> start_velocity_;     // relative, at the begin, by point [m/s]
   std::vector<double> lagged_;           // normal force, by point [N]
+  std::vector<std::uint32_t> split_entry_;  // index into `touched_`, of each load within bodies
+  std::vector<Vec3> split_place_;        // centre of its particle at the predicted pose [m]
+  std::vector<double> split_scale_;      // by pair, lagged [1]
   std::vector<std::uint32_t> pair_of_;   // by point
   std::vector<Vec3> moved_, turned_;     // since the start, by touched particle [m], [rad]
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coupled_;

@@ -74,18 +74,18 @@ class StepPotential {
   }
 
   /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
-  void solve(const IntegratorSettings& settings, const ParticleState& pose, StepReport& report) {
+  void solve(const IntegratorSettings& settings, const ParticleState& pose, FrictionHessian friction, StepReport& report) {
     const bool direct = 6 * set_.size() <= static_cast<std::size_t>(settings.direct_unknowns);
     factorised_ = false;
     if (direct) {
-      assemble(pose, HessianKind::Exact);
+      assemble(pose, HessianKind::Exact, friction);
       factorised_ = buffers_.solver.factorise(buffers_.hessian);
       if (factorised_) {
         buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
         return;
       }
     }
-    assemble(pose, HessianKind::PositiveSemiDefinite);
+    assemble(pose, HessianKind::PositiveSemiDefinite, friction);
     factorised_ = direct && buffers_.solver.factorise(buffers_.hessian);
     if (factorised_) {
       buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
@@ -101,7 +101,7 @@ class StepPotential {
   }
 
  private:
-  void assemble(const ParticleState& pose, HessianKind kind) {
+  void assemble(const ParticleState& pose, HessianKind kind, FrictionHessian friction) {
     buffers_.bonded.clear();
     buffers_.blocks.clear();
     for_each_hessian(set_, pose, interactions_, kind, [this](std::uint32_t a, std::uint32_t b, const PairHessian& h) {
@@ -120,7 +120,7 @@ class StepPotential {
       buffers_.hessian.add_particle(static_cast<std::uint32_t>(i), h);
     }
     for (std::size_t k = 0; k < buffers_.blocks.size(); ++k) buffers_.hessian.add_pair(k, buffers_.blocks[k]);
-    buffers_.contact.add_hessian(pose, buffers_.blocks.size(), buffers_.hessian);
+    buffers_.contact.add_hessian(pose, buffers_.blocks.size(), friction, buffers_.hessian);
   }
 
   const ParticleSet& set_;
@@ -175,6 +175,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
   report.within_tolerance = false;
   double value = 0.0;
   int lags = 0;
+  FrictionHessian friction = FrictionHessian::Majorant;
   const auto begin_at_pose = [&] {
     if (lags < kMostLags && buffers.contact.lag_friction(buffers.pose) > kLagged) {
       ++lags;
@@ -191,13 +192,14 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
       report.within_tolerance = true;
       return;
     }
-    potential.solve(settings, buffers.pose, report);
+    potential.solve(settings, buffers.pose, friction, report);
     ++report.newton_iterations;
     report.last_correction = size_of(buffers.correction, settings.length);
     if (!std::isfinite(report.last_correction)) return;
 
     // A correction within the tolerance is the last one. Its gain may be less than the potential's rounding errors.
-    const bool last = report.last_correction <= settings.tolerance && buffers.contact.stick_ratio(buffers.correction) <= kStuck;
+    const bool newton = friction == FrictionHessian::Exact || buffers.contact.empty();  // what a majorant leaves is no square of its correction
+    const bool last = newton && report.last_correction <= settings.tolerance && buffers.contact.stick_ratio(buffers.correction) <= kStuck;
     const double slope = buffers.gradient.dot(buffers.correction);
     const double angle = largest_angle(buffers.correction);
     double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
@@ -211,6 +213,8 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
       share *= 0.5;
     }
     if (!found) return;
+    // Newton's corrections that run into the kinks of friction are cut short.
+    friction = share < 1.0 && angle <= kLargestTurn ? FrictionHessian::Majorant : FrictionHessian::Exact;
     std::swap(buffers.pose, buffers.trial);
     value = next;
     begin_at_pose();
@@ -226,6 +230,11 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     }
   }
 }
+
+/// Of implicit midpoint: friction acts against the slip a little after the middle of the step. At the middle itself what sticks would swing to and fro for
+/// ever, by what it slid in its last step; so it fades by 0.82 a step. At the end friction would be of first order only, as arms and normals are those of the
+/// middle.
+constexpr double kSlipFactor = 1.1;
 
 /// Free flight from `state` over h under frozen loads, to `out`.
 void fly(const ParticleSet& set, const ParticleState& state, const Loads& frozen, double h, ParticleState& out) {
@@ -330,8 +339,8 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   if (problem.contact != nullptr) problem.contact->find(buffers.flight, time + h, buffers.points);
   // The start is kept: `state` changes before the contacts are booked.
   buffers.start = state;
-  buffers.contact.begin(set, buffers.points, buffers.start, buffers.flight, {.h = h, .end_factor = midpoint ? 2.0 : 1.0},
-                        problem.contact != nullptr ? problem.contact->stick_speed : 1.0);
+  buffers.contact.begin(set, buffers.points, buffers.start, buffers.flight, {.h = h, .end_factor = midpoint ? 2.0 : 1.0, .slip_factor = midpoint ? kSlipFactor : 1.0},
+                        problem.contact != nullptr ? SlowSlip{problem.contact->stick_speed, problem.contact->slow_slip} : SlowSlip{});
 
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
   // Stiff bonds make free flight a bad first guess: the pose before the step may be a better one.

@@ -282,8 +282,11 @@ void KickState::hash(Hasher& hasher) const {
   hasher.add(sample.dissipated_at_fixed);
 }
 
-void advance(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time, double dt,
-             ParticleState& state, KickState& kick_state, Ledger& ledger, RotationUpdate rotation) {
+void advance(const StepProblem& problem, double time, double dt, const StepTarget& target, RotationUpdate rotation) {
+  const ParticleSet& set = problem.set;
+  const Interactions& interactions = problem.interactions;
+  const ForceModel& forces = problem.forces;
+  const auto& [state, kick_state, ledger] = target;
   SUPPLE_EXPECTS(dt > 0.0 && state.size() == set.size());
   ForceSample& sample = kick_state.sample;
   stop_pinned(set, state);

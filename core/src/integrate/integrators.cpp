@@ -24,7 +24,7 @@ StepReport advance(const IntegratorSettings& settings, const StepProblem& proble
   switch (settings.method) {
     case Integrator::Symplectic: {
       const int evaluations = target.kick.valid ? 1 : 2;
-      advance(problem.set, problem.interactions, problem.forces, time, dt, target.state, target.kick, target.ledger, settings.rotation);
+      advance(problem, time, dt, target, settings.rotation);
       return {.substeps = 1, .force_evaluations = evaluations};
     }
     case Integrator::BackwardEuler:
@@ -33,8 +33,7 @@ StepReport advance(const IntegratorSettings& settings, const StepProblem& proble
     case Integrator::RungeKutta4:
     case Integrator::Adaptive: break;
   }
-  return advance_runge_kutta(settings, problem.set, problem.interactions, problem.forces, time, dt, target.state, target.kick,
-                             target.ledger, tools.workspace.impl().runge_kutta);
+  return advance_runge_kutta(settings, problem, time, dt, target, tools.workspace.impl().runge_kutta);
 }
 
 }  // namespace supple::core

@@ -64,11 +64,12 @@ void resize(Rates& rates, std::size_t n) {
   rates.torque.resize(n);
 }
 
-void evaluate_rates(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces,
-                    const ParticleState& state, double time, RungeKuttaBuffers& buffers, Rates& rates) {
+void evaluate_rates(const StepProblem& problem, const ParticleState& state, double time, RungeKuttaBuffers& buffers, Rates& rates) {
+  const ParticleSet& set = problem.set;
+  const Interactions& interactions = problem.interactions;
   const std::size_t n = set.size();
   ForceSample& sample = buffers.sample;
-  evaluate(forces, state, time, sample);
+  evaluate(problem.forces, state, time, sample);
   buffers.friction.reset(n);
   buffers.medium.reset(n);
   add_friction_loads(set, interactions.friction, state, buffers.friction);
@@ -169,11 +170,10 @@ double local_error(const ParticleSet& set, const ParticleState& state, double dt
 
 class Stepper {
  public:
-  Stepper(const Tableau& tableau, const ParticleSet& set, const Interactions& interactions, const ForceModel& forces,
-          RungeKuttaBuffers& buffers)
-      : tableau_(tableau), set_(set), interactions_(interactions), forces_(forces), buffers_(buffers) {
+  Stepper(const Tableau& tableau, const StepProblem& problem, RungeKuttaBuffers& buffers)
+      : tableau_(tableau), problem_(problem), buffers_(buffers) {
     if (buffers_.stage.size() < tableau_.c.size()) buffers_.stage.resize(tableau_.c.size());
-    for (Rates& rates : buffers_.stage) resize(rates, set.size());
+    for (Rates& rates : buffers_.stage) resize(rates, problem.set.size());
   }
 
   /// Computes the state after dt in `buffers.trial`. `first_known`: stage 0 holds the rates at `state` already.
@@ -189,7 +189,7 @@ class Stepper {
     combine(state, dt, tableau_.b, buffers_.stage, buffers_.trial);
   }
   [[nodiscard]] double error(const ParticleState& state, double dt, double length) const {
-    return local_error(set_, state, dt, tableau_.error, buffers_.stage, length);
+    return local_error(problem_.set, state, dt, tableau_.error, buffers_.stage, length);
   }
   void accept(double dt, ParticleState& state, Ledger& ledger) {
     for (std::size_t s = 0; s < tableau_.b.size(); ++s) add(ledger, dt * tableau_.b[s], buffers_.stage[s].ledger);
@@ -201,20 +201,19 @@ class Stepper {
 
  private:
   void rates_at(const ParticleState& state, double time, std::size_t stage) {
-    evaluate_rates(set_, interactions_, forces_, state, time, buffers_, buffers_.stage[stage]);
+    evaluate_rates(problem_, state, time, buffers_, buffers_.stage[stage]);
     ++evaluations_;
   }
 
   const Tableau& tableau_;
-  const ParticleSet& set_;
-  const Interactions& interactions_;
-  const ForceModel& forces_;
+  const StepProblem& problem_;
   RungeKuttaBuffers& buffers_;
   std::int64_t evaluations_ = 0;
 };
 
-StepReport advance_adaptively(const IntegratorSettings& settings, double time, double dt, ParticleState& state,
-                              double& next_step, Ledger& ledger, Stepper& stepper) {
+StepReport advance_adaptively(const IntegratorSettings& settings, double time, double dt, const StepTarget& target, Stepper& stepper) {
+  ParticleState& state = target.state;
+  double& next_step = target.kick.next_step;
   StepReport report;
   const double smallest = dt / settings.max_substeps;
   double h = next_step > 0.0 ? next_step : (settings.first_step > 0.0 ? settings.first_step : dt);
@@ -235,7 +234,7 @@ StepReport advance_adaptively(const IntegratorSettings& settings, double time, d
     }
     if (error <= settings.tolerance || step <= smallest) {
       if (!(error <= settings.tolerance)) report.within_tolerance = false;
-      stepper.accept(step, state, ledger);
+      stepper.accept(step, state, target.ledger);
       stepper.hand_on();
       ++report.substeps;
       // The end of the step may have shortened this substep, which does not reduce the size to try next.
@@ -252,16 +251,16 @@ StepReport advance_adaptively(const IntegratorSettings& settings, double time, d
 
 }  // namespace
 
-StepReport advance_runge_kutta(const IntegratorSettings& settings, const ParticleSet& set,
-                               const Interactions& interactions, const ForceModel& forces, double time, double dt,
-                               ParticleState& state, KickState& kick, Ledger& ledger, RungeKuttaBuffers& buffers) {
+StepReport advance_runge_kutta(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                               const StepTarget& target, RungeKuttaBuffers& buffers) {
+  const auto& [state, kick, ledger] = target;
   const bool adaptive = settings.method == Integrator::Adaptive;
-  stop_pinned(set, state);
+  stop_pinned(problem.set, state);
   kick.valid = false;
-  Stepper stepper(adaptive ? kPrince : kClassic, set, interactions, forces, buffers);
+  Stepper stepper(adaptive ? kPrince : kClassic, problem, buffers);
   StepReport report;
   if (adaptive) {
-    report = advance_adaptively(settings, time, dt, state, kick.next_step, ledger, stepper);
+    report = advance_adaptively(settings, time, dt, target, stepper);
   } else {
     stepper.attempt(state, time, dt, false);
     stepper.accept(dt, state, ledger);

@@ -25,8 +25,7 @@ struct RungeKuttaBuffers {
   Loads medium;
 };
 
-StepReport advance_runge_kutta(const IntegratorSettings& settings, const ParticleSet& set,
-                               const Interactions& interactions, const ForceModel& forces, double time, double dt,
-                               ParticleState& state, KickState& kick, Ledger& ledger, RungeKuttaBuffers& buffers);
+StepReport advance_runge_kutta(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+                               const StepTarget& target, RungeKuttaBuffers& buffers);
 
 }  // namespace supple::core

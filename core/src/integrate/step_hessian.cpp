@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "supple/core/interrupt.h"
+
 namespace supple::core {
 namespace {
 
@@ -40,6 +42,7 @@ class BlockJacobi {
   }
   template <class Right>
   [[nodiscard]] Eigen::VectorXd solve(const Right& right) const {
+    heed_scope();  // once an iteration
     Eigen::VectorXd out(right.size());
     for (std::size_t b = 0; b < inverse_.size(); ++b) {
       const auto row = static_cast<Eigen::Index>(6 * b);
@@ -140,12 +143,37 @@ void StepHessian::add_coupling(std::size_t index, const Mat6& h) {
 }
 
 bool StepSolver::factorise(const StepHessian& hessian) {
+  const Eigen::SparseMatrix<double>& matrix = hessian.matrix();
+  const auto blocks = static_cast<std::uint32_t>(matrix.cols() / 6);
   if (pattern_ != hessian.pattern()) {
-    factor_.analyzePattern(hessian.matrix());
+    factor_.analyse(blocks, hessian.pairs());
     pattern_ = hessian.pattern();
+  } else {
+    factor_.clear();
   }
-  factor_.factorize(hessian.matrix());
-  return factor_.info() == Eigen::Success;
+  for (std::uint32_t a = 0; a < blocks; ++a) {
+    const int* const row = matrix.innerIndexPtr() + matrix.outerIndexPtr()[6 * a];
+    const int rows = matrix.outerIndexPtr()[6 * a + 1] - matrix.outerIndexPtr()[6 * a];
+    Mat6 block = Mat6::Zero();
+    for (int c = 0; c < 6; ++c) {
+      const double* const column = matrix.valuePtr() + matrix.outerIndexPtr()[6 * static_cast<int>(a) + c];
+      for (int r = c; r < 6; ++r) block(r, c) = column[r - c];
+    }
+    factor_.add_diagonal(a, block);
+    for (int e = 6; e < rows; e += 6) {
+      for (int c = 0; c < 6; ++c) {
+        block.col(c) = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(matrix.valuePtr() + matrix.outerIndexPtr()[6 * static_cast<int>(a) + c] + e - c);
+      }
+      factor_.add(static_cast<std::uint32_t>(row[e] / 6), a, block);
+    }
+  }
+  return factor_.factorise();
+}
+
+Eigen::VectorXd StepSolver::solve(const Eigen::VectorXd& right) const {
+  Eigen::VectorXd x = right;
+  factor_.solve(x);
+  return x;
 }
 
 int StepSolver::solve_iteratively(const StepHessian& hessian, const Eigen::VectorXd& right, Eigen::VectorXd& x) {

@@ -1,19 +1,17 @@
 // The linear systems of implicit steps: a symmetric matrix of 6x6 blocks, one row of blocks a particle.
 #pragma once
 
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "integrate/block_cholesky.h"
 #include "supple/core/pair_hessian.h"
 #include "supple/core/particles.h"
 
 namespace supple::core {
-
-using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 /// Lower triangle, columns compressed. Unknowns that a pin holds have a row and a column of the identity.
 class StepHessian {
@@ -27,6 +25,7 @@ class StepHessian {
   /// Only what couples the two particles of pair `index`. @param h  rows of the particle with the larger number
   void add_coupling(std::size_t index, const Mat6& h);
   [[nodiscard]] const Eigen::SparseMatrix<double>& matrix() const { return matrix_; }
+  [[nodiscard]] std::span<const std::pair<std::uint32_t, std::uint32_t>> pairs() const { return pairs_; }
   /// Raised whenever the pattern changes.
   [[nodiscard]] std::uint64_t pattern() const { return pattern_; }
 
@@ -47,12 +46,12 @@ class StepSolver {
  public:
   /// False when the matrix is not positive definite.
   [[nodiscard]] bool factorise(const StepHessian& hessian);
-  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& right) const { return factor_.solve(right); }
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
   /// @return iterations
   static int solve_iteratively(const StepHessian& hessian, const Eigen::VectorXd& right, Eigen::VectorXd& x);
 
  private:
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor_;
+  BlockCholesky factor_;
   std::uint64_t pattern_ = 0;
 };
 

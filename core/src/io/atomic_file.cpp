@@ -133,16 +133,29 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
 }
 
 std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes) {
-  const Descriptor descriptor = open_file(path, O_RDONLY);
+  Descriptor descriptor = open_file(path, O_RDONLY);
   if (!descriptor.is_open()) return std::nullopt;
   std::size_t used = 0;
   while (used < bytes.size()) {
     const ssize_t count = retried([&] { return ::read(descriptor.get(), bytes.data() + used, bytes.size() - used); });
-    if (count < 0) return std::nullopt;
+    if (count < 0) {
+      const int code = errno;
+      (void)descriptor.close();
+      errno = code;
+      return std::nullopt;
+    }
     if (count == 0) break;
     used += static_cast<std::size_t>(count);
   }
   return used;
+}
+
+std::size_t read_start_if_there(const std::filesystem::path& path, std::span<std::byte> bytes) {
+  const std::optional<std::size_t> count = read_start(path, bytes);
+  if (count) return *count;
+  const int code = errno;
+  if (code != ENOENT && code != ENOTDIR) fail(path, "cannot be read", code);
+  return 0;
 }
 
 void make_writable_folder(const std::filesystem::path& path) {

@@ -98,9 +98,15 @@ void rub_spins(const ParticleSet& set, const Side& a, const Side& b, double h, P
   ledger.dissipated += lost;
 }
 
+/// Step times friction of a pair.
+struct RubSteps {
+  double slide = 0.0;  ///< [kg]
+  double spin = 0.0;   ///< [kg m^2]
+};
+
 /// Both frictions of two free isotropic bodies at once: `rub` and `rub_spins` without their questions.
-void rub_free_isotropic(const ParticleSet& set, std::size_t a, std::size_t b, double h, double h_spin,
-                        ParticleState& state, Ledger& ledger) {
+void rub_free_isotropic(const ParticleSet& set, const IndexPair& pair, const RubSteps& steps, ParticleState& state, Ledger& ledger) {
+  const auto [a, b] = pair;
   const double mass_a = 1.0 / set.mass[a];
   const double mass_b = 1.0 / set.mass[b];
   const double inertia_a = 1.0 / set.inertia[a].x();
@@ -111,9 +117,9 @@ void rub_free_isotropic(const ParticleSet& set, std::size_t a, std::size_t b, do
   const double d2 = r.squaredNorm();
   const double across_term = std::fma(0.25 * spin_term, d2, mass_term);
   const double along_share = d2 > 0.0 ? 1.0 / d2 : 0.0;
-  const double gain_along = gain(h, mass_term);
-  const double gain_across = gain(h, across_term);
-  const double gain_spin = gain(h_spin, spin_term);
+  const double gain_along = gain(steps.slide, mass_term);
+  const double gain_across = gain(steps.slide, across_term);
+  const double gain_spin = gain(steps.spin, spin_term);
 
   Vec3 momentum_a = state.angular_momentum[a];
   Vec3 momentum_b = state.angular_momentum[b];
@@ -153,7 +159,7 @@ void apply_friction(const ParticleSet& set, const std::vector<Friction>& frictio
     for (std::size_t step = 0; step < law.first.size(); ++step) {
       const std::size_t bond = forward ? step : law.first.size() - 1 - step;
       if (is_free_isotropic(set, law.first[bond]) && is_free_isotropic(set, law.second[bond])) {
-        rub_free_isotropic(set, law.first[bond], law.second[bond], dt * law.linear, dt * law.angular, state, ledger);
+        rub_free_isotropic(set, {law.first[bond], law.second[bond]}, {dt * law.linear, dt * law.angular}, state, ledger);
         continue;
       }
       const Side a = side_of(set, law.first[bond]);

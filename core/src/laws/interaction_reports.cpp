@@ -64,12 +64,6 @@ Stiffness pair_stiffness(const Law& law, double rest_distance) {
 
 }  // namespace
 
-bool Interactions::bonded_only() const {
-  bool none = true;
-  for_each_geometric(*this, [&none](const auto& lists) { none = none && lists.empty(); });
-  return none;
-}
-
 std::size_t Interactions::law_count() const {
   std::size_t count = literal_form.size();
   for_each_bonded(*this, [&count](const auto& lists) { count += lists.size(); });

@@ -88,8 +88,13 @@ Mat12 mass_root(const ParticleSet& set, const ParticleState& state, std::size_t 
   return root;
 }
 
-void damp(const ParticleSet& set, std::size_t a, std::size_t b, const PairHessian& hessian, double h,
-          ParticleState& state, Ledger& ledger) {
+struct DampedPair {
+  std::uint32_t a, b;
+  PairHessian hessian;
+};
+
+void damp(const ParticleSet& set, const DampedPair& pair, double h, ParticleState& state, Ledger& ledger) {
+  const auto& [a, b, hessian] = pair;
   const Vec3 r = state.position[b] - state.position[a];
   const Mat12 k = deformation_stiffness(r, hessian);
   const Mat12 light = mass_root(set, state, a, b, true);
@@ -111,17 +116,13 @@ void damp(const ParticleSet& set, std::size_t a, std::size_t b, const PairHessia
 void apply_stiffness_damping(const ParticleSet& set, const Interactions& interactions, double dt, PairOrder order,
                              ParticleState& state, Ledger& ledger) {
   if (interactions.stiffness_damping.empty()) return;
-  struct Block {
-    std::uint32_t a, b;
-    PairHessian h;
-  };
-  std::vector<Block> blocks;
+  std::vector<DampedPair> blocks;
   for_each_hessian(set, state, interactions, HessianKind::PositiveSemiDefinite,
                    [&blocks](std::uint32_t a, std::uint32_t b, const PairHessian& h) { blocks.push_back({a, b, h}); });
   for (std::size_t step = 0; step < blocks.size(); ++step) {
-    const Block& block = blocks[order == PairOrder::Forward ? step : blocks.size() - 1 - step];
+    const DampedPair& block = blocks[order == PairOrder::Forward ? step : blocks.size() - 1 - step];
     const double time = damping_time(set, interactions.stiffness_damping, block.a, block.b);
-    if (time > 0.0) damp(set, block.a, block.b, block.h, dt * time, state, ledger);
+    if (time > 0.0) damp(set, block, dt * time, state, ledger);
   }
 }
 

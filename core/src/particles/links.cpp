@@ -197,8 +197,8 @@ LinkState unbroken(const Links& links) {
   return state;
 }
 
-LinkChange update_links(const ParticleSet& set, const ParticleState& state, const Interactions& present,
-                        const Links& links, double dt, LinkState& links_state, Ledger& ledger) {
+LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger) {
+  const auto& [set, state, present] = linked;
   SUPPLE_EXPECTS(links_state.broken.size() == links.size() && dt >= 0.0);
   LinkChange change;
   thread_local std::vector<LinkLoad> load;

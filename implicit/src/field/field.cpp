@@ -131,11 +131,11 @@ std::uint64_t evaluate_batch(const Field::Index& index, std::span<const Vec3> po
   if (n == 0) return 0;
   if (index.size() <= Field::Index::kScanLimit) {
     std::uint32_t ids[Field::Index::kScanLimit + lanes::kSpill];
-    if (index.cull && index.size() > 1) {  // one primitive costs no more than to tell where it is zero
-      return lanes::evaluate_packs(in, index.leaf.data(), index.leaf.size(), ids, points.data(), n, values, gradients);
+    if (index.cull && index.size() > 1) {  // for one primitive the evaluation costs no more than a test
+      return lanes::evaluate_packs(in, index.leaf, ids, {points.data(), n, values, gradients});
     }
     std::iota(ids, ids + index.size(), 0u);
-    lanes::evaluate_ids(in, ids, index.size(), points.data(), n, values, gradients);
+    lanes::evaluate_ids(in, {ids, index.size()}, {points.data(), n, values, gradients});
     return index.size() * n;
   }
   Scratch& scratch = Scratch::of_thread(index.size());
@@ -143,11 +143,10 @@ std::uint64_t evaluate_batch(const Field::Index& index, std::span<const Vec3> po
   for_groups(index, points, [&](const Group& group) {
     const std::size_t candidates = query(index, group.box, scratch);
     const std::size_t count = group.end - group.begin;
-    const Vec3* from = points.data() + group.begin;
-    double* to = values + group.begin;
-    Vec3* gradients_to = gradients == nullptr ? nullptr : gradients + group.begin;
+    const lanes::Batch at{points.data() + group.begin, count, values + group.begin,
+                          gradients == nullptr ? nullptr : gradients + group.begin};
     if (count <= lanes::kBlock || !index.cull) {
-      lanes::evaluate_ids(in, scratch.ids.data(), candidates, from, count, to, gradients_to);
+      lanes::evaluate_ids(in, {scratch.ids.data(), candidates}, at);
       visited += candidates * count;
       return;
     }
@@ -159,8 +158,7 @@ std::uint64_t evaluate_batch(const Field::Index& index, std::span<const Vec3> po
         clear_slot(scratch.packs[i / kPack], i % kPack);
       }
     }
-    visited += lanes::evaluate_packs(in, scratch.packs.data(), packs, scratch.group_ids.data(), from, count, to,
-                                     gradients_to);
+    visited += lanes::evaluate_packs(in, {scratch.packs.data(), packs}, scratch.group_ids.data(), at);
   });
   return visited;
 }
@@ -216,8 +214,8 @@ void part_rows(const Field::Index& index, std::span<const Vec3> points, FieldPar
       scratch.values.resize(kPack * candidates);
       scratch.gradients.resize(kPack * candidates);
     }
-    lanes::evaluate_each(in, scratch.ids.data(), candidates, points.data() + begin, end - begin,
-                         scratch.values.data(), scratch.gradients.data());
+    lanes::evaluate_each(in, {scratch.ids.data(), candidates},
+                         {points.data() + begin, end - begin, scratch.values.data(), scratch.gradients.data()});
     for (std::size_t j = 0; j < end - begin; ++j) {
       for (std::size_t i = 0; i < candidates; ++i) {
         const double f = scratch.values[kPack * i + j];

@@ -1,4 +1,4 @@
-// Baseline and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// Baseline and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include "field/field_lanes.h"
@@ -173,7 +173,7 @@ HWY_INLINE KernelLanes<V> any_kernel(D d, const PackedPrimitive& p, const Packed
   return out;
 }
 
-/// What `measure` says of each point: a value, returned, and a vector, in place of the point.
+/// What `measure` returns at each point: a value, returned, and a vector, in place of the point.
 template <class D, class Measure, class V = hn::Vec<D>>
 HWY_INLINE V point_by_point(D d, const Measure& measure, V& x, V& y, V& z) {
   constexpr std::size_t kLanes = hn::MaxLanes(D());
@@ -392,45 +392,45 @@ HWY_INLINE void store_sums(D d, const Tile<D, K, kGradient>& tile, double iso, s
   }
 }
 
+/// The next points of a batch, and the batch without them.
+template <bool kGradient>
+HWY_INLINE Batch take(std::size_t count, Batch& rest) {
+  const Batch taken{rest.points, count, rest.values, rest.gradients};
+  rest.count -= count;
+  rest.points += count;
+  rest.values += count;
+  if constexpr (kGradient) rest.gradients += count;
+  return taken;
+}
+
 template <bool kGradient, std::size_t K, class D>
-HWY_INLINE void evaluate_tile(D d, const Primitives& in, const std::uint32_t* ids, std::size_t id_count,
-                              const Vec3* points, std::size_t n, double* values, Vec3* gradients) {
+HWY_INLINE void evaluate_tile(D d, const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at) {
   Tile<D, K, kGradient> tile;
-  load_points(d, points, n, tile);
+  load_points(d, at.points, at.count, tile);
   tile.clear(d);
-  add_ids(d, in, ids, id_count, tile);
-  store_sums(d, tile, in.iso, n, values, gradients);
+  add_ids(d, in, ids.data(), ids.size(), tile);
+  store_sums(d, tile, in.iso, at.count, at.values, at.gradients);
 }
 
 template <bool kGradient>
-HWY_INLINE void evaluate_points(const Primitives& in, const std::uint32_t* ids, std::size_t id_count,
-                                const Vec3* points, std::size_t n, double* values, Vec3* gradients) {
+HWY_INLINE void evaluate_points(const Primitives& in, std::span<const std::uint32_t> ids, Batch rest) {
   constexpr std::size_t kLanes = hn::MaxLanes(Full());
-  while (n > 0) {
-    std::size_t step;
-    if (n <= 2) {
-      step = n;
-      evaluate_tile<kGradient, 1>(Pair(), in, ids, id_count, points, step, values, gradients);
-    } else if (n <= kLanes) {
-      step = n;
-      evaluate_tile<kGradient, 1>(Full(), in, ids, id_count, points, step, values, gradients);
+  while (rest.count > 0) {
+    if (rest.count <= 2) {
+      evaluate_tile<kGradient, 1>(Pair(), in, ids, take<kGradient>(rest.count, rest));
+    } else if (rest.count <= kLanes) {
+      evaluate_tile<kGradient, 1>(Full(), in, ids, take<kGradient>(rest.count, rest));
     } else {
-      step = std::min(n, 2 * kLanes);
-      evaluate_tile<kGradient, 2>(Full(), in, ids, id_count, points, step, values, gradients);
+      evaluate_tile<kGradient, 2>(Full(), in, ids, take<kGradient>(std::min(rest.count, 2 * kLanes), rest));
     }
-    n -= step;
-    points += step;
-    values += step;
-    if constexpr (kGradient) gradients += step;
   }
 }
 
-void EvaluateIds(const Primitives& in, const std::uint32_t* ids, std::size_t id_count, const Vec3* points,
-                 std::size_t n, double* values, Vec3* gradients) {
-  if (gradients == nullptr) {
-    evaluate_points<false>(in, ids, id_count, points, n, values, nullptr);
+void EvaluateIds(const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at) {
+  if (at.gradients == nullptr) {
+    evaluate_points<false>(in, ids, at);
   } else {
-    evaluate_points<true>(in, ids, id_count, points, n, values, gradients);
+    evaluate_points<true>(in, ids, at);
   }
 }
 
@@ -466,7 +466,7 @@ HWY_INLINE std::size_t filter_packs(const LeafPack* pack, std::size_t pack_count
       const V q = hn::MulAdd(z, z, hn::MulAdd(y, y, hn::Mul(x, x)));
       std::uint8_t bits[8];
       hn::StoreMaskBits(d, hn::Le(q, hn::Load(d, p->reach2 + lane)), bits);
-      // Compressed in a register and stored whole: scalar loads follow at once, and masked stores do not forward.
+      // Compressed in a register and stored as a full vector: scalar loads follow at once, and masked stores do not forward.
       hn::StoreU(pack_lanes(hn::Load(di, p->id + lane), hn::LoadMaskBits(di, bits)), di, ids + count);
       count += static_cast<std::size_t>(std::popcount(bits[0]));
     }
@@ -538,60 +538,51 @@ HWY_INLINE BoxLanes box_of(D d, const Tile<D, K, kGradient>& tile) {
 
 /// One tile with the candidates of its own box. @return how many candidates
 template <bool kGradient, std::size_t K, class D>
-HWY_INLINE std::size_t filter_and_evaluate(D d, const Primitives& in, const LeafPack* pack, std::size_t pack_count,
-                                           std::uint32_t* ids, const Vec3* points, std::size_t n, double* values,
-                                           Vec3* gradients) {
+HWY_INLINE std::size_t filter_and_evaluate(D d, const Primitives& in, std::span<const LeafPack> packs, std::uint32_t* ids,
+                                           const Batch& at) {
   Tile<D, K, kGradient> tile;
-  load_points(d, points, n, tile);
-  const std::size_t candidates = filter_packs(pack, pack_count, box_of(d, tile), ids);
+  load_points(d, at.points, at.count, tile);
+  const std::size_t candidates = filter_packs(packs.data(), packs.size(), box_of(d, tile), ids);
   tile.clear(d);
   add_ids(d, in, ids, candidates, tile);
-  store_sums(d, tile, in.iso, n, values, gradients);
+  store_sums(d, tile, in.iso, at.count, at.values, at.gradients);
   return candidates;
 }
 
 template <bool kGradient>
-HWY_INLINE std::uint64_t evaluate_tiles(const Primitives& in, const LeafPack* pack, std::size_t pack_count,
-                                        std::uint32_t* ids, const Vec3* points, std::size_t n, double* values,
-                                        Vec3* gradients) {
+HWY_INLINE std::uint64_t evaluate_tiles(const Primitives& in, std::span<const LeafPack> packs, std::uint32_t* ids, Batch rest) {
   constexpr std::size_t kLanes = hn::MaxLanes(Full());
   std::uint64_t visited = 0;
-  while (n > 0) {
-    const std::size_t step = std::min(n, 2 * kLanes);
+  while (rest.count > 0) {
+    const std::size_t left = rest.count;
+    const Batch at = take<kGradient>(std::min(left, 2 * kLanes), rest);
     const auto use = [&](auto tile, auto d) HWY_ATTR {
-      return filter_and_evaluate<kGradient, decltype(tile)::value>(d, in, pack, pack_count, ids, points, step, values,
-                                                                   gradients);
+      return filter_and_evaluate<kGradient, decltype(tile)::value>(d, in, packs, ids, at);
     };
     using One = std::integral_constant<std::size_t, 1>;
     using Two = std::integral_constant<std::size_t, 2>;
-    const std::size_t candidates = n <= 2 ? use(One(), Pair()) : n <= kLanes ? use(One(), Full()) : use(Two(), Full());
-    visited += candidates * step;
-    n -= step;
-    points += step;
-    values += step;
-    if constexpr (kGradient) gradients += step;
+    const std::size_t candidates = left <= 2 ? use(One(), Pair()) : left <= kLanes ? use(One(), Full()) : use(Two(), Full());
+    visited += candidates * at.count;
   }
   return visited;
 }
 
-std::uint64_t EvaluatePacks(const Primitives& in, const LeafPack* pack, std::size_t pack_count, std::uint32_t* ids,
-                            const Vec3* points, std::size_t n, double* values, Vec3* gradients) {
-  if (gradients == nullptr) return evaluate_tiles<false>(in, pack, pack_count, ids, points, n, values, nullptr);
-  return evaluate_tiles<true>(in, pack, pack_count, ids, points, n, values, gradients);
+std::uint64_t EvaluatePacks(const Primitives& in, std::span<const LeafPack> packs, std::uint32_t* ids, const Batch& at) {
+  if (at.gradients == nullptr) return evaluate_tiles<false>(in, packs, ids, at);
+  return evaluate_tiles<true>(in, packs, ids, at);
 }
 
-void EvaluateEach(const Primitives& in, const std::uint32_t* ids, std::size_t id_count, const Vec3* points,
-                  std::size_t n, double* values, Vec3* gradients) {
+void EvaluateEach(const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at) {
   const Full d;
   constexpr std::size_t kLanes = hn::MaxLanes(Full());
-  for (std::size_t begin = 0; begin < n; begin += kLanes) {
-    const std::size_t count = std::min(kLanes, n - begin);
+  for (std::size_t begin = 0; begin < at.count; begin += kLanes) {
+    const std::size_t count = std::min(kLanes, at.count - begin);
     Tile<Full, 1, true> tile;
-    load_points(d, points + begin, count, tile);
-    for (std::size_t i = 0; i < id_count; ++i) {
+    load_points(d, at.points + begin, count, tile);
+    for (std::size_t i = 0; i < ids.size(); ++i) {
       tile.clear(d);
-      add_ids(d, in, ids + i, 1, tile);
-      store_sums(d, tile, 0.0, count, values + kPack * i + begin, gradients + kPack * i + begin);
+      add_ids(d, in, ids.data() + i, 1, tile);
+      store_sums(d, tile, 0.0, count, at.values + kPack * i + begin, at.gradients + kPack * i + begin);
     }
   }
 }
@@ -620,19 +611,16 @@ Bounds bounds_of(const Vec3* points, std::size_t n) noexcept {
   return box;
 }
 
-void evaluate_ids(const Primitives& in, const std::uint32_t* ids, std::size_t id_count, const Vec3* points,
-                  std::size_t n, double* values, Vec3* gradients) {
-  HWY_DYNAMIC_DISPATCH(EvaluateIds)(in, ids, id_count, points, n, values, gradients);
+void evaluate_ids(const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at) {
+  HWY_DYNAMIC_DISPATCH(EvaluateIds)(in, ids, at);
 }
 
-std::uint64_t evaluate_packs(const Primitives& in, const LeafPack* pack, std::size_t pack_count, std::uint32_t* ids,
-                             const Vec3* points, std::size_t n, double* values, Vec3* gradients) {
-  return HWY_DYNAMIC_DISPATCH(EvaluatePacks)(in, pack, pack_count, ids, points, n, values, gradients);
+std::uint64_t evaluate_packs(const Primitives& in, std::span<const LeafPack> packs, std::uint32_t* ids, const Batch& at) {
+  return HWY_DYNAMIC_DISPATCH(EvaluatePacks)(in, packs, ids, at);
 }
 
-void evaluate_each(const Primitives& in, const std::uint32_t* ids, std::size_t id_count, const Vec3* points,
-                   std::size_t n, double* values, Vec3* gradients) {
-  HWY_DYNAMIC_DISPATCH(EvaluateEach)(in, ids, id_count, points, n, values, gradients);
+void evaluate_each(const Primitives& in, std::span<const std::uint32_t> ids, const Batch& at) {
+  HWY_DYNAMIC_DISPATCH(EvaluateEach)(in, ids, at);
 }
 
 std::size_t filter(const LeafPack* pack, std::size_t pack_count, const Bounds& box, std::uint32_t* ids) {

@@ -13,17 +13,36 @@
 namespace supple::implicit {
 namespace {
 
-constexpr double kNodes = 512.0;  ///< of a leaf
-/// Of a primitive at a node: a value in single or double precision, a value with its gradient in double precision [ns].
-constexpr double kSingleValue = 0.1, kValue = 0.7, kGradient = 1.1;
-/// Of a leaf besides: bounds, roots and triangles of about 45 vertices; bounds, the tree, and volumeToMesh [ns].
-constexpr double kCubesLeaf = 3500.0, kGridLeaf = 10000.0;
-/// Of a primitive, to find it near a leaf [ns].
-constexpr double kPrimitive = 200.0;
-/// Vertices of a leaf by way of a grid, and how often each is evaluated: twice and a half on their way onto the surface, once for normals.
-constexpr double kGridVertices = 45.0, kLooksAtVertex = 3.5;
-/// Leaves of the band, three cells wide on each side, for one that holds surface.
-constexpr double kBandLeaves = 1.8;
+/// Costs of meshing. Values and searches are fitted to the times of `bench implicit/mesh` (every shape, all scenes of the library) on one core
+/// of an Intel Xeon at 2 to 3 GHz. Choices use ratios of them only, so they hold on other processors; estimates are most often right
+/// within a factor of two.
+constexpr double kNodes = 512.0;                      ///< of a leaf: 8^3, as in OpenVDB
+constexpr double kSingleValue = 0.1;                  ///< a primitive at a node: its value in single precision [ns]
+constexpr double kValue = 0.7;                        ///< the same in double precision [ns]
+constexpr double kGradient = 1.1;                     ///< value and gradient in double precision [ns]
+constexpr double kPrimitive = 200.0;                  ///< to find a primitive near a leaf [ns]
+constexpr double kCubesLeaf = 3500.0;                 ///< further costs of a leaf of marching cubes: bounds, roots and triangles of 45 vertices [ns]
+constexpr double kGridLeaf = 10000.0;                 ///< further costs of a leaf of a grid: bounds, the tree and volumeToMesh [ns]
+constexpr double kGridVertices = 45.0;                ///< vertices of a leaf through a grid
+constexpr double kLooksAtVertex = 3.5;                ///< evaluations of each: 2.5 for projection onto the surface, 1 for its normal
+constexpr double kBandLeaves = 1.8;                   ///< leaves of the narrow band (three cells on each side) per leaf with surface
+constexpr double kOtherShapes = 2.5;                  ///< nearest points on other shapes relative to points
+constexpr double kDividedLeaf = 0.04;                 ///< a leaf of tetrahedra [ms]
+constexpr double kBoundary = 0.8;                     ///< the boundary curve of a contact patch among tetrahedra [ms]
+constexpr double kLeastHalved = 1.0;                  ///< a search near a primitive smaller than a cell: about a thousand cubes [ms]
+constexpr double kContact = 0.2;                      ///< a search between two bodies that touch: some hundred cubes [ms]
+constexpr double kMoreBalls = 1.0;                    ///< the same for each further primitive that overlaps there, for balls [ms]
+constexpr double kMoreShapes = 170.0;                 ///< and for other shapes [ms]
+
+/// Cost of a search relative to marching cubes: for cubes of the lattice, and for halving those near the surface until their edges
+/// are a given fraction of the length on which gradients turn, where primitives are alone and where they overlap. Bounds of overlapping
+/// primitives add up where their gradients cancel.
+struct SearchWork {
+  double lattice = 0.0, alone = 0.0, overlapping = 0.0;
+};
+constexpr SearchWork kBlobSearch{.lattice = 0.5, .alone = 0.0, .overlapping = 5.0};
+constexpr SearchWork kEighthSearch{.lattice = 0.1, .alone = 12.0, .overlapping = 8.0};  ///< eight cubes at once (eighth_bounds.h)
+constexpr SearchWork kSumSearch{.lattice = 0.2, .alone = 130.0, .overlapping = 85.0};
 
 bool is_blobs(const Skeleton& skeleton) {
   return skeleton.blend.rule == BlendRule::Sum &&
@@ -77,7 +96,7 @@ bool decides(const Skeleton& skeleton) {
   });
 }
 
-/// Whether eight cubes are looked at side by side: EighthBounds::know.
+/// Whether eight cubes are processed side by side: EighthBounds::know.
 bool goes_by_eighths(const Skeleton& skeleton) {
   return skeleton.blend.rule == BlendRule::Sum && std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(), [](const Primitive& p) {
     if (p.convolved || (p.kernel.kind != KernelKind::Wyvill && p.kernel.kind != KernelKind::Gascuel)) return false;
@@ -93,7 +112,7 @@ bool goes_by_eighths(const Skeleton& skeleton) {
   });
 }
 
-/// Supports that hold the middle of one of them, on average over some.
+/// Supports that contain the centre of one of them, averaged over some.
 double local_overlap(std::span<const Box> supports) {
   constexpr std::size_t kLooks = 8;
   const std::size_t looks = std::min(supports.size(), kLooks);
@@ -105,24 +124,6 @@ double local_overlap(std::span<const Box> supports) {
   }
   return looks > 0 ? static_cast<double>(held) / static_cast<double>(looks) : 0.0;
 }
-
-/// Of a search, in the time that marching cubes take: for cubes of the lattice, and for halving those near the surface until their edges
-/// are some part of the length on which gradients turn. Bounds of overlapping primitives add up where their gradients cancel.
-struct SearchWork {
-  double lattice = 0.0, alone = 0.0, overlapping = 0.0;
-};
-constexpr SearchWork kBlobSearch{.lattice = 0.5, .alone = 0.0, .overlapping = 5.0};
-constexpr SearchWork kEighthSearch{.lattice = 0.1, .alone = 12.0, .overlapping = 8.0};
-constexpr SearchWork kSumSearch{.lattice = 0.2, .alone = 130.0, .overlapping = 85.0};
-/// Of a primitive smaller than a cell, about a thousand cubes [ms].
-constexpr double kLeastHalved = 1.0;
-/// What nearest points on other shapes than points cost beside theirs.
-constexpr double kOtherShapes = 2.5;
-/// Of tetrahedra: of a leaf, and of the rim of a contact [ms].
-constexpr double kDividedLeaf = 0.04, kRim = 0.8;
-/// Of two bodies that touch, for some hundred cubes where gap or overlap is thinner than a cell [ms]; and by each primitive more that overlaps
-/// there, of balls and of shapes with edges.
-constexpr double kContact = 0.2, kMoreBalls = 1.0, kMoreShapes = 170.0;
 
 /// CPU time of marching cubes [ms].
 double cubes_ms(const Skeleton& skeleton, std::span<const Box> supports, double cell) {
@@ -194,7 +195,7 @@ SearchEstimate estimate_search(std::span<const DividingBody> bodies, std::span<c
   }
   for (const auto& [a, b] : pairs) {
     all.search_ms += kContact + std::max(more_ms[a], more_ms[b]);
-    all.mesh_ms += kRim;
+    all.mesh_ms += kBoundary;
   }
   return all;
 }

@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kBoxesPerTask = 32;
 constexpr std::size_t kMostCubes = 8192;  // of a level that is refined at once
+constexpr std::size_t kSamples = 8, kSampled = 128;  // of a level with more, and the cubes of each
+constexpr double kSpreads = 6.0, kFarTooMany = 1.25;  // below their mean, samples leave no doubt; of the limit
 constexpr double kLargestNode = 1 << 30;
 
 /// A cube of 2^level blocks, in units of its own size, with its candidates.
@@ -40,13 +42,13 @@ Box world_box(const BlockBox& blocks, const Lattice& lattice, int last_node) {
                         node(blocks.upper[2], last_node))};
 }
 
-/// What one task of a level leaves.
+/// Result of one task of a level.
 struct LevelPart {
   std::vector<Cube> cube;
   std::vector<std::uint32_t> candidate;
   std::vector<BlockBox> inside;
 
-  /// Cubes first..last of another one that was looked at, with their candidates, which follow each other.
+  /// Cubes first..last of a processed parent, with their candidates, which are consecutive.
   void append(const LevelPart& other, std::size_t first, std::size_t last) {
     if (first == last) return;
     const std::uint32_t from = other.cube[first].first, to = other.cube[last - 1].first + other.cube[last - 1].count;
@@ -59,7 +61,7 @@ struct LevelPart {
   }
 };
 
-/// Looks at every cube of a level, in order; @return those to keep.
+/// Processes every cube of a level, in order; @return those to keep.
 LevelPart look(const LevelPart& level, int size, const BlockRange& range, const Lattice& lattice,
                const Executor& executor, const RefineOptions& options, const Decide& decide) {
   std::vector<LevelPart> parts((level.cube.size() + kBoxesPerTask - 1) / kBoxesPerTask);
@@ -110,7 +112,7 @@ class Refinement {
   Refinement(const BlockRange& range, const Lattice& lattice, const Executor& executor, const RefineOptions& options, const Decide& decide)
       : range_(range), lattice_(lattice), executor_(executor), options_(options), decide_(decide) {}
 
-  /// @param level  cubes of 2^size blocks that were not looked at yet
+  /// @param level  cubes of 2^size blocks that are not processed yet
   void refine(LevelPart level, int size) {
     for (;; --size) {
       std::uint64_t& looked = looked_[static_cast<std::size_t>(size)];
@@ -126,7 +128,10 @@ class Refinement {
       }
       if (count > kMostCubes) {
         // By all halves, as a band about the surface fills more of them the smaller they are.
-        if (expected_ == 0.0) expected_ = blocks_in(8 * std::uint64_t{count}, size - 1);
+        if (expected_ == 0.0) {
+          expected_ = blocks_in(8 * std::uint64_t{count}, size - 1);
+          expect_not_far_too_many(level, size);
+        }
         for (std::size_t first = 0; first < count; first += kMostCubes) {
           LevelPart part;
           part.append(level, first, std::min(first + kMostCubes, count));
@@ -142,6 +147,40 @@ class Refinement {
   LevelPart& found() { return found_; }
 
  private:
+  /// Refuses at once what is far too much, by samples of a level whose cubes were looked at; their spread tells how good they are.
+  void expect_not_far_too_many(const LevelPart& level, int size) const {
+    const std::size_t stride = odd(level.cube.size() / kSampled + 1);
+    double sum = 0.0, squares = 0.0;
+    for (std::size_t k = 0; k < kSamples; ++k) {
+      const double blocks = static_cast<double>(stride) * sampled_blocks(every(level, k * stride / kSamples, stride), size, k);
+      sum += blocks;
+      squares += blocks * blocks;
+    }
+    constexpr auto n = static_cast<double>(kSamples);
+    const double mean = sum / n, spread = std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1.0));
+    if (mean - kSpreads * spread > kFarTooMany * static_cast<double>(options_.limit)) refuse(mean);
+  }
+  /// About how many blocks are left of cubes of 2^size blocks that were looked at: levels of many are thinned out.
+  double sampled_blocks(LevelPart level, int size, std::size_t sample) const {
+    double share = 1.0;
+    while (size > 0) {
+      if (level.cube.size() > 8 * kSampled) {
+        const std::size_t stride = odd(level.cube.size() / kSampled);
+        level = every(level, sample * stride / kSamples, stride);
+        share *= static_cast<double>(stride);
+      }
+      halve(level, --size, range_);
+      level = look(level, size, range_, lattice_, executor_, options_, decide_);
+    }
+    return share * static_cast<double>(level.cube.size());
+  }
+  /// Cubes come in eights, which even strides would see one of.
+  static std::size_t odd(std::size_t number) { return number | 1; }
+  static LevelPart every(const LevelPart& level, std::size_t first, std::size_t stride) {
+    LevelPart part;
+    for (std::size_t i = first; i < level.cube.size(); i += stride) part.append(level, i, i + 1);
+    return part;
+  }
   /// A surface in n boxes of 2^size blocks lies in about 4^size n blocks.
   static double blocks_in(std::uint64_t boxes, int size) { return std::ldexp(static_cast<double>(boxes), 2 * size); }
   [[noreturn]] void refuse(double least) const { refuse_blocks(std::max(least, expected_), lattice_, options_); }

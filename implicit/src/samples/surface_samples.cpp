@@ -71,7 +71,7 @@ struct Scratch {
   std::vector<std::size_t> open, searching;
 };
 
-/// What all blocks of one call share.
+/// Data shared by all blocks of one call.
 struct Task {
   const Skeleton& skeleton;
   const SampleLayout& layout;
@@ -306,18 +306,17 @@ void SampleState::save(StateWriter& out) const { out.write(std::span<const doubl
 void SampleState::load(StateReader& in) { in.read(distance); }
 void SampleState::hash(Hasher& hasher) const { hasher.add(std::span<const double>(distance)); }
 
-void sample_surface(const Skeleton& skeleton, const SampleLayout& layout, std::span<const Pose> parts,
-                    const FieldView& field, std::span<const std::uint8_t> active, std::span<const Box> near,
-                    const Executor& executor, SampleState& state, SurfaceSamples& out) {
-  SUPPLE_EXPECTS(parts.size() == skeleton.part_count);
-  SUPPLE_EXPECTS(active.empty() || active.size() == parts.size());
-  const std::size_t n = layout.size();
+void sample_surface(const SampledBody& body, const SampledRegion& region, const Executor& executor, SampleState& state,
+                    SurfaceSamples& out) {
+  SUPPLE_EXPECTS(body.parts.size() == body.skeleton.part_count);
+  SUPPLE_EXPECTS(region.active.empty() || region.active.size() == body.parts.size());
+  const std::size_t n = body.layout.size();
   if (state.distance.size() != n) state.distance.assign(n, -1.0);
   out.point.resize(n);
   out.normal.resize(n);
   out.area.resize(n);
   out.valid.resize(n);
-  const Task task{skeleton, layout, parts, field, active, near, state, out};
+  const Task task{body.skeleton, body.layout, body.parts, body.field, region.active, region.near, state, out};
   struct Job {
     const Task& task;
     std::atomic<std::uint64_t> visited{0}, failures{0};

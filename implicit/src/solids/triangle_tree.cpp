@@ -44,7 +44,8 @@ TriangleTree::TriangleTree(std::span<const Vec3> position, std::span<const std::
   }
   origin_ = box.centre();
   constexpr double kRounding = 1e-6;  // of single precision, over the size of the mesh, with room to spare
-  pad_ = kRounding * 0.5 * box.extent().norm();
+  unit_ = std::ldexp(1.0, std::ilogb(box.extent().maxCoeff()));
+  pad_ = kRounding * 0.5 * (box.extent() / unit_).norm();
   place_.assign(count_, static_cast<std::uint32_t>(order.size()));
   face_.reserve(order.size() + 1);
   root_ = build(order, 0, given);
@@ -52,7 +53,7 @@ TriangleTree::TriangleTree(std::span<const Vec3> position, std::span<const std::
     place_[t] = static_cast<std::uint32_t>(face_.size());
     face_.push_back(given[t]);
   }
-  // What triangles without area point at.
+  // The target of triangles without area.
   face_.push_back({.corner = {}, .normal = Vec3::Zero(), .inward = {}, .inverse_square = {}, .triangle = 0});
 }
 
@@ -101,8 +102,8 @@ std::uint32_t TriangleTree::build(std::span<std::uint32_t> faces, std::uint32_t 
     for (std::size_t k = 0; k < 3; ++k) {
       const auto axis = static_cast<Eigen::Index>(k);
       constexpr float kFar = std::numeric_limits<float>::infinity();
-      node_[at].lower[k][c] = own.empty() ? kFar : static_cast<float>(box.lower[axis] - origin_[axis] - pad_);
-      node_[at].upper[k][c] = own.empty() ? -kFar : static_cast<float>(box.upper[axis] - origin_[axis] + pad_);
+      node_[at].lower[k][c] = own.empty() ? kFar : static_cast<float>((box.lower[axis] - origin_[axis]) / unit_ - pad_);
+      node_[at].upper[k][c] = own.empty() ? -kFar : static_cast<float>((box.upper[axis] - origin_[axis]) / unit_ + pad_);
     }
     node_[at].child[c] = child;
     dipole_[at][c] = dipole;
@@ -120,11 +121,11 @@ std::uint32_t TriangleTree::add_leaf(std::span<const std::uint32_t> faces, std::
     for (std::size_t j = 0; j < 3; ++j) {
       const auto axis = static_cast<Eigen::Index>(j);
       for (std::size_t k = 0; k < 3; ++k) {
-        leaf.corner[k][j][i] = static_cast<float>(face.corner[k][axis] - origin_[axis]);
-        leaf.along[k][j][i] = static_cast<float>(face.corner[(k + 1) % 3][axis] - face.corner[k][axis]);
-        leaf.inward[k][j][i] = static_cast<float>(face.inward[k][axis]);
+        leaf.corner[k][j][i] = static_cast<float>((face.corner[k][axis] - origin_[axis]) / unit_);
+        leaf.along[k][j][i] = static_cast<float>((face.corner[(k + 1) % 3][axis] - face.corner[k][axis]) / unit_);
+        leaf.inward[k][j][i] = static_cast<float>(face.inward[k][axis] / unit_);
       }
-      leaf.inverse_square[j][i] = static_cast<float>(face.inverse_square[j]);
+      leaf.inverse_square[j][i] = static_cast<float>(face.inverse_square[j] * unit_ * unit_);
       leaf.normal[j][i] = static_cast<float>(face.normal[axis]);
     }
   }
@@ -181,12 +182,17 @@ inline void TriangleTree::look_at(const Face& face, const Vec3& x, TriangleSite&
 TriangleSite TriangleTree::nearest(const Vec3& x) const {
   TriangleSite best;
   if (root_ == kNone) return best;
-  thread_local std::uint32_t last = 0;  // points that are asked for one after another lie close together
+  thread_local std::uint32_t last = 0;  // points of successive queries lie close together
   look_at(face_[last < face_.size() - 1 ? last : 0], x, best);
   constexpr float kBelow = 1.0F - 1e-5F;  // more than single precision loses of a squared distance
   constexpr double kAbove = 1.0 + 1e-5;
   std::array<float, 3> at;
-  for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<float>(x[static_cast<Eigen::Index>(k)] - origin_[static_cast<Eigen::Index>(k)]);
+  constexpr double kFar = 1e18;  // units: the squares of what is farther do not fit; seen from there the mesh is a point
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto axis = static_cast<Eigen::Index>(k);
+    at[k] = static_cast<float>(std::clamp((x[axis] - origin_[axis]) / unit_, -kFar, kFar));
+  }
+  const double scale = 1.0 / (unit_ * unit_);
   struct Entry {
     float square;
     std::uint32_t child;
@@ -195,11 +201,11 @@ TriangleSite TriangleTree::nearest(const Vec3& x) const {
   stack[0] = {0.0F, root_};
   for (std::size_t n = 1; n > 0;) {
     const Entry entry = stack[--n];
-    if (static_cast<double>(entry.square) > best.square) continue;
+    if (static_cast<double>(entry.square) > best.square * scale) continue;
     if ((entry.child & kLeaf) != 0) {
       const Leaf& leaf = leaf_[entry.child & ~kLeaf];
       const Lanes square = squares(leaf, at);
-      const double reach = (std::sqrt(best.square) + pad_) * kAbove;
+      const double reach = (std::sqrt(best.square * scale) + pad_) * kAbove;
       const auto most = static_cast<float>(reach * reach);
       for (std::uint32_t i = 0; i < leaf.count; ++i) {
         if (square[i] <= most) look_at(face_[leaf.first + i], x, best);
@@ -215,10 +221,11 @@ TriangleSite TriangleTree::nearest(const Vec3& x) const {
       square += over * over;
     }
     const std::size_t begin = n;
+    const double most = best.square * scale;
     for (std::size_t c = 0; c < kWide; ++c) {
       const float least = square[c] * kBelow;
-      if (node.child[c] == kNone || static_cast<double>(least) > best.square) continue;
-      std::size_t i = n++;  // the nearest is looked at first
+      if (node.child[c] == kNone || static_cast<double>(least) > most) continue;
+      std::size_t i = n++;  // the nearest is tested first
       for (; i > begin && stack[i - 1].square < least; --i) stack[i] = stack[i - 1];
       stack[i] = {least, node.child[c]};
     }

@@ -23,14 +23,14 @@ struct TriangleSite {
   Vec3 from = Vec3::Zero();    ///< from an edge or a corner to the point [m]
 };
 
-/// The nearest of several triangles does not depend on the order in which they are looked at: of equally near ones it is that with the lowest index.
+/// The nearest of several triangles does not depend on the order of the tests: among equally near ones it is that with the lowest index.
 class TriangleTree {
  public:
   /// @param triangle  without area: they are nowhere nearest   @pre indices are valid, fewer than 2^31 triangles
   TriangleTree(std::span<const Vec3> position, std::span<const std::array<std::uint32_t, 3>> triangle);
 
   [[nodiscard]] std::size_t size() const { return count_; }
-  /// The nearest triangle; none (an infinite `square`) without triangles that have an area. The last answer on the same thread is looked at first.
+  /// The nearest triangle; none (an infinite `square`) without triangles that have an area. The last result on the same thread is tested first.
   [[nodiscard]] TriangleSite nearest(const Vec3& x) const;
   /// How often the triangles go around x: whole for a closed surface, but for the error of far triangles that are seen as dipoles, below 0.05, and half of
   /// a whole more or less in the plane of a triangle (Barill, Dickson, Schmidt, Levin & Jacobson 2018, "Fast Winding Numbers for Soups and Clouds").
@@ -48,12 +48,12 @@ class TriangleTree {
   using Lanes = float __attribute__((vector_size(kWide * sizeof(float))));
   using Stack = std::array<std::uint32_t, 128>;  // seven a level, and each level has an eighth of the last
 
-  /// Boxes relative to `origin_`, in single precision and outwards by more than that loses.
+  /// Boxes relative to `origin_`, over `unit_`, in single precision and outwards by more than that loses.
   struct Node {
     std::array<Lanes, 3> lower, upper;
     std::array<std::uint32_t, kWide> child;  // a node, or kLeaf with a leaf; kNone
   };
-  /// What a child looks like from afar.
+  /// The far-field approximation of a child.
   struct Dipole {
     Vec3 centre = Vec3::Zero(), area = Vec3::Zero();  // area: of the faces, along their normals, summed
     double radius = 0.0;                              // of a ball about the centre that holds the child
@@ -65,7 +65,7 @@ class TriangleTree {
     std::array<double, 3> inverse_square;  // of the lengths of the edges
     std::uint32_t triangle;
   };
-  /// Up to eight faces in single precision, relative to `origin_`: tells which of them may be nearest.
+  /// Up to eight faces in single precision, relative to `origin_` and over `unit_`: selects those that may be nearest.
   struct Leaf {
     std::array<std::array<Lanes, 3>, 3> corner, along, inward;  // by corner or edge, then by axis
     std::array<Lanes, 3> inverse_square, normal;
@@ -79,7 +79,8 @@ class TriangleTree {
 
   std::size_t count_ = 0;
   Vec3 origin_ = Vec3::Zero();
-  double pad_ = 0.0;                               // more than single precision loses of a place in the mesh [m]
+  double unit_ = 1.0;                              // the power of two below the size, so that squares of single precision hold meshes of any size [m]
+  double pad_ = 0.0;                               // more than single precision loses of a place in the mesh, over `unit_`
   std::uint32_t root_ = kNone;
   std::vector<Node> node_;
   std::vector<Leaf> leaf_;
@@ -93,7 +94,7 @@ void TriangleTree::each_near(const Box& box, const Use& use) const {
   if (root_ == kNone) return;
   Stack stack;
   stack[0] = root_;
-  const Box local{box.lower - origin_, box.upper - origin_};
+  const Box local{(box.lower - origin_) / unit_, (box.upper - origin_) / unit_};
   for (std::size_t n = 1; n > 0;) {
     const Node& node = node_[stack[--n]];
     for (std::size_t c = 0; c < kWide; ++c) {

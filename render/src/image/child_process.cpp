@@ -4,6 +4,7 @@
 #include <linux/close_range.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -22,7 +23,7 @@ namespace supple::render {
 namespace {
 
 constexpr int kNotStarted = 127;            // as shells have it
-constexpr int kSlice_ms = 20;               // between two looks at `interrupt`
+constexpr int kSlice_ms = 20;               // between two checks of `interrupt`
 constexpr std::size_t kMostKept = 65536;    // bytes of messages
 
 [[noreturn]] void fail(int code) { throw std::system_error(code, std::system_category()); }
@@ -46,15 +47,15 @@ struct Start {
   pid_t parent;
   int null, messages, failure;
   const sigset_t* signals;
+  int life, own_life;  ///< read and write end of a pipe that nobody writes into: it ends with us
 };
 
 /// Comes back where that fails, with errno.
 int exec(const Start& start) {
-  ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != start.parent) return ESRCH;  // it ended before the system knew what to do then
+  if (::getppid() != start.parent) return ESRCH;  // the parent ended before the signal was set up
   if (::dup2(start.null, STDIN_FILENO) < 0 || ::dup2(start.null, STDOUT_FILENO) < 0 || ::dup2(start.messages, STDERR_FILENO) < 0) return errno;
-  // Also what libraries and our own parent opened. Older systems lack the call; what we open is marked anyway.
+  // Also descriptors of libraries and of our own parent. Older systems lack the call; our own descriptors are marked anyway.
   ::syscall(SYS_close_range, STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);
   ::sigprocmask(SIG_SETMASK, start.signals, nullptr);
   ::execve(start.program, start.words, environ);
@@ -65,6 +66,48 @@ int exec(const Start& start) {
   const int code = exec(start);
   (void)!::write(start.failure, &code, sizeof code);
   ::_exit(kNotStarted);
+}
+
+/// Ends as another process did.
+[[noreturn]] void end_like(int status) {
+  if (WIFEXITED(status)) ::_exit(WEXITSTATUS(status));
+  const int number = WTERMSIG(status);
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  ::signal(number, SIG_DFL);
+  sigset_t one;
+  ::sigemptyset(&one);
+  ::sigaddset(&one, number);
+  ::sigprocmask(SIG_UNBLOCK, &one, nullptr);
+  ::raise(number);
+  ::_exit(kNotStarted);
+}
+
+/// The system kills what we start when we end, but not what that starts. A process between us and the program leads the group of all of them: it ends as the
+/// program does, or kills the group when we are gone. Nothing that it calls may allocate, either.
+[[noreturn]] void keep(Start start) {
+  ::setpgid(0, 0);
+  const pid_t parent = start.parent;
+  start.parent = ::getpid();
+  const pid_t program = ::fork();
+  if (program == 0) become(start);
+  if (program < 0) {
+    const int code = errno;
+    (void)!::write(start.failure, &code, sizeof code);
+    ::_exit(kNotStarted);
+  }
+  // Locks and pipes of ours are not held for longer than we live; standard streams neither.
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) (void)::dup2(start.null, stream);
+  for (const int used : {start.own_life, start.messages, start.failure}) ::close(used);
+  ::syscall(SYS_close_range, STDERR_FILENO + 1, static_cast<unsigned>(start.life) - 1, 0);
+  ::syscall(SYS_close_range, static_cast<unsigned>(start.life) + 1, ~0U, 0);
+  pollfd life{.fd = start.life, .events = POLLIN, .revents = 0};
+  for (;;) {
+    int status = 0;
+    if (::waitpid(program, &status, WNOHANG) == program) end_like(status);
+    const bool gone = ::poll(&life, 1, kSlice_ms) > 0 || ::getppid() != parent;
+    if (gone) ::kill(0, SIGKILL);
+  }
 }
 
 /// A program that was started; killed with its group and waited for on every way out.
@@ -83,7 +126,7 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  /// Whether it has ended; `status` then tells how.
+  /// Whether it has ended; `status` is then set.
   bool ended(int& status) {
     const pid_t found = io::retried([&] { return ::waitpid(process_, &status, WNOHANG); });
     if (found == 0) return false;
@@ -117,11 +160,11 @@ pid_t start_child(Start start) {
   start.signals = &blocked.before();
   const pid_t process = ::fork();
   if (process < 0) fail(errno);
-  if (process == 0) become(start);
+  if (process == 0) keep(start);
   return process;
 }
 
-/// Takes what there is; false at the end of the stream.
+/// Reads the available bytes; false at the end of the stream.
 bool take(const io::Descriptor& pipe, std::string& messages) {
   std::array<char, 4096> buffer;
   for (;;) {
@@ -157,7 +200,8 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   const io::Descriptor null = io::open_file("/dev/null", O_RDWR);
   if (!null.is_open()) fail(errno);
   Pipe messages = make_pipe(), failure = make_pipe();
-  Child child(start_child({program.c_str(), argv.data(), ::getpid(), null.get(), messages.write.get(), failure.write.get(), nullptr}));
+  const Pipe life = make_pipe();
+  Child child(start_child({program.c_str(), argv.data(), ::getpid(), null.get(), messages.write.get(), failure.write.get(), nullptr, life.read.get(), life.write.get()}));
   (void)messages.write.close();
   (void)failure.write.close();
 
@@ -167,7 +211,7 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   ProgramEnd end;
   ::fcntl(messages.read.get(), F_SETFL, O_NONBLOCK);
   pollfd wait{.fd = messages.read.get(), .events = POLLIN, .revents = 0};
-  // What it has started may hold the pipe for longer than it lives, or it may close its own end.
+  // A program that it started may hold the pipe for longer, or it may close its own end.
   for (bool ended = false; !ended;) {
     heed(interrupt);
     (void)::poll(&wait, 1, kSlice_ms);  // broken off by a signal it is made again

@@ -1,4 +1,4 @@
-/// Programs that we start, and that never outlive who waits for them.
+/// Child programs that never outlive the call that waits for them.
 #pragma once
 
 #include <atomic>
@@ -11,7 +11,7 @@ namespace supple::render {
 /// How a program ended.
 struct ProgramEnd {
   int status = 0;        ///< as waitpid gives it
-  std::string messages;  ///< the end of what it wrote to its error stream
+  std::string messages;  ///< the end of its error stream
 };
 
 /// Where a program is: `name` itself where it holds a slash, otherwise that in the first folder of PATH with a file of this
@@ -20,7 +20,7 @@ struct ProgramEnd {
 
 /// Runs a program without a shell to its end. Its input is empty, its output goes nowhere, and of our descriptors it gets none.
 /// It leads a process group of its own: what a terminal sends to ours does not reach it.
-/// The system kills it when the calling thread ends, as all do when this process is killed.
+/// It is killed with all of its group, what it has started included, when this process ends, however that ends.
 /// @param words      its arguments, the first one its name
 /// @param interrupt  kills it and its group when set by another thread or a signal; null: never
 /// @throws std::system_error when it cannot be started, Interrupted when it was killed for `interrupt`

@@ -108,7 +108,7 @@ std::string identity_of(const std::vector<std::string>& arguments, const std::ve
   return std::string(kPictures) + to_hex(hasher.value()) + std::string(kNote) + note + ';';
 }
 
-/// The facts about an MP4, which stand before its pictures; empty for what is none of ours.
+/// The metadata of an MP4, which precede its pictures; empty for files of other programs.
 std::string facts_of(const std::filesystem::path& film) {
   std::error_code absent;
   const std::uintmax_t length = std::filesystem::file_size(film, absent);
@@ -120,9 +120,10 @@ std::string facts_of(const std::filesystem::path& film) {
     const std::string_view kind(reinterpret_cast<const char*>(&head[4]), 4);
     if (kind == "mdat") return {};  // the facts come first in films of `encode_film`
     std::string box(size - head.size(), '\0');
-    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) return {};
+    if (!in.read(box.data(), static_cast<std::streamsize>(box.size()))) break;
     if (kind == "moov") return box;
   }
+  if (in.bad()) throw std::filesystem::filesystem_error("cannot be read", film, std::make_error_code(std::errc::io_error));
   return {};
 }
 

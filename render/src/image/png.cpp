@@ -180,7 +180,7 @@ void write_png(const std::filesystem::path& path, const Image& image, std::strin
 std::string png_fingerprint(const std::filesystem::path& path) {
   constexpr std::size_t kHead = 1024;  // our chunks before the pixels are far shorter
   std::array<std::byte, kHead> head{};
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), io::read_start(path, head).value_or(0));
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), io::read_start_if_there(path, head));
   if (text.size() < kSignature.size() || std::memcmp(text.data(), kSignature.data(), kSignature.size()) != 0) return {};
   for (std::size_t at = kSignature.size(); at + 8 <= text.size();) {
     const std::size_t length = get_u32(reinterpret_cast<const std::byte*>(text.data() + at));

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <tuple>
 #include <type_traits>
 
@@ -23,6 +24,14 @@ void check(RTCDevice device) {
               Fault{.place = "render", .key = {}, .expected = memory ? "no memory for the triangles of the picture"
                                                                      : "Embree reports error " + std::to_string(code),
                     .found = {}, .hint = {}});
+}
+
+/// What Embree gave, which is nothing where its memory is out. @throws Error
+template <class Given>
+Given* given(RTCDevice device, Given* pointer) {
+  if (pointer != nullptr) return pointer;
+  check(device);
+  throw std::bad_alloc();
 }
 
 Vec3f vector(const float* v) { return {v[0], v[1], v[2]}; }
@@ -88,7 +97,7 @@ float spread_of(const std::vector<Quadrangle>& quadrangles, const std::vector<fl
 
 }  // namespace
 
-/// What of an item stays between pictures.
+/// Data of an item kept between pictures.
 struct Geometry::Part {
   RTCGeometry geometry = nullptr;
   unsigned id = RTC_INVALID_GEOMETRY_ID;
@@ -102,8 +111,8 @@ struct Geometry::Part {
   PaintSource paint;
 };
 
-Geometry::Geometry() : device_(rtcNewDevice("set_affinity=0")) {
-  scene_ = rtcNewScene(device_);
+Geometry::Geometry() : device_(given(nullptr, rtcNewDevice("set_affinity=0"))) {
+  scene_ = given(device_, rtcNewScene(device_));
   rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
   rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_LOW);  // a hierarchy for each item and one of them all: others are not refitted
   check(device_);
@@ -201,17 +210,16 @@ void Geometry::set(std::span<const Item> items, const PictureSpace& space, doubl
     for (std::size_t q = part.quadrangle.size(); q-- > 0;)
       for (const std::uint32_t v : part.quadrangle[q]) part.first_quadrangle[v] = static_cast<std::uint32_t>(q);
     part.spread = spread_of(part.quadrangle, part.position);
-    part.geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+    part.geometry = given(device_, rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD));
     rtcSetGeometryBuildQuality(part.geometry, RTC_BUILD_QUALITY_REFIT);
     if (moving) rtcSetGeometryTimeStepCount(part.geometry, 2);
     const auto fill = [&](unsigned slot, const std::vector<float>& from) {
-      void* to = rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, slot, RTC_FORMAT_FLOAT3, 4 * sizeof(float), n);
+      void* to = given(device_, rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_VERTEX, slot, RTC_FORMAT_FLOAT3, 4 * sizeof(float), n));
       std::memcpy(to, from.data(), from.size() * sizeof(float));
     };
     fill(0, part.position);
     if (moving) fill(1, part.position_end);
-    void* to = rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, sizeof(Quadrangle),
-                                       part.quadrangle.size());
+    void* to = given(device_, rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, sizeof(Quadrangle), part.quadrangle.size()));
     std::memcpy(to, part.quadrangle.data(), part.quadrangle.size() * sizeof(Quadrangle));
     // Wires alone throw no shadow.
     rtcSetGeometryMask(part.geometry, items[i].surface ? 3u : 1u);

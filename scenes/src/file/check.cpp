@@ -1,8 +1,11 @@
 #include "supple/scenes/check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "file/read_scene_faults.h"
+#include "model/crowded_start.h"
 #include "supple/scenes/output_limits.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/run.h"
@@ -15,6 +18,11 @@ std::string not_built(const SceneCounts& counts, double build) {
   const Count& most = *std::max_element(counts.count.begin(), counts.count.end(), [](const Count& a, const Count& b) { return (rule_of(a.what).drawn ? 0.0 : a.bytes()) < (rule_of(b.what).drawn ? 0.0 : b.bytes()); });
   return most.key + ": only the counts of the scene were checked: with " + count_text(most) + ' ' + std::string(rule_of(most.what).name) + " it needs about " +
          bytes_text(counts.undrawn_bytes()) + " of memory, more than the limit of " + bytes_text(build) + " of a check; --memory raises the limit";
+}
+
+std::string not_solved(const CrowdedStart& crowd) {
+  return crowd.key + ": the scene was counted, not built: about " + short_text(std::round(crowd.pairs)) + " pairs of bodies overlap at the start, each with about " +
+         short_text(std::round(crowd.others)) + " others, and solving their contacts takes longer than a check; move them apart";
 }
 
 void build_and_look(const Scene& scene, const SimulationOptions& options, CheckReport& report) {
@@ -48,6 +56,10 @@ CheckReport check_scene(const Scene& scene, SimulationOptions options, double bu
     return report;
   }
   check_pictures(scene);
+  if (const std::optional<CrowdedStart> crowd = find_crowd(scene)) {
+    report.warnings.push_back(not_solved(*crowd));
+    return report;
+  }
   options.questions = true;
   options.memory = build;
   try {

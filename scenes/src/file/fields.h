@@ -49,13 +49,14 @@ template <class Archive>
 void fields(Archive& archive, IntegratorDesc& d) {
   using enum MethodName;
   archive("method", d.method, {},
-          "auto: symplectic, or backward_euler where stiffness makes that much cheaper; `supple explain` prints the choice and its reason. backward_euler and "
-          "implicit_midpoint solve contact and friction within the step, so that bodies held by friction stay at rest");
+          "auto: symplectic, or backward_euler where stiffness makes that much cheaper; with `accuracy` symplectic or implicit, whichever reaches it at less cost. "
+          "`supple explain` prints the choice and its reason. backward_euler and implicit_midpoint solve contact and friction within the step, so that bodies held by "
+          "friction stay at rest. implicit: implicit_midpoint in steps that resolve contact; backward_euler where the scene fixes steps that do not");
   archive("rotation", d.rotation, Rule{}.only("method", d.method, {Auto, Symplectic}),
           "how free particles rotate. splitting: about one principal axis after another; exponential: once, about the axis at the middle of the step");
   archive("tolerance", d.tolerance,
-          between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint}),
-          "largest local error (adaptive) or last correction (implicit methods), relative to the smallest length, or in radians; auto: 1e-6 (adaptive) or 1e-9 (implicit methods)");
+          between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint, Implicit}),
+          "largest local error (adaptive) or last correction (implicit methods), relative to the smallest length, or in radians; auto: 1e-6 (adaptive) or 1e-9 (implicit methods; with `accuracy` a thousandth of it)");
 }
 
 /// Checks that the particles of pins, loads and primitives exist.
@@ -210,6 +211,8 @@ void fields(Archive& archive, Scene& d) {
   archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames per second");
   archive("gravity", d.gravity, any(kAcceleration), "acceleration of gravity; z is up");
   archive("planar", d.planar, {}, "motion in a plane: particles keep their z, which must be the same for all, and rotate about z only");
+  archive("accuracy", d.accuracy, between(1e-5, 1e-2, kNumber),
+          "error of positions relative to the size of the bodies, until a scene becomes chaotic: sets time step, integrator, contact error, mesh error and noise together, as `supple explain` prints; other keys override what it sets; absent: every stage has its own default");
   archive("time_step", d.time_step, {}, "size of the time steps. A run ends with exit code 5 and names the fastest object if nine tenths of its energy come neither from the initial state nor from loads or obstacles. Scenes whose energy does not balance by their own choice are exempt: laws with paper_literal, contact.split: contribution, objects with 'volume', and obstacles with keys in steps that the scene fixes");
   archive("integrator", d.integrator, {}, "method of time integration");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "deformable objects");
@@ -241,7 +244,8 @@ void fields(Archive& archive, Scene& d) {
                   "objects[" + std::to_string(i) + "].particles.inertia_axes", "expected three equal ones in a planar scene",
                   "different ones", "a planar particle turns about z only: use inertia_radius");
   }
-  const bool implicit = d.integrator.method == MethodName::BackwardEuler || d.integrator.method == MethodName::ImplicitMidpoint;
+  const bool implicit = d.integrator.method == MethodName::BackwardEuler || d.integrator.method == MethodName::ImplicitMidpoint ||
+                        d.integrator.method == MethodName::Implicit;
   const bool literal = std::any_of(d.objects.begin(), d.objects.end(), [](const ObjectDesc& o) { return literal_laws(o); });
   archive.check(!(implicit && literal), "integrator.method",
                 "expected an explicit method beside a law with paper_literal, which has no energy",

@@ -9,6 +9,33 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::string_view kShorthand = R"(## Variables, expressions, repetition, includes
+
+```yaml
+include: [materials.yaml, camera.yaml]   # files of this folder
+variables:
+  r: 5 cm
+  n: 12
+defaults:
+  objects: {contact: {modulus: 20 kPa}}  # keys of every item of a list
+objects:
+  - repeat: {i: "${n}"}                  # n copies with i = 0 .. n - 1; several indices are nested; `repeat: 12` has the index i
+    name: ball${i}
+    particles: {arrange: single, at: ["${2.1*r*i}", 0, "${r + 2 cm}"], mass: 0.1}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: "${r/0.6}"}}]
+```
+
+- **Expressions** stand between `${` and `}`: numbers, numbers with units, variables, `+ - * / ^`, parentheses, `pi`, and `sqrt`, `abs`,
+  `min`, `max`, `floor`, `ceil`, `round`, `exp`, `log`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`. Dimensions are checked. Units
+  bind to the number before them: `1/2 s` is 0.5 Hz. An expression that is all of a value keeps its unit; inside a text it becomes text.
+  Within `[ ]` and `{ }` YAML needs quotes around it. `$${` stands for `${`. Nothing is executed.
+- **Variables** are numbers, quantities or texts, may use one another, and are set by `--set variables.r=3cm`.
+- **Defaults** are merged into each item of a list of the scene (`objects`, `obstacles`, ...) where it does not have the key.
+- **Includes** are files in the scene's folder. Mappings are merged, lists of mappings joined; the scene's own keys win, and so does a later file
+  over an earlier one. Files that an included file names are relative to the scene.
+
+)";
+
 std::string required_text(const FieldInfo& info) {
   if (!info.required) return info.default_text.empty() ? "-" : '`' + info.default_text + '`';
   return "required";
@@ -37,8 +64,8 @@ void write_tables(const std::vector<FieldInfo>& list, const std::string& path, s
 }
 
 void write_units(std::string& out) {
-  out += "## Units\n\nProducts, quotients and powers of these are units, too: `N s/m`, `kg/m^3`, `1/s`.\n\n"
-         "| of | units | words for some of them |\n|---|---|---|\n";
+  out += "## Units\n\nProducts, quotients and powers of these are units too: `N s/m`, `kg/m^3`, `1/s`.\n\n"
+         "| quantity | units | also accepted |\n|---|---|---|\n";
   for (const UnitsOfKind& kind : known_units()) {
     out += "| " + std::string(kind.noun) + " | " + joined(kind.units) + " | " + joined(kind.words) + " |\n";
   }
@@ -53,8 +80,9 @@ Json number_schema(const Rule& rule, bool whole) {
   if (!whole && !rule.quantity.unit.empty()) {
     any.push_back({{"type", "string"}, {"pattern", R"(^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *[A-Za-z%1/\u00b0\u00b5\u03bc].*$)"}});
   }
+  any.push_back({{"type", "string"}, {"pattern", R"(^\$\{.*\}$)"}});  // an expression
   if (rule.automatic) any.push_back({{"const", "auto"}});
-  return any.size() == 1 ? number : Json{{"anyOf", any}};
+  return {{"anyOf", any}};
 }
 
 Json mapping_schema(const std::vector<FieldInfo>& list);
@@ -77,7 +105,7 @@ Json value_schema(const FieldInfo& info) {
       if (info.rule.automatic) return {{"anyOf", Json::array({{{"type", "boolean"}}, {{"const", "auto"}}})}};
       return {{"type", "boolean"}};
     case FieldType::Text:
-      return info.rule.name ? Json{{"type", "string"}, {"pattern", "^[A-Za-z_][A-Za-z0-9_.-]*$"}} : Json{{"type", "string"}};
+      return info.rule.name ? Json{{"type", "string"}, {"pattern", R"(^([A-Za-z_][A-Za-z0-9_.-]*|.*\$\{.*\}.*)$)"}} : Json{{"type", "string"}};
     case FieldType::Choice: return {{"enum", info.choices}};
     case FieldType::Choices: {
       const Json one{{"enum", info.choices}};
@@ -96,7 +124,12 @@ Json value_schema(const FieldInfo& info) {
       const Json word = info.may_be_empty ? Json{{"type", "boolean"}} : Json{{"const", false}};
       return {{"anyOf", Json::array({mapping, word})}};
     }
-    case FieldType::Mappings: return list_schema(mapping_schema(info.children), info.rule, 0, kAny);
+    case FieldType::Mappings: {
+      Json item = mapping_schema(info.children);
+      item["properties"]["repeat"] = {{"anyOf", Json::array({number_schema({.low = 0.0}, true), {{"type", "object"}}})},
+                                      {"description", "copies of the item: a count, with the index i, or a mapping of indices to counts"}};
+      return list_schema(std::move(item), info.rule, 0, kAny);
+    }
   }
   return {};
 }
@@ -133,11 +166,12 @@ Json mapping_schema(const std::vector<FieldInfo>& list) {
 std::string scene_reference() {
   std::string out =
       "# Scene files\n\n"
-      "YAML (and so JSON). Bare numbers are SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted after their dimension has been\n"
+      "Scenes are YAML, so JSON works too. Bare numbers are in SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted, and their dimension is\n"
       "checked. Numbers are 0 or between 1e-50 and 1e50 in size, and may be fractions: `30000/1001`, `5/8 in`. Keys that end in\n"
       "`_deg` are in degrees. `true` and `false` may be written `True`, `TRUE`, `False`, `FALSE`.\n"
-      "`--set objects.ball.particles.mass=2` overrides any key. This page is generated from the lists that read scenes.\n\n";
+      "`--set objects.ball.particles.mass=2` overrides any key. `supple reference` generates this page.\n\n";
   write_units(out);
+  out += kShorthand;
   write_tables(scene_fields(), "", out);
   return out;
 }
@@ -145,6 +179,11 @@ std::string scene_reference() {
 std::string scene_json_schema() {
   Json out{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "supple scene"}};
   out.update(mapping_schema(scene_fields()));
+  Json& properties = out["properties"];
+  properties["include"] = {{"anyOf", Json::array({{{"type", "string"}}, {{"type", "array"}, {"items", {{"type", "string"}}}}})},
+                           {"description", "files of the scene's folder whose keys are merged into this one"}};
+  properties["variables"] = {{"type", "object"}, {"description", "names and values for expressions"}};
+  properties["defaults"] = {{"type", "object"}, {"description", "keys of every item of the named lists"}};
   return out.dump(2) + '\n';
 }
 

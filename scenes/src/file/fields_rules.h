@@ -22,8 +22,8 @@ namespace supple::scenes {
 template <class E>
 struct EnumNames;
 template <> struct EnumNames<MethodName> {
-  static constexpr std::array<std::string_view, 6> names{"auto",     "symplectic",     "rk4",
-                                                         "adaptive", "backward_euler", "implicit_midpoint"};
+  static constexpr std::array<std::string_view, 7> names{"auto",     "symplectic",     "rk4",              "adaptive",
+                                                         "backward_euler", "implicit_midpoint", "implicit"};
 };
 template <> struct EnumNames<RotationName> {
   static constexpr std::array<std::string_view, 2> names{"splitting", "exponential"};

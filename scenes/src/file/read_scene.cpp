@@ -6,11 +6,14 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
+#include "file/expand_scene.h"
 #include "file/read_scene_archive.h"
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
 namespace {
@@ -110,6 +113,48 @@ class Override {
   std::string_view rest_;
 };
 
+/// One `--set path=value`.
+struct Setting {
+  std::uint32_t source;
+  std::string_view path;
+  Node* value;
+};
+
+/// The tree with variables as the settings have them, expanded, and then with the other settings.
+Node* expand(Node* root, std::span<const Setting> settings, Tree& tree, FaultList& faults) {
+  constexpr std::string_view kVariables = "variables.";
+  for (const Setting& setting : settings) {
+    if (!setting.path.starts_with(kVariables)) continue;
+    const Node::Entry* variables = root->find("variables");
+    const std::string_view name = setting.path.substr(kVariables.size());
+    if (variables == nullptr || variables->value->find(name) == nullptr) {
+      std::vector<std::string_view> names;
+      if (variables != nullptr) {
+        for (const Node::Entry& entry : variables->value->entries) names.push_back(entry.key);
+      }
+      faults.add({setting.source, 1, 1}, shown(setting.path), names.empty() ? "expected a scene with variables" : "expected a variable of the scene",
+                 names.empty() ? "one without" : '\'' + shown(name) + '\'', names.empty() ? "" : known_hint(name, names));
+      continue;
+    }
+    Override(tree, faults, setting.source, setting.path).apply(root, setting.value);
+  }
+  Expansion expansion(*root, tree, faults);
+  root = expansion.expand_scene(*root);
+  for (const Setting& setting : settings) {
+    if (setting.path.starts_with(kVariables)) continue;
+    Override(tree, faults, setting.source, setting.path).apply(root, expansion.expand(*setting.value, shown(setting.path)));
+  }
+  return root;
+}
+
+/// What `accuracy` sets, before the keys that override it are read. One that is faulty sets nothing; reading it says so.
+void read_accuracy(const Node& root, Scene& scene) {
+  const Node::Entry* entry = root.find("accuracy");
+  if (entry == nullptr || entry->value->kind != Node::Kind::Scalar) return;
+  const QuantityText accuracy = read_quantity(entry->value->text, kNumber);
+  if (accuracy.ok && accuracy.value > 0.0) set_by_accuracy(accuracy.value, scene);
+}
+
 }  // namespace
 
 int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
@@ -126,6 +171,9 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     if (faults.count() == 0) faults.add({source, 1, 1}, "", "expected a scene", "an empty file", "begin with 'schema: 1'");
     faults.raise();
   }
+  const bool mapping = root->kind == Node::Kind::Mapping;
+  if (mapping) root = with_includes(root, folder, texts, tree, faults);
+  std::vector<Setting> settings;
   for (const std::string& text_set : overrides) {
     const std::size_t equals = std::min(text_set.find('='), text_set.size());
     const std::uint32_t set =
@@ -138,12 +186,17 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     }
     Node* value = parse_yaml(texts.text(set), set, tree, faults);
     if (value == nullptr) value = tree.make(Node::Kind::Null, {set, 1, 1});
-    Override(tree, faults, set, path).apply(root, value);
+    settings.push_back({set, path, value});
+  }
+  if (mapping) {
+    root = expand(root, settings, tree, faults);
+    faults.raise();  // expressions without a value would be faults of their keys, too
   }
   Scene scene;
-  if (root->kind != Node::Kind::Mapping) {
+  if (!mapping) {
     faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");
   } else {
+    read_accuracy(*root, scene);
     ReadArchive archive(faults, *root, "");
     scene_members(archive, scene);
     archive.finish();

@@ -317,6 +317,57 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
   return out;
 }
 
+Dimension operator*(const Dimension& a, const Dimension& b) {
+  return {static_cast<std::int8_t>(a.m + b.m), static_cast<std::int8_t>(a.kg + b.kg), static_cast<std::int8_t>(a.s + b.s),
+          static_cast<std::int8_t>(a.rad + b.rad)};
+}
+
+Dimension inverse(const Dimension& a) {
+  return {static_cast<std::int8_t>(-a.m), static_cast<std::int8_t>(-a.kg), static_cast<std::int8_t>(-a.s), static_cast<std::int8_t>(-a.rad)};
+}
+
+std::optional<Dimension> root_of(const Dimension& a) {
+  if (a.m % 2 != 0 || a.kg % 2 != 0 || a.s % 2 != 0 || a.rad % 2 != 0) return std::nullopt;
+  return Dimension{static_cast<std::int8_t>(a.m / 2), static_cast<std::int8_t>(a.kg / 2), static_cast<std::int8_t>(a.s / 2),
+                   static_cast<std::int8_t>(a.rad / 2)};
+}
+
+std::string si_unit(const Dimension& dimension) {
+  const std::array<std::pair<std::string_view, int>, 4> factors{
+      {{"kg", dimension.kg}, {"m", dimension.m}, {"s", dimension.s}, {"rad", dimension.rad}}};
+  std::string above, below;
+  for (const auto& [name, exponent] : factors) {
+    const int size = std::abs(exponent);
+    if (size == 0) continue;
+    std::string& side = exponent > 0 ? above : below;
+    if (exponent < 0) side += '/';
+    if (exponent > 0 && !side.empty()) side += ' ';
+    side += name;
+    if (size > 1) side += '^' + std::to_string(size);
+  }
+  return above.empty() && !below.empty() ? '1' + below : above + below;
+}
+
+LeadingNumber leading_decimal_of(std::string_view text) {
+  const bool signed_text = !text.empty() && (text[0] == '+' || text[0] == '-');
+  const Leading number = leading_decimal(text);
+  return signed_text ? LeadingNumber{} : LeadingNumber{number.length, number.value};
+}
+
+std::optional<KnownUnit> unit_named(std::string_view name) {
+  const Unit* const unit = find_unit(name);
+  return unit == nullptr ? std::nullopt : std::optional(KnownUnit{unit->factor, unit->dimension});
+}
+
+std::optional<KnownUnit> read_any_quantity(std::string_view text) {
+  text = trimmed(text);
+  const Leading number = leading_number(text);
+  if (number.length == 0 || number.octal_looking || number.divides_by_zero || !number.in_range) return std::nullopt;
+  const UnitText unit = read_unit(trimmed(text.substr(number.length)), {});
+  if (!unit.ok) return std::nullopt;
+  return KnownUnit{number.value * unit.factor, unit.dimension};
+}
+
 std::vector<UnitsOfKind> known_units() {
   std::vector<UnitsOfKind> kinds;
   for (const Unit& unit : kUnits) {

@@ -3,7 +3,9 @@
 /// "30000/1001", "5/8 in".
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +17,13 @@ struct Dimension {
   std::int8_t m = 0, kg = 0, s = 0, rad = 0;
   friend bool operator==(const Dimension&, const Dimension&) = default;
 };
+
+[[nodiscard]] Dimension operator*(const Dimension& a, const Dimension& b);
+[[nodiscard]] Dimension inverse(const Dimension& a);
+/// The dimension whose square this is, if there is one.
+[[nodiscard]] std::optional<Dimension> root_of(const Dimension& a);
+/// "kg m/s^2"; "" of a pure number.
+[[nodiscard]] std::string si_unit(const Dimension& dimension);
 
 /// The quantity of a key: a noun and the SI unit for messages, and the dimension.
 struct Quantity {
@@ -45,13 +54,30 @@ inline constexpr Quantity kVolume{"volume", "m^3", {3, 0, 0, 0}};
 inline constexpr Quantity kInverseArea{"inverse area", "1/m^2", {-2, 0, 0, 0}};
 inline constexpr Quantity kInverseSpeed{"inverse speed", "s/m", {-1, 0, 1, 0}};
 
-/// A scalar read as a quantity. Without `ok`, `hint` says what to do (may be empty).
+/// A scalar read as a quantity. Without `ok`, `hint` is advice for the user (may be empty).
 struct QuantityText {
   bool ok = false;
   double value = 0.0;  ///< SI; of kAngle: degrees
   std::string hint;
 };
 [[nodiscard]] QuantityText read_quantity(std::string_view text, const Quantity& quantity);
+
+/// A number without sign that a text begins with: digits [. digits] [e digits].
+struct LeadingNumber {
+  std::size_t length = 0;  ///< 0: none
+  double value = 0.0;
+};
+[[nodiscard]] LeadingNumber leading_decimal_of(std::string_view text);
+
+/// A unit in SI units. Of a quantity, `factor` is its value.
+struct KnownUnit {
+  double factor = 1.0;
+  Dimension dimension;
+};
+/// By name or by a word for it: "cm", "metres".
+[[nodiscard]] std::optional<KnownUnit> unit_named(std::string_view name);
+/// A number with any unit, or without: "5 cm", "30000/1001"; none for other texts.
+[[nodiscard]] std::optional<KnownUnit> read_any_quantity(std::string_view text);
 
 /// Units of one kind, in the order of messages and of the reference.
 struct UnitsOfKind {

@@ -324,7 +324,8 @@ Node* parse_yaml(const std::string& text, std::uint32_t source, Tree& tree, Faul
   } catch (const Stop&) {
     return nullptr;
   } catch (const YAML::Exception& error) {
-    faults.add(builder.at(error.mark), "", "not valid YAML: " + shown(error.msg), "", "");
+    const bool expressions = text.find("${") != std::string::npos;
+    faults.add(builder.at(error.mark), "", "not valid YAML: " + shown(error.msg), "", expressions ? "expressions inside [ ] or { } need quotes: \"${...}\"" : "");
     return nullptr;
   }
   return builder.root;

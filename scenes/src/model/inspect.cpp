@@ -199,6 +199,14 @@ std::string describe_run(const fs::path& folder) {
       if (value.is_number()) text += line("  %-34s %.3g", key.c_str(), value.get<double>());
     }
   }
+  if (report.contains("errors")) {
+    text += "estimated errors of positions\n";
+    for (const auto& [key, error] : report["errors"].items()) {
+      if (!error.is_object()) continue;
+      text += line("  %-34s %.3g m, %.3g of the size of %s", key.c_str(), number_at(error, "position_m"), number_at(error, "share"),
+                   text_at(error, "object").c_str());
+    }
+  }
   if (report.contains("objects")) {
     text += "objects\n";
     for (const auto& [name, object] : report["objects"].items()) {

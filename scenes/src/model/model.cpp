@@ -12,6 +12,7 @@
 #include "model/model_volume.h"
 #include "model/point_tree.h"
 #include "supple/core/error.h"
+#include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
 namespace {
@@ -177,7 +178,7 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
   return rule;
 }
 
-/// Components of the blending graph of an object with self contact become bodies of their own, and so do groups that are connected through others only. An object that keeps its
+/// Components of the blending graph of an object with self contact become bodies, and so do groups that are connected through others only. An object that keeps its
 /// volume stays one body: all that do not blend are groups of it.
 void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   if (!d.contact->self.value_or(true)) return;
@@ -241,6 +242,14 @@ void stop_pinned(Model& model) {
   }
 }
 
+/// Of meshes by `accuracy`; none where a cell or another way to the mesh is asked for.
+std::optional<double> error_by_accuracy(const Scene& scene, const ObjectModel& object) {
+  const MeshingName method = scene.output.meshing.method;
+  const bool cubes = method == MeshingName::Auto || method == MeshingName::Cubes;
+  if (!cubes || object.cell_is_stated || scene.render.pixel_error || object.skeleton.primitive.empty()) return std::nullopt;
+  return accuracy_rules(*scene.accuracy).mesh_share * size_of(object);
+}
+
 /// Limits of what is no divergence: where particles start and how fast, free flight, also under the loads, and far more than
 /// the size of the objects on top.
 void set_believable(const Scene& scene, const Box& everything, Model& model) {
@@ -265,6 +274,12 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
 }
 
 }  // namespace
+
+double size_of(const ObjectModel& object) {
+  const double surface = 2.0 * object.iso_radius;
+  if (object.separate || object.last == object.first + 1) return surface > 0.0 ? surface : object.rest_diameter;
+  return object.rest_diameter + surface;
+}
 
 Model build_model(const Scene& scene, double memory) {
   SUPPLE_EXPECTS(scene.duration > 0.0 && scene.frame_rate > 0.0);  // scenes need not come from a file
@@ -332,6 +347,7 @@ Model build_model(const Scene& scene, double memory) {
     object.cell_is_stated = object.own_cell || scene.output.cell;
     object.own_error = meshing.error.has_value();
     object.mesh_error = meshing.error ? meshing.error : scene.output.meshing.error;
+    if (scene.accuracy && !object.mesh_error) object.mesh_error = error_by_accuracy(scene, object);
     if (meshing.cell) least_own = std::min(least_own, *meshing.cell);
     double fitting = std::numeric_limits<double>::infinity();
     double reach = object.iso_radius;

@@ -393,6 +393,26 @@ double dissipation_for(double restitution, double speed) {
   return 0.5 * (low + high) / speed;
 }
 
+double largest_friction(const Model& model) {
+  const std::size_t n = model.objects.size();
+  const auto collides = [&](std::size_t i) { return i >= n || model.objects[i].collides; };
+  const auto material = [&](std::size_t i) { return i >= n ? model.fixed[i - n].material : model.objects[i].material; };
+  const auto& overrides = model.rules.overrides;
+  double largest = 0.0;
+  for (const auto& o : overrides) largest = std::max(largest, o.material.friction);
+  for (std::uint32_t a = 0; a < n; ++a) {
+    if (!collides(a) || material(a).friction == 0.0) continue;
+    if (own_contacts(model.objects[a]) > 0) largest = std::max(largest, material(a).friction);
+    for (std::uint32_t b = a + 1; b < n + model.fixed.size(); ++b) {
+      const collision::BodyPair pair{a, b};
+      if (!collides(b) || (model.rules.allowed && !model.rules.allowed(a, b))) continue;
+      const double both = std::sqrt(material(a).friction * material(b).friction);
+      if (both > largest && std::none_of(overrides.begin(), overrides.end(), [&](const auto& o) { return o.pair == pair; })) largest = both;
+    }
+  }
+  return largest;
+}
+
 void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults) {
   add_fixed_bodies(scene, model, faults);
   model.contact.error = scene.contact.error;

@@ -19,6 +19,9 @@ namespace supple::scenes {
 /// Number of bodies of an object that may touch each other, from the initial state; objects that may break count as two.
 [[nodiscard]] std::size_t own_contacts(const ObjectModel& object);
 
+/// Largest coefficient of friction between any two bodies that may touch; 0: none has any.
+[[nodiscard]] double largest_friction(const Model& model);
+
 /// @param budget  counts surface samples before they are made
 void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults);
 

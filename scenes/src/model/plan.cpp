@@ -199,63 +199,151 @@ core::StepLimits step_limits(const Scene& scene, const Model& model, double freq
           .angular_speed = speeds.angular};
 }
 
+namespace {
+
+/// Steps a frame that methods take where the particles begin; infinite: no number is enough.
+class StepCounts {
+ public:
+  StepCounts(const Scene& scene, const Model& model)
+      : scene_(scene), model_(model), speeds_(core::largest_speeds(model.particles, model.initial)), frame_(1.0 / scene.frame_rate),
+        longest_(std::min(frame_, scene.time_step.size.value_or(frame_))) {}
+
+  [[nodiscard]] double frame() const { return frame_; }
+  [[nodiscard]] double longest() const { return longest_; }
+  [[nodiscard]] double of(double frequency, const StepBounds& bounds) const {
+    return of_step(core::stable_step(scaled(step_limits(scene_, model_, frequency, speeds_), bounds)));
+  }
+  /// Explicit steps blur friction below a speed v of about mu a dt, a the acceleration by which contact stops a body; what v adds up to over
+  /// the scene is to stay within the accuracy.
+  [[nodiscard]] double to_resolve_friction(double accuracy) const {
+    const double friction = largest_friction(model_);
+    if (friction == 0.0) return 1.0;
+    double size = std::numeric_limits<double>::infinity();
+    for (const ObjectModel& object : model_.objects) {
+      if (object.collides) size = std::min(size, size_of(object));
+    }
+    const double gravity = scene_.gravity.norm(), speed = std::max(speeds_.linear, std::sqrt(gravity * size));
+    const double blur = friction * (gravity + model_.contact_frequency * speed);  // of v, by dt [m/s^2]
+    return of_step(blur > 0.0 ? accuracy * size / (blur * scene_.duration) : frame_);
+  }
+
+ private:
+  [[nodiscard]] double of_step(double step) const {
+    if (!(step > 0.0)) return std::numeric_limits<double>::infinity();
+    return std::ldexp(1.0, core::halvings(frame_, std::min(step, longest_)));
+  }
+
+  const Scene& scene_;
+  const Model& model_;
+  core::Speeds speeds_;
+  double frame_, longest_;
+};
+
+/// Whether implicit methods can simulate the model, and are not refused: they minimise an energy, and would damp the motion that fluids are simulated for.
+bool suits_implicit(const Model& model) {
+  return model.interactions.literal_form.empty() && model.interactions.geometric_lennard_jones.empty() && model.interactions.gay_berne.empty();
+}
+
+/// `auto` without `accuracy`.
+void choose_by_stability(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
+  const double explicit_steps = counts.of(std::hypot(plan.pair_frequency, model.contact_frequency), {});
+  const double implicit_steps = counts.of(model.contact_frequency, {});
+  const bool refused = explicit_steps > scene.time_step.max_substeps;
+  const bool implicit = suits_implicit(model) && (refused || explicit_steps > kImplicitCost * implicit_steps);
+  plan.settings.method = implicit ? core::Integrator::BackwardEuler : core::Integrator::Symplectic;
+  const std::string taken = number_text(explicit_steps) + " steps of velocity Verlet per frame";
+  const std::string size =
+      counts.longest() < counts.frame() ? " (time_step.size: none longer than " + number_text(counts.longest()) + " s)" : "";
+  if (!implicit) {
+    plan.reason = "symplectic: " + taken + " at the start" + size;
+    return;
+  }
+  plan.reason = "backward_euler: " + number_text(implicit_steps) + size + " instead of " + taken +
+                (refused ? "; more than time_step.max_substeps" : "; it damps what it does not resolve");
+}
+
+/// `auto` with it.
+void choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
+  const double accuracy = *scene.accuracy;
+  const AccuracyRules rules = accuracy_rules(accuracy);
+  const double stable = counts.of(std::hypot(plan.pair_frequency, model.contact_frequency), rules.explicit_steps);
+  const double friction = counts.to_resolve_friction(accuracy), explicit_steps = std::max(stable, friction);
+  const double implicit_steps = counts.of(model.contact_frequency, rules.implicit_steps);
+  const bool implicit = suits_implicit(model) && explicit_steps > kImplicitStepCost * implicit_steps;
+  plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;
+  plan.reason = std::string(implicit ? "implicit_midpoint" : "symplectic") + ": accuracy " + number_text(accuracy) + " takes " +
+                number_text(implicit_steps) + " implicit steps per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
+                (friction > stable ? ", to resolve friction" : "") + "; an implicit step costs as much as " + std::to_string(kImplicitStepCost);
+}
+
+/// The method `implicit`.
+void take_implicit(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
+  constexpr double kResolved = 1.5;  // omega dt up to which implicit midpoint follows a contact [rad]
+  const double fixed = scene.time_step.substeps ? std::ldexp(counts.frame(), -core::halvings(counts.frame(), counts.longest())) / *scene.time_step.substeps : 0.0;
+  if (fixed * model.contact_frequency > kResolved) {
+    plan.settings.method = core::Integrator::BackwardEuler;
+    plan.reason = "backward_euler: steps of " + number_text(fixed) + " s, fixed by the scene, are longer than a contact lasts";
+    return;
+  }
+  plan.settings.method = core::Integrator::ImplicitMidpoint;
+  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : number_text(counts.of(model.contact_frequency, plan.bounds)) + " steps per frame") +
+                " resolve contact";
+}
+
+/// What follows from the method.
+void set_limits(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
+  const bool implicit = core::is_implicit(plan.settings.method);
+  const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
+  const double by_accuracy = scene.accuracy ? accuracy_rules(*scene.accuracy).tolerance : 1e-9;
+  plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? by_accuracy : 1e-6);
+  plan.limiting_frequency = !implicit ? all : plan.chosen ? model.contact_frequency : 0.0;
+  if (!implicit && scene.accuracy && plan.chosen) {
+    const double steps = counts.to_resolve_friction(*scene.accuracy);
+    if (std::isfinite(steps)) plan.limiting_frequency = std::max(all, plan.bounds.phase * steps / counts.frame());
+  }
+  if (plan.settings.method == core::Integrator::Adaptive) {
+    plan.limiting_frequency = 0.0;
+    plan.settings.first_step = core::stable_step({.frequency = all});
+    if (!std::isfinite(plan.settings.first_step)) plan.settings.first_step = 0.0;
+  }
+}
+
+}  // namespace
+
 IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   using core::Integrator;
-  const double frame = 1.0 / scene.frame_rate, longest = std::min(frame, scene.time_step.size.value_or(frame));
-  const core::Speeds speeds = core::largest_speeds(model.particles, model.initial);
+  const StepCounts counts(scene, model);
   IntegratorPlan plan;
   plan.pair_frequency = core::largest_frequency(model.particles, model.rest, model.interactions);
-  const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
-  const auto steps_a_frame = [&](double frequency) {
-    const double step = core::stable_step(step_limits(scene, model, frequency, speeds));
-    if (!(step > 0.0)) return std::numeric_limits<double>::infinity();
-    return std::ldexp(1.0, core::halvings(frame, std::min(step, longest)));
-  };
-  const double explicit_steps = steps_a_frame(all);
-  const double implicit_steps = steps_a_frame(model.contact_frequency);
-  const bool fixed = scene.time_step.substeps.has_value();
-
   plan.settings.rotation = scene.integrator.rotation == RotationName::Splitting ? core::RotationUpdate::Splitting
                                                                                : core::RotationUpdate::Exponential;
   plan.settings.length = model.smallest_length;
   plan.settings.max_substeps = scene.time_step.max_substeps;
-  switch (scene.integrator.method) {
-    case MethodName::Auto: {
-      plan.chosen = !fixed;
-      const bool refused = explicit_steps > scene.time_step.max_substeps;
-      const bool dearer = explicit_steps > kImplicitCost * implicit_steps;
-      const bool energies = model.interactions.literal_form.empty();  // implicit methods minimise one
-      // Fluids are simulated for their motion, which an implicit step would damp.
-      const bool fluid = !model.interactions.geometric_lennard_jones.empty() || !model.interactions.gay_berne.empty();
-      const bool implicit = plan.chosen && energies && !fluid && (refused || dearer);
-      plan.settings.method = implicit ? Integrator::BackwardEuler : Integrator::Symplectic;
-      const std::string counts = number_text(explicit_steps) + " steps of velocity Verlet per frame";
-      const std::string size = longest < frame ? " (time_step.size: at most " + number_text(longest) + " s)" : "";
-      if (fixed) {
-        plan.reason = "symplectic: the scene fixes the time step";
-      } else if (!implicit) {
-        plan.reason = "symplectic: " + counts + " at the start" + size;
+  const MethodName method = scene.integrator.method;
+  plan.chosen = (method == MethodName::Auto || method == MethodName::Implicit) && !scene.time_step.substeps;
+  const AccuracyRules rules = accuracy_rules(scene.accuracy.value_or(kDefaultAccuracy));
+  if (method == MethodName::Implicit) plan.bounds = rules.implicit_steps;
+  switch (method) {
+    case MethodName::Auto:
+      if (!plan.chosen) {
+        plan.reason = "symplectic: the scene fixes the step";
+      } else if (scene.accuracy) {
+        choose_by_accuracy(scene, model, counts, plan);
       } else {
-        plan.reason = "backward_euler: " + number_text(implicit_steps) + " steps per frame instead of " + counts + size +
-                      (refused ? ", which are more than time_step.max_substeps" : "; damps motion that its steps do not resolve");
+        choose_by_stability(scene, model, counts, plan);
       }
       break;
-    }
     case MethodName::Symplectic: plan.settings.method = Integrator::Symplectic; break;
     case MethodName::Rk4: plan.settings.method = Integrator::RungeKutta4; break;
     case MethodName::Adaptive: plan.settings.method = Integrator::Adaptive; break;
     case MethodName::BackwardEuler: plan.settings.method = Integrator::BackwardEuler; break;
     case MethodName::ImplicitMidpoint: plan.settings.method = Integrator::ImplicitMidpoint; break;
+    case MethodName::Implicit: take_implicit(scene, model, counts, plan); break;
   }
-  if (plan.reason.empty()) plan.reason = std::string(name_of(scene.integrator.method)) + ": set in the scene";
-  const bool implicit = core::is_implicit(plan.settings.method);
-  plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? 1e-9 : 1e-6);
-  plan.limiting_frequency = !implicit ? all : plan.chosen ? model.contact_frequency : 0.0;
-  if (plan.settings.method == Integrator::Adaptive) {
-    plan.limiting_frequency = 0.0;
-    plan.settings.first_step = core::stable_step({.frequency = all});
-    if (!std::isfinite(plan.settings.first_step)) plan.settings.first_step = 0.0;
-  }
+  if (plan.reason.empty()) plan.reason = std::string(name_of(method)) + ": given by the scene";
+  if (scene.accuracy) plan.bounds = core::is_implicit(plan.settings.method) ? rules.implicit_steps : rules.explicit_steps;
+  if (scene.accuracy) plan.slow_slip = rules.slow_slip;
+  set_limits(scene, model, counts, plan);
   return plan;
 }
 

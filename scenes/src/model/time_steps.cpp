@@ -50,7 +50,7 @@ core::StepLimits limits_of(const Scene& scene, const Model& model, const Integra
     const double contact = model.contact_frequency * damping_of(model, speeds);
     frequency = std::max(frequency, std::hypot(core::largest_frequency(model.particles, particles, laws), contact));
   }
-  return step_limits(scene, model, frequency, speeds);
+  return scaled(step_limits(scene, model, frequency, speeds), integrator.bounds);
 }
 
 /// k of the longest steps that the scene allows.

@@ -144,33 +144,13 @@ void add_wide_samples(const Model& model, double spacing, std::vector<std::strin
   }
 }
 
-/// Whether any two bodies that may touch have friction.
-bool any_friction(const Model& model) {
-  const std::size_t n = model.objects.size();
-  const auto collides = [&](std::size_t i) { return i >= n || model.objects[i].collides; };
-  const auto material = [&](std::size_t i) { return i >= n ? model.fixed[i - n].material : model.objects[i].material; };
-  const auto allowed = [&](std::uint32_t a, std::uint32_t b) { return !model.rules.allowed || model.rules.allowed(a, b); };
-  const auto& overrides = model.rules.overrides;
-  if (std::any_of(overrides.begin(), overrides.end(), [](const auto& o) { return o.material.friction > 0.0; })) return true;
-  for (std::uint32_t a = 0; a < n; ++a) {
-    if (!collides(a) || material(a).friction == 0.0) continue;
-    if (own_contacts(model.objects[a]) > 0) return true;
-    for (std::uint32_t b = a + 1; b < n + model.fixed.size(); ++b) {
-      const collision::BodyPair pair{a, b};
-      if (!collides(b) || material(b).friction == 0.0 || !allowed(a, b)) continue;
-      if (std::none_of(overrides.begin(), overrides.end(), [&](const auto& o) { return o.pair == pair; })) return true;
-    }
-  }
-  return false;
-}
-
 /// Keys that are given but have no effect.
 void add_idle(const Scene& scene, const Model& model, std::vector<std::string>& warnings) {
   const ContactDesc& d = scene.contact;
   const auto idle = [&](bool given, const std::string& key, const char* why) {
     if (given) warnings.push_back(key + ": it has no effect, as " + why);
   };
-  if ((d.stick || d.friction_speed != ContactDesc{}.friction_speed) && !any_friction(model)) {
+  if ((d.stick || d.friction_speed != ContactDesc{}.friction_speed) && largest_friction(model) == 0.0) {
     constexpr const char* kSmooth = "no two bodies that may touch have friction";
     idle(d.stick.has_value(), "contact.stick", kSmooth);
     idle(d.friction_speed != ContactDesc{}.friction_speed, "contact.friction_speed", kSmooth);

@@ -10,6 +10,7 @@
 #include "output/saved_frames.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/executor.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::scenes {
 namespace {
@@ -39,13 +40,12 @@ int crew_size(const RunOptions& options, std::size_t frames, double share) {
   return std::max(1, static_cast<int>(std::min<double>(most, room)));
 }
 
-DrawingCrew::DrawingCrew(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, std::vector<int> frames, int saved,
-                         int members, Leader leader, Reporter& report)
-    : scene_(scene), options_(options), outputs_(outputs), frames_(std::move(frames)), leader_(leader), report_(report),
+DrawingCrew::DrawingCrew(Work work, int members, Leader leader, Reporter& report)
+    : scene_(work.scene), options_(work.options), outputs_(work.outputs), frames_(std::move(work.frames)), leader_(leader), report_(report),
       profile_before_(leader.simulation.profile()), pictures_before_(leader.writer.picture_times()), cpu_before_(process_cpu_seconds()),
-      members_(static_cast<std::size_t>(members - 1)), saved_(saved) {
+      members_(static_cast<std::size_t>(members - 1)), saved_(work.saved) {
   leader.result.frames_at_once = members;
-  options_.threads = std::max(1, Executor(options.threads).threads() / members);
+  options_.threads = std::max(1, Executor(options_.threads).threads() / members);
   options_.progress = [this](const Progress& progress) {
     const std::lock_guard lock(mutex_);
     report_(progress.stage, progress.frame, static_cast<double>(progress.frame) / frames_.back());
@@ -111,6 +111,7 @@ void DrawingCrew::fail(int frame) {
 
 void DrawingCrew::begin(Member& member) {
   try {
+    const InterruptScope scope(options_.interrupt);
     std::unique_lock lock(opening_);
     Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt, options_.scene_memory});
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);

@@ -31,10 +31,17 @@ class DrawingCrew {
     RunResult& result;
   };
 
-  /// @param frames  to draw, ascending   @param saved  the last of them whose state is saved
-  DrawingCrew(const Scene& scene, const RunOptions& options, const OutputRequest& outputs, std::vector<int> frames, int saved, int members,
-              Leader leader, Reporter& report);
-  ~DrawingCrew();  ///< waits for frames in work, skips the others
+  /// What is to be drawn.
+  struct Work {
+    const Scene& scene;
+    const RunOptions& options;
+    const OutputRequest& outputs;
+    std::vector<int> frames;  ///< ascending
+    int saved = 0;            ///< the last of them whose state is there
+  };
+
+  DrawingCrew(Work work, int members, Leader leader, Reporter& report);
+  ~DrawingCrew();  ///< waits for frames in hand, leaves the others
   DrawingCrew(const DrawingCrew&) = delete;
   DrawingCrew& operator=(const DrawingCrew&) = delete;
 

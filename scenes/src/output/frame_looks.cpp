@@ -32,7 +32,7 @@ fs::path sheet_path(const fs::path& folder, const std::string& name) { return fo
 
 PictureSize picture_size(const fs::path& path) {
   std::array<std::byte, 24> head{};
-  if (io::read_start(path, head).value_or(0) < head.size()) return {};
+  if (io::read_start_if_there(path, head) < head.size()) return {};
   const auto number = [&head](std::size_t at) {
     const auto byte = [&](std::size_t k) { return std::to_integer<std::uint32_t>(head[at + k]); };
     return static_cast<int>(byte(0) << 24U | byte(1) << 16U | byte(2) << 8U | byte(3));

@@ -229,9 +229,16 @@ std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& 
   return parts;
 }
 
-/// The surfaces of the bodies of a group: all at once, but for those that pass through another one.
-void mesh_group(const StageContext& context, const Division& division, std::span<const std::uint64_t> version, const DivisionGroup& group,
-                StageProfile& profile, Frame& frame, std::vector<Mesh>& surfaces) {
+/// The bodies that touch, and versions of their fields.
+struct DividedBodies {
+  const Division& division;
+  std::span<const std::uint64_t> version;
+};
+
+/// The surfaces of the bodies of a group: all together, except those that pass through another one.
+void mesh_group(const StageContext& context, const DividedBodies& bodies, const DivisionGroup& group, StageProfile& profile, Frame& frame,
+                std::vector<Mesh>& surfaces) {
+  const auto& [division, version] = bodies;
   const double cell = group.finest->cell;
   const implicit::Lattice lattice{.origin = cell * kOffPlanes, .cell = cell};
   implicit::Lattice used = lattice;
@@ -264,7 +271,7 @@ void mesh_divided(const StageContext& context, const Division& division, StagePr
   const std::vector<std::uint64_t> version = versions_of(context, division, frame);
   for (const DivisionGroup& group : groups_of(context.model, context.bodies, division)) {
     try {
-      mesh_group(context, division, version, group, profile, frame, surfaces);
+      mesh_group(context, {division, version}, group, profile, frame, surfaces);
     } catch (const Error& failure) {
       throw with_keys_of(context.model, failure, group.finest, group.strictest);
     }
@@ -412,7 +419,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const Division
   }
   for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
     if (surfaces[i].position.empty()) continue;
-    add_look_columns(model, bodies[i], particles, laws, frame.field[i], frame.pose[i], context.executor, surfaces[i]);
+    add_look_columns(model, {bodies[i], particles, laws, frame.field[i], frame.pose[i]}, context.executor, surfaces[i]);
     if (model.objects[bodies[i].object].look.colour_by == ColourByName::Pressure) {
       add_pressure(frame.bodies, frame.surface, i, context.executor, surfaces[i]);
     }

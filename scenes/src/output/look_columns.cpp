@@ -30,9 +30,8 @@ std::vector<double> mean_stretch(const Model& model, const Body& body, const cor
 
 }  // namespace
 
-void add_look_columns(const Model& model, const Body& body, const core::ParticleState& particles,
-                      const core::Interactions& laws, const implicit::FieldView& field, std::span<const Pose> poses,
-                      const Executor& executor, Mesh& mesh) {
+void add_look_columns(const Model& model, const LookedAt& now, const Executor& executor, Mesh& mesh) {
+  const auto& [body, particles, laws, field, poses] = now;
   const LookDesc& look = model.objects[body.object].look;
   std::vector<Vec3> places;
   for (const Pose& pose : poses) places.push_back(pose.position);

@@ -7,10 +7,16 @@
 
 namespace supple::scenes {
 
-/// @param poses  of the body's particles
-void add_look_columns(const Model& model, const Body& body, const core::ParticleState& particles,
-                      const core::Interactions& laws, const implicit::FieldView& field, std::span<const Pose> poses,
-                      const Executor& executor, Mesh& mesh);
+/// A body as it is now.
+struct LookedAt {
+  const Body& body;
+  const core::ParticleState& particles;
+  const core::Interactions& laws;  ///< those that nothing has broken
+  implicit::FieldView field;
+  std::span<const Pose> poses;     ///< of the body's particles
+};
+
+void add_look_columns(const Model& model, const LookedAt& now, const Executor& executor, Mesh& mesh);
 
 /// Adds the column "pressure" [Pa]: min(p_A, p_B) where the body's surface is pressed in by another one, 0 elsewhere.
 /// @param bodies  contact bodies   @param surface  their contact surfaces

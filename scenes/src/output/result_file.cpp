@@ -1,6 +1,7 @@
 #include "output/result_file.h"
 
 #include <algorithm>
+#include <array>
 #include <sys/resource.h>
 
 #include <nlohmann/json.hpp>
@@ -34,6 +35,27 @@ ordered_json json_of(const ObjectModel& object, const std::vector<implicit::Volu
     held["scale"].push_back(v.scale);
   }
   return held;
+}
+
+ordered_json json_of(const ErrorEstimate& error) {
+  if (error.object.empty()) return nullptr;
+  return {{"position_m", error.position}, {"share", error.share}, {"object", error.object}, {"frames", error.frames}};
+}
+
+/// Estimates by stage, and which is largest; null: not known.
+ordered_json json_of(const Scene& scene, const StageErrors& errors) {
+  const std::array<std::pair<const char*, const ErrorEstimate*>, 3> stages{{{"time", &errors.time}, {"contact", &errors.contact}, {"mesh", &errors.mesh}}};
+  ordered_json json = {{"accuracy", scene.accuracy ? ordered_json(*scene.accuracy) : ordered_json(nullptr)}};
+  const char* largest = nullptr;
+  double most = 0.0;
+  for (const auto& [name, error] : stages) {
+    json[name] = json_of(*error);
+    if (error->object.empty() || !(error->share > most)) continue;
+    most = error->share;
+    largest = name;
+  }
+  json["largest"] = largest != nullptr ? ordered_json(largest) : ordered_json(nullptr);
+  return json;
 }
 
 ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
@@ -84,6 +106,11 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
                       {"external_impulse_ns", vector(state.ledger.external_impulse)},
                       {"pin_impulse_ns", vector(state.ledger.pin_impulse)},
                       {"pin_angular_impulse_nms", vector(state.ledger.pin_angular_impulse)}};
+    json["errors"] = json_of(scene, result.errors);
+    json["friction"] = ordered_json::array();
+    for (const auto& [names, speed] : simulation->friction_speeds()) {
+      json["friction"].push_back({{"a", names.first}, {"b", names.second}, {"speed_m_s", speed}, {"asked_m_s", scene.contact.friction_speed}});
+    }
     json["overloads"] = ordered_json::array();
     for (const auto& o : state.record.overloads) {
       json["overloads"].push_back({{"a", o.a}, {"b", o.b}, {"time_s", o.time}, {"energy_j", o.energy}, {"capacity_j", o.capacity}});

@@ -27,6 +27,7 @@
 #include "output/result_file.h"
 #include "output/saved_frames.h"
 #include "output/search_files.h"
+#include "output/stage_errors.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
@@ -50,6 +51,34 @@ void check_continues(const fs::path& folder, const std::string& name) {
                                    .expected = "expected saved states of '" + name + "' to continue from",
                                    .found = "those of '" + *saved.begin() + "'",
                                    .hint = "resume the scene that was run here, or choose another --out"});
+}
+
+/// Warns where explicit steps reduce friction below speeds far above contact.friction_speed.
+void add_blurred_friction(const Scene& scene, const Simulation& simulation, std::vector<std::string>& warnings) {
+  constexpr double kFarMore = 10.0;
+  const auto& speeds = simulation.friction_speeds();
+  if (core::is_implicit(simulation.integrator().settings.method)) return;
+  const auto worst = std::max_element(speeds.begin(), speeds.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (worst == speeds.end() || !(worst->second > kFarMore * scene.contact.friction_speed)) return;
+  warnings.push_back("contact.friction_speed: explicit steps reduce friction below " + short_text(worst->second) + " m/s between '" + worst->first.first +
+                     "' and '" + worst->first.second + "', not only below the " + number_text(scene.contact.friction_speed) +
+                     " m/s of the scene; integrator.method: implicit keeps to that speed");
+}
+
+SimulationOptions simulation_options(const RunOptions& options) {
+  return {.threads = options.threads, .skip = options.skip, .profile = options.profile, .delaunay = options.delaunay, .interrupt = options.interrupt,
+          .memory = options.scene_memory};
+}
+
+/// A run whose estimated error exceeds the accuracy of the scene names the stage with the largest error.
+void add_missed_accuracy(const Scene& scene, const StageErrors& errors, std::vector<std::string>& warnings) {
+  if (!scene.accuracy) return;
+  const bool by_time = errors.time.share >= errors.contact.share;
+  const ErrorEstimate& worst = by_time ? errors.time : errors.contact;
+  if (!(worst.share > *scene.accuracy)) return;
+  warnings.push_back("accuracy: " + std::string(by_time ? "time steps" : "contact") + " displace '" + worst.object + "' by about " +
+                     short_text(worst.position) + " m at the end of the run, " + short_text(worst.share) + " of its size, more than the accuracy " +
+                     number_text(*scene.accuracy) + "; use a larger accuracy or a smaller " + (by_time ? "time_step.size" : "contact.error"));
 }
 
 OutputRequest outputs_of(const Scene& scene, const RunOptions& options) {
@@ -117,7 +146,7 @@ class TimeLimit {
  public:
   /// @param seconds  0: none
   explicit TimeLimit(double seconds) : seconds_(seconds) {}
-  /// Whether it has passed; the result says so then.
+  /// Whether it has passed; the result then reports it.
   [[nodiscard]] bool passed(RunResult& result) const {
     if (!(seconds_ > 0.0) || seconds_since(begin_) < seconds_) return false;
     result.reason = "time limit: expected an end within " + short_text(seconds_) + " s, found frame " + std::to_string(result.frames) +
@@ -141,6 +170,7 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
   const auto begin = Clock::now();
   const double cpu_before = process_cpu_seconds();
   try {
+    const InterruptScope scope(options.interrupt);
     body(result);
     const bool limited = result.exit_code == static_cast<int>(ErrorKind::Limit);
     result.outcome = result.exit_code == 0 ? "done" : limited ? outcome_of(ErrorKind::Limit) : "interrupted";
@@ -176,6 +206,7 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
       result.warnings.push_back(std::to_string(overloads.size() - kMostOverloads) + " more pairs were overloaded ('overloads' in the report)");
     }
     const IntegratorPlan& plan = simulation->integrator();
+    add_blurred_friction(scene, *simulation, result.warnings);
     const double error = simulation->audits().energy_error;
     if (plan.chosen && plan.settings.method == core::Integrator::BackwardEuler && error > kMuchEnergy) {
       result.warnings.push_back("integrator.method: auto chose backward_euler, which damps motion that its steps do not resolve: the energy balance is off by " +
@@ -292,7 +323,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
   return guarded(scene, options, report_name, simulation, [&](RunResult& result) {
     check_needs(scene, options, outputs);
     const double before = resident_bytes();
-    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt, options.scene_memory});
+    simulation.emplace(scene, simulation_options(options));
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, last);
     std::vector<int> frames;
@@ -307,7 +338,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
       if (pictures_only && writer.pictures_drawn() > 0) {  // the first one shows what each needs
         const int members = crew_size(options, frames.size() - i, resident_bytes() - before);
         if (members > 1) {
-          DrawingCrew crew(scene, options, outputs, {frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end()}, last, members,
+          DrawingCrew crew({scene, options, outputs, {frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end()}, last}, members,
                            {*simulation, writer, result}, report);
           crew.join();
           if (was_interrupted(options, result)) return;
@@ -417,7 +448,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     }
     if (!options.resume) remove_outputs(options.folder, name);
     const double before = resident_bytes();
-    simulation.emplace(scene, SimulationOptions{options.threads, options.skip, options.profile, options.delaunay, options.interrupt, options.scene_memory});
+    simulation.emplace(scene, simulation_options(options));
     const int last_frame = options.frames.empty() ? scene.frame_count() : std::min(scene.frame_count(), *options.frames.rbegin());
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, last_frame);
@@ -436,6 +467,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     drawing.overwrite = true;
     std::optional<DrawingCrew> crew;
     std::exception_ptr diverged;
+    StageErrorEstimator errors(scene, simulation_options(options), last_frame);
     try {
       while (result.frames < last_frame && !stopped()) {
         // The first picture shows what each needs.
@@ -443,14 +475,18 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
           std::vector<int> frames = frames_to_draw(options, result.frames + 1, last_frame);
           const int members = crew_size(options, frames.size(), resident_bytes() - before);
           if (members > 1) {
-            crew.emplace(scene, drawing, outputs, std::move(frames), result.frames, members,
+            crew.emplace(DrawingCrew::Work{scene, drawing, outputs, std::move(frames), result.frames}, members,
                          DrawingCrew::Leader{*simulation, writer, result}, report);
           }
         }
         const int next = simulation->frame() + 1;
         crew ? crew->simulating(next) : report("simulate", next, static_cast<double>(next - 1) / last_frame);
+        errors.begin(*simulation);
         while (simulation->frame() < next && !stopped()) simulation->step();
         if (simulation->frame() < next) break;
+        StageProfile& steps = simulation->profile(Stage::Integrate);
+        steps.apart_s += errors.end(*simulation);
+        steps.scale();
         if (crew) {
           save();
           if (!crew->saved(next)) break;
@@ -467,6 +503,8 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
       limit.passed(result) ? crew->leave() : crew->join();
       show_last(*simulation, options, result.frames);
     }
+    result.errors = errors.estimate(simulation->model());
+    add_missed_accuracy(scene, result.errors, result.warnings);
     if (diverged) std::rethrow_exception(diverged);
     if (stopped()) return;
     finish(writer, *simulation, report, result);

@@ -157,8 +157,15 @@ class GroupTies {
   std::vector<collision::BodyPair> once_, bonds_;  // of groups; of particles
 };
 
+/// What particles of an object carry.
+struct CarriedParts {
+  const Carried &primitives, &seeds;
+};
+
 /// The groups of one object: where it may break, those of a piece that others of it may touch.
-void add_groups(const Model& model, const ObjectModel& object, const core::LinkState& parted, const Carried& primitives, const Carried& seeds, std::span<const Body> whole, std::vector<Body>& groups) {
+void add_groups(const Model& model, const ObjectModel& object, const core::LinkState& parted, const CarriedParts& carried,
+                std::span<const Body> whole, std::vector<Body>& groups) {
+  const auto& [primitives, seeds] = carried;
   const std::vector<std::uint32_t>& node = object.skeleton.blend.node;
   std::vector<std::uint32_t> led_by(node.size(), kElsewhere);  // nodes are no more than particles
   for (const std::uint32_t first : object.group) led_by[node[first]] = first;
@@ -328,7 +335,7 @@ std::vector<Body> make_bodies(const Model& model, const core::LinkState& links, 
       take_part(object, primitives, seeds, own[k]);
     }
     fade_blends(model, links, broken_for, own);
-    if (!object.group.empty()) add_groups(model, object, parted, primitives, seeds, own, groups);
+    if (!object.group.empty()) add_groups(model, object, parted, {primitives, seeds}, own, groups);
     std::move(own.begin(), own.end(), std::back_inserter(bodies));
   }
   std::move(groups.begin(), groups.end(), std::back_inserter(bodies));

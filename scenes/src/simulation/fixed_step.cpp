@@ -7,6 +7,7 @@
 
 #include "file/read_scene_faults.h"
 #include "simulation/overload.h"
+#include "simulation/stages.h"
 #include "supple/core/integrate.h"
 #include "supple/scenes/solid_motion.h"
 

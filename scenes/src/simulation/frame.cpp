@@ -4,6 +4,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "simulation/contact_bodies.h"
 #include "supple/collision/deformed_field.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/parts.h"
@@ -11,76 +12,10 @@
 namespace supple::scenes {
 namespace {
 
-constexpr std::size_t kBodyBlock = 16;
-
 Box box_of(const implicit::PlacedSkeleton& placed) {
   Box box;
   for (const Box& support : placed.support) box = box.united(support);
   return box;
-}
-
-bool has_surface(const Body& body) { return !body.skeleton.primitive.empty(); }
-
-bool collides(const StageContext& context, const Body& body) {
-  return has_surface(body) && context.model.objects[body.object].collides;
-}
-
-/// Pairs of components of an object that may not touch each other, of those that its list names.
-std::uint64_t count_never(const StageContext& context, const ObjectModel& object, const std::vector<collision::BodyPair>& pairs) {
-  const std::vector<Body>& bodies = context.bodies;
-  std::uint64_t never = 0;
-  for (const collision::BodyPair& pair : pairs) {
-    if (object.are_groups(pair)) continue;
-    const std::uint32_t i = body_led_by(bodies, object.first + pair.a), j = body_led_by(bodies, object.first + pair.b);
-    if (collides(context, bodies[i]) && collides(context, bodies[j]) && !context.rules.allowed(i, j)) ++never;
-  }
-  return never;
-}
-
-/// Pairs that may ever touch. The particles of a `separate` object have the same rules, and so have components that do not break
-/// except for the listed pairs, so the first one represents all. Groups are checked one by one.
-std::uint64_t count_present_pairs(const StageContext& context) {
-  struct Kind {
-    std::uint32_t first = 0;
-    std::uint64_t count = 0;
-  };
-  const std::vector<Body>& bodies = context.bodies;
-  std::vector<Kind> kinds;
-  std::vector<std::size_t> kind_of(context.model.objects.size(), std::numeric_limits<std::size_t>::max());  // of objects with equal bodies
-  const auto count = static_cast<std::uint32_t>(bodies.size() + context.model.fixed.size());
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if (i < bodies.size()) {
-      if (!collides(context, bodies[i]) || bodies[i].origin.is_group()) continue;
-      const ObjectModel& object = context.model.objects[bodies[i].object];
-      if (object.separate || (!object.component.empty() && !object.breaks)) {
-        std::size_t& kind = kind_of[bodies[i].object];
-        if (kind < kinds.size()) {
-          ++kinds[kind].count;
-          continue;
-        }
-        kind = kinds.size();
-      }
-    }
-    kinds.push_back({.first = i, .count = 1});
-  }
-  std::uint64_t pairs = 0;
-  for (std::size_t a = 0; a < kinds.size(); ++a) {
-    if (kinds[a].count > 1) {
-      const ObjectModel& object = context.model.objects[bodies[kinds[a].first].object];
-      pairs += kinds[a].count * (kinds[a].count - 1) / 2;
-      pairs -= count_never(context, object, object.bonded) + count_never(context, object, object.overlapping);
-    }
-    for (std::size_t b = a + 1; b < kinds.size(); ++b) {
-      const bool moves = kinds[a].first < bodies.size() || kinds[b].first < bodies.size();
-      if (moves && context.rules.allowed(kinds[a].first, kinds[b].first)) pairs += kinds[a].count * kinds[b].count;
-    }
-  }
-  for (auto i = static_cast<std::uint32_t>(surface_count(bodies)); i < bodies.size(); ++i) {
-    for (std::uint32_t j = i + 1; j < bodies.size() && bodies[j].object == bodies[i].object; ++j) {
-      if (collides(context, bodies[i]) && context.rules.allowed(i, j)) ++pairs;
-    }
-  }
-  return pairs;
 }
 
 void place(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
@@ -89,32 +24,6 @@ void place(const StageContext& context, const core::ParticleState& particles, st
   implicit::place_skeleton(body.skeleton, frame.pose[i], frame.placed[i]);
   frame.reach[i] = box_of(frame.placed[i]);
   frame.indexed[i] = 0;
-}
-
-void index(const StageContext& context, std::size_t i, Frame& frame) {
-  if (frame.indexed[i]) return;
-  implicit::index_field(context.bodies[i].skeleton, frame.placed[i], frame.field[i]);
-  frame.indexed[i] = 1;
-}
-
-/// The contact body of one body.
-void view_body(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
-  const Model& model = context.model;
-  const Body& own = context.bodies[i];
-  collision::ContactBody& body = frame.bodies[i];
-  core::gather_motion(model.particles, particles, own.particle, frame.velocity[i], frame.spin[i]);
-  body.field = frame.field[i];
-  body.material = model.objects[own.object].material;
-  body.pose = frame.pose[i];
-  body.velocity = frame.velocity[i];
-  body.angular_velocity = frame.spin[i];
-  body.samples = &frame.samples[i];
-  body.skeleton = &own.skeleton;
-  body.yield = own.yield;
-  body.core_value = std::numeric_limits<double>::infinity();
-  for (const implicit::Primitive& primitive : own.skeleton.primitive) {
-    body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);
-  }
 }
 
 /// A moving solid at its position, and its field.
@@ -166,28 +75,6 @@ void view_fixed_bodies(const Model& model, double time, bool first_time, Frame& 
   }
 }
 
-/// Calls use(i) for every body that is awake and collides.
-template <class Use>
-void for_awake(const StageContext& context, const Use& use) {
-  const std::size_t count = context.awake != nullptr ? context.awake->size() : context.bodies.size();
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = context.awake != nullptr ? (*context.awake)[k] : k;
-    if (collides(context, context.bodies[i])) use(i);
-  }
-}
-
-/// The same from several threads; bodies share no data there.
-template <class Use>
-void for_awake_at_once(const StageContext& context, const Use& use) {
-  const std::size_t count = context.awake != nullptr ? context.awake->size() : context.bodies.size();
-  context.executor.for_blocks(count, kBodyBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t i = context.awake != nullptr ? (*context.awake)[k] : k;
-      if (collides(context, context.bodies[i])) use(i);
-    }
-  });
-}
-
 /// Bodies that rest are placed when they have fallen asleep, and stay.
 void place_resting(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   if (frame.resting_placed) return;
@@ -199,83 +86,6 @@ void place_resting(const StageContext& context, const core::ParticleState& parti
     frame.resting.push_back(i);
   }
   frame.resting_boxes.build(frame.reach, frame.resting);
-}
-
-/// Pairs of bodies whose supports reach one another, one of them awake; sorted.
-void find_reaching(const StageContext& context, Frame& frame) {
-  const std::size_t moving = context.bodies.size();
-  if (frame.resting.empty()) {
-    frame.reach_list.find(frame.reach, context.executor, frame.reaching);
-  } else {
-    std::vector<std::uint32_t> number;  // of the boxes in the sweep
-    std::vector<Box> boxes;
-    const auto add = [&](std::size_t i) {
-      number.push_back(static_cast<std::uint32_t>(i));
-      boxes.push_back(frame.reach[i]);
-    };
-    for_awake(context, add);
-    const std::size_t awake = number.size();
-    for (std::size_t i = moving; i < frame.reach.size(); ++i) add(i);
-    frame.reach_list.find(boxes, context.executor, frame.reaching);
-    for (collision::BodyPair& pair : frame.reaching) pair = {number[pair.a], number[pair.b]};
-    std::vector<std::uint32_t> found;
-    for (std::size_t k = 0; k < awake; ++k) {
-      found.clear();
-      frame.resting_boxes.find(boxes[k], found);
-      for (const std::uint32_t j : found) frame.reaching.push_back({std::min(number[k], j), std::max(number[k], j)});
-    }
-    std::sort(frame.reaching.begin(), frame.reaching.end());
-  }
-  std::erase_if(frame.reaching, [&](const collision::BodyPair& pair) {
-    return (pair.a >= moving && pair.b >= moving) || !context.rules.allowed(pair.a, pair.b);
-  });
-}
-
-/// Flags the bodies whose supports reach another body.
-void flag_reached(const StageContext& context, Frame& frame) {
-  const std::size_t moving = context.bodies.size();
-  for (const std::uint32_t i : frame.reached) frame.near[i] = 0;
-  frame.reached.clear();
-  find_reaching(context, frame);
-  const auto flag = [&](std::size_t i, const Box& other) {
-    if (i >= moving || frame.near[i] != 0) return;
-    const std::vector<Box>& support = frame.placed[i].support;
-    if (std::none_of(support.begin(), support.end(), [&](const Box& box) { return box.overlaps(other); })) return;
-    frame.reached.push_back(static_cast<std::uint32_t>(i));
-    frame.near[i] = 1;
-  };
-  for (const collision::BodyPair& pair : frame.reaching) {
-    flag(pair.a, frame.reach[pair.b]);
-    flag(pair.b, frame.reach[pair.a]);
-  }
-  std::sort(frame.reached.begin(), frame.reached.end());
-}
-
-/// Where the surfaces of a pair may meet, and the parts in reach: the only ones that are sampled, unless both bodies are
-/// convex, which need no samples to find each other. A rule on State alone, so it decides which kept distances move on.
-void flag_sampled(const StageContext& context, Frame& frame) {
-  for (const std::uint32_t i : frame.reached) {
-    frame.active[i].clear();
-    frame.shared[i].clear();
-  }
-  const auto spacing_of = [&](std::size_t i) {
-    return i < context.bodies.size() ? context.model.objects[context.bodies[i].object].sample_spacing : 0.0;
-  };
-  for (const collision::BodyPair& pair : frame.pairs) {
-    const auto reaches = [&](std::size_t i) { return i >= context.bodies.size() || frame.near[i] != 0; };
-    if ((frame.convex[pair.a] != 0 && frame.convex[pair.b] != 0) || !reaches(pair.a) || !reaches(pair.b)) continue;
-    // Samples search as far as their spacing, which blends and slopes widen.
-    const double margin = 2.0 * std::max(spacing_of(pair.a), spacing_of(pair.b));
-    const Box shared = frame.surface_box[pair.a].intersection(frame.surface_box[pair.b]).inflated(margin);
-    for (const std::uint32_t i : {pair.a, pair.b}) {
-      if (i >= context.bodies.size()) continue;
-      frame.shared[i].push_back(shared);
-      frame.active[i].resize(context.bodies[i].particle.size());
-      for (std::size_t k = 0; k < frame.placed[i].support.size(); ++k) {
-        if (frame.placed[i].support[k].overlaps(shared)) frame.active[i][context.bodies[i].skeleton.primitive[k].part] = 1;
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -335,9 +145,34 @@ bool rests(const StageContext& context, std::size_t body) {
   return context.awake != nullptr && !std::binary_search(context.awake->begin(), context.awake->end(), static_cast<std::uint32_t>(body));
 }
 
+void index_body(const StageContext& context, std::size_t i, Frame& frame) {
+  if (frame.indexed[i]) return;
+  implicit::index_field(context.bodies[i].skeleton, frame.placed[i], frame.field[i]);
+  frame.indexed[i] = 1;
+}
+
+void view_body(const StageContext& context, const core::ParticleState& particles, std::size_t i, Frame& frame) {
+  const Model& model = context.model;
+  const Body& own = context.bodies[i];
+  collision::ContactBody& body = frame.bodies[i];
+  core::gather_motion(model.particles, particles, own.particle, frame.velocity[i], frame.spin[i]);
+  body.field = frame.field[i];
+  body.material = model.objects[own.object].material;
+  body.pose = frame.pose[i];
+  body.velocity = frame.velocity[i];
+  body.angular_velocity = frame.spin[i];
+  body.samples = &frame.samples[i];
+  body.skeleton = &own.skeleton;
+  body.yield = own.yield;
+  body.core_value = std::numeric_limits<double>::infinity();
+  for (const implicit::Primitive& primitive : own.skeleton.primitive) {
+    body.core_value = std::min(body.core_value, implicit::peak(primitive.kernel) - own.skeleton.iso);
+  }
+}
+
 void place_and_index(const StageContext& context, const core::ParticleState& particles, std::size_t body, Frame& frame) {
   place(context, particles, body, frame);
-  index(context, body, frame);
+  index_body(context, body, frame);
 }
 
 void place_and_index_all(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
@@ -365,154 +200,6 @@ void place_contact_bodies(const StageContext& context, const core::ParticleState
   view_fixed_bodies(context.model, context.time, false, frame);
   place_resting(context, particles, frame);
   for_awake_at_once(context, [&](std::size_t i) { place(context, particles, i, frame); });
-}
-
-void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
-                          std::vector<implicit::SampleState>& samples, Frame& frame, bool energy) {
-  const Model& model = context.model;
-  const std::vector<Body>& bodies = context.bodies;
-  const auto profile = [&](Stage stage) -> StageProfile& {
-    return context.profile[static_cast<std::size_t>(stage)];
-  };
-  const auto nothing_touches = [&frame] {
-    frame.surface.clear();
-    frame.pressed.clear();
-  };
-  {
-    StageTimer timer(profile(Stage::PlaceSkeleton), context.timed);
-    place_contact_bodies(context, particles, frame);
-    for_awake(context, [&](std::size_t i) { profile(Stage::PlaceSkeleton).visited += bodies[i].skeleton.primitive.size(); });
-    profile(Stage::PlaceSkeleton).present += frame.primitives_present;
-    flag_reached(context, frame);
-  }
-  // Bodies whose supports reach no other body cannot touch: their fields are not even indexed.
-  const bool near = !frame.reached.empty();
-  {
-    StageTimer timer(profile(Stage::IndexField), context.timed);
-    const auto index_one = [&](std::size_t i) {
-      index(context, i, frame);
-      frame.surface_box[i] = frame.field[i].surface_box();
-      view_body(context, particles, i, frame);
-    };
-    std::uint64_t& visited = profile(Stage::IndexField).visited;
-    profile(Stage::IndexField).present += frame.bodies_present;
-    if (!context.skip) {
-      for_awake_at_once(context, index_one);
-      for_awake(context, [&](std::size_t) { ++visited; });
-    } else {
-      context.executor.for_blocks(frame.reached.size(), kBodyBlock, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) index_one(frame.reached[k]);
-      });
-      visited += frame.reached.size();
-      if (energy) for_awake(context, [&](std::size_t i) { view_body(context, particles, i, frame); });
-    }
-  }
-  if (context.skip && !near) return nothing_touches();
-  {
-    StageTimer timer(profile(Stage::SampleSurface), context.timed);
-    const auto usable = [&](std::uint32_t i) {
-      return i >= bodies.size() || frame.near[i] != 0 || (!context.skip && collides(context, bodies[i]));
-    };
-    frame.pairs.clear();
-    for (const collision::BodyPair& pair : frame.reaching) {
-      if (!usable(pair.a) || !usable(pair.b)) continue;
-      if (frame.surface_box[pair.a].overlaps(frame.surface_box[pair.b])) frame.pairs.push_back(pair);
-    }
-    flag_sampled(context, frame);
-    profile(Stage::SampleSurface).present += frame.samples_present;
-    for (const std::uint32_t i : frame.reached) {
-      if (frame.shared[i].empty()) {
-        frame.samples[i] = {};
-        continue;
-      }
-      const Body& body = bodies[i];
-      implicit::sample_surface(body.skeleton, body.samples, frame.pose[i], frame.field[i], frame.active[i],
-                               frame.shared[i], context.executor, samples[i], frame.samples[i]);
-      profile(Stage::SampleSurface).visited += frame.samples[i].visited;
-    }
-  }
-  {
-    StageTimer timer(profile(Stage::FindContacts), context.timed);
-    if (!frame.pairs_present) frame.pairs_present = count_present_pairs(context);
-    profile(Stage::FindContacts).present += *frame.pairs_present;
-    profile(Stage::FindContacts).visited += frame.pairs.size();
-    if (context.skip && frame.pairs.empty()) return nothing_touches();
-    collision::find_contacts(frame.bodies, frame.pairs, context.executor, frame.candidates);
-  }
-  if (context.skip && frame.candidates.pair.empty()) return nothing_touches();
-  {
-    StageTimer timer(profile(Stage::SolveContactSurface), context.timed);
-    collision::ContactSettings settings = model.contact;
-    settings.energy = energy;
-    collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
-    std::vector<std::uint8_t> touches(frame.bodies.size(), 0);
-    for (const auto& s : frame.surface.summary) touches[s.bodies.a] = touches[s.bodies.b] = 1;
-    frame.pressed.clear();
-    for (std::uint32_t i = 0; i < touches.size(); ++i) {
-      if (touches[i] != 0) frame.pressed.push_back(i);
-    }
-    profile(Stage::SolveContactSurface).present += frame.candidates.pair.size();
-    profile(Stage::SolveContactSurface).visited += frame.surface.summary.size();
-  }
-}
-
-void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out) {
-  const Model& model = context.model;
-  frame.reaction = {};
-  frame.traction_force.clear();
-  frame.pair_power.clear();
-  if (context.skip && frame.surface.summary.empty()) return;
-  StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
-  StageTimer timer(profile, context.timed);
-  context.executor.for_blocks(frame.pressed.size(), kBodyBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::uint32_t i = frame.pressed[k];
-      for (collision::PartLoads* loads : {&frame.loads[i], &frame.dissipative[i]}) {
-        loads->force.assign(frame.bodies[i].pose.size(), Vec3::Zero());
-        loads->torque.assign(frame.bodies[i].pose.size(), Vec3::Zero());
-      }
-    }
-  });
-  collision::ReactionSettings settings = model.reaction;
-  settings.step = context.step;
-  frame.reaction = collision::react(frame.bodies, context.rules, frame.surface, settings, context.executor,
-                                    frame.loads, &frame.traction_force, frame.dissipative, &frame.pair_power, context.sticks);
-  const bool dissipates = frame.reaction.dissipated_power != 0.0 || model.reaction.stick.stiffness > 0.0;
-  if (dissipates) out.dissipative.reset(model.particles.size());
-  for (const std::uint32_t i : frame.pressed) {
-    if (i >= context.bodies.size()) {
-      const Vec3 &force = frame.loads[i].force[0], &torque = frame.loads[i].torque[0];
-      const LedSolid& led = frame.led[i - context.bodies.size()];
-      out.force_on_fixed += force;
-      out.moment_on_fixed += led.pose.position.cross(force) + torque;
-      out.power_of_fixed -= force.dot(led.velocity) + torque.dot(led.spin);
-      const collision::PartLoads& taken = frame.dissipative[i];
-      out.dissipated_at_fixed -= taken.force[0].dot(led.velocity) + taken.torque[0].dot(led.spin);
-      continue;
-    }
-    const std::vector<std::uint32_t>& particle = context.bodies[i].particle;
-    if (dissipates) {
-      core::add_part_loads(frame.dissipative[i].force, frame.dissipative[i].torque, particle, out.dissipative);
-    }
-    core::add_part_loads(frame.loads[i].force, frame.loads[i].torque, particle, out.internal);
-  }
-  profile.visited += frame.surface.point.size();
-  profile.present += frame.surface.point.size();
-}
-
-void linearise_reactions(const StageContext& context, Frame& frame, core::ContactPoints& out) {
-  frame.reaction = {};
-  frame.traction_force.clear();
-  frame.pair_power.clear();
-  out.clear();
-  if (frame.surface.summary.empty()) return;
-  StageProfile& profile = context.profile[static_cast<std::size_t>(Stage::React)];
-  StageTimer timer(profile, context.timed);
-  std::vector<std::span<const std::uint32_t>> particles(frame.bodies.size());
-  for (std::size_t i = 0; i < context.bodies.size(); ++i) particles[i] = context.bodies[i].particle;
-  collision::linearise_contacts(frame.bodies, context.rules, frame.surface, particles, frame.linearise, out);
-  profile.visited += frame.surface.point.size();
-  profile.present += frame.surface.point.size();
 }
 
 }  // namespace supple::scenes

@@ -148,16 +148,6 @@ void place_contact_bodies(const StageContext& context, const core::ParticleState
 [[nodiscard]] std::vector<std::uint32_t> find_stirred(const StageContext& context, const core::ParticleState& particles, double until,
                                                       Frame& frame);
 
-/// Stages 2 to 6: from particles to the contact surface, with its energy if asked for. Warm starts are read from and written to `samples`.
-void find_contact_surface(const StageContext& context, const core::ParticleState& particles,
-                          std::vector<implicit::SampleState>& samples, Frame& frame, bool energy);
-
-/// Stage 7: loads of the contact surface on particles; the loads on fixed bodies are added to the sample apart.
-void apply_reactions(const StageContext& context, Frame& frame, core::ForceSample& out);
-
-/// Stage 7 of implicit steps: the contact surface as points whose pressure is linear in the approach.
-void linearise_reactions(const StageContext& context, Frame& frame, core::ContactPoints& out);
-
 /// Everything that the field of a body depends on, to the bit; fixed bodies follow the others.
 void add_field_content(const std::vector<Body>& bodies, const Frame& frame, std::uint32_t body, ContentWords& words);
 

@@ -110,11 +110,11 @@ void OverloadWatch::look(const StageContext& context, const Frame& frame, double
     const double coarse = place->second;
     if (!suspicious(s, kinetic, coarse)) continue;
     const collision::ContactBody &a = frame.bodies[s.bodies.a], &b = frame.bodies[s.bodies.b];
-    if (!(kinetic + collision::shifted_energy(a, b, Vec3::Zero(), kCoarseCells) > kSafety * coarse)) continue;
+    if (!(kinetic + collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCoarseCells) > kSafety * coarse)) continue;
     double& worst = worst_[s.bodies];
     constexpr int kCells = 24;
     constexpr double kWorthMeasuring = 1.02;
-    const double energy = kinetic + collision::shifted_energy(a, b, Vec3::Zero(), kCells);
+    const double energy = kinetic + collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCells);
     if (!(energy > kWorthMeasuring * worst)) continue;
     worst = energy;
     const double capacity = collision::contact_capacity(a, b, approach.normal, kCells);

@@ -8,8 +8,10 @@
 #include "simulation/contact_work.h"
 #include "simulation/held_volumes.h"
 #include "simulation/pieces.h"
+#include "simulation/stages.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::scenes {
 namespace {
@@ -91,7 +93,13 @@ void Simulation::Impl::step() {
   timed = options.profile || steps_made % kTimedEvery == 0;
   const std::uint64_t calls = p.calls;
   const double inside = timed ? measured_inside(profile) : 0.0, begin = timed ? process_cpu_seconds() : 0.0;
-  make_step();
+  try {
+    make_step();
+  } catch (const Interrupted&) {  // in the middle of the step
+    drop_results();
+    if (last_frame.record.valid) take(last_frame);
+    throw;
+  }
   ++steps_made;
   const double end = timed ? process_cpu_seconds() : 0.0;
   const double taken = timed ? end - begin - process_cpu_clock_cost() - (measured_inside(profile) - inside) : 0.0;
@@ -111,7 +119,7 @@ void Simulation::Impl::make_step() {
   drop_results();
   if (state.substep == 0) {
     last_frame = state;
-    state.halvings = first_halvings(scene, model, integrator, laws, state);
+    state.halvings = std::max(0, first_halvings(scene, model, integrator, laws, state) + options.finer);
     note_coarse_steps();
   } else {
     refine_step();
@@ -141,6 +149,7 @@ void Simulation::Impl::make_step() {
     if (contact.find) {
       frame.pair_power.resize(contact.load.size());
       for (std::size_t k = 0; k < contact.load.size(); ++k) frame.pair_power[k] = contact.load[k].dissipated / dt();
+      friction.look(context(), frame, contact.load);
     }
     book_work(report);
     ++p.calls;
@@ -160,6 +169,7 @@ void Simulation::Impl::make_step() {
   }
   check_fixed_step();
   if (!awake.empty()) book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
+  if (state.substep == (1 << state.halvings) && !core::is_implicit(method) && contact_on()) friction.look(context(), frame);
   commit_friction();
   wake_touched();
   watch_pressing();
@@ -174,7 +184,10 @@ void Simulation::Impl::make_step() {
 
 /// Substeps stay on the grid of the frame.
 void Simulation::Impl::refine_step() {
-  const int halvings = next_halvings(scene, model, integrator, laws, state);
+  state.halvings -= options.finer;
+  const int next = next_halvings(scene, model, integrator, laws, state) + options.finer;
+  state.halvings += options.finer;
+  const int halvings = std::max(state.halvings, next);
   state.substep <<= halvings - state.halvings;
   state.halvings = halvings;
 }
@@ -193,13 +206,13 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
     StageContext now = context();
     now.time = at;
     find_contact_surface(now, at_state, state.samples, frame, false);
-    apply_reactions(now, frame, out);
+    stages::react(now, frame, out);
   }
 }
 
 /// Contact as a part of an implicit step; null where the method is explicit or nothing touches.
 core::ImplicitContact Simulation::Impl::implicit_contact() {
-  core::ImplicitContact contact{.find = {}, .stick_speed = model.reaction.friction_speed};
+  core::ImplicitContact contact{.find = {}, .stick_speed = model.reaction.friction_speed, .slow_slip = integrator.slow_slip};
   if (!core::is_implicit(integrator.settings.method)) return contact;
   frame.surface.clear();
   if (!contact_on()) return contact;
@@ -207,7 +220,7 @@ core::ImplicitContact Simulation::Impl::implicit_contact() {
     StageContext now = context();
     now.time = at;
     find_contact_surface(now, pose, state.samples, frame, false);
-    linearise_reactions(now, frame, out);
+    stages::linearise(now, frame, out);
   };
   return contact;
 }
@@ -340,6 +353,7 @@ const core::Loads& Simulation::contact_loads() {
 }
 
 const IntegratorPlan& Simulation::integrator() const { return impl_->integrator; }
+const std::map<std::pair<std::string, std::string>, double>& Simulation::friction_speeds() const { return impl_->friction.speeds(); }
 const core::StepReport& Simulation::integration() const { return impl_->work; }
 
 double Simulation::cell() const { return impl_->model.cell; }

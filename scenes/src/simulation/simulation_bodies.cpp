@@ -98,8 +98,7 @@ void Simulation::Impl::divide_anew() {
 void Simulation::Impl::update_links() {
   if (model.links.size() == 0) return;
   const bool fades = age_broken_links(model, dt(), state);
-  const core::LinkChange change = core::update_links(model.particles, state.particles, laws, model.links, dt(),
-                                                     state.links, state.ledger);
+  const core::LinkChange change = core::update_links({model.particles, state.particles, laws}, model.links, dt(), state.links, state.ledger);
   if (change.any()) form_laws();
   if (change.any() || fades) state.kick.valid = false;
   if (change.broke == 0 && !fades) return;

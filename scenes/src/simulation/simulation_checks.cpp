@@ -8,6 +8,7 @@
 #include "file/scene_places.h"
 #include "simulation/audits.h"
 #include "simulation/pieces.h"
+#include "simulation/stages.h"
 #include "supple/core/error.h"
 
 namespace supple::scenes {

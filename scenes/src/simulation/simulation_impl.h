@@ -14,6 +14,7 @@
 #include "model/warnings.h"
 #include "simulation/fixed_step.h"
 #include "simulation/frame.h"
+#include "simulation/friction_watch.h"
 #include "simulation/overload.h"
 #include "supple/scenes/simulation.h"
 
@@ -42,6 +43,7 @@ struct Simulation::Impl {
   collision::ContactRules rules;
   Frame frame;
   OverloadWatch watch;
+  FrictionWatch friction;
   core::InteractionWorkspace workspace;
   IntegratorPlan integrator;
   core::IntegratorWorkspace integrator_workspace;

@@ -8,6 +8,7 @@
 #include "output/camera.h"
 #include "output/picture.h"
 #include "simulation/audits.h"
+#include "simulation/stages.h"
 #include "supple/core/error.h"
 
 namespace supple::scenes {
@@ -58,7 +59,7 @@ void Simulation::Impl::pull_contacts() {
     quiet.step = held_step();
     find_contact_surface(quiet, state.particles, trial, pulled, true);
     pulled_sample.internal.reset(model.particles.size());
-    apply_reactions(quiet, pulled, pulled_sample);
+    stages::react(quiet, pulled, pulled_sample);
   }
   pulled_contacts = true;
   pulled_fields = false;

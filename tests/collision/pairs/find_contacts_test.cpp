@@ -89,20 +89,16 @@ TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
   stage.add(wall).fixed = true;
   stage.rules.allowed = [](std::uint32_t a, std::uint32_t b) { return (a + b) % 5 != 0; };
   std::vector<BodyPair> expected;
-  std::uint64_t expected_present = 0;
   for (std::uint32_t a = 0; a < stage.bodies().size(); ++a) {
     for (std::uint32_t b = a + 1; b < stage.bodies().size(); ++b) {
       const bool both_fixed = stage.bodies()[a].fixed && stage.bodies()[b].fixed;
       if (both_fixed || (a + b) % 5 == 0) continue;
-      ++expected_present;
       if (stage.bodies()[a].field.surface_box().overlaps(stage.bodies()[b].field.surface_box())) {
         expected.push_back({a, b});
       }
     }
   }
-  std::uint64_t present = 0;
-  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules, Executor(1), &present), expected);
-  EXPECT_EQ(present, expected_present);
+  EXPECT_EQ(broad_phase(stage.bodies(), stage.rules, Executor(1)), expected);
   EXPECT_GT(expected.size(), 50u);
 }
 

@@ -41,7 +41,7 @@ struct Balls {
       l.torque.assign(1, Vec3::Zero());
     }
     dissipative = loads;
-    react(stage.bodies(), stage.rules, stage.surface, {.stick = rule}, Executor(1), loads, nullptr, dissipative, nullptr, &sticks);
+    react({stage.bodies(), stage.rules, stage.surface, {.stick = rule}, &sticks}, Executor(1), {loads, dissipative});
     return dissipative;
   }
 };

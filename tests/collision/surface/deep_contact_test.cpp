@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <vector>
@@ -559,6 +560,47 @@ std::vector<DeepPair> deep_pairs() {
           {"two soft balls in ball", two, 1e3, ball, 1e4, {Vec3(0.01, 0.05, 0.03), Quat::Identity()}},
           {"one of two soft balls beyond its middle", two, 1e3, ball, 1e4, {Vec3(0.01, 0.1, 0.03), Quat::Identity()}},
           {"ten soft balls in ten", benchmarks::ten_blobs(3), 1e3, benchmarks::ten_blobs(4), 1e4, {Vec3(0.03, 0.01, 0.02), Quat::Identity()}}};
+}
+
+/// Integral of min(p_A, p_B) over what two balls of Wyvill's kernel about one centre have in common.
+double energy_of_nested(const std::array<double, 2>& support, const std::array<double, 2>& modulus) {
+  constexpr int kShells = 20000;
+  double sum = 0.0;
+  for (int k = 0; k < kShells; ++k) {
+    const double r = support[0] * (k + 0.5) / kShells;
+    std::array<double, 2> p;
+    for (const std::size_t side : {0u, 1u}) p[side] = modulus[side] * (std::pow(std::max(0.0, 1.0 - r * r / (support[side] * support[side])), 3) - 0.5);
+    sum += std::max(0.0, std::min(p[0], p[1])) * 4.0 * std::numbers::pi * r * r * support[0] / kShells;
+  }
+  return sum;
+}
+
+// What one of them has more of everywhere leaves no Sigma between them; where their pressures cross there is a sphere of it.
+TEST(DeepContact, OfBallsAboutOneCentreHasItsEnergyAndTakesFewEvaluationsWithoutSigma) {
+  struct Case {
+    std::array<double, 2> support, modulus;
+    bool crosses;
+  };
+  for (const Case& c : {Case{{0.5, 0.5}, {1e4, 2e4}, false}, {{0.5, 0.8}, {1e4, 1e4}, false}, {{0.5, 0.3}, {2e6, 1e4}, false}, {{0.5, 0.4}, {1e4, 3e4}, true}}) {
+    const Pose pose{Vec3(0.3, -0.2, 0.7), Quat::Identity()};
+    benchmarks::Rigid one(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), c.support[0]), c.modulus[0], 0.03);
+    benchmarks::Rigid other(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), c.support[1]), c.modulus[1], 0.03);
+    one.put(pose);
+    other.put(pose);
+    const std::vector<ContactSurface::Summary> found = query_all(std::array{one.body(), other.body()}, {.error = 1e-3});
+    ASSERT_EQ(found.size(), 1u);
+    const ContactSurface::Summary& s = found[0];
+    const double energy = energy_of_nested(c.support, c.modulus);
+    EXPECT_NEAR(s.energy, energy, 2e-3 * energy);
+    EXPECT_LT(s.force.norm(), 1e-9 * std::max(c.modulus[0], c.modulus[1]));
+    EXPECT_EQ(s.reason == RuleReason::Within, !c.crosses);
+    if (c.crosses) continue;
+    // As many as filling the softer ball takes, as where both are the same.
+    const benchmarks::Rigid& softer = c.support[1] < c.support[0] || c.modulus[1] < c.modulus[0] ? other : one;
+    const std::vector<ContactSurface::Summary> alone = query_all(std::array{softer.body(), softer.body()}, {.error = 1e-3});
+    ASSERT_EQ(alone.size(), 1u);
+    EXPECT_LT(static_cast<double>(s.evaluations), 1.1 * static_cast<double>(alone[0].evaluations)) << c.support[1];
+  }
 }
 
 TEST(DeepContact, OfBodiesThatAreNotConvexHasItsEnergyAndVolumes) {

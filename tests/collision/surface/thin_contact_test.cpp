@@ -7,7 +7,10 @@
 #include <limits>
 #include <tuple>
 
+#include "benchmarks/contact_shapes.h"
 #include "benchmarks/thin_cases.h"
+#include "supple/implicit/mesh_solid.h"
+#include "support/closed_meshes.h"
 
 namespace supple::collision {
 namespace {
@@ -172,6 +175,45 @@ TEST(ThinContacts, TakeLittleWorkWhereStripsBegin) {
   EXPECT_LE(all, 25000u * kPoses);
   plate.upper.put({Vec3(0.01, 0.02, 0.1 + plate.round - 3e-3), Quat(Eigen::AngleAxisd(0.4, Vec3::UnitZ()))});
   EXPECT_LE(contact_between({plate.upper.body(), plate.lower.body()}, 1e-6).evaluations, 13000u);
+}
+
+
+/// A shank, a stock and two flukes, which cross: thin and thick parts, corners that point inwards.
+Mesh anchor() {
+  Mesh mesh = test::block(Vec3(0.04, 0.04, 0.5));
+  append(mesh, test::block(Vec3(0.25, 0.03, 0.03), Vec3(0, 0, 0.4)));
+  append(mesh, test::block(Vec3(0.35, 0.05, 0.04), Vec3(0, 0, -0.48)));
+  for (const double side : {-1.0, 1.0}) append(mesh, test::block(Vec3(0.01, 0.12, 0.08), Vec3(side * 0.33, 0, -0.4)));
+  return mesh;
+}
+
+// Balls of 1.5 percent of the size, pressed into the middles of faces by 1 percent: none finds a surface that is elsewhere.
+TEST(ThinContacts, OfSmallBallsWithAllFacesOfAMeshAreFound) {
+  constexpr double kDepth = 0.01, kRadius = 0.015;
+  for (const Mesh& mesh : {anchor(), test::gear(24, 0.8, 1.0, 0.3)}) {
+    const implicit::MeshSolid solid(mesh, {.slope = 1.0});
+    const double size = solid.surface_box().extent().maxCoeff();
+    benchmarks::Rigid ball(benchmarks::linear_sphere(kRadius * size), 1e5, 0.2 * kRadius * size);
+    const Pose still;
+    const Executor executor(1);
+    const Mesh& faces = solid.mesh();
+    int probes = 0;
+    for (std::size_t t = 0; t < faces.triangle.size(); t += 1 + faces.triangle.size() / 100) {
+      const auto& c = faces.triangle[t];
+      const Vec3 at = (faces.position[c[0]] + faces.position[c[1]] + faces.position[c[2]]) / 3.0, &normal = faces.normal[c[0]];
+      if (implicit::FieldView(solid).value(at + kDepth * size * normal) > 0.0) continue;  // within another shell
+      ball.put({at + (kRadius - kDepth) * size * normal, Quat::Identity()});
+      const std::array<ContactBody, 2> bodies{ball.body(), benchmarks::single_part(solid, 1e6 / size, still)};
+      ContactCandidates candidates;
+      ContactSurface surface;
+      find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
+      solve_contact_surface(bodies, candidates, {.error = 1e-2}, executor, surface);
+      ASSERT_EQ(surface.summary.size(), 1u) << at.transpose();
+      EXPECT_GT(surface.summary[0].force.norm(), 0.0) << at.transpose();
+      ++probes;
+    }
+    EXPECT_GT(probes, 40);
+  }
 }
 
 }  // namespace

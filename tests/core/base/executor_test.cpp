@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "support/allocations.h"
 
 namespace {
@@ -48,37 +49,33 @@ TEST_P(Executors, RethrowTheFirstFailureInBlockOrderAfterAllBlocksEnded) {
   EXPECT_EQ(blocks, 100);
 }
 
-TEST_P(Executors, SumWithTheSameBits) {
-  const auto term = [](std::size_t i) {
-    const auto x = static_cast<double>(i);
-    return std::sin(x) * 1e3 / (1.0 + x);
-  };
-  for (const std::size_t n : {0U, 1U, 256U, 257U, 100003U}) {
-    EXPECT_EQ(ordered_sum(Executor(GetParam()), n, term), ordered_sum(Executor(1), n, term)) << n;
-  }
-}
-
-TEST_P(Executors, SumWithinASum) {
+TEST_P(Executors, EndSoonInAScopeThatIsInterrupted) {
   const Executor executor(GetParam());
-  const auto inner = [&](std::size_t i) {
-    return ordered_sum(executor, 1000, [i](std::size_t j) { return i == j ? 1.0 : 0.0; });
-  };
-  EXPECT_EQ(ordered_sum(executor, 1000, inner), 1000.0);
+  std::atomic<int> interrupt{0}, blocks{0}, nested{0};
+  const InterruptScope scope(&interrupt);
+  executor.for_blocks(100, 1, [&](std::size_t, std::size_t) { ++blocks; });
+  EXPECT_EQ(blocks, 100);
+  EXPECT_THROW(executor.for_blocks(100000, 1,
+                                   [&](std::size_t, std::size_t) {
+                                     if (++blocks == 110) interrupt = 2;
+                                     heed_scope();  // also on the threads of the executor
+                                     ++nested;
+                                   }),
+               Interrupted);
+  EXPECT_GE(blocks, 110);
+  EXPECT_LE(blocks, 110 + GetParam());
+  EXPECT_LE(nested, 10 + GetParam());
+  {
+    const InterruptScope none(nullptr);
+    executor.for_blocks(10, 1, [&](std::size_t, std::size_t) { heed_scope(); });
+  }
+  EXPECT_THROW(heed_scope(), Interrupted);
 }
 
 TEST_P(Executors, RunLibraryCodeInside) {
   bool ran = false;
   Executor(GetParam()).run([&] { ran = true; });
   EXPECT_TRUE(ran);
-}
-
-TEST(Executor, SumsWithoutAllocatingAfterTheFirstCall) {
-  const Executor executor(1);
-  const std::function<double(std::size_t)> term = [](std::size_t i) { return static_cast<double>(i); };
-  EXPECT_EQ(ordered_sum(executor, 1000, term), 499500.0);
-  const std::uint64_t before = supple::test::allocation_count();
-  EXPECT_EQ(ordered_sum(executor, 1000, term), 499500.0);
-  EXPECT_EQ(supple::test::allocation_count(), before);
 }
 
 TEST(Executor, TakesAllThreadsForZeroAndRefusesNegativeCounts) {

@@ -239,7 +239,22 @@ struct TwoBodies {
       points.share.insert(points.share.end(), {a, 1.0 - a, -b, b - 1.0});
       points.offset.push_back(static_cast<std::uint32_t>(points.particle.size()));
     }
-    points.pair.push_back({.begin = 0, .end = 7, .friction = 0.4, .dissipation = 0.3});
+    points.pair.push_back({.begin = 0, .end = 7, .friction = 0.4, .dissipation = 0.3, .split_begin = 0, .split_end = 4});
+    for (std::uint32_t i = 0; i < 4; ++i) points.split_particle.push_back(i);
+    for (int body = 0; body < 2; ++body) {
+      const Vec3 force = 2.0 * draw.vector(1.0);
+      points.split_force.insert(points.split_force.end(), {force, -force});
+      points.split_torque.insert(points.split_torque.end(), {0.1 * draw.vector(1.0), Vec3::Zero()});
+    }
+  }
+  /// The contact at a pose, in which the loads within a body have no moment.
+  [[nodiscard]] ContactPoints at(const ParticleState& pose) const {
+    ContactPoints out = points;
+    for (std::size_t first : {0, 2}) {
+      const Vec3 arm = pose.position[first + 1] - pose.position[first];
+      out.split_torque[first + 1] = arm.cross(out.split_force[first]) - out.split_torque[first];
+    }
+    return out;
   }
 };
 
@@ -247,7 +262,7 @@ TEST(ImplicitContact, LeavesMomentaToRoundOff) {
   Draw draw(11);
   for (int trial = 0; trial < 20; ++trial) {
     TwoBodies two(draw);
-    ImplicitContact contact{.find = [&](const ParticleState&, double, ContactPoints& out) { out = two.points; }, .stick_speed = 1e-3};
+    ImplicitContact contact{.find = [&](const ParticleState& pose, double, ContactPoints& out) { out = two.at(pose); }, .stick_speed = 1e-3};
     const Executor executor(1);
     InteractionWorkspace pairs(two.p.set, two.interactions);
     const ForceModel none = [](const ParticleState&, double, ForceSample&) {};
@@ -279,7 +294,7 @@ TEST(ImplicitContact, HasTheGradientAndTheHessianOfItsPotential) {
     ContactTerm term;
     const ParticleState predicted = moved(0.01);
     const double end_factor = trial % 2 == 0 ? 1.0 : 2.0;
-    term.begin(two.p.set, two.points, two.p.state, predicted, {.h = 0.01, .end_factor = end_factor}, 0.5);
+    term.begin(two.p.set, two.points, two.p.state, predicted, {.h = 0.01, .end_factor = end_factor, .slip_factor = trial % 2 == 0 ? 1.0 : 1.1}, {.speed = 0.5});
     term.lag_friction(predicted);
     const ParticleState pose = moved(0.003);
     const auto nudged = [&](Eigen::Index row, double by) {
@@ -302,7 +317,7 @@ TEST(ImplicitContact, HasTheGradientAndTheHessianOfItsPotential) {
     const Eigen::VectorXd gradient = gradient_at(pose);
     StepHessian hessian;
     hessian.begin(two.p.set.pinned, term.coupled());
-    term.add_hessian(pose, 0, hessian);
+    term.add_hessian(pose, 0, FrictionHessian::Exact, hessian);
     const Eigen::MatrixXd dense = Eigen::MatrixXd(hessian.matrix()).selfadjointView<Eigen::Lower>();
     const double step = 1e-6;
     for (Eigen::Index row = 0; row < 24; ++row) {
@@ -313,6 +328,29 @@ TEST(ImplicitContact, HasTheGradientAndTheHessianOfItsPotential) {
       EXPECT_LT((dense.col(row) - column).cwiseAbs().maxCoeff(), 1e-5 * dense.cwiseAbs().maxCoeff() + gradient.cwiseAbs().maxCoeff())
           << trial << ' ' << row;
     }
+  }
+}
+
+TEST(ImplicitContact, SharesTheElasticForceWithinABodyAsItsEnergyDoes) {
+  Draw draw(13);
+  TwoBodies two(draw);
+  two.points.pair[0].friction = two.points.pair[0].dissipation = 0.0;
+  const auto slope_of = [](const ContactPoints& points, const ParticleState& pose, const ParticleSet& set) {
+    ContactTerm term;
+    term.begin(set, points, pose, pose, {.h = 0.01}, {});
+    term.lag_friction(pose);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(24);
+    term.add_gradient(pose, gradient);
+    return gradient;
+  };
+  const ContactPoints with = two.at(two.p.state);
+  ContactPoints without = with;
+  without.pair[0].split_end = 0;
+  const Eigen::VectorXd change = slope_of(with, two.p.state, two.p.set) - slope_of(without, two.p.state, two.p.set);
+  for (Eigen::Index i = 0; i < 4; ++i) {  // the normal force is the predicted one here
+    const auto k = static_cast<std::size_t>(i);
+    EXPECT_LT((change.segment<3>(6 * i) + with.split_force[k]).norm(), 1e-12);
+    EXPECT_LT((change.segment<3>(6 * i + 3) + with.split_torque[k]).norm(), 1e-12);
   }
 }
 

@@ -35,7 +35,7 @@ struct System {
   }
   void run(const ForceModel& forces, double dt, int steps) {
     for (int k = 0; k < steps; ++k) {
-      advance(p.set, interactions, forces, time, dt, p.state, kick, ledger);
+      advance({p.set, interactions, forces}, time, dt, {p.state, kick, ledger});
       time += dt;
     }
   }

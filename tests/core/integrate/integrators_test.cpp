@@ -230,7 +230,7 @@ TEST(SymplecticMethod, IsVelocityVerletToTheBitByDefault) {
     accumulate_interactions(plain.p.set, state, plain.interactions, t, executor, pairs, out.internal, out.external);
   };
   for (int k = 0; k < 50; ++k) {
-    advance(plain.p.set, plain.interactions, forces, k * 1e-3, 1e-3, plain.p.state, plain.kick, plain.ledger);
+    advance({plain.p.set, plain.interactions, forces}, k * 1e-3, 1e-3, {plain.p.state, plain.kick, plain.ledger});
   }
   EXPECT_EQ(s.hash(), plain.hash());
   System other = make_spiral(kExponential);

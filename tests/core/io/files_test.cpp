@@ -89,6 +89,16 @@ TEST_F(Files, ThatAreAbsentOrTooLargeAreNamed) {
   EXPECT_EQ(io::read_file(path("large"), 11).size(), 11U);
 }
 
+TEST_F(Files, StartsAreReadOfFilesThatMayBeAbsentAlone) {
+  std::array<std::byte, 4> start{};
+  EXPECT_EQ(io::read_start_if_there(path("absent"), start), 0U);
+  io::write_atomically(path("short"), std::string_view("abc"));
+  EXPECT_EQ(io::read_start_if_there(path("short"), start), 3U);
+  EXPECT_EQ(io::read_start_if_there(path("short") / "below", start), 0U);
+  // A folder opens and cannot be read, as a file on a failing disk.
+  expect_error(ErrorKind::Io, "Is a directory", [&] { static_cast<void>(io::read_start_if_there(path("."), start)); });
+}
+
 TEST_F(Files, FoldersAreMadeOrRefused) {
   io::make_writable_folder(path("a") / "b");
   EXPECT_TRUE(fs::is_directory(path("a") / "b"));

@@ -82,8 +82,6 @@ TEST(CohesionForce, RepelsMonotonicallyUpToSixteenThirds) {
   };
   EXPECT_EQ(rising_points(5.3), 0);
   EXPECT_GT(rising_points(5.5), 0);
-  EXPECT_TRUE(unit_law(16.0 / 3.0).monotone_repulsion());
-  EXPECT_FALSE(unit_law(5.34).monotone_repulsion());
 }
 
 TEST(CohesionEnergy, HasItsPrintedValues) {

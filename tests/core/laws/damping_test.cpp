@@ -19,7 +19,7 @@ struct Damped {
   Interactions interactions;
   KickState kick;
   Ledger ledger;
-  void step(double dt) { advance(p.set, interactions, kNoForces, 0.0, dt, p.state, kick, ledger); }
+  void step(double dt) { advance({p.set, interactions, kNoForces}, 0.0, dt, {p.state, kick, ledger}); }
   [[nodiscard]] Motion motion() const { return measure_motion(p.set, p.state); }
 };
 
@@ -131,7 +131,7 @@ TEST(Friction, DecaysAsTheExponentialToSecondOrder) {
     laws.friction.push_back({.name = "f", .first = {0}, .second = {1}, .linear = 0.5});
     KickState kick;
     Ledger ledger;
-    for (int k = 0; k < steps; ++k) advance(p.set, laws, kNoForces, 0.0, 1.0 / steps, p.state, kick, ledger);
+    for (int k = 0; k < steps; ++k) advance({p.set, laws, kNoForces}, 0.0, 1.0 / steps, {p.state, kick, ledger});
     return std::abs(p.state.velocity[1].x() - p.state.velocity[0].x() - 0.1 * std::exp(-0.75));
   };
   const double coarse = error(8), fine = error(16);
@@ -249,7 +249,7 @@ TEST(StiffnessDamping, GivesABondTheRatioOfItsFrequency) {
     };
     const double end = 2.0;
     const int steps = static_cast<int>(std::lround(end / dt));
-    for (int k = 0; k < steps; ++k) advance(d.p.set, d.interactions, forces, 0.0, dt, d.p.state, d.kick, d.ledger);
+    for (int k = 0; k < steps; ++k) advance({d.p.set, d.interactions, forces}, 0.0, dt, {d.p.state, d.kick, d.ledger});
     const double exact =
         std::exp(-decay * end) * (std::cos(omega_d * end) + decay / omega_d * std::sin(omega_d * end));
     return std::abs(d.p.state.position[1].x() - d.p.state.position[0].x() - exact);

@@ -295,7 +295,6 @@ TEST(Interactions, CountWhatTheyVisit) {
   bonded.geometric_co_normality.clear();
   bonded.geometric_co_circularity.clear();
   bonded.repulsion.clear();
-  EXPECT_TRUE(bonded.bonded_only());
   EXPECT_EQ(evaluate_loads(crowd.p, bonded, Executor(1)).counts.pairs_visited, kChainLaws * chain + 59 + 58);
 }
 

@@ -27,7 +27,7 @@ struct Chain {
     state = unbroken(links);
   }
   LinkChange update(Ledger& ledger, double dt = 1e-3) {
-    return update_links(p.set, p.state, intact(laws, links, state), links, dt, state, ledger);
+    return update_links({p.set, p.state, intact(laws, links, state)}, links, dt, state, ledger);
   }
   [[nodiscard]] double energy() const {
     return potential_energy(p.set, p.state, intact(laws, links, state));
@@ -106,7 +106,7 @@ TEST(Breaking, OfCohesionReleasesTheWorkOfSeparation) {
   LinkState state = unbroken(links);
   p.state.position[1].x() = 6.1;
   Ledger ledger;
-  EXPECT_EQ(update_links(p.set, p.state, laws, links, 1e-3, state, ledger).broke, 1u);
+  EXPECT_EQ(update_links({p.set, p.state, laws}, links, 1e-3, state, ledger).broke, 1u);
   EXPECT_NEAR(ledger.dissipated, law.binding_energy(), 1e-10 * law.binding_energy());
 }
 

@@ -33,7 +33,7 @@ struct Sampled {
   }
   void again(const Body& body, int threads = 1, std::span<const std::uint8_t> active = {}) {
     const Executor executor(threads);
-    sample_surface(body.skeleton, layout, body.parts, body.field, active, {}, executor, state, samples);
+    sample_surface({body.skeleton, layout, body.parts, body.field}, {active}, executor, state, samples);
   }
   [[nodiscard]] double area() const { return std::accumulate(samples.area.begin(), samples.area.end(), 0.0); }
   [[nodiscard]] std::size_t valid() const {
@@ -285,7 +285,7 @@ TEST_P(SampledBody, AllocateNothingOnceWarm) {
   const auto step = [&] {
     place_skeleton(body_.skeleton, body_.parts, placed);
     index_field(body_.skeleton, placed, field);
-    sample_surface(body_.skeleton, sampled.layout, body_.parts, field, {}, {}, executor, sampled.state, sampled.samples);
+    sample_surface({body_.skeleton, sampled.layout, body_.parts, field}, {}, executor, sampled.state, sampled.samples);
     static_cast<void>(field.bound(body_.placed.support[0]));
     static_cast<void>(field.surface_box());
   };
@@ -331,7 +331,7 @@ TEST(SurfaceSamples, SeeANarrowGapBetweenTwoParts) {
   SampleState state;
   SurfaceSamples samples;
   const Executor executor(1);
-  sample_surface(body.skeleton, layout, body.parts, body.field, {}, {}, executor, state, samples);
+  sample_surface({body.skeleton, layout, body.parts, body.field}, {}, executor, state, samples);
   EXPECT_EQ(samples.valid[0], 1);
   EXPECT_NEAR(state.distance[0], facing, 1e-14);
 }
@@ -373,13 +373,13 @@ TEST(SurfaceSamples, NearABoxAreThoseOfAllThatLieThere) {
   const Executor executor(2);
   SampleState all_state, near_state;
   SurfaceSamples all, some;
-  sample_surface(body.skeleton, layout, body.parts, body.field, {}, {}, executor, all_state, all);
+  sample_surface({body.skeleton, layout, body.parts, body.field}, {}, executor, all_state, all);
   EXPECT_EQ(all.visited, layout.size());
   const std::vector<double> found = all_state.distance;
-  sample_surface(body.skeleton, layout, body.parts, body.field, {}, {}, executor, all_state, all);
+  sample_surface({body.skeleton, layout, body.parts, body.field}, {}, executor, all_state, all);
   EXPECT_EQ(all_state.distance, found);  // again, from where they are
   const std::array boxes{Box{Vec3(0.3, -0.2, 0.1), Vec3(0.9, 0.3, 0.9)}, Box{Vec3(-1, -1, -0.1), Vec3(-0.7, 0, 0)}};
-  sample_surface(body.skeleton, layout, body.parts, body.field, {}, boxes, executor, near_state, some);
+  sample_surface({body.skeleton, layout, body.parts, body.field}, {{}, boxes}, executor, near_state, some);
   std::size_t inside = 0, outside = 0;
   for (std::size_t s = 0; s < layout.size(); ++s) {
     if (all.valid[s] == 0) continue;

@@ -28,7 +28,7 @@ double value(const MeshSolid& solid, const Vec3& x) { return FieldView(solid).va
 constexpr double kCells = 128.0;
 
 TEST(MeshSolid, IsNearTheExactDistance) {
-  // Weights of a cubic B-spline have a mean square distance of a cell from where it is asked for, and a distance changes by the way at most.
+  // Weights of a cubic B-spline have a mean square distance of a cell from the point of evaluation, and a distance changes by the way at most.
   for (const Mesh& mesh : {block(Vec3(0.5, 0.3, 0.2)), gear(24, 0.4, 0.5, 0.1), octahedral_sphere(0.5, 4),
                            both(block(Vec3(0.5, 0.02, 0.02)), block(Vec3(0.02, 0.5, 0.001)))}) {
     const MeshSolid solid(mesh, {.slope = 1.0});
@@ -47,9 +47,9 @@ TEST(MeshSolid, IsNearTheExactDistance) {
 }
 
 TEST(MeshSolid, IsTheSameInAnyUnitOfLength) {
-  // Powers of two near 1e-18, 1e-9 and 1e18: nothing is rounded otherwise.
+  // Powers of two near 1e-50, 1e-18, 1e-9, 1e18 and 1e50: nothing is rounded otherwise.
   const MeshSolid solid(octahedral_sphere(1.0, 3), {.slope = 1.0});
-  for (const int power : {-60, -30, 60}) {
+  for (const int power : {-166, -60, -30, 60, 166}) {
     const double scale = std::ldexp(1.0, power);
     const MeshSolid scaled(octahedral_sphere(scale, 3), {.slope = 1.0});
     for (const Vec3& u : places({Vec3::Constant(-1.02), Vec3::Constant(1.02)}, 40)) {

@@ -1,7 +1,9 @@
 // Pairs that press harder than they can hold: what is reported, what hard cores do, and that nothing passes below.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -125,6 +127,41 @@ TEST(Overload, OfConcentricBallsHoldsTheEnergyOfTheSofter) {
   EXPECT_NEAR(simulation.contacts().summary[0].energy, kCapacity, 1e-4 * kCapacity);
   while (simulation.frame() < 4) simulation.step_frame();
   EXPECT_EQ(simulation.audits().energy_error, 0.0);
+}
+
+// A shelf of 10 mm that is part of a block of 1 m.
+TEST(Overload, IsNotReportedOfAThinPartOfAMesh) {
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "overload_shelf";
+  std::filesystem::create_directories(folder);
+  std::ofstream file(folder / "shelf.obj");
+  // A profile in x and z, between two planes of y.
+  for (const double y : {0.5, -0.5}) {
+    for (const auto& [x, z] : {std::pair{-0.5, 0.0}, {0.5, 0.0}, {0.5, 0.6}, {0.8, 0.6}, {0.8, 0.61}, {0.5, 0.61}, {0.5, 1.0}, {-0.5, 1.0}}) {
+      file << "v " << x << ' ' << y << ' ' << z << '\n';
+    }
+  }
+  for (const auto& f : std::initializer_list<std::array<int, 3>>{{2, 1, 8}, {3, 2, 8}, {5, 4, 3}, {6, 5, 3}, {8, 7, 6}, {3, 8, 6}, {16, 9, 10}, {16,
+           10, 11}, {11, 12, 13}, {11, 13, 14}, {14, 15, 16}, {14, 16, 11}, {10, 9, 2}, {2, 9, 1}, {11, 10, 3}, {3, 10, 2}, {12, 11, 4}, {4, 11, 3},
+           {13, 12, 5}, {5, 12, 4}, {14, 13, 6}, {6, 13, 5}, {15, 14, 7}, {7, 14, 6}, {9, 16, 1}, {1, 16, 8}, {16, 15, 8}, {8, 15, 7}}) {
+    file << "f " << f[0] << ' ' << f[1] << ' ' << f[2] << '\n';
+  }
+  file.close();
+  Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 1 s
+gravity: [0, 0, -9.81]
+contact: {error: 0.01}
+obstacles: [{name: block, shape: mesh, file: shelf.obj}]
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0.65, 0, 0.71], mass: 0.05}
+    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.15, thickness: 0.1, slope: 5}}]
+    contact: {modulus: 1e4, dissipation: 1}
+)",
+                                    "test.yaml", folder));
+  while (simulation.frame() < 6) simulation.step_frame();
+  ASSERT_EQ(simulation.contacts().summary.size(), 1u);
+  EXPECT_TRUE(simulation.state().record.overloads.empty());
 }
 
 TEST(Overload, IsKeptWithTheState) {

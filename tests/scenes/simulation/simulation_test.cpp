@@ -4,12 +4,16 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <thread>
 
 #include "scenes/run_scenes.h"
 #include "scenes/small_scenes.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/core/mesh.h"
 #include "supple/scenes/read_scene.h"
 
@@ -63,6 +67,51 @@ TEST(Advancing, EndsAtTheFrameOrWhereItIsTold) {
   Simulation straight = make(two_balls());
   run(straight, 3);
   EXPECT_EQ(simulation.state_hash(), straight.state_hash());
+}
+
+TEST(Advancing, IsInterruptedWithinAStepAndGoesOnFromTheLastFrame) {
+  Simulation undisturbed = make(two_balls()), simulation = make(two_balls());
+  std::atomic<int> interrupt{0};
+  const InterruptScope scope(&interrupt);
+  simulation.advance_to(3);
+  const std::uint64_t at_frame = simulation.state_hash();
+  simulation.step();
+  simulation.step();
+  interrupt = 2;
+  EXPECT_THROW(simulation.step(), Interrupted);
+  EXPECT_EQ(simulation.frame(), 3);
+  EXPECT_EQ(simulation.state_hash(), at_frame);
+  interrupt = 0;
+  simulation.advance_to(5);
+  undisturbed.advance_to(5);
+  EXPECT_EQ(simulation.state_hash(), undisturbed.state_hash());
+}
+
+// Ten thousand times stiffer than its steps resolve: the linear system of one of them takes minutes.
+TEST(Advancing, IsInterruptedWithinALinearSystem) {
+  Simulation simulation = make(R"(
+schema: 1
+duration: 1 s
+frame_rate: 24
+integrator: {method: backward_euler}
+gravity: [0, 0, -9.81]
+objects:
+  - name: sheet
+    particles: {arrange: grid, columns: 120, rows: 120, spacing: 0.01, mass: 1e-4}
+    interactions: [{law: bond_frame, within: 0.015, stretch: 1e12, rotation: 0.1}]
+    pins: [{particle: 0}, {particle: -1}]
+)");
+  std::atomic<int> interrupt{0};
+  const InterruptScope scope(&interrupt);
+  std::chrono::steady_clock::time_point told;
+  std::jthread signal([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    told = std::chrono::steady_clock::now();
+    interrupt = 2;
+  });
+  EXPECT_THROW(simulation.advance_to(1000), Interrupted);
+  signal.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - told, std::chrono::seconds(5));  // a second, on a machine that others use, too
 }
 
 class Arrays : public testing::TestWithParam<const char*> {};

@@ -30,11 +30,13 @@ struct Approach {
 [[nodiscard]] double approach_inverse_mass(std::span<const ContactBody> bodies, std::span<const PartMobility> mobility,
                                            const ContactSurface::Summary& summary);
 
-/// Integral of [min(p_A, p_B)]+ dV [J] with A moved by `shift`, by midpoints of `cells` cubed cells of the overlap box.
-[[nodiscard]] double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, int cells);
+/// Integral of [min(p_A, p_B)]+ dV [J] with A moved by `shift`: by midpoints of `cells` cubed cells of the overlap box, or, where a body is too thin for
+/// these, as a plate or a shell may be, by some `cells` squared columns parallel to `along` (unit). Parts thinner than 2^-13 of the box may be missed.
+[[nodiscard]] double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, const Vec3& along, int cells);
 
 /// U_max: the largest contact energy [J] that the pair can reach when A is moved into B along `direction` (unit) until it
-/// is through, or for an unbounded B, as deep as it still grows. What approaches with more kinetic energy passes, if B has another side.
+/// is through, or for an unbounded B, as deep as it still grows; not less than the energy where they are. What approaches with more kinetic energy passes,
+/// if B has another side.
 /// Two equal linear balls of pressure E (1 - r/R) hold pi E R^3 / 3. @param cells  see `shifted_energy`
 [[nodiscard]] double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells = 32);
 

@@ -16,7 +16,6 @@ struct ContactCandidates {
   std::vector<double> spacing;         ///< of the coarser samples of the two bodies [m], 0: none; shape [pairs]
   /// 1: both bodies are convex, so that their overlap is one piece with one peak; its only seed lies between their cores.
   std::vector<std::uint8_t> convex;    ///< shape [pairs]
-  std::uint64_t pairs_present = 0;     ///< pairs that the rules allow, as `broad_phase` counts them
 };
 
 /// Pairs of boxes that overlap, by sweep and prune along the longest axis, in columns across the others; sorted.
@@ -35,16 +34,13 @@ class OverlapList {
   std::vector<BodyPair> near_;  // which of these overlap
 };
 
-/// Pairs that the rules allow, touching or not; asks for each of them.
-[[nodiscard]] std::uint64_t count_allowed(std::span<const ContactBody> bodies, const ContactRules& rules);
-
-/// Pairs whose surface boxes overlap and that may touch, sorted.
+/// Pairs whose surface boxes overlap and that may touch, sorted: for bodies that the caller owns, of whom no list is kept.
 [[nodiscard]] std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const ContactRules& rules,
-                                                const Executor& executor, std::uint64_t* present = nullptr);
+                                                const Executor& executor);
 
 /// Stage 5. Needs the samples of stage 4 for the bodies of the broad phase, but not of pairs of convex bodies. A sample is a seed when the other surface is,
 /// to first order, at most one sample spacing away. Pairs that have samples but no seed are left out, and convex ones whose
-/// cores are farther apart than both surfaces reach; pairs without any samples are kept and searched by stage 6. `pairs_present` is left as it is.
+/// cores are farther apart than both surfaces reach; pairs without any samples are kept and searched by stage 6.
 void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair> pairs, const Executor& executor,
                    ContactCandidates& out);
 

@@ -38,14 +38,24 @@ struct ReactionReport {
   double dissipated_power = 0.0;    ///< of damping and friction [W], >= 0; with springs also what goes into them
 };
 
-/// Adds to loads[i] (sized to the parts of body i) what contact does to body i. Forces and moments of a pair sum to zero.
-/// @param dissipative  if not empty: receives the dissipative part of the same loads, by body, sized like `loads`
-/// @param sticks  the springs that `ReactionSettings::stick` speaks of; pairs without one have no friction yet
-/// @param traction_force  if not null: total force on A of each pair, dissipative part included, shape [pairs]
-/// @param pair_power  if not null: what damping and friction take of each pair [W], shape [pairs]
-ReactionReport react(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface,
-                     const ReactionSettings& settings, const Executor& executor, std::span<PartLoads> loads,
-                     std::vector<Vec3>* traction_force = nullptr, std::span<PartLoads> dissipative = {},
-                     std::vector<double>* pair_power = nullptr, const StickState* sticks = nullptr);
+/// What reactions follow from.
+struct ReactionInputs {
+  std::span<const ContactBody> bodies;
+  const ContactRules& rules;
+  const ContactSurface& surface;
+  ReactionSettings settings{};
+  const StickState* sticks = nullptr;  ///< the springs of `ReactionSettings::stick`; pairs without one have no friction yet
+};
+
+/// What reactions are added to; what is empty or null is not asked for.
+struct ReactionOutputs {
+  std::span<PartLoads> loads;                    ///< by body, sized to the parts of each
+  std::span<PartLoads> dissipative{};            ///< the dissipative part of the same loads, sized like `loads`
+  std::vector<Vec3>* traction_force = nullptr;   ///< replaced: the force on A of each pair, dissipative part included [N], shape [pairs]
+  std::vector<double>* pair_power = nullptr;     ///< replaced: what damping and friction take of each pair [W], shape [pairs]
+};
+
+/// Adds to out.loads[i] what contact does to body i. Forces and moments of a pair sum to zero.
+ReactionReport react(const ReactionInputs& in, const Executor& executor, const ReactionOutputs& out);
 
 }  // namespace supple::collision

@@ -3,7 +3,7 @@
 /// them the pressure is linear in the approach of the two bodies, and each body moves there as the weighted mean of
 /// its particles. In addition to inertia and pair laws the step minimises
 ///   sum_q l_n(u_q . n) + sum_q l_t(v_q),
-/// u_q the displacement of body A relative to B within the step, v_q their relative velocity along the surface at its end:
+/// u_q the displacement of body A relative to B within the step, v_q their relative velocity along the surface (backward Euler: at its end; implicit midpoint: just after its middle):
 ///   l_n' = w [p + g (u - u_p) . n]_+ (1 + d u . n / h)_+     pressure, and damping (Hunt & Crossley 1975); increases, so l_n is convex,
 ///   l_t' = mu N f1(|v_q|) v_q / |v_q|                        Coulomb friction, N the normal force of the last iterate (Li et al. 2020),
 /// with weight w, pressure p and approach u_p . n at the predicted pose, and the slope g of the pressure in the approach: for parallel
@@ -28,6 +28,7 @@ struct ContactPoints {
     double friction = 0.0;             ///< mu [1]
     double dissipation = 0.0;          ///< d [s/m]
     ObstacleSide obstacle = ObstacleSide::None;
+    std::uint32_t split_begin = 0, split_end = 0;  ///< its loads within bodies
   };
   std::vector<Pair> pair;
 
@@ -44,6 +45,12 @@ struct ContactPoints {
   std::vector<std::uint32_t> particle;
   std::vector<double> share;
 
+  /// What the pressure does to the particles beyond these shares, at this pose: the forces of a body follow from the energy of contact, which shares
+  /// differently. Its forces and moments of each body sum to zero. It grows and falls with the normal force of the pair.
+  std::vector<std::uint32_t> split_particle;
+  std::vector<Vec3> split_force;   ///< [N]
+  std::vector<Vec3> split_torque;  ///< about the particle's centre [N m]
+
   void clear();
 };
 
@@ -51,6 +58,7 @@ struct ContactPoints {
 struct ContactPairLoad {
   Vec3 force = Vec3::Zero();  ///< on A [N]; B gets the opposite
   double dissipated = 0.0;    ///< by damping and friction in the step [J], >= 0
+  double stick_speed = 0.0;   ///< below which friction faded out [m/s]
 };
 
 /// Computes the contacts at a pose and a time.
@@ -58,8 +66,10 @@ using ContactModel = std::function<void(const ParticleState& pose, double time, 
 
 struct ImplicitContact {
   ContactModel find;
-  /// Speed below which friction falls to zero [m/s]: bodies below the Coulomb limit creep at most at this speed, or at a thousandth of the pair's relative speed if that is more.
+  /// Speed below which friction falls to zero [m/s]: bodies below the Coulomb limit creep at most at this speed, or at `slow_slip` times the pair's
+  /// relative speed if that is more.
   double stick_speed = 1e-8;
+  double slow_slip = 1e-3;  ///< that share of the pair's relative speed [1]
   std::vector<ContactPairLoad> load{};  ///< of the last step, by ContactPoints::pair
 };
 

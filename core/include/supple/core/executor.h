@@ -21,6 +21,7 @@ class Executor {
 
   /// Calls body(begin, end) for the consecutive blocks [0, block), [block, 2 block) ... of [0, n), in any order and
   /// possibly at the same time. The first exception in block order is rethrown after all blocks ended.
+  /// Where the calling thread's InterruptScope says so, blocks that have not begun throw Interrupted instead.
   /// @pre block > 0
   void for_blocks(std::size_t n, std::size_t block, const std::function<void(std::size_t, std::size_t)>& body) const;
 
@@ -31,10 +32,5 @@ class Executor {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-inline constexpr std::size_t kReduceBlock = 256;
-
-/// Sum of map(i) for i in [0, n), grouped by kReduceBlock alone: the same bits for every thread count.
-[[nodiscard]] double ordered_sum(const Executor& executor, std::size_t n, const std::function<double(std::size_t)>& map);
 
 }  // namespace supple

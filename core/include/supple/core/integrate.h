@@ -13,6 +13,8 @@
 
 namespace supple::core {
 
+struct ImplicitContact;
+
 /// exp of a rotation vector [rad]: (sin(|t|/2) t/|t|, cos(|t|/2)), by series near 0.
 [[nodiscard]] Quat rotation_exp(const Vec3& rotation);
 /// Rotation vector of a unit quaternion, |t| <= pi [rad].
@@ -68,12 +70,27 @@ struct KickState {
   void hash(Hasher& hasher) const;
 };
 
+/// Particles and everything that acts on them.
+struct StepProblem {
+  const ParticleSet& set;
+  const Interactions& interactions;
+  const ForceModel& forces;
+  /// Of the implicit methods: contact as a part of the step; `forces` then leave it out. Null: all that acts beside the pair laws is frozen.
+  ImplicitContact* contact = nullptr;
+};
+
+/// What a step changes.
+struct StepTarget {
+  ParticleState& state;
+  KickState& kick;
+  Ledger& ledger;
+};
+
 /// One step of size dt: damping dt/2 in pair order, kick dt/2, drift dt, forces, kick dt/2, damping dt/2 in reverse
 /// pair order. Friction between particles is integrated implicitly pair by pair (unconditionally stable, momentum
 /// exact); medium damping by its exact exponential. Pinned particles do not move; their impulse goes to the ledger.
 /// Calls `forces` once (twice when `kick` is not valid).
-void advance(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time, double dt,
-             ParticleState& state, KickState& kick, Ledger& ledger,
+void advance(const StepProblem& problem, double time, double dt, const StepTarget& target,
              RotationUpdate rotation = RotationUpdate::Splitting);
 
 /// Total kinetic energy [J], momentum [N s] and angular momentum about the world origin [N m s].

@@ -73,22 +73,6 @@ class IntegratorWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Particles and everything that acts on them.
-struct StepProblem {
-  const ParticleSet& set;
-  const Interactions& interactions;
-  const ForceModel& forces;
-  /// Implicit methods: contact as a part of the step; `forces` then exclude it. Null: all loads other than pair laws are constant.
-  ImplicitContact* contact = nullptr;
-};
-
-/// The data that a step changes.
-struct StepTarget {
-  ParticleState& state;
-  KickState& kick;
-  Ledger& ledger;
-};
-
 /// Tools of a step. `pairs` is the workspace of `StepProblem::interactions`; the implicit methods use it.
 struct StepTools {
   const Executor& executor;

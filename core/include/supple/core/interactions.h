@@ -136,8 +136,6 @@ struct Interactions {
   /// External loads are means over this span of time [s], that of a step; without extent, they are those of the moment.
   std::array<double, 2> load_span{};
 
-  /// True when no law needs the neighbour search.
-  [[nodiscard]] bool bonded_only() const;
   /// Number of pair laws; friction and external loads are not counted.
   [[nodiscard]] std::size_t law_count() const;
 };

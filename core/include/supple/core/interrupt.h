@@ -18,4 +18,22 @@ inline void heed(const std::atomic<int>* interrupt) {
   if (interrupt != nullptr && interrupt->load(std::memory_order_relaxed) != 0) throw Interrupted();
 }
 
+/// While it lives, long calls of this thread, and what they do on the threads of an executor, throw Interrupted soon after a number is not 0.
+/// Of several the last one made counts.
+class InterruptScope {
+ public:
+  /// @param interrupt  set by another thread or a signal, and outlives the scope; null: nothing ends the calls
+  explicit InterruptScope(const std::atomic<int>* interrupt) noexcept;
+  ~InterruptScope();
+  InterruptScope(const InterruptScope&) = delete;
+  InterruptScope& operator=(const InterruptScope&) = delete;
+
+ private:
+  const std::atomic<int>* outer_;
+};
+/// That of this thread's scope; null without one.
+[[nodiscard]] const std::atomic<int>* interrupt_of_scope() noexcept;
+/// @throws Interrupted where that is not 0
+inline void heed_scope() { heed(interrupt_of_scope()); }
+
 }  // namespace supple

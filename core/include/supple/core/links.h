@@ -78,10 +78,15 @@ struct LinkChange {
   [[nodiscard]] bool any() const noexcept { return broke + yielded > 0; }
 };
 
-/// Between two steps: breaks and yields links by their rules, `dt` after the last call. Their energy is booked as
-/// dissipated. `present` is the result of `intact` for `links_state`; it must be made again after a change.
-LinkChange update_links(const ParticleSet& set, const ParticleState& state, const Interactions& present,
-                        const Links& links, double dt, LinkState& links_state, Ledger& ledger);
+/// Particles and the present interactions between them.
+struct LinkedParticles {
+  const ParticleSet& set;
+  const ParticleState& state;
+  const Interactions& present;  ///< what `intact` gives for the present state of the links; after a change it must be made again
+};
+
+/// Between two steps: breaks and yields links by their rules, `dt` after the last call. Their energy is booked as dissipated.
+LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger);
 
 /// The interactions without the bonds (and friction) of broken links, with the present rest data.
 [[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);

@@ -71,7 +71,6 @@ struct Cohesion {
   [[nodiscard]] double binding_energy() const;            ///< U(inf) - U(r0) [J], closed form (Dawson and Ei)
   [[nodiscard]] double maximum_distance() const;          ///< r_m [m]: the only root beyond r0 of f' = 0
   [[nodiscard]] double influence_radius(double epsilon) const;  ///< r_c: |f| = epsilon F_max there, r_c > r_m [m]
-  [[nodiscard]] bool monotone_repulsion() const { return a <= 16.0 / 3.0; }
 };
 
 /// Form (shape memory), Lombardo & Puech 1995 sec. 4 in its consistent, normalised form with one curvature per pair:

@@ -59,15 +59,26 @@ struct SurfaceSamples {
   std::uint64_t failures = 0;        ///< seeds without a root
 };
 
+/// A body whose surface is sampled.
+struct SampledBody {
+  const Skeleton& skeleton;
+  const SampleLayout& layout;
+  std::span<const Pose> parts;  ///< world poses, shape [part_count]
+  const FieldView& field;
+};
+
+/// Where a surface is sampled; empty: everywhere.
+struct SampledRegion {
+  std::span<const std::uint8_t> active{};  ///< flags by part, shape [part_count] or empty
+  std::span<const Box> near{};             ///< world boxes, one of which the ray of a seed must meet [m]
+};
+
 /// Stage 4. Re-projects the seeds of the parts in `active` whose rays come near (all when these are empty); the rest keep their
 /// distance and are marked invalid. The distance is a function of the poses alone up to 1e-13 reach: of the roots where the ray leaves
 /// the body, the outermost in the seed's own territory, else the outermost. Roots are bracketed by fixed stations at
 /// most a quarter of the field's feature size apart (32 intervals at most; dips and humps between stations are looked
 /// into); the kept distance is but the start of the iteration.
-/// @param parts  world poses, shape [part_count]   @param active  flags by part, shape [part_count] or empty
-/// @param near   world boxes, one of which the ray of a seed must meet [m]
-void sample_surface(const Skeleton& skeleton, const SampleLayout& layout, std::span<const Pose> parts,
-                    const FieldView& field, std::span<const std::uint8_t> active, std::span<const Box> near,
-                    const Executor& executor, SampleState& state, SurfaceSamples& out);
+void sample_surface(const SampledBody& body, const SampledRegion& region, const Executor& executor, SampleState& state,
+                    SurfaceSamples& out);
 
 }  // namespace supple::implicit

@@ -28,9 +28,9 @@ std::vector<std::uint32_t> border(std::span<const Triangle> triangles) {
 
 class Sharpener {
  public:
-  Sharpener(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-            bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh)
-      : whole_(whole), fields_(fields), lattice_(lattice), owner_(owner), skip_(skip), changes_(changes), memory_(memory), crossings_(crossings), mesh_(mesh),
+  Sharpener(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh)
+      : whole_(field.whole), fields_(field.fields), lattice_(field.lattice), owner_(field.owner), skip_(field.skip), changes_(changes),
+        memory_(memory), crossings_(crossings), mesh_(mesh),
         steps_(std::move(mesh.triangle)), safe_(steps_.triangles().size(), true) {}
 
   /// @return cells that keep a crease cut off
@@ -62,7 +62,7 @@ class Sharpener {
   };
 
   using CellPlace = std::array<std::int64_t, 3>;
-  /// Where the middle of a triangle lies: all triangles of marching cubes lie in their cell.
+  /// The centre of a triangle: all triangles of marching cubes lie in their cell.
   [[nodiscard]] CellPlace cell_of(const Triangle& t) const {
     const Vec3 centre = (mesh_.position[t[0]] + mesh_.position[t[1]] + mesh_.position[t[2]]) / 3.0;
     const Vec3 at = (centre - lattice_.origin) / lattice_.cell;
@@ -247,7 +247,7 @@ class Sharpener {
         joined.push_back({left, right});
       }
     }
-    // A step for triangles that share cut edges, directly or by way of others.
+    // A step for triangles that share cut edges, directly or through others.
     std::vector<Triangle> pieces;
     for (const std::vector<std::uint32_t>& group : groups_of(joined)) {
       pieces.clear();
@@ -256,7 +256,7 @@ class Sharpener {
     }
   }
 
-  /// What pairs join, directly or by way of others.
+  /// Components of a set of pairs.
   static std::vector<std::vector<std::uint32_t>> groups_of(std::span<const std::array<std::uint32_t, 2>> pairs) {
     std::vector<std::uint32_t> member;
     for (const auto& pair : pairs) member.insert(member.end(), pair.begin(), pair.end());
@@ -386,9 +386,9 @@ class Sharpener {
 
 }  // namespace
 
-std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh) {
-  return Sharpener(whole, fields, lattice, owner, skip, changes, memory, crossings, mesh).run();
+std::uint64_t sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings,
+                      Mesh& mesh) {
+  return Sharpener(field, changes, memory, crossings, mesh).run();
 }
 
 }  // namespace supple::implicit

@@ -13,13 +13,21 @@
 
 namespace supple::implicit {
 
+/// A field with creases, and whose vertices a mesh of it has.
+struct CreasedField {
+  const FieldView& whole;                ///< F
+  std::span<const FieldView> fields;     ///< F_k of the nodes
+  const Lattice& lattice;
+  std::span<const std::uint32_t> owner;  ///< of the vertices, by place in `fields`
+  bool skip = true;                      ///< as MarchOptions::skip
+};
+
 /// Puts a vertex onto the crease in every cell whose vertices belong to several nodes, turns edges that cross the crease, and cuts those
 /// that still do (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here). What
 /// crosses then is taken back.
-/// @param whole    F   @param fields  F_k of the nodes   @param owner  of the vertices, by place in `fields`
-/// @param changes  since the memory was last used   @param skip  as MarchOptions::skip
+/// @param changes  since the memory was last used
 /// @return cells that keep a crease cut off
-std::uint64_t sharpen(const FieldView& whole, std::span<const FieldView> fields, const Lattice& lattice, std::span<const std::uint32_t> owner,
-                      bool skip, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh);
+std::uint64_t sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings,
+                      Mesh& mesh);
 
 }  // namespace supple::implicit

@@ -70,6 +70,9 @@ struct ObjectModel {
   bool own_error = false;                 ///< the object has its own key for `mesh_error`
 };
 
+/// Size that errors of an object are compared with: its rest diameter with what its surface adds; of `separate` ones that of one body [m].
+[[nodiscard]] double size_of(const ObjectModel& object);
+
 /// A solid that forces do not move and that touches every object with contact. Without keys it is at rest; with keys they
 /// move it, and `solid` is given at the origin.
 struct FixedBody {

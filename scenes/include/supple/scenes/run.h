@@ -12,6 +12,7 @@
 
 #include "supple/core/error.h"
 #include "supple/render/renderer.h"
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/simulation.h"
 
 namespace supple::scenes {
@@ -44,7 +45,7 @@ struct RunOptions {
   double scene_memory = kDefaultMemory;         ///< limit of memory for the scene, by the counts made before it is built [byte]
   double time_limit = 0.0;                      ///< stop between two steps after this time [s]; 0: never. Ends with ErrorKind::Limit
   std::function<void(const Progress&)> progress{}; ///< called by several threads, but never at the same time; may be empty
-  const std::atomic<int>* interrupt = nullptr;  ///< non-zero: stop after the current step, or in a Delaunay mesh (the signal's number)
+  const std::atomic<int>* interrupt = nullptr;  ///< non-zero (the signal's number): the run ends soon, in whatever stage it is; saved frames stay
 };
 
 inline constexpr const char* kOutOfMemory =
@@ -78,6 +79,7 @@ struct RunResult {
   std::vector<std::string> warnings;
   SearchCounts searches;    ///< counts of the meshes of all frames, kept ones included
   PictureTimes pictures;
+  StageErrors errors;       ///< of what `run_scene` simulated
 };
 
 /// Checks the requirements of pictures, as runs that draw do before they begin: the files of textures, and the path tracer.

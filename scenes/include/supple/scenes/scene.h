@@ -23,7 +23,7 @@ struct TimeStepDesc {
   int max_substeps = 4096;           ///< a scene whose automatic steps would be finer is refused
 };
 
-enum class MethodName : std::uint8_t { Auto, Symplectic, Rk4, Adaptive, BackwardEuler, ImplicitMidpoint };
+enum class MethodName : std::uint8_t { Auto, Symplectic, Rk4, Adaptive, BackwardEuler, ImplicitMidpoint, Implicit };
 enum class RotationName : std::uint8_t { Splitting, Exponential };
 
 /// integrator
@@ -426,6 +426,7 @@ struct Scene {
   double frame_rate = 24.0;           ///< [1/s]
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
   bool planar = false;                ///< particles keep their z and turn about z only
+  std::optional<double> accuracy;     ///< over the size of the bodies [1]; absent: every stage by its own keys
   TimeStepDesc time_step;
   IntegratorDesc integrator;
   std::vector<ObjectDesc> objects;    ///< sorted by name

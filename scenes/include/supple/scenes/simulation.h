@@ -12,10 +12,12 @@
 #include <atomic>
 #include <functional>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "supple/core/content_versions.h"
@@ -36,6 +38,7 @@ struct SimulationOptions {
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes with it are refused
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps continue
   double memory = kDefaultMemory;  ///< limit of memory for the scene, by the counts made before it is built [byte]
+  int finer = 0;               ///< steps are halved this many more times; negative: fewer times, but at most one step per frame
   bool questions = false;      ///< for queries of states: an initial state that needs finer steps than time_step.max_substeps is refused by the first step, not earlier
 };
 
@@ -104,6 +107,8 @@ class Simulation {
   [[nodiscard]] double time_step() const;       ///< of the current frame interval [s]
   [[nodiscard]] std::uint64_t state_hash() const;
   [[nodiscard]] const IntegratorPlan& integrator() const;
+  /// Speed below which friction fell to zero between two objects or obstacles, by their names: the largest at frames (explicit methods) or steps [m/s].
+  [[nodiscard]] const std::map<std::pair<std::string, std::string>, double>& friction_speeds() const;
   /// Work of the steps of this object so far: sums, the largest last correction, and whether all steps met the tolerance.
   [[nodiscard]] const core::StepReport& integration() const;
 

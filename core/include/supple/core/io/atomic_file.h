@@ -56,6 +56,8 @@ void rename_whole(const std::filesystem::path& from, const std::filesystem::path
 
 /// Fills `bytes` with the start of a file. @return number of bytes; none, with errno, where it cannot be read
 [[nodiscard]] std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes);
+/// The same of a file that may be absent, which has none. @throws Error{Io} where it is there and cannot be read
+[[nodiscard]] std::size_t read_start_if_there(const std::filesystem::path& path, std::span<std::byte> bytes);
 
 /// Creates the folder (and its parents) and checks that files can be made in it. @throws Error{Io} otherwise.
 void make_writable_folder(const std::filesystem::path& path);

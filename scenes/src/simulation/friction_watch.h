@@ -1,0 +1,31 @@
+/// @file friction_watch.h
+/// Records the speeds below which friction falls to zero in a run. Explicit steps raise the speed of the scene where friction would otherwise reverse the
+/// motion of a pair in every step (react.h); implicit steps raise it with the relative speed of the pair (compliant_contact.h).
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "simulation/frame.h"
+#include "supple/core/compliant_contact.h"
+
+namespace supple::scenes {
+
+class FrictionWatch {
+ public:
+  /// The pairs of `frame.surface` in explicit steps of `context.step`, by the mean contributions where their load acts.
+  void look(const StageContext& context, const Frame& frame);
+  /// The same of an implicit step. @param loads  by pair of `frame.surface`
+  void look(const StageContext& context, const Frame& frame, std::span<const core::ContactPairLoad> loads);
+  /// The largest such speed of each two objects, by their names [m/s].
+  [[nodiscard]] const std::map<std::pair<std::string, std::string>, double>& speeds() const { return speeds_; }
+
+ private:
+  void note(const StageContext& context, const collision::BodyPair& bodies, double speed);
+
+  std::map<std::pair<std::string, std::string>, double> speeds_;
+};
+
+}  // namespace supple::scenes

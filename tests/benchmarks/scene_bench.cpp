@@ -1,0 +1,182 @@
+/// @file scene_bench.cpp
+/// Whole scenes at one accuracy, one JSON object a line: CPU time of a simulated second, its shares by stage, and what positions are off by, over the size of
+/// their objects. The reference has steps 16 times as short and a 16th of the error of contact. Errors are told up to the first frame at which a second
+/// reference, with factors of 8, is away from it by more than a tenth of the accuracy: what follows is chaos.
+///   scene_bench [NAME ...] [--accuracy A] [--set path.to.key=value ...]
+/// All scenes where none is named; --accuracy 0.01 by default; keys are set in runs and references alike.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "supple/core/cpu_time.h"
+#include "supple/core/error.h"
+#include "supple/scenes/accuracy.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/simulation.h"
+#include "usage.h"
+
+namespace {
+
+using namespace supple;
+using namespace supple::scenes;
+namespace fs = std::filesystem;
+
+struct Case {
+  std::string_view name;
+  std::string_view file;  ///< in the source tree
+  double seconds;         ///< simulated of it
+};
+
+constexpr Case kCases[] = {
+    {"jelly", "tests/benchmarks/scenes/jelly_stairs.yaml", 2.0},
+    {"letter", "tests/benchmarks/scenes/letter_s.yaml", 1.0},
+    {"chain", "tests/benchmarks/scenes/chain_hit.yaml", 1.0},
+    {"ball_hits_spiral", "scenes/library/figures/ball_hits_spiral.yaml", 2.0},
+    {"spiral_uncoils", "scenes/library/figures/spiral_uncoils.yaml", 4.0},
+    {"pile_rests", "scenes/library/contacts/pile_rests.yaml", 1.0},
+    {"hand_closes", "scenes/library/objects/hand_closes.yaml", 1.0},
+    {"shell_dents", "scenes/library/objects/shell_dents.yaml", 1.0},
+    {"plate_breaks", "scenes/library/objects/plate_breaks.yaml", 1.0},
+    {"slide", "scenes/library/contacts/slide_on_incline.yaml", 1.0},
+    {"cradle", "scenes/library/contacts/newtons_cradle.yaml", 2.0},
+    {"ball_in_ring", "scenes/library/contacts/ball_in_ring.yaml", 1.0},
+};
+
+struct Settings {
+  double accuracy = 1e-2;
+  std::vector<std::string> overrides;
+};
+
+/// One run.
+struct Motion {
+  std::vector<std::vector<Vec3>> positions;  ///< by frame
+  std::vector<Vec3> impulse;                 ///< from outside, by frame [N s]
+  double cpu_s = 0.0;
+  double contact_share = 0.0;                ///< of CPU time, that finding and solving contacts takes
+  std::uint64_t steps = 0;
+  double seconds = 0.0;
+  std::string method;
+};
+
+fs::path source_file(const Case& c) { return fs::path(SUPPLE_SOURCE_DIR) / c.file; }
+
+Scene scene_of(const Case& c, const Settings& settings) {
+  std::vector<std::string> set{"accuracy=" + std::to_string(settings.accuracy)};
+  set.insert(set.end(), settings.overrides.begin(), settings.overrides.end());
+  Scene scene = read_scene(source_file(c), set);
+  scene.output = {};
+  return scene;
+}
+
+/// @param finer  halvings of every step; the error of contact is divided by as much
+Motion run(const Case& c, const Settings& settings, int finer) {
+  Scene scene = scene_of(c, settings);
+  scene.contact.error = std::max(1e-10, std::ldexp(scene.contact.error, -finer));
+  scene.time_step.max_substeps = 1048576;
+  const int frames = std::min(scene.frame_count(), 1 + static_cast<int>(std::lround(c.seconds * scene.frame_rate)));
+  Simulation simulation(std::move(scene), {.threads = 1, .profile = false, .finer = finer});
+  Motion motion;
+  motion.method = simulation.integrator().reason;
+  motion.positions.push_back(simulation.state().particles.position);
+  motion.impulse.push_back(simulation.state().ledger.external_impulse);
+  const double begin = process_cpu_seconds();
+  while (simulation.frame() < frames) {
+    simulation.step_frame();
+    motion.positions.push_back(simulation.state().particles.position);
+    motion.impulse.push_back(simulation.state().ledger.external_impulse);
+  }
+  motion.cpu_s = process_cpu_seconds() - begin;
+  motion.steps = simulation.state().steps;
+  motion.seconds = simulation.time();
+  const Profile profile = simulation.profile();
+  double contact = 0.0, all = 0.0;
+  for (const StageInfo& stage : stage_table()) {
+    const double cpu = profile[static_cast<std::size_t>(stage.stage)].cpu_s;
+    all += cpu;
+    const bool of_contact = stage.stage >= Stage::PlaceSkeleton && stage.stage <= Stage::React;
+    if (of_contact) contact += cpu;
+  }
+  motion.contact_share = all > 0.0 ? contact / all : 0.0;
+  return motion;
+}
+
+struct Difference {
+  double largest = 0.0, square = 0.0;  ///< over sizes, of one frame [1], [1]
+};
+
+Difference difference(const Model& model, const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  Difference out;
+  for (const ObjectModel& object : model.objects) {
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      const double apart = (a[i] - b[i]).norm() / size_of(object);
+      out.largest = std::max(out.largest, apart);
+      out.square += apart * apart / static_cast<double>(a.size());
+    }
+  }
+  return out;
+}
+
+void bench(const Case& c, const Settings& settings) {
+  const Model model = build_model(scene_of(c, settings));
+  const Motion motion = run(c, settings, 0), reference = run(c, settings, 4), second = run(c, settings, 3);
+  double largest = 0.0, square = 0.0;
+  std::size_t compared = 0;
+  for (std::size_t f = 0; f < motion.positions.size(); ++f) {
+    if (difference(model, second.positions[f], reference.positions[f]).largest > 0.1 * settings.accuracy) break;
+    const Difference d = difference(model, motion.positions[f], reference.positions[f]);
+    largest = std::max(largest, d.largest);
+    square += d.square;
+    compared = f + 1;
+  }
+  const std::size_t last = std::max<std::size_t>(compared, 1) - 1;
+  double scale = 0.0;
+  for (const Vec3& impulse : reference.impulse) scale = std::max(scale, impulse.norm());
+  const double impulse = scale > 0.0 ? (motion.impulse[last] - reference.impulse[last]).norm() / scale : 0.0;
+  std::printf("{\"scene\": \"%.*s\", \"accuracy\": %g, \"cpu_s_per_s\": %.4g, \"steps\": %llu, \"largest_error\": %.3g, \"rms_error\": %.3g, "
+              "\"impulse_error\": %.3g, \"compared_s\": %.4g, \"of_s\": %.4g, \"contact_share\": %.3g, \"method\": \"%s\"}\n",
+              static_cast<int>(c.name.size()), c.name.data(), settings.accuracy, motion.cpu_s / motion.seconds,
+              static_cast<unsigned long long>(motion.steps), largest, std::sqrt(square / static_cast<double>(std::max<std::size_t>(compared, 1))), impulse,
+              static_cast<double>(last) * motion.seconds / static_cast<double>(motion.positions.size() - 1), motion.seconds, motion.contact_share,
+              motion.method.c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int count, char** words) try {
+  Settings settings;
+  std::vector<std::string_view> names;
+  for (int i = 1; i < count; ++i) {
+    const std::string_view word = words[i];
+    if ((word == "--accuracy" || word == "--set") && i + 1 < count) {
+      const char* value = words[++i];
+      if (word == "--set") settings.overrides.emplace_back(value);
+      if (word == "--accuracy") settings.accuracy = std::stod(value);
+    } else {
+      names.push_back(word);
+    }
+  }
+  for (const std::string_view name : names) {
+    if (std::any_of(std::begin(kCases), std::end(kCases), [&](const Case& c) { return c.name == name; })) continue;
+    std::string known;
+    for (const Case& c : kCases) known.append(known.empty() ? "" : ", ").append(c.name);
+    std::fprintf(stderr, "scene_bench: expected one of %s, found '%.*s'\n", known.c_str(), static_cast<int>(name.size()), name.data());
+    return 2;
+  }
+  for (const Case& c : kCases) {
+    if (!names.empty() && std::find(names.begin(), names.end(), c.name) == names.end()) continue;
+    try {
+      bench(c, settings);
+    } catch (const Error& error) {
+      std::printf("{\"scene\": \"%.*s\", \"failed\": \"%s\"}\n", static_cast<int>(c.name.size()), c.name.data(), error.what());
+    }
+  }
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "scene_bench: %s\n", error.what());
+  return 1;
+}

@@ -1,0 +1,144 @@
+/// The key `accuracy`: what it sets, which method it chooses, and the errors that runs tell.
+#include "supple/scenes/accuracy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "supple/core/error.h"
+#include "supple/scenes/query.h"
+#include "supple/scenes/read_scene.h"
+#include "supple/scenes/run.h"
+
+namespace supple::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A ball on a plane.
+std::string ball(const std::string& keys, double friction) {
+  return "schema: 1\nduration: 1 s\nframe_rate: 24\ngravity: [0, 0, -9.81]\n" + keys + R"(
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0, 0, 0.3], velocity: [1, 0, 0], mass: 0.1, inertia_radius: 0.03}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]
+    contact: {modulus: 1e4, friction: )" + std::to_string(friction) + "}\nground: {height: 0, friction: " + std::to_string(friction) + "}\n";
+}
+
+Scene read(const std::string& text) { return parse_scene(text, "test.yaml", "."); }
+
+TEST(AccuracyKey, SetsWhatNoKeyGives) {
+  EXPECT_EQ(read(ball("", 0.5)).contact.error, ContactDesc{}.error);
+  const Scene fine = read(ball("accuracy: 1e-3", 0.5));
+  EXPECT_EQ(fine.contact.error, 1e-3);
+  const Scene given = read(ball("contact: {error: 1e-6}\naccuracy: 1e-3", 0.5));
+  EXPECT_EQ(given.contact.error, 1e-6);
+  const Model model = build_model(fine);
+  EXPECT_EQ(*model.objects[0].mesh_error, 1e-3 * size_of(model.objects[0]));
+  EXPECT_EQ(*build_model(read(ball("accuracy: 1e-3\noutput: {meshing: {error: 0.004}}", 0.5))).objects[0].mesh_error, 0.004);
+  EXPECT_EQ(plan_integrator(fine, model).settings.tolerance, 1e-6);
+  EXPECT_EQ(plan_integrator(read(ball("accuracy: 1e-3\nintegrator: {tolerance: 1e-8}", 0.5)), model).settings.tolerance, 1e-8);
+}
+
+TEST(AccuracyKey, TakesStepsThatGrowWithItsRoot) {
+  const auto steps = [](const std::string& accuracy) { return 1 << Simulation(read(ball("accuracy: " + accuracy, 0.0))).state().halvings; };
+  EXPECT_EQ(steps("1e-4"), 8 * steps("6.4e-3"));  // both methods are of second order, steps powers of two
+}
+
+TEST(AccuracyKey, ChoosesByWhatItsErrorCosts) {
+  const auto choice = [](const std::string& text) {
+    const Scene scene = read(text);
+    return plan_integrator(scene, build_model(scene));
+  };
+  const IntegratorPlan slides = choice(ball("accuracy: 1e-2", 0.5)), smooth = choice(ball("accuracy: 1e-2", 0.0));
+  EXPECT_EQ(slides.settings.method, core::Integrator::ImplicitMidpoint);
+  EXPECT_NE(slides.reason.find("of velocity Verlet, to resolve friction"), std::string::npos) << slides.reason;
+  EXPECT_EQ(smooth.settings.method, core::Integrator::Symplectic);
+  EXPECT_EQ(choice(ball("", 0.5)).settings.method, core::Integrator::Symplectic);
+  // Explicit steps that the scene selects by name are as short as friction needs them.
+  EXPECT_EQ(choice(ball("accuracy: 1e-2\nintegrator: {method: symplectic}", 0.5)).settings.method, core::Integrator::Symplectic);
+}
+
+TEST(ImplicitMethod, IsMidpointInStepsThatResolveContactAndElseBackwardEuler) {
+  const auto choice = [](const std::string& keys) {
+    const Scene scene = read(ball("integrator: {method: implicit}\n" + keys, 0.5));
+    return plan_integrator(scene, build_model(scene)).settings.method;
+  };
+  EXPECT_EQ(choice(""), core::Integrator::ImplicitMidpoint);
+  EXPECT_EQ(choice("time_step: {substeps: 256}"), core::Integrator::ImplicitMidpoint);
+  EXPECT_EQ(choice("time_step: {substeps: 1}"), core::Integrator::BackwardEuler);
+}
+
+TEST(ImplicitMethod, NeitherExplodesNorPassesThroughInLongSteps) {
+  const double most = std::sqrt(1.0 + 2.0 * 9.81 * 0.3);  // speed of all the energy that there is [m/s]
+  for (const int substeps : {1, 8}) {
+    for (const double modulus : {1e4, 1e6, 1e9}) {  // softer ones cannot carry the ball
+      std::string text = ball("integrator: {method: implicit}\ntime_step: {substeps: " + std::to_string(substeps) + "}", 0.5);
+      text.replace(text.find("1e4"), 3, std::to_string(modulus));
+      Simulation simulation(read(text));
+      try {
+        while (simulation.frame() < 15) simulation.step_frame();
+      } catch (const Error& error) {  // of steps in which a contact is missed, by its name
+        EXPECT_EQ(error.kind(), ErrorKind::Diverged);
+        EXPECT_NE(std::string(error.what()).find("'ball' and 'ground'"), std::string::npos) << error.what();
+      }
+      EXPECT_GT(simulation.state().particles.position[0].z(), 0.0) << substeps << ' ' << modulus;
+      EXPECT_LT(simulation.state().particles.velocity[0].norm(), 1.01 * most) << substeps << ' ' << modulus;
+    }
+  }
+}
+
+/// What friction makes of the way of a ball that comes down slantwise and begins to roll [m].
+double way_of_a_bounce(int substeps) {
+  Simulation simulation(read(ball("integrator: {method: implicit}\naccuracy: 1e-4\ntime_step: {substeps: " + std::to_string(substeps) + "}", 0.5)));
+  while (simulation.frame() < 13) simulation.step_frame();
+  return simulation.state().particles.position[0].x();
+}
+
+TEST(ImplicitMethod, SpinsUpABallFasterThanToFirstOrder) {
+  const double fine = way_of_a_bounce(1024), error16 = std::abs(way_of_a_bounce(16) - fine), error64 = std::abs(way_of_a_bounce(64) - fine);
+  EXPECT_LT(error64, error16 / 4.0);
+  EXPECT_LT(error64, 1e-2 * 0.09);  // of the ball's size
+}
+
+nlohmann::json errors_of(const std::string& text) {
+  const fs::path folder = fs::path(testing::TempDir()) / "accuracy_errors";
+  fs::remove_all(folder);
+  const RunResult done = run_scene(read(text), {.folder = folder, .threads = 1});
+  EXPECT_EQ(done.outcome, "done") << done.reason;
+  std::ifstream file(folder / "result.json");
+  return nlohmann::json::parse(file);
+}
+
+TEST(StageErrors, OfTimeFallWithTheSquareOfTheStep) {
+  const auto error = [](int substeps) {
+    return errors_of(R"(
+schema: 1
+duration: 2 s
+frame_rate: 24
+time_step: {substeps: )" + std::to_string(substeps) + R"(}
+objects:
+  - name: pair
+    particles: {arrange: line, count: 2, spacing: 1, spin: [0, 0, 2], mass: 1, inertia_radius: 0.1}
+    interactions: [{law: bond_frame, stretch: 400, rotation: 1}]
+)").at("errors").at("time").at("position_m").get<double>();
+  };
+  EXPECT_NEAR(error(8) / error(16), 4.0, 0.2);
+}
+
+TEST(StageErrors, NameTheLargestAndWhatFrictionIsBlurredBy) {
+  const nlohmann::json blurred = errors_of(ball("accuracy: 1e-2\nintegrator: {method: symplectic}\ntime_step: {substeps: 64}", 0.5));
+  EXPECT_EQ(blurred.at("errors").at("largest"), "time");
+  EXPECT_EQ(blurred.at("friction").at(0).at("a"), "ball");
+  EXPECT_GT(blurred.at("friction").at(0).at("speed_m_s"), 10.0 * ContactDesc{}.friction_speed);
+  EXPECT_NE(blurred.at("warnings").dump().find("explicit steps reduce friction below"), std::string::npos);
+  const nlohmann::json kept = errors_of(ball("accuracy: 1e-2", 0.5));
+  EXPECT_EQ(kept.at("warnings").dump().find("explicit steps"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace supple::scenes
