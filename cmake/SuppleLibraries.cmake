@@ -1,7 +1,7 @@
-# Libraries without a CMake package of their own, as targets: those of this build, and, from the installed package, those of the
+# Targets for libraries without a CMake package: those of this build and, for the installed package, those of the
 # machine that uses it.
 
-# supple_library(NAME LIBRARY [REQUIRED]): makes supple::NAME of what find_library finds by that name, if it finds it.
+# supple_library(NAME LIBRARY [REQUIRED]): makes the target supple::NAME of a library that find_library finds.
 function(supple_library name library)
   if(TARGET supple::${name})
     return()

@@ -13,7 +13,7 @@ endif()
 
 add_library(supple_flags INTERFACE)
 target_compile_features(supple_flags INTERFACE cxx_std_20)
-# AVX2 and FMA are the documented minimum; contraction off, because fma is written where it is wanted.
+# AVX2 and FMA are the documented minimum; contraction is off, because the code calls fma explicitly.
 target_compile_options(supple_flags INTERFACE
   -march=x86-64-v3 -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
@@ -25,28 +25,28 @@ if(SUPPLE_WARNINGS_AS_ERRORS AND NOT SUPPLE_SANITIZE)  # what sanitizers add lea
 endif()
 if(SUPPLE_SANITIZE)
   list(JOIN SUPPLE_SANITIZE "," supple_sanitizers)
-  # Lines are all that reports name; full debug information takes a quarter of the build.
+  # Reports need line numbers only; full debug information takes a quarter of the build.
   target_compile_options(supple_flags INTERFACE -fsanitize=${supple_sanitizers} -fno-omit-frame-pointer -O1 -g1)
   target_link_options(supple_flags INTERFACE -fsanitize=${supple_sanitizers})
   if(supple_sanitizers MATCHES "undefined")
     target_compile_options(supple_flags INTERFACE -fno-sanitize-recover=undefined)
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-      # GCC takes two to three times as long with these; the address sanitizer stops at what the first two would find,
-      # and scripts/check_all.sh sanitizers has clang look for all of them.
+      # GCC takes two to three times as long with these; the address sanitizer finds the faults of the first two,
+      # and scripts/check_all.sh sanitizers runs all of them with clang.
       target_compile_options(supple_flags INTERFACE -fno-sanitize=null,object-size,alignment)
     endif()
   endif()
 endif()
 
-# What most files include is read once for all that are compiled with the same options; a quarter to a third of the compiler's time
-# otherwise.
+# Precompiled headers: common includes are read once for all files with the same options, which saves a quarter to a third of the
+# compiler's time.
 option(SUPPLE_PRECOMPILE_HEADERS "Precompile the headers of Eigen, GoogleTest and the standard library" ${PROJECT_IS_TOP_LEVEL})
 set(supple_common_headers
   <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <numbers> <numeric> <optional> <span>
   <string> <string_view> <tuple> <utility> <vector> <Eigen/Core> <Eigen/Geometry>)
 
-# supple_precompile(TARGET OWNER PIC LIBRARIES headers...): those of OWNER, a target that has nothing else and is made for the first TARGET.
-# It has the compile options of this one, and no macros of its own: GCC takes precompiled headers for files with more of them, not with fewer.
+# supple_precompile(TARGET OWNER PIC LIBRARIES headers...): uses the precompiled headers of OWNER, a target that is made for the first TARGET.
+# OWNER has the compile options of TARGET and defines no macros: GCC accepts precompiled headers for files with more macros, not with fewer.
 function(supple_precompile target owner pic libraries)
   if(NOT SUPPLE_PRECOMPILE_HEADERS)
     return()
@@ -71,8 +71,8 @@ function(supple_precompile target owner pic libraries)
   endif()
 endfunction()
 
-# Files of a module that have no name in common are compiled as one (together.cmake): half of the compiler's time for all of them, more
-# for one that changed. So by default builds with tests, where one works on them, compile each on its own.
+# Files of a module without common names are compiled as one (together.cmake): half of the compiler's time for a full build, more
+# after a small change. So by default builds with tests, which are used for development, compile each file alone.
 if(SUPPLE_BUILD_TESTS)
   set(supple_unity_build OFF)
 else()
@@ -80,8 +80,8 @@ else()
 endif()
 option(SUPPLE_UNITY_BUILD "Compile files of a module in groups" ${supple_unity_build})
 if(SUPPLE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # GCC takes the files of a group for headers, where types of a file's own may not be parts of others.
-  # What it sees inline across files leads it to false alarms about memory, which so are no errors.
+  # GCC treats the files of a group as headers, where private types of a file may not be members of others.
+  # Inlining across files leads to false warnings about memory, which therefore are not errors.
   target_compile_options(supple_flags INTERFACE -Wno-subobject-linkage -Wno-error=maybe-uninitialized -Wno-error=uninitialized
     -Wno-error=array-bounds -Wno-error=stringop-overflow -Wno-error=stringop-overread -Wno-error=dangling-pointer
     -Wno-error=use-after-free -Wno-error=free-nonheap-object -Wno-error=null-dereference)
@@ -98,7 +98,7 @@ function(supple_together)
 endfunction()
 
 # supple_module(NAME [OWN_OPTIONS] HEADERS h... SOURCES s... [PUBLIC targets] [PRIVATE targets])
-# HEADERS are relative to include/supple/NAME. OWN_OPTIONS: it is compiled in another way than the others, so shares no precompiled headers.
+# HEADERS are relative to include/supple/NAME. OWN_OPTIONS: the module has compile options of its own, so it shares no precompiled headers.
 function(supple_module name)
   cmake_parse_arguments(arg "OWN_OPTIONS" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target supple_${name})
@@ -139,7 +139,7 @@ function(supple_test module)
     PROPERTIES LABELS ${module} ENVIRONMENT TEST_TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT 600)
 endfunction()
 
-# The package for CMake, the scenes, the documents and the licence; the libraries install themselves.
+# Installs the CMake package, scenes, documents and licence; each library installs itself.
 function(supple_install_package)
   get_property(SUPPLE_INSTALLED GLOBAL PROPERTY SUPPLE_INSTALLED)
   list(JOIN SUPPLE_INSTALLED " " SUPPLE_INSTALLED)

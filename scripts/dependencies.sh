@@ -61,7 +61,7 @@ install_packages() {
   if ((EUID != 0)); then
     command -v sudo >/dev/null ||
       dependency_failure "packages are missing, and installing needs root: no sudo here." "${missing[@]}"
-    # Without a terminal nobody can type a password: fail at once instead of waiting.
+    # Without a terminal no password can be typed: fail at once instead of waiting.
     if [[ -t 0 ]]; then as_root=(sudo); else as_root=(sudo -n); fi
   fi
   as_root+=(env DEBIAN_FRONTEND=noninteractive)

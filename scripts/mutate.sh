@@ -76,9 +76,9 @@ plant() { perl -0777 -pi -e 'BEGIN { ($from, $to) = splice @ARGV, 0, 2 } s/\Q$fr
 # build TARGET: in `home`, to a log, quietly.
 build() { cmake --build "$home/tree/build/release" --target "$1" >"$home/build.log" 2>&1; }
 
-# The copies lie elsewhere each time; relative paths and the layout of the tree itself let the cache know them again.
+# The copies are in another folder each time; relative paths and the same layout allow hits of a compiler cache.
 export CCACHE_NOHASHDIR=1
-# Defects may leave warnings, such as of a variable that nothing uses any more.
+# Defects may cause warnings, such as an unused variable.
 cat >"$work/compile" <<'END'
 #!/bin/sh
 command -v ccache >/dev/null && set -- ccache "$@"

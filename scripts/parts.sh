@@ -18,7 +18,7 @@ part() {
   part_names+=("$name") part_results+=("$result") part_seconds+=($((SECONDS - start)))
   if [[ $result == FAILED ]]; then
     echo "---- the end of ${log#"$supple_root"/}:"
-    # Of a test run only what did not pass.
+    # Of a test run only the failures.
     grep -Ev '^ *Start +[0-9]+: | Passed +[0-9.]+ sec$' "$log" | tail -n 60 | cut -c -240
     echo "----"
     return 1
@@ -31,7 +31,7 @@ skip_part() {
   part_names+=("$1") part_results+=("skipped: $2") part_seconds+=(0)
 }
 
-# print_summary: one line a part and the total; returns 1 unless every part passed.
+# print_summary: one line per part and the total; returns 1 unless every part passed.
 print_summary() {
   local k all=0
   echo

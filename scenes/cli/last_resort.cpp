@@ -28,7 +28,7 @@ void let_reserve_go() {
 
 void say(const char* text) { static_cast<void>(!::write(STDERR_FILENO, text, std::strlen(text))); }
 
-/// Allocates nothing, and calls only what is safe in any state of the program.
+/// Allocates nothing, and calls only functions that are safe in any state of the program.
 [[noreturn]] void end_program() {
   const std::type_info* type = abi::__cxa_current_exception_type();
   const bool no_memory = type != nullptr && (*type == typeid(std::bad_alloc) || *type == typeid(std::bad_array_new_length));

@@ -1,4 +1,4 @@
-/// The command line tool: parses, calls the library, prints. Nothing lives here that a library user lacks.
+/// The command line tool: parses arguments, calls the library, prints. It has no functions beyond the library.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -134,7 +134,7 @@ int report(const scenes::RunResult& result, const Arguments& arguments) {
   return 0;
 }
 
-/// What optional components of this program offer.
+/// Adds the optional components of this program.
 scenes::SimulationOptions simulation_options(int threads) {
   scenes::SimulationOptions options;
   options.threads = threads;
@@ -354,7 +354,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_flags(run_verb, a);
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, whatever its scene");
   run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; frames whose states are lost or damaged are simulated again");
-  run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or tables");
+  run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or samples");
   drawing_flags(run_verb, a);
   run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume continues from the last saved state")
       ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
@@ -401,7 +401,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
 
   CLI::App* explain_verb = app.add_subcommand("explain", "print which stages a scene runs, each with the reason");
   scene_option(explain_verb, a);
-  explain_verb->add_flag("--simulate-only", a.simulate_only, "as if no output were requested");
+  explain_verb->add_flag("--simulate-only", a.simulate_only, "explain the scene without its outputs");
   memory_flag(explain_verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G)");
   explain_verb->footer("Example: supple explain scenes/library/contacts/two_balls.yaml");
 
@@ -435,13 +435,13 @@ int parse_and_call(int argc, char** argv, bool silent) {
   reference_verb->add_flag("--schema", a.json, "print a JSON Schema for editors instead");
   reference_verb->footer("Example: supple reference --schema > supple.schema.json");
 
-  CLI::App* describe_verb = app.add_subcommand("describe", "print completions for a shell, or a page for man");
+  CLI::App* describe_verb = app.add_subcommand("describe", "print completions for a shell, or a manual page");
   describe_verb->add_option("form", a.query, "bash, zsh or man")->required()->check(CLI::IsMember({"bash", "zsh", "man"}));
   describe_verb->footer("Example: source <(supple describe bash)");
 
-  CLI::App* new_verb = app.add_subcommand("new", "write a small scene to begin with");
+  CLI::App* new_verb = app.add_subcommand("new", "write a small scene from a template");
   new_verb->add_option("name", a.scene, "name of the scene; the file is NAME.yaml")->required();
-  new_verb->add_option("--template", a.from, "what to begin with")->default_val("ball");
+  new_verb->add_option("--template", a.from, "template of the scene")->default_val("ball");
   std::string known = "Templates:\n";
   for (const tool::Template& one : tool::templates()) known += "  " + std::string(one.name) + ": " + std::string(one.meaning) + '\n';
   new_verb->footer(known + "\nExample: supple new my_scene --template jelly && supple run my_scene.yaml");
@@ -473,7 +473,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   }
   if (new_verb->parsed()) {
     const std::string path = tool::write_new_scene(a.scene, a.from);
-    print(std::cout, "%s is a scene to begin with. Next: supple run %s\n", path.c_str(), path.c_str());
+    print(std::cout, "Wrote %s. Next: supple run %s\n", path.c_str(), path.c_str());
     return 0;
   }
   if (reference_verb->parsed()) {
@@ -483,7 +483,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   return query(a);
 }
 
-/// @throws Error{Io} where what was printed could not be written
+/// @throws Error{Io} where the output could not be written
 void flush_output() {
   if (std::cout.flush().good()) return;
   throw Error(ErrorKind::Io, Fault{.place = "standard output", .key = {}, .expected = "cannot be written", .found = {}, .hint = {}});
@@ -516,13 +516,13 @@ int call(int argc, char** argv, bool silent) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Before anything is opened, or a file would get the number of what is closed, and the text that is printed there.
+  // Before any file is opened: it would get the number of a closed standard stream, and the text that is printed there.
   const bool silent = supple::io::occupy_standard_descriptors()[STDOUT_FILENO];
   std::signal(SIGCHLD, SIG_DFL);  // our parent may ignore it, which hides how ffmpeg ends
   std::ios::sync_with_stdio(false);
   supple::tool::prepare_last_resort();
   const int code = call(argc, argv, silent);
-  // Where memory ran out, arrays of Eigen that were being resized hold what was freed: what threads keep for life is not destroyed.
+  // After running out of memory, arrays of Eigen may hold freed memory: data of threads is not destroyed.
   if (code == static_cast<int>(supple::ErrorKind::Limit)) {
     std::cout.flush();
     std::_Exit(code);

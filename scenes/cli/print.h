@@ -1,4 +1,4 @@
-/// Text for people. Streams write again what a signal breaks off, which stdio does not.
+/// printf-like output to streams. Unlike stdio, streams repeat writes that a signal interrupts.
 #pragma once
 
 #include <ostream>

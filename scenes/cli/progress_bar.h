@@ -1,4 +1,4 @@
-/// Progress on long work: a bar on a terminal, a line a frame elsewhere.
+/// Progress of long work: a bar on a terminal, one line per frame elsewhere.
 #pragma once
 
 #include <string>

@@ -10,7 +10,7 @@
 namespace supple::tool {
 namespace {
 
-/// @param near  the known word that is meant, or empty
+/// @param near  the nearest known word, or empty
 [[noreturn]] void refuse(const std::string& place, const std::string& kind, std::string_view found, const std::string& near,
                          const std::vector<std::string>& known) {
   std::string all;

@@ -1,4 +1,4 @@
-/// Words of the command line that the tool does not know.
+/// Unknown words of the command line.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,7 +7,7 @@
 namespace supple::tool {
 
 /// @param words  the command line without the name of the program
-/// @throws Error{Usage} for the first word that is no command or option where one belongs, with the nearest known one or all
+/// @throws Error{Usage} for the first unknown command or option, with the nearest known one or all
 void expect_known_words(const CLI::App& app, std::span<char* const> words);
 
 }  // namespace supple::tool

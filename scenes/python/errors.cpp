@@ -41,7 +41,7 @@ py::str text(const std::string& bytes) {
 }  // namespace
 
 void bind_errors(py::module_& /*module*/) {
-  py::register_exception_translator([](std::exception_ptr thrown) {  // NOLINT: pybind11 asks for this signature
+  py::register_exception_translator([](std::exception_ptr thrown) {  // NOLINT: pybind11 needs this signature
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Error& error) {

@@ -104,7 +104,7 @@ std::vector<Vec3> corners_of(const std::vector<Ball>& balls) {
 }
 
 /// Distance, by Newton's method, of a point to where the fields of its labels agree.
-double distance_to_rim(const std::vector<Ball>& balls, const LabelSet& labels, const Vec3& start) {
+double distance_to_boundary(const std::vector<Ball>& balls, const LabelSet& labels, const Vec3& start) {
   Vec3 p = start;
   for (int round = 0; round < 20; ++round) {
     Eigen::Matrix3d slope = Eigen::Matrix3d::Zero();
@@ -169,16 +169,16 @@ void rims(int sets, double cell) {
       add(meshes, hasher);
       all.junctions += counts.junctions;
       all.junctions_moved += counts.junctions_moved;
-      all.rim_points += counts.rim_points;
-      all.rim_points_moved += counts.rim_points_moved;
+      all.boundary_points += counts.boundary_points;
+      all.boundary_points_moved += counts.boundary_points_moved;
       const PatchComplex complex(views, meshes);
       std::vector<Vec3> corner;
       for (PatchComplex::Vertex v = 0; v < complex.vertex_count(); ++v) {
         if (complex.place(v) == PatchPlace::Interior) continue;
         const LabelSet labels = complex.labels(v);
-        if (labels.count == 3) rim.add(distance_to_rim(balls, labels, complex.position(v)) / cell);
+        if (labels.count == 3) rim.add(distance_to_boundary(balls, labels, complex.position(v)) / cell);
         if (labels.count == 4) {
-          point.add(distance_to_rim(balls, labels, complex.position(v)) / cell);
+          point.add(distance_to_boundary(balls, labels, complex.position(v)) / cell);
           corner.push_back(complex.position(v));
         }
       }
@@ -192,7 +192,7 @@ void rims(int sets, double cell) {
                 "\"exact_points\":%zu,\"without\":%zu,\"farthest\":%.2f,\"junctions\":%llu,\"moved\":%llu,\"rim_points\":%llu,\"rim_moved\":%llu,\"s\":%.3f,\"hash\":\"%s\"}\n",
                 count, sets, rim.count, rim.off, rim.rms(), rim.largest, point.count, point.off, near.count, near.off, near.largest,
                 static_cast<unsigned long long>(all.junctions), static_cast<unsigned long long>(all.junctions_moved),
-                static_cast<unsigned long long>(all.rim_points), static_cast<unsigned long long>(all.rim_points_moved), seconds,
+                static_cast<unsigned long long>(all.boundary_points), static_cast<unsigned long long>(all.boundary_points_moved), seconds,
                 to_hex(hasher.value()).c_str());
   }
 }

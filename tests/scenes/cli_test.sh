@@ -221,7 +221,7 @@ completed=$(bash -c 'source completion.sh; COMP_WORDS=(supple run --over); COMP_
 "$supple" describe man > supple.1 && grep -q 'overwrite' supple.1 || fault 'no page for man'
 expect 2 '' describe fish
 
-# Scenes to begin with.
+# Templates of scenes.
 for template in ball balls chain jelly sheet; do
   expect 0 '' new "new_$template" --template "$template"
   expect 0 '' check "new_$template.yaml"

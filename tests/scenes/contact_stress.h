@@ -15,9 +15,9 @@ namespace supple::scenes::stress {
 
 enum class Outcome {
   Held,        ///< nothing passed, energy within Verlet's swing
-  Overloaded,  ///< more than the pair can hold, which the run says
+  Overloaded,  ///< more than the pair can hold; the run reports it
   Gains,       ///< more energy than there was
-  Passed,      ///< one body is behind the other and nobody was told, or a hard core let it
+  Passed,      ///< one body is behind the other and no warning was given, or in spite of a barrier
   Stopped,     ///< ended by an error: diverged, or too many substeps
 };
 

@@ -1,4 +1,4 @@
-/// A library to be preloaded that makes allocations of a program fail, for tests of what it does then:
+/// A library to be preloaded that makes allocations of a program fail, for tests of its reaction:
 ///
 ///     SUPPLE_FAIL_AT=1234 LD_PRELOAD=liballoc_failure.so supple run scene.yaml --out folder
 ///
@@ -7,7 +7,7 @@
 ///   SUPPLE_FAIL_MANY   how many fail from there on (default 1; 0: all)
 ///   SUPPLE_FAIL_KIND   `new` (default): operator new, by whichever library it is called; `malloc`: malloc, calloc, realloc and
 ///                      posix_memalign where the program itself calls them
-///   SUPPLE_FAIL_COUNT  a file that gets the number of allocations seen when the program ends
+///   SUPPLE_FAIL_COUNT  a file that gets the number of allocations when the program ends
 #include <fcntl.h>
 #include <link.h>
 #include <unistd.h>
@@ -93,7 +93,7 @@ void* allocate(std::size_t size, std::size_t alignment) {
   return alignment == 0 ? __libc_malloc(size == 0 ? 1 : size) : __libc_memalign(alignment, size);
 }
 
-/// As the standard asks: the new-handler is called until it makes room, or throws.
+/// As in the standard: the new-handler is called until it makes room, or throws.
 void* allocate_or_throw(std::size_t size, std::size_t alignment) {
   for (;;) {
     if (void* memory = allocate(size, alignment)) return memory;

@@ -20,7 +20,7 @@ inline constexpr const char* kAsItIs = "";
 struct Fuzzer {
   Limits limits{};
   std::function<Trial(std::uint64_t)> trial;
-  /// Leaves the input of a trial in a file, as small as it gets. @return its name
+  /// Writes the reduced input of a trial to a file. @return its name
   std::function<std::filesystem::path(const FoundFault&)> keep;
 };
 
@@ -30,13 +30,13 @@ struct FuzzSettings {
   std::filesystem::path scratch;  ///< for files of trials and those that are kept
 };
 
-/// Scenes of the library and those of golden messages, changed: read and checked, and where nothing is wrong with them run for two small frames.
+/// Mutated scenes of the library and of golden messages: read and checked, and run for two small frames if they are valid.
 [[nodiscard]] Fuzzer scene_fuzzer(const FuzzSettings& settings);
 /// Meshes (OBJ, PLY, OFF, STL) and tables of points (CSV), changed: read as obstacles and as places of particles.
 [[nodiscard]] Fuzzer file_fuzzer(const FuzzSettings& settings);
-/// Saved states with bits flipped, bytes exchanged, cut off or added: refused, or read as what was saved.
+/// Saved states with flipped bits, or exchanged, missing or added bytes: refused, or read as saved.
 [[nodiscard]] Fuzzer state_fuzzer(const FuzzSettings& settings);
-/// Lists of frames as `--frames` takes them.
+/// Lists of frames for `--frames`.
 [[nodiscard]] Fuzzer frames_fuzzer(const FuzzSettings& settings);
 /// Trials that go wrong on purpose, one kind after another, by what `plant` says: crash, hang, memory, slow, place, contract, internal.
 /// All of them must be found.
@@ -45,7 +45,7 @@ struct FuzzSettings {
 inline constexpr double kMostSeconds = 1.0;      ///< of processor time that refusing may take
 inline constexpr double kMostBytes = 256e6 * 1.048576;  ///< of memory that refusing may take
 
-/// Calls `use` and judges what it throws: a mistake of the user refused in time, with little memory and with places, or a fault.
+/// Calls `use` and judges its exception: a user error refused in time, with little memory and with places, or a fault.
 [[nodiscard]] Trial judged(const std::string& name, const std::function<void()>& use);
 
 /// All that `supple check` does. @throws Error

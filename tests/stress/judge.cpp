@@ -68,7 +68,7 @@ void interrupt_after(double seconds) {
   setitimer(ITIMER_VIRTUAL, &timer, nullptr);
 }
 
-/// Small, few, and every kind that the scene asks for but the film.
+/// Small and few outputs of every kind that the scene requests, except the film.
 void shrink_outputs(scenes::Scene& scene) {
   if (scene.output.images) {
     scene.output.images->size = {32, 24};
@@ -78,7 +78,7 @@ void shrink_outputs(scenes::Scene& scene) {
   scene.render.most_samples = std::min(scene.render.most_samples, 4);
 }
 
-/// What must not be among the files of a run, whatever came of it.
+/// Files that must not exist after a run of any outcome.
 std::string fault_in_folder(const fs::path& folder) {
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();

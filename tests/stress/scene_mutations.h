@@ -27,7 +27,7 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// A YAML value that need not be a right one: keys may stand twice, scalars may hold anything.
+/// A YAML value that may be invalid: keys may occur twice, scalars may hold anything.
 struct Value {
   enum class Kind { Scalar, List, Map };
   Kind kind = Kind::Scalar;
@@ -37,11 +37,11 @@ struct Value {
   std::vector<Value> items{};
 };
 
-/// @return nothing where the text is no YAML
+/// @return nothing where the text is not YAML
 [[nodiscard]] std::optional<Value> parse_value(const std::string& text);
 [[nodiscard]] std::string print_value(const Value& value);
 
-/// Keys and words that scenes know, from the JSON Schema.
+/// Keys and words of scenes, from the JSON Schema.
 struct Vocabulary {
   std::vector<std::string> keys;
   std::vector<std::string> words;

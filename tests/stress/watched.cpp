@@ -28,7 +28,7 @@ constexpr bool kSanitized = true;
 constexpr bool kSanitized = false;
 #endif
 
-/// What the process of the trials tells while it lives; read when it is dead.
+/// Data that the process of the trials shares while it lives; read after its end.
 struct Board {
   std::atomic<std::uint64_t> at{0};       ///< the trial at work
   std::atomic<std::uint64_t> tried{0};

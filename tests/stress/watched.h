@@ -10,10 +10,10 @@
 
 namespace supple::stress {
 
-/// What came of one trial.
+/// Result of one trial.
 struct Trial {
   bool refused = false;   ///< the input was refused with a message
-  std::string fault{};    ///< empty: nothing that must not happen
+  std::string fault{};    ///< empty: no fault
 };
 
 struct Limits {
@@ -33,7 +33,7 @@ struct Tally {
   std::vector<FoundFault> faults;
 };
 
-/// Runs trials first, first + 1, ..., first + count - 1. What the trials print goes to the end of `log`.
+/// Runs trials first, first + 1, ..., first + count - 1. Output of the trials goes to the end of `log`.
 [[nodiscard]] Tally watch(std::uint64_t first, std::uint64_t count, const Limits& limits, const std::filesystem::path& log,
                           const std::function<Trial(std::uint64_t)>& trial);
 

@@ -38,7 +38,7 @@ inline Mesh octahedral_sphere(double radius, int levels) {
   return mesh;
 }
 
-/// A box about `centre`. @param turned  so that its triangles run the other way round
+/// A box about `centre`. @param turned  reverses the orientation of its triangles
 inline Mesh block(const Vec3& half, const Vec3& centre = Vec3::Zero(), bool turned = false) {
   Mesh mesh;
   for (int corner = 0; corner < 8; ++corner) {
@@ -57,7 +57,7 @@ inline Mesh both(Mesh one, const Mesh& other) {
   return one;
 }
 
-/// A gear: `teeth` of them between two radii, `height` thick, with its faces cut into strips from its axis.
+/// A gear: `teeth` of them between two radii, `height` thick, with its faces divided into strips from its axis.
 inline Mesh gear(int teeth, double inner, double outer, double height) {
   Mesh mesh;
   const auto rim = static_cast<std::uint32_t>(4 * teeth);

@@ -98,7 +98,7 @@ void extract_array(std::span<const std::byte> bytes, std::size_t& offset, Array&
   using T = typename Array::value_type;
   std::uint64_t count = 0;
   extract(bytes, offset, &count, sizeof count);
-  // Checked before the allocation: a damaged count must not ask for all memory.
+  // Checked before the allocation: a damaged count must not allocate all memory.
   if (count > (bytes.size() - offset) / sizeof(T)) {
     throw Error(ErrorKind::Corrupt,
                 Fault{.place = {},

@@ -15,7 +15,7 @@ void stop_pinned(const ParticleSet& set, ParticleState& state);
 /// false, having done nothing, where one has unequal moments or turns so far that the series of the others does not hold.
 [[nodiscard]] bool rotate_four(const Vec3* angular_momentum, const Vec3* inertia, double dt, Quat* orientation);
 
-/// Clears `sample` and asks for the loads.
+/// Clears `sample` and requests the loads.
 void evaluate(const ForceModel& forces, const ParticleState& state, double time, ForceSample& sample);
 
 }  // namespace supple::core

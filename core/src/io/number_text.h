@@ -16,7 +16,7 @@ void append_number(std::string& text, Number value) {
   text.append(buffer.data(), static_cast<std::size_t>(result.ptr - buffer.data()));
 }
 
-/// "1, 2, 3" with separators of one's own; in single precision, as other tools keep points, unless told otherwise.
+/// "1, 2, 3" with the given separator; by default in single precision, as other tools store points.
 template <class Number = float, class Vector>
 void append_vector(std::string& text, const Vector& v, std::string_view separator) {
   for (int k = 0; k < 3; ++k) {

@@ -35,7 +35,7 @@ std::vector<Batch> batches_of(std::span<const std::uint32_t> first, std::span<co
   return out;
 }
 
-/// Whether the lanes are filled well enough to pay for the transpositions that other batches need.
+/// Whether the lanes are filled well enough to justify the transpositions that other batches need.
 bool pays(std::span<const Batch> batches, std::size_t bonds) {
   std::size_t steps = 0;
   for (const Batch& batch : batches) steps += (batch.count + kLanes - 1) / kLanes;

@@ -40,7 +40,7 @@ struct GroupLaw {
 struct Group {
   std::vector<Batch> batch;
   std::vector<GroupLaw> laws;
-  bool normal = false, torque = false;  ///< whether a law knows them
+  bool normal = false, torque = false;  ///< whether a law uses them
   std::size_t count = 0;                ///< bonds
 };
 
@@ -57,7 +57,7 @@ struct Runs {
   std::vector<NumberRow> numbers;
   std::vector<NumberRow> rows;  ///< shape [kRows][room / kBatch]
   std::size_t room = 0;         ///< particles, and space for a batch that reaches beyond them
-  bool normal = false;          ///< whether a law knows normals
+  bool normal = false;          ///< whether a law uses normals
 
   [[nodiscard]] bool empty() const { return groups.empty(); }
   [[nodiscard]] Work work() { return {numbers.data(), rows.empty() ? nullptr : rows.front().value.data(), room}; }

@@ -40,7 +40,7 @@ void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medi
 void apply_stiffness_damping(const ParticleSet& set, const Interactions& interactions, double dt, PairOrder order,
                              ParticleState& state, Ledger& ledger);
 
-/// The same as forces and torques at a state, for integrators that know no half steps; added to `loads`.
+/// The same as forces and torques at a state, for integrators without half steps; added to `loads`.
 void add_friction_loads(const ParticleSet& set, const std::vector<Friction>& friction, const ParticleState& state,
                         Loads& loads);
 void add_medium_loads(const ParticleSet& set, const std::vector<MediumDamping>& medium, const ParticleState& state,

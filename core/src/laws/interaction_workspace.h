@@ -15,7 +15,7 @@
 
 namespace supple::core {
 
-/// Rows of four, the last number 0 but for the quaternion.
+/// Rows of four, the last number 0 except for the quaternion.
 struct alignas(32) StagedPose {
   std::array<double, 4> position;
   std::array<double, 4> orientation;

@@ -45,7 +45,7 @@ class NeighbourGrid {
   std::vector<std::uint32_t> index_;  ///< points by bucket, ascending within one
   std::vector<double> x_, y_, z_;     ///< their positions, with room to read a full lane past the end
   std::uint32_t mask_ = 0;            ///< buckets - 1, buckets a power of two
-  bool far_ = false;                  ///< coordinates are so large that a cell is not told from its neighbour
+  bool far_ = false;                  ///< coordinates are so large that neighbouring cells are indistinguishable
 
   struct Block {
     std::vector<IndexPair> pairs;

@@ -30,7 +30,7 @@
 namespace supple::cgal {
 namespace {
 
-/// A vertex or cell that knows when it was made. CGAL then sorts by that and not by address, and repeats.
+/// A vertex or cell with the number of its creation. CGAL then sorts by that and not by address, so results repeat.
 template <class Base>
 class Stamped : public Base {
  public:
@@ -122,7 +122,7 @@ class Oracle {
   [[nodiscard]] Construct_initial_points construct_initial_points_object() const { return {}; }
 };
 
-/// The bounds, a limit, and a way out: the mesher looks at every new triangle here.
+/// The bounds, a limit, and an exit: the mesher tests every new triangle here.
 class Criteria : public CGAL::Surface_mesh_default_criteria_3<Triangulation> {
  public:
   Criteria(const implicit::DelaunayOptions& options, const implicit::DelaunayEstimate& estimate, const Triangulation& triangulation)
@@ -341,7 +341,7 @@ Mesh delaunay_mesh(const implicit::FieldView& field, const implicit::DelaunayOpt
     if (missing.part.empty() && alike(inspect(mesh), seen)) break;
     if (!seed_denser(missing, part, options.cell, spacing)) {
       if (!missing.part.empty()) refuse_missing(options);
-      break;  // whole, though of another topology than the lattice saw
+      break;  // complete, but of another topology than on the lattice
     }
   }
   if (report != nullptr) *report = found;

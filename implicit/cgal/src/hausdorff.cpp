@@ -14,7 +14,7 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-/// Share of the error by which what has no area is widened.
+/// Share of the error by which degenerate triangles are widened.
 constexpr double kWidth = 0.125;
 
 /// The triangles as a soup: corners are not shared, so any mesh will do. What has no area, a segment or a point, becomes a triangle that holds

@@ -126,7 +126,7 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
     for (std::size_t i = 1; i < count_; ++i) {
       GradientBounds& bounds = entry_[i].bounds;
       if (!bounds.curved.known) continue;  // the same everywhere
-      bounds.term.clear();  // of the whole box
+      bounds.term.clear();  // for the whole box
       const auto& [lower, upper] = bounds.curved.curvature;
       const double first = slope_[i][c].cwiseAbs().dot(half + rounding_of(box)) + bounds.round_off, second = 0.5 * reach * reach;
       bounds.value = {value_[i][c] - first + second * lower, value_[i][c] + first + second * upper};
@@ -168,7 +168,7 @@ bool CubeBounds::passes_convex_primitives() const {
 }
 
 void CubeBounds::find_leads(const Entry& own) {
-  // Where `own` has a part, its claim is the largest of all.
+  // Where `own` is the owner, its claim is the largest.
   const Interval a{std::max(own.value.lower, most_), std::max(own.value.upper, most_)};
   const auto above_least = [&](const Entry& e) { return Interval{e.value.lower + e.depth, std::min(e.value.upper, a.upper) + e.depth}; };
   lead_.clear();

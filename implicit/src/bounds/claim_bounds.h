@@ -1,11 +1,11 @@
 /// @file claim_bounds.h
-/// Bodies that divide space, and what bounds tell of who has a cube. Label 0 is outside, m + 1 is body m.
+/// Bodies that divide space, and bounds of the owner of a cube. Label 0 is outside, m + 1 is body m.
 ///
-/// With claims c_m = weight F_m, p_m = c_m + phi_m >= 0 is the claim above its least value, which it has beyond the supports of m. Label a has the points where
+/// With claims c_m = weight F_m, p_m = c_m + phi_m >= 0 is the claim above its least value, which it has beyond the supports of m. Label a owns the points where
 ///   M_a = c_a (1 - max over m != a of p_m / (c_a + phi_m)),  M_0 = 1 - max over m of p_m / phi_m
-/// are above 0: where c_a > 0 and c_a > c_m, and where all c_m < 0. Nothing there depends on a cube, so each M_a is one continuous function all over space
-/// and has a maximum in every closed piece of a's; and a body tells nothing where it does not reach, as p_m is 0. So cubes need only know bodies that
-/// reach them. Each lead c_a (1 - p_m / (c_a + phi_m)) rises along a direction if c_a - rho c_m does, with rho = 1 / (1 + phi_m (c_a - c_m) / (c_a (c_a + phi_m))) held.
+/// are above 0: where c_a > 0 and c_a > c_m, and where all c_m < 0. These do not depend on a cube, so each M_a is one continuous function over space
+/// and has a maximum in every closed piece of a; a body has no effect out of its reach, as p_m is 0 there. So a cube needs only the bodies that
+/// reach it. Each lead c_a (1 - p_m / (c_a + phi_m)) rises along a direction if c_a - rho c_m does, rho = 1 / (1 + phi_m (c_a - c_m) / (c_a (c_a + phi_m))) constant.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ class Claim {
   [[nodiscard]] double gradient_bound(const Box& box) const { return weight_ * field_->gradient_bound(box); }
   [[nodiscard]] Box surface_box() const { return field_->surface_box(); }
   [[nodiscard]] double feature_size() const { return field_->feature_size(); }
-  /// Beyond it the claim is at its least.
+  /// Beyond it the claim has its least value.
   [[nodiscard]] Box support_box() const;
   [[nodiscard]] const Field& field() const { return *field_; }
   [[nodiscard]] double weight() const { return weight_; }
@@ -51,16 +51,16 @@ class Claim {
   double weight_, depth_;
 };
 
-/// What bounds tell of a cube.
+/// Result of bounds on a cube.
 struct Verdict {
   bool certain = false;  ///< all of it is `label`'s
   Label label = 0;
-  bool flat = false;     ///< no claim's difference to the next has an extremum there
+  bool flat = false;     ///< no difference of two claims has an extremum there
   bool second_order = true;
   [[nodiscard]] bool settled() const { return certain || flat; }
 };
 
-/// Bodies that may decide who has a part of a cube, and by how much, each with those of its primitives that may reach it, where it is a sum.
+/// Bodies that may own a part of a cube, or bound the lead there, each with its primitives in reach, if it is a sum.
 struct Candidates {
   std::vector<std::uint32_t> body;    ///< ascending
   std::vector<std::uint32_t> offset;  ///< of their primitives, body.size() + 1 of them
@@ -73,7 +73,7 @@ struct Candidates {
 /// Those of some bodies whose supports reach a box.
 void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found);
 
-/// Takes the bounds of the claims on cubes; outside claims 0.
+/// Computes bounds of the claims on cubes; the claim of outside is 0.
 class CubeBounds {
  public:
   explicit CubeBounds(std::span<const Claim> claims) : claims_(claims), entry_(1) {
@@ -81,13 +81,13 @@ class CubeBounds {
     entry_[0].bounds.hull.assign(1, {});
   }
 
-  /// Step by step, until a cube is settled: by bounds of first order, by directions, by second derivatives.
-  /// @param flat_anyway  whether one that is certain is flat matters, too
+  /// In steps until a cube is decided: by bounds of first order, by directions, by second derivatives.
+  /// @param flat_anyway  also test flatness of a cube with a certain owner
   [[nodiscard]] Verdict operator()(const Box& box, const Candidates& candidates, bool flat_anyway);
-  /// Bodies that matter on parts of the box that was looked at last, with those of their primitives that add to them there.
+  /// Bodies that matter on parts of the last box, with their primitives in reach.
   void narrow(Candidates& narrowed) const;
-  /// The same verdicts on the eighths of the box that was looked at last and was not settled, x + 2 y + 4 z: by its bounds of second derivatives and
-  /// by values and gradients at their middles. Undecided where some claim has no bounds of second derivatives, and between lone primitives, where steps cost no more.
+  /// The same for the eighths of the last box if that was undecided, x + 2 y + 4 z: by its bounds of second derivatives and
+  /// by values and gradients at their centres. Undecided where some claim has no bounds of second derivatives, and between single primitives, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:
@@ -98,7 +98,7 @@ class CubeBounds {
     Interval value{};                   ///< of the claim
     bool matters = false;
   };
-  /// Of a claim over another one.
+  /// Lead of a claim over another one.
   struct Lead {
     Entry* other;
     Interval rho;
@@ -107,9 +107,9 @@ class CubeBounds {
   void start(const Box& box, const Candidates& candidates);
   void add(Step step, const Box& box);
   [[nodiscard]] bool may_have_part(const Entry& e) const { return !(e.value.upper < most_) && (e.label == 0 || e.value.upper > 0.0); }
-  /// Leaves out bodies that neither have a part of the cube nor are next to one that has. @pre judge() was asked
+  /// Leaves out bodies that neither own a part of the cube nor are next to an owner. @pre judge() was called
   void drop_others();
-  /// The leads of a claim that may be its least where it has a part of the cube.
+  /// The leads of a claim that may be the least one where it owns a part of the cube.
   void find_leads(const Entry& own);
   [[nodiscard]] std::span<Entry> entries() { return std::span(entry_).first(count_); }
 
@@ -120,10 +120,10 @@ class CubeBounds {
   [[nodiscard]] bool is_flat();
   /// Whether there is a direction along which all leads rise that may be the least of a claim.
   [[nodiscard]] bool rises(const Entry& own);
-  /// Whether no maximum of the least lead of space outside is there, since it is next to three convex primitives at most. Where no direction leads
+  /// Whether the least lead of outside has no maximum there because at most three convex primitives are near. Where no direction leads
   /// away from all bodies, some multiples of the slopes of squared distances cancel, so that those of three lie in a plane. By convexity no distance
-  /// falls along the normal of that plane, and so no lead: maxima would go on both ways, but that farthest from the origin does not.
-  /// @pre rises(outside) was looked at last
+  /// falls along the normal of that plane, and so no lead does: maxima would extend both ways, but the one farthest from the origin cannot.
+  /// @pre rises(outside) was called last
   [[nodiscard]] bool passes_convex_primitives() const;
 
   std::span<const Claim> claims_;

@@ -1,5 +1,5 @@
 /// @file eighth_bounds.h
-/// What bounds tell of the eighths of a box, side by side: the first two steps of field_box_bounds.h for sums of boxes, ellipsoids, segments,
+/// Bounds on the eighths of a box, side by side: the first two steps of field_box_bounds.h for sums of boxes, ellipsoids, segments,
 /// rectangles and discs with Wyvill's or Gascuel's kernel.
 #pragma once
 
@@ -14,7 +14,7 @@ namespace supple::implicit {
 
 class EighthBounds {
  public:
-  /// Whether it can be asked about a field.
+  /// Whether it supports a field.
   [[nodiscard]] static bool know(const Field& field);
 
   struct Verdict {
@@ -24,7 +24,7 @@ class EighthBounds {
   };
   /// @param ids  of all primitives that may add to F on the box, ascending  @pre know(field)
   [[nodiscard]] Verdict operator()(const Field& field, const Box& box, std::span<const std::uint32_t> ids);
-  /// Those of the primitives that may add to F on an eighth of the box that was asked about last.
+  /// The primitives that may add to F on an eighth of the last box.
   void narrow(unsigned eighth, std::vector<std::uint32_t>& ids) const;
 
  private:

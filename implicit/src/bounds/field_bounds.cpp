@@ -169,12 +169,12 @@ Box find_surface_box(const Field::Index& index, const Field& field) {
     inner = {box.centre(), box.centre()};
   }
   if (index.size() == 1 && (index.primitive[0].kind == PackedKind::PointWyvill || index.primitive[0].kind == PackedKind::PointGascuel)) {
-    return inner.inflated(1e-9 * size);  // a ball, with what the search for its radius leaves
+    return inner.inflated(1e-9 * size);  // a ball, and the tolerance of the search for its radius
   }
   const double tolerance = std::max(index.feature_size / 24.0, size / 256.0);
   for (int axis = 0; axis < 3; ++axis) {
     for (const bool low : {true, false}) {
-      double& side = low ? box.lower[axis] : box.upper[axis];  // nothing lies beyond it
+      double& side = low ? box.lower[axis] : box.upper[axis];  // F is zero beyond it
       double within = low ? inner.lower[axis] : inner.upper[axis];
       while (std::abs(within - side) > tolerance) {
         const double middle = 0.5 * (side + within);

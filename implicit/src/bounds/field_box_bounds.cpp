@@ -18,10 +18,10 @@ constexpr double kCancels = 1e4;  // of convolutions, which sum over edges: thei
 /// Taylor's expansion of a sum of potentials about the centre of a box.
 struct Expansion {
   std::uint32_t node = 0;         ///< of the blend
-  double value = 0.0;             ///< of what is expanded
+  double value = 0.0;             ///< of the terms that are expanded
   Vec3 gradient = Vec3::Zero();
   CurvatureRange curvature{};     ///< of its second derivatives on the box
-  Interval rest{0.0, 0.0};        ///< of what is not
+  Interval rest{0.0, 0.0};        ///< of the others
   Interval plain{0.0, 0.0};       ///< of all, from distances alone
   bool sloped = true;             ///< nothing is left for the rest
   double scale = 0.0;             ///< of round-off [1]
@@ -153,7 +153,7 @@ double scale_of(const PackedShape& shape, double reach) {
   return shape.peak + shape.lipschitz * reach + (shape.foot == PackedFoot::Convolved ? kCancels * shape.peak : 0.0);
 }
 
-/// With all that is known of a primitive. @return that, less where it cannot be expanded
+/// With all known bounds of a primitive. @return these, or less where it cannot be expanded
 void add_expanded(const Field::Index& index, const Box& box, GradientBounds::Term& term, Expansion& sum) {
   sum.plain = added(sum.plain, term.value);
   const CurvatureRange curvature = curvature_of(index, box, term);

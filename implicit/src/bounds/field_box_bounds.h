@@ -43,11 +43,11 @@ struct GradientBounds : Field::BoxBounds {
   };
   std::vector<Ball> hull{};  ///< of these balls holds Clarke's gradients of F on all of the box; several where parts win in turn, empty: not known
   std::size_t convex = 0;  ///< primitives that may add to a sum on the box, if the squared distances to all of them are convex
-  std::vector<Term> term{};  ///< of a sum; empty: not known, or none
+  std::vector<Term> term{};  ///< of a sum; empty: unknown, or none
   double scale = 0.0;        ///< of round-off of the sum [1]
   double round_off = 0.0;    ///< of values, where the hull is known [1]
   double slack = 0.0;        ///< and of slopes [1/m]
-  bool stepwise = false;     ///< add_slopes and add_curvature know more
+  bool stepwise = false;     ///< add_slopes and add_curvature provide more bounds
 };
 
 [[nodiscard]] GradientBounds bounds_with_gradient(const Field& field, const Box& box);
@@ -61,7 +61,7 @@ inline Vec3 rounding_of(const Box& box) { return 4e-15 * (box.lower.cwiseAbs() +
 void start_bounds(const Field& field, const Box& box, std::span<const std::uint32_t> ids, GradientBounds& bounds);
 /// Then by nearest points: slope_along.
 void add_slopes(const Field& field, const Box& box, GradientBounds& bounds);
-/// And by second derivatives: all that bounds_with_gradient tells.
+/// And by second derivatives: all bounds of bounds_with_gradient.
 void add_curvature(const Field& field, const Box& box, GradientBounds& bounds);
 
 /// Whether fields are sums, whose bounds come in steps.

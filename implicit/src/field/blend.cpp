@@ -250,7 +250,7 @@ double BlendIndex::slope_bound(std::span<const NodeBound> nodes) const {
 bool BlendIndex::find_terms(std::span<const NodeBound> nodes, std::vector<Term>& terms) const {
   terms.clear();
   const double least = bound(nodes).lower;
-  // Of what blends with node k beside node j.
+  // The sum of what blends with node k, other than node j.
   const auto beside = [&](std::size_t k, std::size_t j) {
     Interval sum;
     for_neighbours(nodes, k, [&](std::size_t i, double w) {

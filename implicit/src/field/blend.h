@@ -17,7 +17,7 @@ struct NodeSample {
   Vec3 gradient = Vec3::Zero();
 };
 
-/// The potential and what it takes of each node.
+/// The potential and its derivatives by the nodes.
 struct Combined {
   double value = 0.0;
   // Gradient: the pair that is the largest, and dF/dx by the cosine x of its angle; by_cosine is 0 otherwise.
@@ -46,7 +46,7 @@ class BlendIndex {
     std::uint32_t node = 0;
     Interval value{};
     double slope = 0.0;             ///< of |grad f_k|
-    // Gradient: within `turn` of `gradient` lies grad f_k; infinite: not known.
+    // Gradient: grad f_k lies within `turn` of `gradient`; infinite: unknown.
     Vec3 gradient = Vec3::Zero();
     double turn = std::numeric_limits<double>::infinity();
   };
@@ -58,7 +58,7 @@ class BlendIndex {
   struct Term {
     std::size_t winner = 0, node = 0;  ///< positions in `nodes`
     double weight = 1.0;
-    bool or_winner = false;            ///< the winner's gradient may stand for the node's
+    bool or_winner = false;            ///< the winner's gradient replaces the node's
   };
   [[nodiscard]] bool find_terms(std::span<const NodeBound> nodes, std::vector<Term>& terms) const;
   /// Ricci: the least and largest dF/df_k, by bounds of the f_k. @param all  bound(nodes)

@@ -1,5 +1,5 @@
 /// @file bytes_of.h
-/// Memory that is held.
+/// Memory of containers.
 #pragma once
 
 #include <cstdint>

@@ -131,7 +131,7 @@ std::uint64_t evaluate_batch(const Field::Index& index, std::span<const Vec3> po
   if (n == 0) return 0;
   if (index.size() <= Field::Index::kScanLimit) {
     std::uint32_t ids[Field::Index::kScanLimit + lanes::kSpill];
-    if (index.cull && index.size() > 1) {  // one primitive costs no more than to tell where it is zero
+    if (index.cull && index.size() > 1) {  // for one primitive the evaluation costs no more than a test
       return lanes::evaluate_packs(in, index.leaf, ids, {points.data(), n, values, gradients});
     }
     std::iota(ids, ids + index.size(), 0u);

@@ -44,8 +44,8 @@ void gather(const BlendIndex& blend, const FieldParts& parts, std::size_t i, std
   }
 }
 
-/// Calls use(row, added, along) for the parts of the winning pair: what the turning of the angle between their gradients adds to
-/// the gradient, split by whose second derivatives make it, and dF / d(grad f) of their nodes [m].
+/// Calls use(row, added, along) for the parts of the winning pair: what the change of the angle between their gradients adds to
+/// the gradient, split by the part whose second derivatives cause it, and dF / d(grad f) of their nodes [m].
 template <class Use>
 void for_turning(const Field::Index& index, const Combined& combined, std::span<const NodeSample> nodes, const FieldParts& parts,
                  std::size_t i, const Vec3& x, const Use& use) {

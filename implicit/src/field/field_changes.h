@@ -13,11 +13,11 @@
 
 namespace supple::implicit {
 
-/// Places whose values a primitive is part of: within sqrt(reach2) of the box [lower, upper], and in `whole`.
+/// Points whose values depend on a primitive: within sqrt(reach2) of the box [lower, upper], and in `whole`.
 struct Reach {
   RoundedBox rounded;
   Box whole;
-  /// Whether it meets a closed box; never false where a point of the box sees the primitive.
+  /// Whether it meets a closed box; never false where a point of the box is in reach of the primitive.
   [[nodiscard]] bool meets(const Box& box) const {
     double off2 = 0.0;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -44,7 +44,7 @@ class FieldChanges {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  /// All that the primitives of a field are made of.
+  /// All data of the primitives of a field.
   struct Content {
     ContentWords words;
     std::vector<std::size_t> end;  ///< of the words of a primitive, by id

@@ -1,5 +1,5 @@
 /// @file field_index.h
-/// What a Field holds: the primitives packed for evaluation, and a packed 8-ary hierarchy of bounding boxes over them.
+/// The data of a Field: the primitives packed for evaluation, and a packed 8-ary hierarchy of bounding boxes over them.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace supple::implicit {
 
-/// Shapes as the evaluation tells them apart. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
+/// Shapes as the evaluation distinguishes them. Segment, rectangle, box and ellipsoid are all Slab: with y = A (x - p),
 /// the vector from the foot point is v = y - clamp(y, -half, half) and q = |v|^2. For an ellipsoid half = 0 and
 /// A = R D^-1 Q^T, otherwise A = S^-1 Q^T with the stretch S. The common pairs of shape and kernel have loops of their own.
 enum class PackedKind : std::uint32_t {
@@ -25,7 +25,7 @@ enum class PackedKind : std::uint32_t {
 /// How the foot point of a general primitive is found.
 enum class PackedFoot : std::uint8_t { Slab, Disc, Scalar, Convolved };
 
-/// What the hot loop reads of a primitive; one cache line.
+/// Data of a primitive for the inner loop; one cache line.
 struct alignas(64) PackedPrimitive {
   std::array<double, 3> position{};  ///< p [m]
   double inverse_r2 = 0.0;           ///< 1 / R^2 [1/m^2]
@@ -34,7 +34,7 @@ struct alignas(64) PackedPrimitive {
   std::uint32_t part = 0;
 };
 
-/// What all but Wyvill points need besides.
+/// Further data of all but Wyvill points.
 struct PackedShape {
   std::array<double, 9> to_local{};  ///< A, row by row
   std::array<double, 3> half{};      ///< [m]; a disc keeps its radius in half[0]
@@ -100,7 +100,7 @@ struct Field::Index {
   std::vector<std::vector<NodePack>> level;  ///< level[0] bounds the leaves, level[l + 1] bounds level[l]
   std::size_t level_count = 0;
 
-  // The surface box, sought when it is first asked for; contact asks every step, other uses never.
+  // The surface box, computed on first use; contact uses it every step, other stages never.
   mutable std::mutex surface_box_mutex;
   mutable std::optional<Box> surface_box;
 
@@ -110,7 +110,7 @@ struct Field::Index {
   std::vector<Box> leaf_box, box_swap;
 
   [[nodiscard]] std::size_t size() const noexcept { return primitive.size(); }
-  // The hierarchy, built when it is first asked for: what only meshes Wyvill points never does.
+  // The hierarchy, built on first use: meshes of Wyvill points never need it.
   std::atomic<bool> built{false};
   std::mutex build_mutex;
 
@@ -139,7 +139,7 @@ struct DistanceRange {
 /// Of one primitive on a box.
 struct PrimitiveBound {
   Interval value{};
-  double slope = 0.0;  ///< of |grad f|, where asked for
+  double slope = 0.0;  ///< of |grad f|, where requested
 };
 [[nodiscard]] PrimitiveBound bound_primitive(const Field::Index& index, std::uint32_t id, const Box& box, bool with_slope);
 

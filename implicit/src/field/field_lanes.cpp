@@ -1,4 +1,4 @@
-// Baseline and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// Baseline and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include "field/field_lanes.h"
@@ -173,7 +173,7 @@ HWY_INLINE KernelLanes<V> any_kernel(D d, const PackedPrimitive& p, const Packed
   return out;
 }
 
-/// What `measure` says of each point: a value, returned, and a vector, in place of the point.
+/// What `measure` returns at each point: a value, returned, and a vector, in place of the point.
 template <class D, class Measure, class V = hn::Vec<D>>
 HWY_INLINE V point_by_point(D d, const Measure& measure, V& x, V& y, V& z) {
   constexpr std::size_t kLanes = hn::MaxLanes(D());
@@ -466,7 +466,7 @@ HWY_INLINE std::size_t filter_packs(const LeafPack* pack, std::size_t pack_count
       const V q = hn::MulAdd(z, z, hn::MulAdd(y, y, hn::Mul(x, x)));
       std::uint8_t bits[8];
       hn::StoreMaskBits(d, hn::Le(q, hn::Load(d, p->reach2 + lane)), bits);
-      // Compressed in a register and stored whole: scalar loads follow at once, and masked stores do not forward.
+      // Compressed in a register and stored as a full vector: scalar loads follow at once, and masked stores do not forward.
       hn::StoreU(pack_lanes(hn::Load(di, p->id + lane), hn::LoadMaskBits(di, bits)), di, ids + count);
       count += static_cast<std::size_t>(std::popcount(bits[0]));
     }

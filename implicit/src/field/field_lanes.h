@@ -12,7 +12,7 @@
 
 namespace supple::implicit::lanes {
 
-/// Points that are looked at together when a batch is cut into groups.
+/// Points that are processed together when a batch is divided into groups.
 inline constexpr std::size_t kBlock = 16;
 /// Ids may be written this far beyond the end of a list.
 inline constexpr std::size_t kSpill = kPack;
@@ -64,7 +64,7 @@ void evaluate_each(const Primitives& in, std::span<const std::uint32_t> ids, con
 struct BoundSums {
   double lower = 0.0;  ///< of the least f
   double upper = 0.0;  ///< of the largest f
-  double slope = 0.0;  ///< of the largest |grad f| [1/m]; only when asked for
+  double slope = 0.0;  ///< of the largest |grad f| [1/m]; only when requested
   double slope_scale = 0.0;  ///< of the largest |grad f| anywhere, for round-off
   double scale = 0.0;  ///< of f(0), for round-off
   double terms = 0.0;  ///< how many were added

@@ -30,7 +30,7 @@ Convexity convexity_of(const ShapeView& view) noexcept {
   }
 }
 
-/// A primitive as the ray sees it: y(t) = start + t along, in the frame of its shape.
+/// A primitive along the ray: y(t) = start + t along, in the frame of its shape.
 struct Seen {
   const PackedShape* shape;
   Vec3 start, along;

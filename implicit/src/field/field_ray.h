@@ -1,5 +1,5 @@
 /// @file field_ray.h
-/// Where a ray first meets the surface of a Field, by intervals along the ray that hold F and its derivative for certain.
+/// First hit of a ray with the surface of a Field, by intervals along the ray that are certain to contain F and its derivative.
 #pragma once
 
 #include <optional>

@@ -19,7 +19,7 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// A stretch of which less than this share is clear is halved.
 constexpr double kShort = 0.25;
-/// Shortest stretch, in features: what no bound decides there touches the surface.
+/// Shortest interval, in features: where no bound decides there, the ray touches the surface.
 constexpr double kFinest = 1e-8;
 /// The same of views that bound neither slopes nor values well enough, where a change of sign is all that shows.
 constexpr double kUnbounded = 1e-3;

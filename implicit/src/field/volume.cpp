@@ -95,20 +95,20 @@ class CutBlock {
  private:
   static constexpr int kSteps = 12;
   static constexpr double kSettled = 1e-3;           // of a cell; the next step would change its square
-  static constexpr double kFarthest = kReach + 0.5;  // where a foot is looked for [cells]
+  static constexpr double kFarthest = kReach + 0.5;  // where a foot is searched [cells]
 
   /// For the foot of one middle.
   struct Search {
     std::size_t cell = 0;
     Vec3 middle = Vec3::Zero();
     bool inside = false;
-    Vec3 foot = Vec3::Zero();  ///< to look at next
+    Vec3 foot = Vec3::Zero();  ///< next point to evaluate
     NearPlane plane{};
     double least = std::numeric_limits<double>::infinity();  ///< of |F| so far
     Vec3 before = Vec3::Zero(), beyond = Vec3::Zero();  ///< the last feet on the middle's side of the surface and on the other one
     bool crossed = false;
 
-    /// Takes the field at a point. @return whether there is more to look at
+    /// Takes the field at a point. @return whether there is another point to evaluate
     bool look(const Vec3& point, double value, const Vec3& gradient, double size) {
       const bool first = std::isinf(least);
       const bool halved = std::abs(value) <= 0.5 * least;
@@ -138,7 +138,7 @@ class CutBlock {
   std::vector<std::size_t> open_;
 };
 
-/// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may hold some of the body;
+/// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may contain a part of the body;
 /// the middles of the cells are set in both, the shares in the second.
 template <class Whole, class Cut>
 void for_blocks_of(const FieldView& field, double cell, const Whole& whole, const Cut& cut) {

@@ -36,7 +36,7 @@ std::vector<CrossedEdge> crossed_edges(const FieldView& field, const Lattice& la
     for (const int step : {-1, 1}) {
       const Vec3 way = step * lattice.cell * Vec3::Unit(axis);
       const int face = step < 0 ? 0 : kCells - 1;
-      Box next;  // the nodes beyond the face: nothing is evaluated where their side is known
+      Box next;  // the nodes beyond the face: not evaluated where their side is known
       std::vector<openvdb::Index> at_face;
       for (const openvdb::Index n : nodes) {
         Coord local = Leaf::offsetToLocalCoord(n);
@@ -133,7 +133,7 @@ SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, bool
       result.leaf->setValueOff(n, f > 0.0 ? 1.0F : -1.0F);  // its side, until the background is known
       continue;
     }
-    // Where grad F vanishes, on skeletons and at the rims of supports, it tells no distance: what is thin is about such nodes.
+    // Where grad F vanishes, on skeletons and at the end of supports, it gives no distance: such nodes are near thin parts.
     const double distance = crosses ? std::copysign(along[n], -f) : slope > 0.0 ? -f / slope : 0.0;
     const auto value = static_cast<float>(options.content == GridContent::Field ? f : distance);
     result.leaf->setValueOn(n, value);

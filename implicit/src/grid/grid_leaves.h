@@ -1,5 +1,5 @@
 /// @file grid_leaves.h
-/// How OpenVDB grids of a surface are made, leaf by leaf.
+/// Construction of OpenVDB grids of a surface, leaf by leaf.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -44,8 +44,8 @@ static_assert(Leaf::DIM == lattice::kCells, "a leaf holds the nodes that a block
 /// The blocks of a grid: those of the surface's box and of the band around it.
 [[nodiscard]] BlockRange range_of(const FieldView& field, const GridOptions& options);
 
-/// Whether parts may be so thin that a node inside has neighbours beyond all supports, where no gradient tells a distance. Its leaves are then
-/// told by the nodes next to them, too.
+/// Whether parts may be so thin that a node inside has neighbours beyond all supports, where no gradient gives a distance. Its leaves are then
+/// found from the nodes next to them, too.
 [[nodiscard]] bool is_thin(const FieldView& field, const GridOptions& options);
 
 /// Whether the nodes of a box may be in the band, or, of thin parts, a cell from the surface.
@@ -56,13 +56,13 @@ static_assert(Leaf::DIM == lattice::kCells, "a leaf holds the nodes that a block
 
 [[nodiscard]] std::uint64_t most_leaves(const GridOptions& options);
 
-/// The leaves of a range that may hold some of the band, as `decide` has it of boxes. @param bodies  that it decides among
+/// The leaves of a range that may contain some of the narrow band, decided by `decide` on boxes. @param bodies  to decide among
 /// @throws Error{Limit}
 [[nodiscard]] BlockList band_leaves(const BlockRange& range, const GridOptions& options, std::uint32_t bodies, const Executor& executor,
                                     const lattice::Decide& decide);
 [[nodiscard]] BlockList band_leaves(const FieldView& field, const GridOptions& options, const Executor& executor);
 
-/// One leaf while the grid is built.
+/// A leaf during construction.
 struct SampledLeaf {
   std::unique_ptr<Leaf> leaf;   ///< none when no voxel is in the band
   bool inside = false;          ///< of a leaf without band: all voxels inside
@@ -70,17 +70,17 @@ struct SampledLeaf {
 };
 [[nodiscard]] SampledLeaf sample_leaf(const FieldView& field, const GridOptions& options, bool thin, const BlockCoord& block);
 
-/// What stands for voxels beyond the band: its width, or the largest |F| in it, with the sign of the side.
+/// The value of voxels beyond the band: its width, or the largest |F| in it, with the sign of the side.
 [[nodiscard]] float inside_value(const GridOptions& options, float largest);
 
 void set_beyond(Leaf& leaf, float inside);
 void fill(openvdb::FloatTree& tree, const BlockBox& box, float value);
-/// Has another value stand for all voxels beyond the band.
+/// Sets another value for all voxels beyond the band.
 void change_beyond(openvdb::FloatTree& tree, float inside);
-/// Puts a sampled leaf, or the tile that stands for it, into the tree.
+/// Puts a sampled leaf, or the tile that replaces it, into the tree.
 void place(openvdb::FloatTree& tree, const BlockCoord& block, SampledLeaf& sampled, float inside);
 
-/// A whole grid and what its making found.
+/// A complete grid and the counts of its construction.
 struct MadeGrid {
   openvdb::FloatGrid::Ptr grid;
   float inside = 0.0F;
@@ -88,7 +88,7 @@ struct MadeGrid {
   std::uint64_t looked_at = 0;
 };
 
-/// The largest |value| by leaf, of GridContent::Field: the largest of all stands for what is beyond the band.
+/// The largest |value| by leaf, of GridContent::Field: the maximum of all is the value beyond the band.
 class LargestValues {
  public:
   void reset(std::span<const std::pair<BlockCoord, float>> by_leaf);

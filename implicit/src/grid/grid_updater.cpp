@@ -14,7 +14,7 @@ using openvdb::FloatTree;
 
 namespace {
 
-/// Ranges of more are made anew: their differences would be too many blocks to look at.
+/// Larger ranges are rebuilt: their differences would be too many blocks to test.
 constexpr std::uint64_t kMostBlocksKept = 100'000'000;
 
 bool holds(const BlockRange& range, const BlockCoord& block) {
@@ -54,7 +54,7 @@ struct GridUpdater::Impl {
     }
     touch(reached);
   }
-  /// Blocks of a that b has not, side by side.
+  /// Blocks of a that are not in b, side by side.
   void touch_others(BlockRange a, const BlockRange& b) {
     if (b.empty()) return touch(a);
     for (std::size_t k = 0; k < 3 && !a.empty(); ++k) {

@@ -179,7 +179,7 @@ void keep_volumes(const Mesh& mesh, std::vector<Vec3>& onto) {
   }
 }
 
-/// Takes back what turns triangles over, until none is.
+/// Undoes moves that invert triangles, until none is inverted.
 void keep_sides(const Mesh& mesh, std::vector<Vec3>& onto) {
   const auto normal_of = [](const std::vector<Vec3>& p, const Triangle& t) { return Vec3((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]])); };
   for (bool turned = true; turned;) {

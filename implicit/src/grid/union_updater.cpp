@@ -17,7 +17,7 @@ namespace {
 
 bool before_box(const BlockBox& a, const BlockBox& b) { return std::tie(a.lower, a.upper) < std::tie(b.lower, b.upper); }
 
-/// Calls use(box) for the boxes of a that b has not. @pre both sorted
+/// Calls use(box) for the boxes of a that are not in b. @pre both sorted
 template <class Use>
 void for_others(const std::vector<BlockBox>& a, const std::vector<BlockBox>& b, const Use& use) {
   auto at = b.begin();
@@ -27,7 +27,7 @@ void for_others(const std::vector<BlockBox>& a, const std::vector<BlockBox>& b, 
   }
 }
 
-/// Leaves that may hold some of the band.
+/// Leaves that may contain some of the band.
 struct LeafList : BlockList {
   std::vector<std::optional<double>> constant;  ///< by candidate: its value, where that is the same in the whole leaf; with GridContent::Field
 };
@@ -44,8 +44,8 @@ Verdict look_at_depths(std::span<const UnitedBody> bodies, const GridOptions& op
   return left.size() == none ? Verdict::Outside : Verdict::Keep;
 }
 
-/// Of fields: those that may be the largest somewhere in a box. A field that is constant there, as all are beyond their supports, may be
-/// so too, at any distance; the first of equal ones stands for them.
+/// Selects the fields that may be the largest somewhere in a box. A field that is constant there, as all are beyond their supports, may
+/// be the largest at any distance; the first of equal fields represents them.
 Verdict look_at_fields(std::span<const UnitedBody> bodies, double width, const Box& box, std::span<const std::uint32_t> candidates,
                        std::vector<std::uint32_t>& left) {
   thread_local std::vector<Interval> value;
@@ -124,7 +124,7 @@ struct UnionUpdater::Impl {
       }
     }
   }
-  /// Whether the view of a body is in a leaf what that of a body of the last call was, by their places.
+  /// Whether the view of a body is unchanged in a leaf, by the indices of its body now and in the last call.
   [[nodiscard]] bool stays(std::span<const UnitedBody> bodies, std::uint32_t now, std::uint32_t last, const Box& leaf) const {
     if (bodies[now].version == version[last]) return true;
     if (now != last || bodies[now].field == nullptr || changes[now].all()) return false;
@@ -132,7 +132,7 @@ struct UnionUpdater::Impl {
     return std::none_of(reaches.begin(), reaches.end(), [&](const Reach& reach) { return reach.whole.overlaps(leaf) && reach.meets(leaf); });
   }
 
-  /// Leaves of `next` that are not as they were, and leaves of the last list that `next` has not.
+  /// Changed leaves of `next`, and leaves of the last list that are not in `next`.
   void compare(std::span<const UnitedBody> bodies, const LeafList& next, std::vector<std::size_t>& changed, std::vector<BlockCoord>& gone) const {
     const auto unchanged = [&](std::size_t i, std::size_t old) {
       const std::size_t count = next.offset[i + 1] - next.offset[i];
@@ -167,7 +167,7 @@ struct UnionUpdater::Impl {
       for (std::size_t i = 0; i < changed.size(); ++i) largest.set(next.block[changed[i]], leaves[i]);
       if (const float now = inside_value(options, largest.of_all()); now != inside) change_beyond(tree, inside = now);
     }
-    // What was inside or in the band is outside but where `next` says otherwise.
+    // Former inside and band leaves are outside except where `next` has them.
     for_others(list.inside, next.inside, [&](const BlockBox& box) { fill(tree, box, -inside); });
     for (const BlockCoord& block : gone) fill(tree, {block, block}, -inside);
     for_others(next.inside, list.inside, [&](const BlockBox& box) { fill(tree, box, inside); });

@@ -37,7 +37,7 @@ class BlobGrid {
     std::array<double, 3> centre;
     double radius;
   };
-  /// What is different from the last build: everything, or what supports left and entered.
+  /// Changes since the last build: everything, or the regions that supports left and entered.
   struct Change {
     bool all = true;
     std::vector<Ball> balls;
@@ -69,9 +69,9 @@ class BlobGrid {
     BlobColumn blobs;
   };
   void gather_column(const Cells& base, std::int64_t size, std::int64_t height, Column& column) const;
-  /// As above, for a cube of a column that holds it and without a margin.
+  /// As above, for a cube of a column that contains it, without a margin.
   void gather(const Column& column, const Cells& base, std::int64_t size, BlobList& list, BlobList* far = nullptr) const;
-  /// Calls use(box) for each bin that holds blobs, with the cells that their centres lie in.
+  /// Calls use(box) for each bin with blobs, with the cells of their centres.
   template <class Use>
   void for_bins(const Use& use) const {
     std::size_t b = 0;
@@ -100,7 +100,7 @@ class BlobGrid {
     std::array<double, 3> position;
     double inverse_r2;
   };
-  std::vector<Source> last_;          ///< what the last build was made of
+  std::vector<Source> last_;          ///< input of the last build
   bool forgotten_ = false;
   std::vector<std::uint32_t> moved_;  ///< ids
   Lattice lattice_;
@@ -121,7 +121,7 @@ class BlobGrid {
     return static_cast<std::uint32_t>((at[2] * count_[1] + at[1]) * row_length() + at[0]);
   }
   void look_up_radius(double inverse_r2) {
-    if (inverse_r2 == inverse_r2_) return;  // most often all are alike
+    if (inverse_r2 == inverse_r2_) return;  // mostly all are equal
     inverse_r2_ = inverse_r2;
     radius_ = per_cell_ / std::sqrt(inverse_r2);
     radius_scale_ = static_cast<float>(1.0 / radius_);

@@ -1,4 +1,4 @@
-// Baseline and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// Baseline and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include "mesh/blob_lanes.h"
@@ -51,7 +51,7 @@ HWY_INLINE Distances distances(V s, V x, V y, V z, V cx, V cy, V cz, V half) {
           hn::MulAdd(fz, fz, hn::MulAdd(fy, fy, hn::Mul(fx, fx)))};
 }
 
-/// What the sums and the evaluation of single points may be off by.
+/// Round-off bounds of the sums and of the evaluation of single points.
 HWY_INLINE float round_off(std::size_t count, float size) {
   return (4e-6F + 1e-7F * static_cast<float>(count)) * (1.0F + size);
 }

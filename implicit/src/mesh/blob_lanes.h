@@ -28,7 +28,7 @@ struct BlobList {
   std::size_t near = 0;  ///< those that were put first, all where the order stayed
 
   void reserve(std::size_t blobs);
-  /// Fills the slots that vectors read beyond the end with blobs that reach nothing.
+  /// Fills the slots that vectors read beyond the end with blobs without reach.
   void pad();
 };
 
@@ -48,7 +48,7 @@ struct BlobRun {
 void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
             BlobList& list, BlobList* far);
 
-/// Blobs around cubes that stand on each other, layer by layer of bins: what is read once for all of them.
+/// Blobs around a column of cubes, by layers of bins: data that are read once for all of them.
 struct BlobColumn {
   std::vector<float> scale, x, y;    ///< x and y as in a list of one of the cubes
   std::vector<double> z;             ///< [cells] from the lattice's origin

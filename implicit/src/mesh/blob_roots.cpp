@@ -1,4 +1,4 @@
-// Baseline and AVX-512 variants only; AES support must not decide which variant a processor gets.
+// Baseline and AVX-512 variants only; support of AES must not affect the variant that a processor gets.
 #define HWY_DISABLE_PCLMUL_AES
 
 #include <algorithm>

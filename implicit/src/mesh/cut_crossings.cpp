@@ -173,7 +173,7 @@ void CutCrossings::find_crossing(const Mesh& from, const Mesh& to, const Executo
           const std::uint32_t o = in_box_[j].triangle;
           if (!cut_[n].box.overlaps(cut_[o].box)) continue;
           const Box common = cut_[n].box.intersection(cut_[o].box);
-          if (boxes.holding(common.lower) != in_box_[i].box) continue;  // of all boxes that hold both, one
+          if (boxes.holding(common.lower) != in_box_[i].box) continue;  // of all boxes that contain both, one
           for (std::size_t k = 0; k < 4; ++k) {
             const Box box = box_of(to.position, part(n, k));
             if (!box.overlaps(common)) continue;

@@ -1,10 +1,10 @@
 /// @file cut_crossings.h
-/// Triangles that were cut into four, with the middles of their edges moved to the surface, must not pass through each other.
+/// Prevents intersections of triangles that are divided into four with the midpoints of their edges moved to the surface.
 ///
-/// On the way from the flat triangles, which do not cross, to the moved ones two would have to touch first. Along a line across all sheets that meet
-/// there inside and outside alternate, so some two of them face each other: nothing touches where one direction has all normals of near triangles, at
-/// all times, on its side. Near is whose box, that of its corners and middles, holds the place. Elsewhere triangles are compared one by one, where they
-/// end: that crossings which begin there do not move on to where none begin is tested, not proved.
+/// On the way from the flat triangles, which do not intersect, to the moved ones two would have to touch first. Along a line across all sheets that
+/// meet there inside and outside alternate, so two of them face each other: nothing touches where one direction has all normals of near triangles, at
+/// all times, on its side. A triangle is near a point if the box of its corners and midpoints contains the point. Elsewhere the final triangles are compared one
+/// by one; that intersections which begin there do not move to other places is tested, not proved.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace supple::implicit {
 
-/// The middle of an edge that was put back on it, and where it had been moved to.
+/// The midpoint of an edge that was put back on it, and its moved position.
 struct StraightEdge {
   std::uint32_t vertex = 0;
   Vec3 position = Vec3::Zero();  ///< [m]
@@ -26,13 +26,13 @@ struct StraightEdge {
 /// Kept for its memory.
 class CutCrossings {
  public:
-  /// Of triangles that cross, puts the middle of an edge that was moved farthest back onto it, until none do; normals stay.
-  /// @param from  does not cross itself   @param to  triangle n of it cut into 4n (a, ab, ca), 4n + 1 (ab, b, bc), 4n + 2 (ca, bc, c) and 4n + 3
-  /// (ab, bc, ca); its first vertices are those of `from`   @param straight  receives what was put back, by rising vertex
+  /// Puts back the midpoint that was moved farthest of intersecting triangles, until none intersect; normals stay.
+  /// @param from  does not intersect itself   @param to  triangle n of it divided into 4n (a, ab, ca), 4n + 1 (ab, b, bc), 4n + 2 (ca, bc, c) and 4n + 3
+  /// (ab, bc, ca); its first vertices are those of `from`   @param straight  receives the midpoints put back, by rising vertex
   void take_back(const Mesh& from, const Executor& executor, Mesh& to, std::vector<StraightEdge>& straight);
 
  private:
-  /// A triangle that is cut.
+  /// A divided triangle.
   struct Cut {
     Box box;
     Vec3 axis = Vec3::Zero();  ///< unit; zero: its normals, on the way, are not all within a right angle of one
@@ -54,7 +54,7 @@ class CutCrossings {
   void find_cuts(const Mesh& from, const Mesh& to, const Executor& executor);
   /// Those in boxes of one width in which no direction has all normals on its side.
   void find_doubtful();
-  /// Middles to be put back of what crosses.
+  /// Midpoints of intersecting triangles that are to be put back.
   void find_crossing(const Mesh& from, const Mesh& to, const Executor& executor);
 
   std::vector<Cut> cut_;

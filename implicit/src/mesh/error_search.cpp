@@ -35,7 +35,7 @@ double distance_by_points(const FieldView& field, const Mesh& mesh, const std::a
   return foot.converged ? std::min(least, (foot.point - p).norm()) : least;
 }
 
-/// How errors shrink, by the last three meshes, and what that leaves to be hoped for.
+/// Extrapolates how errors shrink from the last three meshes.
 class Order {
  public:
   void add(int level, double error) {
@@ -85,7 +85,7 @@ class Order {
                                  .hint = "allow at least " + three_digits(1.05 * reachable) + " m"});
 }
 
-/// The coarsest mesh is too large by itself.
+/// The coarsest mesh alone is too large.
 [[noreturn]] void refuse_first(const ErrorGoal& goal, const Error& size) {
   std::vector<Fault> faults = size.faults();
   for (Fault& fault : faults) {
@@ -147,8 +147,8 @@ int levels_left(double now, double most, double growth) {
 LevelTry tried(double error, const Mesh& mesh, const MarchCounts& counts) {
   constexpr double kTelling = 10'000.0;  // triangles
   constexpr double kMostBytes = 8e9;
-  // By counts: memory that a mesher keeps from earlier meshes must not decide.
-  constexpr double kBytesATriangle = 72.0;  // with its half of a vertex, and what cutting triangles takes
+  // By counts: the decision must not depend on the memory that a mesher keeps from earlier meshes.
+  constexpr double kBytesATriangle = 72.0;  // with its half of a vertex, and the memory for dividing triangles
   constexpr double kBytesATile = 400.0;     // of 4^3 nodes
   const auto triangles = static_cast<double>(mesh.triangle_count());
   const double bytes = kBytesATile * static_cast<double>(counts.tiles) + kBytesATriangle * triangles;
@@ -168,7 +168,7 @@ double first_cell(const FieldView& field, double cell) {
 void make_within(const ErrorGoal& goal, const std::function<LevelTry(int level)>& make) {
   SUPPLE_EXPECTS(goal.error > 0.0 && goal.first > 0.0);
   constexpr int kEvenLevels = 4, kLevels = 2;
-  constexpr double kPromise = 0.9;  // of the error, what a level must promise to be tried
+  constexpr double kPromise = 0.9;  // of the error: predicted error of a level that is tried
   Order order;
   LevelTry now;
   for (int level = 0, last = 0;;) {

@@ -13,7 +13,7 @@
 namespace supple::implicit {
 namespace {
 
-/// What meshing takes. Values and searches are fitted to the times of `bench implicit/mesh` (every shape, all scenes of the library) on one core
+/// Costs of meshing. Values and searches are fitted to the times of `bench implicit/mesh` (every shape, all scenes of the library) on one core
 /// of an Intel Xeon at 2 to 3 GHz. Choices use ratios of them only, so they hold on other processors; estimates are most often right
 /// within a factor of two.
 constexpr double kNodes = 512.0;                      ///< of a leaf: 8^3, as in OpenVDB
@@ -21,21 +21,21 @@ constexpr double kSingleValue = 0.1;                  ///< a primitive at a node
 constexpr double kValue = 0.7;                        ///< the same in double precision [ns]
 constexpr double kGradient = 1.1;                     ///< value and gradient in double precision [ns]
 constexpr double kPrimitive = 200.0;                  ///< to find a primitive near a leaf [ns]
-constexpr double kCubesLeaf = 3500.0;                 ///< a leaf of marching cubes besides: bounds, roots and triangles of 45 vertices [ns]
-constexpr double kGridLeaf = 10000.0;                 ///< a leaf of a grid besides: bounds, the tree and volumeToMesh [ns]
-constexpr double kGridVertices = 45.0;                ///< vertices of a leaf by way of a grid
-constexpr double kLooksAtVertex = 3.5;                ///< evaluations of each: 2.5 on its way onto the surface, 1 for its normal
-constexpr double kBandLeaves = 1.8;                   ///< leaves of the band (three cells on each side) for one that holds surface
-constexpr double kOtherShapes = 2.5;                  ///< nearest points on other shapes than points, in times of those
+constexpr double kCubesLeaf = 3500.0;                 ///< further costs of a leaf of marching cubes: bounds, roots and triangles of 45 vertices [ns]
+constexpr double kGridLeaf = 10000.0;                 ///< further costs of a leaf of a grid: bounds, the tree and volumeToMesh [ns]
+constexpr double kGridVertices = 45.0;                ///< vertices of a leaf through a grid
+constexpr double kLooksAtVertex = 3.5;                ///< evaluations of each: 2.5 for projection onto the surface, 1 for its normal
+constexpr double kBandLeaves = 1.8;                   ///< leaves of the narrow band (three cells on each side) per leaf with surface
+constexpr double kOtherShapes = 2.5;                  ///< nearest points on other shapes relative to points
 constexpr double kDividedLeaf = 0.04;                 ///< a leaf of tetrahedra [ms]
-constexpr double kContactEdge = 0.8;                  ///< the edge of a contact patch among tetrahedra [ms]
+constexpr double kBoundary = 0.8;                     ///< the boundary curve of a contact patch among tetrahedra [ms]
 constexpr double kLeastHalved = 1.0;                  ///< a search near a primitive smaller than a cell: about a thousand cubes [ms]
 constexpr double kContact = 0.2;                      ///< a search between two bodies that touch: some hundred cubes [ms]
-constexpr double kMoreBalls = 1.0;                    ///< the same, for each primitive more that overlaps there, of balls [ms]
-constexpr double kMoreShapes = 170.0;                 ///< and of other shapes [ms]
+constexpr double kMoreBalls = 1.0;                    ///< the same for each further primitive that overlaps there, for balls [ms]
+constexpr double kMoreShapes = 170.0;                 ///< and for other shapes [ms]
 
-/// Of a search, in the time that marching cubes take: for cubes of the lattice, and for halving those near the surface until their edges
-/// are some part of the length on which gradients turn, where primitives are alone and where they overlap. Bounds of overlapping
+/// Cost of a search relative to marching cubes: for cubes of the lattice, and for halving those near the surface until their edges
+/// are a given fraction of the length on which gradients turn, where primitives are alone and where they overlap. Bounds of overlapping
 /// primitives add up where their gradients cancel.
 struct SearchWork {
   double lattice = 0.0, alone = 0.0, overlapping = 0.0;
@@ -96,7 +96,7 @@ bool decides(const Skeleton& skeleton) {
   });
 }
 
-/// Whether eight cubes are looked at side by side: EighthBounds::know.
+/// Whether eight cubes are processed side by side: EighthBounds::know.
 bool goes_by_eighths(const Skeleton& skeleton) {
   return skeleton.blend.rule == BlendRule::Sum && std::all_of(skeleton.primitive.begin(), skeleton.primitive.end(), [](const Primitive& p) {
     if (p.convolved || (p.kernel.kind != KernelKind::Wyvill && p.kernel.kind != KernelKind::Gascuel)) return false;
@@ -112,7 +112,7 @@ bool goes_by_eighths(const Skeleton& skeleton) {
   });
 }
 
-/// Supports that hold the middle of one of them, on average over some.
+/// Supports that contain the centre of one of them, averaged over some.
 double local_overlap(std::span<const Box> supports) {
   constexpr std::size_t kLooks = 8;
   const std::size_t looks = std::min(supports.size(), kLooks);
@@ -195,7 +195,7 @@ SearchEstimate estimate_search(std::span<const DividingBody> bodies, std::span<c
   }
   for (const auto& [a, b] : pairs) {
     all.search_ms += kContact + std::max(more_ms[a], more_ms[b]);
-    all.mesh_ms += kContactEdge;
+    all.mesh_ms += kBoundary;
   }
   return all;
 }

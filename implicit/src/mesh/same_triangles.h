@@ -1,5 +1,5 @@
 /// @file same_triangles.h
-/// What two meshes have in common, bit for bit.
+/// Common parts of two meshes, to the bit.
 #pragma once
 
 #include <cstdint>

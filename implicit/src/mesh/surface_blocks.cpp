@@ -42,13 +42,13 @@ Box world_box(const BlockBox& blocks, const Lattice& lattice, int last_node) {
                         node(blocks.upper[2], last_node))};
 }
 
-/// What one task of a level leaves.
+/// Result of one task of a level.
 struct LevelPart {
   std::vector<Cube> cube;
   std::vector<std::uint32_t> candidate;
   std::vector<BlockBox> inside;
 
-  /// Cubes first..last of another one that was looked at, with their candidates, which follow each other.
+  /// Cubes first..last of a processed parent, with their candidates, which are consecutive.
   void append(const LevelPart& other, std::size_t first, std::size_t last) {
     if (first == last) return;
     const std::uint32_t from = other.cube[first].first, to = other.cube[last - 1].first + other.cube[last - 1].count;
@@ -61,7 +61,7 @@ struct LevelPart {
   }
 };
 
-/// Looks at every cube of a level, in order; @return those to keep.
+/// Processes every cube of a level, in order; @return those to keep.
 LevelPart look(const LevelPart& level, int size, const BlockRange& range, const Lattice& lattice,
                const Executor& executor, const RefineOptions& options, const Decide& decide) {
   std::vector<LevelPart> parts((level.cube.size() + kBoxesPerTask - 1) / kBoxesPerTask);
@@ -112,7 +112,7 @@ class Refinement {
   Refinement(const BlockRange& range, const Lattice& lattice, const Executor& executor, const RefineOptions& options, const Decide& decide)
       : range_(range), lattice_(lattice), executor_(executor), options_(options), decide_(decide) {}
 
-  /// @param level  cubes of 2^size blocks that were not looked at yet
+  /// @param level  cubes of 2^size blocks that are not processed yet
   void refine(LevelPart level, int size) {
     for (;; --size) {
       std::uint64_t& looked = looked_[static_cast<std::size_t>(size)];

@@ -25,7 +25,7 @@ namespace supple::implicit {
 /// Boxes of triangles, halved along their longest side.
 class TriangleBoxes {
  public:
-  /// @param number  of those that are looked at
+  /// @param number  of those that are tested
   TriangleBoxes(std::span<const Vec3> position, std::span<const std::array<std::uint32_t, 3>> triangle, std::vector<std::uint32_t> number);
 
   /// Calls use(number) for each whose box overlaps another one.

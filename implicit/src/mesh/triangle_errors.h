@@ -15,9 +15,9 @@ namespace supple::implicit {
 class TriangleErrors {
  public:
   /// centroid_error of a mesh. A triangle whose corners are bit for bit those of one of the last mesh, in that order, keeps its error where
-  /// the field is what it was.
+  /// the field is unchanged.
   /// @param last     the mesh of the last call
-  /// @param nothing  of the last call holds
+  /// @param nothing  of the last call is valid
   /// @param differs  whether the field, not its feature size, may have other values in a box than in the last call
   [[nodiscard]] double measure(const FieldView& field, const Mesh& mesh, const Mesh& last, bool nothing,
                                const std::function<bool(const Box&)>& differs, const Executor& executor);
@@ -27,7 +27,7 @@ class TriangleErrors {
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   struct Found {
     double error = 0.0;          ///< [m]
-    std::uint32_t wide = kNone;  ///< place in wide_ of where the field was asked, if not at the centroid alone
+    std::uint32_t wide = kNone;  ///< index in wide_ of the box in which the field was evaluated, if not at the centroid alone
   };
   std::vector<Found> found_;  ///< by triangle of the last mesh
   std::vector<Box> wide_;

@@ -18,7 +18,7 @@ class TriangleSteps {
 
   explicit TriangleSteps(std::vector<Triangle> mesh) : triangle_(std::move(mesh)), first_made_(triangle_.size()), taker_(triangle_.size(), kNone) {}
 
-  /// A step: triangles that are there make room for others with the same border. @return number of the first of these
+  /// A step: replaces triangles by others with the same border. @return number of the first of these
   std::uint32_t replace(std::span<const std::uint32_t> taken, std::span<const Triangle> made);
   /// Undoes a step, and before it those that replaced what it made. @param back  what is there again is appended
   void take_back(std::uint32_t step, std::vector<std::uint32_t>& back);

@@ -14,11 +14,11 @@ namespace supple::implicit {
 namespace {
 
 constexpr double kRemove = 0.5;           ///< samples nearer than this [spacings] are one too many
-constexpr double kAdd = 0.7;              ///< a place farther than this from all samples of its side gets one
+constexpr double kAdd = 0.7;              ///< a point farther than this from all samples of its side gets one
 constexpr double kCell = 1.0 / 6.0;       ///< of the lattice whose vertices are such places, at most: 0.7 + sqrt(3) / 6 < 1
 constexpr double kCellOfFeature = 0.5;    ///< no ball of the surface passes through a cell of half the feature size
 constexpr double kFarthestMove = 0.5;     ///< a sample whose surface went farther away is lost
-constexpr double kSpacingByDensity = 1.28;  ///< d sqrt(n) of n samples a square metre on a plane, measured
+constexpr double kSpacingByDensity = 1.28;  ///< d sqrt(n) of n samples per square metre on a plane, measured
 constexpr std::size_t kSamplesPerTask = 64;
 
 constexpr std::size_t kTrianglesPerTask = 512;

@@ -16,7 +16,7 @@ namespace supple::implicit {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-/// Directions of one sphere that are looked at for a box.
+/// Directions of one sphere that are tested for a box.
 constexpr double kMostNear = 1 << 18;
 
 /// Smallest multiple of `step` that is at least x and at least `least`.
@@ -101,7 +101,7 @@ class LayoutBuilder {
   LayoutBuilder(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box* near, SampleLayout& out)
       : skeleton_(skeleton), asked_(spacing), parts_(parts), near_(near), layout_(out) {}
 
-  /// @return seeds looked at
+  /// @return number of seeds tested
   std::size_t build() {
     layout_.clear();
     for (std::size_t i = 0; i < skeleton_.primitive.size(); ++i) {
@@ -274,7 +274,7 @@ class LayoutBuilder {
         }
       }
     }
-    // The rim sweeps half a torus: (r + rho cos latitude) rho d(latitude) d(turn).
+    // The edge of a disc sweeps half a torus: (r + rho cos latitude) rho d(latitude) d(turn).
     const int turns = count_for(2.0 * kPi * (r + rho_) / spacing_, 4, 8);
     const int latitudes = count_for(kPi * rho_ / spacing_, 2, 4);
     for (int l = 0; l < latitudes; ++l) {
@@ -290,7 +290,7 @@ class LayoutBuilder {
     }
   }
 
-  /// Rays from the centre of what is star-shaped, the solid angles those of an ellipsoid with the same semi-axes.
+  /// Rays from the centre of star-shaped primitives, with the solid angles of an ellipsoid with the same semi-axes.
   void star() {
     const double R = primitive_->kernel.radius;
     Vec3 size = primitive_->size;

@@ -71,7 +71,7 @@ struct Scratch {
   std::vector<std::size_t> open, searching;
 };
 
-/// What all blocks of one call share.
+/// Data shared by all blocks of one call.
 struct Task {
   const Skeleton& skeleton;
   const SampleLayout& layout;

@@ -95,7 +95,7 @@ Pair edge(const Form& k, double z2, double h, double from, double to) noexcept {
   if (!(c2 > 0.0) || h == 0.0) return {};
   const double h2 = h * h;
   const double A = 1.0 + k.s * z2;
-  // H and its analogue for dk/dq at the support's rim.
+  // H and its analogue for dk/dq at the boundary of the support.
   Pair rim;
   double scale = 0.0;
   const int m = k.power;

@@ -130,7 +130,7 @@ CurvatureRange gascuel_curvature(const Kernel& k, double near, double far) noexc
 }
 
 /// Bounds of 2 f' and e = 2 f' + 4 u f'' over R^2 by interval arithmetic on either side of the joint: both derivatives keep
-/// their signs there, and what they are made of is linear in u. @param p  hardness
+/// their signs there, and their parts are linear in u. @param p  hardness
 CurvatureRange blanc_schlick_inner(double p, double from, double to) noexcept {
   if (from > to) return {};
   const double b = 4.5 - 4.0 * p;

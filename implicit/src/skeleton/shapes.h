@@ -26,7 +26,7 @@ struct ShapeView {
 
 [[nodiscard]] ShapeView view_of(const Primitive& primitive) noexcept;
 
-/// q, half its gradient, and its second derivatives where asked for.
+/// q, half its gradient, and its second derivatives where requested.
 struct FootSample {
   double q = 0.0;
   Vec3 half_gradient = Vec3::Zero();

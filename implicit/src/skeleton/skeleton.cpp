@@ -228,7 +228,7 @@ bool has_convex_levels(const Skeleton& skeleton) noexcept {
 
 namespace {
 
-/// Turned alike in all directions.
+/// Rotated in the same way in all directions.
 bool is_wyvill_ball(const Primitive& p) noexcept {
   return p.shape == ShapeKind::Point && p.kernel.kind == KernelKind::Wyvill && p.stretch == Vec3::Ones() && !p.convolved;
 }

@@ -15,14 +15,14 @@ namespace {
 using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr double kTouching = 1e-7;        // of the mesh's size: nearer triangles touch
-constexpr double kPieces = 1.0 / 512.0;   // of the mesh's size: longest edge of what is left of crossing triangles
+constexpr double kPieces = 1.0 / 512.0;   // of the mesh's size: longest edge of the pieces of crossing triangles
 constexpr std::size_t kMostPieces = 1U << 20;
 
 [[noreturn]] void refuse(const std::string& expected, const std::string& found, const std::string& hint) {
   throw Error(ErrorKind::Scene, Fault{.place = {}, .key = "mesh", .expected = expected, .found = found, .hint = hint});
 }
 
-/// Triangles between vertices of which each is used and has a place of its own.
+/// Triangles over vertices that are all used and at different positions.
 struct Welded {
   std::vector<Vec3> position;
   std::vector<std::uint32_t> given;  // the first vertex of the mesh at each place
@@ -112,7 +112,7 @@ void expect_closed(const Welded& mesh, const std::vector<Side>& sides) {
          "close its holes, so that it has an inside");
 }
 
-/// For each triangle the first of those that it is joined to by edges between two that `counts` holds for.
+/// For each triangle the first one that it is connected to by edges of two triangles that `counts` holds for.
 template <class Counts>
 std::vector<std::uint32_t> joined(std::size_t triangles, const std::vector<Side>& sides, const Counts& counts) {
   std::vector<std::uint32_t> parent(triangles);
@@ -131,8 +131,8 @@ std::vector<std::uint32_t> joined(std::size_t triangles, const std::vector<Side>
   return parent;
 }
 
-/// Turns shells that cross others so that they run around what they enclose the same way: one that is cut bounds no cavity.
-/// @return how many triangles were turned
+/// Reverses shells that intersect others so that all are oriented outward: a shell that is cut bounds no cavity.
+/// @return number of reversed triangles
 std::size_t turn_crossing_shells(Welded& mesh, const std::vector<Side>& sides, const std::vector<std::uint8_t>& crosses) {
   const std::vector<std::uint32_t> shell = joined(mesh.triangle.size(), sides, [](std::uint32_t) { return true; });
   std::vector<double> volume(mesh.triangle.size(), 0.0);
@@ -152,8 +152,8 @@ std::size_t turn_crossing_shells(Welded& mesh, const std::vector<Side>& sides, c
   return count;
 }
 
-/// Turns triangles that run around the other way than most of those that they are joined to by edges between two.
-/// @return how many were turned
+/// Reverses triangles that are oriented against most of those that they are connected to by edges of two triangles.
+/// @return number of reversed triangles
 std::size_t agree(Welded& mesh, const std::vector<Side>& sides) {
   struct Neighbour {
     std::uint32_t triangle;
@@ -251,7 +251,7 @@ struct Flat {
   }
 };
 
-/// Whether the edges of s come to the face or to the edges of t. Faces that lie in one plane do not touch: what bounds them does.
+/// Whether the edges of s come within `reach` of the face or the edges of t. Faces in one plane do not count; their neighbours do.
 /// @param shared  a corner that both have by their mesh: edges of s that end there are left out; null: none
 bool touches(const Flat& s, const Flat& t, double reach, const Vec3* shared) {
   std::array<double, 3> height;

@@ -13,7 +13,7 @@
 namespace supple::implicit {
 
 /// The side of the surface is that of the nearest place, by the mean of the normals about it, weighted by angles (Baerentzen & Aanaes 2005, "Signed
-/// Distance Computation Using the Angle Weighted Pseudonormal"), or tells by winding number where triangles cross.
+/// Distance Computation Using the Angle Weighted Pseudonormal"), or decides by winding number where triangles cross.
 class ExactDistance {
  public:
   explicit ExactDistance(ClosedSurface surface);
@@ -38,7 +38,7 @@ class ExactDistance {
   ClosedSurface surface_;
   TriangleTree tree_;
   Box box_;
-  std::vector<std::array<Vec3, 3>> edge_normal_, corner_normal_;  // of each triangle, unit; zero: the winding number tells
+  std::vector<std::array<Vec3, 3>> edge_normal_, corner_normal_;  // of each triangle, unit; zero: the winding number decides
 };
 
 template <class Use>
@@ -50,7 +50,7 @@ void ExactDistance::each_place(std::size_t count, const Use& use) const {
   std::size_t made = 0;
   for (std::uint32_t t = 0; t < surface_.triangle.size(); ++t) {
     sum += area(t);
-    // As many as its area holds.
+    // A number proportional to its area.
     for (; made < count && (static_cast<double>(made) + 0.5) * whole <= sum * static_cast<double>(count); ++made) {
       double u = std::fmod(0.5 + static_cast<double>(made) * 0.7548776662466927, 1.0), v = std::fmod(0.5 + static_cast<double>(made) * 0.5698402909980532, 1.0);
       if (u + v > 1.0) {

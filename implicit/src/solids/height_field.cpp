@@ -307,7 +307,7 @@ Mesh HeightField::mesh(int finer) const {
   return mesh;
 }
 
-/// Strips from the rim of the surface down to the lowest height. @param across, along  vertices of the surface each way
+/// Strips of triangles from the border of the surface down to the lowest height. @param across, along  vertices of the surface each way
 void HeightField::add_sides(std::size_t across, std::size_t along, Mesh& mesh) const {
   const double lowest = corner_.z() + height_.least();
   const auto add_side = [&](std::size_t first, std::size_t stride, std::size_t count, const Vec3& outward) {

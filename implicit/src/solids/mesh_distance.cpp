@@ -9,12 +9,12 @@ namespace supple::implicit {
 namespace {
 
 constexpr double kCellsAlong = 128.0;  // the longest side
-constexpr double kMargin = 8.0;       // cells around the mesh: the band and what the spline mixes
+constexpr double kMargin = 8.0;       // cells around the mesh: the band and the stencil of the spline
 constexpr double kPoor = 0.75;        // cells that the spline may be off near the surface
 constexpr double kNear = 2.0;         // cells from the surface
 constexpr double kThin = 1.5;         // cells: of plates and gaps below it little is left
-constexpr double kMostPlaces = 1e6;   // that are looked at on the surface
-constexpr std::size_t kBlock = 8;     // nodes along each side that one distance may tell to be far outside
+constexpr double kMostPlaces = 1e6;   // that are tested on the surface
+constexpr std::size_t kBlock = 8;     // nodes along each side that one distance may prove to be far outside
 
 /// Weights of the uniform cubic B-spline at t in [0, 1] for the nodes -1 .. 2, and their slopes.
 struct Weights {

@@ -53,7 +53,7 @@ TriangleTree::TriangleTree(std::span<const Vec3> position, std::span<const std::
     place_[t] = static_cast<std::uint32_t>(face_.size());
     face_.push_back(given[t]);
   }
-  // What triangles without area point at.
+  // The target of triangles without area.
   face_.push_back({.corner = {}, .normal = Vec3::Zero(), .inward = {}, .inverse_square = {}, .triangle = 0});
 }
 
@@ -182,7 +182,7 @@ inline void TriangleTree::look_at(const Face& face, const Vec3& x, TriangleSite&
 TriangleSite TriangleTree::nearest(const Vec3& x) const {
   TriangleSite best;
   if (root_ == kNone) return best;
-  thread_local std::uint32_t last = 0;  // points that are asked for one after another lie close together
+  thread_local std::uint32_t last = 0;  // points of successive queries lie close together
   look_at(face_[last < face_.size() - 1 ? last : 0], x, best);
   constexpr float kBelow = 1.0F - 1e-5F;  // more than single precision loses of a squared distance
   constexpr double kAbove = 1.0 + 1e-5;
@@ -225,7 +225,7 @@ TriangleSite TriangleTree::nearest(const Vec3& x) const {
     for (std::size_t c = 0; c < kWide; ++c) {
       const float least = square[c] * kBelow;
       if (node.child[c] == kNone || static_cast<double>(least) > most) continue;
-      std::size_t i = n++;  // the nearest is looked at first
+      std::size_t i = n++;  // the nearest is tested first
       for (; i > begin && stack[i - 1].square < least; --i) stack[i] = stack[i - 1];
       stack[i] = {least, node.child[c]};
     }

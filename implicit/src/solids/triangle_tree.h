@@ -23,14 +23,14 @@ struct TriangleSite {
   Vec3 from = Vec3::Zero();    ///< from an edge or a corner to the point [m]
 };
 
-/// The nearest of several triangles does not depend on the order in which they are looked at: of equally near ones it is that with the lowest index.
+/// The nearest of several triangles does not depend on the order of the tests: among equally near ones it is that with the lowest index.
 class TriangleTree {
  public:
   /// @param triangle  without area: they are nowhere nearest   @pre indices are valid, fewer than 2^31 triangles
   TriangleTree(std::span<const Vec3> position, std::span<const std::array<std::uint32_t, 3>> triangle);
 
   [[nodiscard]] std::size_t size() const { return count_; }
-  /// The nearest triangle; none (an infinite `square`) without triangles that have an area. The last answer on the same thread is looked at first.
+  /// The nearest triangle; none (an infinite `square`) without triangles that have an area. The last result on the same thread is tested first.
   [[nodiscard]] TriangleSite nearest(const Vec3& x) const;
   /// How often the triangles go around x: whole for a closed surface, but for the error of far triangles that are seen as dipoles, below 0.05, and half of
   /// a whole more or less in the plane of a triangle (Barill, Dickson, Schmidt, Levin & Jacobson 2018, "Fast Winding Numbers for Soups and Clouds").
@@ -53,7 +53,7 @@ class TriangleTree {
     std::array<Lanes, 3> lower, upper;
     std::array<std::uint32_t, kWide> child;  // a node, or kLeaf with a leaf; kNone
   };
-  /// What a child looks like from afar.
+  /// The far-field approximation of a child.
   struct Dipole {
     Vec3 centre = Vec3::Zero(), area = Vec3::Zero();  // area: of the faces, along their normals, summed
     double radius = 0.0;                              // of a ball about the centre that holds the child
@@ -65,7 +65,7 @@ class TriangleTree {
     std::array<double, 3> inverse_square;  // of the lengths of the edges
     std::uint32_t triangle;
   };
-  /// Up to eight faces in single precision, relative to `origin_` and over `unit_`: tells which of them may be nearest.
+  /// Up to eight faces in single precision, relative to `origin_` and over `unit_`: selects those that may be nearest.
   struct Leaf {
     std::array<std::array<Lanes, 3>, 3> corner, along, inward;  // by corner or edge, then by axis
     std::array<Lanes, 3> inverse_square, normal;

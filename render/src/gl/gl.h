@@ -13,7 +13,7 @@
 
 namespace supple::render {
 
-// X(type suffix in capitals, name): one line a function; the list is the whole of our use of OpenGL.
+// X(type suffix in capitals, name): one line per function; the list is all OpenGL that we use.
 #define SUPPLE_GL_FUNCTIONS(X)                                                                                \
   X(ACTIVETEXTURE, ActiveTexture) X(ATTACHSHADER, AttachShader) X(BINDBUFFER, BindBuffer)                     \
   X(BINDFRAMEBUFFER, BindFramebuffer) X(BINDSAMPLER, BindSampler) X(BINDTEXTURE, BindTexture)                 \
@@ -75,7 +75,7 @@ class Program {
   GLuint id_;
 };
 
-/// A texture and the framebuffer that draws into it (with depth when asked for).
+/// A texture and the framebuffer that draws into it (with depth where requested).
 struct Target {
   GLuint framebuffer = 0;
   GLuint colour = 0;
@@ -91,7 +91,7 @@ struct TargetFormat {
   GLenum filter = GL_NEAREST;
 };
 
-/// A framebuffer of two targets of equal size: depth and first colour of `first`, and a texture of its own.
+/// A framebuffer of two targets of equal size: depth and first colour of `first`, and a second texture.
 [[nodiscard]] Target add_colour(const Gl& gl, const Target& first, const TargetFormat& format);
 /// @throws Error{Limit} when the driver cannot hold it.
 [[nodiscard]] Target make_target(const Gl& gl, int width, int height, const TargetFormat& format);

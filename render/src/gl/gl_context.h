@@ -1,5 +1,5 @@
 /// @file gl_context.h
-/// An OpenGL core context without a window. The drawing code sees this and no window system.
+/// An OpenGL core context without a window. The drawing code uses this and no window system.
 #pragma once
 
 #include <memory>

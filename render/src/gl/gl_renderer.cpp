@@ -11,7 +11,7 @@
 namespace supple::render {
 namespace {
 
-// Shares of the distance between camera and point looked at, so that a still camera gives still looks.
+// Shares of the distance between camera and look_at, so that a fixed camera gives fixed looks.
 constexpr double kOcclusionRadius = 0.07;
 constexpr double kRegion = 3.0;
 
@@ -315,7 +315,7 @@ GlRenderer::Shot GlRenderer::draw(const LocalView& local, std::span<const Item> 
   gl_.Enable(GL_CULL_FACE);
   gl_.CullFace(GL_BACK);
 
-  // Maps cover what is near the picture; something that flew away does not coarsen them.
+  // Maps cover the surroundings of the picture; a distant item does not make them coarser.
   const Vec3 reach = Vec3::Constant(kRegion * shot.camera.distance);
   const Box region = list_.bounds.intersection({-reach, reach});
   const bool has_items = !list_.indices.empty();

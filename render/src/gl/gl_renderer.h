@@ -17,14 +17,14 @@
 
 namespace supple::render {
 
-// Texture units: one for each map, for the whole life of the context.
+// Texture units: one for each map, for the lifetime of the context.
 enum Unit : int {
   kShadowDepth, kShadowCompare, kHeights, kGroundOcclusion, kGeometry, kDepths, kOcclusion, kBlurred, kMaterials,
   kPaints, kPicture, kColourMaps, kAreaDepth, kAreaCompare, kGroundPicture, kUploads
 };
 inline constexpr int kHeightMapSize = 256;
 inline constexpr int kGroundOcclusionSize = 96;
-// Materials lie in double rows of this many items; the shader knows it as 4095 and 12.
+// Materials lie in double rows of this many items; the shader uses the constants 4095 and 12.
 inline constexpr std::size_t kMaterialRow = 4096;
 inline constexpr std::size_t kAreaLights = 4;
 inline constexpr int kAreaMapSize = 1024;  // of each of the four, two by two
@@ -39,7 +39,7 @@ class GlRenderer final : public Renderer {
 
  private:
   struct Programs;
-  /// What only pictures with painted items need, made with the first of them.
+  /// Programs and textures for painted items, made with the first of them.
   struct Painting {
     Painting(const Gl& gl, const Target& geometry, int samples);
     Program geometry;
@@ -48,7 +48,7 @@ class GlRenderer final : public Renderer {
     GLuint maps = 0;
   };
   struct LightPrograms;
-  /// What is needed to draw the lit picture once more.
+  /// Data for drawing the lit picture again.
   struct Shot {
     CameraMatrices camera;
     std::optional<MapFit> shadow;

@@ -33,7 +33,7 @@ class OsMesaContext final : public GlContext {
   OsMesaContext& operator=(const OsMesaContext&) = delete;
 
   void make_current() override {
-    // Pictures are drawn into framebuffer objects; OSMesa asks for a window buffer all the same.
+    // Pictures are drawn into framebuffer objects; OSMesa needs a window buffer nevertheless.
     if (make_current_(context_, window_.data(), GL_UNSIGNED_BYTE, kWindow, kWindow) != GL_TRUE)
       library_.fail("cannot make its context current");
   }

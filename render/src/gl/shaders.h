@@ -9,10 +9,10 @@
 
 namespace supple::render::shaders {
 
-/// What the lighting of a picture needs. Branches are not free where nobody takes them, so each choice has programs of its own.
+/// Features that the lighting of a picture needs. Branches cost time even where none is taken, so each choice has programs of its own.
 struct Lighting {
   int samples = 1;            ///< of the geometry buffer
-  bool painted = false;       ///< albedos of the geometry buffer where a material says so
+  bool painted = false;       ///< albedos of the geometry buffer where a material requires it
   bool area_lights = false;
   bool ground_paint = false;
   bool scene_linear = false;  ///< radiance times cover, and cover, instead of the display's colours
@@ -22,7 +22,7 @@ struct Lighting {
 // Vertex stages.
 [[nodiscard]] std::string position_only();  ///< to_clip
 [[nodiscard]] std::string surface();        ///< with the normal
-[[nodiscard]] std::string painted_surface();  ///< and with what decides the colour
+[[nodiscard]] std::string painted_surface();  ///< and the attributes of the colour
 [[nodiscard]] std::string whole_picture();  ///< one triangle that covers the target at depth `plane` (clip)
 
 // Fragment stages; `samples` is that of the geometry buffer.

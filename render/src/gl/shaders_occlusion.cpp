@@ -6,7 +6,7 @@ namespace supple::render::shaders {
 // Along each azimuth the columns of the height range hide elevations from atan(low / d) to atan(high / d), and what joins one
 // column to the next the elevations in between; with the cosine weight of a diffuse receiver the hidden share is the measure
 // of their sin^2. What is hidden already is kept in bins (Therrien, Levesque & Gilet 2023), for a wall may stand behind what
-// hangs overhead. Their borders differ from azimuth to azimuth, so that the mean over all knows no steps.
+// hangs overhead. Their borders differ from azimuth to azimuth, so that the mean over all azimuths has no steps.
 std::string ground_occlusion() {
   return std::string(kVersion) + R"(
 uniform sampler2D heights;

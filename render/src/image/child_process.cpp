@@ -23,7 +23,7 @@ namespace supple::render {
 namespace {
 
 constexpr int kNotStarted = 127;            // as shells have it
-constexpr int kSlice_ms = 20;               // between two looks at `interrupt`
+constexpr int kSlice_ms = 20;               // between two checks of `interrupt`
 constexpr std::size_t kMostKept = 65536;    // bytes of messages
 
 [[noreturn]] void fail(int code) { throw std::system_error(code, std::system_category()); }
@@ -53,9 +53,9 @@ struct Start {
 /// Comes back where that fails, with errno.
 int exec(const Start& start) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != start.parent) return ESRCH;  // it ended before the system knew what to do then
+  if (::getppid() != start.parent) return ESRCH;  // the parent ended before the signal was set up
   if (::dup2(start.null, STDIN_FILENO) < 0 || ::dup2(start.null, STDOUT_FILENO) < 0 || ::dup2(start.messages, STDERR_FILENO) < 0) return errno;
-  // Also what libraries and our own parent opened. Older systems lack the call; what we open is marked anyway.
+  // Also descriptors of libraries and of our own parent. Older systems lack the call; our own descriptors are marked anyway.
   ::syscall(SYS_close_range, STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);
   ::sigprocmask(SIG_SETMASK, start.signals, nullptr);
   ::execve(start.program, start.words, environ);
@@ -126,7 +126,7 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  /// Whether it has ended; `status` then tells how.
+  /// Whether it has ended; `status` is then set.
   bool ended(int& status) {
     const pid_t found = io::retried([&] { return ::waitpid(process_, &status, WNOHANG); });
     if (found == 0) return false;
@@ -164,7 +164,7 @@ pid_t start_child(Start start) {
   return process;
 }
 
-/// Takes what there is; false at the end of the stream.
+/// Reads the available bytes; false at the end of the stream.
 bool take(const io::Descriptor& pipe, std::string& messages) {
   std::array<char, 4096> buffer;
   for (;;) {
@@ -211,7 +211,7 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   ProgramEnd end;
   ::fcntl(messages.read.get(), F_SETFL, O_NONBLOCK);
   pollfd wait{.fd = messages.read.get(), .events = POLLIN, .revents = 0};
-  // What it has started may hold the pipe for longer than it lives, or it may close its own end.
+  // A program that it started may hold the pipe for longer, or it may close its own end.
   for (bool ended = false; !ended;) {
     heed(interrupt);
     (void)::poll(&wait, 1, kSlice_ms);  // broken off by a signal it is made again

@@ -1,4 +1,4 @@
-/// Programs that we start, and that never outlive who waits for them.
+/// Child programs that never outlive the call that waits for them.
 #pragma once
 
 #include <atomic>
@@ -11,7 +11,7 @@ namespace supple::render {
 /// How a program ended.
 struct ProgramEnd {
   int status = 0;        ///< as waitpid gives it
-  std::string messages;  ///< the end of what it wrote to its error stream
+  std::string messages;  ///< the end of its error stream
 };
 
 /// Where a program is: `name` itself where it holds a slash, otherwise that in the first folder of PATH with a file of this

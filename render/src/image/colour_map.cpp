@@ -6,7 +6,7 @@
 namespace supple::render {
 namespace {
 
-// sRGB (0xrrggbb) at equal steps, from the published tables; what lies between is interpolated.
+// sRGB (0xrrggbb) at equal steps, from the published tables; values between are interpolated.
 constexpr std::size_t kStops = 17;
 constexpr std::uint32_t kStopColours[kColourMapNames.size()][kStops] = {
     {0x440154, 0x48186a, 0x472d7b, 0x424086, 0x3b528b, 0x33638d, 0x2c728e, 0x26828e, 0x21918c,

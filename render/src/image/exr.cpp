@@ -23,7 +23,7 @@
 namespace supple::render {
 namespace {
 
-/// A file in memory, so that it gets its name when it is whole.
+/// A file in memory, so that it gets its name when it is complete.
 class Memory final : public Imf::OStream {
  public:
   Memory() : Imf::OStream("memory") {}
@@ -45,7 +45,7 @@ class Memory final : public Imf::OStream {
 std::vector<half> halves(const std::vector<float>& values) {
   std::vector<half> out;
   out.reserve(values.size());
-  // Larger light than a half holds is as bright as it can be.
+  // Light larger than a half float is clamped to its maximum.
   for (const float v : values) out.emplace_back(std::isfinite(v) ? std::clamp(v, -static_cast<float>(HALF_MAX), static_cast<float>(HALF_MAX)) : v);
   return out;
 }

@@ -108,7 +108,7 @@ std::string identity_of(const std::vector<std::string>& arguments, const std::ve
   return std::string(kPictures) + to_hex(hasher.value()) + std::string(kNote) + note + ';';
 }
 
-/// The facts about an MP4, which stand before its pictures; empty for what is none of ours.
+/// The metadata of an MP4, which precede its pictures; empty for files of other programs.
 std::string facts_of(const std::filesystem::path& film) {
   std::error_code absent;
   const std::uintmax_t length = std::filesystem::file_size(film, absent);

@@ -124,7 +124,7 @@ void Denoiser::rows(const Body& body) const {
   });
 }
 
-/// Rows that lie `stride` apart one after the other: two of the three that a row asks for are then in the nearest cache.
+/// Rows that lie `stride` apart one after the other: two of the three rows that a row needs are then in the nearest cache.
 template <class Body>
 void Denoiser::rows_apart(int stride, const Body& body) const {
   const int height = film_->height, longest = (height + stride - 1) / stride;
@@ -213,7 +213,7 @@ void Denoiser::sort_paths() {
   }
 }
 
-/// Means over neighbours: what a single pixel knows of brightness and noise is noisy itself.
+/// Means over neighbours: the brightness and noise of a single pixel are noisy themselves.
 void Denoiser::guide(int y) {
   shown_blocks(y, [&](std::ptrdiff_t at) {
     for (Signal& signal : signals_) signal.guide.store(at, f_.share.load(at) * tent_sum<1>(signal.light.bright, at));
@@ -265,7 +265,7 @@ void Denoiser::smooth(int stride) {
   const std::array<const Plane*, 5> numbers = {&film_->cover, &signals_[0].guide, &signals_[1].guide, &signals_[0].light.variance,
                                                &signals_[1].light.variance};
   rows_apart(stride, [&](int y) {
-    // More streams than processors follow on their own: the row that the next one asks for is fetched beside this one.
+    // More streams than processors follow on their own: the row that the next one needs is fetched along with this one.
     const std::ptrdiff_t ahead = film_->cover.index(0, std::min(2 * stride, film_->height - 1 - y));
     blocks(y, [&](std::ptrdiff_t at, bool any_shown) {
       for (const VectorPlane* plane : vectors) plane->prefetch(at + ahead);
@@ -318,7 +318,7 @@ void Denoiser::finish(Film& film) const {
 
 Neighbours Denoiser::around(const DetailedPixel& pixel) const {
   constexpr int kReach = 2;
-  constexpr float kPaths = 32.0F;  // that tell as much as a filtered pixel
+  constexpr float kPaths = 32.0F;  // paths that weigh as much as a filtered pixel
   const Film& film = *film_;
   const Light& light = signals_[1].light;
   const int x = pixel.x, y = pixel.y;

@@ -19,7 +19,7 @@ constexpr int kRun = 16;                     // pixels that are passed over at o
 constexpr std::uint8_t kMeet = 1, kInGap = 2, kEnds = 4;
 constexpr std::array<std::pair<int, int>, 4> kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
 
-/// What tells details, of eight pixels each.
+/// Measures of detail, of eight pixels each.
 class Signs {
  public:
   /// @param pixel  size of a pixel at unit distance
@@ -40,7 +40,7 @@ class Signs {
     }
     return meet;
   }
-  /// By the mean nearness of what the pixels around see light from: one path a pixel knows little.
+  /// By the mean nearness of what the pixels around see light from: one path per pixel is too noisy.
   [[nodiscard]] LaneMask are_gaps(std::ptrdiff_t at) const {
     const Lanes size = pixel_ * (film_.position.load(at) - Vec3Lanes(eye_)).norm();
     return both(film_.cover.load(at) > 0.0F, tent_sum<2>(film_.nearness, at) * size > kGap * tent_sum<2>(film_.cover, at));

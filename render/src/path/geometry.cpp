@@ -97,7 +97,7 @@ float spread_of(const std::vector<Quadrangle>& quadrangles, const std::vector<fl
 
 }  // namespace
 
-/// What of an item stays between pictures.
+/// Data of an item kept between pictures.
 struct Geometry::Part {
   RTCGeometry geometry = nullptr;
   unsigned id = RTC_INVALID_GEOMETRY_ID;

@@ -1,5 +1,5 @@
 /// @file geometry.h
-/// The triangles of a picture in Embree: what a ray meets first, and with which material.
+/// The triangles of a picture in Embree: first hits of rays, and their materials.
 #pragma once
 
 #include <embree3/rtcore.h>

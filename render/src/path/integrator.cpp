@@ -12,7 +12,7 @@ constexpr int kTile = 8;
 constexpr std::uint32_t kRaysAPath = 2;    // camera rays of a pixel of which one goes on beyond its first surface
 constexpr std::uint32_t kDetailStream = 0xfffffff0u;  // those of tiles begin at 0
 
-/// Sums of a part of the light of a pixel, or of eight.
+/// Sums over a part of the light of a pixel, or of eight.
 template <class Number>
 struct LightSum {
   using Vector = typename LaneTypes<Number>::Vector;
@@ -46,7 +46,7 @@ struct Sums {
   Vector normal = Vector::Zero();
   Vector position = Vector::Zero();
   Number cover{};
-  Number walked_cover{};  ///< of the samples that know of indirect light
+  Number walked_cover{};  ///< of the samples with indirect light
   Number nearness{};
   Number mirror{};
 
@@ -94,7 +94,7 @@ struct Row {
   Lanes direct_variance{}, indirect_variance{};  ///< of means of the luminance
 };
 
-/// The pixels of a tile, and what they tell of their noise.
+/// The pixels of a tile, and estimates of their noise.
 class Tile {
  public:
   explicit Tile(const Window& window) : window_(window) {}
@@ -102,8 +102,8 @@ class Tile {
 
   /// @return mean over all pixels of their squared standard error over (luminance + 0.1) squared
   float estimate_errors() {
-    // One path a pixel knows nothing of its noise, which is at most what pixels differ by; a few know little, as where light is
-    // even but for rare dark paths: they count as if one of them were such a path.
+    // One path per pixel says nothing about its noise, which is at most the difference between pixels; a few say little where light
+    // is even except for rare dark paths: they count as if one of them were such a path.
     LightSum<Lanes> paths;
     for_rows([&](std::size_t, const Row& row) {
       const Sums<Lanes>& sum = row.sums;
@@ -203,7 +203,7 @@ class Exposure {
   std::uint32_t least_;
 };
 
-/// What camera rays alone tell of a pixel, or of eight. @param variance  of the mean luminance of its direct light
+/// Estimates from camera rays alone of a pixel, or of eight. @param variance  of the mean luminance of its direct light
 template <class Number>
 void Exposure::keep_surface(int x, int y, const Sums<Number>& sum, float count, Number variance) const {
   using Vector = typename LaneTypes<Number>::Vector;
@@ -222,7 +222,7 @@ void Exposure::keep_surface(int x, int y, const Sums<Number>& sum, float count, 
   film_.position.store(x, y, Vector(sum.position * share));
 }
 
-/// What the paths of a pixel tell, or of eight. @param variance  of the mean luminance of its indirect light
+/// Estimates from the paths of a pixel, or of eight. @param variance  of the mean luminance of its indirect light
 template <class Number>
 void Exposure::keep_paths(int x, int y, const Sums<Number>& sum, float count, Number variance) const {
   using Vector = typename LaneTypes<Number>::Vector;
@@ -235,7 +235,7 @@ void Exposure::keep_paths(int x, int y, const Sums<Number>& sum, float count, Nu
   film_.mirror.store(x, y, sum.mirror * share);
 }
 
-/// @return camera rays a pixel
+/// @return camera rays per pixel
 std::uint32_t Exposure::sample_until_quiet(const Window& window, Tile& tile) const {
   const Lanes taken = select(window.inside(), all_lanes(1.0F), 0.0F);
   std::uint32_t n = 0;

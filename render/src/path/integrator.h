@@ -20,7 +20,7 @@ struct FilmLight {
   Plane variance;        ///< of the mean luminance
 };
 
-/// Why a pixel takes its camera rays anew.
+/// Why camera rays of a pixel are traced again.
 enum class Detail : std::uint8_t {
   Surfaces,  ///< meet in it: its indirect light is that of its facets, by neighbours on the same surfaces, in gaps by paths, too
   Gap,       ///< light comes from a few pixels away and changes as fast: it takes more paths, too

@@ -119,7 +119,7 @@ struct Pair {
   Number x, y;
 };
 
-/// What goes with a number.
+/// Types that belong to a number.
 template <class Number>
 struct LaneTypes;
 template <>

@@ -1,5 +1,5 @@
 /// @file lights.h
-/// What shines, for the path tracer: the sun as a disc in the sky, a sky of even radiance, rectangles.
+/// Lights of the path tracer: the sun as a disc in the sky, a sky of even radiance, rectangles.
 #pragma once
 
 #include <vector>

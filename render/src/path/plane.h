@@ -1,5 +1,5 @@
 /// @file plane.h
-/// One number a pixel, eight pixels at a time.
+/// One number per pixel, eight pixels at a time.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,7 @@ class Plane {
     const std::size_t off = reinterpret_cast<std::uintptr_t>(values_.data()) / sizeof(float) % kCacheLine;
     first_ = values_.data() + (lead + kCacheLine - off) + index(kMargin, kMargin);
   }
-  /// Of a pixel, or from one pixel to another; the same in all planes of one size.
+  /// Offset of a pixel, or from one pixel to another; the same in all planes of one size.
   [[nodiscard]] std::ptrdiff_t index(int x, int y) const { return std::ptrdiff_t{y} * pitch_ + x; }
   [[nodiscard]] float& at(int x, int y) { return first_[index(x, y)]; }
   [[nodiscard]] float at(int x, int y) const { return first_[index(x, y)]; }
@@ -52,7 +52,7 @@ class Plane {
   std::vector<float> values_;
 };
 
-/// One vector a pixel.
+/// One vector per pixel.
 struct VectorPlane {
   Plane x, y, z;
   void resize(int width, int height) {

@@ -93,7 +93,7 @@ Lanes Tracer::ground_share(const Vec3Lanes& point) const {
   return (1.0F - step(0.7F, 3.2F, away)) * step(0.02F, 0.22F, down);
 }
 
-/// What comes from the sun unless something is in the way.
+/// Light from the sun where nothing occludes it.
 Tracer::Light Tracer::sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const {
   const Sun& sun = lights_.sun;
   const Pair<Lanes> u = random.pair();
@@ -106,7 +106,7 @@ Tracer::Light Tracer::sunlight(const Places& places, const Axes& axes, const Vec
   return {.light = f.cwiseProduct(sun_radiance_) * (share * (1.0F / sun_density_)), .direction = direction};
 }
 
-/// What comes from one of the rectangles.
+/// Light from one of the rectangles.
 Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, Random& random) const {
   if (lights_.rectangles.empty()) return Vec3Lanes::Zero();
   const Lanes which = random.number();
@@ -148,7 +148,7 @@ Vec3Lanes Tracer::direct(const Places& places, const Axes& axes, const Vec3Lanes
   return select(both(lit, ~shadowed), sunny.light, Vec3Lanes::Zero()) + lamplight(places, axes, out, who, time, random);
 }
 
-/// What comes to surfaces from the sky and from other surfaces.
+/// Light from the sky and from other surfaces.
 Vec3Lanes Tracer::indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const {
   Vec3Lanes sum = Vec3Lanes::Zero();
   Vec3Lanes weight = Vec3Lanes::Ones();

@@ -1,5 +1,5 @@
 /// @file tracer.h
-/// Eight camera rays at once: what they meet, the light of sun and rectangles there, and paths further on.
+/// Eight camera rays at a time: first hits, direct light of sun and rectangles there, and further paths.
 #pragma once
 
 #include <optional>
@@ -23,8 +23,8 @@ struct GroundPlane {
 struct TraceSettings {
   int width = 0;
   int height = 0;
-  int least_samples = 1;       ///< camera rays a pixel to begin with, a power of two
-  int most_samples = 256;      ///< a pixel, a power of two
+  int least_samples = 1;       ///< initial camera rays per pixel, a power of two
+  int most_samples = 256;      ///< per pixel, a power of two
   double noise = 0.05;         ///< standard error of a pixel's luminance over (luminance + 0.1), RMS of a tile; 0: most_samples
   int bounces = 6;             ///< surfaces along a path after the first
   bool exact = true;           ///< hits lie on the surface of the field, where an item has one
@@ -33,25 +33,25 @@ struct TraceSettings {
   float largest_indirect = 10.0F;  ///< luminance that a bounce can add; keeps single bright paths out of a picture
 };
 
-/// What one camera ray of a pixel met, or eight of them.
+/// First hit of one camera ray of a pixel, or of eight.
 template <class Number>
 struct FacetOf {
   using Vector = typename LaneTypes<Number>::Vector;
   Number cover{};
-  Vector albedo = Vector::Zero();       ///< seen head on
+  Vector albedo = Vector::Zero();       ///< at normal incidence
   Vector reflectance = Vector::Zero();  ///< towards the eye
   Vector normal = Vector::Zero();
   Vector position = Vector::Zero();
 };
 using Facet = FacetOf<float>;
 
-/// What a camera ray brings.
+/// Result of a camera ray.
 template <class Number>
 struct SampleOf {
   using Vector = typename LaneTypes<Number>::Vector;
   Vector direct = Vector::Zero();
   Vector indirect = Vector::Zero();
-  Number weight{};    ///< camera rays that its indirect light stands for; 0: it knows of none
+  Number weight{};    ///< number of camera rays that its indirect light represents; 0: it has none
   Number nearness{};  ///< 1 / distance of where it comes from
   Number mirror{};
   FacetOf<Number> facet;
@@ -98,9 +98,9 @@ class Tracer {
     Vec3Lanes point, normal, leave;
     BsdfOf<Lanes> bsdf;
   };
-  /// What rays meet first.
+  /// First hits of rays.
   struct Meeting {
-    LaneMask surface;  ///< of an item or the ground; its place is known
+    LaneMask surface;  ///< of an item or the ground; the position is known
     LaneMask ground;
     LaneMask lamp;
     Lanes distance;
@@ -129,7 +129,7 @@ class Tracer {
   const TraceSettings& settings_;
   Eigen::Matrix3f to_world_;
   Axes sun_axes_;
-  Vec3Lanes sun_radiance_;  // infinite for a point, as is the density of its directions; neither is asked for then
+  Vec3Lanes sun_radiance_;  // infinite for a point, as is the density of its directions; neither is used then
   float sun_density_;
   float least_distance_;  // of what counts as near
 };

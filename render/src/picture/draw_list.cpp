@@ -39,7 +39,7 @@ void append(const Mesh& mesh, const PictureSpace& space, DrawList& list) {
   SUPPLE_EXPECTS(largest < mesh.vertex_count());
 }
 
-/// What decides the colour at the vertices of an item.
+/// Attributes that determine the colour at the vertices of an item.
 void append_paint(const Item& item, std::vector<float>& out) {
   const Mesh& mesh = *item.mesh;
   const std::size_t first = out.size();
@@ -166,7 +166,7 @@ MapFit fit_map(const Box& bounds, const Vec3& direction, int size) {
   Vec3 extent;
   Vec3 corner;
   for (int k = 0; k < 3; ++k) {
-    // Four texels of room: filters at the rim, and the shift onto whole texels.
+    // Margin of four texels: for filters at the border, and for the shift onto whole texels.
     extent[k] = rung(reach[k] * (1.0 + 4.0 / size) + 1e-6);
     const double texel = extent[k] / size;
     corner[k] = texel * std::floor((middle[k] - 0.5 * extent[k]) / texel + 0.5);

@@ -1,6 +1,6 @@
 /// @file draw_list.h
-/// What a picture is made of, in the numbers the graphics driver takes: packed vertices, matrices, fitted maps.
-/// Lengths and places are those of the picture (picture_space.h), so that single precision is spent on what is seen.
+/// The content of a picture in the numbers of the graphics driver: packed vertices, matrices, fitted maps.
+/// Lengths and positions are those of the picture (picture_space.h), so that single precision is used for visible parts.
 #pragma once
 
 #include <span>
@@ -29,7 +29,7 @@ struct DrawList {
 };
 
 /// Fills `list`, reusing its capacity.
-/// @pre every mesh has one normal a vertex, finite positions and valid indices; fewer than 2^32 vertices in all
+/// @pre every mesh has one normal per vertex, finite positions and valid indices; fewer than 2^32 vertices in all
 void pack(std::span<const Item> items, const PictureSpace& space, DrawList& list);
 
 struct CameraMatrices {
@@ -37,11 +37,11 @@ struct CameraMatrices {
   Eigen::Matrix4f view_projection;  ///< to clip, whose depth is near plane over depth: as precise far off as near by
   Eigen::Vector3f eye;
   Eigen::Vector2f half_extent;      ///< tangents of half the horizontal and half the vertical field of view
-  Eigen::Vector2f depth_range;      ///< near plane, and what lies beyond all items
-  double distance = 0.0;            ///< from the eye to the point looked at
+  Eigen::Vector2f depth_range;      ///< near plane, and the far limit of all items
+  double distance = 0.0;            ///< from the eye to look_at
 };
 
-/// @throws Error{Usage} when the eye is at the point looked at or the field of view is not in (0, pi).
+/// @throws Error{Usage} when the eye is at look_at or the field of view is not in (0, pi).
 [[nodiscard]] CameraMatrices camera_matrices(const Camera& camera, double aspect, const Box& bounds);
 
 /// An orthographic map of a box: u, v in [0, 1] across it and w in [0, 1] along the direction of view.
@@ -52,15 +52,15 @@ struct MapFit {
   Eigen::Vector3f extent;   ///< of the box along u, v, w
 };
 
-/// The map of `bounds` seen along `direction`, `size` texels an edge. Its edges grow in steps and its corner lies on
-/// whole texels, so that the map of a slowly changing box stands still and shadows do not swim from frame to frame.
+/// The map of `bounds` along `direction`, `size` texels per edge. Its edges grow in steps and its corner lies on
+/// whole texels, so that the map of a slowly changing box is constant and shadows do not move from frame to frame.
 [[nodiscard]] MapFit fit_map(const Box& bounds, const Vec3& direction, int size);
 
-/// What an area light sees, in perspective from its middle along `front`: u to the right. Tangents are lateral over depth.
+/// The view of an area light, in perspective from its centre along `front`: u to the right. Tangents are lateral over depth.
 struct AreaMap {
   Eigen::Matrix4f to_clip = Eigen::Matrix4f::Identity();  ///< to clip; depth is affine in 1 / depth
   Eigen::Vector3f lower = Eigen::Vector3f::Zero();        ///< least tangents; 1 / depth of the near plane
-  Eigen::Vector3f extent = Eigen::Vector3f::Zero();       ///< of the tangents and of 1 / depth; 0: the light sees nothing
+  Eigen::Vector3f extent = Eigen::Vector3f::Zero();       ///< of the tangents and of 1 / depth; 0: nothing is in view of the light
 };
 
 /// The map of the vertices before the light, of `size` texels an edge. Tangents beyond 4 are left out.

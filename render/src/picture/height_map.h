@@ -1,5 +1,5 @@
 /// @file height_map.h
-/// Between which heights items hang over the ground: what a map of it seen from above needs of the triangles. A software
+/// Range of heights of items above the ground, for a map seen from above. A software
 /// rasteriser spends most of its time on triangles of less than a texel; here these cost a look at their boxes.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace supple::render {
 
-/// Nothing is above a texel.
+/// No item is above a texel.
 inline constexpr float kNoHeight = -1e30F;
 
 /// Minus the lowest and the highest height over the middle of each texel, at least 0; shape [size][size][2], rows along v.

@@ -1,5 +1,5 @@
 /// @file lighting.h
-/// The light of every picture, for both renderers: what sun, sky and ground send, and what becomes of it on film.
+/// The light of every picture, for both renderers: radiance of sun, sky and ground, and the response of film.
 #pragma once
 
 #include "supple/render/view.h"

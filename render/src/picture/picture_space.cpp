@@ -31,7 +31,7 @@ double seen_distance(const Camera& camera, std::span<const Item> items) {
   }
   if (box.empty()) return distance;
   const Reach reach = reach_of(box, camera.from);
-  // Where all items are at the eye, nothing can be said.
+  // Where all items are at the eye, there is no distance.
   return reach.farthest > 0.0 ? std::clamp(distance, kShort * reach.nearest, kPast * reach.farthest) : distance;
 }
 

@@ -1,5 +1,5 @@
 /// @file picture_space.h
-/// Where a picture is computed. Single precision, thresholds and floors of both renderers hold for lengths near 1 and places near 0, so
+/// The coordinates in which a picture is computed. Single precision, thresholds and floors of both renderers hold for lengths near 1 and positions near 0, so
 /// a picture has its own origin and its own unit of length: a scene of nanometres, of kilometres, or far from the origin of the world
 /// looks like the same scene of metres beside it.
 #pragma once
@@ -31,7 +31,7 @@ struct LocalView {
 
 /// The unit is near the distance of the camera, the origin is what it looks at. Of a camera that looks far past all items, or not half
 /// as far as the first of them, it is a point nearer to them on the same line.
-/// @throws Error{Usage} when the eye is at the point looked at
+/// @throws Error{Usage} when the eye is at look_at
 [[nodiscard]] LocalView localised(const View& view, std::span<const Item> items);
 
 /// A place near `place` [m] where a pattern looks as it does at zero, so that differences from there, in single precision, tell its colours.

@@ -21,8 +21,8 @@ std::string not_built(const SceneCounts& counts, double build) {
 }
 
 std::string not_solved(const CrowdedStart& crowd) {
-  return crowd.key + ": the scene was counted, not built: about " + short_text(std::round(crowd.pairs)) + " pairs of bodies begin in one another, each with about " +
-         short_text(std::round(crowd.others)) + " others, and their contacts take longer than a check; set them apart";
+  return crowd.key + ": the scene was counted, not built: about " + short_text(std::round(crowd.pairs)) + " pairs of bodies overlap at the start, each with about " +
+         short_text(std::round(crowd.others)) + " others, and solving their contacts takes longer than a check; move them apart";
 }
 
 void build_and_look(const Scene& scene, const SimulationOptions& options, CheckReport& report) {

@@ -64,8 +64,8 @@ void write_tables(const std::vector<FieldInfo>& list, const std::string& path, s
 }
 
 void write_units(std::string& out) {
-  out += "## Units\n\nProducts, quotients and powers of these are units, too: `N s/m`, `kg/m^3`, `1/s`.\n\n"
-         "| of | units | words for some of them |\n|---|---|---|\n";
+  out += "## Units\n\nProducts, quotients and powers of these are units too: `N s/m`, `kg/m^3`, `1/s`.\n\n"
+         "| quantity | units | also accepted |\n|---|---|---|\n";
   for (const UnitsOfKind& kind : known_units()) {
     out += "| " + std::string(kind.noun) + " | " + joined(kind.units) + " | " + joined(kind.words) + " |\n";
   }
@@ -127,7 +127,7 @@ Json value_schema(const FieldInfo& info) {
     case FieldType::Mappings: {
       Json item = mapping_schema(info.children);
       item["properties"]["repeat"] = {{"anyOf", Json::array({number_schema({.low = 0.0}, true), {{"type", "object"}}})},
-                                      {"description", "how often the item stands here: a count with the index i, or indices with their counts"}};
+                                      {"description", "copies of the item: a count, with the index i, or a mapping of indices to counts"}};
       return list_schema(std::move(item), info.rule, 0, kAny);
     }
   }
@@ -166,10 +166,10 @@ Json mapping_schema(const std::vector<FieldInfo>& list) {
 std::string scene_reference() {
   std::string out =
       "# Scene files\n\n"
-      "YAML (and so JSON). Bare numbers are SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted after their dimension has been\n"
+      "Scenes are YAML, so JSON works too. Bare numbers are in SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted, and their dimension is\n"
       "checked. Numbers are 0 or between 1e-50 and 1e50 in size, and may be fractions: `30000/1001`, `5/8 in`. Keys that end in\n"
       "`_deg` are in degrees. `true` and `false` may be written `True`, `TRUE`, `False`, `FALSE`.\n"
-      "`--set objects.ball.particles.mass=2` overrides any key. This page is generated from the lists that read scenes.\n\n";
+      "`--set objects.ball.particles.mass=2` overrides any key. `supple reference` generates this page.\n\n";
   write_units(out);
   out += kShorthand;
   write_tables(scene_fields(), "", out);

@@ -17,7 +17,7 @@ namespace supple::scenes {
 struct SceneKey {
   std::string path;      ///< "objects.ball.particles.mass"; items of a list by name or index
   std::string value;     ///< as in a file; kGiven for a mapping, the hash of its content for a file
-  std::string fallback;  ///< the value where the key is left out; kNone where no value says so
+  std::string fallback;  ///< the value where the key is left out; kNone where there is none
   friend bool operator==(const SceneKey&, const SceneKey&) = default;
 };
 using SceneKeys = std::vector<SceneKey>;  ///< by path, ascending

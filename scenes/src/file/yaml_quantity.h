@@ -54,7 +54,7 @@ inline constexpr Quantity kVolume{"volume", "m^3", {3, 0, 0, 0}};
 inline constexpr Quantity kInverseArea{"inverse area", "1/m^2", {-2, 0, 0, 0}};
 inline constexpr Quantity kInverseSpeed{"inverse speed", "s/m", {-1, 0, 1, 0}};
 
-/// A scalar read as a quantity. Without `ok`, `hint` says what to do (may be empty).
+/// A scalar read as a quantity. Without `ok`, `hint` is advice for the user (may be empty).
 struct QuantityText {
   bool ok = false;
   double value = 0.0;  ///< SI; of kAngle: degrees

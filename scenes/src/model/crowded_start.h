@@ -1,5 +1,5 @@
 /// @file crowded_start.h
-/// Bodies that begin in one another by the dozen, counted before their contacts are solved.
+/// Bodies that overlap many others at the start, counted before their contacts are solved.
 #pragma once
 
 #include <optional>
@@ -15,8 +15,8 @@ struct CrowdedStart {
   double others = 0.0;  ///< that overlap with a body, on average, about
 };
 
-/// Whether so many bodies begin in one another that solving their contacts once takes longer than a check: a pair of them is cut by all the others that
-/// overlap with both. Looked for among bodies of one particle each, by their distances and the smallest support of their kernels.
+/// Finds whether so many bodies overlap at the start that solving their contacts once takes longer than a check: each pair is cut by all the others that
+/// overlap with both. Considers bodies of one particle each, by their distances and the smallest support of their kernels.
 [[nodiscard]] std::optional<CrowdedStart> find_crowd(const Scene& scene);
 
 }  // namespace supple::scenes

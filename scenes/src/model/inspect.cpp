@@ -200,7 +200,7 @@ std::string describe_run(const fs::path& folder) {
     }
   }
   if (report.contains("errors")) {
-    text += "errors of positions, estimated\n";
+    text += "estimated errors of positions\n";
     for (const auto& [key, error] : report["errors"].items()) {
       if (!error.is_object()) continue;
       text += line("  %-34s %.3g m, %.3g of the size of %s", key.c_str(), number_at(error, "position_m"), number_at(error, "share"),

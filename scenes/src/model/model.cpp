@@ -178,7 +178,7 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
   return rule;
 }
 
-/// Components of the blending graph of an object with self contact become bodies of their own, and so do groups that are connected through others only. An object that keeps its
+/// Components of the blending graph of an object with self contact become bodies, and so do groups that are connected through others only. An object that keeps its
 /// volume stays one body: all that do not blend are groups of it.
 void divide_by_blend(const ObjectDesc& d, ObjectModel& object) {
   if (!d.contact->self.value_or(true)) return;

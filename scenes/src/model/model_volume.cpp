@@ -26,7 +26,7 @@ double support_volume(const implicit::Primitive& primitive) {
   return implicit::support_box(implicit::scaled(primitive, implicit::kLargestScale)).extent().prod();
 }
 
-/// Of a body that keeps its shape but for the scale of its kernels; none where it would take long to measure.
+/// Volume of a body of constant shape at a scale of its kernels; none where the measurement would take long.
 std::optional<double> volume_at(const ObjectModel& object, double scale) {
   constexpr double kMostCells = 1e5;  // along its surface
   implicit::Skeleton skeleton = object.skeleton;

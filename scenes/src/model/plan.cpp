@@ -251,14 +251,14 @@ void choose_by_stability(const Scene& scene, const Model& model, const StepCount
   const bool refused = explicit_steps > scene.time_step.max_substeps;
   const bool implicit = suits_implicit(model) && (refused || explicit_steps > kImplicitCost * implicit_steps);
   plan.settings.method = implicit ? core::Integrator::BackwardEuler : core::Integrator::Symplectic;
-  const std::string taken = number_text(explicit_steps) + " steps of velocity Verlet a frame";
+  const std::string taken = number_text(explicit_steps) + " steps of velocity Verlet per frame";
   const std::string size =
       counts.longest() < counts.frame() ? " (time_step.size: none longer than " + number_text(counts.longest()) + " s)" : "";
   if (!implicit) {
     plan.reason = "symplectic: " + taken + " at the start" + size;
     return;
   }
-  plan.reason = "backward_euler: in place of " + taken + ", " + number_text(implicit_steps) + size +
+  plan.reason = "backward_euler: " + number_text(implicit_steps) + size + " instead of " + taken +
                 (refused ? "; more than time_step.max_substeps" : "; it damps what it does not resolve");
 }
 
@@ -272,8 +272,8 @@ void choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts
   const bool implicit = suits_implicit(model) && explicit_steps > kImplicitStepCost * implicit_steps;
   plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;
   plan.reason = std::string(implicit ? "implicit_midpoint" : "symplectic") + ": accuracy " + number_text(accuracy) + " takes " +
-                number_text(implicit_steps) + " implicit steps a frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
-                (friction > stable ? ", which blur friction" : "") + "; an implicit one costs as much as " + std::to_string(kImplicitStepCost);
+                number_text(implicit_steps) + " implicit steps per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
+                (friction > stable ? ", to resolve friction" : "") + "; an implicit step costs as much as " + std::to_string(kImplicitStepCost);
 }
 
 /// The method `implicit`.
@@ -282,11 +282,11 @@ void take_implicit(const Scene& scene, const Model& model, const StepCounts& cou
   const double fixed = scene.time_step.substeps ? std::ldexp(counts.frame(), -core::halvings(counts.frame(), counts.longest())) / *scene.time_step.substeps : 0.0;
   if (fixed * model.contact_frequency > kResolved) {
     plan.settings.method = core::Integrator::BackwardEuler;
-    plan.reason = "backward_euler: steps of " + number_text(fixed) + " s, which the scene fixes, are longer than contacts last";
+    plan.reason = "backward_euler: steps of " + number_text(fixed) + " s, fixed by the scene, are longer than a contact lasts";
     return;
   }
   plan.settings.method = core::Integrator::ImplicitMidpoint;
-  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : number_text(counts.of(model.contact_frequency, plan.bounds)) + " steps a frame") +
+  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : number_text(counts.of(model.contact_frequency, plan.bounds)) + " steps per frame") +
                 " resolve contact";
 }
 
@@ -340,7 +340,7 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
     case MethodName::ImplicitMidpoint: plan.settings.method = Integrator::ImplicitMidpoint; break;
     case MethodName::Implicit: take_implicit(scene, model, counts, plan); break;
   }
-  if (plan.reason.empty()) plan.reason = std::string(name_of(method)) + ": the scene asks for it";
+  if (plan.reason.empty()) plan.reason = std::string(name_of(method)) + ": given by the scene";
   if (scene.accuracy) plan.bounds = core::is_implicit(plan.settings.method) ? rules.implicit_steps : rules.explicit_steps;
   if (scene.accuracy) plan.slow_slip = rules.slow_slip;
   set_limits(scene, model, counts, plan);

@@ -235,7 +235,7 @@ struct DividedBodies {
   std::span<const std::uint64_t> version;
 };
 
-/// The surfaces of the bodies of a group: all at once, but for those that pass through another one.
+/// The surfaces of the bodies of a group: all together, except those that pass through another one.
 void mesh_group(const StageContext& context, const DividedBodies& bodies, const DivisionGroup& group, StageProfile& profile, Frame& frame,
                 std::vector<Mesh>& surfaces) {
   const auto& [division, version] = bodies;

@@ -53,16 +53,16 @@ void check_continues(const fs::path& folder, const std::string& name) {
                                    .hint = "resume the scene that was run here, or choose another --out"});
 }
 
-/// Explicit steps may blur friction far more than asked for.
+/// Warns where explicit steps reduce friction below speeds far above contact.friction_speed.
 void add_blurred_friction(const Scene& scene, const Simulation& simulation, std::vector<std::string>& warnings) {
   constexpr double kFarMore = 10.0;
   const auto& speeds = simulation.friction_speeds();
   if (core::is_implicit(simulation.integrator().settings.method)) return;
   const auto worst = std::max_element(speeds.begin(), speeds.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   if (worst == speeds.end() || !(worst->second > kFarMore * scene.contact.friction_speed)) return;
-  warnings.push_back("contact.friction_speed: explicit steps fade friction out below " + short_text(worst->second) + " m/s between '" + worst->first.first +
-                     "' and '" + worst->first.second + "', where " + number_text(scene.contact.friction_speed) +
-                     " m/s is asked for; integrator.method: implicit keeps to it");
+  warnings.push_back("contact.friction_speed: explicit steps reduce friction below " + short_text(worst->second) + " m/s between '" + worst->first.first +
+                     "' and '" + worst->first.second + "', not only below the " + number_text(scene.contact.friction_speed) +
+                     " m/s of the scene; integrator.method: implicit keeps to that speed");
 }
 
 SimulationOptions simulation_options(const RunOptions& options) {
@@ -70,15 +70,15 @@ SimulationOptions simulation_options(const RunOptions& options) {
           .memory = options.scene_memory};
 }
 
-/// The estimate is of what was asked for, so a run that misses it says by which stage.
+/// A run whose estimated error exceeds the accuracy of the scene names the stage with the largest error.
 void add_missed_accuracy(const Scene& scene, const StageErrors& errors, std::vector<std::string>& warnings) {
   if (!scene.accuracy) return;
   const bool by_time = errors.time.share >= errors.contact.share;
   const ErrorEstimate& worst = by_time ? errors.time : errors.contact;
   if (!(worst.share > *scene.accuracy)) return;
-  warnings.push_back("accuracy: " + std::string(by_time ? "time steps" : "contact") + " put '" + worst.object + "' off by about " +
-                     short_text(worst.position) + " m until the end, " + short_text(worst.share) + " of its size, where " + number_text(*scene.accuracy) +
-                     " is asked for; ask for less, or for a smaller " + (by_time ? "time_step.size" : "contact.error"));
+  warnings.push_back("accuracy: " + std::string(by_time ? "time steps" : "contact") + " displace '" + worst.object + "' by about " +
+                     short_text(worst.position) + " m at the end of the run, " + short_text(worst.share) + " of its size, more than the accuracy " +
+                     number_text(*scene.accuracy) + "; use a larger accuracy or a smaller " + (by_time ? "time_step.size" : "contact.error"));
 }
 
 OutputRequest outputs_of(const Scene& scene, const RunOptions& options) {
@@ -146,7 +146,7 @@ class TimeLimit {
  public:
   /// @param seconds  0: none
   explicit TimeLimit(double seconds) : seconds_(seconds) {}
-  /// Whether it has passed; the result says so then.
+  /// Whether it has passed; the result then reports it.
   [[nodiscard]] bool passed(RunResult& result) const {
     if (!(seconds_ > 0.0) || seconds_since(begin_) < seconds_) return false;
     result.reason = "time limit: expected an end within " + short_text(seconds_) + " s, found frame " + std::to_string(result.frames) +

@@ -1,6 +1,6 @@
 /// @file stage_errors.h
-/// How far off the stages of a run put the particles: a sample of its frames, of those with contact and of those without, is made again from the state before, with steps twice as long (or half as
-/// long, where a frame is one step), and, with `accuracy`, with a tenth of the error of contact.
+/// Estimates the error of positions that each stage of a run causes. A sample of the frames with contact, and one of those without, is simulated again from
+/// the state before: with steps twice as long (half as long where a frame is one step) and, with `accuracy`, with a tenth of contact.error.
 #pragma once
 
 #include <array>
@@ -25,11 +25,11 @@ class StageErrorEstimator {
   [[nodiscard]] StageErrors estimate(const Model& model) const;
 
  private:
-  /// A second simulation, made when it is first needed, and what its frames differ by.
+  /// A second simulation, made when it is first needed, and the differences of its frames.
   struct Variant {
     std::optional<Simulation> simulation;
     std::array<int, 2> frames{};                ///< by whether anything touched in them
-    std::array<std::vector<double>, 2> sum{};   ///< likewise, by object: what these frames do to its particles by the end of the run [m]
+    std::array<std::vector<double>, 2> sum{};   ///< likewise, by object: displacement by the end of the run caused by these frames [m]
   };
   void compare(const Simulation& simulation, int finer, double contact_error, Variant& variant);
   [[nodiscard]] ErrorEstimate estimate_of(std::initializer_list<const Variant*> variants, const Model& model) const;

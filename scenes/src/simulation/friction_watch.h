@@ -1,6 +1,6 @@
 /// @file friction_watch.h
-/// Below which speeds friction fades out in a run. Explicit steps raise the speed that a scene asks for where friction would turn a pair back, to and
-/// fro (react.h); implicit ones raise it with how fast a pair moves (compliant_contact.h).
+/// Records the speeds below which friction falls to zero in a run. Explicit steps raise the speed of the scene where friction would otherwise reverse the
+/// motion of a pair in every step (react.h); implicit steps raise it with the relative speed of the pair (compliant_contact.h).
 #pragma once
 
 #include <map>
@@ -19,7 +19,7 @@ class FrictionWatch {
   void look(const StageContext& context, const Frame& frame);
   /// The same of an implicit step. @param loads  by pair of `frame.surface`
   void look(const StageContext& context, const Frame& frame, std::span<const core::ContactPairLoad> loads);
-  /// The largest speed of each two objects, by their names [m/s].
+  /// The largest such speed of each two objects, by their names [m/s].
   [[nodiscard]] const std::map<std::pair<std::string, std::string>, double>& speeds() const { return speeds_; }
 
  private:

@@ -28,7 +28,7 @@ double value(const MeshSolid& solid, const Vec3& x) { return FieldView(solid).va
 constexpr double kCells = 128.0;
 
 TEST(MeshSolid, IsNearTheExactDistance) {
-  // Weights of a cubic B-spline have a mean square distance of a cell from where it is asked for, and a distance changes by the way at most.
+  // Weights of a cubic B-spline have a mean square distance of a cell from the point of evaluation, and a distance changes by the way at most.
   for (const Mesh& mesh : {block(Vec3(0.5, 0.3, 0.2)), gear(24, 0.4, 0.5, 0.1), octahedral_sphere(0.5, 4),
                            both(block(Vec3(0.5, 0.02, 0.02)), block(Vec3(0.02, 0.5, 0.001)))}) {
     const MeshSolid solid(mesh, {.slope = 1.0});

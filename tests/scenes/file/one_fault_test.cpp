@@ -1,4 +1,4 @@
-/// One slip in a scene is one fault: what is told at other keys is no consequence of it.
+/// One slip in a scene is one fault: no consequence of it is reported at other keys.
 #include <gtest/gtest.h>
 
 #include <algorithm>

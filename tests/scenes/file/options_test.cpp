@@ -639,7 +639,7 @@ class Options : public testing::Test {
     return options;
   }
 
-  /// A number for what `in` names of a scene after two frames; a refusal is told by its message.
+  /// A number for what `in` names of a scene after two frames; a refusal is given as its message.
   static std::uint64_t outcome(const Parts& parts, In in) {
     const Scene scene = parse_scene(text_of(parts), "option.yaml", folder());
     Hasher hasher;

@@ -56,10 +56,10 @@ TEST(AccuracyKey, ChoosesByWhatItsErrorCosts) {
   };
   const IntegratorPlan slides = choice(ball("accuracy: 1e-2", 0.5)), smooth = choice(ball("accuracy: 1e-2", 0.0));
   EXPECT_EQ(slides.settings.method, core::Integrator::ImplicitMidpoint);
-  EXPECT_NE(slides.reason.find("of velocity Verlet, which blur friction"), std::string::npos) << slides.reason;
+  EXPECT_NE(slides.reason.find("of velocity Verlet, to resolve friction"), std::string::npos) << slides.reason;
   EXPECT_EQ(smooth.settings.method, core::Integrator::Symplectic);
   EXPECT_EQ(choice(ball("", 0.5)).settings.method, core::Integrator::Symplectic);
-  // Explicit steps that the scene asks for by name are as short as friction needs them.
+  // Explicit steps that the scene selects by name are as short as friction needs them.
   EXPECT_EQ(choice(ball("accuracy: 1e-2\nintegrator: {method: symplectic}", 0.5)).settings.method, core::Integrator::Symplectic);
 }
 
@@ -135,7 +135,7 @@ TEST(StageErrors, NameTheLargestAndWhatFrictionIsBlurredBy) {
   EXPECT_EQ(blurred.at("errors").at("largest"), "time");
   EXPECT_EQ(blurred.at("friction").at(0).at("a"), "ball");
   EXPECT_GT(blurred.at("friction").at(0).at("speed_m_s"), 10.0 * ContactDesc{}.friction_speed);
-  EXPECT_NE(blurred.at("warnings").dump().find("explicit steps fade friction out below"), std::string::npos);
+  EXPECT_NE(blurred.at("warnings").dump().find("explicit steps reduce friction below"), std::string::npos);
   const nlohmann::json kept = errors_of(ball("accuracy: 1e-2", 0.5));
   EXPECT_EQ(kept.at("warnings").dump().find("explicit steps"), std::string::npos);
 }

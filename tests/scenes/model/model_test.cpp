@@ -280,7 +280,7 @@ TEST(Warnings, TellOfKeysThatChangeNothing) {
 }
 
 TEST(Warnings, TellOfContactsThatAreNotSolvedAsWellAsAsked) {
-  // The patch of a ring on the ground: samples end at a bound of 8e-2, marching goes as far as is asked.
+  // The patch of a ring on the ground: samples end at a bound of 8e-2, marching reaches the given error.
   const auto warnings_of = [](const std::string& rule) {
     Simulation simulation(parse_scene("schema: 1\nduration: 0.02 s\nframe_rate: 100\nground: {modulus: 1e6}\ncontact: {error: 1e-3, rule: " + rule + "}\nobjects:\n"
                                       "  - {name: hoop, particles: {at: [0, 0, 0.085]}, skeleton: [{shape: ring, radius: 0.3, kernel: {type: wyvill, radius: 0.2}}], "

@@ -192,7 +192,7 @@ TEST(DelaunayScene, TellsOfTrianglesThatCrossInAllFrames) {
   EXPECT_TRUE(warnings.empty());
 }
 
-// Objects that touch share their contact bit for bit, within the angle, the size and the distance asked for.
+// Objects that touch share their contact bit for bit, within the angle, the given size and distance.
 TEST(DelaunayScene, DividesObjectsThatTouchWithinAngleSizeAndDistance) {
   const auto meshes_of = [](const std::string& meshing) {
     const std::string text = std::string(kTwoBalls) + "output: {mesh: ply, cell: 0.1, meshing: " + meshing + "}\n";
@@ -212,7 +212,7 @@ TEST(DelaunayScene, DividesObjectsThatTouchWithinAngleSizeAndDistance) {
     const MeshReport report = inspect(mesh);
     EXPECT_TRUE(report.closed && report.oriented);
     EXPECT_GE(least_angle(mesh), std::numbers::pi / 6.0 - 1e-9);
-    for (const auto& t : mesh.triangle) {  // chords of circles with the radius asked for
+    for (const auto& t : mesh.triangle) {  // chords of circles with the given radius
       for (std::size_t k = 0; k < 3; ++k) EXPECT_LE((mesh.position[t[k]] - mesh.position[t[(k + 1) % 3]]).norm(), std::sqrt(3.0) * 0.15);
     }
   }

@@ -46,7 +46,7 @@ implicit::testing::Body small_body(bool creased) {
   return body;
 }
 
-// Of both kinds of meshers, in frames that ask for more and for less: together they keep no more than allowed, whoever is meshed first.
+// Of both kinds of meshers, in frames that need more and less memory: together they keep no more than allowed, whichever is meshed first.
 TEST(KeptMeshes, ToAnErrorShareWhatTheyMayKeep) {
   const implicit::testing::Body ball = small_body(false), pair = small_body(true);
   const Executor executor(1);

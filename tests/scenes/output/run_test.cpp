@@ -213,7 +213,7 @@ TEST_F(Run, ReplacesTheResultOfAnotherSceneAndNoFileThatItDidNotWrite) {
   for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
     if (entry.is_regular_file()) found.insert(entry.path().lexically_relative(folder_).string());
   }
-  found.erase(".lock");  // of whoever runs in the folder
+  found.erase(".lock");  // held by the process that runs in the folder
   std::set<std::string> expected(kept.begin(), kept.end());
   for (const char* frame : {"0001", "0002", "0003"}) {
     expected.insert(std::string("states/drop.") + frame + ".state");
@@ -458,7 +458,7 @@ TEST_F(Run, DrawsFramesAtTheSameTimeWithTheSameBytes) {
   result = render_run(scene_, o);
   EXPECT_EQ(result.frames_at_once, 1);
   EXPECT_EQ(result.pictures_drawn, 5);
-  // What is current stays, and a state that cannot be read is told of.
+  // What is current stays, and a state that cannot be read is reported.
   o.memory = 0.0;
   o.overwrite = false;
   fs::remove(folder_ / "frames/drops.0002.png");
@@ -670,7 +670,7 @@ TEST_F(Run, RefusesThinSurfacesAndOwnCellsByTheirKeys) {
             "1e-05 m; use cells of at least 0.000586 m");
 }
 
-/// What is told of the outputs of a scene at its start; empty: nothing.
+/// Warnings about the outputs of a scene at its start; may be empty.
 std::string told_at_the_start(const Scene& scene) {
   Simulation simulation(scene);
   try {

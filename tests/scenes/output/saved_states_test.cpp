@@ -1,4 +1,4 @@
-/// What a run goes on from, and what it refuses to.
+/// Saved states from which a run resumes, and those it refuses.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -60,7 +60,7 @@ TEST(Explain, SaysWhyNoStepCanBeMade) {
 }
 
 TEST(Query, SaysWhereTheErrorIsAboveWhatWasAsked) {
-  // The patch of a ring on the ground: samples end at a bound of 8e-2, marching goes as far as is asked.
+  // The patch of a ring on the ground: samples end at a bound of 8e-2, marching reaches the given error.
   const auto make = [](const std::string& rule) {
     return Simulation(parse_scene("schema: 1\nduration: 1 s\nground: {modulus: 1e6}\ncontact: {error: 1e-3, rule: " + rule +
                                       "}\nobjects:\n  - name: hoop\n    particles: {at: [0, 0, 0.085]}\n"

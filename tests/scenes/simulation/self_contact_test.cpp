@@ -527,7 +527,7 @@ TEST(GroupContact, OfGroupsThatBondsHaveLeftBeginsOnceTheyHaveBeenApart) {
   EXPECT_EQ(touching.bodies()[2].origin.cut, (std::vector<std::uint32_t>{0}));
   EXPECT_EQ(touching.state().apart, (ApartPairs{{3, 4}}));  // behind all particles, as the body itself is led by the first
   EXPECT_LT(touching.audits().energy_error, 1e-3);
-  EXPECT_LT(nearest(blending), 0.0);  // without fading they go on blending
+  EXPECT_LT(nearest(blending), 0.0);  // without fading they continue to blend
 }
 
 TEST(GroupContact, OfGroupsThatBondsHaveLeftGoesOnFromASavedState) {

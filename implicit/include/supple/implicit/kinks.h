@@ -23,7 +23,7 @@ struct Kink {
   Vec3 origin = Vec3::Zero();           ///< world [m]
   Mat3 to_local = Mat3::Identity();
   Vec3 half = Vec3::Zero();             ///< [m]
-  double level = 0.0;                   ///< [m]; > 0 but for planes
+  double level = 0.0;                   ///< [m]; > 0 except for planes
   int order = 2;                        ///< of the lowest derivative of the field that jumps there, at least
 
   /// s [m], a signed distance to first order where `to_local` does not stretch, and its gradient [1].

@@ -31,8 +31,8 @@ struct PolygoniseCounts {
   double residual = 0.0;              ///< largest |F| at a vertex, |F_a - F_b| where two bodies touch
   std::uint64_t junctions = 0;        ///< points where three or more regions (bodies, outside) meet
   std::uint64_t junctions_moved = 0;  ///< of these, approximate: the exact point lies outside its simplex of the lattice
-  std::uint64_t rim_points = 0;       ///< vertices on boundary curves away from the faces between three different nodes
-  std::uint64_t rim_points_moved = 0; ///< of these, approximate: near the curve
+  std::uint64_t boundary_points = 0;       ///< vertices on boundary curves away from the faces between three different nodes
+  std::uint64_t boundary_points_moved = 0; ///< of these, approximate: near the curve
   std::uint64_t gaps = 0;             ///< edges across a gap between two bodies that is thinner than a cell
   std::uint64_t bytes = 0;            ///< kept data of a PartitionMesher
 };

@@ -18,7 +18,7 @@ struct Projection {
 /// Newton along the gradient, x <- x - F grad F / |grad F|^2, each step at most half the feature size; a bracketed root
 /// between the last two points when a step changed the sign of F without halving it. Fails (converged = false) where
 /// the gradient vanishes. The result depends on the feature size and on values in `evaluated` alone.
-/// @param evaluated  grows by a box of the points at which the field was asked
+/// @param evaluated  extended by the box of the points at which the field was evaluated
 [[nodiscard]] Projection project_to_surface(const FieldView& field, const Vec3& start, int max_iterations = 50, Box* evaluated = nullptr);
 
 /// Root of F on the segment a + t (b - a), t in [0, 1], F(a) and F(b) of opposite sign: bracketed Newton.

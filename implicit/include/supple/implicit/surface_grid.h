@@ -69,8 +69,8 @@ struct GridCounts {
   bool whole = false;                  ///< everything was rebuilt
 };
 
-/// Makes the grid of one body again and again: only leaves are touched that the support of a primitive that moved, or was
-/// where it is no longer, reaches. The grid is that of `make_surface_grid`, in values, in its tree and so in its file.
+/// Makes the grid of one body repeatedly: only leaves are changed that the present or former support of a moved primitive
+/// reaches. The grid is that of `make_surface_grid`, in values, in its tree and so in its file.
 class GridUpdater {
  public:
   GridUpdater();
@@ -78,9 +78,9 @@ class GridUpdater {
   GridUpdater(GridUpdater&&) noexcept;
   GridUpdater& operator=(GridUpdater&&) noexcept;
 
-  /// Valid until the next call. Everything is made anew where options, iso value or blend are not those of the last call, where half of
+  /// Valid until the next call. Everything is rebuilt where options, iso value or blend are not those of the last call, where half of
   /// the primitives moved and where more than half of the leaves would change.
-  /// @throws as make_surface_grid; the next call then makes everything anew
+  /// @throws as make_surface_grid; the next call then rebuilds everything
   const SurfaceGrid& make(const Field& field, const GridOptions& options, const Executor& executor,
                           GridCounts* counts = nullptr);
 
@@ -134,8 +134,8 @@ struct UnitedBody {
   const Field* field = nullptr;  ///< the Field behind the view, if any: then leaves out of reach of its moved primitives are kept
 };
 
-/// Makes the grid of several bodies as one again and again: only leaves are touched that a body may reach which is no longer, or was
-/// not, what it is. The grid is that of `make_surface_grid` of a UnitedField of the views, in values, in its tree and so in its file.
+/// Makes the grid of several bodies as one repeatedly: only leaves are changed that a changed body reaches or
+/// reached. The grid is that of `make_surface_grid` of a UnitedField of the views, in values, in its tree and so in its file.
 class UnionUpdater {
  public:
   UnionUpdater();
@@ -143,9 +143,9 @@ class UnionUpdater {
   UnionUpdater(UnionUpdater&&) noexcept;
   UnionUpdater& operator=(UnionUpdater&&) noexcept;
 
-  /// Valid until the next call. Everything is made anew where options are not those of the last call and where more than half of the
+  /// Valid until the next call. Everything is rebuilt where options are not those of the last call and where more than half of the
   /// leaves would change.
-  /// @throws as make_surface_grid; the next call then makes everything anew
+  /// @throws as make_surface_grid; the next call then rebuilds everything
   const SurfaceGrid& make(std::span<const UnitedBody> bodies, const GridOptions& options, const Executor& executor,
                           GridCounts* counts = nullptr);
 

@@ -22,7 +22,7 @@ namespace supple::implicit {
 [[nodiscard]] double enclosed_volume(const FieldView& field, double cell);
 
 /// The same by part: a cell is shared by the planes where its strongest parts are equal, so the territories of all parts add up to
-/// `enclosed_volume` but for rounding. With cells of a sixth of the least iso radius a part errs by about 1e-3. Shape [part_count].
+/// `enclosed_volume` up to rounding. With cells of a sixth of the least iso radius a part errs by about 1e-3. Shape [part_count].
 [[nodiscard]] std::vector<double> part_volumes(const FieldView& field, double cell, std::size_t part_count);
 
 /// The same body with every primitive on a part of its own, numbered like the primitives: `part_volumes` of its field, placed

@@ -93,7 +93,7 @@ class TakingBack {
       back.clear();
       for (const auto& [s, t] : found) {
         if (!steps_.is_there(s) || !steps_.is_there(t)) continue;
-        // Numbers of steps from 1 on, with 0 for what none made.
+        // Numbers of steps from 1, with 0 for triangles of no step.
         const std::uint32_t later = std::max(steps_.maker(s) + 1, steps_.maker(t) + 1);
         SUPPLE_EXPECTS(later > 0);
         steps_.take_back(later - 1, back);
@@ -156,7 +156,7 @@ class TakingBack {
     leave_once(same, memory_.mesh.triangle_count());
     return same;
   }
-  /// Leaves the first of equal numbers.
+  /// Keeps the first of equal numbers.
   static void leave_once(std::vector<std::uint32_t>& numbers, std::size_t count) {
     std::vector<bool> taken(count, false);
     for (std::uint32_t& n : numbers) {

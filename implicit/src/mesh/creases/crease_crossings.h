@@ -1,5 +1,5 @@
 /// @file crease_crossings.h
-/// What puts a mesh onto creases is taken back where triangles would cross.
+/// Undoes steps that put a mesh onto creases where triangles would intersect.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace supple::implicit {
 
-/// What was looked at in the last call, and what of it collides: that is not looked at again for pairs of triangles that are the same.
+/// Tested pairs of triangles of the last call, and their intersections: unchanged pairs are not tested again.
 struct CrossingMemory {
   using Pair = std::array<std::uint32_t, 2>;
   Mesh mesh;                        ///< its triangles were there before any step was taken back
@@ -21,13 +21,13 @@ struct CrossingMemory {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_of(mesh) + bytes_of(safe) + bytes_of(pair); }
 };
 
-/// Takes back steps until no two triangles cross, of which one is not safe, or run along an edge in the same direction: of each such pair
-/// the later step of the two. That ends, as every round takes a step back and none is made; it ends with nothing that crosses, in the
-/// limit with the mesh to begin with, which must not cross itself. Looks at what is near triangles that are not safe.
+/// Undoes steps until no two triangles of which one is unsafe intersect or have the same orientation along an edge: of each such pair
+/// the later step of the two. This terminates, as every round undoes a step and makes none; it ends without intersections, in the
+/// limit with the initial mesh, which must not intersect itself. Tests the surroundings of unsafe triangles.
 /// @param mesh  vertices; its triangles are those of the steps
-/// @param safe  by number, those from its end on are not: triangles that cross no safe one, also where others are taken back
+/// @param safe  by number, triangles beyond its end are unsafe: triangles that intersect no safe one, even after other steps are undone
 /// @param cell  size of triangles, about [m]
-/// @return triangles that are there again
+/// @return restored triangles
 [[nodiscard]] std::vector<std::uint32_t> take_back_crossings(const Mesh& mesh, const std::vector<bool>& safe, double cell, CrossingMemory& memory,
                                                              TriangleSteps& steps);
 

@@ -15,7 +15,7 @@ using Triangle = TriangleSteps::Triangle;
 constexpr int kGrowths = 4;
 constexpr std::size_t kMostTaken = 60;  // triangles of a hole
 
-/// A polygon on one side of the crease, seen along a direction.
+/// A polygon on one side of the crease, projected along a direction.
 class Ears {
  public:
   /// @param joined  whether an edge between two vertices is there already
@@ -156,8 +156,8 @@ class Mending {
     return any;
   }
 
-  /// An attempt depends on the triangles at the vertices of its hole when the pass began. Holes that were filled there since let it fail, too,
-  /// and it is made again in the next pass.
+  /// An attempt depends on the triangles at the vertices of its hole when the pass began. If holes were filled there since,
+  /// the attempt also fails and is repeated in the next pass.
   [[nodiscard]] bool fails_again(std::span<const std::uint32_t> vertices) const {
     return std::none_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return touched_before_[v]; });
   }
@@ -219,7 +219,7 @@ class Mending {
     return false;
   }
 
-  /// Whether a triangle is no longer there or lies beside a hole that was filled in this pass.
+  /// Whether a triangle is gone or lies beside a hole that was filled in this pass.
   [[nodiscard]] bool touches_filled(std::uint32_t triangle) const {
     const Triangle& t = triangle_[triangle];
     return touched_[t[0]] || touched_[t[1]] || touched_[t[2]];

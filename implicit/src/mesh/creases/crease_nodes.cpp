@@ -20,7 +20,7 @@ void gather(const BlendIndex& blend, std::size_t i, const FieldParts& parts, std
   }
 }
 
-/// F_k and its gradient; where sums are alike but for rounding, that from within the node's own side, where its sum is the larger.
+/// F_k and its gradient; where sums are equal up to rounding, the gradient from the node's own side, where its sum is the larger.
 /// @param own  sums of node k  @param nodes  of all nodes
 NodeSample node_sample(const Field::Index& index, const NodeSample& own, std::span<const NodeSample> nodes) {
   constexpr double kAlike = 1e-12;  // points of creases leave 1e-13

@@ -43,16 +43,16 @@ struct CreasePoint {
   Vec3 position, normal;
 };
 
-/// What searches for points of creases found, from call to call.
+/// Results of searches for points of creases, kept from call to call.
 class CreaseMemory {
  public:
-  /// @param nothing  of the last call holds
+  /// @param nothing  of the last call is valid
   void begin_call(bool nothing) {
     last_.clear();
     if (!nothing) last_.swap(now_);
     now_.clear();
   }
-  /// What this search found in the last call if that still holds by `holds(search)`, else search_anew(search).
+  /// The result of this search in the last call if it is still valid by `holds(search)`, else search_anew(search).
   template <class Holds, class Search>
   const std::optional<CreasePoint>& find(const CreaseSearch& search, const Holds& holds, const Search& search_anew) {
     const auto words = search.words();

@@ -62,7 +62,7 @@ class Sharpener {
   };
 
   using CellPlace = std::array<std::int64_t, 3>;
-  /// Where the middle of a triangle lies: all triangles of marching cubes lie in their cell.
+  /// The centre of a triangle: all triangles of marching cubes lie in their cell.
   [[nodiscard]] CellPlace cell_of(const Triangle& t) const {
     const Vec3 centre = (mesh_.position[t[0]] + mesh_.position[t[1]] + mesh_.position[t[2]]) / 3.0;
     const Vec3 at = (centre - lattice_.origin) / lattice_.cell;
@@ -247,7 +247,7 @@ class Sharpener {
         joined.push_back({left, right});
       }
     }
-    // A step for triangles that share cut edges, directly or by way of others.
+    // A step for triangles that share cut edges, directly or through others.
     std::vector<Triangle> pieces;
     for (const std::vector<std::uint32_t>& group : groups_of(joined)) {
       pieces.clear();
@@ -256,7 +256,7 @@ class Sharpener {
     }
   }
 
-  /// What pairs join, directly or by way of others.
+  /// Components of a set of pairs.
   static std::vector<std::vector<std::uint32_t>> groups_of(std::span<const std::array<std::uint32_t, 2>> pairs) {
     std::vector<std::uint32_t> member;
     for (const auto& pair : pairs) member.insert(member.end(), pair.begin(), pair.end());

@@ -36,14 +36,14 @@ bool has_creases(const Field& field) {
 
 namespace {
 
-/// The mesh with creases on one lattice, and what is kept of it.
+/// The mesh with creases on one lattice, and its kept data.
 class CreaseMarcher {
  public:
   /// @param field  to be kept until the next call
   const Mesh& make(const Field& field, const Lattice& lattice, bool skip, const Executor& executor);
   /// centroid_error of the mesh that was made since the last call.
   [[nodiscard]] double error(const Executor& executor);
-  /// Marches anew, with nothing of earlier calls: counts are then those of a fresh mesher. The mesh stays.
+  /// Marches from scratch: counts are then those of a new mesher. The mesh stays.
   void march_anew(const Executor& executor);
 
   [[nodiscard]] const MarchCounts& counts() const { return counts_; }
@@ -55,7 +55,7 @@ class CreaseMarcher {
 
  private:
   void count_kept();
-  /// Whether nothing is different since the last mesh was made.
+  /// Whether nothing changed since the last mesh was made.
   [[nodiscard]] bool stayed(bool others) const {
     const march::ViewMemory& changes = marcher_.memory.view;
     return !others && !changes.all && changes.changes.reaches().empty();
@@ -74,7 +74,7 @@ class CreaseMarcher {
   CreaseMemory memory_;
   CrossingMemory crossings_;
   Mesh mesh_, last_mesh_;
-  TriangleErrors errors_;             ///< of last_mesh_, or mesh_ once they are asked for
+  TriangleErrors errors_;             ///< of last_mesh_, or mesh_ once they are requested
   std::uint64_t blunt_cells_ = 0;     ///< of mesh_
   double error_ = 0.0;                ///< the largest of them [m]
   double feature_ = 0.0;              ///< of the field when they were [m]
@@ -168,7 +168,7 @@ struct CreaseMesher::Impl {
 
   CreaseMarcher fixed;  ///< of the last mesh without an error
   march::TriedLattices<CreaseMarcher> tried;
-  Mesh alone;           ///< where nothing is kept of it
+  Mesh alone;           ///< where no data are kept
 
   // For make_to_error.
   static march::LevelPlan plan_of(double first, int level) { return {.cell = spacing_at(first, level)}; }

@@ -92,7 +92,7 @@ Bits reached(const BlocksAbove& above, const Mask& mask) {
   return Steps(words).any();
 }
 
-/// Marks the edges and cells that the surface crosses, and counts what the tiles will hold.
+/// Marks the edges and cells that the surface crosses, and counts the content of the tiles.
 void count_block(const BlockTable& table, Block& block) {
   const BlocksAbove above = blocks_above(table, block);
   // A root depends on whether the value at the upper end is known.
@@ -129,7 +129,7 @@ void count_block(const BlockTable& table, Block& block) {
   block.corners.assign(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(cells));
 }
 
-/// Brings up to date what the table counts of a block.
+/// Updates the counts of a block in the table.
 void count_held(BlockTable& table, std::size_t index) {
   Block& block = table.block[index];
   table.holds[index] = block.uniform() ? 0 : 1;

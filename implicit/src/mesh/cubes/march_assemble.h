@@ -46,8 +46,8 @@ class BlockShifts {
 /// Triangles that stay.
 void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::size_t count, Mesh& mesh);
 
-/// Room for the points of all vertices. Those that stay are where they are looked for.
-/// @param blocks   that hold vertices
+/// Makes room for the points of all vertices. Those that stay are at their final index.
+/// @param blocks   with vertices
 /// @param counted  of these, those whose vertices may be others
 void place_points(BlockTable& table, std::span<const std::uint32_t> blocks, std::span<const std::uint32_t> counted, std::size_t vertices,
                   bool none_stays, std::vector<EdgePoint>& points);

@@ -16,7 +16,7 @@ using blobs::Cells;
 
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// Those of `tiles`, inside and without values, that are asked for more than their sign: a cell that they own has a node outside, or an
+/// Selects those of `tiles`, inside and without values, of which more than the sign is needed: a cell that they own has a node outside, or an
 /// edge that starts at one, in the tile below along an axis, ends in them.
 Bits next_to_outside(const BlockTable& table, const Block& block, Bits tiles) {
   const BlocksAbove above = blocks_above(table, block);
@@ -278,7 +278,7 @@ class BlobSampler final : public Sampler {
     edges.count = n;
   }
 
-  /// Calls use(block index) for the blocks that hold the cells and lie in the table.
+  /// Calls use(block index) for the blocks of the table that contain the cells.
   template <class Use>
   static void for_blocks_in(const BlockTable& table, const blobs::CellBox& cells, const Use& use) {
     BlockCoord low{}, high{};
@@ -312,7 +312,7 @@ class BlobSampler final : public Sampler {
     return list;
   }
 
-  /// Marks what lies up to `steps` from a mark along every axis.
+  /// Marks everything up to `steps` from a mark along every axis.
   static void spread(std::vector<std::uint8_t>& marks, const BlockCoord& count, std::size_t steps) {
     std::vector<std::uint8_t> line;
     std::size_t stride = 1;
@@ -423,7 +423,7 @@ class BlobSampler final : public Sampler {
     return {static_cast<float>(node[0]), static_cast<float>(node[1]), static_cast<float>(node[2])};
   }
 
-  /// Leaves none of these tiles with values.
+  /// Clears the values of these tiles.
   static void empty(Block& block, Bits tiles, bool inside, Workspace& work) {
     work.changes.drop(tiles);
     block.changed |= tiles;
@@ -447,7 +447,7 @@ class BlobSampler final : public Sampler {
       block.decided |= bit;
       return;
     }
-    // Tiles of a leaf that bounds decided have not been looked at one by one.
+    // Tiles of a leaf that bounds decided were not tested one by one.
     const Bits tiles = was_decided ? own : own & block.changed;
     empty(block, tiles, false, work);
     Bits inside = work.sure & tiles;
@@ -480,7 +480,7 @@ class BlobSampler final : public Sampler {
   }
 
   /// Gives values to the tiles whose sums ended early where a node next to them is outside.
-  /// @param sampled  blocks that were, in this call: only next to them can an outside node be new
+  /// @param sampled  blocks sampled in this call: only next to them can an outside node be new
   void evaluate_needed(const Executor& executor, std::span<const std::uint32_t> sampled, BlockTable& table) const {
     std::vector<std::uint8_t> near(table.block.size());
     for (const std::uint32_t b : sampled) {
@@ -532,7 +532,7 @@ class BlobSampler final : public Sampler {
   static constexpr double kColumns = 5.0;
   [[nodiscard]] bool sure_by_tiles() const { return skip_ && grid_.reach() >= kSureTiles; }
   [[nodiscard]] bool sure_by_cubes() const { return skip_ && !sure_by_tiles() && grid_.reach() >= kSureCubes; }
-  /// Beyond this blobs are few, and bounds look at all of them.
+  /// Beyond this blobs are few, and bounds test all of them.
   static constexpr double kNearMost = 16.0;
   [[nodiscard]] bool near_first(double from) const { return grid_.reach() >= from && grid_.reach() <= kNearMost; }
 

@@ -38,7 +38,7 @@ class TileChanges {
   void make(unsigned place, Bits inside) {
     inside_[place] = inside;
     made_ |= Bits{1} << place;
-    // What apply() will write to is on its way by then.
+    // Prefetches the memory that apply() will write.
     constexpr std::size_t kLine = 64 / sizeof(float);
     const std::size_t first = kTileNodes * static_cast<std::size_t>(std::popcount(made_) - 1);
     for (std::size_t i = first; i < std::min(first + kTileNodes, room_); i += kLine) __builtin_prefetch(to_ + i, 1);

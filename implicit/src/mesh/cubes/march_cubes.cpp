@@ -61,9 +61,9 @@ struct CubeMesher::Impl {
   march::RefinedMarcher fixed;  ///< of the last mesh without an error
   march::TriedLattices<march::RefinedMarcher> tried;
   march::CutScratch scratch;
-  Mesh alone;  ///< where nothing is kept of it
+  Mesh alone;  ///< where no data are kept
 
-  // For make_to_error. Triangles are cut, up to twice, before cells get smaller.
+  // For make_to_error. Triangles are divided, up to twice, before cells get smaller.
   static march::LevelPlan plan_of(double first, int level) {
     constexpr int kRefinements = 2;
     const int refinements = std::min(level / 2, kRefinements);

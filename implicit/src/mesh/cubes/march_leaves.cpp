@@ -128,7 +128,7 @@ void ViewMemory::compare(const FieldView& field, const Lattice& now) {
       range.upper[k] = std::max(range.upper[k], held[k]);
     }
   }
-  for (std::size_t k = 0; k < 3; ++k) {  // what is next to the surface is told of too
+  for (std::size_t k = 0; k < 3; ++k) {  // the values next to the surface are included
     --range.lower[k];
     ++range.upper[k];
   }

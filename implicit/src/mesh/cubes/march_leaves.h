@@ -1,5 +1,5 @@
 /// @file march_leaves.h
-/// Which leaves of a field that is sampled through its view hold values, from call to call.
+/// The leaves with values of a field that is sampled through its view, from call to call.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ namespace supple::implicit::march {
 
 using lattice::BlockCoord;
 
-/// Leaves with surface, of about 7 kB each with their part of the mesh; where more are in reach, nothing is kept of each.
+/// Leaves with surface, about 7 kB each with their part of the mesh; where more are in reach, no data are kept per leaf.
 inline constexpr std::uint64_t kMostLeaves = 1'000'000;
 
 /// The closed box of a leaf: it ends at the first nodes of the next ones.
 [[nodiscard]] Box leaf_box(const BlockCoord& leaf, const Lattice& lattice);
 
-/// Whether one of these meets a box, or they are so many that looking at each would not be worth it.
+/// Whether one of these meets a box, or they are too many to test.
 [[nodiscard]] bool may_meet(std::span<const Reach> reaches, const Box& box);
 
 /// Tiles of leaves, those of a leaf as bits x + 2 y + 4 z; beyond a range of leaves there are none.
@@ -51,7 +51,7 @@ class ChangedTiles {
   std::vector<std::uint8_t> tiles_;
 };
 
-/// What is known of the field of the last call.
+/// Known data of the field of the last call.
 struct ViewMemory {
   Lattice lattice;
   FieldChanges changes;
@@ -67,7 +67,7 @@ struct ViewMemory {
     if (all || !changed.covers(evaluated, lattice)) return true;
     return changed.meets(evaluated, lattice) && may_meet(changes.reaches(), evaluated);
   }
-  /// Sees what is different in a field that is to be sampled, and `leaf` as it was.
+  /// Records the changes of a field that is to be sampled, and `leaf` of the last call.
   void compare(const FieldView& field, const Lattice& now);
   [[nodiscard]] std::size_t bytes() const { return changes.bytes() + leaf.capacity() * sizeof(leaf[0]) + changed.bytes(); }
 };

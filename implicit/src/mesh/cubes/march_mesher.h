@@ -1,5 +1,5 @@
 /// @file march_mesher.h
-/// A mesh of marching cubes and what is kept of it from call to call.
+/// A mesh of marching cubes and its data kept from call to call.
 #pragma once
 
 #include <memory>
@@ -18,13 +18,13 @@ struct Marcher {
   Lattice lattice;                   ///< of the last mesh
   double iso = 0.0;
   bool kept = false;     ///< table and mesh are those of the memory
-  bool skipped = false;  ///< as the last mesh was asked for
+  bool skipped = false;  ///< option of the last mesh
 
   /// Makes `mesh`, unrefined.
   void march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor, MarchCounts& counts);
-  /// Whether nothing of the last but one was kept.
+  /// Whether no data of the last but one were kept.
   [[nodiscard]] bool whole() const { return sampler->single_precision() ? memory.grid.change().all : memory.view.all; }
-  /// What a fresh mesher counts at most. @param counts  of this one
+  /// Largest counts of a new mesher. @param counts  of this one
   [[nodiscard]] MarchCounts most_counts(const MarchCounts& counts) const;
 };
 

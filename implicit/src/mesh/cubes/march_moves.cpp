@@ -9,7 +9,7 @@
 namespace supple::implicit::march {
 namespace {
 
-/// From the number `first` on, numbers move by `more` further than before it.
+/// From the number `first` on, numbers move by `more` further than those before.
 struct Shift {
   std::uint32_t first, more;
 };

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kTilesPerTask = 64;
 
-/// The tiles that hold triangles, in their order.
+/// The tiles with triangles, in their order.
 void list_tiles(const BlockTable& table, std::vector<TileTriangles>& tiles) {
   tiles.clear();
   for (const Block& block : table.block) {
@@ -84,7 +84,7 @@ void RefinedMarcher::find_changes() {
   const blobs::BlobGrid& grid = marcher_.memory.grid;
   const Lattice& lattice = marcher_.lattice;
   lattice::BlockRange range;
-  for (std::size_t k = 0; k < 3; ++k) {  // and what is next to it
+  for (std::size_t k = 0; k < 3; ++k) {  // and the tiles next to it
     range.lower[k] = static_cast<std::int32_t>(grid.support().lower[k] / kLeafNodes) - 2;
     range.upper[k] = static_cast<std::int32_t>(grid.support().upper[k] / kLeafNodes) + 2;
   }

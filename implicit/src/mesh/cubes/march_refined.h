@@ -1,7 +1,7 @@
 /// @file march_refined.h
-/// The meshes of marching cubes on one lattice: that of its cells, those whose triangles are cut into four, again and again, and their
-/// errors. From call to call a tile keeps the vertices that cutting adds, and its error, where its triangles and all of their vertices
-/// are what they were, to the last bit, and no primitive that is different reaches where the field was asked for them.
+/// The meshes of marching cubes on one lattice: that of its cells, those whose triangles are repeatedly divided into four, and their
+/// errors. From call to call a tile keeps the vertices that division adds, and its error, where its triangles and all of their vertices
+/// are unchanged to the bit, and no changed primitive reaches the points at which the field was evaluated for them.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace supple::implicit::march {
 
-/// What cutting triangles needs; kept for its memory.
+/// Buffers for dividing triangles; kept for their memory.
 struct CutScratch {
   std::vector<std::array<std::uint32_t, 3>> middle;
   std::vector<std::uint32_t> start, target, edge;
@@ -26,29 +26,29 @@ class RefinedMarcher {
  public:
   /// Makes the mesh of the cells. @param field  to be kept until the next call
   void march(const FieldView& field, const Lattice& lattice, bool skip, const Executor& executor);
-  /// Makes it anew, with nothing of earlier calls: counts are then those of a fresh mesher. Meshes and errors stay valid.
+  /// Rebuilds it: counts are then those of a new mesher. Meshes and errors stay valid.
   void march_anew(const Executor& executor);
-  /// The next mesh of the cells has nothing of this one.
+  /// The next mesh of the cells reuses nothing of this one.
   void forget() { marcher_.kept = false; }
 
   /// Valid until the next call of march(). @param may_cross  itself; the same in all calls until then
   [[nodiscard]] const Mesh& mesh(int refinements, bool may_cross, const Executor& executor, CutScratch& scratch);
-  /// centroid_error of that mesh. @pre the mesh was asked for since march()
+  /// centroid_error of that mesh. @pre the mesh was made since march()
   [[nodiscard]] double error(int refinements, const Executor& executor);
 
-  /// Of the mesh of the cells, and edges of the last mesh that was asked for.
+  /// Of the mesh of the cells, and edges of the last mesh.
   [[nodiscard]] const MarchCounts& counts() const { return counts_; }
-  /// Whether nothing of it was kept.
+  /// Whether no data were kept.
   [[nodiscard]] bool whole() const { return marcher_.whole(); }
-  /// What a fresh mesher counts at most.
+  /// Largest counts of a new mesher.
   [[nodiscard]] MarchCounts most_counts() const { return marcher_.most_counts(counts_); }
-  /// Of all meshes and what is kept of them [byte].
+  /// Size of all meshes and kept data [byte].
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] Mesh take_mesh(int refinements);
 
  private:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  /// The vertices that cutting the triangles of a tile adds, and where the field was asked for them.
+  /// The vertices that dividing the triangles of a tile adds, and the box in which the field was evaluated for them.
   struct TileVertices {
     std::uint32_t first = 0, count = 0;
     Box evaluated;
@@ -57,7 +57,7 @@ class RefinedMarcher {
     double error = 0.0;  ///< [m]
     Box evaluated;
   };
-  /// After so many cuts.
+  /// After this many divisions.
   struct Step {
     bool made = false, measured = false;
     Mesh mesh;                        ///< but for the first one, which is the marcher's
@@ -72,7 +72,7 @@ class RefinedMarcher {
   void cut(int step, bool may_cross, const Executor& executor, CutScratch& scratch);
   [[nodiscard]] Mesh& mesh_of(int step) { return step == 0 ? marcher_.mesh : now_[static_cast<std::size_t>(step)].mesh; }
   [[nodiscard]] bool differs(const Box& evaluated) const;
-  /// Calls use(triangle number) for the triangles of a tile after so many cuts.
+  /// Calls use(triangle number) for the triangles of a tile after this many divisions.
   template <class Use>
   static void for_triangles(const TileTriangles& tile, int step, const Use& use) {
     const std::size_t parts = std::size_t{1} << (2 * step);
@@ -85,7 +85,7 @@ class RefinedMarcher {
   bool skip_ = true;
   MarchCounts counts_;
   double feature_ = 0.0;              ///< of the field [m]
-  bool listed_ = false;               ///< what follows is of this call
+  bool listed_ = false;               ///< the following data are of this call
   std::vector<TileTriangles> tiles_;
   std::vector<std::size_t> first_, last_first_;  ///< of the triangles of tiles, now and in the last call
   std::vector<std::uint32_t> last_tile_;         ///< by tile: its number in the last call; kNone where its triangles are others

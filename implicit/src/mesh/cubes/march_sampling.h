@@ -1,5 +1,5 @@
 /// @file march_sampling.h
-/// How marching cubes gets at a field: values on the blocks that may hold surface, and roots on crossed edges.
+/// Access of marching cubes to a field: values on the blocks that may contain surface, and roots on crossed edges.
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ class Sampler {
   [[nodiscard]] virtual bool single_precision() const = 0;
 };
 
-/// What samplers keep from call to call.
+/// Data that samplers keep from call to call.
 struct SamplerMemory {
   blobs::BlobGrid grid;  ///< of a body of Wyvill points
   ViewMemory view;       ///< of any other
@@ -86,14 +86,14 @@ struct Run {
   std::uint32_t more = 0;        ///< of all others
 };
 
-/// What building a mesh needs besides the mesh; kept for its memory.
+/// Buffers for building a mesh; kept for their memory.
 struct MeshScratch {
   std::vector<EdgePoint> point;      ///< of the vertices, block by block from Block::first_point on
   std::vector<Run> stayed;           ///< vertices that are those of the last mesh, in rising order
   [[nodiscard]] std::size_t bytes() const { return point.capacity() * sizeof(EdgePoint) + stayed.capacity() * sizeof(Run); }
 };
 
-/// Counts, numbers, solves and joins everything; what did not change is taken from the last mesh.
+/// Counts, numbers, solves and joins everything; unchanged data come from the last mesh.
 void assemble(BlockTable& table, const Sampler& sampler, const Lattice& lattice, const Executor& executor,
               MeshScratch& scratch, Mesh& mesh);
 

@@ -20,7 +20,7 @@ namespace supple::implicit::march {
 using lattice::BlockCoord;
 
 inline constexpr int kBlockNodes = 16;  ///< along the edge of a block
-inline constexpr int kLeafNodes = 8;    ///< along the edge of a leaf, 2^3 tiles for which bounds are looked at together
+inline constexpr int kLeafNodes = 8;    ///< along the edge of a leaf, 2^3 tiles whose bounds are evaluated together
 inline constexpr unsigned kLeaves = 8;  ///< of a block, x + 2 y + 4 z
 
 /// 4^3 tiles of a block or nodes of a tile.
@@ -64,7 +64,7 @@ struct Steps {
   }
 };
 
-/// One that holds values.
+/// A tile with values.
 struct Tile {
   Bits cells = 0;                 ///< crossed
   std::array<Bits, 3> edges{};    ///< crossed, by axis
@@ -84,7 +84,7 @@ void for_tile_edges(const Tile& tile, const Use& use) {
   }
 }
 
-/// Brings what has left the nearer caches back before it is asked for.
+/// Prefetches data that have left the nearer caches.
 template <class Item>
 void fetch_ahead(const Item* items, std::size_t count) {
   constexpr std::size_t kLine = 64;
@@ -100,13 +100,13 @@ void fetch_ahead(const Item* items, std::size_t count) {
   return (place >> 1 & 1u) | (place >> 2 & 2u) | (place >> 3 & 4u);
 }
 
-/// What blocks hold.
+/// Content of blocks.
 struct Held {
   std::uint64_t tiles = 0, bytes = 0;
 };
 
 struct alignas(64) Block {
-  // What blocks are asked for again and again lies in one cache line.
+  // Data of blocks that are used most are in one cache line.
   BlockCoord coord{};         ///< lowest node / 16
   std::uint32_t vertices = 0, first_vertex = 0, old_vertex = 0;        ///< in the mesh, and in that of the last call
   std::uint32_t triangles = 0, first_triangle = 0, old_triangle = 0;  ///< the same
@@ -117,7 +117,7 @@ struct alignas(64) Block {
   Bits outside = kAll;        ///< tiles with nodes outside
   Bits changed = 0;           ///< sampled anew in this call: what moved may reach their nodes or those next to them
   Bits flipped = 0;           ///< those that hold values and did not before, or the other way round
-  Bits early = 0;             ///< those inside by partial sums, whose values nobody needs yet
+  Bits early = 0;             ///< those inside by partial sums, whose values are not needed yet
   Bits needed = 0;            ///< of these, those next to a node outside
   std::uint8_t decided = 0;   ///< leaves on which bounds show one sign
   std::vector<Bits> inside_nodes;  ///< of the tiles that hold values, by place: F > 0
@@ -144,7 +144,7 @@ struct alignas(64) Block {
     return {std::int64_t{kBlockNodes} * coord[0], std::int64_t{kBlockNodes} * coord[1],
             std::int64_t{kBlockNodes} * coord[2]};
   }
-  /// Where a tile that holds values stands among them.
+  /// Index of a tile with values among these.
   [[nodiscard]] std::size_t rank(unsigned place) const {
     return static_cast<std::size_t>(std::popcount(held & ((Bits{1} << place) - 1)));
   }
@@ -165,7 +165,7 @@ struct BlockTable {
   bool all = false;                   ///< whether all that hold values were touched in this call
   Held held;                          ///< of all blocks
 
-  /// Forgets what was made anew.
+  /// Clears the marks of rebuilt tiles.
   void begin_call() {
     all = false;
     for (std::size_t b = 0; b < block.size(); ++b) {

@@ -35,7 +35,7 @@ constexpr auto kPlaces = [] {
 constexpr auto kTilePlace = kPlaces<blobs::kTile>, kNodePlace = kPlaces<1>;
 
 /// Vertices on the edges of a block's cells: those of the block by their order, then those that its upper neighbours own. What a
-/// cell asks for is small enough to stay in the nearest cache.
+/// cell requires is small enough to stay in the nearest cache.
 class LocalVertices {
  public:
   using Number = std::uint16_t;
@@ -127,7 +127,7 @@ struct alignas(32) CellLoop {
   std::uint8_t size = 0;                      ///< 0: there are several loops
   std::uint8_t triangles = 0;
   std::uint32_t code = 0;                     ///< of the first five
-  std::array<std::uint8_t, kMost> apex{};     ///< of the fan to be taken where corner k is asked for
+  std::array<std::uint8_t, kMost> apex{};     ///< of the fan to be taken where corner k is requested
 };
 
 constexpr std::size_t first_apex(const Loop& loop) { return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(loop.apices))); }
@@ -201,7 +201,7 @@ struct Cells {
   alignas(32) std::array<std::uint32_t, kMost + kWide> code;
   std::array<const CellLoop*, kMost> loop;
   std::array<std::uint16_t, kMost> place;
-  alignas(32) std::array<std::uint32_t, kMost + kWide> fan;                ///< the corner that is asked for as its apex
+  alignas(32) std::array<std::uint32_t, kMost + kWide> fan;                ///< the corner that is requested as its apex
   std::array<std::uint32_t, kMost + kWide> pentagon;                       ///< cells of five corners
   std::size_t count = 0, pentagons = 0;
 
@@ -273,7 +273,7 @@ void Cells::choose_fans(const EdgePoint* points) {
     number[i] = {};
     code[i] = 0;
   }
-  // The two fans of four corners; what is asked for of three is any, and of more a place to begin.
+  // The two fans of four corners; for three corners any apex will do, and for more it is a start.
   for (std::size_t i = 0; i < count; i += kWide) {
     const __m256i codes = _mm256_load_si256(reinterpret_cast<const __m256i*>(&code[i]));
     const auto corner = [&](std::size_t k) { return LoopCorners(k, codes, points, [&](std::size_t j) { return number[i + j][k]; }); };

@@ -1,5 +1,5 @@
 /// @file march_tried.h
-/// What a mesher keeps of the meshes that its last call tried to reach an error.
+/// Data that a mesher keeps of its trial meshes for an error.
 #pragma once
 
 #include <cmath>
@@ -34,18 +34,18 @@ class TriedLattices {
     Entry& on = on_[cell];
     return {on.mesher, !std::exchange(on.used, true)};
   }
-  /// Leaves others than that of a cell out, the coarsest first, which take the least time to make anew, until they fit without it: it may
-  /// be the next to go, and finer ones are still to be tried.
-  /// @param beside  what is kept beside them [byte]
+  /// Drops others than that of a cell, the coarsest first, which are cheapest to rebuild, until they fit without it: it may
+  /// be the next to be dropped, and finer ones follow.
+  /// @param beside  size of other kept data [byte]
   void fit(double cell, std::uint64_t beside = 0) { leave_out(cell, beside, on_.contains(cell) ? on_.at(cell).mesher.bytes() : 0); }
-  /// Leaves out what this call did not use, and others as above until all fits. @return whether it does
+  /// Drops what this call did not use, and others as above until all fits. @return whether it does
   bool end_call(double cell, std::uint64_t beside = 0) {
     std::erase_if(on_, [](const auto& on) { return !on.second.used; });
     leave_out(cell, beside, 0);
     return bytes() + beside <= most_;
   }
   void clear() { on_.clear(); }
-  /// make_within; keeps nothing when that refuses.
+  /// make_within; keeps nothing when that throws.
   void search(const ErrorGoal& goal, const std::function<LevelTry(int level)>& make) try {
     make_within(goal, make);
   } catch (...) {
@@ -68,12 +68,12 @@ class TriedLattices {
   std::map<double, Entry, std::greater<>> on_;  ///< the coarsest first
 };
 
-/// How large the meshes of a search get, twice as large from level to level.
+/// Predicted sizes of the meshes of a search, which double from level to level.
 class TriedSize {
  public:
   /// @param most  triangles
   TriedSize(const FieldView& field, const Vec3& origin, std::uint64_t most) : field_(field), origin_(origin), most_(most) {}
-  /// Whether a level's mesh is to be expected to have more. @throws Error{Limit} as that of level 0 would
+  /// Whether a level's mesh can be expected to have more. @throws Error{Limit} as that of level 0 would
   bool exceeds(int level, double cell, const Executor& executor) {
     if (most_ == ~std::uint64_t{0}) return false;
     exceeded_ = level == 0 ? exceeds_first({.origin = origin_, .cell = cell}, executor)
@@ -106,8 +106,8 @@ class TriedSize {
   bool exceeded_ = false;
 };
 
-/// tried() of a mesh. Counts decide what is tried, and those of a mesh that was kept may be others than of a fresh one: then those
-/// of a fresh one are at most the marcher's, and are found where that is not enough to tell.
+/// tried() of a mesh. Counts decide the trials, and those of a kept mesh may differ from those of a new one: then those
+/// of a new one are at most the marcher's, and are computed where that bound does not decide.
 /// @param of  with counts(), whole(), most_counts() and march_anew(executor); to be kept while the search runs, as the mesh
 template <class Of>
 [[nodiscard]] LevelTry try_kept(double error, const Mesh& mesh, Of& of, const Executor& executor) {
@@ -120,18 +120,18 @@ template <class Of>
   return now;
 }
 
-/// How a mesh of a level is made.
+/// Lattice and refinements of a level.
 struct LevelPlan {
   double cell = 0.0;  ///< [m]
   int refinements = 0;
 };
 
-/// Makes meshes of rising level until one has options.error, and keeps of them what may be kept.
+/// Makes meshes of rising level until one meets options.error, and keeps their data within the limit.
 /// @param of    has `tried`, TriedLattices<OnLattice>; `alone`, the mesh where nothing is kept of it; plan_of(first cell, level);
 ///              mesh_on(on, first_time, plan, field, options, executor), where first_time says that this call makes the first mesh of the
 ///              lattice; error_on(on, plan, executor); take_mesh(on, plan); and bytes_beside() and forget_beside() of what is kept
 ///              beside the lattices [byte]
-/// @param most  triangles of a mesh that is made; where the search asks for more, it ends. @return null then
+/// @param most  largest number of triangles of a mesh; a search that needs more ends. @return null then
 template <class Of, class AnyField>
 const Mesh* make_to_error(Of& of, const AnyField& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
                           std::uint64_t most = ~std::uint64_t{0}) {

@@ -122,7 +122,7 @@ class ViewSampler final : public Sampler {
     return lattice::surface_blocks(field_, lattice_, executor, kMostLeaves, counts);
   }
 
-  /// The nodes [lower, upper] that leaves hold.
+  /// The node range [lower, upper] of leaves.
   static std::pair<Cells, Cells> nodes_of(std::span<const BlockCoord> leaves) {
     Cells lower, upper;
     lower.fill(std::numeric_limits<std::int64_t>::max());
@@ -143,8 +143,8 @@ class ViewSampler final : public Sampler {
     return value.lower > 0.0 ? lattice::Verdict::Inside : lattice::Verdict::Keep;
   }
 
-  /// What bounds tell of leaves that something different reaches, block by block. What they told of the others still holds. That they may
-  /// tell more or less of a leaf than in a search from above does not show in the mesh: see `upper_value`.
+  /// Evaluates bounds again on leaves in reach of changes, block by block. The results for the others are still valid. Bounds of a leaf may be
+  /// tighter or wider than in a search from above, which does not affect the mesh: see `upper_value`.
   void look_again(const Executor& executor) {
     looked_ = memory_.changed.leaves();
     std::stable_sort(looked_.begin(), looked_.end(), [](const BlockCoord& a, const BlockCoord& b) { return lattice::before(block_of(a), block_of(b)); });
@@ -216,8 +216,8 @@ class ViewSampler final : public Sampler {
     }
   }
 
-  /// F at the upper end of an edge that the surface crosses: as a tile holds it or, if none does, would hold it, so that it does not matter
-  /// to a root which tiles bounds left. @param held  0 if none does or the value is no other  @param lower  F at the lower end
+  /// F at the upper end of an edge that the surface crosses: as a tile stores it or, if none does, would store it, so that roots do not
+  /// depend on which tiles the bounds kept. @param held  0 if none does or the value is no other  @param lower  F at the lower end
   [[nodiscard]] double upper_value(double held, double lower, const Vec3& end) const {
     if (held != 0.0) return held;
     const double exact = field_.value(end), rounded = static_cast<double>(static_cast<float>(exact));
@@ -243,7 +243,7 @@ class ViewSampler final : public Sampler {
     }
   }
 
-  /// @param leaves  that are to hold values
+  /// @param leaves  that get values
   void sample_block(Block& block, std::uint8_t leaves) const {
     thread_local TileChanges changes;
     changes.begin(block);
@@ -305,7 +305,7 @@ class ViewSampler final : public Sampler {
   Lattice lattice_;
   ViewMemory& memory_;
   lattice::BlockList leaves_;               ///< where everything is different
-  std::vector<BlockCoord> looked_;          ///< elsewhere: leaves that bounds were asked for
+  std::vector<BlockCoord> looked_;          ///< elsewhere: leaves whose bounds were evaluated
   std::vector<lattice::Verdict> verdict_;   ///< on them
 };
 

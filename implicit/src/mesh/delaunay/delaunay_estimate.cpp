@@ -11,7 +11,7 @@
 namespace supple::implicit {
 namespace {
 
-/// Refinement takes 1.8 (balls) to 3.5 (rims of contacts) times the estimate where there are no edges: it ends within so many.
+/// Refinement takes 1.8 (balls) to 3.5 (boundary curves of contacts) times the estimate where there are no edges: it ends within so many.
 constexpr double kEnough = 4.0;
 
 /// Integral of the mean curvature over a triangle, of the normals as they vary between its corners: half that of their divergence. [m]
@@ -57,7 +57,7 @@ DelaunayEstimate estimate_delaunay(std::span<const Mesh> coarse, const DelaunayO
       const Vec3 twice = (mesh.position[t[1]] - mesh.position[t[0]]).cross(mesh.position[t[2]] - mesh.position[t[0]]);
       const double area = 0.5 * twice.norm();
       if (!(area > 0.0)) continue;
-      // At a rim normals turn from patch to patch, which bends none of them.
+      // At a boundary curve normals turn from patch to patch, which bends none of them.
       const bool free = contact == mesh.columns.end() ||
                         std::all_of(t.begin(), t.end(), [&](std::uint32_t v) { return contact->values[v] == 0.0; });
       const double by_size = (free ? kVertices : 0.5 * kVertices) * area / (options.size * options.size);

@@ -1,7 +1,7 @@
 // Bodies that touch, with triangles of guaranteed quality. Every patch, the free surface of a body or the contact of two, is a
 // triangulation of its own (Chew 1993): bad triangles get a vertex at their circumcentre, taken to the surface, and edges are flipped until
-// opposite angles add up to pi at most. Rims are shared by their patches: a circumcentre that comes too near to an edge of one splits it
-// instead, at a point of the rim (Ruppert 1995). Dihedral angles do not matter, so that also the groove where two balls just touch holds
+// opposite angles add up to pi at most. Boundary curves are shared by their patches: a circumcentre that comes too near to an edge of one splits it
+// instead, at a point of the boundary curve (Ruppert 1995). Dihedral angles do not matter, so that also the groove where two balls just touch holds
 // the angle.
 
 #include <algorithm>
@@ -88,8 +88,8 @@ std::vector<std::array<std::uint32_t, 2>> find_crossings(const PatchComplex& com
   return found;
 }
 
-/// Refines where triangles cross, nearer and nearer to the surface. @return false as refine_patches
-/// @throws Error{Limit} when most_vertices do not reach the bounds without a thought of crossings
+/// Refines where triangles cross, in steps that bring vertices nearer to the surface. @return false as refine_patches
+/// @throws Error{Limit} when most_vertices do not suffice for the bounds, crossings left aside
 bool refine_apart(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate, PatchComplex& complex,
                   DelaunayReport& report) {
   constexpr int kTries = 4;
@@ -124,7 +124,7 @@ bool make_delaunay(std::span<const FieldView> fields, const DelaunayOptions& opt
   return report.largest_radius <= options.size && report.largest_distance <= options.distance;
 }
 
-/// The mesh of a body.
+/// The mesh of one body.
 Mesh extract(std::span<const FieldView> fields, const PatchComplex& complex, std::uint32_t body) {
   constexpr std::uint32_t kNone = ~std::uint32_t{0};
   const Label own = body + 1;
@@ -207,7 +207,7 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, const DelaunayOption
     if (found.sharp == 0 && found.crossings == 0) break;
   }
   if (best) return std::move(*best);
-  // Size and distance without the angle: the longest edge of a tetrahedron is no longer than the size. Nor are parts missed that the cell sees.
+  // Size and distance without the angle: the longest edge of a tetrahedron is at most the size. Parts that the cell resolves are not missed.
   const Lattice lattice{.origin = Vec3::Zero(), .cell = std::min(options.cell, options.size / std::sqrt(3.0))};
   std::vector<Mesh> meshes = polygonise_partition_within(fields, lattice, {options.distance, "mesh.distance"}, executor);
   report.least_angle = std::numbers::pi;

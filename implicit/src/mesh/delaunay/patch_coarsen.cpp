@@ -18,7 +18,7 @@ using lattice::LabelSet;
 
 /// Edges shorter than this share of the size are taken out.
 constexpr double kShort = 0.7;
-/// Edges shorter than this share have no shape that is worth keeping.
+/// Shorter edges, over the size, have no shape worth keeping.
 constexpr double kTiny = 0.02;
 
 class Coarsener {
@@ -26,13 +26,13 @@ class Coarsener {
   Coarsener(const PatchSurface& surface, const DelaunayOptions& options, PatchComplex& complex)
       : surface_(surface), options_(options), complex_(complex) {}
 
-  /// Takes vertices of rims that are near them to them.
-  void settle_rims() {
+  /// Takes vertices of boundary curves that are near them to them.
+  void settle_boundaries() {
     for (Vertex v = 0; v < complex_.vertex_count(); ++v) {
       if (complex_.star(v).empty() || complex_.place(v) == PatchPlace::Interior) continue;
       const Vec3 before = complex_.position(v);
       const LabelSet labels = complex_.labels(v);
-      if (labels.count != (complex_.place(v) == PatchPlace::Rim ? 3 : 4)) continue;
+      if (labels.count != (complex_.place(v) == PatchPlace::Boundary ? 3 : 4)) continue;
       const auto at = surface_.settle(labels, before, 0.5 * options_.size);
       if (at && (*at - before).norm() > kTiny * kTiny * options_.size) complex_.move(v, *at);
     }
@@ -80,13 +80,13 @@ class Coarsener {
     return any;
   }
 
-  /// Takes out vertices that lie beyond their patch or rim, where corners have moved. @return whether there were any
+  /// Takes out vertices that lie beyond their patch or boundary curve, where corners have moved. @return whether there were any
   bool drop_strays() {
     bool any = false;
     for (Vertex v = 0; v < complex_.vertex_count(); ++v) {
       if (complex_.star(v).empty() || complex_.place(v) == PatchPlace::Corner) continue;
       const LabelSet labels = complex_.labels(v);
-      if (labels.count == (complex_.place(v) == PatchPlace::Rim ? 3 : 2) && surface_.settle(labels, complex_.position(v), kTiny * options_.size)) continue;
+      if (labels.count == (complex_.place(v) == PatchPlace::Boundary ? 3 : 2) && surface_.settle(labels, complex_.position(v), kTiny * options_.size)) continue;
       std::vector<Vertex> around;
       double best = 1.0;
       for (const std::uint32_t t : complex_.star(v)) {
@@ -119,17 +119,17 @@ class Coarsener {
   }
 
  private:
-  /// May `from` go to `to` without a change of what the patches and their rims are?
+  /// Can `from` merge into `to` without a change of the topology of patches and boundary curves?
   [[nodiscard]] bool keeps_topology(Vertex from, Vertex to, const Around& edge) const {
     // Four labels meet at a point: an edge among them is one that the lattice made.
     const bool point = complex_.place(to) == PatchPlace::Corner && complex_.labels(edge).count > 3;
     if (complex_.place(from) == PatchPlace::Corner && !point) return false;
-    if (complex_.place(from) == PatchPlace::Rim) {
-      if (!complex_.is_rim(edge)) return false;
-      for (const Vertex other : complex_.along_rims(from)) {  // a rim of three edges stays
+    if (complex_.place(from) == PatchPlace::Boundary) {
+      if (!complex_.is_boundary(edge)) return false;
+      for (const Vertex other : complex_.along_boundaries(from)) {  // a boundary curve of three edges stays
         if (other == to) continue;
         const Around last = complex_.around(other, to);
-        if (last.count > 0 && complex_.is_rim(last)) return false;
+        if (last.count > 0 && complex_.is_boundary(last)) return false;
       }
     }
     // Neighbours that both have are corners of the triangles that vanish, and no others.
@@ -147,7 +147,7 @@ class Coarsener {
 
   [[nodiscard]] bool can_collapse(Vertex from, Vertex to, const Around& edge) const {
     if (!keeps_topology(from, to, edge)) return false;
-    if (complex_.place(from) == PatchPlace::Rim && complex_.labels(edge).count < 4 && !rim_stays(from, to, edge)) return false;
+    if (complex_.place(from) == PatchPlace::Boundary && complex_.labels(edge).count < 4 && !boundary_stays(from, to, edge)) return false;
     const double longest = 1.6 * options_.size;
     const bool tiny = (complex_.position(from) - complex_.position(to)).norm() < kTiny * options_.size;
     // No triangle may become sharper, or lean farther from the surface, than those that are there.
@@ -172,17 +172,17 @@ class Coarsener {
     return true;
   }
 
-  /// Does a rim keep its shape without a vertex?
-  [[nodiscard]] bool rim_stays(Vertex from, Vertex to, const Around& edge) const {
+  /// Does a boundary curve keep its shape without a vertex?
+  [[nodiscard]] bool boundary_stays(Vertex from, Vertex to, const Around& edge) const {
     constexpr double kTurn = 0.64;  // cosine: eight edges at least around a circle
-    const std::vector<Vertex> ends = complex_.along_rims(from);
+    const std::vector<Vertex> ends = complex_.along_boundaries(from);
     if (ends.size() != 2) return false;
     const Vertex other = ends[0] == to ? ends[1] : ends[0];
     if ((complex_.position(from) - complex_.position(to)).norm() < kTiny * options_.size) return true;
     const Vec3 &a = complex_.position(other), &b = complex_.position(to);
     const auto straight = [&](Vertex at, const Vec3& towards) {
       if (complex_.place(at) == PatchPlace::Corner) return true;
-      for (const Vertex next : complex_.along_rims(at)) {
+      for (const Vertex next : complex_.along_boundaries(at)) {
         if (next == from) continue;
         const Vec3 in = complex_.position(at) - complex_.position(next), out = towards - complex_.position(at);
         if (in.dot(out) < kTurn * in.norm() * out.norm()) return false;
@@ -208,7 +208,7 @@ void coarsen_patches(const PatchSurface& surface, const DelaunayOptions& options
   for (int round = 0; round < kMaxRounds; ++round) {
     flip_all(complex);
     const bool any = coarsener.coarsen();
-    coarsener.settle_rims();
+    coarsener.settle_boundaries();
     if (!coarsener.drop_strays() && !any) break;
   }
   flip_all(complex);

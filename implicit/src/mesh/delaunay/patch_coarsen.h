@@ -1,5 +1,5 @@
 /// @file patch_coarsen.h
-/// A PatchComplex with as few vertices as show what its patches and rims are.
+/// Reduces a PatchComplex to few vertices that still show its patches and boundary curves.
 #pragma once
 
 #include "mesh/delaunay/patch_complex.h"
@@ -8,7 +8,7 @@
 
 namespace supple::implicit {
 
-/// Takes out short edges and vertices beyond their patch or rim, and takes vertices of rims to them. Edges are Delaunay's afterwards.
+/// Takes out short edges and vertices beyond their patch or boundary curve, and takes vertices of boundary curves to them. Edges are Delaunay's afterwards.
 void coarsen_patches(const PatchSurface& surface, const DelaunayOptions& options, PatchComplex& complex);
 
 }  // namespace supple::implicit

@@ -53,8 +53,8 @@ PatchComplex::PatchComplex(std::span<const FieldView> fields, std::span<const Me
   star_.resize(position_.size());
   for (std::uint32_t t = 0; t < triangle_.size(); ++t) link(t);
   for (Vertex v = 0; v < position_.size(); ++v) {
-    const std::size_t rims = along_rims(v).size();
-    place_.push_back(rims == 0 ? PatchPlace::Interior : rims == 2 ? PatchPlace::Rim : PatchPlace::Corner);
+    const std::size_t boundaries = along_boundaries(v).size();
+    place_.push_back(boundaries == 0 ? PatchPlace::Interior : boundaries == 2 ? PatchPlace::Boundary : PatchPlace::Corner);
   }
 }
 
@@ -74,7 +74,7 @@ PatchComplex::Around PatchComplex::around(Vertex a, Vertex b) const {
   return found;
 }
 
-bool PatchComplex::is_rim(const Around& edge) const {
+bool PatchComplex::is_boundary(const Around& edge) const {
   return edge.count != 2 || !triangle_[edge.triangle[0]].same_patch(triangle_[edge.triangle[1]]);
 }
 
@@ -98,11 +98,11 @@ LabelSet PatchComplex::labels(Vertex v) const {
   return set;
 }
 
-std::vector<PatchComplex::Vertex> PatchComplex::along_rims(Vertex v) const {
+std::vector<PatchComplex::Vertex> PatchComplex::along_boundaries(Vertex v) const {
   std::vector<Vertex> ends;
   for (const std::uint32_t t : star_[v]) {
     for (const Vertex w : triangle_[t].vertex) {
-      if (w != v && std::find(ends.begin(), ends.end(), w) == ends.end() && is_rim(around(v, w))) ends.push_back(w);
+      if (w != v && std::find(ends.begin(), ends.end(), w) == ends.end() && is_boundary(around(v, w))) ends.push_back(w);
     }
   }
   std::sort(ends.begin(), ends.end());
@@ -148,7 +148,7 @@ PatchComplex::Vertex PatchComplex::split(Vertex a, Vertex b, const Vec3& at) {
   const Around edge = around(a, b);
   const auto v = static_cast<Vertex>(position_.size());
   position_.push_back(at);
-  place_.push_back(is_rim(edge) ? PatchPlace::Rim : PatchPlace::Interior);
+  place_.push_back(is_boundary(edge) ? PatchPlace::Boundary : PatchPlace::Interior);
   star_.emplace_back();
   for (const std::uint32_t t : edge.view()) {
     Triangle part = triangle_[t];

@@ -1,6 +1,6 @@
 /// @file patch_complex.h
 /// Surfaces that divide space, as triangles between two labels (0 is outside, m + 1 is body m). Triangles with the same two labels
-/// are a patch; where patches meet runs a rim. A vertex knows its triangles, so that any number of them may share an edge.
+/// are a patch; patches meet in boundary curves. Vertices list their triangles, so that any number of these may share an edge.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@
 
 namespace supple::implicit {
 
-/// Interior of a patch, of a rim, or a place where rims meet.
-enum class PatchPlace : std::uint8_t { Interior, Rim, Corner };
+/// Interior of a patch, interior of a boundary curve, or a point where boundary curves meet.
+enum class PatchPlace : std::uint8_t { Interior, Boundary, Corner };
 
 class PatchComplex {
  public:
@@ -56,21 +56,21 @@ class PatchComplex {
 
   [[nodiscard]] Around around(Vertex a, Vertex b) const;
   [[nodiscard]] bool joined(Vertex a, Vertex b) const { return around(a, b).count > 0; }
-  /// Does a rim run along an edge?
-  [[nodiscard]] bool is_rim(const Around& edge) const;
+  /// Does a boundary curve run along an edge?
+  [[nodiscard]] bool is_boundary(const Around& edge) const;
   [[nodiscard]] lattice::LabelSet labels(const Around& edge) const;
   [[nodiscard]] lattice::LabelSet labels(Vertex v) const;
-  /// The other ends of the rims at a vertex.
-  [[nodiscard]] std::vector<Vertex> along_rims(Vertex v) const;
+  /// The other ends of the boundary curves at a vertex.
+  [[nodiscard]] std::vector<Vertex> along_boundaries(Vertex v) const;
 
   void move(Vertex v, const Vec3& to) { position_[v] = to; }
   /// A vertex in the middle of a triangle. @return it
   Vertex split(std::uint32_t t, const Vec3& at);
   /// A vertex in the middle of an edge. @return it
   Vertex split(Vertex a, Vertex b, const Vec3& at);
-  /// The other diagonal of two triangles of a patch.
+  /// Flips the edge of two triangles of a patch.
   void flip(const Around& edge);
-  /// `from` goes to `to`; the triangles at the edge between them vanish.
+  /// Merges `from` into `to`; the triangles at the edge between them vanish.
   void collapse(Vertex from, Vertex to);
 
  private:

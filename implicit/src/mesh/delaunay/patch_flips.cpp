@@ -41,7 +41,7 @@ void flip_edges(PatchComplex& complex, std::vector<PatchEdge> edges, std::vector
     const auto [a, b] = edges.back();
     edges.pop_back();
     const Around edge = complex.around(a, b);
-    if (edge.count != 2 || complex.is_rim(edge) || !should_flip(complex, a, b, edge)) continue;
+    if (edge.count != 2 || complex.is_boundary(edge) || !should_flip(complex, a, b, edge)) continue;
     const Vertex c = complex.triangle(edge.triangle[0]).apex(a, b), d = complex.triangle(edge.triangle[1]).apex(a, b);
     complex.flip(edge);
     changed.insert(changed.end(), edge.view().begin(), edge.view().end());

@@ -13,7 +13,7 @@ namespace supple::implicit {
 
 using PatchEdge = std::array<PatchComplex::Vertex, 2>;
 
-/// Those edges, and those around what flips. @param changed  triangles that flipped are added
+/// Those edges, and those around flips. @param changed  flipped triangles are added
 void flip_edges(PatchComplex& complex, std::vector<PatchEdge> edges, std::vector<std::uint32_t>& changed);
 /// All edges, and those of the triangles around a vertex.
 void flip_all(PatchComplex& complex);

@@ -42,7 +42,7 @@ class Refiner {
         const auto [a, b] = encroached_.back();
         encroached_.pop_back();
         const Around edge = complex_.around(a, b);
-        if (edge.count > 0 && complex_.is_rim(edge) && is_encroached(a, b, edge)) split_rim(a, b, edge);
+        if (edge.count > 0 && complex_.is_boundary(edge) && is_encroached(a, b, edge)) split_boundary(a, b, edge);
         continue;
       }
       if (bad_.empty()) break;
@@ -70,7 +70,7 @@ class Refiner {
     return set;
   }
 
-  /// How much a triangle asks for a vertex; 0: not at all.
+  /// Priority of a triangle for a new vertex; 0: none needed.
   [[nodiscard]] double badness_of(std::uint32_t t) const {
     const PatchComplex::Triangle& triangle = complex_.triangle(t);
     const Corners corner = complex_.corners(t);
@@ -78,12 +78,12 @@ class Refiner {
     if (shape.shortest < kShortest * options_.size) return 0.0;
     if (shape.radius > options_.size) return 2.0 + shape.radius / options_.size;
     if (shape.angle < options_.angle) {
-      // Between two rims the angle is what it is.
+      // Between two boundary curves the angle is fixed.
       const std::size_t k = shape.sharpest;
       const Vertex at = triangle.vertex[k];
-      const bool corner_of_rims = complex_.is_rim(complex_.around(at, triangle.vertex[(k + 1) % 3])) &&
-                                  complex_.is_rim(complex_.around(at, triangle.vertex[(k + 2) % 3]));
-      if (!corner_of_rims) return 2.0 - shape.angle;
+      const bool corner_of_boundaries = complex_.is_boundary(complex_.around(at, triangle.vertex[(k + 1) % 3])) &&
+                                  complex_.is_boundary(complex_.around(at, triangle.vertex[(k + 2) % 3]));
+      if (!corner_of_boundaries) return 2.0 - shape.angle;
     }
     const Vec3 normal = normal_of(corner).normalized();
     const double away = surface_.distance_along(triangle, shape.centre, normal, 2.0 * options_.size);
@@ -105,7 +105,7 @@ class Refiner {
     const PatchComplex::Triangle& triangle = complex_.triangle(t);
     for (std::size_t k = 0; k < 3; ++k) {
       const Vertex a = triangle.vertex[k], b = triangle.vertex[(k + 1) % 3], c = triangle.vertex[(k + 2) % 3];
-      if (encroaches(complex_.position(c), complex_.position(a), complex_.position(b)) && complex_.is_rim(complex_.around(a, b))) {
+      if (encroaches(complex_.position(c), complex_.position(a), complex_.position(b)) && complex_.is_boundary(complex_.around(a, b))) {
         encroached_.push_back({a, b});
       }
     }
@@ -129,14 +129,14 @@ class Refiner {
   }
 
   /// @return whether it was split
-  bool split_rim(Vertex a, Vertex b, const Around& edge) {
+  bool split_boundary(Vertex a, Vertex b, const Around& edge) {
     if ((complex_.place(a) == PatchPlace::Corner) < (complex_.place(b) == PatchPlace::Corner)) std::swap(a, b);
     const Vec3 &p = complex_.position(a), &q = complex_.position(b);
     const double length = (q - p).norm();
     if (length < kShortest * options_.size) return false;
     double share = 0.5;
     if (complex_.place(a) == PatchPlace::Corner && complex_.place(b) != PatchPlace::Corner) {
-      // At a power of two from the corner, so that rims that meet at a sharp angle do not split each other for ever.
+      // At a power of two from the corner, so that boundary curves that meet at a sharp angle do not split each other for ever.
       share = std::exp2(std::round(std::log2(0.5 * length / options_.size))) * options_.size / length;
     }
     const Vec3 chord = p + share * (q - p);
@@ -165,7 +165,7 @@ class Refiner {
   struct Way {
     std::uint32_t triangle;
     Vec3 point;
-    std::optional<PatchEdge> rim;  ///< the edge where it leaves the patch
+    std::optional<PatchEdge> boundary;  ///< the edge where it leaves the patch
   };
   [[nodiscard]] Way walk(std::uint32_t t, Vec3 to) const {
     constexpr int kMost = 200;
@@ -193,7 +193,7 @@ class Refiner {
       if (exit == 3) return {t, to, std::nullopt};
       const Vertex a = v[exit], b = v[(exit + 1) % 3];
       const Around edge = complex_.around(a, b);
-      if (complex_.is_rim(edge)) return {t, to, std::array{a, b}};
+      if (complex_.is_boundary(edge)) return {t, to, std::array{a, b}};
       const Vec3 origin = c[exit], along = (c[(exit + 1) % 3] - origin).normalized();
       const Vec3 crossing = from + least * (to - from);
       const Vec3 outward = along.cross(normal);
@@ -207,18 +207,18 @@ class Refiner {
     return {t, from, std::nullopt};
   }
 
-  /// Edges of rims that a new vertex would come too near to, of the triangles of a patch whose balls hold it.
-  [[nodiscard]] std::vector<PatchEdge> rims_near(std::uint32_t first, const Vec3& p) const {
+  /// Edges of boundary curves that a new vertex would come too near to, of the triangles of a patch whose balls hold it.
+  [[nodiscard]] std::vector<PatchEdge> boundaries_near(std::uint32_t first, const Vec3& p) const {
     constexpr std::size_t kMost = 100;
     std::vector<std::uint32_t> seen{first};
-    std::vector<PatchEdge> rims;
+    std::vector<PatchEdge> boundaries;
     for (std::size_t i = 0; i < seen.size() && seen.size() < kMost; ++i) {
       const auto v = complex_.triangle(seen[i]).vertex;
       for (std::size_t k = 0; k < 3; ++k) {
         const Vertex a = v[k], b = v[(k + 1) % 3];
         const Around edge = complex_.around(a, b);
-        if (complex_.is_rim(edge)) {
-          if (encroaches(p, complex_.position(a), complex_.position(b))) rims.push_back({a, b});
+        if (complex_.is_boundary(edge)) {
+          if (encroaches(p, complex_.position(a), complex_.position(b))) boundaries.push_back({a, b});
           continue;
         }
         const std::uint32_t next = edge.triangle[0] == seen[i] ? edge.triangle[1] : edge.triangle[0];
@@ -227,7 +227,7 @@ class Refiner {
         if ((p - shape.centre).squaredNorm() < shape.radius * shape.radius * (1.0 - 1e-9)) seen.push_back(next);
       }
     }
-    return rims;
+    return boundaries;
   }
 
   void improve(const BadTriangle& bad) {
@@ -235,19 +235,19 @@ class Refiner {
     const Shape shape = shape_of(complex_.corners(t));
     if (!std::isfinite(shape.radius)) return;
     const Way way = walk(t, shape.centre);
-    std::vector<PatchEdge> rims;
+    std::vector<PatchEdge> boundaries;
     std::optional<Vec3> at;
-    if (way.rim) {
-      rims.push_back(*way.rim);
+    if (way.boundary) {
+      boundaries.push_back(*way.boundary);
     } else {
       at = surface_.settle(labels_of(complex_.triangle(t)), way.point, shape.radius);
-      rims = rims_near(way.triangle, at.value_or(way.point));
+      boundaries = boundaries_near(way.triangle, at.value_or(way.point));
     }
-    if (!rims.empty()) {
+    if (!boundaries.empty()) {
       bool any = false;
-      for (const auto& [a, b] : rims) {
+      for (const auto& [a, b] : boundaries) {
         const Around edge = complex_.around(a, b);
-        if (edge.count > 0 && complex_.is_rim(edge)) any = split_rim(a, b, edge) || any;
+        if (edge.count > 0 && complex_.is_boundary(edge)) any = split_boundary(a, b, edge) || any;
       }
       if (any && complex_.triangle(t).alive && complex_.triangle(t).version == bad.version) bad_.push(bad);
       return;
@@ -271,8 +271,8 @@ class Refiner {
       if ((c[(j + 1) % 3] - c[j]).norm() > (c[(k + 1) % 3] - c[k]).norm()) k = j;
     }
     const Around edge = complex_.around(v[k], v[(k + 1) % 3]);
-    if (complex_.is_rim(edge)) {
-      (void)split_rim(v[k], v[(k + 1) % 3], edge);
+    if (complex_.is_boundary(edge)) {
+      (void)split_boundary(v[k], v[(k + 1) % 3], edge);
       return;
     }
     const double length = (c[(k + 1) % 3] - c[k]).norm();

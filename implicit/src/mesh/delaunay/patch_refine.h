@@ -1,5 +1,5 @@
 /// @file patch_refine.h
-/// Vertices for the bad triangles of a PatchComplex: circumcentres, taken to the surface (Chew 1993), and points of the rims that these
+/// Vertices for the bad triangles of a PatchComplex: circumcentres, taken to the surface (Chew 1993), and points of the boundary curves that these
 /// would come too near to (Ruppert 1995).
 #pragma once
 
@@ -17,10 +17,10 @@ struct NearerPlace {
   double distance = 0.0;  ///< [m], in place of DelaunayOptions::distance
 };
 
-/// Adds vertices until angle, size and distance hold, but for the angle where rims meet at a sharper one.
+/// Adds vertices until angle, size and distance hold, except for sharper angles between boundary curves.
 /// @return false where edges become ever shorter
-/// @param nearer  of a triangle whose box overlaps several, the least holds
-/// @param report  what it inserts is added
+/// @param nearer  for a triangle whose box overlaps several, the least applies
+/// @param report  counts of inserted vertices are added
 /// @param estimate  for the words of a refusal
 /// @throws Error{Limit} when most_vertices do not reach the bounds
 [[nodiscard]] bool refine_patches(const PatchSurface& surface, const DelaunayOptions& options, const DelaunayEstimate& estimate,

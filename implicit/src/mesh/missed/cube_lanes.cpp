@@ -126,7 +126,7 @@ void DropSloped(const BlobList& list, float round_off, float half, CubeBatch& cu
       skew_y = hn::MulAdd(s3t, uy, skew_y);
       skew_z = hn::MulAdd(s3t, uz, skew_z);
       fourth = hn::MulAdd(s, s3t, fourth);
-      // |u.d| <= half |u|_1; of blobs that do not reach the middle only what is beyond their rim counts.
+      // |u.d| <= half |u|_1; of blobs that do not reach the middle only the part beyond their support counts.
       const V delta = hn::MulAdd(hn::Set(d, 2.0F * scale * half), sum_of_abs(ux, uy, uz),
           hn::Set(d, scale * scale * rho2));
       const V past = hn::Max(hn::Add(delta, hn::Min(rest, zero)), zero);

@@ -1,6 +1,6 @@
 /// @file cube_lanes.h
-/// What bounds tell of a sum of Wyvill points on small cubes: in single precision, a cube in each lane, as in
-/// blob_lanes.h. What they tell is certain, round-off included.
+/// Bounds of a sum of Wyvill points on small cubes: in single precision, one cube per lane, as in
+/// blob_lanes.h. The bounds include round-off.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ struct CubeBatch {
   std::vector<float> slope_x, slope_y, slope_z, bend;
   std::size_t count = 0;
 
-  /// Makes room for so many and what vectors write beyond.
+  /// Makes room for this many, and for the lanes that vectors write beyond them.
   void reserve(std::size_t cubes);
   void clear() { count = 0; }
   void add(float at_x, float at_y, float at_z) {

@@ -52,7 +52,7 @@ class BlobSearch {
       if (!found_.cell.empty()) open.push_back(found_);
     }
   }
-  /// Looked at.
+  /// Number of cubes processed.
   [[nodiscard]] std::uint64_t cubes() const { return cubes_; }
 
  private:
@@ -143,7 +143,7 @@ class BlobSearch {
         return (c >> axis & 1) == 0 ? nearest : at > nearest ? nearest + 1.0F : nearest - 1.0F;
       };
       const float dx = node(x, 0) - x, dy = node(y, 1) - y, dz = node(z, 2) - z;
-      // A little more than half a step along each axis.
+      // Slightly more than half a step along each axis.
       const float half = 0.501F / kSteps * std::max({std::abs(dx), std::abs(dy), std::abs(dz)});
       way_.clear();
       for (int k = 0; k < kSteps; ++k) {
@@ -157,7 +157,7 @@ class BlobSearch {
     return false;
   }
 
-  /// The cells that hold the parts left.
+  /// The cells of the remaining parts.
   void add_cells() {
     for (std::size_t i = 0; i < parts_.count; ++i) {
       const auto in_leaf = [](float at, int corner) {

@@ -27,9 +27,9 @@ namespace {
 using Node = std::array<std::int64_t, 3>;
 
 constexpr int kParts = kSearchParts;
-/// The smallest cubes along an edge of the finer lattice; they only tell whether something is there.
+/// The smallest cubes along an edge of the finer lattice; they only show whether a piece exists.
 constexpr int kShift = 2, kUnits = 1 << kShift;
-/// Cubes that are looked at in a cell before it counts as undecided; without bounds of second order those of three halvings.
+/// Largest number of cubes processed in a cell before it counts as undecided; without bounds of second order those of three halvings.
 constexpr int kMostCubes = 10'000, kMostByValues = 8 + 64 + 512;
 /// Smallest cubes of a cell that may stay undecided before the rest of it is given up, too.
 constexpr int kMostOpen = 64;
@@ -100,7 +100,7 @@ class Labels {
   std::vector<Label> labels_;
 };
 
-/// Looks for the extrema in a block of 8^3 cells. Cubes are measured in the smallest of them.
+/// Searches for extrema in a block of 8^3 cells. Cubes are measured in the smallest of them.
 class BlockSearch {
  public:
   BlockSearch(std::span<const Claim> claims, const Lattice& fine)
@@ -136,7 +136,7 @@ class BlockSearch {
     return {std::int64_t{kEdge} * block[0], std::int64_t{kEdge} * block[1], std::int64_t{kEdge} * block[2]};
   }
 
-  /// search_eighths of a single body, eight cubes side by side; cells that are left are looked at by all bounds.
+  /// search_eighths for a single body, eight cubes side by side; the remaining cells are processed with all bounds.
   void halve(const Node& at, int edge, std::size_t level) {
     EighthBounds& bounds = eighths_[level];
     const unsigned settled = bounds(claims_[0].field(), box_of(at, edge), candidates_[level].primitive).settled();
@@ -193,7 +193,7 @@ class BlockSearch {
     counts_->undecided += undecided_ ? 1 : 0;
   }
 
-  /// @pre bounds_ were asked for it last
+  /// @pre bounds_ were evaluated for it last
   void search_parts(const Node& at, int edge) {
     const std::array<Verdict, 8> eighth = bounds_.eighths(box_of(at, edge));
     for (unsigned c = 0; c < 8; ++c) {
@@ -287,8 +287,8 @@ class BlockSearch {
 
 enum class Flood { Closed, Joined, Known, Several, TooLarge };
 
-/// The nodes of one label that hang together with a seed: those of a body along edges, those outside across faces of cells too, as in
-/// march_cases.h. Ends at a node of the coarse lattice or of another part.
+/// The nodes of one label that are connected to a seed: those of a body along edges, those outside across faces of cells too, as in
+/// march_cases.h. Stops at a node of the coarse lattice or of another part.
 /// @param beyond  the label around them; Several where there are more  @param end  the node of the coarse lattice
 Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels,
     NodeSet& part, Label& beyond, Node& end) {
@@ -339,7 +339,7 @@ Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_
   return several ? Flood::Several : Flood::Closed;
 }
 
-/// The crossed edges around one piece, as they are asked for, and the roots of its claim's difference to that around it.
+/// The crossed edges around one piece, as they are requested, and the roots of its claim's difference to that around it.
 class PieceVertices {
  public:
   PieceVertices(const Lattice& fine, const FieldView& plus, const FieldView& minus) : fine_(fine), plus_(plus), minus_(minus) {}
@@ -471,7 +471,7 @@ Reaching find_reaching(std::span<const Claim> claims, const Lattice& lattice, st
   return found;
 }
 
-/// What the searches of blocks found.
+/// Results of the searches of blocks.
 struct BlockSeeds {
   std::vector<Seed> seeds;
   MissedPieces counts;
@@ -501,7 +501,7 @@ std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Latti
   return found;
 }
 
-/// The same for a sum of Wyvill points: what many cubes at a time leave open.
+/// The same for a sum of Wyvill points: the cubes that remain open after processing many at a time.
 std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> claims, const Lattice& lattice,
     const Lattice& fine, const Executor& executor) {
   std::uint64_t cubes = 0;
@@ -527,7 +527,7 @@ MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lat
   std::iota(all.begin(), all.end(), 0u);
   MissedPieces found;
   Labels labels(claims, fine);
-  NodeSet known;   // of parts that were looked at
+  NodeSet known;   // of parts that were processed
   NodeSet joined;  // where they met the coarse lattice
   for (const BlockSeeds& block : blocks) {
     found.undecided += block.counts.undecided;

@@ -32,7 +32,7 @@ class LabelMap {
   [[nodiscard]] bool same() const { return same_; }
   /// Bodies that stay follow each other as before.
   [[nodiscard]] bool in_order() const { return in_order_; }
-  /// kNoLabel: of a body that does not stay.
+  /// kNoLabel: of a body that is gone.
   [[nodiscard]] Label operator()(Label l) const { return l == kAnyLabel ? l : label_[l]; }
   [[nodiscard]] std::uint32_t body(std::uint32_t b) const { return b == kNoBody ? b : label_[b + 1] - 1; }
 
@@ -72,9 +72,9 @@ void relabel(const LabelMap& map, KeptBlock& kept) {
   for (BodyCount& count : kept.facets.body) count.body = map.body(count.body);
 }
 
-void relabel(const LabelMap& map, KeptRims& rims) {
-  for (Crossing& c : rims.crossing) relabel(map, c.labels);
-  for (TwiceCovered& t : rims.twice) {
+void relabel(const LabelMap& map, KeptBoundaries& boundaries) {
+  for (Crossing& c : boundaries.crossing) relabel(map, c.labels);
+  for (TwiceCovered& t : boundaries.twice) {
     for (Label* l : {&t.low, &t.high, &t.at_a, &t.at_b}) *l = map(*l);
   }
 }
@@ -102,7 +102,7 @@ bool has_vertex(std::span<const Facet> facets, const Is& is) {
 
 std::uint64_t KeptPartition::bytes() const {
   std::uint64_t sum = bytes_of(all.block) + bytes_of(all.use_end) + bytes_of(all.use) + bytes_of(all.kind) + bytes_of(all.cover) + bytes_of(all.meeting);
-  sum += bytes_of(version) + bytes_of(block) + bytes_of(rims.crossing) + bytes_of(rims.twice) + bytes_of(rims.uncovered) + bytes_of(rims.island);
+  sum += bytes_of(version) + bytes_of(block) + bytes_of(boundaries.crossing) + bytes_of(boundaries.twice) + bytes_of(boundaries.uncovered) + bytes_of(boundaries.island);
   for (const KeptBlock& kept : block) {
     const PartitionVertices& v = kept.vertices;
     sum += bytes_of(kept.candidate) + bytes_of(v.block) + bytes_of(v.use_end) + bytes_of(v.use) + bytes_of(v.kind) + bytes_of(v.cover) +
@@ -116,7 +116,7 @@ std::vector<ChangedBlock> take_blocks(KeptPartition& partition, const BlockList&
                                       std::span<const std::uint64_t> version) {
   if (lattice.cell != partition.lattice.cell || lattice.origin != partition.lattice.origin) partition = {};
   const LabelMap map(partition.version, version);
-  if (!map.in_order()) partition = {};  // who comes first decides ties
+  if (!map.in_order()) partition = {};  // the order decides ties
   std::vector<KeptBlock> last = std::exchange(partition.block, {});
   partition.lattice = lattice;
   partition.version.assign(version.begin(), version.end());
@@ -148,7 +148,7 @@ std::vector<ChangedBlock> take_blocks(KeptPartition& partition, const BlockList&
     }
   }
   while (old != last.end()) leave();
-  if (!map.same()) relabel(map, partition.rims);
+  if (!map.same()) relabel(map, partition.boundaries);
   return changed;
 }
 

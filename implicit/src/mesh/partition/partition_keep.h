@@ -1,5 +1,5 @@
 /// @file partition_keep.h
-/// What a division of space keeps for the next one: what blocks gave whose candidates are the same bodies with the same fields.
+/// Data of a division of space that are kept for the next one: results of blocks whose candidates are the same bodies with the same fields.
 #pragma once
 
 #include <cstdint>
@@ -17,21 +17,21 @@ struct KeptBlock {
   std::vector<std::uint32_t> candidate;  ///< bodies, ascending
   PartitionVertices vertices;            ///< of this block, without a LabelledBlock where no labels meet
   FacetPart facets;
-  bool made = true;                      ///< anew, in this call
+  bool made = true;                      ///< rebuilt in this call
 };
 
 struct KeptPartition {
   Lattice lattice;
   std::vector<std::uint64_t> version;  ///< of the bodies' fields
   std::vector<KeptBlock> block;        ///< in z, y, x order
-  KeptRims rims;
+  KeptBoundaries boundaries;
   std::uint32_t vertices = 0;          ///< that have numbers
   AllVertices all;                     ///< of the call, kept for its capacity
 
   [[nodiscard]] std::uint64_t bytes() const;
 };
 
-/// Where a block is new, is not what it was, or is gone.
+/// Where a block is new, changed, or gone.
 struct ChangedBlock {
   BlockCoord coord{};
   std::vector<Facet> facet;  ///< that it had

@@ -133,7 +133,7 @@ bool mark(std::span<const double> values, Crossed& block) {
   return true;
 }
 
-/// What one task needs besides its result.
+/// Buffers of one task besides its result.
 struct Workspace {
   std::array<Vec3, kBlockNodes> nodes;
   std::array<double, kBlockNodes> values{};

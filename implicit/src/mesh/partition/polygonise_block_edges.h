@@ -1,5 +1,5 @@
 /// @file polygonise_block_edges.h
-/// What both mesh paths do with one block: take a crossed edge to its root, and find a vertex of a neighbour.
+/// Common code of both mesh paths for one block: roots on crossed edges, and vertices of a neighbour.
 #pragma once
 
 #include <limits>
@@ -64,7 +64,7 @@ template <class Block, class Coord>
   return found;
 }
 
-/// A node of a closed block as the block that owns it sees it: which of the eight neighbours, and where there.
+/// A node of a closed block in the block that owns it: which of the eight neighbours, and its position there.
 struct OwnedNode {
   unsigned neighbour;
   int x, y, z;
@@ -74,7 +74,7 @@ struct OwnedNode {
         x(x0 & 7), y(y0 & 7), z(z0 & 7) {}
 };
 
-/// @throws Error{Internal}: a bound excluded a block that holds surface, so the mesh would have a hole.
+/// @throws Error{Internal}: a bound excluded a block with surface, so the mesh would have a hole.
 [[noreturn]] void throw_missing_block(const BlockCoord& block);
 /// @throws Error{Limit} when vertices cannot be numbered in 32 bits.
 void expect_indexable(std::uint64_t vertices, const Lattice& lattice);

@@ -23,17 +23,17 @@ struct BlockRange {
   [[nodiscard]] std::uint64_t count() const;
 };
 
-/// The blocks that hold the box and `margin` cells around it.
+/// The blocks that contain the box and `margin` cells around it.
 /// @throws Error{Usage} when the box is unbounded, Error{Limit} when node numbers leave 2^30.
 [[nodiscard]] BlockRange block_range(const Box& box, const Lattice& lattice, int margin);
 
 enum class Verdict : std::uint8_t {
-  Outside,  ///< nothing here, all outside
-  Inside,   ///< nothing here, all inside one body
+  Outside,  ///< no surface, all outside
+  Inside,   ///< no surface, all inside one body
   Keep,     ///< halve, or keep when it is one block
 };
 
-/// Decides on a box. `candidates` are the bodies that its parent left; those it leaves are appended to `left`.
+/// Classifies a box. `candidates` are the bodies left by its parent; those that remain are appended to `left`.
 using Decide =
     std::function<Verdict(const Box& box, std::span<const std::uint32_t> candidates, std::vector<std::uint32_t>& left)>;
 
@@ -47,15 +47,15 @@ struct BlockList {
   std::vector<BlockCoord> block;         ///< in z, y, x order
   std::vector<std::uint32_t> offset;     ///< candidates of block i are [offset[i], offset[i+1])
   std::vector<std::uint32_t> candidate;  ///< bodies, ascending
-  std::vector<BlockBox> inside;          ///< boxes that were found inside, if asked for
+  std::vector<BlockBox> inside;          ///< boxes that were found inside, if requested
 };
 
 struct RefineOptions {
   std::uint64_t limit = 0;        ///< largest number of blocks
-  std::uint64_t look_factor = 1;  ///< times that, boxes may be looked at in one level
+  std::uint64_t look_factor = 1;  ///< times that: limit of boxes processed in one level
   int last_node = kCells;         ///< a block spans nodes 0..last_node: 8 for cells, 7 for voxels
   bool keep_inside = false;       ///< fill BlockList::inside
-  std::string_view counted = "blocks of 8^3 cells";  ///< what a message counts
+  std::string_view counted = "blocks of 8^3 cells";  ///< noun of the counts in messages
   std::uint64_t per_block = 1;                       ///< how many of them a block has
 };
 

@@ -60,7 +60,7 @@ struct Junction {
 [[nodiscard]] Junction meet_inside(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels,
                                    const Vec3& start, double scale);
 
-/// The same for three labels where that fails: in a tetrahedron along the rim from where it enters, then from other places.
+/// The same for three labels where that fails: in a tetrahedron along the boundary curve from where it enters, then from other places.
 [[nodiscard]] Junction search_inside(std::span<const FieldView> fields, const Simplex& simplex, const LabelSet& labels, double scale);
 
 /// The point between `from`, where F_a >= F_b, and `to`, where F_a <= F_b, with F_a = F_b (outside has F = 0).

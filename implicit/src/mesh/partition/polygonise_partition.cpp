@@ -1,7 +1,8 @@
 // Interfaces between labels are made once, as triangles between two labels, and given to both bodies. A tetrahedron with
 // two labels is cut as for one body. With three or four labels, its faces are divided around their face points and the
 // interfaces are the cones over those segments from an interior point: faces of a subdivision of the tetrahedron, so
-// they cannot intersect. So are those of one with two labels in which these meet with two others.
+// they cannot intersect. A tetrahedron with two labels in which these interfaces meet two others is divided in
+// the same way.
 
 #include "mesh/partition/polygonise_partition.h"
 
@@ -214,7 +215,7 @@ AllVertices& join(KeptPartition& partition, bool keeps, Carried& carried, const 
     covers += block.vertices.cover.size();
   }
   expect_indexable(vertices + uses, lattice);
-  all.use_end.reserve(vertices + covers);  // those on rims follow
+  all.use_end.reserve(vertices + covers);  // those on boundary curves follow
   all.kind.reserve(vertices + covers);
   all.use.reserve(uses + 3 * covers);
   carried.number.assign(partition.vertices, kGone);
@@ -384,14 +385,14 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std:
     for (std::size_t i = begin; i < end; ++i) {
       KeptBlock& block = partition.block[to_make[i]];
       labeller.take_block(block.coord, block.candidate, block.vertices);
-      block.vertices.use.shrink_to_fit();  // most of what is kept, with facets
+      block.vertices.use.shrink_to_fit();  // most of the kept data, with facets
     }
   });
   const bool keeps = most_kept > 0 && partition.bytes() <= most_kept;
   Carried carried;
   AllVertices& all = join(partition, keeps, carried, lattice, count);
   std::vector<FacetPart> parts = join_facets(partition, changed, all, has_mesh, executor, carried);
-  cut_at_rims({fields, has_mesh, lattice, executor}, all, parts, carried, partition.rims, count);
+  cut_at_boundaries({fields, has_mesh, lattice, executor}, all, parts, carried, partition.boundaries, count);
   partition.vertices = static_cast<std::uint32_t>(all.use_end.size());
   std::vector<Mesh> meshes = write_meshes(fields.size(), all, parts, has_mesh, executor);
   auto part = parts.begin();
@@ -422,7 +423,7 @@ std::vector<Mesh> PartitionMesher::make(std::span<const FieldView> fields, std::
   SUPPLE_EXPECTS(version.size() == fields.size());
   PolygoniseCounts local;
   PolygoniseCounts& count = counts != nullptr ? *counts : local;
-  KeptPartition partition = std::exchange(impl_->kept, {});  // nothing is kept of a call that throws
+  KeptPartition partition = std::exchange(impl_->kept, {});  // no data are kept of a call that throws
   std::vector<Mesh> meshes = divide(fields, version, lattice, executor, kMostKeptBytes, partition, count);
   impl_->kept = std::move(partition);
   return meshes;

@@ -51,7 +51,7 @@ void for_all_cells(const Use& use) {
 inline constexpr Label kAnyLabel = ~Label{0};
 inline constexpr std::uint32_t kNoBody = ~std::uint32_t{0};
 
-/// A vertex as one body sees it.
+/// A vertex in the mesh of one body.
 struct VertexUse {
   std::uint32_t body = 0;
   Label other = kAnyLabel;    ///< beyond the triangles that it is meant for
@@ -60,8 +60,8 @@ struct VertexUse {
   Vec3 position = Vec3::Zero();  ///< bit-equal for all bodies of a contact; each body's own across a gap
 };
 
-/// A vertex between two or three labels where another one wins: the interfaces part there, one sheet on every side of it, and each has the
-/// vertex at a place of its own. Between them and the vertices where it does not win runs a rim.
+/// A vertex between two or three labels where another one is largest: the interfaces split there, one sheet on every side of it, and each has the
+/// vertex at its own position. Between these and the vertices where it is not largest runs a boundary curve.
 struct Cover {
   std::uint32_t vertex = 0;
   LabelSet between;             ///< those that would meet there
@@ -71,7 +71,7 @@ struct Cover {
   [[nodiscard]] bool parts(Label a, Label b) const { return between.has(a) && between.has(b); }
 };
 
-/// What meets at a junction.
+/// Labels that meet at a junction.
 struct Meeting {
   std::uint32_t vertex = 0;
   LabelSet labels;
@@ -103,7 +103,7 @@ struct PartitionVertices {
   PolygoniseCounts counts;
 };
 
-/// Finds labels and vertices of blocks; one a task.
+/// Finds labels and vertices of blocks; one per task.
 class Labeller {
  public:
   /// @param has_mesh  by body: 0 when only the others' meshes are wanted
@@ -129,10 +129,10 @@ class Labeller {
                     const LabelSet& labels, PartitionVertices& out);
   void add_junction(const LabelSet& labels, const Junction& junction, PartitionVertices& out) const;
   [[nodiscard]] Simplex simplex_of(const Cell& cell, const std::array<std::uint8_t, 4>& chain, std::uint8_t size) const;
-  /// The uses of a covered vertex: its places on the ways to its point from where each of the labels is the largest.
+  /// The uses of a covered vertex: its positions on the lines to its point from where each of the labels is the largest.
   void add_covered(const Cover& cover, std::span<const Vec3> at, PartitionVertices& out) const;
   void add_covered(const Cell& cell, std::span<const std::uint8_t> chain, const Cover& cover, PartitionVertices& out) const;
-  /// Where the labels of a simplex meet, and perhaps one more; or what covers that place.
+  /// Point where the labels of a simplex meet, and perhaps one more; or the label that covers that point.
   struct Met {
     Junction junction;
     LabelSet labels;
@@ -147,7 +147,7 @@ class Labeller {
   [[nodiscard]] Met meet_four(const Cell& cell, const Simplex& simplex, const LabelSet& labels, const Vec3& start) const;
   [[nodiscard]] std::optional<Junction> meet_with_others(const Cell& cell, const Simplex& simplex, LabelSet& labels) const;
   [[nodiscard]] std::optional<Vec3> linear_meeting(const Cell& cell, const Simplex& simplex, const LabelSet& labels) const;
-  /// Other labels that may win inside a simplex.
+  /// Other labels that may be largest inside a simplex.
   [[nodiscard]] std::vector<Label> others_near(const Cell& cell, std::span<const std::uint8_t> chain, const LabelSet& labels) const;
   [[nodiscard]] double scale_of(const LabelSet& labels) const;
   [[nodiscard]] std::optional<Label> winner_at(const LabelSet& labels, const Vec3& point) const;

@@ -13,11 +13,11 @@
 namespace supple::implicit::lattice {
 namespace {
 
-class RimCutter {
+class BoundaryCutter {
  public:
-  RimCutter(const RimFacets& facets, const RimCrossings& crossings) : facets_(facets), crossings_(crossings), pieces_(facets, crossings) {}
+  BoundaryCutter(const BoundaryFacets& facets, const BoundaryCrossings& crossings) : facets_(facets), crossings_(crossings), pieces_(facets, crossings) {}
 
-  /// Where vertices of one triangle do not tell how it is cut, covered vertices get one place: what the third label has between its sheets
+  /// Where vertices of one triangle do not decide how it is cut, covered vertices get one place: what the third label has between its sheets
   /// is closed at that vertex.
   void uncover_mixed() {
     std::vector<std::uint32_t> mixed;
@@ -32,7 +32,7 @@ class RimCutter {
     } while (!mixed.empty());
   }
 
-  /// The same where points on the edges of a facet do not tell how it is cut, where sheets on either side of a third label would cross
+  /// As above where points on the edges of a facet do not decide how it is cut, where sheets on either side of a third label would cross
   /// within a tetrahedron, and, when there are none, where more than two of a body would meet in an edge. @return whether there were any
   bool uncover_tangles() {
     std::vector<std::uint32_t> tangled;
@@ -109,7 +109,7 @@ class RimCutter {
       if (facet.inner == by || facet.outer == by) held[root(c)] = 1;
       if (facets_.covered(facet, v) == nullptr) return;
       for (const std::uint32_t w : facet.vertex) {
-        if (facets_.side(facet, w, by) == Side::Rim) hangs[root(c)] = 1;
+        if (facets_.side(facet, w, by) == Side::Boundary) hangs[root(c)] = 1;
       }
     });
     for (std::uint32_t c = 0; c < facets_.all().cover.size(); ++c) {
@@ -119,7 +119,7 @@ class RimCutter {
   }
 
   [[nodiscard]] bool is_mixed(const Facet& facet) const {
-    const RimFacets::Covering covering = facets_.covering_of(facet);
+    const BoundaryFacets::Covering covering = facets_.covering_of(facet);
     if (covering.count > 2) return true;
     std::size_t whole = 0, all_parted = 0;
     for (const std::uint32_t v : facet.vertex) {
@@ -134,14 +134,14 @@ class RimCutter {
     return false;
   }
 
-  /// Adds the vertices of facets of which more than two pieces of one body would meet in an edge between rims.
+  /// Adds the vertices of facets of which more than two pieces of one body would meet in an edge between boundary curves.
   void find_crowded(std::vector<std::uint32_t>& crowded) const {
     struct Edge {
       const VertexUse *a, *b;
       std::uint32_t facet;  ///< of `facets_.beside()`
       [[nodiscard]] auto key() const { return std::pair(a, b); }
     };
-    const auto on_rim = [&](std::uint32_t v) { return v >= crossings_.first_vertex() || facets_.all().kind[v] != VertexKind::Edge; };
+    const auto on_boundary = [&](std::uint32_t v) { return v >= crossings_.first_vertex() || facets_.all().kind[v] != VertexKind::Edge; };
     std::vector<Edge> edges;
     std::vector<Facet> pieces;
     for (std::uint32_t f = 0; f < facets_.beside().size(); ++f) {
@@ -150,7 +150,7 @@ class RimCutter {
       for (const Facet& piece : pieces) {
         for (std::size_t k = 0; k < 3; ++k) {
           const std::uint32_t a = piece.vertex[k], b = piece.vertex[(k + 1) % 3];
-          if (!on_rim(a) || !on_rim(b)) continue;
+          if (!on_boundary(a) || !on_boundary(b)) continue;
           for (const auto& [own, other] : {std::pair(piece.inner, piece.outer), std::pair(piece.outer, piece.inner)}) {
             if (!facets_.has_mesh(own)) continue;
             const VertexUse *u = &facets_.all().use_of(a, own - 1, other), *v = &facets_.all().use_of(b, own - 1, other);
@@ -190,9 +190,9 @@ class RimCutter {
     return true;
   }
 
-  const RimFacets& facets_;
-  const RimCrossings& crossings_;
-  RimPieces pieces_;
+  const BoundaryFacets& facets_;
+  const BoundaryCrossings& crossings_;
+  BoundaryPieces pieces_;
 };
 
 /// Bodies that no triangle shows at a vertex do not have it: at uncovered ones, and where a fourth body meets three in their tetrahedron.
@@ -224,8 +224,8 @@ void drop_unused(AllVertices& all, std::span<const FacetPart> parts) {
   }
 }
 
-/// Takes what was found at rims to the numbers of this call, without what is gone.
-void renumber(std::span<const std::uint32_t> number, KeptRims& kept) {
+/// Takes what was found at boundary curves to the numbers of this call, without what is gone.
+void renumber(std::span<const std::uint32_t> number, KeptBoundaries& kept) {
   const auto first = static_cast<std::uint32_t>(number.size() - kept.crossing.size());
   for (std::uint32_t i = 0; i < kept.crossing.size(); ++i) kept.crossing[i].before = first + i;
   const auto move = [&](auto& edge) {
@@ -240,7 +240,7 @@ void renumber(std::span<const std::uint32_t> number, KeptRims& kept) {
 }
 
 /// Leaves in `kept` what holds in this call.
-void leave_kept(const AllVertices& all, const Carried& carried, const RimIslands& islands, KeptRims& kept) {
+void leave_kept(const AllVertices& all, const Carried& carried, const BoundaryIslands& islands, KeptBoundaries& kept) {
   renumber(carried.number, kept);
   const auto changed = [&](const auto& edge) { return islands.changed(all.kind[edge.a] == VertexKind::Covered ? edge.a : edge.b); };
   std::erase_if(kept.crossing, changed);
@@ -249,15 +249,15 @@ void leave_kept(const AllVertices& all, const Carried& carried, const RimIslands
 }
 
 /// By part: 1 where facets are to be cut, 0 where they are those of the last call and so are their cuts.
-std::vector<std::uint8_t> find_recut(const RimFacets& facets, const Carried& carried) {
+std::vector<std::uint8_t> find_recut(const BoundaryFacets& facets, const Carried& carried) {
   std::vector<std::uint8_t> recut(facets.parts().size());
   for (std::size_t p = 0; p < recut.size(); ++p) recut[p] = carried.same[p] == 0 ? 1 : 0;
   for (const FacetPlace& place : facets.near()) recut[place.part] = 1;
   return recut;
 }
 
-/// What this call found at rims.
-void keep(const AllVertices& all, const RimCrossings& crossings, std::vector<std::uint32_t> island, KeptRims& kept) {
+/// What this call found at boundary curves.
+void keep(const AllVertices& all, const BoundaryCrossings& crossings, std::vector<std::uint32_t> island, KeptBoundaries& kept) {
   kept = {.crossing = crossings.crossings(), .twice = crossings.twice(), .uncovered = {}, .island = std::move(island)};
   for (const Cover& cover : all.cover) {
     if (all.kind[cover.vertex] == VertexKind::Uncovered) kept.uncovered.push_back(cover.vertex);
@@ -266,7 +266,7 @@ void keep(const AllVertices& all, const RimCrossings& crossings, std::vector<std
 
 }  // namespace
 
-void cut_at_rims(const CutBodies& bodies, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
+void cut_at_boundaries(const CutBodies& bodies, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptBoundaries& kept,
                  PolygoniseCounts& counts) {
   const auto& [fields, has_mesh, lattice, executor] = bodies;
   if (all.cover.empty()) {
@@ -277,13 +277,13 @@ void cut_at_rims(const CutBodies& bodies, AllVertices& all, std::span<FacetPart>
     }
     return;
   }
-  const RimIslands islands(all, carried, kept.island);
-  const RimFacets facets(fields, has_mesh, all, parts, islands);
+  const BoundaryIslands islands(all, carried, kept.island);
+  const BoundaryFacets facets(fields, has_mesh, all, parts, islands);
   leave_kept(all, carried, islands, kept);
   const std::vector<std::uint8_t> recut = find_recut(facets, carried);
   std::vector<std::uint32_t> island = islands.now(facets);
-  RimCrossings crossings(facets, lattice);
-  RimCutter cutter(facets, crossings);
+  BoundaryCrossings crossings(facets, lattice);
+  BoundaryCutter cutter(facets, crossings);
   expect_indexable(all.use.size() + 8 * all.cover.size(), lattice);
   cutter.uncover(kept.uncovered);
   cutter.uncover_mixed();

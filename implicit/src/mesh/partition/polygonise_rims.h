@@ -1,8 +1,8 @@
 /// @file polygonise_rims.h
-/// Rims inside the triangles between two labels. Where a third label wins at some vertices of a triangle and not at others, a rim
-/// passes through: the triangle is cut there, at points on the rim in the faces and tetrahedra of the lattice, and beyond them
-/// parts into one on either side of the third label. Where different labels win at its vertices it is cut for both, and where these two
-/// meet in it a wall between them stands on the cut. All of it stays in the tetrahedron of the triangle.
+/// Boundary curves inside the triangles between two labels. Where a third label is largest at some vertices of a triangle and not at others, a boundary
+/// curve passes through: the triangle is cut there, at points on the curve in the faces and tetrahedra of the lattice, and beyond them
+/// splits into one on either side of the third label. Where different labels are largest at its vertices it is cut for both, and where these two
+/// meet in it, an interface between them starts at the cut. All of it stays in the tetrahedron of the triangle.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ struct BodyCount {
 
 /// The facets of one block.
 struct FacetPart {
-  std::vector<Facet> facet;  ///< before rims cut them
+  std::vector<Facet> facet;  ///< before boundary curves cut them
   std::vector<Facet> cut;    ///< after that, where is_cut
   bool is_cut = false;
   std::vector<BodyCount> body;  ///< of `whole()`, where it is counted
@@ -66,7 +66,7 @@ struct AllVertices {
     const std::uint32_t begin = first_use(vertex);
     return std::span(use).subspan(begin, use_end[vertex] - begin);
   }
-  /// As a body sees it in triangles with `other` beyond.
+  /// The vertex of a body in triangles with `other` beyond.
   [[nodiscard]] const VertexUse& use_of(std::uint32_t vertex, std::uint32_t body, Label other) const {
     std::uint32_t u = first_use(vertex);
     while (use[u].body != body || (use[u].other != kAnyLabel && use[u].other != other)) ++u;
@@ -77,9 +77,9 @@ struct AllVertices {
 inline constexpr std::uint32_t kGone = ~std::uint32_t{0};
 inline constexpr std::uint8_t kTouched = 1, kNew = 2;
 
-/// What of the last call's work holds in this one.
+/// Results of the last call that are valid in this one.
 struct Carried {
-  std::vector<std::uint32_t> number;     ///< by vertex of the last call, those on rims behind the others: its number now, or kGone
+  std::vector<std::uint32_t> number;     ///< by vertex of the last call, those on boundary curves behind the others: its number now, or kGone
   std::vector<std::uint8_t> disturbed;   ///< by vertex: kNew, or kTouched where one of its facets is not as it was; 0: it and they are
   std::vector<std::uint8_t> same;        ///< by part, 1: its facets are those of the last call, but for `cut`
 };
@@ -90,8 +90,8 @@ inline void renumber(std::span<const std::uint32_t> number, std::span<Facet> fac
   }
 }
 
-/// What was found at rims, see rim_crossings.h.
-struct KeptRims;
+/// Results at boundary curves, see rim_crossings.h.
+struct KeptBoundaries;
 
 /// The bodies that are meshed together.
 struct CutBodies {
@@ -101,10 +101,10 @@ struct CutBodies {
   const Executor& executor;
 };
 
-/// Cuts the facets that rims cross, and adds vertices on these.
-/// @param carried  gets the numbers of vertices on rims
-/// @param kept  in: what the last call found, in its numbers; out: the same of this one
-void cut_at_rims(const CutBodies& bodies, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptRims& kept,
+/// Cuts the facets that boundary curves cross, and adds vertices on these.
+/// @param carried  gets the numbers of vertices on boundary curves
+/// @param kept  in: results of the last call, in its numbers; out: those of this one
+void cut_at_boundaries(const CutBodies& bodies, AllVertices& all, std::span<FacetPart> parts, Carried& carried, KeptBoundaries& kept,
                  PolygoniseCounts& counts);
 
 }  // namespace supple::implicit::lattice

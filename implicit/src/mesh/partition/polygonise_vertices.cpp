@@ -187,7 +187,7 @@ void Labeller::add_covered(const Cover& cover, std::span<const Vec3> at, Partiti
 void Labeller::add_covered(const Cell& cell, std::span<const std::uint8_t> chain, const Cover& cover, PartitionVertices& out) const {
   std::array<Vec3, 3> at;
   for (std::size_t k = 0; k < cover.between.count; ++k) {
-    // Where the middle of its nodes is not a body's own, one of them is.
+    // Where the centre of its nodes is in no body, one of them is.
     const Label label = cover.between.label[k];
     const Vec3 middle = middle_of(cell, chain, label);
     const auto value_at = [&](Label l) { return l == 0 ? 0.0 : fields_[l - 1].value(middle); };
@@ -210,7 +210,7 @@ Vec3 Labeller::crossing(std::size_t node_a, std::size_t node_b) const {
   return nodes_[node_a] + t * (nodes_[node_b] - nodes_[node_a]);
 }
 
-/// Where a body ends on the way from a node of its own to a point outside all bodies.
+/// Where a body ends on the line from one of its nodes to a point outside all bodies.
 Vec3 Labeller::own_root(Label label, const Vec3& inside, const Vec3& outside) const {
   return root_on_segment(fields_[label - 1], inside, outside);
 }
@@ -250,7 +250,7 @@ Vec3 Labeller::middle_of(const Cell& cell, std::span<const std::uint8_t> chain, 
   return sum / count;
 }
 
-/// The pair of labels of a simplex that a third one keeps apart on all its edges between them.
+/// The pair of labels of a simplex that a third one separates on all its edges between them.
 std::optional<Cover> Labeller::covered_pair(const Cell& cell, std::span<const std::uint8_t> chain,
                                                             const LabelSet& labels) const {
   std::optional<Cover> found;

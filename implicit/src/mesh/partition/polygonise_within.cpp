@@ -65,7 +65,7 @@ class Share {
     }
   }
   void evaluate_parts(std::span<const Vec3> points, FieldParts& parts) const { own_.evaluate_parts(points, parts); }
-  /// An upper bound alone: what others take is left out.
+  /// An upper bound: other bodies are ignored.
   [[nodiscard]] Interval bound(const Box& box) const { return {-std::numeric_limits<double>::infinity(), own_.bound(box).upper}; }
   [[nodiscard]] double gradient_bound(const Box& box) const {
     double steepest = 0.0;
@@ -173,7 +173,7 @@ struct PartitionErrorMesher::Impl {
   [[nodiscard]] std::uint64_t bytes() const {
     return std::accumulate(level.begin(), level.end(), std::uint64_t{0}, [](std::uint64_t sum, const auto& on) { return sum + on.second.bytes; });
   }
-  /// The coarsest ones take the least time to make anew.
+  /// The coarsest ones are cheapest to rebuild.
   void leave_out_coarsest() {
     while (!level.empty() && bytes() > most_kept) level.erase(level.begin());
   }

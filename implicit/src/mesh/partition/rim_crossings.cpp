@@ -20,7 +20,7 @@ std::uint32_t contact_of(const LabelSet& labels, std::uint32_t body) {
   return 0;
 }
 
-void RimCrossings::find(const Executor& executor) {
+void BoundaryCrossings::find(const Executor& executor) {
   crossing_.clear();
   twice_.clear();
   for (const FacetPlace& at : facets_.near()) {
@@ -62,7 +62,7 @@ void RimCrossings::find(const Executor& executor) {
   sort_crossings();
 }
 
-void RimCrossings::add_vertices() {
+void BoundaryCrossings::add_vertices() {
   first_ = static_cast<std::uint32_t>(facets_.all().use_end.size());
   for (const Crossing& c : crossing_) {
     add_uses(c.labels, c.found.point);
@@ -71,13 +71,13 @@ void RimCrossings::add_vertices() {
   }
 }
 
-void RimCrossings::remove_vertices() {
+void BoundaryCrossings::remove_vertices() {
   facets_.all().use_end.resize(first_);
   facets_.all().kind.resize(first_);
   facets_.all().use.resize(first_ == 0 ? 0 : facets_.all().use_end.back());
 }
 
-void RimCrossings::add_kept(const KeptRims& kept) {
+void BoundaryCrossings::add_kept(const KeptBoundaries& kept) {
   const auto merge = [](auto& into, const auto& more) {
     const auto middle = static_cast<std::ptrdiff_t>(into.size());
     into.insert(into.end(), more.begin(), more.end());
@@ -87,22 +87,22 @@ void RimCrossings::add_kept(const KeptRims& kept) {
   merge(twice_, kept.twice);
 }
 
-void RimCrossings::count(PolygoniseCounts& counts) const {
+void BoundaryCrossings::count(PolygoniseCounts& counts) const {
   for (const Crossing& c : crossing_) {
-    ++counts.rim_points;
-    if (!c.found.exact) ++counts.rim_points_moved;
+    ++counts.boundary_points;
+    if (!c.found.exact) ++counts.boundary_points_moved;
     counts.residual = std::max(counts.residual, c.found.residual);
   }
 }
 
-std::uint32_t RimCrossings::crossing_of(std::uint32_t v, std::uint32_t w, const std::array<Label, 3>& labels) const {
+std::uint32_t BoundaryCrossings::crossing_of(std::uint32_t v, std::uint32_t w, const std::array<Label, 3>& labels) const {
   const auto [a, b] = std::minmax(v, w);
   const auto at = std::lower_bound(crossing_.begin(), crossing_.end(), std::tuple(a, b, labels_of(labels).label),
                                    [](const Crossing& c, const auto& key) { return c.key() < key; });
   return first_ + static_cast<std::uint32_t>(at - crossing_.begin());
 }
 
-std::optional<std::uint32_t> RimCrossings::crossing_for_others(std::uint32_t v, std::uint32_t w, Label low, Label high) const {
+std::optional<std::uint32_t> BoundaryCrossings::crossing_for_others(std::uint32_t v, std::uint32_t w, Label low, Label high) const {
   const auto [a, b] = std::minmax(v, w);
   auto at = std::lower_bound(crossing_.begin(), crossing_.end(), std::pair(a, b), [](const Crossing& c, const auto& key) { return std::pair(c.a, c.b) < key; });
   for (; at != crossing_.end() && at->a == a && at->b == b; ++at) {
@@ -111,19 +111,19 @@ std::optional<std::uint32_t> RimCrossings::crossing_for_others(std::uint32_t v, 
   return {};
 }
 
-Crossing RimCrossings::lone_crossing(std::uint32_t a, std::uint32_t b, Label low, Label high, Label by, bool wins_at_b, const EdgePlace& at) const {
+Crossing BoundaryCrossings::lone_crossing(std::uint32_t a, std::uint32_t b, Label low, Label high, Label by, bool wins_at_b, const EdgePlace& at) const {
   const std::uint32_t from = wins_at_b ? a : b, to = wins_at_b ? b : a;
   return {.a = a, .b = b, .labels = labels_of(std::array{low, high, by}), .block = at.block, .tetrahedron = at.tetrahedron, .face = at.face,
           .minus = low == 0 ? 0 : high, .plus = by, .here = facets_.place(from, low, high), .there = facets_.place(to, low, high)};
 }
 
-Crossing RimCrossings::touching(const TwiceCovered& t, Label beside) const {
+Crossing BoundaryCrossings::touching(const TwiceCovered& t, Label beside) const {
   const auto start = [&](std::uint32_t v, Label by) { return facets_.is_wanted(by, beside) ? facets_.position(v, by, beside) : facets_.cover_of(v).point; };
   return {.a = t.a, .b = t.b, .labels = labels_of(std::array{beside, t.at_a, t.at_b}), .block = t.block, .tetrahedron = t.tetrahedron,
           .face = t.face, .minus = t.at_a, .plus = t.at_b, .here = start(t.a, t.at_a), .there = start(t.b, t.at_b)};
 }
 
-std::array<Crossing, 2> RimCrossings::look_between(TwiceCovered& t) const {
+std::array<Crossing, 2> BoundaryCrossings::look_between(TwiceCovered& t) const {
   const auto holds = [&](const Crossing& c, Label other) {
     return c.found.exact && !(facets_.value(other, c.found.point) > level(c.labels, c.found.point));
   };
@@ -142,13 +142,13 @@ std::array<Crossing, 2> RimCrossings::look_between(TwiceCovered& t) const {
   return points;
 }
 
-double RimCrossings::level(const LabelSet& labels, const Vec3& point) const {
+double BoundaryCrossings::level(const LabelSet& labels, const Vec3& point) const {
   double largest = -std::numeric_limits<double>::infinity();
   for (const Label l : labels.view()) largest = std::max(largest, facets_.value(l, point));
   return largest;
 }
 
-void RimCrossings::solve(Crossing& c) const {
+void BoundaryCrossings::solve(Crossing& c) const {
   const Simplex simplex = simplex_of(c);
   const auto lead = [&](const Vec3& p) { return facets_.value(c.plus, p) - facets_.value(c.minus, p); };
   const double before = lead(c.here), after = lead(c.there);
@@ -164,13 +164,13 @@ void RimCrossings::solve(Crossing& c) const {
   c.found = {.point = c.here + std::clamp(linear, 0.05, 0.95) * (c.there - c.here), .residual = 0.0, .exact = false};
 }
 
-void RimCrossings::sort_crossings() {
+void BoundaryCrossings::sort_crossings() {
   std::stable_sort(crossing_.begin(), crossing_.end(), [](const Crossing& x, const Crossing& y) { return x.key() < y.key(); });
   const auto same = [](const Crossing& x, const Crossing& y) { return x.key() == y.key(); };
   crossing_.erase(std::unique(crossing_.begin(), crossing_.end(), same), crossing_.end());
 }
 
-Simplex RimCrossings::simplex_of(const Crossing& c) const {
+Simplex BoundaryCrossings::simplex_of(const Crossing& c) const {
   const BlockCoord& block = facets_.all().block[c.block]->coord;
   const int cell = c.tetrahedron / 6;
   const std::int64_t x = std::int64_t{kCells} * block[0] + cell % kCells, y = std::int64_t{kCells} * block[1] + cell / kCells % kCells,
@@ -182,7 +182,7 @@ Simplex RimCrossings::simplex_of(const Crossing& c) const {
   return s;
 }
 
-void RimCrossings::add_uses(const LabelSet& labels, const Vec3& point) {
+void BoundaryCrossings::add_uses(const LabelSet& labels, const Vec3& point) {
   for (const Label label : labels.view()) {
     if (!facets_.has_mesh(label)) continue;
     facets_.all().use.push_back({.body = label - 1, .contact = contact_of(labels, label - 1),
@@ -190,7 +190,7 @@ void RimCrossings::add_uses(const LabelSet& labels, const Vec3& point) {
   }
 }
 
-TwiceCovered::Kind RimCrossings::kind_of(std::uint32_t v, std::uint32_t w, Label low, Label high) const {
+TwiceCovered::Kind BoundaryCrossings::kind_of(std::uint32_t v, std::uint32_t w, Label low, Label high) const {
   const auto [a, b] = std::minmax(v, w);
   return std::lower_bound(twice_.begin(), twice_.end(), std::tuple(a, b, low, high), [](const TwiceCovered& t, const auto& key) {
            return t.key() < key;

@@ -1,6 +1,6 @@
 /// @file rim_crossings.h
-/// Points of rims on edges of facets: between a vertex where a third label wins and one where it does not, or between two vertices
-/// where others win.
+/// Points of boundary curves on edges of facets: between a vertex where a third label is largest and one where it is not, or between two vertices
+/// where different labels are largest.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ struct Crossing {
   [[nodiscard]] auto key() const { return std::tuple(a, b, labels.label); }
 };
 
-/// An edge of facets between labels low and high with ends where two different labels win.
+/// An edge of facets between labels low and high with ends where two different labels are largest.
 struct TwiceCovered {
   enum class Kind : std::uint8_t { Unknown, Apart, Touching };  ///< Apart: low and high meet between them
   std::uint32_t a = 0, b = 0;                                   ///< its vertices, ascending
@@ -41,25 +41,25 @@ struct TwiceCovered {
   [[nodiscard]] auto key() const { return std::tuple(a, b, low, high); }
 };
 
-/// What one call leaves to the next, in the numbers of its vertices: points on rims, and covered vertices that got one place.
-struct KeptRims {
+/// Data of one call for the next, in the numbers of its vertices: points on boundary curves, and covered vertices with a single position.
+struct KeptBoundaries {
   std::vector<Crossing> crossing;     ///< with the places and labels from which they were found left as they were
   std::vector<TwiceCovered> twice;
   std::vector<std::uint32_t> uncovered;
   std::vector<std::uint32_t> island;  ///< by vertex, see rim_islands.h
 };
 
-class RimCrossings {
+class BoundaryCrossings {
  public:
-  RimCrossings(const RimFacets& facets, const Lattice& lattice) : facets_(facets), lattice_(lattice) {}
+  BoundaryCrossings(const BoundaryFacets& facets, const Lattice& lattice) : facets_(facets), lattice_(lattice) {}
 
-  /// All, anew.
+  /// Finds all crossings.
   void find(const Executor& executor);
-  /// Vertices at them behind all others, and takes these away.
+  /// Adds vertices at them after all others, and removes these.
   void add_vertices();
   void remove_vertices();
-  /// Adds what the last call found, in the numbers of this one. @pre no vertices are added
-  void add_kept(const KeptRims& kept);
+  /// Adds results of the last call, in the numbers of this one. @pre no vertices are added
+  void add_kept(const KeptBoundaries& kept);
   void count(PolygoniseCounts& counts) const;
   [[nodiscard]] const std::vector<Crossing>& crossings() const { return crossing_; }
   [[nodiscard]] const std::vector<TwiceCovered>& twice() const { return twice_; }
@@ -67,7 +67,7 @@ class RimCrossings {
   [[nodiscard]] std::uint32_t crossing_of(std::uint32_t v, std::uint32_t w, const std::array<Label, 3>& labels) const;
   /// The vertex on an edge where a third label meets two for which the edge has no end that is covered, if there is one.
   [[nodiscard]] std::optional<std::uint32_t> crossing_for_others(std::uint32_t v, std::uint32_t w, Label low, Label high) const;
-  /// What is known of an edge with ends where different labels win. @pre they do
+  /// Data of an edge with ends where different labels are largest. @pre they are
   [[nodiscard]] TwiceCovered::Kind kind_of(std::uint32_t v, std::uint32_t w, Label low, Label high) const;
   /// The first vertex that was added.
   [[nodiscard]] std::uint32_t first_vertex() const { return first_; }
@@ -78,11 +78,11 @@ class RimCrossings {
     std::uint16_t tetrahedron;
     std::uint8_t face;
   };
-  /// Where a label begins to win on the interface of two others, between vertices a and b.
+  /// The point from which a label is largest on the interface of two others, between vertices a and b.
   [[nodiscard]] Crossing lone_crossing(std::uint32_t a, std::uint32_t b, Label low, Label high, Label by, bool wins_at_b, const EdgePlace& at) const;
-  /// Where the labels that win at the ends meet on the interface with one more label, `beside`.
+  /// Where the labels that are largest at the ends meet on the interface with one more label, `beside`.
   [[nodiscard]] Crossing touching(const TwiceCovered& t, Label beside) const;
-  /// Which of the ways to part an edge is there: both of its points are exact, and none of the four labels wins there.
+  /// The kind of split of an edge: both of its points are exact, and none of the four labels is larger there.
   [[nodiscard]] std::array<Crossing, 2> look_between(TwiceCovered& t) const;
   /// The value at a point where labels meet.
   [[nodiscard]] double level(const LabelSet& labels, const Vec3& point) const;
@@ -92,7 +92,7 @@ class RimCrossings {
   [[nodiscard]] Simplex simplex_of(const Crossing& c) const;
   void add_uses(const LabelSet& labels, const Vec3& point);
 
-  const RimFacets& facets_;
+  const BoundaryFacets& facets_;
   Lattice lattice_;
   std::vector<Crossing> crossing_;   ///< by vertices and labels, ascending
   std::vector<TwiceCovered> twice_;  ///< by vertices and labels, ascending

@@ -6,15 +6,15 @@
 namespace supple::implicit::lattice {
 namespace {
 
-/// Can rims ever run along an edge of it?
-bool has_edge_of_rims(const AllVertices& all, const Facet& facet) {
+/// Can boundary curves ever run along an edge of it?
+bool has_edge_of_boundaries(const AllVertices& all, const Facet& facet) {
   return std::count_if(facet.vertex.begin(), facet.vertex.end(), [&](std::uint32_t v) { return all.kind[v] != VertexKind::Edge; }) > 1;
 }
 
 }  // namespace
 
-RimFacets::RimFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all,
-                     std::span<const FacetPart> parts, const RimIslands& islands)
+BoundaryFacets::BoundaryFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all,
+                     std::span<const FacetPart> parts, const BoundaryIslands& islands)
     : fields_(fields), has_mesh_(has_mesh), all_(all), parts_(parts), place_(all.kind.size()) {
   for (std::uint32_t c = 0; c < all.cover.size(); ++c) place_[all.cover[c].vertex] = c;
   for (std::uint32_t m = 0; m < all.meeting.size(); ++m) place_[all.meeting[m].vertex] = m;
@@ -25,17 +25,17 @@ RimFacets::RimFacets(std::span<const FieldView> fields, std::span<const std::uin
       if (!islands.changed(parts[p].facet[f])) continue;
       const bool near = is_covered(parts[p].facet[f]);
       if (near) near_.push_back(at);
-      if (near || has_edge_of_rims(all, parts[p].facet[f])) beside_.push_back(at);
+      if (near || has_edge_of_boundaries(all, parts[p].facet[f])) beside_.push_back(at);
     }
   }
 }
 
-bool RimFacets::is_covered(const Facet& facet) const {
+bool BoundaryFacets::is_covered(const Facet& facet) const {
   return std::any_of(facet.vertex.begin(), facet.vertex.end(),
                      [&](std::uint32_t v) { return all_.kind[v] == VertexKind::Covered; });
 }
 
-RimFacets::Covering RimFacets::covering_of(const Facet& facet) const {
+BoundaryFacets::Covering BoundaryFacets::covering_of(const Facet& facet) const {
   Covering covering;
   for (const std::uint32_t v : facet.vertex) {
     const Cover* cover = covered(facet, v);
@@ -45,7 +45,7 @@ RimFacets::Covering RimFacets::covering_of(const Facet& facet) const {
   return covering;
 }
 
-LabelSet RimFacets::labels_at(std::uint32_t vertex) const {
+LabelSet BoundaryFacets::labels_at(std::uint32_t vertex) const {
   switch (all_.kind[vertex]) {
     case VertexKind::Junction: return all_.meeting[place_[vertex]].labels;
     case VertexKind::Uncovered:
@@ -55,18 +55,18 @@ LabelSet RimFacets::labels_at(std::uint32_t vertex) const {
   return {};
 }
 
-Side RimFacets::side(const Facet& facet, std::uint32_t vertex, Label by) const {
+Side BoundaryFacets::side(const Facet& facet, std::uint32_t vertex, Label by) const {
   if (covered(facet, vertex) != nullptr) return Side::Covered;
   const VertexKind kind = all_.kind[vertex];
-  return (kind == VertexKind::Junction || kind == VertexKind::Uncovered) && labels_at(vertex).has(by) ? Side::Rim : Side::Here;
+  return (kind == VertexKind::Junction || kind == VertexKind::Uncovered) && labels_at(vertex).has(by) ? Side::Boundary : Side::Here;
 }
 
-const Vec3& RimFacets::position(std::uint32_t vertex, Label inner, Label outer) const {
+const Vec3& BoundaryFacets::position(std::uint32_t vertex, Label inner, Label outer) const {
   const std::uint32_t body = (has_mesh(inner) ? inner : outer) - 1;
   return all_.use_of(vertex, body, body + 1 == inner ? outer : inner).position;
 }
 
-const Vec3& RimFacets::place(std::uint32_t vertex, Label low, Label high) const {
+const Vec3& BoundaryFacets::place(std::uint32_t vertex, Label low, Label high) const {
   if (all_.kind[vertex] == VertexKind::Covered) {
     const Cover& cover = cover_of(vertex);
     if (cover.parts(low, high)) return cover.point;

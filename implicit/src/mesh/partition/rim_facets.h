@@ -1,5 +1,5 @@
 /// @file rim_facets.h
-/// What facets near rims know: which of their vertices a third label covers, and where these lie.
+/// Facets near boundary curves: which of their vertices a third label covers, and positions of these.
 #pragma once
 
 #include <array>
@@ -12,26 +12,26 @@
 
 namespace supple::implicit::lattice {
 
-/// A vertex as a facet sees it beside the label that covers others of its vertices.
-enum class Side : std::uint8_t { Here, Rim, Covered };
+/// A vertex of a facet relative to the label that covers others of its vertices.
+enum class Side : std::uint8_t { Here, Boundary, Covered };
 
 /// A facet of a part.
 struct FacetPlace {
   std::uint32_t part, facet;
 };
 
-class RimFacets {
+class BoundaryFacets {
  public:
   /// @param islands  facets of those that are kept are neither near nor beside any
-  RimFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all, std::span<const FacetPart> parts,
-            const RimIslands& islands);
+  BoundaryFacets(std::span<const FieldView> fields, std::span<const std::uint8_t> has_mesh, AllVertices& all, std::span<const FacetPart> parts,
+            const BoundaryIslands& islands);
 
   [[nodiscard]] std::span<const FieldView> fields() const { return fields_; }
   [[nodiscard]] AllVertices& all() const { return all_; }
   [[nodiscard]] std::span<const FacetPart> parts() const { return parts_; }
   /// Those with a vertex that was covered.
   [[nodiscard]] std::span<const FacetPlace> near() const { return near_; }
-  /// These, and others with an edge between rims.
+  /// These, and others with an edge between boundary curves.
   [[nodiscard]] std::span<const FacetPlace> beside() const { return beside_; }
   [[nodiscard]] const Facet& facet_at(const FacetPlace& place) const { return parts_[place.part].facet[place.facet]; }
   [[nodiscard]] bool is_covered(const Facet& facet) const;
@@ -43,20 +43,20 @@ class RimFacets {
     const Cover& cover = cover_of(vertex);
     return cover.parts(facet.inner, facet.outer) ? &cover : nullptr;
   }
-  /// The labels that win at vertices of a facet.
+  /// The labels that are largest at vertices of a facet.
   struct Covering {
     std::array<Label, 3> by{};
     std::size_t count = 0;
   };
   [[nodiscard]] Covering covering_of(const Facet& facet) const;
-  /// What meets at a vertex; nothing at one of an edge.
+  /// Labels that meet at a vertex; empty for a vertex on an edge.
   [[nodiscard]] LabelSet labels_at(std::uint32_t vertex) const;
   [[nodiscard]] Side side(const Facet& facet, std::uint32_t vertex, Label by) const;
   [[nodiscard]] bool has_mesh(Label label) const { return label != 0 && has_mesh_[label - 1] != 0; }
   /// Does a body with a mesh lie on one side?
   [[nodiscard]] bool is_wanted(Label a, Label b) const { return has_mesh(a) || has_mesh(b); }
   [[nodiscard]] const Vec3& position(std::uint32_t vertex, Label inner, Label outer) const;
-  /// Where a vertex lies between two labels, before it parts.
+  /// Position of a vertex between two labels, before it is split.
   [[nodiscard]] const Vec3& place(std::uint32_t vertex, Label low, Label high) const;
   [[nodiscard]] double value(Label label, const Vec3& point) const {
     return label == 0 ? 0.0 : fields_[label - 1].value(point);

@@ -8,7 +8,7 @@
 
 namespace supple::implicit::lattice {
 
-RimIslands::RimIslands(const AllVertices& all, const Carried& carried, std::span<const std::uint32_t> last)
+BoundaryIslands::BoundaryIslands(const AllVertices& all, const Carried& carried, std::span<const std::uint32_t> last)
     : all_(all), island_(all.kind.size()), changed_(all.kind.size(), 1), in_part_(all.block.size()) {
   std::iota(island_.begin(), island_.end(), 0u);
   std::vector<std::uint8_t> lost(last.size());  // by vertex of the last call that gives an island its number
@@ -34,7 +34,7 @@ RimIslands::RimIslands(const AllVertices& all, const Carried& carried, std::span
   for_parts_with(coords, all.block, [&](std::size_t part) { in_part_[part] = 1; });
 }
 
-std::vector<std::uint32_t> RimIslands::now(const RimFacets& facets) const {
+std::vector<std::uint32_t> BoundaryIslands::now(const BoundaryFacets& facets) const {
   std::vector<std::uint32_t> island = island_;
   const auto root = [&](std::uint32_t v) {
     while (island[v] != v) v = island[v] = island[island[v]];

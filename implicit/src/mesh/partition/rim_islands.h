@@ -1,5 +1,5 @@
 /// @file rim_islands.h
-/// Facets near rims whose cuts can depend on each other: those that share a tetrahedron or a vertex where three labels meet. What becomes
+/// Facets near boundary curves whose cuts can depend on each other: those that share a tetrahedron or a vertex where three labels meet. What becomes
 /// of such an island depends on nothing else.
 #pragma once
 
@@ -11,20 +11,20 @@
 
 namespace supple::implicit::lattice {
 
-class RimFacets;
+class BoundaryFacets;
 
-/// Which islands of the last call are not what they were.
-class RimIslands {
+/// Islands of the last call that changed.
+class BoundaryIslands {
  public:
   /// @param last  of each vertex in the last call, the number that one vertex of its island had then
-  RimIslands(const AllVertices& all, const Carried& carried, std::span<const std::uint32_t> last);
+  BoundaryIslands(const AllVertices& all, const Carried& carried, std::span<const std::uint32_t> last);
 
   [[nodiscard]] bool changed(std::uint32_t vertex) const { return changed_[vertex] != 0; }
   [[nodiscard]] bool changed(const Facet& facet) const { return changed(anchor(facet)); }
-  /// Whether facets of a part may be of a changed island.
+  /// Whether facets of a part may belong to a changed island.
   [[nodiscard]] bool any_changed(std::uint32_t part) const { return in_part_[part] != 0; }
-  /// The islands of this call, as `last` has those of that. @param facets  of changed islands
-  [[nodiscard]] std::vector<std::uint32_t> now(const RimFacets& facets) const;
+  /// The islands of this call, in the form of `last`. @param facets  of changed islands
+  [[nodiscard]] std::vector<std::uint32_t> now(const BoundaryFacets& facets) const;
 
  private:
   /// The first vertex that is not on an edge between two labels.

@@ -39,8 +39,8 @@ bool pierces(const Corners& s, const Corners& t) {
 
 }  // namespace
 
-bool RimPieces::cut(const Facet& facet, std::vector<Facet>& out) const {
-  const RimFacets::Covering covering = facets_.covering_of(facet);
+bool BoundaryPieces::cut(const Facet& facet, std::vector<Facet>& out) const {
+  const BoundaryFacets::Covering covering = facets_.covering_of(facet);
   const auto& by = covering.by;
   const auto [low, high] = std::minmax(facet.inner, facet.outer);
   std::vector<RingPoint> ring;
@@ -130,7 +130,7 @@ bool RimPieces::cut(const Facet& facet, std::vector<Facet>& out) const {
   return true;
 }
 
-bool RimPieces::cross(std::span<const Facet> facets) const {
+bool BoundaryPieces::cross(std::span<const Facet> facets) const {
   struct Sheet {
     Label label;
     Corners corners;
@@ -156,7 +156,7 @@ bool RimPieces::cross(std::span<const Facet> facets) const {
   return false;
 }
 
-void RimPieces::add(const Polygon& polygon, Label from, Label to, std::vector<Facet>& out) const {
+void BoundaryPieces::add(const Polygon& polygon, Label from, Label to, std::vector<Facet>& out) const {
   if (!facets_.is_wanted(from, to)) return;
   const std::size_t n = polygon.size();
   std::size_t best = 0;

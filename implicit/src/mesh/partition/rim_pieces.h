@@ -1,5 +1,5 @@
 /// @file rim_pieces.h
-/// Pieces of facets that rims cross.
+/// Pieces of facets that boundary curves cross.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace supple::implicit::lattice {
 
-class RimPieces {
+class BoundaryPieces {
  public:
-  RimPieces(const RimFacets& facets, const RimCrossings& crossings) : facets_(facets), crossings_(crossings) {}
+  BoundaryPieces(const BoundaryFacets& facets, const BoundaryCrossings& crossings) : facets_(facets), crossings_(crossings) {}
 
-  /// Adds the pieces of a facet. @return false where that cannot be told; `out` is then of no use
+  /// Adds the pieces of a facet. @return false where they cannot be determined; `out` is then invalid
   [[nodiscard]] bool cut(const Facet& facet, std::vector<Facet>& out) const;
-  /// Do triangles of one body cross?
+  /// Do triangles of one body intersect?
   [[nodiscard]] bool cross(std::span<const Facet> facets) const;
 
  private:
@@ -24,8 +24,8 @@ class RimPieces {
   /// The fan of a polygon whose smallest triangle is the largest, facing from one label to another.
   void add(const Polygon& polygon, Label from, Label to, std::vector<Facet>& out) const;
 
-  const RimFacets& facets_;
-  const RimCrossings& crossings_;
+  const BoundaryFacets& facets_;
+  const BoundaryCrossings& crossings_;
 };
 
 }  // namespace supple::implicit::lattice

@@ -1,5 +1,5 @@
 /// @file supple/render/colour_map.h
-/// Colours for numbers. All maps but `Turbo` change lightness evenly, so that equal steps look equal.
+/// Colour maps. All but `Turbo` change lightness evenly, so that equal steps look equal.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace supple::render {
 enum class ColourMap : std::uint8_t { Viridis, Magma, Coolwarm, Turbo, Grey };
 inline constexpr std::array<std::string_view, 5> kColourMapNames = {"viridis", "magma", "coolwarm", "turbo", "grey"};
 
-/// sRGB colour at t in [0, 1]; outside, that of the nearer end.
+/// sRGB colour at t in [0, 1]; outside, the colour of the nearer end.
 [[nodiscard]] Vec3 colour_of(ColourMap map, double t);
 
 }  // namespace supple::render

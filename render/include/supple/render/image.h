@@ -1,5 +1,5 @@
 /// @file supple/render/image.h
-/// 8-bit sRGB images and what is made of them: PNG files, contact sheets, films.
+/// 8-bit sRGB images, PNG files, contact sheets, films.
 #pragma once
 
 #include <atomic>
@@ -15,19 +15,19 @@
 
 namespace supple::render {
 
-/// RGB, 3 bytes a pixel, rows from top to bottom.
+/// RGB, 3 bytes per pixel, rows from top to bottom.
 struct Image {
   int width = 0;
   int height = 0;
   std::vector<std::uint8_t> pixels;  ///< shape [height][width][3]
 };
 
-/// Light before exposure and tone curve, for compositing; rows from top to bottom. The background is a display's picture and
-/// not in it.
+/// Linear light before exposure and tone curve, for compositing; rows from top to bottom. The background is display-referred and
+/// not included.
 struct LinearImage {
   int width = 0;
   int height = 0;
-  /// Radiance in Rec. 709 primaries, relative to that of the sky (0.93, 1.00, 1.10), times cover; and cover, in [0, 1].
+  /// Radiance in Rec. 709 primaries, relative to that of the sky (0.93, 1.00, 1.10), times coverage; and coverage, in [0, 1].
   /// Shape [height][width][4].
   std::vector<float> rgba;
 };
@@ -35,24 +35,24 @@ struct LinearImage {
 /// Writes a PNG (sRGB chunk, text chunks for `software` and, unless empty, `fingerprint`) by temporary file and rename.
 /// @throws Error{Io}
 void write_png(const std::filesystem::path& path, const Image& image, std::string_view fingerprint = {});
-/// The fingerprint that a PNG of ours carries; empty for any other file, or none. Reads its head only.
+/// The fingerprint in a PNG of `write_png`; empty for any other file, or none. Reads its header only.
 [[nodiscard]] std::string png_fingerprint(const std::filesystem::path& path);
 /// Reads an 8-bit RGB or RGBA PNG (alpha dropped). @throws Error{Io}, Error{Corrupt}
 [[nodiscard]] Image read_png(const std::filesystem::path& path);
 
 /// Averages boxes of pixels down to `width` (height in proportion), in linear light. @pre 1 <= width <= image.width
 [[nodiscard]] Image downscale(const Image& image, int width);
-/// A grid of equally sized images, `columns` a row, with `gap` pixels of white between and around.
+/// A grid of equally sized images, `columns` per row, with `gap` pixels of white between and around.
 /// @pre !images.empty(), columns >= 1, gap >= 0
 [[nodiscard]] Image contact_sheet(std::span<const Image> images, int columns, int gap);
 
-/// How far two pictures are apart, by their 8-bit sRGB values.
+/// Difference of two pictures, by their 8-bit sRGB values.
 struct ImageDifference {
   double psnr = 0.0;   ///< 10 log10(255^2 / mean squared difference) [dB]; infinite for equal pictures
-  int largest = 0;     ///< of a channel, 0 .. 255
+  int largest = 0;     ///< largest difference of a channel, 0 .. 255
   Image picture;       ///< absolute difference of each channel, times a gain
 };
-/// @pre pictures of one size, gain > 0
+/// @pre pictures of equal size, gain > 0
 [[nodiscard]] ImageDifference compare(const Image& a, const Image& b, double gain);
 
 /// The pictures of a film: folder/stem.0001.png ..., first to last.
@@ -61,22 +61,22 @@ struct FilmSource {
   std::string stem;
   int first = 1, last = 1;
   double frame_rate = 24.0;  ///< [1/s]
-  std::string note{};        ///< a word about the pictures that the film carries (printable, without semicolon)
+  std::string note{};        ///< comment about the pictures, stored in the film (printable, without semicolon)
 };
 
 /// Encodes pictures to an MP4 (H.264, yuv420p, bt709, faststart) by the ffmpeg program, in a temporary folder beside `film` that
 /// goes with it, and renames it when ffmpeg ended well. The environment variable SUPPLE_FFMPEG names another program or its
 /// path. Odd sizes are stretched to even ones. A film there that already holds the same pictures at the
-/// same rate and note (it says so in its comment) is kept. ffmpeg never outlives the call, also where the process is killed.
+/// same rate and note (stored in its comment) is kept. ffmpeg never outlives the call, also where the process is killed.
 /// @param interrupt  ends ffmpeg when set by another thread or a signal; null: never
 /// @throws Error{Io} when ffmpeg is absent (hint: the package to install; the frames are kept) or fails (its last line),
-///   Interrupted; no film is left then but one of before
+///   Interrupted; no new film is left then
 void encode_film(const FilmSource& source, const std::filesystem::path& film, const std::atomic<int>* interrupt = nullptr);
 
-/// The note of a film that `encode_film` made; nothing for any other file, or none. Reads its head only.
+/// The note of a film that `encode_film` made; nothing for any other file, or none. Reads its header only.
 [[nodiscard]] std::optional<std::string> film_note(const std::filesystem::path& film);
 
-/// Looks for the program that `encode_film` starts. @throws Error{Io} when it is absent
+/// Finds the program that `encode_film` starts. @throws Error{Io} when it is absent
 void find_film_program();
 
 }  // namespace supple::render

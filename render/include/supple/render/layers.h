@@ -1,6 +1,6 @@
 /// @file supple/render/layers.h
-/// What compositing programs want beside a picture: depth, normals, velocities and object numbers, and OpenEXR files that
-/// hold them together.
+/// Layers for compositing programs: depth, normals, velocities and object numbers, and OpenEXR files that
+/// contain them.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@
 
 namespace supple::render {
 
-/// What the ray through the middle of each pixel meets first; rows from top to bottom.
+/// First hit of the ray through the centre of each pixel; rows from top to bottom.
 struct Layers {
   int width = 0;
   int height = 0;
-  std::vector<float> depth;           ///< along the line of sight [m]; infinite where nothing is, shape [height][width]
-  std::vector<float> normal;          ///< unit, world, towards the eye's side; 0 where nothing is, shape [height][width][3]
+  std::vector<float> depth;           ///< along the line of sight [m]; infinite without a hit, shape [height][width]
+  std::vector<float> normal;          ///< unit, world, towards the eye's side; 0 without a hit, shape [height][width][3]
   std::vector<float> velocity;        ///< of the surface, by the columns velocity_x, _y, _z [m/s], shape [height][width][3]
   std::vector<std::uint32_t> object;  ///< 0: nothing, k: items[k - 1], items.size() + 1: the ground, shape [height][width]
 };
@@ -32,13 +32,13 @@ class LayerRenderer {
   [[nodiscard]] virtual Layers render(const View& view, std::span<const Item> items) = 0;
 };
 
-/// Of settings, width, height and context count. @throws as make_renderer
+/// Uses width, height and context of the settings. @throws as make_renderer
 [[nodiscard]] std::unique_ptr<LayerRenderer> make_layer_renderer(const RenderSettings& settings);
 
 /// OpenEXR, ZIP-compressed scan lines: R, G, B, A (half, scene-linear: LinearImage), N.X, N.Y, N.Z (half),
 /// velocity.X, .Y, .Z, Z (float), id (uint). The header has `objects`, the names of the numbers, `exposure`, by which
 /// pictures multiply the light before their tone curve, and `fingerprint` unless empty.
-/// @pre picture and layers of one size  @throws Error{Io}
+/// @pre picture and layers of equal size  @throws Error{Io}
 void write_exr(const std::filesystem::path& path, const LinearImage& picture, const Layers& layers,
                std::span<const std::string> objects, std::string_view fingerprint = {});
 /// The fingerprint of a file of `write_exr`; empty for any other, or none.

@@ -1,5 +1,5 @@
 /// @file supple/render/overlay.h
-/// What is written over a finished picture: text and scale bars of colour maps.
+/// Text and scale bars of colour maps over a finished picture.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
 /// @file supple/render/view.h
-/// What a picture shows, whoever draws it: camera, lights, ground, and items with their materials. Colours are sRGB in
+/// The content of a picture for all renderers: camera, lights, ground, and items with their materials. Colours are sRGB in
 /// [0, 1] and become linear light (IEC 61966-2-1) before anything is computed with them.
 #pragma once
 
@@ -23,28 +23,28 @@ struct Camera {
   Vec3 up = Vec3::UnitZ();        ///< looking along it, y is up in the picture
   double field_of_view = 0.61;    ///< vertical [rad], in (0, pi)
   double aperture = 0.0;          ///< radius of a thin lens [m]; 0: everything is sharp (path tracer)
-  double focus = 0.0;             ///< distance of what is sharp, along the line of sight [m]; 0: that of look_at
+  double focus = 0.0;             ///< distance that is sharp, along the line of sight [m]; 0: distance of look_at
 };
 
 struct Light {
-  Vec3 direction = Vec3(-0.45, 0.35, -1.0);  ///< the way the light travels
+  Vec3 direction = Vec3(-0.45, 0.35, -1.0);  ///< direction in which the light travels
   double intensity = 3.0;                    ///< irradiance over pi, relative to the radiance of the sky
 };
 
-/// A rectangle that shines on the side it faces.
+/// A rectangular light that shines on one side.
 struct AreaLight {
-  Vec3 at = Vec3::Zero();                    ///< its middle [m]
-  Vec3 facing = -Vec3::UnitZ();              ///< where it shines
+  Vec3 at = Vec3::Zero();                    ///< centre [m]
+  Vec3 facing = -Vec3::UnitZ();              ///< direction in which it shines
   Eigen::Vector2d half_sizes = {0.5, 0.5};   ///< [m]; the first is horizontal
   Vec3 colour = Vec3::Ones();                ///< sRGB
   double radiance = 5.0;                     ///< relative to that of the sky
 };
 
-/// Where the colour of an item comes from. Patterns live in object coordinates: the columns "rest_x", "rest_y", "rest_z"
-/// of the mesh [m], or world positions where it has none. They so stick to a body that moves and deforms.
+/// Source of the colour of an item. Patterns are in object coordinates: the columns "rest_x", "rest_y", "rest_z"
+/// of the mesh [m], or world positions where it has none, so they move and deform with the body.
 enum class PaintKind : std::uint8_t {
   Plain,    ///< Item::colour
-  Checker,  ///< cubes of Item::colour and Paint::colour in turn
+  Checker,  ///< cubes of Item::colour and Paint::colour, alternating
   Stripes,  ///< the same in slices across Paint::axis
   Picture,  ///< an image, projected along the three axes and mixed by the slope of the surface there
   Values,   ///< a column of the mesh through a colour map
@@ -53,13 +53,13 @@ enum class PaintKind : std::uint8_t {
 
 struct Paint {
   PaintKind kind = PaintKind::Plain;
-  Vec3 colour = Vec3(0.95, 0.95, 0.93);           ///< the second one of Checker and Stripes
+  Vec3 colour = Vec3(0.95, 0.95, 0.93);           ///< second colour of Checker and Stripes
   double size = 0.1;                              ///< edge of a cube, thickness of a slice, width of the image [m]
   Vec3 axis = Vec3::UnitX();                      ///< Stripes
   std::shared_ptr<const Image> picture = nullptr; ///< Picture
   std::string column = {};                        ///< Values; a mesh without it shows the lower end
   ColourMap map = ColourMap::Viridis;             ///< Values
-  double lower = 0.0;                             ///< Values: what the ends of the map stand for
+  double lower = 0.0;                             ///< Values: values at the ends of the map
   double upper = 1.0;
 };
 
@@ -80,10 +80,10 @@ struct Item {
   double metallic = 0.0;                     ///< 0: dielectric of index 1.5, 1: metal
   double opacity = 1.0;                      ///< (0, 1]; OpenGL: in steps of 1 / samples
   Paint paint = {};
-  bool surface = true;                       ///< false: only what `wireframe` asks for
-  double reflectance = 0.04;                 ///< of the clear coat, head on; 0: matt
-  SurfaceField field = {};                   ///< whose zero the mesh is; the path tracer meets it instead of the triangles
-  double field_reach = 0.0;                  ///< how far from its triangle the surface may be [m]
+  bool surface = true;                       ///< false: only the `wireframe` is drawn
+  double reflectance = 0.04;                 ///< of the clear coat at normal incidence; 0: matt
+  SurfaceField field = {};                   ///< field whose zero set the mesh approximates; the path tracer intersects it instead of the triangles
+  double field_reach = 0.0;                  ///< largest distance of the surface from its triangle [m]
   bool wireframe = false;                    ///< edges of the triangles, dark on a surface, in the item's colour without
 };
 
@@ -93,7 +93,7 @@ struct View {
   std::optional<Ground> ground;
   Vec3 background_top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
   Vec3 background_bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
-  std::vector<AreaLight> area_lights = {};          ///< OpenGL takes the first four
+  std::vector<AreaLight> area_lights = {};          ///< OpenGL uses the first four
 };
 
 }  // namespace supple::render

@@ -1,17 +1,17 @@
 /// @file supple/scenes/accuracy.h
-/// The key `accuracy`: one number a that every stage is set by, the error of positions over the size of the bodies. Keys that a scene gives
-/// override what it sets.
+/// The key `accuracy`: one number a, the error of positions over the size of the bodies, from which the parameters of every stage follow. Keys that a
+/// scene gives override them.
 ///
 /// | stage    | key                     | rule                                   | why                                                        |
 /// |----------|-------------------------|----------------------------------------|------------------------------------------------------------|
-/// | contact  | contact.error           | a                                      | a force that is off by a moves a bounce by about a of its way |
-/// | time     | time_step               | omega dt and v dt / length as the root of a / 1e-2 | all methods that are taken are of second order     |
-/// | friction | contact.friction_speed  | slower slips than min(1e-2, 10 a) of the pair's speed may be sticking | it errs by far less than its share, and Newton's method converges |
-/// | solver   | integrator.tolerance    | a / 1000                               | a correction that is left out is the square of the last one |
-/// | meshes   | output.meshing.error    | a of the size of the smallest object, 1e-4 at least | no picture shows less                          |
-/// | pictures | render.noise            | 10 a, in [0.01, 0.1]                   | the filter leaves about a tenth of it                      |
+/// | contact  | contact.error           | a                                      | a relative error a of a force changes a bounce by about a  |
+/// | time     | time_step               | omega dt and v dt / length as the root of a / 1e-2 | all methods that are chosen are of second order    |
+/// | friction | contact.friction_speed  | slip below min(1e-2, 10 a) of the pair's speed may count as sticking | its error is far smaller, and Newton's method converges |
+/// | solver   | integrator.tolerance    | a / 1000                               | the next correction is the square of the last one |
+/// | meshes   | output.meshing.error    | a of the size of the smallest object, 1e-4 at least | a picture shows no smaller errors              |
+/// | pictures | render.noise            | 10 a, in [0.01, 0.1]                   | the filter leaves about a tenth of the noise               |
 ///
-/// Samples only find contacts; they stay a sixth of the smallest feature apart.
+/// Samples only find contacts; their spacing stays a sixth of the smallest feature.
 #pragma once
 
 #include <string>
@@ -21,12 +21,12 @@
 
 namespace supple::scenes {
 
-/// Of the method `implicit` where a scene names no accuracy.
+/// Accuracy of the method `implicit` where a scene gives none.
 inline constexpr double kDefaultAccuracy = 1e-2;
 
-/// How far one step may go.
+/// Bounds of one time step.
 struct StepBounds {
-  double phase = 0.3;   ///< omega dt, omega the largest frequency of what a method resolves [rad]
+  double phase = 0.3;   ///< omega dt, omega the largest frequency that a method resolves [rad]
   double travel = 0.1;  ///< v dt over the smallest length [1]
 };
 
@@ -39,25 +39,25 @@ struct AccuracyRules {
   StepBounds explicit_steps, implicit_steps;
 };
 
-/// How far one stage puts particles off by the end of a run, as an estimate.
+/// Estimated error of particle positions at the end of a run that one stage causes.
 struct ErrorEstimate {
   double position = 0.0;   ///< [m]
   double share = 0.0;      ///< over the size of the object [1]
   std::string object{};    ///< where the share is largest; empty: not known
-  int frames = 0;          ///< that were made twice for it
+  int frames = 0;          ///< simulated twice for the estimate
 };
 
-/// Of the stages of a run.
+/// Estimated errors of the stages of a run.
 struct StageErrors {
   ErrorEstimate time;      ///< the difference to steps twice as long, summed over the frames of a sample and scaled to all
   ErrorEstimate contact;   ///< likewise to a tenth of contact.error; of runs with `accuracy`
-  ErrorEstimate mesh;      ///< what meshes are made to
+  ErrorEstimate mesh;      ///< the error to which meshes are made
 };
 
 /// @param accuracy  in [1e-5, 1e-2]
 [[nodiscard]] AccuracyRules accuracy_rules(double accuracy);
 
-/// Sets the keys of a scene that nothing has been read into yet.
+/// Sets the keys that follow from an accuracy. @pre no keys have been read into the scene yet
 void set_by_accuracy(double accuracy, Scene& scene);
 
 /// Limits for `core::stable_step`, which keeps to the default bounds, so that its step keeps to these.

@@ -15,7 +15,7 @@
 
 namespace supple::scenes {
 
-/// In the order of one frame. Interact to Integrate run once a step, Polygonise to Export once an output frame.
+/// In the order of one frame. Interact to Integrate run once per step, Polygonise to Export once per output frame.
 enum class Stage : std::uint8_t {
   Interact,
   PlaceSkeleton,

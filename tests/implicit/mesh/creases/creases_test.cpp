@@ -120,11 +120,11 @@ TEST(Creases, AlongAPlaneOfTheLatticeHaveNoVerticesInOnePlace) {
 /// Distance to the surface of two balls of a radius, `apart` from their middle along an axis, united.
 double distance_to_two_balls(const Vec3& p, const Vec3& axis, double radius, double apart) {
   const double along = p.dot(axis), rim = std::sqrt(radius * radius - apart * apart);
-  const double to_rim = std::hypot(along, (p - along * axis).norm() - rim);
+  const double to_boundary = std::hypot(along, (p - along * axis).norm() - rim);
   const Vec3 from = p - std::copysign(apart, along) * axis;
   // The foot on the ball of this side is on the surface where it stays on this side of the middle plane.
   const double foot = std::copysign(apart, along) + radius * from.dot(axis) / from.norm();
-  return (foot > 0.0) == (along > 0.0) ? std::min(to_rim, std::abs(from.norm() - radius)) : to_rim;
+  return (foot > 0.0) == (along > 0.0) ? std::min(to_boundary, std::abs(from.norm() - radius)) : to_boundary;
 }
 double distance_to_two_balls(const Vec3& p, double apart) { return distance_to_two_balls(p, kAxis, kRadius, apart); }
 
@@ -161,10 +161,10 @@ std::size_t edges_across(const Mesh& mesh, const Vec3& normal, double on_plane) 
 
 // Two balls that meet at the bottom of a valley with walls that lean this little from the vertical: cells bridge it a cell and more above.
 TEST(Creases, AreMetInSteepValleys) {
-  constexpr double kRim = 1.0, kCell = 0.125;
+  constexpr double kBoundary = 1.0, kCell = 0.125;
   Random random(5);
   for (const double degrees : {26.0, 22.0, 18.0, 26.0, 22.0, 18.0, 22.0, 18.0}) {
-    const double lean = degrees * std::numbers::pi / 180.0, ball = kRim / std::sin(lean), apart = kRim / std::tan(lean);
+    const double lean = degrees * std::numbers::pi / 180.0, ball = kBoundary / std::sin(lean), apart = kBoundary / std::tan(lean);
     const Vec3 axis = random.direction(), u = axis.unitOrthogonal(), v = axis.cross(u);
     Body body = body_of({{wyvill_point(ball / kRadius), apart * axis}, {wyvill_point(ball / kRadius), -apart * axis}});
     body.skeleton.blend = {.rule = BlendRule::Graph, .node = {}, .edge = {{0, 1, 0.0}}};
@@ -180,9 +180,9 @@ TEST(Creases, AreMetInSteepValleys) {
     double largest = 0.0;
     for (int i = 0; i < 1000; ++i) {
       const double angle = 2.0 * std::numbers::pi * i / 1000.0;
-      largest = std::max(largest, distance(kRim * (std::cos(angle) * u + std::sin(angle) * v)));
+      largest = std::max(largest, distance(kBoundary * (std::cos(angle) * u + std::sin(angle) * v)));
     }
-    EXPECT_LT(largest, 9.0 * kCell * kCell / (8.0 * kRim)) << degrees;  // the sagitta of a chord of three cells
+    EXPECT_LT(largest, 9.0 * kCell * kCell / (8.0 * kBoundary)) << degrees;  // the sagitta of a chord of three cells
   }
 }
 
@@ -350,7 +350,7 @@ TEST(CreasesNeverCross, TakesBackWhatCrossesStepByStep) {
   EXPECT_EQ(steps.numbers(), (std::vector<std::uint32_t>{0, 1, 2, d}));
 }
 
-// Where steps are taken back, the error is that of what is left: asked for less, finer cells follow.
+// Where steps are taken back, the error is that of the remaining mesh; a smaller given error leads to finer cells.
 TEST(CreasesNeverCross, ToAnErrorEither) {
   constexpr double kDegrees = 8.0, kCell = 0.125;
   const double apart = 1.0 / std::tan(kDegrees * std::numbers::pi / 180.0), ball = std::hypot(1.0, apart);

@@ -426,7 +426,7 @@ TEST(MarchCubes, ForgetsWhatItKeptFromAnotherBody) {
   EXPECT_EQ(mesher.make(none.field, options, Executor(1)).vertex_count(), 0u);
 }
 
-// The error asked for holds at the centroids, is not overdone, and smaller errors need more triangles.
+// The given error holds at the centroids, is not overdone, and smaller errors need more triangles.
 TEST(MarchCubes, ReachesTheErrorThatIsAskedFor) {
   const Body body = body_of({{wyvill_point(1.0), Vec3(-0.4, 0, 0)}, {wyvill_point(1.0), Vec3(0.4, 0, 0)},
                              {wyvill_point(0.5), Vec3(2.5, 0.1, 0)}});

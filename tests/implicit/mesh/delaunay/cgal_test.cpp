@@ -112,7 +112,7 @@ Primitive segment(double half_length, double radius) {
   return primitive;
 }
 
-/// Closed, with the parts of marching cubes, and all of them: within the distance asked for, twice for the cubes' own.
+/// Closed, with the parts of marching cubes, and all of them: within the given distance, twice for the cubes' own.
 void expect_whole(const Body& body, const DelaunayOptions& options, const std::string& what) {
   DelaunayReport report;
   const Mesh mesh = delaunay_mesh(body.field, options, &report);
@@ -228,7 +228,7 @@ TEST(DelaunayMesh, NamesWhatTookTooManyVerticesWhereItStops) {
                            .box = {Vec3(-0.11, -0.31, -0.3), Vec3(0.11, 0.33, 0.34)}};
   const Fault edge = fault_of(lens, {.size = 0.3, .distance = 0.002, .cell = 0.02, .most_vertices = 1000});
   EXPECT_EQ(edge.key, "mesh.angle");
-  EXPECT_TRUE(edge.found.starts_with("more, where size and distance alone ask for less than ")) << edge.found;
+  EXPECT_TRUE(edge.found.starts_with("more, where size and distance alone need less than ")) << edge.found;
 }
 
 // By evaluations of the field, not by a clock.

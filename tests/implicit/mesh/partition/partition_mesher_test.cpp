@@ -112,8 +112,8 @@ void expect_same(const PolygoniseCounts& kept, const PolygoniseCounts& fresh) {
   EXPECT_EQ(kept.residual, fresh.residual);
   EXPECT_EQ(kept.junctions, fresh.junctions);
   EXPECT_EQ(kept.junctions_moved, fresh.junctions_moved);
-  EXPECT_EQ(kept.rim_points, fresh.rim_points);
-  EXPECT_EQ(kept.rim_points_moved, fresh.rim_points_moved);
+  EXPECT_EQ(kept.boundary_points, fresh.boundary_points);
+  EXPECT_EQ(kept.boundary_points_moved, fresh.boundary_points_moved);
   EXPECT_EQ(kept.gaps, fresh.gaps);
 }
 

@@ -117,12 +117,12 @@ TEST(PolygonisePartition, MeetsTheCircleThatIsTheRimOfTwoBalls) {
         const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(cell), Executor(1), &counts);
         expect_all_closed(mesh);
         EXPECT_EQ(contact_triangles(mesh[0], 1, false), contact_triangles(mesh[1], 0, true));
-        EXPECT_GT(counts.rim_points, 0u);
-        EXPECT_LE(counts.rim_points_moved, counts.rim_points / 100);
+        EXPECT_GT(counts.boundary_points, 0u);
+        EXPECT_LE(counts.boundary_points_moved, counts.boundary_points / 100);
         EXPECT_LE(counts.junctions_moved, counts.junctions / 100);
         // Sagitta of a chord as long as the diagonal of a cell.
         const double sagitta = 3.0 * cell * cell / (8.0 * rim);
-        std::array<std::set<std::array<double, 3>>, 2> on_rim;
+        std::array<std::set<std::array<double, 3>>, 2> on_boundary;
         for (std::size_t m = 0; m < 2; ++m) {
           const supple::testing::MeshDistance distance(mesh[m], cell);
           double largest = 0.0;
@@ -136,11 +136,11 @@ TEST(PolygonisePartition, MeetsTheCircleThatIsTheRimOfTwoBalls) {
           }
           for (const Vec3& p : mesh[m].position) {
             const double along = p.dot(axis), across = (p - along * axis).norm();
-            if (std::hypot(along - place, across - rim) < 1e-9) on_rim[m].insert({p.x(), p.y(), p.z()});
+            if (std::hypot(along - place, across - rim) < 1e-9) on_boundary[m].insert({p.x(), p.y(), p.z()});
           }
         }
-        EXPECT_EQ(on_rim[0], on_rim[1]);  // bit for bit
-        EXPECT_GT(static_cast<double>(on_rim[0].size()), 2.0 * std::numbers::pi * rim / cell);  // more than one a cell
+        EXPECT_EQ(on_boundary[0], on_boundary[1]);  // bit for bit
+        EXPECT_GT(static_cast<double>(on_boundary[0].size()), 2.0 * std::numbers::pi * rim / cell);  // more than one a cell
       }
     }
   }
@@ -155,7 +155,7 @@ TEST(PolygonisePartition, FindsTheRimOfALensThatHoldsNoNode) {
   PolygoniseCounts counts;
   const std::vector<Mesh> mesh = polygonise_partition(views_of(balls), lattice_of(kCell), Executor(1), &counts);
   expect_all_closed(mesh);
-  EXPECT_GT(counts.rim_points, 0u);
+  EXPECT_GT(counts.boundary_points, 0u);
   for (std::size_t m = 0; m < 2; ++m) {
     EXPECT_EQ(self_intersections(mesh[m], kCell), 0u);
     const supple::testing::MeshDistance distance(mesh[m], kCell);
@@ -240,11 +240,11 @@ TEST(PolygonisePartition, ThreeBallsMeetAtTheirRims) {
 double distance_to_half(const Vec3& p, const Vec3& axis, double apart, double radius) {
   const double along = p.dot(axis), across = (p - along * axis).norm(), rim = std::sqrt(radius * radius - apart * apart);
   const Vec3 from = p - apart * axis;
-  const double to_rim = std::hypot(along, across - rim);
+  const double to_boundary = std::hypot(along, across - rim);
   // The foot on the ball lies on the cap where it is on this side of the plane.
   const bool on_cap = apart + radius * from.dot(axis) / from.norm() >= 0.0;
-  const double to_cap = on_cap ? std::abs(from.norm() - radius) : to_rim;
-  return std::min(to_cap, across <= rim ? std::abs(along) : to_rim);
+  const double to_cap = on_cap ? std::abs(from.norm() - radius) : to_boundary;
+  return std::min(to_cap, across <= rim ? std::abs(along) : to_boundary);
 }
 
 // Meshes to a stated error, where bodies touch: both ways, and with the contact shared bit for bit.

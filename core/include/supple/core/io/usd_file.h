@@ -39,7 +39,7 @@ class UsdAnimation {
   UsdAnimation(const UsdAnimation&) = delete;
   UsdAnimation& operator=(const UsdAnimation&) = delete;
 
-  /// @param meshes   by object, with one normal a vertex; an empty one is not there in this frame
+  /// @param meshes   by object, with one normal per vertex; an empty one is absent in this frame
   /// @param cameras  the same cameras in every frame
   /// @pre frames ascend  @throws Error{Io}
   void add_frame(int frame, std::span<const Mesh* const> meshes, std::span<const UsdCamera> cameras = {});

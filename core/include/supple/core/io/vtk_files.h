@@ -31,7 +31,7 @@ struct PointSet {
   std::vector<double>& add(std::string name, std::vector<std::string> component = {});
 };
 
-/// VTK PolyData in XML: each point a vertex, and the lines. Arrays are appended raw with 64 bits a number, so they are
+/// VTK PolyData in XML: each point a vertex, and the lines. Arrays are appended raw with 64 bits per number, so they are
 /// those of the state. @throws Error{Io}
 void write_vtp(const std::filesystem::path& path, const PointSet& points);
 
