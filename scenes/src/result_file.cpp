@@ -8,6 +8,7 @@
 #include "contact_work.h"
 #include "fields_rules.h"
 #include "search_files.h"
+#include "spare_memory.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 
@@ -41,6 +42,7 @@ ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 }  // namespace
 
 void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken) {
+  const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["scene"] = scene_name(scene);
   json["title"] = scene.title;
