@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <new>
+#include <numeric>
 #include <sstream>
 
 #include "grid_leaves.h"
