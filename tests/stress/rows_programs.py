@@ -62,11 +62,12 @@ SOAK_FRAMES = 100
 
 
 def resident(process):
+    """Memory of its own [kB]: pages of the program itself come and go with what else the machine does."""
     try:
         text = pathlib.Path(f"/proc/{process.pid}/status").read_text()
     except OSError:
         return 0
-    found = re.search(r"VmRSS:\s+(\d+)", text)
+    found = re.search(r"RssAnon:\s+(\d+)", text)
     return int(found.group(1)) if found else 0
 
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <new>
 #include <numeric>
 #include <sstream>
 
@@ -56,7 +57,12 @@ class MemoryArchive : public openvdb::io::Archive {
  public:
   [[nodiscard]] std::string bytes(const openvdb::GridCPtrVec& grids) const {
     std::ostringstream stream(std::ios_base::binary);
-    write(stream, grids, true);
+    stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);  // streams keep what they could not allocate to themselves
+    try {
+      write(stream, grids, true);
+    } catch (const std::ios_base::failure&) {  // in memory nothing else fails
+      throw std::bad_alloc();
+    }
     return std::move(stream).str();
   }
 };

@@ -8,6 +8,7 @@
 
 #include "file/fields_rules.h"
 #include "output/search_files.h"
+#include "output/spare_memory.h"
 #include "simulation/contact_work.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -63,6 +64,7 @@ ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 }  // namespace
 
 void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken) {
+  const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["scene"] = scene_name(scene);
   json["title"] = scene.title;

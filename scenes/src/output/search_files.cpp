@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "output/output_files.h"
+#include "output/spare_memory.h"
 #include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
@@ -53,6 +54,7 @@ SearchCounts read_counts(const fs::path& path) {
   if (!fs::exists(path)) return {};
   const std::vector<std::byte> text = io::read_file(path, kLargestFile);
   const char* begin = reinterpret_cast<const char*>(text.data());
+  const SpareMemory spare(kSpareForJson);
   const ordered_json json = ordered_json::parse(begin, begin + text.size(), nullptr, false);
   return json.is_object() ? searches_of(json) : SearchCounts{};
 }
@@ -82,6 +84,7 @@ void write_searches(const fs::path& folder, const std::string& name, int frame, 
     return;
   }
   io::make_writable_folder(path.parent_path());
+  const SpareMemory spare(kSpareForJson);
   io::write_atomically(path, std::string_view(json_of(counts).dump() + "\n"));
 }
 

@@ -10,6 +10,7 @@
 #include "model/warnings.h"
 #include "output/search_choice.h"
 #include "output/search_files.h"
+#include "output/spare_memory.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -67,6 +68,7 @@ std::string text(const ordered_json& json) { return json.dump(2, ' ', false, ord
 
 std::string query_forces(Simulation& simulation) {
   const Model& model = simulation.model();
+  const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["time_s"] = simulation.time();
   ordered_json objects = ordered_json::array();
@@ -89,6 +91,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
     cpu_s = std::min(cpu_s, process_cpu_seconds() - begin);
   }
   const collision::ContactSurface& surface = simulation.contacts();
+  const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["time_s"] = simulation.time();
   json["cpu_us"] = 1e6 * cpu_s;
@@ -136,6 +139,7 @@ std::string query_field(Simulation& simulation, const fs::path& points) {
   const std::vector<Vec3> at = io::read_points_csv(points);
   const std::vector<Body>& bodies = simulation.bodies();
   const std::vector<implicit::Field>& fields = simulation.fields();
+  const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["time_s"] = simulation.time();
   json["convention"] = "value > 0 inside; the outward normal is -gradient / |gradient|";
@@ -171,6 +175,7 @@ std::string query_mesh(Simulation& simulation, const MeshQuery& query) {
   const double begin = process_cpu_seconds();
   const std::vector<Mesh>& meshes = simulation.meshes();
   const double cpu_ms = 1e3 * (process_cpu_seconds() - begin);
+  const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["cpu_ms"] = cpu_ms;
   ordered_json objects = ordered_json::array();

@@ -130,6 +130,19 @@ TEST(Check, CountsWhatItDoesNotBuild) {
   EXPECT_FALSE(check_scene(small, {}, 1e3).built);
 }
 
+TEST(Check, CountsBodiesThatBeginInOneAnotherByTheDozen) {
+  const auto balls = [](const std::string& spacing) {
+    return scene_of("    particles: {arrange: grid, columns: 5, rows: 5, layers: 4, spacing: " + spacing + "}\n    separate: true\n" +
+                    "    skeleton: [{shape: point, kernel: {type: gascuel, radius: 0.075, thickness: 0.05, slope: 10}}]\n    contact: {}\n");
+  };
+  const CheckReport crowd = check_scene(balls("1e-9"), {});
+  EXPECT_FALSE(crowd.built);
+  ASSERT_EQ(crowd.warnings.size(), 1U);
+  EXPECT_EQ(crowd.warnings[0].rfind("objects.a.particles: the scene was counted, not built: about 4950 pairs of bodies begin in one another, each with about 99 others", 0), 0U)
+      << crowd.warnings[0];
+  EXPECT_TRUE(check_scene(balls("0.099"), {}).built);  // as balls that touch
+}
+
 TEST(Bytes, AreReadAndShown) {
   EXPECT_EQ(parse_bytes("4G"), 4e9);
   EXPECT_EQ(parse_bytes("1.5 GB"), 1.5e9);
