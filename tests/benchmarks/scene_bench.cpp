@@ -135,6 +135,9 @@ void bench(const Case& c, const Settings& settings) {
   const std::size_t last = std::max<std::size_t>(compared, 1) - 1;
   double scale = 0.0;
   for (const Vec3& impulse : reference.impulse) scale = std::max(scale, impulse.norm());
+  double weight = 0.0;  // what an impulse is compared with at least [N s]: a millionth of all masses at a speed of 1 m/s
+  for (const double mass : model.particles.mass) weight += mass;
+  scale = std::max(scale, 1e-6 * weight);
   const double impulse = scale > 0.0 ? (motion.impulse[last] - reference.impulse[last]).norm() / scale : 0.0;
   std::printf("{\"scene\": \"%.*s\", \"accuracy\": %g, \"cpu_s_per_s\": %.4g, \"steps\": %llu, \"largest_error\": %.3g, \"rms_error\": %.3g, "
               "\"impulse_error\": %.3g, \"compared_s\": %.4g, \"of_s\": %.4g, \"contact_share\": %.3g, \"method\": \"%s\"}\n",

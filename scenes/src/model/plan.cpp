@@ -213,17 +213,28 @@ class StepCounts {
   [[nodiscard]] double of(double frequency, const StepBounds& bounds) const {
     return of_step(core::stable_step(scaled(step_limits(scene_, model_, frequency, speeds_), bounds)));
   }
-  /// Explicit steps blur friction below a speed v of about mu a dt, a the acceleration by which contact stops a body; what v adds up to over
-  /// the scene is to stay within the accuracy.
+  /// What implicit steps of an accuracy must follow: contacts, and the slowest waves through an object, of about half the frequency
+  /// pair_frequency x length / size. What is faster hardly moves the object.
+  [[nodiscard]] double resolved(double pair_frequency) const {
+    double frequency = model_.contact_frequency;
+    for (const ObjectModel& object : model_.objects) {
+      if (object.separate || object.last - object.first < 2) continue;
+      frequency = std::max(frequency, 0.5 * pair_frequency * model_.smallest_length / size_of(object));
+    }
+    return frequency;
+  }
+  /// Explicit steps blur friction below a speed v of about mu a dt, a the acceleration by which contact stops a body, but for springs that hold; a part
+  /// of what v adds up to over the scene, as measured, is to stay within the accuracy.
   [[nodiscard]] double to_resolve_friction(double accuracy) const {
+    constexpr double kPart = 0.25;
     const double friction = largest_friction(model_);
-    if (friction == 0.0) return 1.0;
+    if (friction == 0.0 || model_.reaction.stick.stiffness > 0.0) return 1.0;
     double size = std::numeric_limits<double>::infinity();
     for (const ObjectModel& object : model_.objects) {
       if (object.collides) size = std::min(size, size_of(object));
     }
     const double gravity = scene_.gravity.norm(), speed = std::max(speeds_.linear, std::sqrt(gravity * size));
-    const double blur = friction * (gravity + model_.contact_frequency * speed);  // of v, by dt [m/s^2]
+    const double blur = kPart * friction * (gravity + model_.contact_frequency * speed);  // of v, by dt [m/s^2]
     return of_step(blur > 0.0 ? accuracy * size / (blur * scene_.duration) : frame_);
   }
 
@@ -268,12 +279,14 @@ void choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts
   const AccuracyRules rules = accuracy_rules(accuracy);
   const double stable = counts.of(std::hypot(plan.pair_frequency, model.contact_frequency), rules.explicit_steps);
   const double friction = counts.to_resolve_friction(accuracy), explicit_steps = std::max(stable, friction);
-  const double implicit_steps = counts.of(model.contact_frequency, rules.implicit_steps);
-  const bool implicit = suits_implicit(model) && explicit_steps > kImplicitStepCost * implicit_steps;
+  const double implicit_steps = counts.of(counts.resolved(plan.pair_frequency), rules.implicit_steps);
+  // Where no friction limits explicit steps, what does are vibrations, whose phase implicit ones would lose: they must be far stiffer than all else.
+  const int cost = friction > stable ? kImplicitStepCost : kImplicitCost;
+  const bool implicit = suits_implicit(model) && explicit_steps > cost * implicit_steps;
   plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;
   plan.reason = std::string(implicit ? "implicit_midpoint" : "symplectic") + ": accuracy " + number_text(accuracy) + " takes " +
                 number_text(implicit_steps) + " implicit steps per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
-                (friction > stable ? ", to resolve friction" : "") + "; an implicit step costs as much as " + std::to_string(kImplicitStepCost);
+                (friction > stable ? ", to resolve friction" : "") + "; an implicit step costs as much as " + std::to_string(cost);
 }
 
 /// The method `implicit`.
@@ -286,7 +299,7 @@ void take_implicit(const Scene& scene, const Model& model, const StepCounts& cou
     return;
   }
   plan.settings.method = core::Integrator::ImplicitMidpoint;
-  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : number_text(counts.of(model.contact_frequency, plan.bounds)) + " steps per frame") +
+  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : number_text(counts.of(counts.resolved(plan.pair_frequency), plan.bounds)) + " steps per frame") +
                 " resolve contact";
 }
 
@@ -296,7 +309,8 @@ void set_limits(const Scene& scene, const Model& model, const StepCounts& counts
   const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
   const double by_accuracy = scene.accuracy ? accuracy_rules(*scene.accuracy).tolerance : 1e-9;
   plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? by_accuracy : 1e-6);
-  plan.limiting_frequency = !implicit ? all : plan.chosen ? model.contact_frequency : 0.0;
+  const bool resolves = scene.accuracy || scene.integrator.method == MethodName::Implicit;
+  plan.limiting_frequency = !implicit ? all : !plan.chosen ? 0.0 : resolves ? counts.resolved(plan.pair_frequency) : model.contact_frequency;
   if (!implicit && scene.accuracy && plan.chosen) {
     const double steps = counts.to_resolve_friction(*scene.accuracy);
     if (std::isfinite(steps)) plan.limiting_frequency = std::max(all, plan.bounds.phase * steps / counts.frame());

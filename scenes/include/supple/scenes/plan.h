@@ -94,7 +94,8 @@ struct IntegratorPlan {
 /// `auto` chooses velocity Verlet unless a frame needs more of its steps than `time_step.max_substeps`, or more by
 /// kImplicitCost than of backward Euler at its own limits: a count of steps, never a clock.
 /// With `accuracy` it chooses velocity Verlet or implicit midpoint, whichever reaches it at less cost, a step of the latter counted as
-/// kImplicitStepCost of the former, whose steps must resolve friction, too: they blur it below a speed that grows with the step. The method
+/// kImplicitStepCost of the former where its steps must be short to resolve friction, which they blur below a speed that grows with the step,
+/// and otherwise as kImplicitCost. The method
 /// `implicit` is implicit midpoint in steps that resolve contact: of second order, it needs an eighth of the steps of backward Euler for the
 /// same error. Where the scene fixes steps that are longer than contacts last, it is backward Euler, which is stable there.
 [[nodiscard]] IntegratorPlan plan_integrator(const Scene& scene, const Model& model);
