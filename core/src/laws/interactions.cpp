@@ -206,7 +206,7 @@ void gather(const Executor& executor, InteractionWorkspace::Impl& work) {
       }
     }
   };
-  executor.for_blocks(work.sum.size(), kParticleBlock, std::ref(body));
+  executor.for_blocks(work.gather_start.size() - 1, kParticleBlock, std::ref(body));
 }
 
 void accumulate_bonds(const Executor& executor, InteractionWorkspace::Impl& work) {

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <vector>
 
 #include "core/support.h"
 #include "supple/core/error.h"
@@ -277,6 +280,31 @@ TEST(Interactions, HaveTheSameBitsForEveryNumberOfThreads) {
   const std::uint64_t one = hash_of(evaluate_loads(crowd.p, crowd.interactions, Executor(1)));
   for (const int threads : {2, 3, 8}) {
     EXPECT_EQ(hash_of(evaluate_loads(crowd.p, crowd.interactions, Executor(threads))), one) << threads;
+  }
+}
+
+TEST(Interactions, OfOneLawAloneHaveTheSameBitsForEveryNumberOfThreads) {
+  const Crowd crowd = make_crowd(3000, 37);
+  const Interactions& all = crowd.interactions;
+  std::vector<Interactions> alone(4);
+  alone[0].bond_frame = all.bond_frame;  // bonds in runs
+  alone[1].coplanarity = all.coplanarity;
+  alone[2].repulsion = all.repulsion;    // found among neighbours
+  alone[3].cohesion = all.cohesion;      // bonds in a list
+  std::mt19937 shuffle(38);
+  std::shuffle(alone[3].cohesion[0].second.begin(), alone[3].cohesion[0].second.end(), shuffle);
+  BondedLaw<Cohesion>& bonds = alone[3].cohesion[0];
+  for (std::size_t k = bonds.law.size(); k-- > 0;) {
+    if (bonds.first[k] > bonds.second[k]) std::swap(bonds.first[k], bonds.second[k]);
+    if (bonds.first[k] != bonds.second[k]) continue;
+    bonds.first.erase(bonds.first.begin() + static_cast<std::ptrdiff_t>(k));
+    bonds.second.erase(bonds.second.begin() + static_cast<std::ptrdiff_t>(k));
+    bonds.law.erase(bonds.law.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  for (const Interactions& one : alone) {
+    const Evaluated expected = evaluate_loads(crowd.p, one, Executor(1));
+    EXPECT_GT(expected.internal.force[1500].norm() + expected.internal.force[1501].norm(), 0.0);
+    for (const int threads : {2, 3, 8}) EXPECT_EQ(hash_of(evaluate_loads(crowd.p, one, Executor(threads))), hash_of(expected)) << threads;
   }
 }
 
