@@ -13,9 +13,9 @@
 
 namespace supple::core {
 
-/// How an implicit rule sees a step: the pose it solves for lies h after the start, and velocities at the end of the step are
+/// A step of an implicit rule: the pose it solves for lies h after the start, and velocities at the end of the step are
 /// `end_factor` u / h - (end_factor - 1) v, u the displacement until that pose and v the velocity at the start. Friction acts against the
-/// velocity of which `slip_factor` says the same.
+/// velocity with `slip_factor` in place of `end_factor`.
 struct StepRule {
   double h = 0.0;           ///< [s]
   double end_factor = 1.0;  ///< 1: backward Euler; 2: implicit midpoint

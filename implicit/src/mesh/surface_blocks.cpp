@@ -147,7 +147,7 @@ class Refinement {
   LevelPart& found() { return found_; }
 
  private:
-  /// Refuses at once what is far too much, by samples of a level whose cubes were looked at; their spread tells how good they are.
+  /// Refuses counts far above the limit early, by samples of a level whose cubes were processed; their spread measures their quality.
   void expect_not_far_too_many(const LevelPart& level, int size) const {
     const std::size_t stride = odd(level.cube.size() / kSampled + 1);
     double sum = 0.0, squares = 0.0;

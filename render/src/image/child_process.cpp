@@ -47,7 +47,7 @@ struct Start {
   pid_t parent;
   int null, messages, failure;
   const sigset_t* signals;
-  int life, own_life;  ///< read and write end of a pipe that nobody writes into: it ends with us
+  int life, own_life;  ///< read and write end of a pipe without data: it closes when this process ends
 };
 
 /// Comes back where that fails, with errno.

@@ -14,7 +14,7 @@ namespace {
 /// Equal balls that touch have twelve neighbours at most; pairs times neighbours take about a tenth of a millisecond each.
 constexpr double kOrdinary = 16.0, kMostCuts = 5000.0;
 
-/// Below this distance surfaces of the object's bodies overlap: those of usual kernels reach half as far as their support at least.
+/// Below this distance surfaces of the object's bodies overlap: surfaces of the usual kernels reach at least half as far as the support.
 double reach_of(const ObjectDesc& d) {
   double reach = std::numeric_limits<double>::infinity();
   for (const SkeletonDesc& s : d.skeleton) reach = std::min(reach, s.kernel.radius);

@@ -242,7 +242,7 @@ void stop_pinned(Model& model) {
   }
 }
 
-/// Of meshes by `accuracy`; none where a cell or another way to the mesh is asked for.
+/// Error of meshes that follows from `accuracy`; none where the scene gives a cell, a pixel error or another mesher.
 std::optional<double> error_by_accuracy(const Scene& scene, const ObjectModel& object) {
   const MeshingName method = scene.output.meshing.method;
   const bool cubes = method == MeshingName::Auto || method == MeshingName::Cubes;

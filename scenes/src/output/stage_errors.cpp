@@ -9,11 +9,11 @@
 namespace supple::scenes {
 namespace {
 
-constexpr std::array<int, 2> kEvery{16, 6};  // of the frames in which nothing touches, and of the others, one in so many is made again
-constexpr double kFinerContact = 0.1;       // of the error of contact
-constexpr double kFinestContact = 1e-10;    // that contact.error may ask for
+constexpr std::array<int, 2> kEvery{16, 6};  // one in so many frames is simulated again: of those without contact, and of those with contact
+constexpr double kFinerContact = 0.1;       // times contact.error
+constexpr double kFinestContact = 1e-10;    // smallest contact.error
 
-/// Of contact, in all steps so far.
+/// Contact points of all steps so far.
 std::uint64_t points_of(const Simulation& simulation) { return simulation.profile()[static_cast<std::size_t>(Stage::React)].visited; }
 
 double thread_cpu_seconds() {
@@ -22,8 +22,8 @@ double thread_cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// What two ways to a frame come to by the end of the run: the largest difference of positions, and the drift of the object as a whole that its velocity
-/// has from there on, as if nothing held it.
+/// Difference at the end of the run of two simulations of a frame: the largest difference of positions, plus the drift of the object as a whole by the
+/// difference of its velocity, as if it moved freely from there on.
 double difference(const ObjectModel& object, const core::ParticleState& a, const core::ParticleState& b, double left) {
   double farthest = 0.0;
   Vec3 drift = Vec3::Zero();
@@ -75,7 +75,7 @@ void StageErrorEstimator::compare(const Simulation& simulation, int finer, doubl
     variant.simulation->restore(*before_);
     variant.simulation->step_frame();
   } catch (const Error&) {
-    return;  // steps that are too long for this frame tell nothing of its error
+    return;  // steps that are too long for this frame give no estimate
   }
   const double left = (last_frame_ - simulation.frame()) / scene_.frame_rate;
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
@@ -84,7 +84,7 @@ void StageErrorEstimator::compare(const Simulation& simulation, int finer, doubl
   ++variant.frames[kind_];
 }
 
-/// Sums are scaled from the frames made again to all of their kind.
+/// Sums are scaled from the frames that were simulated again to all frames of their kind.
 ErrorEstimate StageErrorEstimator::estimate_of(std::initializer_list<const Variant*> variants, const Model& model) const {
   ErrorEstimate out;
   std::vector<double> position(model.objects.size(), 0.0);

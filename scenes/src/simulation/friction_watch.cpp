@@ -5,7 +5,7 @@
 namespace supple::scenes {
 namespace {
 
-/// Inverse mass that a force at `centre` meets on a body [1/kg].
+/// Effective inverse mass of a body for a force at `centre` [1/kg].
 double yield_at(const collision::ContactBody& body, const Vec3& centre) {
   if (body.yield.empty()) return 0.0;
   const auto of_part = [&](std::size_t k) {
@@ -34,7 +34,7 @@ void FrictionWatch::note(const StageContext& context, const collision::BodyPair&
 void FrictionWatch::look(const StageContext& context, const Frame& frame) {
   const collision::ReactionSettings& settings = context.model.reaction;
   if (!(context.step > 0.0) || settings.stick.stiffness > 0.0) return;
-  constexpr double kPerLoad = 2.0 / 1.6;  // as in react.h: slope of the mollifier over what a step may take of a slip
+  constexpr double kPerLoad = 2.0 / 1.6;  // as in react.h: slope of the mollifier over the share of a slip that a step may remove
   std::vector<std::uint32_t> contacts(frame.bodies.size(), 0);
   for (const auto& s : frame.surface.summary) {
     if (!(s.load > 0.0)) continue;

@@ -21,7 +21,7 @@ class Executor {
 
   /// Calls body(begin, end) for the consecutive blocks [0, block), [block, 2 block) ... of [0, n), in any order and
   /// possibly at the same time. The first exception in block order is rethrown after all blocks ended.
-  /// Where the calling thread's InterruptScope says so, blocks that have not begun throw Interrupted instead.
+  /// After an interrupt of the calling thread's InterruptScope, blocks that have not begun throw Interrupted instead.
   /// @pre block > 0
   void for_blocks(std::size_t n, std::size_t block, const std::function<void(std::size_t, std::size_t)>& body) const;
 

@@ -18,11 +18,11 @@ inline void heed(const std::atomic<int>* interrupt) {
   if (interrupt != nullptr && interrupt->load(std::memory_order_relaxed) != 0) throw Interrupted();
 }
 
-/// While it lives, long calls of this thread, and what they do on the threads of an executor, throw Interrupted soon after a number is not 0.
-/// Of several the last one made counts.
+/// During its lifetime, long calls of this thread, and their work on the threads of an executor, throw Interrupted soon after a number becomes non-zero.
+/// The innermost scope of a thread applies.
 class InterruptScope {
  public:
-  /// @param interrupt  set by another thread or a signal, and outlives the scope; null: nothing ends the calls
+  /// @param interrupt  set by another thread or a signal, and outlives the scope; null: the calls run to their end
   explicit InterruptScope(const std::atomic<int>* interrupt) noexcept;
   ~InterruptScope();
   InterruptScope(const InterruptScope&) = delete;
@@ -31,7 +31,7 @@ class InterruptScope {
  private:
   const std::atomic<int>* outer_;
 };
-/// That of this thread's scope; null without one.
+/// The number of this thread's innermost scope; null without one.
 [[nodiscard]] const std::atomic<int>* interrupt_of_scope() noexcept;
 /// @throws Interrupted where that is not 0
 inline void heed_scope() { heed(interrupt_of_scope()); }
