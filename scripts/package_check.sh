@@ -47,6 +47,6 @@ check_package() {
   [[ -d $build/python ]] || return 0
   local package
   package=$(find "$scratch/prefix" -path '*/supple/__init__.py')
-  (cd / && PYTHONPATH=$(dirname "$(dirname "$package")") /usr/bin/python3 -B "$supple_root/tests/package/stranger.py" \
+  (cd / && PYTHONPATH=$(dirname "$(dirname "$package")") /usr/bin/python3 -B "$supple_root/tests/package/minimal_script.py" \
     "$supple_root/tests/package/two_balls.yaml")
 }

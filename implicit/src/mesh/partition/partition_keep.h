@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "mesh/partition/polygonise_blocks.h"
-#include "mesh/partition/polygonise_rims.h"
-#include "mesh/partition/rim_crossings.h"
+#include "mesh/partition/polygonise_boundaries.h"
+#include "mesh/partition/boundary_crossings.h"
 
 namespace supple::implicit::lattice {
 

@@ -1,4 +1,4 @@
-#include "mesh/partition/rim_pieces.h"
+#include "mesh/partition/boundary_pieces.h"
 
 #include <algorithm>
 #include <array>

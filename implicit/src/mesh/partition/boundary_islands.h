@@ -1,4 +1,4 @@
-/// @file rim_islands.h
+/// @file boundary_islands.h
 /// Facets near boundary curves whose cuts can depend on each other: those that share a tetrahedron or a vertex where three labels meet. What becomes
 /// of such an island depends on nothing else.
 #pragma once
@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/partition/polygonise_rims.h"
+#include "mesh/partition/polygonise_boundaries.h"
 
 namespace supple::implicit::lattice {
 

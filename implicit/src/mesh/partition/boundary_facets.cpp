@@ -1,4 +1,4 @@
-#include "mesh/partition/rim_facets.h"
+#include "mesh/partition/boundary_facets.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "mesh/partition/rim_crossings.h"
+#include "mesh/partition/boundary_crossings.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,4 +1,4 @@
-/// @file rim_crossings.h
+/// @file boundary_crossings.h
 /// Points of boundary curves on edges of facets: between a vertex where a third label is largest and one where it is not, or between two vertices
 /// where different labels are largest.
 #pragma once
@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include "mesh/partition/rim_facets.h"
+#include "mesh/partition/boundary_facets.h"
 
 namespace supple::implicit::lattice {
 
@@ -46,7 +46,7 @@ struct KeptBoundaries {
   std::vector<Crossing> crossing;     ///< with the places and labels from which they were found left as they were
   std::vector<TwiceCovered> twice;
   std::vector<std::uint32_t> uncovered;
-  std::vector<std::uint32_t> island;  ///< by vertex, see rim_islands.h
+  std::vector<std::uint32_t> island;  ///< by vertex, see boundary_islands.h
 };
 
 class BoundaryCrossings {

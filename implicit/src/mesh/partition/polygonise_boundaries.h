@@ -1,4 +1,4 @@
-/// @file polygonise_rims.h
+/// @file polygonise_boundaries.h
 /// Boundary curves inside the triangles between two labels. Where a third label is largest at some vertices of a triangle and not at others, a boundary
 /// curve passes through: the triangle is cut there, at points on the curve in the faces and tetrahedra of the lattice, and beyond them
 /// splits into one on either side of the third label. Where different labels are largest at its vertices it is cut for both, and where these two
@@ -90,7 +90,7 @@ inline void renumber(std::span<const std::uint32_t> number, std::span<Facet> fac
   }
 }
 
-/// Results at boundary curves, see rim_crossings.h.
+/// Results at boundary curves, see boundary_crossings.h.
 struct KeptBoundaries;
 
 /// The bodies that are meshed together.

@@ -1,10 +1,10 @@
-#include "mesh/partition/rim_islands.h"
+#include "mesh/partition/boundary_islands.h"
 
 #include <algorithm>
 #include <numeric>
 
 #include "mesh/partition/partition_keep.h"
-#include "mesh/partition/rim_facets.h"
+#include "mesh/partition/boundary_facets.h"
 
 namespace supple::implicit::lattice {
 

@@ -1,4 +1,4 @@
-/// @file rim_pieces.h
+/// @file boundary_pieces.h
 /// Pieces of facets that boundary curves cross.
 #pragma once
 
@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/partition/rim_crossings.h"
+#include "mesh/partition/boundary_crossings.h"
 
 namespace supple::implicit::lattice {
 

@@ -1,4 +1,4 @@
-/// @file rim_facets.h
+/// @file boundary_facets.h
 /// Facets near boundary curves: which of their vertices a third label covers, and positions of these.
 #pragma once
 
@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "mesh/partition/polygonise_rims.h"
-#include "mesh/partition/rim_islands.h"
+#include "mesh/partition/polygonise_boundaries.h"
+#include "mesh/partition/boundary_islands.h"
 
 namespace supple::implicit::lattice {
 

@@ -1,14 +1,14 @@
-#include "mesh/partition/polygonise_rims.h"
+#include "mesh/partition/polygonise_boundaries.h"
 
 #include <algorithm>
 #include <numeric>
 #include <utility>
 
 #include "mesh/partition/polygonise_block_edges.h"
-#include "mesh/partition/rim_crossings.h"
-#include "mesh/partition/rim_facets.h"
-#include "mesh/partition/rim_islands.h"
-#include "mesh/partition/rim_pieces.h"
+#include "mesh/partition/boundary_crossings.h"
+#include "mesh/partition/boundary_facets.h"
+#include "mesh/partition/boundary_islands.h"
+#include "mesh/partition/boundary_pieces.h"
 
 namespace supple::implicit::lattice {
 namespace {
