@@ -19,10 +19,12 @@ namespace {
 
 constexpr std::size_t kReserve = std::size_t{1} << 20;  // [byte]
 std::atomic<void*> reserve{nullptr};
+std::atomic<bool> ran_out{false};
 
 /// A new-handler. @throws std::bad_alloc
 void let_reserve_go() {
   std::free(reserve.exchange(nullptr));
+  ran_out = true;
   throw std::bad_alloc();
 }
 
@@ -31,7 +33,8 @@ void say(const char* text) { static_cast<void>(!::write(STDERR_FILENO, text, std
 /// Allocates nothing, and calls only functions that are safe in any state of the program.
 [[noreturn]] void end_program() {
   const std::type_info* type = abi::__cxa_current_exception_type();
-  const bool no_memory = type != nullptr && (*type == typeid(std::bad_alloc) || *type == typeid(std::bad_array_new_length));
+  // Functions of the standard library that may not throw, as those that list folders, do not tell what they could not throw.
+  const bool no_memory = type != nullptr ? *type == typeid(std::bad_alloc) || *type == typeid(std::bad_array_new_length) : ran_out.load();
   say(no_memory ? scenes::kOutOfMemory : "internal fault: an exception that no code could handle");
   if (!no_memory && type != nullptr) {
     say(": ");
