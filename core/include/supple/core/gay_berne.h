@@ -4,9 +4,6 @@
 /// stronger or weaker by the directions of approach.
 #pragma once
 
-#include <span>
-
-#include "supple/core/neighbour_list.h"
 #include "supple/core/pair_laws.h"
 
 namespace supple::core {
@@ -45,10 +42,5 @@ struct SwitchedGayBerne {
 [[nodiscard]] PairLoad evaluate(const SwitchedGayBerne& law, const PairPose& pose);
 /// Of the deepest wells, at gaps down to a tenth below that of rest.
 [[nodiscard]] Stiffness stiffness(const SwitchedGayBerne& law);
-
-/// Adds forces and torques between all particles of a list, cut off at its range without a shift.
-/// @param orientations  body to world, shape [particles]
-void accumulate_geometric(NeighbourList& list, const GayBerne& law, std::span<const Quat> orientations,
-                          const Executor& executor, Loads& loads);
 
 }  // namespace supple::core
