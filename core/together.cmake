@@ -5,7 +5,7 @@ supple_together(
    src/base/nearest_word.cpp"
   "src/laws/damping.cpp src/laws/interaction_reports.cpp src/particles/links.cpp src/base/math.cpp src/neighbours/neighbours.cpp"
   "src/integrate/implicit_step.cpp src/laws/interactions.cpp src/laws/lennard_jones.cpp src/laws/literal_form.cpp src/base/mesh.cpp"
-  "src/neighbours/neighbour_list.cpp src/laws/pair_laws.cpp src/particles/particles.cpp src/particles/parts.cpp src/integrate/rotation.cpp src/integrate/step_hessian.cpp
+  "src/neighbours/pair_lists.cpp src/laws/pair_laws.cpp src/particles/particles.cpp src/particles/parts.cpp src/integrate/rotation.cpp src/integrate/step_hessian.cpp
    src/laws/stiffness_damping.cpp"
   "src/laws/pair_hessian.cpp src/io/vtk_files.cpp"
   "src/integrate/runge_kutta.cpp src/io/atomic_file.cpp src/io/descriptor.cpp src/io/open_temporaries.cpp")

@@ -22,7 +22,7 @@
 #include "supple/core/gay_berne.h"
 #include "supple/core/hash.h"
 #include "supple/core/integrate.h"
-#include "supple/core/neighbour_list.h"
+#include "supple/core/interactions.h"
 #include "usage.h"
 
 namespace {
@@ -99,28 +99,43 @@ std::vector<double> read_doubles(const std::string& path) {
   return values;
 }
 
-/// Lennard-Jones atoms in reduced units: m = epsilon = sigma = 1, cut-off 2.5, skin 0.3, time step 0.005.
+/// Forces of what acts between the particles, by the stage that scenes run.
+class Forces {
+ public:
+  Forces(const test::Particles& p, Interactions all) : all_(std::move(all)), workspace_(p.set, all_) {}
+  const Loads& at(const test::Particles& p, const Executor& executor) { return at(p.set, p.state, executor); }
+  const Loads& at(const ParticleSet& set, const ParticleState& state, const Executor& executor) {
+    loads_.reset(set.size());
+    external_.reset(set.size());
+    counts = accumulate_interactions(set, state, all_, 0.0, executor, workspace_, loads_, external_);
+    return loads_;
+  }
+  InteractionCounts counts;
+
+ private:
+  Interactions all_;
+  InteractionWorkspace workspace_;
+  Loads loads_, external_;
+};
+
+/// Lennard-Jones atoms in open space, in reduced units: m = epsilon = sigma = 1, cut-off 2.5 without a shift, time step 0.005.
 struct Melt {
-  PeriodicBox box;
-  std::vector<Vec3> x, v;
-  Loads loads;
-  NeighbourList list{2.5, 0.3};
-  Precision precision = Precision::Double;
-  std::size_t builds = 0;
+  static constexpr double kCutOff = 2.5;
+  test::Particles p;
 
   /// fcc of density 0.8442 with cells^3 unit cells, at temperature 3.
   explicit Melt(int cells) {
     const double edge = std::cbrt(4.0 / 0.8442);
-    box.length = Vec3::Constant(cells * edge);
     std::mt19937_64 engine(87287);
     std::normal_distribution<double> normal;
     for (int i = 0; i < cells * cells * cells; ++i) {
       const Vec3 corner(i / cells / cells, i / cells % cells, i % cells);
       for (const Vec3& basis : {Vec3(0, 0, 0), Vec3(0.5, 0.5, 0), Vec3(0.5, 0, 0.5), Vec3(0, 0.5, 0.5)}) {
-        x.push_back(edge * (corner + basis));
-        v.push_back(Vec3(normal(engine), normal(engine), normal(engine)));
+        p.add(edge * (corner + basis));
+        p.state.velocity.back() = Vec3(normal(engine), normal(engine), normal(engine));
       }
     }
+    std::vector<Vec3>& v = p.state.velocity;
     Vec3 mean = Vec3::Zero();
     for (const Vec3& u : v) mean += u / static_cast<double>(v.size());
     double squares = 0.0;
@@ -128,255 +143,224 @@ struct Melt {
     const double scale = std::sqrt(9.0 * static_cast<double>(v.size() - 1) / squares);
     for (Vec3& u : v) u *= scale;
   }
-  /// Box length, positions and velocities as doubles in a file.
+  /// Positions and velocities as doubles in a file.
   explicit Melt(const std::string& path) {
     const std::vector<double> values = read_doubles(path);
-    box.length = Vec3(values[0], values[1], values[2]);
-    const std::size_t n = (values.size() - 3) / 6;
+    const std::size_t n = values.size() / 6;
     for (std::size_t i = 0; i < n; ++i) {
-      x.emplace_back(values[3 + 3 * i], values[4 + 3 * i], values[5 + 3 * i]);
-      v.emplace_back(values[3 + 3 * (n + i)], values[4 + 3 * (n + i)], values[5 + 3 * (n + i)]);
+      p.add(Vec3(values[3 * i], values[3 * i + 1], values[3 * i + 2]));
+      p.state.velocity.back() = Vec3(values[3 * (n + i)], values[3 * (n + i) + 1], values[3 * (n + i) + 2]);
     }
   }
-
-  void start(const Executor& executor) {
-    list = NeighbourList(2.5, 0.3, box);
-    forces(executor);
-    builds = 0;
+  [[nodiscard]] static LennardJones law() { return {.r0 = std::cbrt(std::sqrt(2.0)), .depth = 1.0}; }
+  [[nodiscard]] Forces forces() const {
+    Interactions all;
+    all.geometric_lennard_jones.push_back({.name = "melt", .range = kCutOff, .law = law()});
+    return {p, all};
   }
-  void forces(const Executor& executor) {
-    builds += list.update(x, executor) ? 1 : 0;
-    loads.force.assign(x.size(), Vec3::Zero());
-    accumulate_geometric(list, TwelveSix{}, executor, loads, precision);
-  }
-  /// Velocity Verlet.
-  void step(const Executor& executor) {
+  /// Velocity Verlet, whose forces are those of the last step.
+  void step(Forces& forces, const Loads*& loads, const Executor& executor) {
     static constexpr double kStep = 0.005;
     constexpr std::size_t kBlock = 4096;
-    const auto kick_and_drift = [this](std::size_t begin, std::size_t end) {
+    const auto kick_and_drift = [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        v[i] += 0.5 * kStep * loads.force[i];
-        x[i] += kStep * v[i];
+        p.state.velocity[i] += 0.5 * kStep * loads->force[i];
+        p.state.position[i] += kStep * p.state.velocity[i];
       }
     };
-    const auto kick = [this](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) v[i] += 0.5 * kStep * loads.force[i];
+    const auto kick = [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) p.state.velocity[i] += 0.5 * kStep * loads->force[i];
     };
-    executor.for_blocks(x.size(), kBlock, std::cref(kick_and_drift));
-    forces(executor);
-    executor.for_blocks(x.size(), kBlock, std::cref(kick));
+    executor.for_blocks(p.set.size(), kBlock, std::cref(kick_and_drift));
+    loads = &forces.at(p, executor);
+    executor.for_blocks(p.set.size(), kBlock, std::cref(kick));
   }
-  /// Temperature, potential and total energy per atom, and pressure, by the plain formulas over the pairs of the list.
+  /// Temperature, potential and total energy per atom, by the law of one pair over all pairs in range.
   [[nodiscard]] std::string thermo(const std::string& prefix) const {
-    double potential = 0.0, virial = 0.0, squares = 0.0;
-    for (const IndexPair& pair : list.pairs()) {
-      const double d2 = box.nearest_image(x[pair.second] - x[pair.first]).squaredNorm();
-      if (d2 >= 6.25) continue;
-      const double i6 = 1.0 / (d2 * d2 * d2);
-      potential += 4.0 * (i6 * i6 - i6);
-      virial += 48.0 * i6 * i6 - 24.0 * i6;
+    double potential = 0.0, squares = 0.0;
+    for (const IndexPair& pair : find_neighbours(p.state.position, kCutOff)) {
+      potential += law().energy((p.state.position[pair.second] - p.state.position[pair.first]).norm());
     }
-    for (const Vec3& u : v) squares += u.squaredNorm();
-    const auto n = static_cast<double>(x.size());
+    for (const Vec3& u : p.state.velocity) squares += u.squaredNorm();
+    const auto n = static_cast<double>(p.set.size());
     return field((prefix + "_temperature").c_str(), squares / (3.0 * (n - 1.0))) + ", " +
            field((prefix + "_potential").c_str(), potential / n) + ", " +
-           field((prefix + "_energy").c_str(), (potential + 0.5 * squares) / n) + ", " +
-           field((prefix + "_pressure").c_str(), (squares + virial) / (3.0 * box.length.prod()));
+           field((prefix + "_energy").c_str(), (potential + 0.5 * squares) / n);
   }
 };
 
-const char* name_of(Precision precision) { return precision == Precision::Double ? "" : "/single"; }
-
-void bench_melt(Melt melt, Precision precision, int steps, int repeats) {
+void bench_melt(Melt melt, int steps, int repeats) {
   const Executor executor(1);
-  melt.precision = precision;
-  const std::vector<Vec3> x = melt.x, v = melt.v;
+  const ParticleState start = melt.p.state;
+  const std::string first = melt.thermo("first");
   double best = std::numeric_limits<double>::infinity();
-  std::string thermo;
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    melt.x = x;
-    melt.v = v;
-    melt.start(executor);
-    thermo = melt.thermo("first");
-    const double start = seconds(CLOCK_PROCESS_CPUTIME_ID);
-    for (int k = 0; k < steps; ++k) melt.step(executor);
-    best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - start) / steps);
+    melt.p.state = start;
+    Forces forces = melt.forces();
+    const Loads* loads = &forces.at(melt.p, executor);
+    const double begin = seconds(CLOCK_PROCESS_CPUTIME_ID);
+    for (int k = 0; k < steps; ++k) melt.step(forces, loads, executor);
+    best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - begin) / steps);
   }
-  const double n = static_cast<double>(x.size());
-  print({.name = "melt" + std::string(name_of(precision)) + "/steps=" + std::to_string(steps),
-         .particles = x.size(),
+  const std::size_t n = melt.p.set.size();
+  print({.name = "melt/steps=" + std::to_string(steps),
+         .particles = n,
          .time = best,
-         .rate = field("steps_per_build", static_cast<double>(steps) / static_cast<double>(melt.builds)) + ", " +
-                 field("list_bytes_per_particle", static_cast<double>(melt.list.bytes()) / n) + ", " +
-                 field("atom_steps_per_s", n / best) + ", " + thermo + ", " + melt.thermo("last"),
-         .hash = hash_of(melt.x, melt.v)});
+         .rate = field("atom_steps_per_s", static_cast<double>(n) / best) + ", " + first + ", " + melt.thermo("last"),
+         .hash = hash_of(melt.p.state.position, melt.p.state.velocity)});
 }
 
-/// Gay-Berne ellipsoids in reduced units: axes 1, 1.5 and 2, wells 1, 0.5 and 0.2, cut-off 4, time step 0.002.
+/// Gay-Berne ellipsoids in open space, in reduced units: axes 1, 1.5 and 2, wells 1, 0.5 and 0.2, cut-off 4 without a switch
+/// that would be felt, time step 0.002.
 struct Ellipsoids {
   static constexpr double kRange = 4.0, kMass = 1.5;
-  const GayBerne law{.radii = Vec3(0.5, 0.75, 1.0), .well = Vec3(1.0, 0.5, 0.2), .upsilon = 3, .mu = 1};
-  PeriodicBox box;
-  ParticleSet set;
-  ParticleState state;
+  const SwitchedGayBerne law{.ellipsoid = {.radii = Vec3(0.5, 0.75, 1.0), .well = Vec3(1.0, 0.5, 0.2), .upsilon = 3, .mu = 1},
+                             .switch_from = kRange * (1.0 - 1e-12),
+                             .cut_off = kRange};
+  test::Particles p;
 
   void add(const Vec3& x, const Vec3& v, const Quat& q) {
-    const Vec3 r2 = law.radii.cwiseAbs2();
-    set.mass.push_back(kMass);
-    set.inertia.push_back(kMass / 5.0 * Vec3(r2.y() + r2.z(), r2.z() + r2.x(), r2.x() + r2.y()));
-    set.normal.push_back(Vec3::UnitZ());
-    set.object.push_back(0);
-    set.pinned.push_back(0);
-    state.position.push_back(x);
-    state.velocity.push_back(v);
-    state.orientation.push_back(q);
-    state.angular_momentum.push_back(Vec3::Zero());
+    const Vec3 r2 = law.ellipsoid.radii.cwiseAbs2();
+    p.add(x, kMass);
+    p.set.inertia.back() = kMass / 5.0 * Vec3(r2.y() + r2.z(), r2.z() + r2.x(), r2.x() + r2.y());
+    p.state.velocity.back() = v;
+    p.state.orientation.back() = q;
   }
   /// Density 0.22, side^3 ellipsoids.
   explicit Ellipsoids(int side) {
     test::Draw draw(982381);
     const double edge = std::cbrt(1.0 / 0.22);
-    box.length = Vec3::Constant(side * edge);
     for (int i = 0; i < side * side * side; ++i) {
       add(edge * Vec3(i / side / side, i / side % side, i % side), draw.vector(1.5), draw.rotation());
     }
   }
-  /// Box length, positions, velocities, orientations (w, x, y, z) and angular momenta as doubles in a file.
+  /// Positions, velocities, orientations (w, x, y, z) and angular momenta as doubles in a file.
   explicit Ellipsoids(const std::string& path) {
     const std::vector<double> values = read_doubles(path);
-    box.length = Vec3(values[0], values[1], values[2]);
-    const std::size_t n = (values.size() - 3) / 13;
-    const double* const x = values.data() + 3;
+    const std::size_t n = values.size() / 13;
+    const double* const x = values.data();
     const double* const v = x + 3 * n;
     const double* const q = v + 3 * n;
     const double* const l = q + 4 * n;
     for (std::size_t i = 0; i < n; ++i) {
       add(Vec3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), Vec3(v[3 * i], v[3 * i + 1], v[3 * i + 2]),
           Quat(q[4 * i], q[4 * i + 1], q[4 * i + 2], q[4 * i + 3]));
-      state.angular_momentum.back() = Vec3(l[3 * i], l[3 * i + 1], l[3 * i + 2]);
+      p.state.angular_momentum.back() = Vec3(l[3 * i], l[3 * i + 1], l[3 * i + 2]);
     }
   }
-  /// Energies per particle, by the law of one pair over the pairs of the list.
-  [[nodiscard]] std::string thermo(const NeighbourList& list, const std::string& prefix) const {
+  [[nodiscard]] Forces forces() const {
+    Interactions all;
+    all.gay_berne.push_back({.name = "ellipsoids", .range = kRange, .law = law});
+    return {p, all};
+  }
+  /// Energies per particle, by the law of one pair over all pairs in range.
+  [[nodiscard]] std::string thermo(const std::string& prefix) const {
     double potential = 0.0;
-    for (const IndexPair& pair : list.pairs()) {
-      const Vec3 r = box.nearest_image(state.position[pair.second] - state.position[pair.first]);
-      if (r.norm() >= kRange) continue;
-      potential += evaluate(law, PairPose{.r = r,
-                                          .orientation_a = state.orientation[pair.first],
-                                          .orientation_b = state.orientation[pair.second]})
-                       .energy;
+    for (const IndexPair& pair : find_neighbours(p.state.position, kRange)) {
+      potential += evaluate(law, test::pair_pose(p, pair.first, pair.second)).energy;
     }
-    const auto n = static_cast<double>(set.size());
+    const auto n = static_cast<double>(p.set.size());
     return field((prefix + "_potential").c_str(), potential / n) + ", " +
-           field((prefix + "_energy").c_str(), (potential + measure_motion(set, state).kinetic_energy) / n);
+           field((prefix + "_energy").c_str(), (potential + measure_motion(p.set, p.state).kinetic_energy) / n);
   }
 };
 
 void bench_ellipsoids(Ellipsoids all, int steps, int repeats) {
   const Executor executor(1);
-  const ParticleState start = all.state;
+  const ParticleState start = all.p.state;
+  const std::string first = all.thermo("first");
   double best = std::numeric_limits<double>::infinity();
-  std::string thermo;
-  std::size_t builds = 0;
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    NeighbourList list(Ellipsoids::kRange, 0.5, all.box);
-    const ForceModel forces = [&](const ParticleState& state, double, ForceSample& out) {
-      builds += list.update(state.position, executor) ? 1 : 0;
-      out.internal.reset(state.size());
+    all.p.state = start;
+    Forces forces = all.forces();
+    const ForceModel model = [&](const ParticleState& state, double, ForceSample& out) {
       out.external.reset(state.size());
-      accumulate_geometric(list, all.law, state.orientation, executor, out.internal);
+      out.internal = forces.at(all.p.set, state, executor);
     };
-    all.state = start;
     KickState kick;
     Ledger ledger;
-    list.update(all.state.position, executor);
-    if (repeat == 0) thermo = all.thermo(list, "first");
-    builds = 0;
+    forces.at(all.p, executor);
     const double begin = seconds(CLOCK_PROCESS_CPUTIME_ID);
     for (int k = 0; k < steps; ++k) {
-      advance({all.set, {}, forces}, 0.002 * k, 0.002, {all.state, kick, ledger});
+      advance({all.p.set, {}, model}, 0.002 * k, 0.002, {all.p.state, kick, ledger});
     }
     best = std::min(best, (seconds(CLOCK_PROCESS_CPUTIME_ID) - begin) / steps);
-    if (repeat + 1 == repeats) {
-      list.update(all.state.position, executor);
-      thermo += ", " + all.thermo(list, "last");
-    }
   }
   print({.name = "gay_berne/steps=" + std::to_string(steps),
-         .particles = all.set.size(),
+         .particles = all.p.set.size(),
          .time = best,
-         .rate = field("builds", static_cast<double>(builds)) + ", " +
-                 field("particle_steps_per_s", static_cast<double>(all.set.size()) / best) + ", " + thermo,
-         .hash = hash_of(all.state.position, all.state.angular_momentum)});
+         .rate = field("particle_steps_per_s", static_cast<double>(all.p.set.size()) / best) + ", " + first + ", " +
+                 all.thermo("last"),
+         .hash = hash_of(all.p.state.position, all.p.state.angular_momentum)});
 }
-
-/// Particles with normals on a disturbed cubic lattice of spacing 1 in open space.
-struct Crowd {
-  std::vector<Vec3> position, normal;
-  explicit Crowd(std::size_t count) {
-    test::Draw draw(17);
-    const auto side = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<double>(count))));
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto z = static_cast<double>(i % side), y = static_cast<double>(i / side % side);
-      position.push_back(Vec3(static_cast<double>(i / side / side), y, z) + draw.vector(0.2));
-      normal.push_back(draw.direction());
-    }
-  }
-};
 
 constexpr double kCrowdRange = 2.5;
-const SurfaceLaws kCrowdLaws{.cohesion = {.r0 = 1.0, .f0 = 1.0, .a = 4.0},
-                             .form = 0.5,
-                             .curvature = 0.3,
-                             .coplanarity = 0.4,
-                             .conormality = 0.2,
-                             .cocircularity = 0.1};
 
-void bench_surface_laws(std::size_t count, Precision precision) {
-  const Crowd crowd(count);
-  const Executor executor(1);
-  NeighbourList list(kCrowdRange, 0.25);
-  list.update(crowd.position, executor);
-  std::size_t pairs = 0;
-  for (const IndexPair& pair : list.pairs()) {
-    if ((crowd.position[pair.first] - crowd.position[pair.second]).norm() < kCrowdRange) ++pairs;
+/// Particles with normals on a disturbed cubic lattice of spacing 1.
+test::Particles make_crowd(std::size_t count) {
+  test::Draw draw(17);
+  test::Particles p;
+  const auto side = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<double>(count))));
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto z = static_cast<double>(i % side), y = static_cast<double>(i / side % side);
+    p.add(Vec3(static_cast<double>(i / side / side), y, z) + draw.vector(0.2));
+    p.set.normal.back() = draw.direction();
   }
-  Loads loads;
-  const double time = least_time(10, CLOCK_PROCESS_CPUTIME_ID, [&] {
-    loads.reset(count);
-    accumulate_geometric(list, kCrowdLaws, crowd.normal, executor, loads, precision);
-  });
-  const auto n = static_cast<double>(count);
-  print({.name = "surface_laws" + std::string(name_of(precision)),
-         .particles = count,
-         .time = time,
-         .rate = field("pairs_per_s", static_cast<double>(pairs) / time) + ", " +
-                 field("pairs_per_particle", static_cast<double>(pairs) / n) + ", " +
-                 field("list_entries_per_particle", static_cast<double>(list.entries()) / n),
-         .hash = hash_of(loads.force, loads.torque)});
+  return p;
 }
 
-void bench_lists(std::size_t count) {
-  const Crowd crowd(count);
-  std::vector<Vec3> moved = crowd.position;
-  for (Vec3& x : moved) x.x() += 0.15;
+struct LawOfACrowd {
+  const char* name;
+  Interactions all;
+};
+std::vector<LawOfACrowd> laws_of_a_crowd() {
+  const Weight weight{.range = kCrowdRange};
+  const auto of = [](auto member, auto law) {
+    Interactions all;
+    (all.*member).push_back({.name = "law", .range = kCrowdRange, .law = law});
+    return all;
+  };
+  return {{"lennard_jones", of(&Interactions::geometric_lennard_jones, Melt::law())},
+          {"cohesion", of(&Interactions::geometric_cohesion, Cohesion{.r0 = 1.0, .f0 = 1.0, .a = 4.0})},
+          {"repulsion", of(&Interactions::repulsion, Repulsion{.force = 1.0, .distance = 1.0, .length = 0.3, .tolerance = 6e-3})},
+          {"coplanarity", of(&Interactions::geometric_coplanarity, Coplanarity{.strength = 0.4, .weight = weight})},
+          {"co_normality", of(&Interactions::geometric_co_normality, CoNormality{.strength = 0.2, .weight = weight})},
+          {"co_circularity", of(&Interactions::geometric_co_circularity, CoCircularity{.strength = 0.1, .weight = weight})}};
+}
+
+void bench_laws(std::size_t count) {
+  const test::Particles p = make_crowd(count);
   const Executor executor(1);
-  NeighbourList list(kCrowdRange, 0.25);
+  for (const LawOfACrowd& law : laws_of_a_crowd()) {
+    Forces forces(p, law.all);
+    std::uint64_t hash = 0;
+    const double time = least_time(10, CLOCK_PROCESS_CPUTIME_ID, [&] { hash = test::hash_of(forces.at(p, executor)); });
+    const auto pairs = static_cast<double>(forces.counts.pairs_present);
+    print({.name = std::string("laws/") + law.name,
+           .particles = count,
+           .time = time,
+           .rate = field("pairs_per_s", pairs / time) + ", " + field("pairs_per_particle", pairs / static_cast<double>(count)),
+           .hash = hash});
+  }
+}
+
+/// What new lists take: evaluations that make them, less those that keep them.
+void bench_lists(std::size_t count) {
+  test::Particles p = make_crowd(count), moved = p;
+  for (Vec3& x : moved.state.position) x.x() += 0.4;
+  const Executor executor(1);
+  Forces forces(p, laws_of_a_crowd()[0].all);
+  const double kept = least_time(6, CLOCK_PROCESS_CPUTIME_ID, [&] { forces.at(p, executor); });
   bool there = false;
-  const double time = least_time(6, CLOCK_PROCESS_CPUTIME_ID, [&] {
-    list.update(there ? crowd.position : moved, executor);
+  const double made = least_time(6, CLOCK_PROCESS_CPUTIME_ID, [&] {
+    forces.at(there ? p : moved, executor);
     there = !there;
   });
-  Hasher hasher;
-  list.hash(hasher);
-  const auto n = static_cast<double>(count);
   print({.name = "list_build",
          .particles = count,
-         .time = time,
-         .rate = field("list_bytes_per_particle", static_cast<double>(list.bytes()) / n) + ", " +
-                 field("list_entries_per_particle", static_cast<double>(list.entries()) / n),
-         .hash = hasher.value()});
+         .time = made - kept,
+         .rate = field("distances_per_particle", static_cast<double>(forces.counts.pairs_visited) / static_cast<double>(count)),
+         .hash = 0});
 }
 
 /// Wall time of `work` with one and with two threads, in turns: the least of many short runs, which finds the moments
@@ -399,25 +383,16 @@ void bench_two_threads(const std::string& name, std::size_t particles, const std
 void bench_threads() {
   for (const int cells : {20, 63}) {
     Melt melt(cells);
-    melt.start(Executor(1));
-    bench_two_threads("melt", melt.x.size(), [&](const Executor& executor) { melt.step(executor); });
+    Forces forces = melt.forces();
+    const Loads* loads = &forces.at(melt.p, Executor(1));
+    bench_two_threads("melt", melt.p.set.size(), [&](const Executor& executor) { melt.step(forces, loads, executor); });
   }
   for (const std::size_t count : {32000U, 1000000U}) {
-    const Crowd crowd(count);
-    NeighbourList list(kCrowdRange, 0.25);
-    Loads loads;
-    list.update(crowd.position, Executor(1));
-    bench_two_threads("surface_laws", count, [&](const Executor& executor) {
-      loads.reset(count);
-      accumulate_geometric(list, kCrowdLaws, crowd.normal, executor, loads);
-    });
-    std::vector<Vec3> moved = crowd.position;
-    for (Vec3& x : moved) x.x() += 0.15;
-    bool there = false;
-    bench_two_threads("list_build", count, [&](const Executor& executor) {
-      list.update(there ? crowd.position : moved, executor);
-      there = !there;
-    });
+    const test::Particles p = make_crowd(count);
+    for (const LawOfACrowd& law : laws_of_a_crowd()) {
+      Forces forces(p, law.all);
+      bench_two_threads(std::string("laws/") + law.name, count, [&](const Executor& executor) { forces.at(p, executor); });
+    }
   }
 }
 
@@ -535,36 +510,24 @@ void bench_spiral(int count, bool rubs) {
 
 }  // namespace
 
-/// @param argv  melt [FILE [STEPS]], melt_single [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, surface, lists,
-///              spiral; all when absent
+/// @param argv  melt [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, laws, lists, spiral; all when absent
 int main(int argc, char** argv) {
-  constexpr std::string_view kUsage = "core_bench [melt|melt_single|ellipsoids [FILE [STEPS]]]\n"
-                                      "       core_bench threads|surface|lists|spiral";
+  constexpr std::string_view kUsage = "core_bench [melt|ellipsoids [FILE [STEPS]]]\n"
+                                      "       core_bench threads|laws|lists|spiral";
   supple::benchmarks::answer_usage(argc, argv, kUsage, 3);
   const std::string_view what = argc > 1 ? argv[1] : "";
   if (argc > 1) {
-    supple::benchmarks::expect_word(kUsage, what, std::array<std::string_view, 7>{"melt", "melt_single", "ellipsoids", "threads", "surface", "lists", "spiral"});
+    supple::benchmarks::expect_word(kUsage, what, std::array<std::string_view, 6>{"melt", "ellipsoids", "threads", "laws", "lists", "spiral"});
   }
   const auto steps = [&](int otherwise) { return argc > 3 ? supple::benchmarks::whole_number(kUsage, argv[3]) : otherwise; };
   const auto wanted = [&](std::string_view name) { return what.empty() || what == name; };
-  for (const Precision precision : {Precision::Double, Precision::SingleForces}) {
-    const bool single = precision == Precision::SingleForces;
-    if (what.empty() || what == (single ? "melt_single" : "melt")) {
-      bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), precision, steps(100), 3);
-    }
-  }
+  if (wanted("melt")) bench_melt(argc > 2 ? Melt(argv[2]) : Melt(20), steps(100), 3);
   if (wanted("ellipsoids")) {
     bench_ellipsoids(argc > 2 ? Ellipsoids(argv[2]) : Ellipsoids(20), steps(50), 3);
   }
-  if (wanted("surface")) {
-    for (const Precision precision : {Precision::Double, Precision::SingleForces}) {
-      for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) {
-        bench_surface_laws(count, precision);
-      }
-    }
-  }
-  if (wanted("lists")) {
-    for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) bench_lists(count);
+  for (const std::size_t count : {100U, 1000U, 10000U, 32000U, 100000U, 1000000U}) {
+    if (wanted("laws")) bench_laws(count);
+    if (wanted("lists")) bench_lists(count);
   }
   if (wanted("spiral")) {
     for (const int count : {10, 100}) {

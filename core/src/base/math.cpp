@@ -7,20 +7,14 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/exponential.h"
+
 namespace supple::math {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A constant as an unevaluated sum of two doubles.
-struct Split {
-  double high;
-  double low;
-};
-
-constexpr double kInverseLn2 = 0x1.71547652b82fep+0;
-constexpr Split kLn2{0x1.62e42fefa39efp-1, 0x1.abc9e3b39803fp-56};
 constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
 constexpr Split kHalfPi{0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
 constexpr double kHalfPiRest = -0x1.f1976b7ed8fbcp-110;  ///< pi/2 less both parts of kHalfPi
@@ -48,17 +42,6 @@ double polynomial(const std::array<double, N>& coefficient, double x) {
   for (std::size_t i = N - 1; i-- > 0;) value = std::fma(value, x, coefficient[i]);
   return value;
 }
-
-/// 1/2!, 1/3!, ... 1/13!: e^r = 1 + r + r^2 sum_i c_i r^i; the rest is below 4e-18 for |r| <= ln 2 / 2.
-constexpr auto kExpSeries = [] {
-  std::array<double, 12> c{};
-  double factorial = 1.0;
-  for (std::size_t i = 0; i < c.size(); ++i) {
-    factorial *= static_cast<double>(i + 2);
-    c[i] = 1.0 / factorial;
-  }
-  return c;
-}();
 
 /// 2/3, 2/5, ... 2/23: 2 atanh(s) = 2 s + s sum_i c_i s^(2i+2); the rest is below 2e-18 relative for s <= 0.1716.
 constexpr auto kAtanhSeries = [] {
@@ -125,20 +108,13 @@ constexpr std::array<ErfNode, 13> kErf{{{{0x0.0p+0, 0x0.0p+0}, 0x1.20dd750429b6d
 }  // namespace
 
 double exp(double x) noexcept {
-  if (!(x >= -708.0)) return x != x ? x : 0.0;
-  if (x > 0x1.62e42fefa39efp+9) return kInfinity;
-  // x = k ln 2 + r + rest, the first step exact because k has 11 bits and the difference cancels.
-  const double k = nearest_integer(x * kInverseLn2);
-  const double high = std::fma(-k, kLn2.high, x);
-  const double low = -k * kLn2.low;
-  const double r = high + low;
-  const double rest = (high - r) + low;
-  const double tail = std::fma(r * r, polynomial(kExpSeries, r), rest);
-  const double value = 1.0 + (r + tail);
+  if (!(x >= kLeastExponent)) return x != x ? x : 0.0;
+  if (x > kLargestExponent) return kInfinity;
+  const Exponential<double> e(x);
   // In two factors: 2^1024 is not a double, yet e^709.5 is.
-  const int exponent = static_cast<int>(k);
+  const int exponent = static_cast<int>(e.k);
   const int half = exponent / 2;
-  return value * power_of_two(half) * power_of_two(exponent - half);
+  return e.mantissa * power_of_two(half) * power_of_two(exponent - half);
 }
 
 double log(double x) noexcept {

@@ -1,11 +1,8 @@
 #include "supple/core/gay_berne.h"
 
-#include <array>
 #include <cmath>
-#include <functional>
 
 #include "laws/gay_berne_kernel.h"
-#include "neighbours/packed_list.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 
@@ -109,56 +106,6 @@ Stiffness stiffness(const SwitchedGayBerne& law) {
   return {.translation = deepest * (bend * (1.0 + lean * lean) + (slope * (1.0 + lean) + e.epsilon * contrast / least) *
                                                                     (1.0 + lean) / least),
           .rotation = deepest * (bend * lever * lever + (1.0 + contrast) * turning)};
-}
-
-void NeighbourList::Impl::stage_ellipsoids(const Vec3& radii2, const Vec3& softness,
-                                           std::span<const Quat> orientations, const Executor& executor) {
-  for (std::vector<packed::Row>& rows : ellipsoid) {
-    rows.resize(position.size());
-    std::fill(rows.begin() + static_cast<std::ptrdiff_t>(source.size()), rows.end(), packed::Row{});
-  }
-  const auto body = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e) {
-      const Mat3 q = orientations[source[e]].toRotationMatrix();
-      const Mat3 g = turned(q, radii2), b = turned(q, softness);
-      ellipsoid[0][e] = {g(0, 0), g(1, 1), g(2, 2), 0.0};
-      ellipsoid[1][e] = {g(1, 2), g(2, 0), g(0, 1), 0.0};
-      ellipsoid[2][e] = {b(0, 0), b(1, 1), b(2, 2), 0.0};
-      ellipsoid[3][e] = {b(1, 2), b(2, 0), b(0, 1), 0.0};
-    }
-  };
-  executor.for_blocks(source.size(), kPointBlock, std::cref(body));
-}
-
-void accumulate_geometric(NeighbourList& list, const GayBerne& law, std::span<const Quat> orientations,
-                          const Executor& executor, Loads& loads) {
-  require(law);
-  NeighbourList::Impl& impl = list.impl();
-  const std::size_t n = impl.reference.size();
-  SUPPLE_EXPECTS(orientations.size() == n && loads.force.size() == n && loads.torque.size() == n);
-  impl.stage_ellipsoids(squared_radii(law), softness_of(law), orientations, executor);
-  const double volume2 = 2.0 * size_of(law) * size_of(law);
-  const packed::GayBerneNumbers numbers{.range2 = impl.range * impl.range,
-                                        .epsilon4 = 4.0 * law.epsilon,
-                                        .slope = 24.0 * law.epsilon / law.sigma,
-                                        .sigma = law.sigma,
-                                        .shift = law.gamma * law.sigma,
-                                        .volume2 = volume2,
-                                        .upsilon = law.upsilon,
-                                        .mu = law.mu};
-  impl.clear(impl.force, executor);
-  impl.clear(impl.turn, executor);
-  packed::EllipsoidRows rows{};
-  for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = impl.ellipsoid[k].data();
-  impl.for_lists(executor, [&](const packed::ListBlock& block) {
-    packed::gay_berne_loads(numbers, block, impl.position.data(), rows, impl.force.data(), impl.turn.data());
-  });
-  impl.for_points(executor, [&](std::size_t i, std::size_t point) {
-    const packed::Row& f = impl.force[point];
-    const packed::Row& t = impl.turn[point];
-    loads.force[i] += Vec3(f.x, f.y, f.z);
-    loads.torque[i] += Vec3(t.x, t.y, t.z);
-  });
 }
 
 }  // namespace supple::core

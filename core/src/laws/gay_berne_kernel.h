@@ -77,17 +77,25 @@ struct PairKernel<SwitchedGayBerne> {
     p[14] = law.switch_from;
     p[15] = 1.0 / (law.cut_off - law.switch_from);
   }
+  /// G_X and B_X of a particle.
   template <class T>
-  static KernelLoads<T> loads(const T* p, const KernelPair<T>& pair) {
-    const SymmetricRows<T> g_a = turned_diagonal(pair.orientation_a, p), g_b = turned_diagonal(pair.orientation_b, p);
-    const SymmetricRows<T> b_a = turned_diagonal(pair.orientation_a, p + 3);
-    const SymmetricRows<T> b_b = turned_diagonal(pair.orientation_b, p + 3);
-    const SymmetricRows<T> g = g_a + g_b, b = b_a + b_b;
+  struct Own {
+    SymmetricRows<T> g, b;
+  };
+  template <class T>
+  static Own<T> own(const T* p, const Rotation<T>& orientation) {
+    return {turned_diagonal(orientation, p), turned_diagonal(orientation, p + 3)};
+  }
+  /// What a neighbour at r does to a particle: -force_b and torque_a. From the other particle force_b is the opposite, to the bit.
+  template <class T>
+  static KernelLoads<T> loads_on(const Own<T>& a, const T* p, const Rotation<T>& orientation, const Vector<T>& r) {
+    const Own<T> other = own(p, orientation);
+    const SymmetricRows<T> g = a.g + other.g, b = a.b + other.b;
     const SymmetricRows<T> g_adjugate = g.adjugate(), b_adjugate = b.adjugate();
     const T inverse_g = T(1.0) / dot(g.x, g_adjugate.x), inverse_b = T(1.0) / dot(b.x, b_adjugate.x);
-    const T d2 = dot(pair.r, pair.r);
+    const T d2 = dot(r, r);
     const T d = sqrt(d2);
-    const Vector<T> u = (T(1.0) / d) * pair.r;
+    const Vector<T> u = (T(1.0) / d) * r;
     const Vector<T> kappa = inverse_g * g_adjugate.times(u), iota = inverse_b * b_adjugate.times(u);
     const T u_kappa = dot(u, kappa), u_iota = dot(u, iota);
 
@@ -116,8 +124,8 @@ struct PairKernel<SwitchedGayBerne> {
       return (T(2.0) * share) * (touching + deepening - (by_eta * inverse_g) * twist(g_x, g_adjugate));
     };
     return {.force_b = scaled_sum(radial, u, T(-1.0) * share * along),
-            .torque_a = torque(g_a, b_a),
-            .torque_b = torque(g_b, b_b)};
+            .torque_a = torque(a.g, a.b),
+            .torque_b = {}};
   }
 
  private:

@@ -53,13 +53,27 @@ void for_each_list(const Interactions& interactions, const Visit& visit) {
   for_each_geometric(interactions, visit_all);
 }
 
+/// The stiffness of a law, found once where it is the same at every distance.
+template <class Law>
+class PairStiffness {
+ public:
+  explicit PairStiffness(const Law& law) : law_(law) {
+    if constexpr (!kOfDistance) same_ = stiffness(law);
+  }
+  [[nodiscard]] Stiffness at(double rest_distance) const {
+    if constexpr (kOfDistance) return stiffness(law_, rest_distance);
+    return same_;
+  }
+
+ private:
+  static constexpr bool kOfDistance = requires(const Law& law) { stiffness(law, 0.0); };
+  const Law& law_;
+  Stiffness same_{};
+};
+
 template <class Law>
 Stiffness pair_stiffness(const Law& law, double rest_distance) {
-  if constexpr (requires { stiffness(law, rest_distance); }) {
-    return stiffness(law, rest_distance);
-  } else {
-    return stiffness(law);
-  }
+  return PairStiffness<Law>(law).at(rest_distance);
 }
 
 }  // namespace
@@ -123,12 +137,24 @@ double largest_frequency(const ParticleSet& set, const ParticleState& rest, cons
     total[i].translation += k.translation;
     total[i].rotation += k.rotation;
   };
-  for_each_list(interactions, [&](const auto& list) {
-    for_each_pair(list, set, rest, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
-      const Stiffness k = pair_stiffness(law, (rest.position[b] - rest.position[a]).norm());
-      add(k, a);
-      add(k, b);
-    });
+  for_each_bonded(interactions, [&](const auto& lists) {
+    for (const auto& list : lists) {
+      for_each_pair(list, set, rest, [&](const auto& law, std::uint32_t a, std::uint32_t b) {
+        const Stiffness k = pair_stiffness(law, (rest.position[b] - rest.position[a]).norm());
+        add(k, a);
+        add(k, b);
+      });
+    }
+  });
+  for_each_geometric(interactions, [&](const auto& lists) {
+    for (const auto& list : lists) {
+      const PairStiffness stiffness(list.law);
+      for_each_pair(list, set, rest, [&](const auto&, std::uint32_t a, std::uint32_t b) {
+        const Stiffness k = stiffness.at((rest.position[b] - rest.position[a]).norm());
+        add(k, a);
+        add(k, b);
+      });
+    }
   });
   for (const BondedLaw<LiteralForm>& list : interactions.literal_form) {
     for (std::size_t k = 0; k < list.law.size(); ++k) {

@@ -10,16 +10,20 @@
 #include "laws/bond_runs.h"
 #include "laws/gay_berne_kernel.h"
 #include "laws/pair_kernels.h"
-#include "neighbours/neighbour_grid.h"
+#include "neighbours/pair_lists.h"
 #include "supple/core/interactions.h"
 
 namespace supple::core {
 
-/// Rows of four, the last number 0 except for the quaternion.
-struct alignas(32) StagedPose {
-  std::array<double, 4> position;
-  std::array<double, 4> orientation;
-  std::array<double, 4> normal;
+/// x, y, z and 0, or a quaternion.
+struct alignas(32) StagedRow {
+  std::array<double, 4> value;
+};
+
+/// Rows of the particles and, of geometric laws, of the two fillers of their lists: far away and far from each other, so that
+/// they are in range of nothing. What no law reads is empty.
+struct StagedPoses {
+  std::vector<StagedRow> position, orientation, normal;
 };
 
 struct alignas(32) StagedLoads {
@@ -44,7 +48,6 @@ struct PackedPairs {
   std::vector<std::uint32_t> second;
   std::size_t count = 0;
 
-  void clear();
   void add(std::uint32_t a, std::uint32_t b);
   void pad();
   [[nodiscard]] std::size_t batches() const { return (count + kLanes - 1) / kLanes; }
@@ -58,21 +61,13 @@ struct PackedBonds {
   std::vector<LaneRow> numbers;
 };
 
-/// A geometric law, with the particles it may act on and the pairs in range at this step.
+/// A geometric law and the lists of the particles it acts on.
 template <class Law>
 struct PackedGeometric {
   using LawType = Law;
   double range = 0.0;
-  bool same_object = false;
-  std::array<LaneRow, PairKernel<Law>::kNumbers> numbers;
-  std::vector<std::uint32_t> particle;  ///< ascending
-  std::vector<std::uint8_t> side;       ///< whether it belongs to object_b
-  PairKinds kinds = PairKinds::Any;
-  std::vector<std::uint32_t> kind;      ///< of `particle`; empty: all of one type
-  std::vector<Vec3> position;
-  std::vector<Vec3> reference;          ///< positions at which `near` was found
-  std::vector<IndexPair> near;          ///< nearer than the range and a skin then; indices into `particle`
-  PackedPairs pairs;
+  std::array<double, PairKernel<Law>::kNumbers> numbers;
+  PairLists lists;
 };
 
 struct InteractionWorkspace::Impl {
@@ -98,11 +93,11 @@ struct InteractionWorkspace::Impl {
   std::size_t bond_count = 0;      ///< those and the ones of `runs`, which come after
   std::size_t law_bonds = 0;       ///< each counted once for every law on it
 
-  NeighbourGrid grid;
-  std::vector<StagedPose> pose;
+  StagedPoses pose;
   std::vector<StagedLoads> sum;
-  std::vector<StagedPairLoads> pair_loads;  ///< of all bonds in `bonded`, or of one geometric law
+  std::vector<StagedPairLoads> pair_loads;  ///< of all bonds in `bonded`
   std::vector<runs::BondLoads> run_loads;
+  std::vector<std::uint64_t> present;       ///< pairs in range, of each block of a geometric law
   std::vector<std::vector<std::size_t>> batch_bonds;  ///< of each group the first bond of each batch
 
   /// For each particle its bonds in ascending order: 2 bond, +1 where it is the second of the pair.

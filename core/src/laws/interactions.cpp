@@ -1,12 +1,12 @@
 #include "supple/core/interactions.h"
 
 #include <algorithm>
+#include <bit>
 #include <functional>
 #include <utility>
 
 #include "laws/interaction_workspace.h"
 #include "laws/law_lists.h"
-#include "neighbours/packed_lanes.h"
 #include "supple/core/error.h"
 
 namespace supple::core {
@@ -16,50 +16,46 @@ namespace {
 constexpr std::size_t kSerialPairs = 1024;
 constexpr std::size_t kBatchBlock = 128;
 constexpr std::size_t kParticleBlock = 512;
-/// Skin of the kept pairs of a geometric law, in ranges.
-constexpr double kSkin = 0.15;
-/// Square of the largest move, in skins: half of one, less the rounding of distances.
-constexpr double kMoveLimit2 = 0.2499;
+/// A coordinate of the fillers of lists, whose square is finite.
+constexpr double kFarAway = 1e150;
+constexpr std::size_t kFillers = 2;
 
-void load_rows(const double* a, const double* b, const double* c, const double* d, std::array<Lanes, 4>& columns) {
-  columns = {Lanes::load(a), Lanes::load(b), Lanes::load(c), Lanes::load(d)};
-  transpose(columns[0], columns[1], columns[2], columns[3]);
+/// The rows of four particles as columns.
+[[gnu::always_inline]] inline std::array<Lanes, 4> load_rows(const StagedRow* rows, const std::uint32_t* j) {
+  std::array<Lanes, 4> c{Lanes::load(rows[j[0]].value.data()), Lanes::load(rows[j[1]].value.data()),
+                         Lanes::load(rows[j[2]].value.data()), Lanes::load(rows[j[3]].value.data())};
+  transpose(c[0], c[1], c[2], c[3]);
+  return c;
+}
+[[gnu::always_inline]] inline Vector<Lanes> load_vectors_of(const StagedRow* rows, const std::uint32_t* j) {
+  const std::array<Lanes, 4> c = load_rows(rows, j);
+  return {c[0], c[1], c[2]};
+}
+[[gnu::always_inline]] inline Rotation<Lanes> load_rotations_of(const StagedRow* rows, const std::uint32_t* j) {
+  const std::array<Lanes, 4> c = load_rows(rows, j);
+  return {{c[0], c[1], c[2]}, c[3]};
 }
 
 /// One batch: poses to lanes, the kernel, and its loads back as one row for each pair.
 template <class Law>
-void evaluate_batch(const std::vector<StagedPose>& pose, const std::uint32_t* first, const std::uint32_t* second,
+void evaluate_batch(const StagedPoses& pose, const std::uint32_t* first, const std::uint32_t* second,
                     const LaneRow* numbers, std::array<StagedPairLoads, kLanes>& out) {
   using Kernel = PairKernel<Law>;
-  const StagedPose& a0 = pose[first[0]];
-  const StagedPose& a1 = pose[first[1]];
-  const StagedPose& a2 = pose[first[2]];
-  const StagedPose& a3 = pose[first[3]];
-  const StagedPose& b0 = pose[second[0]];
-  const StagedPose& b1 = pose[second[1]];
-  const StagedPose& b2 = pose[second[2]];
-  const StagedPose& b3 = pose[second[3]];
-
   KernelPair<Lanes> pair{};
   // x_B - x_A before the transposition: one instead of two.
-  std::array<Lanes, 4> r{Lanes::load(b0.position.data()) - Lanes::load(a0.position.data()),
-                         Lanes::load(b1.position.data()) - Lanes::load(a1.position.data()),
-                         Lanes::load(b2.position.data()) - Lanes::load(a2.position.data()),
-                         Lanes::load(b3.position.data()) - Lanes::load(a3.position.data())};
+  std::array<Lanes, 4> r;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    r[k] = Lanes::load(pose.position[second[k]].value.data()) - Lanes::load(pose.position[first[k]].value.data());
+  }
   transpose(r[0], r[1], r[2], r[3]);
   pair.r = {r[0], r[1], r[2]};
-  std::array<Lanes, 4> c;
   if constexpr (Kernel::kOrientation) {
-    load_rows(a0.orientation.data(), a1.orientation.data(), a2.orientation.data(), a3.orientation.data(), c);
-    pair.orientation_a = {{c[0], c[1], c[2]}, c[3]};
-    load_rows(b0.orientation.data(), b1.orientation.data(), b2.orientation.data(), b3.orientation.data(), c);
-    pair.orientation_b = {{c[0], c[1], c[2]}, c[3]};
+    pair.orientation_a = load_rotations_of(pose.orientation.data(), first);
+    pair.orientation_b = load_rotations_of(pose.orientation.data(), second);
   }
   if constexpr (Kernel::kNormal) {
-    load_rows(a0.normal.data(), a1.normal.data(), a2.normal.data(), a3.normal.data(), c);
-    pair.normal_a = {c[0], c[1], c[2]};
-    load_rows(b0.normal.data(), b1.normal.data(), b2.normal.data(), b3.normal.data(), c);
-    pair.normal_b = {c[0], c[1], c[2]};
+    pair.normal_a = load_vectors_of(pose.normal.data(), first);
+    pair.normal_b = load_vectors_of(pose.normal.data(), second);
   }
   std::array<Lanes, Kernel::kNumbers> p;
   for (std::size_t k = 0; k < Kernel::kNumbers; ++k) p[k] = Lanes::load(numbers[k].value.data());
@@ -98,7 +94,7 @@ void scatter(const StagedPairLoads& loads, StagedLoads& a, StagedLoads& b) {
 /// Pairs in order, both sides at once. The sums of a particle are associated as in `gather`.
 template <class Law>
 void accumulate_in_order(const PackedPairs& pairs, const LaneRow* numbers, std::size_t stride,
-                         const std::vector<StagedPose>& pose, std::vector<StagedLoads>& sum) {
+                         const StagedPoses& pose, std::vector<StagedLoads>& sum) {
   std::array<StagedPairLoads, kLanes> loads;
   for (std::size_t begin = 0; begin < pairs.count; begin += kLanes, numbers += stride) {
     evaluate_batch<Law>(pose, &pairs.first[begin], &pairs.second[begin], numbers, loads);
@@ -112,7 +108,7 @@ void accumulate_in_order(const PackedPairs& pairs, const LaneRow* numbers, std::
 /// Each pair to its own slot of `out`, in blocks.
 template <class Law>
 void evaluate_pairs(const PackedPairs& pairs, const LaneRow* numbers, std::size_t stride, const Executor& executor,
-                    const std::vector<StagedPose>& pose, StagedPairLoads* out) {
+                    const StagedPoses& pose, StagedPairLoads* out) {
   const auto body = [&](std::size_t begin, std::size_t end) {
     std::array<StagedPairLoads, kLanes> loads{};
     for (std::size_t batch = begin; batch < end; ++batch) {
@@ -138,18 +134,23 @@ void for_particles(std::size_t particles, const Executor& executor, const Body& 
 /// Poses for the laws that are no runs; sums are set to 0.
 void stage_poses(const ParticleSet& set, const ParticleState& state, const Executor& executor,
                  InteractionWorkspace::Impl& work) {
-  work.pose.resize(set.size());
-  work.sum.resize(set.size());
-  for_particles(set.size(), executor, [&](std::size_t begin, std::size_t end) {
+  const std::size_t n = set.size();
+  StagedPoses& pose = work.pose;
+  pose.position.resize(n + kFillers);
+  if (work.needs_orientation) pose.orientation.resize(n + kFillers, {{0.0, 0.0, 0.0, 1.0}});
+  if (work.needs_normal) pose.normal.resize(n + kFillers);
+  work.sum.resize(n + kFillers);
+  pose.position[n].value.fill(kFarAway);
+  pose.position[n + 1].value.fill(-kFarAway);
+  for_particles(n, executor, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      StagedPose& pose = work.pose[i];
       const Vec3& x = state.position[i];
-      pose.position = {x.x(), x.y(), x.z(), 0.0};
+      pose.position[i] = {{x.x(), x.y(), x.z(), 0.0}};
       const Quat& q = state.orientation[i];
-      if (work.needs_orientation) pose.orientation = {q.x(), q.y(), q.z(), q.w()};
+      if (work.needs_orientation) pose.orientation[i] = {{q.x(), q.y(), q.z(), q.w()}};
       if (work.needs_normal) {
-        const Vec3 n = q * set.normal[i];
-        pose.normal = {n.x(), n.y(), n.z(), 0.0};
+        const Vec3 normal = q * set.normal[i];
+        pose.normal[i] = {{normal.x(), normal.y(), normal.z(), 0.0}};
       }
       work.sum[i] = StagedLoads{};
     }
@@ -245,53 +246,179 @@ void accumulate_bonds(const Executor& executor, InteractionWorkspace::Impl& work
   gather(executor, work);
 }
 
-double dot(const Vec3& a, const Vec3& b) { return fma(a.x(), b.x(), fma(a.y(), b.y(), a.z() * b.z())); }
+/// `set` where the mask is, else `clear`.
+Vector<Lanes> where(Lanes mask, const Vector<Lanes>& set, const Vector<Lanes>& clear) {
+  return {by_highest_bit(mask, set.x, clear.x), by_highest_bit(mask, set.y, clear.y), by_highest_bit(mask, set.z, clear.z)};
+}
+Vector<Lanes> masked(Lanes mask, const Vector<Lanes>& v) { return {mask & v.x, mask & v.y, mask & v.z}; }
 
-/// Pairs nearer than the range and a skin, kept until a particle has moved by half the skin. Only pairs in range act,
-/// in their order, so that no bit depends on when the pairs were found.
+/// What a kernel keeps of a particle for all its neighbours.
+struct Nothing {};
+template <class Kernel, bool kKeeps = Kernel::kOrientation>
+struct OwnNumbers {
+  using Type = Nothing;
+};
+template <class Kernel>
+struct OwnNumbers<Kernel, true> {
+  using Type = typename Kernel::template Own<Lanes>;
+};
+
+/// Four particles that add up what their neighbours do to them.
 template <class Law>
-void find_near_pairs(PackedGeometric<Law>& law, const ParticleState& state, const Executor& executor,
-                     InteractionWorkspace::Impl& work, InteractionCounts& counts) {
-  law.position.resize(law.particle.size());
-  for (std::size_t k = 0; k < law.particle.size(); ++k) law.position[k] = state.position[law.particle[k]];
-  if (law.position.empty()) return;
-  const double skin = kSkin * law.range;
-  const bool kept = law.reference.size() == law.position.size() &&
-                    packed::largest_move2(law.position[0].data(), law.reference[0].data(), law.position.size()) <=
-                        kMoveLimit2 * skin * skin;
-  if (kept) {
-    counts.pairs_visited += law.near.size();
-    return;
+class Owners {
+ public:
+  using Kernel = PairKernel<Law>;
+
+  Owners(const StagedPoses& pose, const std::uint32_t* owner, const std::vector<StagedLoads>& sum)
+      : position_(pose.position.data()), other_normal_(pose.normal.data()), other_orientation_(pose.orientation.data()),
+        owner_(owner), index_(lanes_of_indices(owner)), x_(load_vectors_of(position_, owner)) {
+    if constexpr (Kernel::kOrientation) orientation_ = load_rotations_of(other_orientation_, owner);
+    if constexpr (Kernel::kNormal) normal_ = load_vectors_of(other_normal_, owner);
+    force_ = load(sum, &StagedLoads::force);
+    if constexpr (Kernel::kTorque) torque_ = load(sum, &StagedLoads::torque);
   }
-  counts.pairs_visited += work.grid.find(law.position, law.range + skin, executor, law.near);
-  law.reference = law.position;
+  /// @return all bits of the lanes whose neighbour is in range
+  [[gnu::always_inline]] Lanes near(Lanes range2, const std::uint32_t* j) const {
+    const Vector<Lanes> r = load_vectors_of(position_, j) - x_;
+    return less(dot(r, r), range2);
+  }
+  /// Adds what one neighbour does to each. @param one  the numbers of the law, and as lanes
+  /// @return a bit for each pair in range
+  [[gnu::always_inline]] unsigned add(const double* one, const Lanes* numbers, Lanes range2, const std::uint32_t* j) {
+    KernelPair<Lanes> pair{};
+    const Vector<Lanes> r = load_vectors_of(position_, j) - x_;
+    const Lanes near = less(dot(r, r), range2);
+    if constexpr (requires { Kernel::loads_of_one(one, numbers, pair); }) {
+      pair.r = r;
+      force_ = force_ - masked(near, Kernel::loads_of_one(one, numbers, pair).force_b);
+    } else if constexpr (!Kernel::kTorque) {
+      // What acts along r is the same from both sides.
+      pair.r = r;
+      force_ = force_ - masked(near, Kernel::loads(numbers, pair).force_b);
+    } else if constexpr (Kernel::kOrientation) {
+      const auto loads = Kernel::loads_on(own_, numbers, load_rotations_of(other_orientation_, j), r);
+      force_ = force_ - masked(near, loads.force_b);
+      torque_ = torque_ + masked(near, loads.torque_a);
+    } else {
+      // The first of a pair has the lower index, so that both of its particles compute the same.
+      const Lanes second = less(lanes_of_indices(j), index_);
+      const Lanes sign = second & Lanes(-0.0);
+      pair.r = {r.x ^ sign, r.y ^ sign, r.z ^ sign};
+      const Vector<Lanes> other = load_vectors_of(other_normal_, j);
+      pair.normal_a = where(second, other, normal_);
+      pair.normal_b = where(second, normal_, other);
+      const KernelLoads<Lanes> loads = Kernel::loads(numbers, pair);
+      const Vector<Lanes>& f = loads.force_b;
+      force_ = force_ - masked(near, Vector<Lanes>{f.x ^ sign, f.y ^ sign, f.z ^ sign});
+      torque_ = torque_ + masked(near, where(second, loads.torque_b, loads.torque_a));
+    }
+    return bits_of(near);
+  }
+  void prepare(const Lanes* numbers) {
+    if constexpr (Kernel::kOrientation) own_ = Kernel::own(numbers, orientation_);
+  }
+  void store(std::size_t count, std::vector<StagedLoads>& sum) const {
+    store(force_, count, sum, &StagedLoads::force);
+    if constexpr (Kernel::kTorque) store(torque_, count, sum, &StagedLoads::torque);
+  }
+
+ private:
+  using LoadRow = std::array<double, 4> StagedLoads::*;
+  Vector<Lanes> load(const std::vector<StagedLoads>& sum, LoadRow row) const {
+    std::array<Lanes, 4> c;
+    for (std::size_t k = 0; k < kLanes; ++k) c[k] = Lanes::load((sum[owner_[k]].*row).data());
+    transpose(c[0], c[1], c[2], c[3]);
+    return {c[0], c[1], c[2]};
+  }
+  void store(const Vector<Lanes>& v, std::size_t count, std::vector<StagedLoads>& sum, LoadRow row) const {
+    std::array<Lanes, 4> rows{v.x, v.y, v.z, Lanes(0.0)};
+    transpose(rows[0], rows[1], rows[2], rows[3]);
+    for (std::size_t k = 0; k < count; ++k) rows[k].store((sum[owner_[k]].*row).data());
+  }
+
+  const StagedRow* position_;
+  const StagedRow* other_normal_;
+  const StagedRow* other_orientation_;
+  const std::uint32_t* owner_;
+  Lanes index_;
+  Vector<Lanes> x_, normal_{}, force_, torque_{};
+  Rotation<Lanes> orientation_{};
+  typename OwnNumbers<Kernel>::Type own_{};
+};
+
+/// The neighbours in range of four particles, each column a list of its own that is filled up with fillers.
+struct NearColumns {
+  std::vector<std::uint32_t> entry;  ///< shape [steps][kLanes]
+  std::uint32_t steps = 0;
+
+  template <class Law>
+  void take(const Owners<Law>& owners, Lanes range2, const std::uint32_t* j, std::uint32_t listed, std::uint32_t filler) {
+    if (entry.size() < kLanes * (listed + std::size_t{1})) entry.resize(2 * kLanes * (listed + std::size_t{1}));
+    std::array<std::uint32_t, kLanes> count{};
+    for (std::uint32_t s = 0; s < listed; ++s, j += kGroup) {
+      const unsigned near = bits_of(owners.near(range2, j));
+      for (std::uint32_t k = 0; k < kLanes; ++k) {
+        entry[kLanes * count[k] + k] = j[k];
+        count[k] += near >> k & 1U;
+      }
+    }
+    steps = *std::max_element(count.begin(), count.end());
+    for (std::uint32_t k = 0; k < kLanes; ++k) {
+      for (std::uint32_t s = count[k]; s < steps; ++s) entry[kLanes * s + k] = filler;
+    }
+  }
+};
+
+/// @return pairs in range, each counted from both sides
+template <class Law>
+std::uint64_t accumulate_block(const PackedGeometric<Law>& law, const PairLists::Block& block, const StagedPoses& pose,
+                               std::vector<StagedLoads>& sum) {
+  std::array<Lanes, PairKernel<Law>::kNumbers> numbers;
+  for (std::size_t n = 0; n < numbers.size(); ++n) numbers[n] = Lanes(law.numbers[n]);
+  const Lanes range2(law.range * law.range);
+  const auto filler = static_cast<std::uint32_t>(sum.size() - kFillers);
+  thread_local NearColumns near;
+  std::uint64_t present = 0;
+  for (const PairGroup& group : block.group) {
+    for (std::size_t first = 0; first < group.owners; first += kLanes) {
+      Owners<Law> owners(pose, group.owner.data() + first, sum);
+      owners.prepare(numbers.data());
+      const std::uint32_t* j = block.entry.data() + group.begin + first;
+      std::uint32_t steps = group.steps;
+      std::size_t stride = kGroup;
+      if constexpr (PairKernel<Law>::kTorque) {
+        // Laws that take longer than the search for what is in range.
+        near.take(owners, range2, j, group.steps, filler);
+        j = near.entry.data();
+        steps = near.steps;
+        stride = kLanes;
+      }
+      for (std::uint32_t s = 0; s < steps; ++s, j += stride) {
+        present += static_cast<unsigned>(std::popcount(owners.add(law.numbers.data(), numbers.data(), range2, j)));
+      }
+      owners.store(std::min<std::size_t>(kLanes, group.owners - first), sum);
+    }
+  }
+  return present;
 }
 
 template <class Law>
 void accumulate_geometric(PackedGeometric<Law>& law, const ParticleState& state, const Executor& executor,
                           InteractionWorkspace::Impl& work, InteractionCounts& counts) {
-  find_near_pairs(law, state, executor, work, counts);
-  law.pairs.clear();
-  const double range2 = law.range * law.range;
-  for (const IndexPair& pair : law.near) {
-    if (!law.same_object && law.side[pair.first] == law.side[pair.second]) continue;
-    if (!law.kind.empty() && !takes_kinds(law.kinds, law.kind[pair.first], law.kind[pair.second])) continue;
-    const Vec3 r = law.position[pair.first] - law.position[pair.second];
-    if (dot(r, r) < range2) law.pairs.add(law.particle[pair.first], law.particle[pair.second]);
+  counts.pairs_visited += law.lists.update(state.position, executor);
+  const std::span<const PairLists::Block> blocks = law.lists.blocks();
+  work.present.assign(blocks.size(), 0);
+  const auto body = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) work.present[b] = accumulate_block(law, blocks[b], work.pose, work.sum);
+  };
+  executor.for_blocks(blocks.size(), 1, std::cref(body));
+  std::uint64_t listed = 0, present = 0;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    listed += blocks[b].pairs;
+    present += work.present[b];
   }
-  law.pairs.pad();
-  counts.pairs_present += law.pairs.count;
-
-  if (executor.threads() == 1 || law.pairs.count < kSerialPairs) {
-    accumulate_in_order<Law>(law.pairs, law.numbers.data(), 0, work.pose, work.sum);
-    return;
-  }
-  if (work.pair_loads.size() < law.pairs.count) work.pair_loads.resize(law.pairs.count);
-  evaluate_pairs<Law>(law.pairs, law.numbers.data(), 0, executor, work.pose, work.pair_loads.data());
-  for (std::size_t k = 0; k < law.pairs.count; ++k) {
-    scatter<PairKernel<Law>::kTorque>(work.pair_loads[k], work.sum[law.pairs.first[k]],
-                                      work.sum[law.pairs.second[k]]);
-  }
+  counts.pairs_visited += listed / 2;
+  counts.pairs_present += present / 2;
 }
 
 /// The lists that are no runs. @param taken  by runs, list by list
@@ -319,20 +446,26 @@ void pack_bonds(const std::vector<BondedLaw<Law>>& laws, std::vector<bool>::cons
 
 template <class Law>
 PackedGeometric<Law> pack_geometric(const GeometricLaw<Law>& law, const ParticleSet& set) {
-  using Kernel = PairKernel<Law>;
-  PackedGeometric<Law> out;
-  out.range = law.range;
-  out.same_object = law.object_a == law.object_b;
-  out.kinds = law.kinds;
-  std::array<double, Kernel::kNumbers> numbers;
-  Kernel::pack(law.law, numbers.data());
-  for (std::size_t n = 0; n < Kernel::kNumbers; ++n) out.numbers[n].value.fill(numbers[n]);
+  std::vector<std::uint32_t> particle;
+  std::vector<std::uint8_t> side;   // whether it belongs to object_b
+  std::vector<std::uint32_t> kind;
   for (std::uint32_t i = 0; i < set.size(); ++i) {
     if (set.object[i] != law.object_a && set.object[i] != law.object_b) continue;
-    out.particle.push_back(i);
-    out.side.push_back(set.object[i] == law.object_b ? 1 : 0);
-    if (law.kinds != PairKinds::Any) out.kind.push_back(set.kind.empty() ? 0 : set.kind[i]);
+    particle.push_back(i);
+    side.push_back(set.object[i] == law.object_b ? 1 : 0);
+    kind.push_back(set.kind.empty() ? 0 : set.kind[i]);
   }
+  PairLists::Takes takes;
+  const bool same_object = law.object_a == law.object_b;
+  if (!same_object || law.kinds != PairKinds::Any) {
+    takes = [same_object, kinds = law.kinds, side, kind](std::uint32_t i, std::uint32_t j) {
+      return (same_object || side[i] != side[j]) && takes_kinds(kinds, kind[i], kind[j]);
+    };
+  }
+  PackedGeometric<Law> out{.range = law.range,
+                           .numbers = {},
+                           .lists = PairLists(law.range, particle, static_cast<std::uint32_t>(set.size()), takes)};
+  PairKernel<Law>::pack(law.law, out.numbers.data());
   return out;
 }
 
@@ -377,12 +510,6 @@ void build_gather_lists(std::size_t particles, InteractionWorkspace::Impl& work)
 }
 
 }  // namespace
-
-void PackedPairs::clear() {
-  first.clear();
-  second.clear();
-  count = 0;
-}
 
 void PackedPairs::add(std::uint32_t a, std::uint32_t b) {
   first.push_back(a);

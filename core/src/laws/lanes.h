@@ -9,7 +9,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
+#include "base/exponential.h"
 #include "supple/core/math.h"
 
 namespace supple::core {
@@ -32,6 +34,8 @@ struct Lanes {
   friend Lanes operator-(Lanes a, Lanes b) { return _mm256_sub_pd(a.v, b.v); }
   friend Lanes operator*(Lanes a, Lanes b) { return _mm256_mul_pd(a.v, b.v); }
   friend Lanes operator/(Lanes a, Lanes b) { return _mm256_div_pd(a.v, b.v); }
+  friend Lanes operator&(Lanes a, Lanes b) { return _mm256_and_pd(a.v, b.v); }
+  friend Lanes operator^(Lanes a, Lanes b) { return _mm256_xor_pd(a.v, b.v); }
   friend Lanes operator-(Lanes a) { return _mm256_xor_pd(a.v, _mm256_set1_pd(-0.0)); }
 };
 
@@ -41,10 +45,16 @@ inline Lanes sqrt(Lanes a) { return _mm256_sqrt_pd(a.v); }
 /// The positive part; 0 where a is NaN or negative.
 inline Lanes positive(Lanes a) { return _mm256_max_pd(a.v, _mm256_setzero_pd()); }
 inline Lanes least(Lanes a, Lanes b) { return _mm256_min_pd(a.v, b.v); }
-/// value where a < b, else 0.
-inline Lanes where_less(Lanes a, Lanes b, Lanes value) {
-  return _mm256_and_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LT_OQ), value.v);
+/// All bits set where a < b.
+inline Lanes less(Lanes a, Lanes b) { return _mm256_cmp_pd(a.v, b.v, _CMP_LT_OQ); }
+/// The highest bit of each lane, that of the first lowest.
+inline unsigned bits_of(Lanes a) { return static_cast<unsigned>(_mm256_movemask_pd(a.v)); }
+/// Whole numbers below 2^31.
+inline Lanes lanes_of_indices(const std::uint32_t* at) {
+  return _mm256_cvtepi32_pd(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at)));
 }
+/// value where a < b, else 0.
+inline Lanes where_less(Lanes a, Lanes b, Lanes value) { return less(a, b) & value; }
 /// The first `count` lanes, the others 0.
 inline Lanes first_lanes(Lanes a, std::size_t count) {
   const __m256i lane = _mm256_set_epi64x(3, 2, 1, 0);
@@ -57,11 +67,22 @@ inline Lanes by_highest_bit(Lanes bits, Lanes set, Lanes clear) { return _mm256_
 inline Lanes next_bit(Lanes bits) {
   return _mm256_castsi256_pd(_mm256_slli_epi64(_mm256_castpd_si256(bits.v), 1));
 }
+/// 2^k of whole numbers whose result is a normal double.
+inline __m256d power_of_two(__m128i k) {
+  return _mm256_castsi256_pd(_mm256_slli_epi64(_mm256_cvtepi32_epi64(_mm_add_epi32(k, _mm_set1_epi32(1023))), 52));
+}
+/// math::exp of each lane.
 inline Lanes exp(Lanes a) {
-  alignas(32) std::array<double, kLanes> x;
-  a.store(x.data());
-  for (double& value : x) value = math::exp(value);
-  return Lanes::load(x.data());
+  const Lanes least_exponent(math::kLeastExponent), largest(math::kLargestExponent);
+  const math::Exponential<Lanes> e(_mm256_min_pd(_mm256_max_pd(a.v, least_exponent.v), largest.v));
+  const __m128i exponent = _mm256_cvtpd_epi32(e.k.v);
+  const __m128i half = _mm_srai_epi32(_mm_add_epi32(exponent, _mm_srli_epi32(exponent, 31)), 1);  // towards 0
+  const __m256d value =
+      _mm256_mul_pd(_mm256_mul_pd(e.mantissa.v, power_of_two(half)), power_of_two(_mm_sub_epi32(exponent, half)));
+  const __m256d finite = _mm256_andnot_pd(less(a, least_exponent).v, value);
+  const __m256d infinite = _mm256_set1_pd(std::numeric_limits<double>::infinity());
+  const __m256d known = _mm256_blendv_pd(finite, infinite, less(largest, a).v);
+  return _mm256_blendv_pd(known, a.v, _mm256_cmp_pd(a.v, a.v, _CMP_UNORD_Q));
 }
 
 /// function(a, b) of each lane.
@@ -97,6 +118,17 @@ T binary_power(const T& x, T digits) {
     digits = next_bit(digits);
     power = power * power;
     power = by_highest_bit(digits, power * x, power);
+  }
+  return power;
+}
+
+/// The same for all lanes. @pre exponent > 0
+template <class T>
+T whole_power(const T& x, int exponent) {
+  T power = x;
+  for (unsigned bit = std::bit_floor(static_cast<unsigned>(exponent)) >> 1U; bit != 0; bit >>= 1U) {
+    power = power * power;
+    if ((static_cast<unsigned>(exponent) & bit) != 0) power = power * x;
   }
   return power;
 }

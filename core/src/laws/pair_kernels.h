@@ -2,6 +2,7 @@
 // Each kernel packs a law into numbers that save work per step; evaluate() in pair_laws.cpp is the reference.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <limits>
@@ -219,17 +220,38 @@ struct PairKernel<LennardJones> {
     const T x = p[0] * inverse;
     const T repulsive = binary_power<kExponentBits>(x, p[1]);
     const T attractive = binary_power<kExponentBits>(x, p[2]);
-    const T force = p[3] * (repulsive - attractive) * inverse;
-    const T energy = fms(p[4], repulsive, p[5] * attractive);
-    const T t = least(positive((d - p[8]) * p[9]), T(1.0));
-    const T rest = T(1.0) - t;
-    const T share = T(1.0) - t * t * t * (T(10.0) - t * (T(15.0) - T(6.0) * t));
-    const T slope = T(-30.0) * p[9] * (t * t) * (rest * rest);
-    const T total = fms(force, share, fma(energy, slope, p[6]));
-    return {.force_b = where_less(d, p[7], total * inverse) * pair.r, .torque_a = {}, .torque_b = {}};
+    return truncated(p, pair, d, inverse, {repulsive, attractive}, true);
+  }
+  /// The same bits where all pairs have the numbers `one`, of which `p` are lanes: only what these numbers ask for is done.
+  template <class T>
+  static KernelLoads<T> loads_of_one(const double* one, const T* p, const KernelPair<T>& pair) {
+    const T d = sqrt(dot(pair.r, pair.r));
+    const T inverse = T(1.0) / d;
+    const T x = p[0] * inverse;
+    const T repulsive = whole_power(x, exponent_of(one[1]));
+    const T attractive = whole_power(x, exponent_of(one[2]));
+    return truncated(p, pair, d, inverse, {repulsive, attractive}, one[9] != 0.0);
   }
 
  private:
+  template <class T>
+  static KernelLoads<T> truncated(const T* p, const KernelPair<T>& pair, const T& d, const T& inverse,
+                                  const std::array<T, 2>& power, bool switched) {
+    const T force = p[3] * (power[0] - power[1]) * inverse;
+    T total = force - p[6];
+    if (switched) {
+      const T energy = fms(p[4], power[0], p[5] * power[1]);
+      const T t = least(positive((d - p[8]) * p[9]), T(1.0));
+      const T rest = T(1.0) - t;
+      const T share = T(1.0) - t * t * t * (T(10.0) - t * (T(15.0) - T(6.0) * t));
+      const T slope = T(-30.0) * p[9] * (t * t) * (rest * rest);
+      total = fms(force, share, fma(energy, slope, p[6]));
+    }
+    return {.force_b = where_less(d, p[7], total * inverse) * pair.r, .torque_a = {}, .torque_b = {}};
+  }
+  static int exponent_of(double packed) {
+    return static_cast<int>(std::bit_cast<std::uint64_t>(packed) >> (64 - kExponentBits));
+  }
   static constexpr int kExponentBits = 6;
   static_assert(LennardJones::kLargestExponent == (1 << kExponentBits) - 1);
   static double packed_exponent(int exponent) {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "neighbours/neighbour_grid.h"
+#include "neighbours/cell_search.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/math.h"
@@ -198,11 +198,10 @@ Bonds bonds_within(std::span<const Vec3> position, std::uint32_t begin, std::uin
 BondCount count_bonds_within(std::span<const Vec3> position, double distance) {
   constexpr std::uint64_t kMostCounted = 10'000'000;  // one by one, in a fraction of a second
   constexpr std::size_t kSample = 512;
-  NeighbourGrid grid;
-  const std::size_t stride = std::max<std::size_t>(1, position.size() / kSample);
-  const std::uint64_t estimate = stride * grid.count(position, distance, stride);
+  const auto stride = static_cast<std::uint32_t>(std::max<std::size_t>(1, position.size() / kSample));
+  const std::uint64_t estimate = stride * count_near_points(position, distance, stride) / 2;
   if (stride == 1 || estimate > kMostCounted) return {.number = estimate, .estimated = stride > 1};
-  return {.number = grid.count(position, distance, 1), .estimated = false};
+  return {.number = count_near_points(position, distance, 1) / 2, .estimated = false};
 }
 
 }  // namespace supple::core

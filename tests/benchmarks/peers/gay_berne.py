@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Gay-Berne ellipsoids by LAMMPS and core_bench: 8,000 of axes 1, 1.5 and 2, density 0.22, cut-off 4, T 2.4, time
-step 0.002.
+"""Gay-Berne ellipsoids, LAMMPS beside core_bench: 8,000 of axes 1, 1.5 and 2, density 0.22 in open space, cut-off 4,
+T 2.4, time step 0.002; core_bench runs the pair law as scenes do.
 
-Both start from the state that LAMMPS reaches from a lattice in 200 steps; the time is the CPU time of one thread
-for whole steps, neighbour lists included, both rebuilt when a particle has moved half the skin. Runs alternate and the
+Both start from the state that LAMMPS reaches from a lattice in 200 steps; what is timed is the CPU time of one thread
+for whole steps, neighbour lists included, rebuilt when a particle has moved half the skin. Runs alternate and the
 fastest of each counts.
 
     python3 tests/benchmarks/peers/gay_berne.py --bench build/release/bin/core_bench --venv DIR
@@ -19,8 +19,9 @@ import lammps_peer
 INPUT = """
 units lj
 atom_style ellipsoid
+boundary s s s
 lattice sc 0.22
-region box block 0 20 0 20 0 20
+region box block 0 19.9 0 19.9 0 19.9
 create_box 1 box
 create_atoms 1 box
 set type 1 mass 1.5

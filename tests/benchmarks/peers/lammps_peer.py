@@ -1,5 +1,4 @@
-"""Common code of the comparisons with LAMMPS: its environment, its CPU time, the states that it exports."""
-import array
+"""What the scripts beside LAMMPS share: its environment, its CPU time, the states it hands over."""
 import json
 import os
 import pathlib
@@ -14,11 +13,9 @@ def cpu():
 
 
 def run(lmp, steps, state, thermo, more=()):
-    """Writes box, positions, velocities and what `more` gathers to `state`, runs, and prints what happened as JSON."""
+    """Writes positions, velocities and what `more` gathers to `state`, runs, and prints what happened as JSON."""
     first = thermo()
-    low, high = lmp.extract_box()[:2]
     with open(state, "wb") as out:
-        array.array("d", [h - l for l, h in zip(low, high)]).tofile(out)
         for name in ("x", "v"):
             out.write(bytes(lmp.gather_atoms(name, 1, 3)))
         for name, count in more:

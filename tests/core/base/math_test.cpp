@@ -4,11 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <vector>
+
+#include "laws/lanes.h"
 
 namespace {
 
@@ -51,6 +55,26 @@ TEST(Exponential, HasItsLimits) {
   EXPECT_EQ(math::exp(710.0), std::numeric_limits<double>::infinity());
   EXPECT_LE(ulp_error(math::exp(709.5), std::exp(709.5L)), 1.0);
   EXPECT_TRUE(std::isnan(math::exp(std::numeric_limits<double>::quiet_NaN())));
+}
+
+TEST(Exponential, OfLanesHasTheSameBits) {
+  const double infinity = std::numeric_limits<double>::infinity(), limit = 0x1.62e42fefa39efp+9;
+  std::vector<double> x{0.0, -0.0, 1.0, -1.0, -708.0, std::nextafter(-708.0, -infinity), -745.0, -1e300, -infinity, limit,
+                        std::nextafter(limit, infinity), infinity, std::numeric_limits<double>::quiet_NaN(), 709.5, -707.5, 1e-300};
+  Draw draw(8);
+  while (x.size() < 20000) x.push_back(draw.uniform(-720.0, 720.0));
+  for (std::size_t i = 0; i + 4 <= x.size(); i += 4) {
+    std::array<double, 4> y{};
+    core::exp(core::Lanes::load_any(&x[i])).store_any(y.data());
+    for (std::size_t k = 0; k < 4; ++k) {
+      const double expected = math::exp(x[i + k]);
+      if (std::isnan(expected)) {
+        EXPECT_TRUE(std::isnan(y[k]));
+      } else {
+        EXPECT_EQ(std::bit_cast<std::uint64_t>(y[k]), std::bit_cast<std::uint64_t>(expected)) << x[i + k];
+      }
+    }
+  }
 }
 
 TEST(Logarithm, IsWithinOneAndAHalfUlp) {

@@ -1,8 +1,7 @@
-// Gay-Berne ellipsoids: the law of a pair, and the packed loop over all pairs of a list.
+// Gay-Berne ellipsoids: the law of a pair, and all pairs in range.
 #include "supple/core/gay_berne.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
@@ -12,7 +11,6 @@
 #include "supple/core/hash.h"
 #include "supple/core/interactions.h"
 #include "supple/core/pair_hessian.h"
-#include "support/allocations.h"
 
 namespace supple::core {
 namespace {
@@ -95,112 +93,6 @@ TEST(GayBerneLaw, AgreesWithLammps) {
   EXPECT_LE((load.force_b - Vec3(0.9654365609409167, 2.744717468403494, 3.402369809273335)).norm(), 1e-12);
   EXPECT_LE((load.torque_a - Vec3(0.8104840952553932, 1.097583587100314, -1.15925601431198)).norm(), 1e-12);
   EXPECT_LE((load.torque_b - Vec3(-0.9191929424445342, 0.4657883871892536, -0.07108139946989904)).norm(), 1e-12);
-}
-
-/// Ellipsoids on a disturbed lattice of spacing 2.1, so that none overlaps deeply.
-struct Ellipsoids {
-  std::vector<Vec3> position;
-  std::vector<Quat> orientation;
-  std::optional<PeriodicBox> box;
-
-  Ellipsoids(int side, std::uint64_t seed, bool periodic) {
-    Draw draw(seed);
-    constexpr double kSpacing = 2.1;
-    if (periodic) box = PeriodicBox{Vec3(1.0, -3.0, 0.5), Vec3::Constant(kSpacing * side)};
-    for (int i = 0; i < side * side * side; ++i) {
-      position.push_back(kSpacing * Vec3(i / side / side, i / side % side, i % side) + draw.vector(0.1));
-      orientation.push_back(draw.rotation());
-    }
-  }
-  [[nodiscard]] Vec3 between(std::size_t i, std::size_t j) const {
-    const Vec3 r = position[j] - position[i];
-    return box ? box->nearest_image(r) : r;
-  }
-};
-
-constexpr double kRange = 4.0;
-
-Loads loads_of(const Ellipsoids& all, const Executor& executor = Executor(1)) {
-  NeighbourList list(kRange, 0.3, all.box);
-  list.update(all.position, executor);
-  Loads loads;
-  loads.reset(all.position.size());
-  accumulate_geometric(list, kEllipsoids, all.orientation, executor, loads);
-  return loads;
-}
-
-TEST(GayBerneLoads, AreThoseOfEveryPairInRange) {
-  for (const bool periodic : {false, true}) {
-    const Ellipsoids all(5, 305, periodic);
-    const std::size_t count = all.position.size();
-    const Loads loads = loads_of(all);
-    Loads reference;
-    reference.reset(count);
-    std::vector<double> scale(count, 0.0);
-    for (std::uint32_t i = 0; i < count; ++i) {
-      for (std::uint32_t j = i + 1; j < count; ++j) {
-        PairPose pose{.r = all.between(i, j), .orientation_a = all.orientation[i], .orientation_b = all.orientation[j]};
-        if (pose.r.norm() >= kRange) continue;
-        const PairLoad load = evaluate(kEllipsoids, pose);
-        reference.force[i] -= load.force_b;
-        reference.force[j] += load.force_b;
-        reference.torque[i] += load.torque_a;
-        reference.torque[j] += load.torque_b;
-        for (const std::uint32_t k : {i, j}) {
-          scale[k] += load.force_b.norm() + load.torque_a.norm() + load.torque_b.norm();
-        }
-      }
-    }
-    // Some hundred roundings; the distance between surfaces is down to a third of that of centres and enters with the
-    // power 13.
-    for (std::size_t i = 0; i < count; ++i) {
-      EXPECT_GT(scale[i], 0.0);
-      EXPECT_LE((loads.force[i] - reference.force[i]).norm(), 1e-12 * scale[i]) << i << periodic;
-      EXPECT_LE((loads.torque[i] - reference.torque[i]).norm(), 1e-12 * scale[i]) << i << periodic;
-    }
-  }
-}
-
-TEST(GayBerneLoads, GiveNoForceAndNoMomentToTheWhole) {
-  const Ellipsoids all(8, 306, false);
-  const Loads loads = loads_of(all);
-  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
-  double force_scale = 0.0, moment_scale = 0.0;
-  for (std::size_t i = 0; i < all.position.size(); ++i) {
-    force += loads.force[i];
-    moment += all.position[i].cross(loads.force[i]) + loads.torque[i];
-    force_scale += loads.force[i].norm();
-    moment_scale += all.position[i].norm() * loads.force[i].norm() + loads.torque[i].norm();
-  }
-  EXPECT_LE(force.norm(), 1e-14 * force_scale);
-  EXPECT_LE(moment.norm(), 1e-14 * moment_scale);
-}
-
-TEST(GayBerneLoads, HaveTheSameBitsForEveryNumberOfThreadsAndEveryVectorWidth) {
-  const Ellipsoids all(12, 307, true);
-  const std::uint64_t one = test::hash_of(loads_of(all));
-  for (const int threads : {2, 3, 8}) EXPECT_EQ(test::hash_of(loads_of(all, Executor(threads))), one) << threads;
-  for (const auto target : {HWY_AVX2, HWY_AVX3}) {
-    if ((hwy::SupportedTargets() & target) == 0) continue;
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(target);
-    EXPECT_EQ(test::hash_of(loads_of(all)), one) << hwy::TargetName(target);
-    hwy::SetSupportedTargetsForTest(0);
-  }
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
-TEST(GayBerneLoads, AllocateNothingAfterTheFirstCall) {
-  const Ellipsoids all(8, 308, true);
-  const Executor executor(1);
-  NeighbourList list(kRange, 0.3, all.box);
-  list.update(all.position, executor);
-  Loads loads;
-  loads.reset(all.position.size());
-  accumulate_geometric(list, kEllipsoids, all.orientation, executor, loads);
-  const std::uint64_t before = supple::test::allocation_count();
-  accumulate_geometric(list, kEllipsoids, all.orientation, executor, loads);
-  EXPECT_EQ(supple::test::allocation_count(), before);
 }
 
 TEST(GayBerneLaw, RefusesSizesThatAreNotPositive) {

@@ -1,6 +1,7 @@
 #include "supple/core/interactions.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -308,6 +309,19 @@ TEST(Interactions, OfOneLawAloneHaveTheSameBitsForEveryNumberOfThreads) {
   }
 }
 
+TEST(Interactions, HaveTheSameBitsForEveryVectorWidth) {
+  const Crowd crowd = make_crowd(1000, 47);
+  const std::uint64_t any = hash_of(evaluate_loads(crowd.p, crowd.interactions, Executor(1)));
+  for (const auto target : {HWY_AVX2, HWY_AVX3}) {
+    if ((hwy::SupportedTargets() & target) == 0) continue;
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(target);
+    EXPECT_EQ(hash_of(evaluate_loads(crowd.p, crowd.interactions, Executor(1))), any) << hwy::TargetName(target);
+    hwy::SetSupportedTargetsForTest(0);
+  }
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
 TEST(Interactions, CountWhatTheyVisit) {
   const Crowd crowd = make_crowd(60, 36);
   const Evaluated loads = evaluate_loads(crowd.p, crowd.interactions, Executor(1));
@@ -361,6 +375,51 @@ TEST(GeometricLaws, GiveTheSameBitsFromKeptPairsAndFromNewOnes) {
                             loads.external);
     ASSERT_EQ(hash_of(loads), hash_of(evaluate_loads(crowd.p, crowd.interactions, executor))) << step;
   }
+}
+
+TEST(GeometricLaws, KeepTheEnergyOfAMelt) {
+  // 500 atoms in open space whose force ends smoothly. omega^2 = 57 * 2^(5/3) 12 / 12: omega dt = 0.03 for the stiffest
+  // pairs, and velocity Verlet holds the energy to (omega dt)^2.
+  constexpr int kCells = 5;
+  const double edge = std::cbrt(4.0 / 0.8442);
+  Particles p;
+  Draw draw(59);
+  for (int i = 0; i < kCells * kCells * kCells; ++i) {
+    const Vec3 corner(i % kCells, i / kCells % kCells, i / kCells / kCells);
+    for (const Vec3& basis : {Vec3(0, 0, 0), Vec3(0.5, 0.5, 0), Vec3(0.5, 0, 0.5), Vec3(0, 0.5, 0.5)}) {
+      p.add(edge * (corner + basis));
+      p.state.velocity.back() = draw.vector(1.5);
+    }
+  }
+  Interactions all;
+  const LennardJones law{.r0 = std::cbrt(std::sqrt(2.0)), .depth = 1.0, .cut_off = 2.5, .switch_from = 2.0};
+  all.geometric_lennard_jones.push_back({.name = "melt", .range = law.cut_off, .law = law});
+  InteractionWorkspace workspace(p.set, all);
+  Loads loads, external;
+  const auto forces = [&] {
+    loads.reset(p.set.size());
+    external.reset(p.set.size());
+    accumulate_interactions(p.set, p.state, all, 0.0, Executor(1), workspace, loads, external);
+  };
+  const auto energy = [&] {
+    double sum = potential_energy(p.set, p.state, all);
+    for (const Vec3& v : p.state.velocity) sum += 0.5 * v.squaredNorm();
+    return sum;
+  };
+  const auto kick = [&](double time) {
+    for (std::size_t i = 0; i < p.set.size(); ++i) p.state.velocity[i] += time * loads.force[i];
+  };
+  forces();
+  const double start = energy(), dt = 0.002;
+  double largest = 0.0;
+  for (int step = 0; step < 250; ++step) {
+    kick(0.5 * dt);
+    for (std::size_t i = 0; i < p.set.size(); ++i) p.state.position[i] += dt * p.state.velocity[i];
+    forces();
+    kick(0.5 * dt);
+    if (step % 10 == 9) largest = std::max(largest, std::abs(energy() - start));
+  }
+  EXPECT_LE(largest, 1e-3 * std::abs(start));
 }
 
 TEST(GeometricLaws, ActOnlyBetweenTheirObjects) {

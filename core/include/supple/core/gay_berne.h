@@ -4,9 +4,6 @@
 /// with a strength that depends on the directions of approach.
 #pragma once
 
-#include <span>
-
-#include "supple/core/neighbour_list.h"
 #include "supple/core/pair_laws.h"
 
 namespace supple::core {
@@ -45,10 +42,5 @@ struct SwitchedGayBerne {
 [[nodiscard]] PairLoad evaluate(const SwitchedGayBerne& law, const PairPose& pose);
 /// Bound for the deepest wells, at gaps down to a tenth below the rest gap.
 [[nodiscard]] Stiffness stiffness(const SwitchedGayBerne& law);
-
-/// Adds forces and torques between all particles of a list, cut off at its range without a shift.
-/// @param orientations  body to world, shape [particles]
-void accumulate_geometric(NeighbourList& list, const GayBerne& law, std::span<const Quat> orientations,
-                          const Executor& executor, Loads& loads);
 
 }  // namespace supple::core

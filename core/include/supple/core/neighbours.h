@@ -18,7 +18,7 @@ struct IndexPair {
 };
 
 /// All pairs (i < j) with |x_i - x_j| < range, sorted. Cost O(n + pairs) for bounded density; points may lie anywhere
-/// (cells are hashed, not stored). @pre range > 0, positions finite
+/// (the box of cells repeats). @pre range > 0, positions finite
 [[nodiscard]] std::vector<IndexPair> find_neighbours(std::span<const Vec3> positions, double range);
 
 /// The same by visiting every pair: the reference.
