@@ -119,8 +119,8 @@ Geometry::Geometry() : device_(given(nullptr, rtcNewDevice("set_affinity=0"))) {
 }
 
 Geometry::~Geometry() {
-  for (const auto& part : parts_)
-    if (part->geometry != nullptr) rtcReleaseGeometry(part->geometry);
+  for (const auto& part : parts_)  // of a picture whose making ran out of memory some are not there
+    if (part != nullptr && part->geometry != nullptr) rtcReleaseGeometry(part->geometry);
   rtcReleaseScene(scene_);
   rtcReleaseDevice(device_);
 }
@@ -133,7 +133,7 @@ void Geometry::set(std::span<const Item> items, const PictureSpace& space, doubl
   scene_is_new_ = false;
   space_ = space;
   for (std::size_t i = items.size(); i < parts_.size(); ++i) {
-    if (parts_[i]->geometry == nullptr) continue;
+    if (parts_[i] == nullptr || parts_[i]->geometry == nullptr) continue;
     changed = true;
     rtcDetachGeometry(scene_, parts_[i]->id);
     rtcReleaseGeometry(parts_[i]->geometry);
