@@ -36,7 +36,7 @@ struct SimulationOptions {
   bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
   bool profile = false;        ///< measure the time of every step, not of every 61st
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes with it are refused
-  const std::atomic<int>* interrupt = nullptr;  ///< not 0: `meshes` by that method throws Interrupted (core/interrupt.h); steps continue
+  const std::atomic<int>* interrupt = nullptr;  ///< not 0: long calls throw Interrupted; see InterruptScope (core/interrupt.h)
   double memory = kDefaultMemory;  ///< limit of memory for the scene, by the counts made before it is built [byte]
   int finer = 0;               ///< steps are halved this many more times; negative: fewer times, but at most one step per frame
   bool questions = false;      ///< for queries of states: an initial state that needs finer steps than time_step.max_substeps is refused by the first step, not earlier
