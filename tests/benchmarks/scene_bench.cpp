@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -150,15 +151,17 @@ void bench(const Case& c, const Settings& settings) {
 
 }  // namespace
 
-int main(int count, char** words) try {
+int main(int argc, char** argv) try {
+  constexpr std::string_view kUsage = "scene_bench [NAME ...] [--accuracy A] [--set path.to.key=value ...]    all scenes where none is named";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--accuracy", 1}, {"--set", 1}});
   Settings settings;
   std::vector<std::string_view> names;
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    if ((word == "--accuracy" || word == "--set") && i + 1 < count) {
-      const char* value = words[++i];
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if ((word == "--accuracy" || word == "--set") && i + 1 < argc) {
+      const char* value = argv[++i];
       if (word == "--set") settings.overrides.emplace_back(value);
-      if (word == "--accuracy") settings.accuracy = std::stod(value);
+      if (word == "--accuracy") settings.accuracy = supple::benchmarks::positive_number(kUsage, value);
     } else {
       names.push_back(word);
     }

@@ -25,6 +25,13 @@ objects:
     skeleton: [{shape: point, kernel: {type: wyvill, radius: "${r/0.6}"}}]
 ```
 
+| key | expected | meaning |
+|---|---|---|
+| `include` | the name of a file, or a list of them | files whose keys are merged into this one |
+| `variables` | a mapping of names to values | values for expressions |
+| `defaults` | a mapping of lists of the scene to mappings | keys of every item of a list |
+| `repeat` | a count, or a mapping of indices to counts | in an item of a list: how often it stands there |
+
 - **Expressions** stand between `${` and `}`: numbers, numbers with units, variables, `+ - * / ^`, parentheses, `pi`, and `sqrt`, `abs`,
   `min`, `max`, `floor`, `ceil`, `round`, `exp`, `log`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`. Dimensions are checked. Units
   bind to the number before them: `1/2 s` is 0.5 Hz. An expression that is all of a value keeps its unit; inside a text it becomes text.

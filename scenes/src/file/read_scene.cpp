@@ -138,11 +138,14 @@ Node* expand(Node* root, std::span<const Setting> settings, Tree& tree, FaultLis
     }
     Override(tree, faults, setting.source, setting.path).apply(root, setting.value);
   }
+  const std::size_t before = faults.count();
   Expansion expansion(*root, tree, faults);
   root = expansion.expand_scene(*root);
-  for (const Setting& setting : settings) {
-    if (setting.path.starts_with(kVariables)) continue;
-    Override(tree, faults, setting.source, setting.path).apply(root, expansion.expand(*setting.value, shown(setting.path)));
+  std::vector<Node*> values;
+  for (const Setting& setting : settings) values.push_back(expansion.expand(*setting.value, shown(setting.path)));
+  if (faults.count() > before) faults.raise();  // expressions without a value would be faults of their keys, too
+  for (std::size_t k = 0; k < settings.size(); ++k) {
+    if (!settings[k].path.starts_with(kVariables)) Override(tree, faults, settings[k].source, settings[k].path).apply(root, values[k]);
   }
   return root;
 }
@@ -172,7 +175,11 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     faults.raise();
   }
   const bool mapping = root->kind == Node::Kind::Mapping;
-  if (mapping) root = with_includes(root, folder, texts, tree, faults);
+  if (mapping) {
+    const std::size_t before = faults.count();
+    root = with_includes(root, folder, texts, tree, faults);
+    if (faults.count() > before) faults.raise();  // keys of files that are not there would be missed, too
+  }
   std::vector<Setting> settings;
   for (const std::string& text_set : overrides) {
     const std::size_t equals = std::min(text_set.find('='), text_set.size());
@@ -188,10 +195,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     if (value == nullptr) value = tree.make(Node::Kind::Null, {set, 1, 1});
     settings.push_back({set, path, value});
   }
-  if (mapping) {
-    root = expand(root, settings, tree, faults);
-    faults.raise();  // expressions without a value would be faults of their keys, too
-  }
+  if (mapping) root = expand(root, settings, tree, faults);
   Scene scene;
   if (!mapping) {
     faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");

@@ -264,13 +264,13 @@ void choose_by_stability(const Scene& scene, const Model& model, const StepCount
   plan.settings.method = implicit ? core::Integrator::BackwardEuler : core::Integrator::Symplectic;
   const std::string taken = number_text(explicit_steps) + " steps of velocity Verlet per frame";
   const std::string size =
-      counts.longest() < counts.frame() ? " (time_step.size: none longer than " + number_text(counts.longest()) + " s)" : "";
+      counts.longest() < counts.frame() ? " (time_step.size: at most " + number_text(counts.longest()) + " s)" : "";
   if (!implicit) {
     plan.reason = "symplectic: " + taken + " at the start" + size;
     return;
   }
-  plan.reason = "backward_euler: " + number_text(implicit_steps) + size + " instead of " + taken +
-                (refused ? "; more than time_step.max_substeps" : "; it damps what it does not resolve");
+  plan.reason = "backward_euler: " + number_text(implicit_steps) + " steps per frame instead of " + taken + size +
+                (refused ? ", which are more than time_step.max_substeps" : "; damps motion that its steps do not resolve");
 }
 
 /// `auto` with it.
@@ -340,7 +340,7 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   switch (method) {
     case MethodName::Auto:
       if (!plan.chosen) {
-        plan.reason = "symplectic: the scene fixes the step";
+        plan.reason = "symplectic: the scene fixes the time step";
       } else if (scene.accuracy) {
         choose_by_accuracy(scene, model, counts, plan);
       } else {

@@ -124,7 +124,7 @@ TEST_F(ExpandedScene, TakesVariablesAndKeysOfCopiesFromTheCommandLine) {
   const Fault fault = faults(kBalls, {"variables.N=5"})[0];
   EXPECT_EQ(fault.expected, "expected a variable of the scene");
   EXPECT_EQ(fault.key, "variables.N");
-  EXPECT_EQ(faults("schema: 1\nduration: 1\nobjects: []\n", {"variables.n=5"})[0].found, "one without");
+  EXPECT_EQ(faults("schema: 1\nduration: 1\nobjects: [{name: a, particles: {arrange: single, mass: 1}}]\n", {"variables.n=5"})[0].found, "one without");
 }
 
 TEST_F(ExpandedScene, IsTheSameSceneAsOneThatIsSpeltOut) {

@@ -138,7 +138,7 @@ TEST(Check, CountsBodiesThatBeginInOneAnotherByTheDozen) {
   const CheckReport crowd = check_scene(balls("1e-9"), {});
   EXPECT_FALSE(crowd.built);
   ASSERT_EQ(crowd.warnings.size(), 1U);
-  EXPECT_EQ(crowd.warnings[0].rfind("objects.a.particles: the scene was counted, not built: about 4950 pairs of bodies begin in one another, each with about 99 others", 0), 0U)
+  EXPECT_EQ(crowd.warnings[0].rfind("objects.a.particles: the scene was counted, not built: about 4950 pairs of bodies overlap at the start, each with about 99 others", 0), 0U)
       << crowd.warnings[0];
   EXPECT_TRUE(check_scene(balls("0.099"), {}).built);  // as balls that touch
 }
